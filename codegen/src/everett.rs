@@ -1,0 +1,45 @@
+//! The Everett table: what identification yields and lowering turns into a constant.
+
+/// Everett function E(up, down) of one leg on a uniform grid of `grid` intervals, in metres of displacement.
+///
+/// E(u_i, u_j) is the displacement gained when the drive rises from saturation at `u_j` to `u_i`
+/// (first-order reversal), for thresholds `u_k = drive_min + k·(drive_max − drive_min)/grid`, i > j.
+/// E(u, u) = 0. Between nodes the controller interpolates bilinearly in square cells and linearly in
+/// the triangles on the diagonal, so that the weight of a diagonal cell is reversible.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EverettTable {
+    /// Number of intervals N, 2 to 256.
+    pub grid: usize,
+    /// Lowest threshold u_0, V.
+    pub drive_min: f64,
+    /// Highest threshold u_N, V.
+    pub drive_max: f64,
+    /// E in metres, N(N+1)/2 values: rows `up` i = 1..=N, in each the columns `down` j = 0..i. See [`EverettTable::index`].
+    pub nodes: Vec<f64>,
+}
+
+impl EverettTable {
+    /// Position of E(u_up, u_down) in [`EverettTable::nodes`], for 1 ≤ `up` ≤ N and `down` < `up`.
+    #[must_use]
+    pub const fn index(up: usize, down: usize) -> usize {
+        up * (up - 1) / 2 + down
+    }
+
+    /// Node value E(u_up, u_down) in metres; zero on the diagonal.
+    #[must_use]
+    pub fn node(&self, up: usize, down: usize) -> f64 {
+        if up == down { 0.0 } else { self.nodes[Self::index(up, down)] }
+    }
+
+    /// Preisach weight of the cell between thresholds `up`−1..`up` and `down`..`down`+1, in metres.
+    ///
+    /// For `down` = `up` − 1 this is the (reversible) weight of the diagonal triangle.
+    /// A table is physical when no weight is negative: then the model is monotone and its inverse unique.
+    #[must_use]
+    pub fn weight(&self, up: usize, down: usize) -> f64 {
+        if down + 1 == up {
+            return self.node(up, down);
+        }
+        self.node(up, down) - self.node(up - 1, down) - self.node(up, down + 1) + self.node(up - 1, down + 1)
+    }
+}

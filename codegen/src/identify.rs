@@ -1,0 +1,1 @@
+//! From reversal-curve records to Everett tables.

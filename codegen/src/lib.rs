@@ -1,0 +1,14 @@
+//! The compiler: one spec file in, one controller crate out.
+//!
+//! ```text
+//! spec (TOML) → model (SI, checked) → tables (identified) → ir (every constant) → emitted crate (text) → built image
+//! ```
+//! Each phase is a module, and data flows one way. ARCHITECTURE.md has the invariants.
+
+pub mod diagnostic;
+pub mod everett;
+pub mod identify;
+pub mod model;
+pub mod spec;
+pub mod stability;
+pub mod target;

@@ -1,0 +1,3 @@
+//! The `specgen` command.
+
+fn main() {}

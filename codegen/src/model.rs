@@ -1,0 +1,263 @@
+//! The checked platform: SI units, no optional value that the controller needs, every number finite and in range.
+//!
+//! Vectors are in the base frame {B} or the platform frame {P} as stated; angles in rad.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// A spec that passed every check that needs no computation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// Name of the platform: ASCII letters, digits, `-` and `_`.
+    pub name: String,
+    /// (1), (2), (AI.2)–(AI.4).
+    pub geometry: Geometry,
+    /// The moving platform, Table 4.
+    pub platform: RigidBody,
+    /// One of six equal legs, Table 4.
+    pub leg: LegBody,
+    /// The piezo stacks of a leg.
+    pub actuator: Actuator,
+    /// Between DAC and stack.
+    pub amplifier: Amplifier,
+    /// Converter that drives the amplifier, in volts at the stack.
+    pub dac: Dac,
+    /// Displacement gauge of a leg.
+    pub sensor: Sensor,
+    /// Where the hysteresis tables come from.
+    pub hysteresis: Hysteresis,
+    /// Run-to-run adaptation, Appendix B.
+    pub adaptation: Adaptation,
+    /// Gains of (7), if given. Held for the task-space controller; the leg feed-forward does not use them.
+    pub gains: Option<Gains>,
+    /// Control timing.
+    pub timing: Timing,
+    /// Poses that the controller accepts.
+    pub workspace: Workspace,
+    /// What is emitted.
+    pub controller: ControllerOptions,
+    /// What it runs on.
+    pub target: Target,
+    /// Where each key stands in the spec file, by key path (`actuator.voltage[1]`), for findings of later phases.
+    pub spans: BTreeMap<String, Range<usize>>,
+}
+
+/// Joint circles of (1) and (2).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Geometry {
+    /// r_B, m.
+    pub base_radius: f64,
+    /// r_P, m.
+    pub platform_radius: f64,
+    /// α_B, rad.
+    pub base_angle: f64,
+    /// α_P, rad.
+    pub platform_angle: f64,
+    /// z of P_C above the base plane at rest, m.
+    pub height: f64,
+}
+
+/// A rigid body in its own frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigidBody {
+    /// kg.
+    pub mass: f64,
+    /// I_xx, I_yy, I_zz about the centre of mass, kg m².
+    pub inertia: [f64; 3],
+    /// Products of inertia −∫xy, −∫xz, −∫yz dm (the matrix entries I_xy, I_xz, I_yz), kg m²; zero if not given.
+    pub products: [f64; 3],
+    /// Centre of mass in {P}, m.
+    pub center_of_mass: [f64; 3],
+}
+
+/// The two parts of a leg.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LegBody {
+    /// m_s, kg.
+    pub fixed_mass: f64,
+    /// m_e, kg.
+    pub extensible_mass: f64,
+    /// I_s about a transverse axis through the part's mass centre, kg m².
+    pub fixed_inertia: f64,
+    /// I_e, likewise, kg m².
+    pub extensible_inertia: f64,
+    /// l_s, from the base joint, m.
+    pub fixed_center: f64,
+    /// l_e, from the platform joint, m.
+    pub extensible_center: f64,
+}
+
+/// Piezo stacks of one leg.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Actuator {
+    /// Stacks in series.
+    pub stacks: u32,
+    /// ρ of one stack, m/V.
+    pub stack_gain: f64,
+    /// Free stroke of the leg, m.
+    pub stroke: f64,
+    /// Voltage limits [min, max], V.
+    pub voltage: [f64; 2],
+    /// V/s.
+    pub slew_rate: f64,
+    /// k_a, N/m.
+    pub axial_stiffness: f64,
+    /// First axial resonance, Hz.
+    pub resonance: f64,
+    /// ζ of that resonance.
+    pub damping_ratio: f64,
+}
+
+impl Actuator {
+    /// ρ̂ of a whole leg, m/V: stacks in series add.
+    #[must_use]
+    pub fn leg_gain(&self) -> f64 {
+        f64::from(self.stacks) * self.stack_gain
+    }
+}
+
+/// Power amplifier.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Amplifier {
+    /// First-order lag, s.
+    pub lag: f64,
+    /// Output noise, V rms.
+    pub noise: f64,
+}
+
+/// Digital-to-analogue converter, referred to the stack.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dac {
+    /// 8 to 24.
+    pub bits: u32,
+    /// Voltage at code 0 and at full scale (2^bits − 1), V.
+    pub range: [f64; 2],
+}
+
+/// Displacement gauge of one leg.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    /// Smallest and largest displacement it can report, m.
+    pub range: [f64; 2],
+    /// m rms.
+    pub noise: f64,
+    /// Resolution of its converter over the range.
+    pub bits: u32,
+}
+
+/// Preisach grid and the records that identify it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hysteresis {
+    /// N, intervals per axis of the Preisach plane.
+    pub grid: usize,
+    /// Capacity of the reversal memory, extrema.
+    pub memory: usize,
+    /// Reversal-curve files relative to the spec: one for all legs, or six.
+    pub records: Vec<String>,
+}
+
+/// How the run-to-run estimate is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AdaptationMode {
+    /// Inverse Preisach alone.
+    Invhys,
+    /// (AII.3).
+    Ewma,
+    /// (AII.5), (AII.6).
+    Pcc,
+}
+
+/// Run-to-run adaptation. A bandwidth in the spec has already become a weight here: ω = Ω·T_run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adaptation {
+    /// Which estimates are used at start-up.
+    pub mode: AdaptationMode,
+    /// ω (EWMA) or ω1 (PCC), per run.
+    pub level_weight: f64,
+    /// ω2, per run.
+    pub drift_weight: f64,
+    /// Control ticks per run.
+    pub run_interval: u32,
+    /// Interval of λ = ρ/ρ̂ over which the loop must be stable.
+    pub gain_ratio: [f64; 2],
+}
+
+/// Diagonal gains of (7), task space: x, y, z, θx, θy, θz.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gains {
+    /// k_p, N/m and N m/rad.
+    pub proportional: [f64; 6],
+    /// k_I, N/(m s) and N m/(rad s).
+    pub integral: [f64; 6],
+    /// k_v, N s/m and N m s/rad.
+    pub derivative: [f64; 6],
+    /// K_e, N/m and N m/rad.
+    pub environment: [f64; 6],
+}
+
+/// Control timing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Timing {
+    /// Control period T_s, s.
+    pub period: f64,
+}
+
+/// Bounds on the pose set-point, measured from rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Workspace {
+    /// |x|, |y|, |z|, m.
+    pub translation: [f64; 3],
+    /// |θx|, |θy|, |θz|, rad.
+    pub rotation: [f64; 3],
+}
+
+/// Floating-point type of the emitted controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scalar {
+    /// 32 bits.
+    F32,
+    /// 64 bits.
+    F64,
+}
+
+/// What the six set-point numbers are at start-up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SetpointKind {
+    /// Pose from rest, m and rad.
+    Pose,
+    /// Leg displacements, m.
+    Leg,
+}
+
+/// What is emitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControllerOptions {
+    /// Arithmetic.
+    pub scalar: Scalar,
+    /// Meaning of the set-point at start-up.
+    pub setpoint: SetpointKind,
+}
+
+/// A microcontroller that specgen can build for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mcu {
+    /// Cortex-M7 with double-precision FPU, emulated.
+    Mps2An500,
+    /// Cortex-M4F, single-precision FPU, emulated.
+    Mps2An386,
+}
+
+/// Where it runs, and what it may use there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// The part.
+    pub mcu: Mcu,
+    /// Flash, bytes, if declared.
+    pub flash: Option<u64>,
+    /// RAM, bytes, if declared.
+    pub ram: Option<u64>,
+    /// Stack of one tick, bytes, if declared.
+    pub stack: Option<u64>,
+    /// Mean instructions per tick, if declared.
+    pub instructions: Option<u64>,
+}

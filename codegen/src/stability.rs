@@ -1,0 +1,1 @@
+//! Stability of the adaptation, decided when compiling.

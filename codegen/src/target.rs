@@ -1,0 +1,1 @@
+//! Cross toolchain, emulator and image analysis.

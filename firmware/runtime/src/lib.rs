@@ -1,0 +1,2 @@
+#![no_std]
+//! Control kernels that every emitted controller uses.

@@ -1,0 +1,1 @@
+//! Plants, scenarios and traces around an emitted controller.
