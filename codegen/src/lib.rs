@@ -7,8 +7,12 @@
 
 pub mod diagnostic;
 pub mod everett;
+pub mod emit;
 pub mod identify;
+pub mod ir;
+pub mod lower;
 pub mod model;
 pub mod spec;
 pub mod stability;
 pub mod target;
+pub mod workspace;
