@@ -38,7 +38,11 @@ impl InstructionCounter {
         timer.set_reload(RELOAD);
         timer.clear_current();
         timer.enable_counter();
-        let mut counter = Self { timer, overhead: 0, overflows: 0 };
+        let mut counter = Self {
+            timer,
+            overhead: 0,
+            overflows: 0,
+        };
         let (_, overhead) = counter.measure(|| ());
         counter.overhead = overhead;
         counter.overflows = 0;
@@ -59,8 +63,8 @@ impl InstructionCounter {
             self.overflows += 1;
         }
         let counts = start.wrapping_sub(end) & RELOAD;
-        let instructions =
-            (counts * NANOSECONDS_PER_COUNT + NANOSECONDS_PER_INSTRUCTION / 2) / NANOSECONDS_PER_INSTRUCTION;
+        let instructions = (counts * NANOSECONDS_PER_COUNT + NANOSECONDS_PER_INSTRUCTION / 2)
+            / NANOSECONDS_PER_INSTRUCTION;
         (value, instructions.saturating_sub(self.overhead))
     }
 

@@ -14,7 +14,9 @@ mod stack;
 mod stages;
 mod stats;
 
-use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, step};
+use controller::{
+    CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, step,
+};
 use core::hint::black_box;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use instructions::InstructionCounter;
@@ -61,7 +63,8 @@ fn replay() -> Result<(), Exit> {
         for (row, result) in rows.iter().zip(&mut results).take(count) {
             let tick_input = TickInput::from_words(row);
             stages.measure(&mut counter, &config, &state, &tick_input);
-            let (tick_output, instructions, depth) = tick(&mut counter, &config, &mut state, &tick_input);
+            let (tick_output, instructions, depth) =
+                tick(&mut counter, &config, &mut state, &tick_input);
             stages.add_step(instructions);
             if depth > deepest {
                 deepest = depth;
@@ -80,7 +83,14 @@ fn replay() -> Result<(), Exit> {
 
     let summary = Summary {
         ticks,
-        sizes: [CONFIG_WORDS, INPUT_WORDS, OUTPUT_WORDS, size_of::<State>(), size_of::<Config>()].map(|n| n as u64),
+        sizes: [
+            CONFIG_WORDS,
+            INPUT_WORDS,
+            OUTPUT_WORDS,
+            size_of::<State>(),
+            size_of::<Config>(),
+        ]
+        .map(|n| n as u64),
         stack: [deepest as u64, stack::WINDOW as u64],
         overhead: u64::from(counter.overhead()),
         self_test,
@@ -88,7 +98,11 @@ fn replay() -> Result<(), Exit> {
     };
     let stats_file = File::create(b"stats.bin\0").ok_or(Exit::CannotWrite)?;
     let written = stats::write(&stats_file, &summary, &stages.all());
-    if written && stats_file.close() && output.close() { Ok(()) } else { Err(Exit::CannotWrite) }
+    if written && stats_file.close() && output.close() {
+        Ok(())
+    } else {
+        Err(Exit::CannotWrite)
+    }
 }
 
 fn read_config() -> Result<Config, Exit> {
@@ -111,8 +125,9 @@ fn tick(
     state: &mut State,
     input: &TickInput,
 ) -> (TickOutput, u32, usize) {
-    let ((output, instructions), depth) =
-        stack::measure_depth(|| counter.measure(|| specgen_step(black_box(config), state, black_box(input))));
+    let ((output, instructions), depth) = stack::measure_depth(|| {
+        counter.measure(|| specgen_step(black_box(config), state, black_box(input)))
+    });
     (output, instructions, depth)
 }
 

@@ -16,7 +16,9 @@ pub struct Stages {
 impl Stages {
     /// Nothing counted yet.
     pub const fn new() -> Self {
-        Self { step: Stage::new("step") }
+        Self {
+            step: Stage::new("step"),
+        }
     }
 
     /// Adds one tick of `controller::step`.
