@@ -1,1 +1,49 @@
-//! Cross toolchain, emulator and image analysis.
+//! Cross toolchain, emulator and image analysis: from an emitted workspace to measured figures.
+//!
+//! ```text
+//! DIR/qemu ─build_image→ Image ─image::footprint→ flash, RAM, forbidden symbols
+//!                              ─stack::bound────→ static stack bound of `controller::step`
+//!                              ─replay──────────→ outputs, state digests, instructions, painted stack
+//! DIR/host ─host::build_library→ shared library
+//! ```
+//! [`toolchain`] is the one place that looks for a cross compiler, [`provision`] the one that installs.
+//! Nothing here knows TOML, the IR or the control law; the words it moves are opaque.
+
+pub mod build;
+mod callgraph;
+pub mod emulator;
+pub mod error;
+pub mod host;
+pub mod image;
+mod process;
+pub mod provision;
+pub mod replay;
+pub mod stack;
+pub mod toolchain;
+
+pub use build::{Image, build_image};
+pub use error::TargetError;
+pub use replay::{ReplayResult, replay};
+
+/// Rust's name of the compilation target of every [`Mcu`](crate::model::Mcu) here.
+pub const TRIPLE: &str = "thumbv7em-none-eabihf";
+
+/// What is there to build for a microcontroller and to run the image.
+#[derive(Debug, Clone)]
+pub struct Tools {
+    /// The cross compiler.
+    pub toolchain: toolchain::Toolchain,
+    /// The emulator.
+    pub emulator: emulator::Emulator,
+}
+
+/// The cross compiler and the emulator, or what is missing and the command that installs it.
+///
+/// # Errors
+/// [`TargetError::MissingTool`], for the first of the two that is not there.
+pub fn available() -> Result<Tools, TargetError> {
+    Ok(Tools {
+        toolchain: toolchain::find()?,
+        emulator: emulator::Emulator::find()?,
+    })
+}

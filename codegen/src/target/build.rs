@@ -1,0 +1,211 @@
+//! Builds DIR/qemu of an emitted workspace into an image.
+
+use super::error::TargetError;
+use super::process::{self, Finished};
+use super::toolchain::{self, Toolchain};
+use crate::model::Mcu;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+/// Building `core`, the dependencies and the image from nothing takes about a minute on two cores.
+const LIMIT: Duration = Duration::from_secs(900);
+
+/// A linked image, ready for [`replay`](super::replay()) and the analyses.
+#[derive(Debug, Clone)]
+pub struct Image {
+    /// The part that it is for.
+    pub mcu: Mcu,
+    /// The ELF file.
+    pub elf: Vec<u8>,
+    /// `rustc --version` of the compiler that made it.
+    pub compiler: String,
+}
+
+/// Builds `dir/qemu` for `mcu`, with the toolchain that [`toolchain::find`] finds.
+///
+/// `target_dir` keeps what can be used again: share it between builds. It is locked while one runs.
+/// `Cargo.lock` is respected; nothing is downloaded if the crates are in cargo's cache.
+///
+/// # Errors
+/// [`TargetError::MissingTool`] without a cross compiler, [`TargetError::PanicPath`] if the controller can
+/// panic, [`TargetError::BuildFailed`] for everything else that cargo says.
+pub fn build_image(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
+    build_image_with(&toolchain::find()?, dir, mcu, target_dir)
+}
+
+/// [`build_image`] with a given toolchain.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_image_with(
+    toolchain: &Toolchain,
+    dir: &Path,
+    mcu: Mcu,
+    target_dir: &Path,
+) -> Result<Image, TargetError> {
+    let package = dir.join("qemu");
+    let what = format!("{} for {}", package.display(), mcu.machine());
+    // A folder per part: they differ in flags only, and cargo would build everything again at each change.
+    let target_dir = target_dir.join(mcu.machine());
+    let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
+    let executable = cargo_artifact(&mut command, &package, &target_dir, &what, |message| {
+        message["executable"].as_str().map(PathBuf::from)
+    })?;
+    Ok(Image {
+        mcu,
+        elf: executable.bytes,
+        compiler: toolchain.version.clone(),
+    })
+}
+
+impl Mcu {
+    /// QEMU's name of the machine, which is also the folder name of its builds.
+    #[must_use]
+    pub fn machine(self) -> &'static str {
+        match self {
+            Self::Mps2An500 => "mps2-an500",
+            Self::Mps2An386 => "mps2-an386",
+        }
+    }
+
+    /// Name of the core, for the emulator.
+    #[must_use]
+    pub fn core(self) -> &'static str {
+        match self {
+            Self::Mps2An500 => "cortex-m7",
+            Self::Mps2An386 => "cortex-m4",
+        }
+    }
+
+    fn target_cpu(self) -> &'static str {
+        match self {
+            Self::Mps2An500 => "-Ctarget-cpu=cortex-m7",
+            Self::Mps2An386 => "-Ctarget-cpu=cortex-m4",
+        }
+    }
+}
+
+/// A file that cargo built.
+pub(super) struct Artifact {
+    /// Where cargo left it. Another build into the same folder overwrites it.
+    pub path: PathBuf,
+    /// Its content, read before any other build could.
+    pub bytes: Vec<u8>,
+}
+
+/// Runs a cargo build of `package` and reads the artifact that `pick` recognises among cargo's messages.
+pub(super) fn cargo_artifact(
+    command: &mut Command,
+    package: &Path,
+    target_dir: &Path,
+    what: &str,
+    pick: impl Fn(&serde_json::Value) -> Option<PathBuf>,
+) -> Result<Artifact, TargetError> {
+    fs::create_dir_all(target_dir).map_err(|e| TargetError::io("creating", target_dir, e))?;
+    let lock_path = target_dir.join("specgen.lock");
+    let lock = File::create(&lock_path).map_err(|e| TargetError::io("creating", &lock_path, e))?;
+    // Cargo's own lock ends with cargo; this one lasts until the artifact is read. Dropping the file frees it.
+    lock.lock()
+        .map_err(|e| TargetError::io("locking", &lock_path, e))?;
+    let scratch = tempfile::tempdir()
+        .map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
+
+    command
+        // Cargo reads its configuration from the working folder upwards, so work where the package is.
+        .current_dir(package)
+        .args([
+            "--locked",
+            "--message-format=json-render-diagnostics",
+            "--color=never",
+        ])
+        .arg("--target-dir")
+        .arg(
+            std::path::absolute(target_dir)
+                .map_err(|e| TargetError::io("resolving", target_dir, e))?,
+        );
+    let finished = process::run(command, scratch.path(), LIMIT)
+        .map_err(|e| TargetError::io("running cargo in", package, e))?;
+    if !finished.success() {
+        return Err(failure(what, &finished));
+    }
+    let path = finished
+        .stdout
+        .lines()
+        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
+        .filter_map(|message| pick(&message))
+        .next_back()
+        .ok_or_else(|| TargetError::BuildFailed {
+            what: what.to_owned(),
+            text: "cargo reports success, but no artifact of the expected kind".into(),
+        })?;
+    let bytes = fs::read(&path).map_err(|e| TargetError::io("reading", &path, e))?;
+    Ok(Artifact { path, bytes })
+}
+
+/// What cargo printed, in our words where we know better.
+fn failure(what: &str, finished: &Finished) -> TargetError {
+    let text = useful_part(&finished.stderr);
+    if finished.status.is_none() {
+        let text = format!(
+            "still running after {} s, ended; it had printed:\n{text}",
+            LIMIT.as_secs()
+        );
+        return TargetError::BuildFailed {
+            what: what.to_owned(),
+            text,
+        };
+    }
+    if finished.stderr.contains("specgen_panic_path_remains") {
+        let text = finished
+            .stderr
+            .lines()
+            .map(str::trim)
+            .filter(|line| {
+                line.contains("specgen_panic_path_remains") || line.starts_with(">>> referenced by")
+            })
+            .filter(|line| !line.contains("\"-o\""))
+            .take(6)
+            .collect::<Vec<_>>()
+            .join("\n");
+        return TargetError::PanicPath {
+            what: what.to_owned(),
+            text,
+        };
+    }
+    TargetError::BuildFailed {
+        what: what.to_owned(),
+        text,
+    }
+}
+
+/// From the first error on, without the linker's command line, at most forty lines.
+fn useful_part(stderr: &str) -> String {
+    let lines: Vec<&str> = stderr
+        .lines()
+        .skip_while(|line| !line.starts_with("error"))
+        .filter(|line| line.len() < 1000)
+        .take(40)
+        .collect();
+    if lines.is_empty() {
+        stderr.trim_end().to_owned()
+    } else {
+        lines.join("\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_report_starts_at_the_first_error_and_leaves_out_the_link_line() {
+        let stderr = format!(
+            "   Compiling a\nwarning: x\nerror: linking failed\n  = note: {}\n  = note: y\n",
+            "z".repeat(2000)
+        );
+        assert_eq!(useful_part(&stderr), "error: linking failed\n  = note: y");
+        assert_eq!(useful_part("killed\n"), "killed");
+    }
+}

@@ -1,0 +1,98 @@
+//! Runs an image in QEMU, in a folder of its own, with a time limit.
+
+use super::build::Image;
+use super::error::TargetError;
+use super::process::{self, find_in_path, first_line};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+/// QEMU for ARM.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Emulator {
+    /// `qemu-system-arm`.
+    pub program: PathBuf,
+    /// The first line of `--version`.
+    pub version: String,
+}
+
+/// How the firmware says why it ended: the codes of `firmware/qemu/src/semihosting.rs`.
+const EXITS: [(i32, &str); 7] = [
+    (10, "the firmware cannot open config.bin"),
+    (
+        11,
+        "config.bin does not hold as many words as the controller's Config",
+    ),
+    (
+        12,
+        "the controller refuses this configuration (Config::from_words)",
+    ),
+    (13, "the firmware cannot open input.bin"),
+    (
+        14,
+        "input.bin ends within a row: rows must hold as many words as the controller's TickInput",
+    ),
+    (
+        15,
+        "the firmware cannot write output.bin or stats.bin; is the disk full?",
+    ),
+    (16, "the processor took a fault"),
+];
+
+impl Emulator {
+    /// Finds it on `PATH`.
+    ///
+    /// # Errors
+    /// [`TargetError::MissingTool`] with the command that installs it.
+    pub fn find() -> Result<Self, TargetError> {
+        let missing = || TargetError::MissingTool {
+            tool: "QEMU for ARM".into(),
+            looked: "qemu-system-arm on PATH".into(),
+            command: "apt-get install qemu-system-arm".into(),
+        };
+        let program = find_in_path("qemu-system-arm").ok_or_else(missing)?;
+        let version = first_line(Command::new(&program).arg("--version")).ok_or_else(missing)?;
+        Ok(Self { program, version })
+    }
+
+    /// Runs the image to its end with `folder` as its working folder: semihosting files live there.
+    ///
+    /// `-icount shift=10` makes the run repeatable and lets the firmware count instructions.
+    ///
+    /// # Errors
+    /// [`TargetError::EmulatorTimeout`] at the limit, [`TargetError::EmulatorFailed`] for any other end than
+    /// the firmware's own "done".
+    pub fn run(&self, image: &Image, folder: &Path, limit: Duration) -> Result<(), TargetError> {
+        let kernel = folder.join("image.elf");
+        std::fs::write(&kernel, &image.elf).map_err(|e| TargetError::io("writing", &kernel, e))?;
+        let mut command = Command::new(&self.program);
+        command
+            .current_dir(folder)
+            .args(["-machine", image.mcu.machine(), "-cpu", image.mcu.core()])
+            .args([
+                "-icount",
+                "shift=10",
+                "-semihosting-config",
+                "enable=on,target=native",
+            ])
+            .args(["-display", "none", "-monitor", "none", "-serial", "none"])
+            .args(["-kernel", "image.elf"]);
+        let finished = process::run(&mut command, folder, limit)
+            .map_err(|e| TargetError::io("running", &self.program, e))?;
+        let Some(status) = finished.status else {
+            return Err(TargetError::EmulatorTimeout {
+                seconds: limit.as_secs(),
+            });
+        };
+        if status.success() {
+            return Ok(());
+        }
+        let known = EXITS.iter().find(|(code, _)| status.code() == Some(*code));
+        let mut text = known.map_or_else(|| format!("{status}"), |(_, words)| (*words).to_owned());
+        let stderr = finished.stderr.trim();
+        if !stderr.is_empty() {
+            text = format!("{text}; it printed: {stderr}");
+        }
+        Err(TargetError::EmulatorFailed { text })
+    }
+}

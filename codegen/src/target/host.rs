@@ -1,0 +1,56 @@
+//! Builds DIR/host of an emitted workspace into a shared library for this machine.
+
+use super::build::cargo_artifact;
+use super::error::TargetError;
+use super::process::{clean_command, find_in_path};
+use std::path::{Path, PathBuf};
+
+/// Builds `dir/host` (a `cdylib` that links only if nothing in it can panic) and returns the library's path.
+///
+/// `target_dir` keeps what can be used again. The library is copied to a name that holds a digest of its
+/// content, so that a later build into the same folder cannot change what the path means.
+///
+/// # Errors
+/// [`TargetError::MissingTool`] without cargo, [`TargetError::PanicPath`] if the controller can panic,
+/// [`TargetError::BuildFailed`] for everything else that cargo says.
+pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
+    let cargo = find_in_path("cargo").ok_or_else(|| TargetError::MissingTool {
+        tool: "cargo".into(),
+        looked: "cargo on PATH".into(),
+        command: "the commands at rustup.rs   (or, on Debian: apt-get install cargo-web)".into(),
+    })?;
+    let package = dir.join("host");
+    let target_dir = target_dir.join("host");
+    let mut command = clean_command(cargo);
+    command.args(["build", "--release"]);
+    let what = package.display().to_string();
+    let library = cargo_artifact(&mut command, &package, &target_dir, &what, |message| {
+        let is_library = message["target"]["kind"]
+            .as_array()?
+            .iter()
+            .any(|kind| kind == "cdylib");
+        let file = message["filenames"].as_array()?.first()?.as_str()?;
+        is_library.then(|| PathBuf::from(file))
+    })?;
+    keep(&library.path, &library.bytes)
+}
+
+/// Copies the library to a name that only this content has.
+fn keep(built: &Path, bytes: &[u8]) -> Result<PathBuf, TargetError> {
+    use sha2::{Digest, Sha256};
+    use std::fmt::Write;
+
+    let mut name = String::new();
+    for byte in &Sha256::digest(bytes)[..8] {
+        // Writing to a String cannot fail.
+        let _ = write!(name, "{byte:02x}");
+    }
+    let kept = built.with_file_name(format!("specgen-{name}{}", std::env::consts::DLL_SUFFIX));
+    if !kept.is_file() {
+        // Written beside and renamed, so that nobody loads half a library.
+        let partial = kept.with_extension(format!("{}.part", std::process::id()));
+        std::fs::write(&partial, bytes).map_err(|e| TargetError::io("writing", &partial, e))?;
+        std::fs::rename(&partial, &kept).map_err(|e| TargetError::io("renaming", &partial, e))?;
+    }
+    Ok(kept)
+}

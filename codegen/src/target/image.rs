@@ -1,0 +1,93 @@
+//! What an image takes, and what it must not contain.
+
+use super::error::TargetError;
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind};
+
+/// Memory of an image.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Footprint {
+    /// Bytes of flash: vectors, code, constants and the initial values of variables.
+    pub flash: u64,
+    /// Of these, code and its literals.
+    pub code: u64,
+    /// Of these, constants: the tables of the controller, for the greatest part.
+    pub constants: u64,
+    /// Bytes of RAM that are taken statically. The state and the buffers of the replay live on the stack.
+    pub ram: u64,
+    /// Symbols of the panic machinery, demangled; empty in an image that cannot panic.
+    pub panic_symbols: Vec<String>,
+    /// Symbols of an allocator, demangled; empty in an image that does not allocate.
+    pub allocator_symbols: Vec<String>,
+}
+
+/// Measures an image.
+///
+/// # Errors
+/// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
+pub fn footprint(elf: &[u8]) -> Result<Footprint, TargetError> {
+    let malformed = |error: object::Error| TargetError::MalformedImage {
+        text: error.to_string(),
+    };
+    let file = object::File::parse(elf).map_err(malformed)?;
+    let mut result = Footprint {
+        flash: 0,
+        code: 0,
+        constants: 0,
+        ram: 0,
+        panic_symbols: Vec::new(),
+        allocator_symbols: Vec::new(),
+    };
+    for section in file.sections().filter(|section| is_loaded(section.flags())) {
+        match section.kind() {
+            SectionKind::Text => result.code += section.size(),
+            SectionKind::UninitializedData => result.ram += section.size(),
+            // Writable: its values are copied from flash at the start.
+            _ if is_writable(section.flags()) => {
+                result.ram += section.size();
+                result.flash += section.size();
+            }
+            _ => result.constants += section.size(),
+        }
+    }
+    result.flash += result.code + result.constants;
+    for symbol in file.symbols() {
+        let mangled = symbol.name().map_err(malformed)?;
+        let name = format!("{:#}", rustc_demangle::demangle(mangled));
+        if is_panic(&name) {
+            result.panic_symbols.push(name);
+        } else if is_allocator(&name) {
+            result.allocator_symbols.push(name);
+        }
+    }
+    result.panic_symbols.sort();
+    result.allocator_symbols.sort();
+    Ok(result)
+}
+
+fn is_loaded(flags: SectionFlags) -> bool {
+    matches!(flags, SectionFlags::Elf { sh_flags, .. } if sh_flags.0 & object::elf::SHF_ALLOC.0 != 0)
+}
+
+fn is_writable(flags: SectionFlags) -> bool {
+    matches!(flags, SectionFlags::Elf { sh_flags, .. } if sh_flags.0 & object::elf::SHF_WRITE.0 != 0)
+}
+
+fn is_panic(name: &str) -> bool {
+    name.contains("panicking")
+        || name.contains("panic_path_remains")
+        || name.contains("begin_unwind")
+}
+
+fn is_allocator(name: &str) -> bool {
+    [
+        "__rust_alloc",
+        "__rust_realloc",
+        "__rg_alloc",
+        "__rdl_alloc",
+        "__rustc::__rust_alloc",
+    ]
+    .iter()
+    .any(|start| name.starts_with(start))
+        || name.starts_with("alloc::")
+        || matches!(name, "malloc" | "calloc" | "realloc" | "free")
+}

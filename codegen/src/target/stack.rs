@@ -1,0 +1,156 @@
+//! Static bound of the stack that one call of `controller::step` can use.
+//!
+//! Sum of the frames along the deepest path of the call graph, from the compiler's own `.stack_sizes`.
+//! The bound holds only if [`StackBound::is_complete`]; what stands against it is listed, not ignored.
+//! Interrupts come on top: 8 words each, 26 with the FPU.
+
+use super::callgraph::CallGraph;
+use super::error::TargetError;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The function that counts as one step: `firmware/qemu/src/main.rs` wraps `controller::step` in it.
+pub const STEP_SYMBOL: &str = "specgen_step";
+
+/// A bound and what it rests on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StackBound {
+    /// Bytes along the deepest path, the root's own frame included.
+    pub bytes: u64,
+    /// That path: function and its frame, bytes, from the root down.
+    pub path: Vec<(String, u64)>,
+    /// Bytes of code that one call can reach, literals included.
+    pub code_bytes: u64,
+    /// Functions that call themselves, directly or through others: a cycle each, as names.
+    pub recursion: Vec<Vec<String>>,
+    /// Functions that call or jump through a register.
+    pub indirect: Vec<String>,
+    /// Functions whose frame is unknown (assembly, or a precompiled library); counted as 0.
+    pub unsized_functions: Vec<String>,
+    /// Functions that branch to what is no function.
+    pub strays: Vec<String>,
+}
+
+impl StackBound {
+    /// Nothing is missing: no run can use more than [`StackBound::bytes`].
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        self.recursion.is_empty()
+            && self.indirect.is_empty()
+            && self.unsized_functions.is_empty()
+            && self.strays.is_empty()
+    }
+}
+
+/// The bound for everything that `root` (a symbol as it stands in the image) can reach.
+///
+/// # Errors
+/// [`TargetError::MalformedImage`] if the file is damaged or has no such function.
+pub fn bound(elf: &[u8], root: &str) -> Result<StackBound, TargetError> {
+    let graph = CallGraph::read(elf)?;
+    let &start = graph
+        .symbols
+        .get(root)
+        .ok_or_else(|| TargetError::MalformedImage {
+            text: format!(
+                "it has no function `{root}`; was it stripped, or made by another specgen?"
+            ),
+        })?;
+    let mut walk = Walk {
+        graph: &graph,
+        deepest: BTreeMap::new(),
+        open: Vec::new(),
+        cycles: BTreeSet::new(),
+    };
+    let bytes = walk.visit(start);
+    let cycles = walk.cycles;
+    let deepest = walk.deepest;
+
+    let name = |address: &u64| {
+        graph
+            .functions
+            .get(address)
+            .map_or_else(String::new, |f| f.name.clone())
+    };
+    let reached = || {
+        deepest
+            .keys()
+            .filter_map(|address| graph.functions.get(address))
+    };
+    let mut path = Vec::new();
+    let mut next = Some(start);
+    while let Some(address) = next {
+        let frame = graph
+            .functions
+            .get(&address)
+            .and_then(|f| f.frame)
+            .unwrap_or(0);
+        path.push((name(&address), frame));
+        next = deepest.get(&address).and_then(|&(_, callee)| callee);
+    }
+    let which = |wanted: fn(&super::callgraph::Function) -> bool| {
+        reached()
+            .filter(|f| wanted(f))
+            .map(|f| f.name.clone())
+            .collect::<Vec<_>>()
+    };
+    Ok(StackBound {
+        bytes,
+        path,
+        code_bytes: reached().map(|f| f.size).sum(),
+        recursion: cycles
+            .iter()
+            .map(|cycle| cycle.iter().map(name).collect())
+            .collect(),
+        indirect: which(|f| !f.indirect.is_empty()),
+        unsized_functions: which(|f| f.frame.is_none()),
+        strays: which(|f| !f.strays.is_empty()),
+    })
+}
+
+/// Depth-first walk of the call graph.
+struct Walk<'a> {
+    graph: &'a CallGraph,
+    /// Bytes from this function down, and the callee that needs them, of every function that is done.
+    deepest: BTreeMap<u64, (u64, Option<u64>)>,
+    /// Functions on the way from the root to here.
+    open: Vec<u64>,
+    /// Cycles found, each starting at its lowest address so that it is found once.
+    cycles: BTreeSet<Vec<u64>>,
+}
+
+impl Walk<'_> {
+    /// Bytes from here down. The recursion here is no deeper than the image has functions.
+    fn visit(&mut self, address: u64) -> u64 {
+        if let Some(&(bytes, _)) = self.deepest.get(&address) {
+            return bytes;
+        }
+        if let Some(position) = self.open.iter().position(|&open| open == address) {
+            let mut cycle = self.open[position..].to_vec();
+            let lowest = cycle
+                .iter()
+                .enumerate()
+                .min_by_key(|&(_, address)| address)
+                .map_or(0, |(i, _)| i);
+            cycle.rotate_left(lowest);
+            self.cycles.insert(cycle);
+            return 0;
+        }
+        let Some(function) = self.graph.functions.get(&address) else {
+            return 0;
+        };
+        self.open.push(address);
+        let mut below = (0, None);
+        for &callee in &function.calls {
+            let bytes = self.visit(callee);
+            // A callee that needs nothing still belongs on the path, but not one that is still open.
+            let closed = self.deepest.contains_key(&callee);
+            if closed && (bytes > below.0 || below.1.is_none()) {
+                below = (bytes, Some(callee));
+            }
+        }
+        self.open.pop();
+        let bytes = function.frame.unwrap_or(0) + below.0;
+        self.deepest.insert(address, (bytes, below.1));
+        bytes
+    }
+}

@@ -1,0 +1,284 @@
+//! The one place that finds a cross compiler.
+//!
+//! In order, and without touching anyone's configuration:
+//! 1. the `rustc` on `PATH` has the target installed (`rustup target add`);
+//! 2. the `rustc` on `PATH` has its sources (`rustup component add rust-src`): `core` is built from them;
+//! 3. Debian's `rustc-web cargo-web rust-web-src` in `/usr`: the same way.
+//!
+//! Building `core` and `-Z emit-stack-sizes` are not stable, so `RUSTC_BOOTSTRAP=1` is set for these builds
+//! alone. The linker is `rust-lld` of that compiler, of the one on `PATH`, or LLVM's `ld.lld`.
+
+use super::TRIPLE;
+use super::error::TargetError;
+use super::process::{clean_command, find_in_path, first_line};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Where `core` for the target comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CoreLibrary {
+    /// Installed with the compiler. Its assembly and `compiler_builtins` carry no stack sizes.
+    Installed,
+    /// Built from the compiler's sources together with the image.
+    FromSource,
+}
+
+/// A compiler for the target, with its cargo and a linker.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Toolchain {
+    /// The compiler.
+    pub rustc: PathBuf,
+    /// Its cargo.
+    pub cargo: PathBuf,
+    /// The linker, if the compiler would not find one by itself.
+    pub linker: Option<PathBuf>,
+    /// Where `core` comes from.
+    pub core: CoreLibrary,
+    /// `rustc --version`.
+    pub version: String,
+}
+
+/// A compiler that may or may not serve.
+#[derive(Debug, Clone)]
+struct Candidate {
+    rustc: PathBuf,
+    cargo: PathBuf,
+}
+
+/// Finds a cross compiler.
+///
+/// # Errors
+/// [`TargetError::MissingTool`] with the command that installs one.
+pub fn find() -> Result<Toolchain, TargetError> {
+    let mut candidates = Vec::new();
+    if let (Some(rustc), Some(cargo)) = (find_in_path("rustc"), find_in_path("cargo")) {
+        candidates.push(Candidate { rustc, cargo });
+    }
+    let debian = Candidate {
+        rustc: "/usr/bin/rustc".into(),
+        cargo: "/usr/bin/cargo".into(),
+    };
+    if debian.rustc.is_file() && debian.cargo.is_file() {
+        candidates.push(debian);
+    }
+    let search_path = std::env::var_os("PATH").unwrap_or_default();
+    let elsewhere: Vec<PathBuf> = std::env::split_paths(&search_path).collect();
+    choose(&candidates, &elsewhere)
+}
+
+/// The first candidate that serves; linkers are looked for beside every candidate, then in `elsewhere`.
+fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, TargetError> {
+    let probed: Vec<(&Candidate, Sysroot)> = candidates
+        .iter()
+        .filter_map(|candidate| Some((candidate, Sysroot::of(&candidate.rustc)?)))
+        .collect();
+    let mut without_linker = None;
+    for (candidate, sysroot) in &probed {
+        let Some(core) = sysroot.core() else { continue };
+        let linker = if sysroot.rust_lld().is_some() {
+            None
+        } else if let Some(linker) = probed
+            .iter()
+            .find_map(|(_, other)| other.rust_lld())
+            .or_else(|| lld(elsewhere))
+        {
+            Some(linker)
+        } else {
+            without_linker = Some(candidate.rustc.clone());
+            continue;
+        };
+        return Ok(Toolchain {
+            rustc: candidate.rustc.clone(),
+            cargo: candidate.cargo.clone(),
+            linker,
+            core,
+            version: sysroot.version.clone(),
+        });
+    }
+    Err(match without_linker {
+        Some(rustc) => TargetError::MissingTool {
+            tool: "a linker for ARM images".into(),
+            looked: format!(
+                "rust-lld beside {} and on PATH, ld.lld on PATH",
+                rustc.display()
+            ),
+            command: "apt-get install lld".into(),
+        },
+        None => TargetError::MissingTool {
+            tool: format!("a Rust compiler for {TRIPLE}"),
+            looked: "the target or rust-src in the rustc on PATH, Debian's rustc-web in /usr"
+                .into(),
+            command: install_command(),
+        },
+    })
+}
+
+/// Words for whoever has neither.
+#[must_use]
+pub fn install_command() -> String {
+    format!(
+        "rustup target add {TRIPLE}   (or, on Debian: apt-get install rustc-web cargo-web rust-web-src)"
+    )
+}
+
+/// The folder a compiler belongs to.
+struct Sysroot {
+    path: PathBuf,
+    host: String,
+    version: String,
+}
+
+impl Sysroot {
+    fn of(rustc: &Path) -> Option<Self> {
+        let path = PathBuf::from(first_line(
+            clean_command(rustc).args(["--print", "sysroot"]),
+        )?);
+        let host = first_line(clean_command(rustc).args(["--print", "host-tuple"]))?;
+        let version = first_line(clean_command(rustc).arg("--version"))?;
+        Some(Self {
+            path,
+            host,
+            version,
+        })
+    }
+
+    fn core(&self) -> Option<CoreLibrary> {
+        let rustlib = self.path.join("lib/rustlib");
+        if rustlib.join(TRIPLE).join("lib").is_dir() {
+            Some(CoreLibrary::Installed)
+        } else if rustlib.join("src/rust/library/core/Cargo.toml").is_file() {
+            Some(CoreLibrary::FromSource)
+        } else {
+            None
+        }
+    }
+
+    fn rust_lld(&self) -> Option<PathBuf> {
+        let file = self
+            .path
+            .join("lib/rustlib")
+            .join(&self.host)
+            .join("bin/rust-lld");
+        file.is_file().then_some(file)
+    }
+}
+
+/// A linker of LLVM's own packages.
+fn lld(folders: &[PathBuf]) -> Option<PathBuf> {
+    ["rust-lld", "ld.lld"].iter().find_map(|name| {
+        folders
+            .iter()
+            .map(|f| f.join(name))
+            .find(|file| file.is_file())
+    })
+}
+
+impl Toolchain {
+    /// `cargo build --release` for the target with these flags for rustc, before the arguments of the caller.
+    ///
+    /// Flags of the caller's environment and configuration do not apply: the figures must not depend on them.
+    #[must_use]
+    pub fn cargo_build(&self, rustflags: &[&str]) -> Command {
+        let mut flags: Vec<String> = rustflags.iter().map(|&flag| flag.to_owned()).collect();
+        flags.push("-Zemit-stack-sizes".into());
+        if let Some(linker) = &self.linker {
+            flags.push(format!("-Clinker={}", linker.display()));
+            flags.push("-Clinker-flavor=ld.lld".into());
+        }
+        let mut command = clean_command(&self.cargo);
+        command
+            .env("RUSTC", &self.rustc)
+            .env("RUSTC_BOOTSTRAP", "1")
+            // Encoded, so that a path with a space stays one flag.
+            .env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"))
+            .args(["build", "--release", "--target", TRIPLE]);
+        if self.core == CoreLibrary::FromSource {
+            command.arg("-Zbuild-std=core");
+        }
+        command
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt;
+
+    /// A compiler that only knows where it lives.
+    fn fake(root: &Path, name: &str, files: &[&str]) -> Candidate {
+        let sysroot = root.join(name);
+        fs::create_dir_all(&sysroot).unwrap();
+        for file in files {
+            let path = sysroot.join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, "").unwrap();
+        }
+        let rustc = sysroot.join("rustc");
+        let script = format!(
+            "#!/bin/sh\ncase \"$2\" in\nsysroot) echo '{}';;\nhost-tuple) echo host;;\n*) echo 'rustc 1.95.0 ({name})';;\nesac\n",
+            sysroot.display()
+        );
+        fs::write(&rustc, script).unwrap();
+        fs::set_permissions(&rustc, fs::Permissions::from_mode(0o755)).unwrap();
+        Candidate {
+            rustc,
+            cargo: sysroot.join("cargo"),
+        }
+    }
+
+    const TARGET: &str = "lib/rustlib/thumbv7em-none-eabihf/lib/libcore.rlib";
+    const SOURCE: &str = "lib/rustlib/src/rust/library/core/Cargo.toml";
+    const LLD: &str = "lib/rustlib/host/bin/rust-lld";
+
+    #[test]
+    fn an_installed_target_is_taken_before_sources() {
+        let root = tempfile::tempdir().unwrap();
+        let rustup = fake(root.path(), "rustup", &[TARGET, SOURCE, LLD]);
+        let debian = fake(root.path(), "debian", &[SOURCE]);
+        let found = choose(&[rustup.clone(), debian], &[]).unwrap();
+        assert_eq!(found.core, CoreLibrary::Installed);
+        assert_eq!(found.rustc, rustup.rustc);
+        assert_eq!(found.linker, None);
+        assert_eq!(found.version, "rustc 1.95.0 (rustup)");
+    }
+
+    #[test]
+    fn a_compiler_with_sources_borrows_the_linker_of_another() {
+        let root = tempfile::tempdir().unwrap();
+        let rustup = fake(root.path(), "rustup", &[LLD]);
+        let debian = fake(root.path(), "debian", &[SOURCE]);
+        let found = choose(&[rustup.clone(), debian.clone()], &[]).unwrap();
+        assert_eq!(found.core, CoreLibrary::FromSource);
+        assert_eq!(found.rustc, debian.rustc);
+        assert_eq!(found.linker, Some(rustup.rustc.with_file_name(LLD)));
+    }
+
+    #[test]
+    fn lld_of_the_distribution_serves_where_there_is_no_rust_lld() {
+        let root = tempfile::tempdir().unwrap();
+        let debian = fake(root.path(), "debian", &[SOURCE]);
+        let bin = root.path().join("bin");
+        fs::create_dir_all(&bin).unwrap();
+        fs::write(bin.join("ld.lld"), "").unwrap();
+        let found = choose(&[debian], std::slice::from_ref(&bin)).unwrap();
+        assert_eq!(found.linker, Some(bin.join("ld.lld")));
+    }
+
+    #[test]
+    fn what_is_missing_is_named_with_the_command_that_installs_it() {
+        let root = tempfile::tempdir().unwrap();
+        let bare = fake(root.path(), "bare", &[LLD]);
+        let error = choose(&[bare], &[]).unwrap_err();
+        assert!(error.is_environment());
+        assert!(
+            error
+                .to_string()
+                .contains("rustup target add thumbv7em-none-eabihf"),
+            "{error}"
+        );
+        let no_linker = fake(root.path(), "debian", &[SOURCE]);
+        let error = choose(&[no_linker], &[]).unwrap_err();
+        assert!(error.to_string().contains("apt-get install lld"), "{error}");
+    }
+}

@@ -1,0 +1,152 @@
+//! Replays recorded ticks through the emitted controller on an emulated Cortex-M.
+//!
+//! Reads `config.bin` (CONFIG_WORDS words) and `input.bin` (rows of INPUT_WORDS words) from the emulator's
+//! working folder; writes `output.bin` (rows of OUTPUT_WORDS words and the digest of the state after the
+//! tick) and `stats.bin` (see [`stats`]). All words are 64 bits, little endian. No control decision is made here.
+
+#![no_std]
+#![no_main]
+
+mod instructions;
+mod panic;
+mod semihosting;
+mod stack;
+mod stages;
+mod stats;
+
+use controller::{
+    CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, step,
+};
+use core::hint::black_box;
+use cortex_m_rt::{ExceptionFrame, entry, exception};
+use instructions::InstructionCounter;
+use semihosting::{Exit, File, exit};
+use stages::Stages;
+use stats::Summary;
+
+/// Ticks per file access.
+const BATCH: usize = 256;
+
+#[entry]
+fn main() -> ! {
+    exit(match replay() {
+        Ok(()) => Exit::Done,
+        Err(code) => code,
+    })
+}
+
+/// The whole run: files in, files out.
+fn replay() -> Result<(), Exit> {
+    let timer = cortex_m::Peripherals::take().ok_or(Exit::Fault)?.SYST;
+    let mut counter = InstructionCounter::new(timer);
+    let self_test = counter.self_test();
+
+    let config = read_config()?;
+    let input = File::open(b"input.bin\0").ok_or(Exit::NoInput)?;
+    let output = File::create(b"output.bin\0").ok_or(Exit::CannotWrite)?;
+
+    let mut state = State::new();
+    let mut stages = Stages::new();
+    let mut rows = [[0; INPUT_WORDS]; BATCH];
+    let mut results = [[0; OUTPUT_WORDS + 1]; BATCH];
+    let mut ticks = 0;
+    let mut deepest = 0;
+    loop {
+        let bytes = input.read(rows.as_flattened_mut());
+        let count = bytes / size_of::<[u64; INPUT_WORDS]>();
+        if count * size_of::<[u64; INPUT_WORDS]>() != bytes {
+            return Err(Exit::InputSize);
+        }
+        if count == 0 {
+            break;
+        }
+        for (row, result) in rows.iter().zip(&mut results).take(count) {
+            let tick_input = TickInput::from_words(row);
+            stages.measure(&mut counter, &config, &state, &tick_input);
+            let (tick_output, instructions, depth) =
+                tick(&mut counter, &config, &mut state, &tick_input);
+            stages.add_step(instructions);
+            if depth > deepest {
+                deepest = depth;
+            }
+            let words = tick_output.to_words();
+            for (slot, word) in result.iter_mut().zip(words) {
+                *slot = word;
+            }
+            result[OUTPUT_WORDS] = state.digest();
+            ticks += 1;
+        }
+        if !output.write(results.get(..count).unwrap_or_default().as_flattened()) {
+            return Err(Exit::CannotWrite);
+        }
+    }
+
+    let summary = Summary {
+        ticks,
+        sizes: [
+            CONFIG_WORDS,
+            INPUT_WORDS,
+            OUTPUT_WORDS,
+            size_of::<State>(),
+            size_of::<Config>(),
+        ]
+        .map(|n| n as u64),
+        stack: [deepest as u64, stack::WINDOW as u64],
+        overhead: u64::from(counter.overhead()),
+        self_test,
+        overflows: counter.overflows(),
+    };
+    let stats_file = File::create(b"stats.bin\0").ok_or(Exit::CannotWrite)?;
+    let written = stats::write(&stats_file, &summary, &stages.all());
+    if written && stats_file.close() && output.close() {
+        Ok(())
+    } else {
+        Err(Exit::CannotWrite)
+    }
+}
+
+fn read_config() -> Result<Config, Exit> {
+    let file = File::open(b"config.bin\0").ok_or(Exit::NoConfig)?;
+    // One word more than is due, so that a file that is too long is found too.
+    let mut words = [0; CONFIG_WORDS + 1];
+    if file.read(&mut words) != size_of::<[u64; CONFIG_WORDS]>() {
+        return Err(Exit::ConfigSize);
+    }
+    let words = words.first_chunk().ok_or(Exit::ConfigSize)?;
+    Config::from_words(words).map_err(|_| Exit::ConfigRefused)
+}
+
+/// One step with its instructions and its stack, bytes. In a frame of its own, so that the stack pointer
+/// stands still around the call.
+#[inline(never)]
+fn tick(
+    counter: &mut InstructionCounter,
+    config: &Config,
+    state: &mut State,
+    input: &TickInput,
+) -> (TickOutput, u32, usize) {
+    let ((output, instructions), depth) = stack::measure_depth(|| {
+        counter.measure(|| specgen_step(black_box(config), state, black_box(input)))
+    });
+    (output, instructions, depth)
+}
+
+/// What the instruction count, the painted stack and the static stack bound all refer to.
+#[unsafe(no_mangle)]
+#[inline(never)]
+#[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
+fn specgen_step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
+    step(config, state, input)
+}
+
+#[exception]
+#[allow(unsafe_code)] // cortex-m-rt wants it so.
+unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+    exit(Exit::Fault)
+}
+
+#[exception]
+#[allow(unsafe_code)] // cortex-m-rt wants it so.
+unsafe fn DefaultHandler(_: i16) {
+    exit(Exit::Fault)
+}

@@ -1,0 +1,111 @@
+//! `stats.bin`: what was measured, as little-endian 64-bit words. This table is the format's only
+//! description; `codegen/src/target/replay.rs` of specgen reads it and refuses another version.
+//!
+//! | word | meaning |
+//! | --- | --- |
+//! | 0 | the bytes `SPECSTAT` |
+//! | 1 | layout version, 1 |
+//! | 2 | ticks replayed |
+//! | 3, 4, 5 | CONFIG_WORDS, INPUT_WORDS, OUTPUT_WORDS of the controller |
+//! | 6, 7 | bytes of `State`, bytes of `Config` |
+//! | 8 | most stack that one `step` used, bytes |
+//! | 9 | painted window, bytes: word 8 at this value means "this or more" |
+//! | 10 | overhead taken off every count, instructions |
+//! | 11 to 14 | counted for 0, 1, 100, 1000 `nop`s |
+//! | 15 | measurements too long to be counted |
+//! | 16 | number of stages S; then S records of six words |
+//! | +0, +1 | stage name, 16 bytes of ASCII, zero padded |
+//! | +2 | calls |
+//! | +3, +4, +5 | instructions per call: smallest, sum over the calls, largest |
+
+use crate::instructions::SelfTest;
+use crate::semihosting::File;
+
+const MAGIC: u64 = u64::from_le_bytes(*b"SPECSTAT");
+const VERSION: u64 = 1;
+
+/// Instruction counts of one stage.
+#[derive(Clone, Copy)]
+pub struct Stage {
+    name: [u8; 16],
+    calls: u64,
+    smallest: u64,
+    sum: u64,
+    largest: u64,
+}
+
+impl Stage {
+    /// No calls yet. `name` is ASCII, at most 16 bytes: the rest would be cut off.
+    pub const fn new(name: &str) -> Self {
+        let mut padded = [0; 16];
+        let bytes = name.as_bytes();
+        let mut i = 0;
+        while i < bytes.len() && i < padded.len() {
+            padded[i] = bytes[i];
+            i += 1;
+        }
+        Self {
+            name: padded,
+            calls: 0,
+            smallest: u64::MAX,
+            sum: 0,
+            largest: 0,
+        }
+    }
+
+    /// Adds one call of so many instructions.
+    pub fn add(&mut self, instructions: u32) {
+        let instructions = u64::from(instructions);
+        self.calls += 1;
+        self.sum += instructions;
+        if instructions < self.smallest {
+            self.smallest = instructions;
+        }
+        if instructions > self.largest {
+            self.largest = instructions;
+        }
+    }
+
+    fn words(&self) -> [u64; 6] {
+        let name = u128::from_le_bytes(self.name);
+        let smallest = if self.calls == 0 { 0 } else { self.smallest };
+        [
+            name as u64,
+            (name >> 64) as u64,
+            self.calls,
+            smallest,
+            self.sum,
+            self.largest,
+        ]
+    }
+}
+
+/// Words 2 to 16, but for the number of stages.
+pub struct Summary {
+    /// Rows of `input.bin`.
+    pub ticks: u64,
+    /// Words 3 to 7.
+    pub sizes: [u64; 5],
+    /// Words 8 and 9.
+    pub stack: [u64; 2],
+    /// Word 10.
+    pub overhead: u64,
+    /// Words 11 to 14.
+    pub self_test: SelfTest,
+    /// Word 15.
+    pub overflows: u64,
+}
+
+/// Writes all of it; false if the file does not take it.
+pub fn write(file: &File, summary: &Summary, stages: &[Stage]) -> bool {
+    let mut good = file.write(&[MAGIC, VERSION, summary.ticks]);
+    good &= file.write(&summary.sizes);
+    good &= file.write(&summary.stack);
+    good &= file.write(&[summary.overhead]);
+    good &= file.write(&summary.self_test);
+    good &= file.write(&[summary.overflows, stages.len() as u64]);
+    for stage in stages {
+        good &= file.write(&stage.words());
+    }
+    good
+}
