@@ -31,6 +31,17 @@ const FIXED: &[(&str, &str)] = &[
     ("runtime/src/real.rs", include_str!("../../firmware/runtime/src/real.rs")),
     ("host/Cargo.toml", include_str!("../../firmware/host/Cargo.toml")),
     ("host/src/lib.rs", include_str!("../../firmware/host/src/lib.rs")),
+    ("qemu/Cargo.lock", include_str!("../../firmware/qemu/Cargo.lock")),
+    ("qemu/Cargo.toml", include_str!("../../firmware/qemu/Cargo.toml")),
+    ("qemu/build.rs", include_str!("../../firmware/qemu/build.rs")),
+    ("qemu/memory.x", include_str!("../../firmware/qemu/memory.x")),
+    ("qemu/src/instructions.rs", include_str!("../../firmware/qemu/src/instructions.rs")),
+    ("qemu/src/main.rs", include_str!("../../firmware/qemu/src/main.rs")),
+    ("qemu/src/panic.rs", include_str!("../../firmware/qemu/src/panic.rs")),
+    ("qemu/src/semihosting.rs", include_str!("../../firmware/qemu/src/semihosting.rs")),
+    ("qemu/src/stack.rs", include_str!("../../firmware/qemu/src/stack.rs")),
+    ("qemu/src/stages.rs", include_str!("../../firmware/qemu/src/stages.rs")),
+    ("qemu/src/stats.rs", include_str!("../../firmware/qemu/src/stats.rs")),
 ];
 
 /// Why an output folder could not be written. Nothing was changed.

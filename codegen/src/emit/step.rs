@@ -120,7 +120,7 @@ pub fn emit(_ir: &Ir) -> TokenStream {
         /// u = Γ⁻¹(T − δ̂ − φ̂) as a permitted code; the memory then holds what that code really requests. Returns whether a
         /// limit of table, voltage or slew rate held the leg back.
         #[inline]
-        fn actuate(config: &Config, leg: &mut LegState, table: &Table, demand: Real) -> bool {
+        pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, demand: Real) -> bool {
             let request = demand - leg.estimate.correction();
             let out_of_reach = !(request >= Real::ZERO && request <= table.full_displacement());
             let drive = leg.memory.solve(table, request);
