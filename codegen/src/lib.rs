@@ -5,6 +5,7 @@
 //! ```
 //! Each phase is a module, and data flows one way. ARCHITECTURE.md has the invariants.
 
+pub mod compile;
 pub mod diagnostic;
 pub mod everett;
 pub mod emit;
