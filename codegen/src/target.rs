@@ -47,3 +47,21 @@ pub fn available() -> Result<Tools, TargetError> {
         emulator: emulator::Emulator::find()?,
     })
 }
+
+/// Set to `1`, it turns a missing tool from a failure into a skip that is said.
+pub const ALLOW_MISSING: &str = "SPECGEN_ALLOW_MISSING";
+
+/// [`available`] for tests: `None`, said on standard error, if something is missing and [`ALLOW_MISSING`] is `1`.
+///
+/// # Errors
+/// As [`available`], without that excuse.
+pub fn available_or_skip(what: &str) -> Result<Option<Tools>, TargetError> {
+    match available() {
+        Ok(tools) => Ok(Some(tools)),
+        Err(error) if std::env::var_os(ALLOW_MISSING).is_some_and(|value| value == "1") => {
+            eprintln!("skipped: {what}: {error}");
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}

@@ -50,7 +50,13 @@ pub fn build_image_with(
     // A folder per part: they differ in flags only, and cargo would build everything again at each change.
     let target_dir = target_dir.join(mcu.machine());
     let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
-    let executable = cargo_artifact(&mut command, &package, &target_dir, &what, |message| {
+    let request = BuildRequest {
+        package: &package,
+        target_dir: &target_dir,
+        rustc_args: &[],
+        locked: true,
+    };
+    let executable = cargo_artifact(&mut command, &request, &what, |message| {
         message["executable"].as_str().map(PathBuf::from)
     })?;
     Ok(Image {
@@ -95,14 +101,26 @@ pub(super) struct Artifact {
     pub bytes: Vec<u8>,
 }
 
-/// Runs a cargo build of `package` and reads the artifact that `pick` recognises among cargo's messages.
+/// What to build, and where.
+pub(super) struct BuildRequest<'a> {
+    /// Folder of the package.
+    pub package: &'a Path,
+    /// Where cargo keeps its work.
+    pub target_dir: &'a Path,
+    /// For `cargo rustc`: what follows `--`.
+    pub rustc_args: &'a [&'a str],
+    /// Refuse if `Cargo.lock` is absent or does not fit: for packages with dependencies from a registry.
+    pub locked: bool,
+}
+
+/// Runs a cargo build and reads the artifact that `pick` recognises among cargo's messages.
 pub(super) fn cargo_artifact(
     command: &mut Command,
-    package: &Path,
-    target_dir: &Path,
+    request: &BuildRequest<'_>,
     what: &str,
     pick: impl Fn(&serde_json::Value) -> Option<PathBuf>,
 ) -> Result<Artifact, TargetError> {
+    let (package, target_dir) = (request.package, request.target_dir);
     fs::create_dir_all(target_dir).map_err(|e| TargetError::io("creating", target_dir, e))?;
     let lock_path = target_dir.join("specgen.lock");
     let lock = File::create(&lock_path).map_err(|e| TargetError::io("creating", &lock_path, e))?;
@@ -115,16 +133,18 @@ pub(super) fn cargo_artifact(
     command
         // Cargo reads its configuration from the working folder upwards, so work where the package is.
         .current_dir(package)
-        .args([
-            "--locked",
-            "--message-format=json-render-diagnostics",
-            "--color=never",
-        ])
+        .args(["--message-format=json-render-diagnostics", "--color=never"])
         .arg("--target-dir")
         .arg(
             std::path::absolute(target_dir)
                 .map_err(|e| TargetError::io("resolving", target_dir, e))?,
         );
+    if request.locked {
+        command.arg("--locked");
+    }
+    if !request.rustc_args.is_empty() {
+        command.arg("--").args(request.rustc_args);
+    }
     let finished = process::run(command, scratch.path(), LIMIT)
         .map_err(|e| TargetError::io("running cargo in", package, e))?;
     if !finished.success() {

@@ -17,27 +17,25 @@ pub struct Emulator {
 }
 
 /// How the firmware says why it ended: the codes of `firmware/qemu/src/semihosting.rs`.
-const EXITS: [(i32, &str); 7] = [
+const EXITS: [(i32, &str); 6] = [
     (10, "the firmware cannot open config.bin"),
     (
         11,
         "config.bin does not hold as many words as the controller's Config",
     ),
+    (12, "the firmware cannot open input.bin"),
     (
-        12,
-        "the controller refuses this configuration (Config::from_words)",
-    ),
-    (13, "the firmware cannot open input.bin"),
-    (
-        14,
+        13,
         "input.bin ends within a row: rows must hold as many words as the controller's TickInput",
     ),
     (
-        15,
+        14,
         "the firmware cannot write output.bin or stats.bin; is the disk full?",
     ),
-    (16, "the processor took a fault"),
+    (15, "the processor took a fault"),
 ];
+/// Statuses from here on name the word of the configuration that the controller refuses.
+const CONFIG_REFUSED: i32 = 64;
 
 impl Emulator {
     /// Finds it on `PATH`.
@@ -87,8 +85,20 @@ impl Emulator {
         if status.success() {
             return Ok(());
         }
-        let known = EXITS.iter().find(|(code, _)| status.code() == Some(*code));
-        let mut text = known.map_or_else(|| format!("{status}"), |(_, words)| (*words).to_owned());
+        let mut text = match status.code() {
+            Some(code) if code >= CONFIG_REFUSED => format!(
+                "the controller refuses word {} of the configuration (see its CONFIG_NAMES and Config::from_words)",
+                code - CONFIG_REFUSED
+            ),
+            Some(code) => {
+                let words = EXITS
+                    .iter()
+                    .find(|(known, _)| *known == code)
+                    .map(|(_, words)| *words);
+                words.map_or_else(|| format!("{status}"), ToOwned::to_owned)
+            }
+            None => format!("{status}"),
+        };
         let stderr = finished.stderr.trim();
         if !stderr.is_empty() {
             text = format!("{text}; it printed: {stderr}");

@@ -1,9 +1,13 @@
 //! Builds DIR/host of an emitted workspace into a shared library for this machine.
 
-use super::build::cargo_artifact;
+use super::build::{BuildRequest, cargo_artifact};
 use super::error::TargetError;
 use super::process::{clean_command, find_in_path};
 use std::path::{Path, PathBuf};
+
+/// A shared library may leave symbols undefined unless told otherwise, and then the proof that nothing can
+/// panic would never fail. libc is for `memcpy` and `memset`, which the compiler calls by itself.
+const LINK: [&str; 2] = ["-Clink-arg=-Wl,-z,defs", "-Clink-arg=-lc"];
 
 /// Builds `dir/host` (a `cdylib` that links only if nothing in it can panic) and returns the library's path.
 ///
@@ -22,16 +26,27 @@ pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetErr
     let package = dir.join("host");
     let target_dir = target_dir.join("host");
     let mut command = clean_command(cargo);
-    command.args(["build", "--release"]);
-    let what = package.display().to_string();
-    let library = cargo_artifact(&mut command, &package, &target_dir, &what, |message| {
-        let is_library = message["target"]["kind"]
-            .as_array()?
-            .iter()
-            .any(|kind| kind == "cdylib");
-        let file = message["filenames"].as_array()?.first()?.as_str()?;
-        is_library.then(|| PathBuf::from(file))
-    })?;
+    // `cargo rustc`, so that the link flags below reach this crate alone.
+    command.args(["rustc", "--release", "--lib"]);
+    let request = BuildRequest {
+        package: &package,
+        target_dir: &target_dir,
+        rustc_args: &LINK,
+        locked: false,
+    };
+    let library = cargo_artifact(
+        &mut command,
+        &request,
+        &package.display().to_string(),
+        |message| {
+            let is_library = message["target"]["kind"]
+                .as_array()?
+                .iter()
+                .any(|kind| kind == "cdylib");
+            let file = message["filenames"].as_array()?.first()?.as_str()?;
+            is_library.then(|| PathBuf::from(file))
+        },
+    )?;
     keep(&library.path, &library.bytes)
 }
 

@@ -91,3 +91,23 @@ fn is_allocator(name: &str) -> bool {
         || name.starts_with("alloc::")
         || matches!(name, "malloc" | "calloc" | "realloc" | "free")
 }
+
+/// Functions that a shared library offers, sorted.
+///
+/// # Errors
+/// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
+pub fn exported(elf: &[u8]) -> Result<Vec<String>, TargetError> {
+    let malformed = |error: object::Error| TargetError::MalformedImage {
+        text: error.to_string(),
+    };
+    let file = object::File::parse(elf).map_err(malformed)?;
+    let mut names = Vec::new();
+    for symbol in file
+        .dynamic_symbols()
+        .filter(|symbol| symbol.is_definition())
+    {
+        names.push(symbol.name().map_err(malformed)?.to_owned());
+    }
+    names.sort();
+    Ok(names)
+}

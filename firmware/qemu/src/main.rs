@@ -113,7 +113,7 @@ fn read_config() -> Result<Config, Exit> {
         return Err(Exit::ConfigSize);
     }
     let words = words.first_chunk().ok_or(Exit::ConfigSize)?;
-    Config::from_words(words).map_err(|_| Exit::ConfigRefused)
+    Config::from_words(words).map_err(|error| Exit::ConfigRefused(error.word as u32))
 }
 
 /// One step with its instructions and its stack, bytes. In a frame of its own, so that the stack pointer

@@ -8,31 +8,46 @@ use cortex_m_semihosting::{nr, syscall};
 
 /// Why the run ended: the emulator's exit status. `codegen/src/target/emulator.rs` of specgen has the words.
 #[derive(Clone, Copy)]
-#[repr(u32)]
 pub enum Exit {
-    /// All ticks ran and all files are written.
-    Done = 0,
-    /// `config.bin` cannot be opened.
-    NoConfig = 10,
-    /// `config.bin` does not hold CONFIG_WORDS words.
-    ConfigSize = 11,
-    /// `Config::from_words` refuses the words.
-    ConfigRefused = 12,
-    /// `input.bin` cannot be opened.
-    NoInput = 13,
-    /// `input.bin` ends within a row.
-    InputSize = 14,
-    /// `output.bin` or `stats.bin` cannot be written.
-    CannotWrite = 15,
-    /// The processor took a fault or an unexpected exception.
-    Fault = 16,
+    /// 0: all ticks ran and all files are written.
+    Done,
+    /// 10: `config.bin` cannot be opened.
+    NoConfig,
+    /// 11: `config.bin` does not hold CONFIG_WORDS words.
+    ConfigSize,
+    /// 12: `input.bin` cannot be opened.
+    NoInput,
+    /// 13: `input.bin` ends within a row.
+    InputSize,
+    /// 14: `output.bin` or `stats.bin` cannot be written.
+    CannotWrite,
+    /// 15: the processor took a fault or an unexpected exception.
+    Fault,
+    /// 64 and more: `Config::from_words` refuses the word of that index, 0 to 63.
+    ConfigRefused(u32),
+}
+
+impl Exit {
+    fn status(self) -> u32 {
+        match self {
+            Self::Done => 0,
+            Self::NoConfig => 10,
+            Self::ConfigSize => 11,
+            Self::NoInput => 12,
+            Self::InputSize => 13,
+            Self::CannotWrite => 14,
+            Self::Fault => 15,
+            // An exit status of the host has eight bits.
+            Self::ConfigRefused(word) => 64 + word % 64,
+        }
+    }
 }
 
 /// Ends the emulator with that exit status.
 pub fn exit(code: Exit) -> ! {
     const SYS_EXIT_EXTENDED: usize = 0x20;
     const APPLICATION_EXIT: u32 = 0x2_0026;
-    let block = [APPLICATION_EXIT, code as u32];
+    let block = [APPLICATION_EXIT, code.status()];
     loop {
         // SAFETY: SYS_EXIT_EXTENDED reads the two words of the block and does not come back.
         unsafe { cortex_m_semihosting::syscall1(SYS_EXIT_EXTENDED, block.as_ptr() as usize) };
