@@ -81,7 +81,7 @@ struct IdentifiedRecords {
 }
 
 fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedRecords, Vec<Diagnostic>> {
-    let options = identify::Options { grid: model.hysteresis.grid, drive: model.actuator.voltage, drift: true };
+    let options = identify::Options::new(model.hysteresis.grid, model.actuator.voltage);
     let mut result =
         IdentifiedRecords { tables: Vec::new(), reports: Vec::new(), findings: Vec::new(), bytes: Vec::new() };
     let mut errors = Vec::new();

@@ -30,6 +30,7 @@ const FIXED: &[(&str, &str)] = &[
     ("runtime/src/memory.rs", include_str!("../../firmware/runtime/src/memory.rs")),
     ("runtime/src/real.rs", include_str!("../../firmware/runtime/src/real.rs")),
     ("host/Cargo.toml", include_str!("../../firmware/host/Cargo.toml")),
+    ("host/build.rs", include_str!("../../firmware/host/build.rs")),
     ("host/src/lib.rs", include_str!("../../firmware/host/src/lib.rs")),
     ("qemu/Cargo.lock", include_str!("../../firmware/qemu/Cargo.lock")),
     ("qemu/Cargo.toml", include_str!("../../firmware/qemu/Cargo.toml")),

@@ -29,7 +29,7 @@ pub fn describe(compiled: &Compiled) -> String {
     let mut text = String::new();
     for (name, report) in compiled.model.hysteresis.records.iter().zip(&compiled.records) {
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "  record {name}: {}", report.summary());
+        let _ = writeln!(text, "  record {name}: {}", super::identify::summary(report));
     }
     let margins = &compiled.margins;
     if let (Some(limit), Some(largest)) = (margins.static_gain_limit, margins.largest_level_weight) {

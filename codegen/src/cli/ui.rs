@@ -23,8 +23,8 @@ pub enum Failure {
     Write(WriteError),
     /// A tool is missing or failed.
     Target(TargetError),
-    /// The simulator failed.
-    Sim(String),
+    /// The file system or the simulator said no.
+    Environment(String),
 }
 
 impl From<Refused> for Failure {
@@ -106,7 +106,7 @@ impl Ui {
             Failure::Write(error @ WriteError::Occupied { .. }) => (1, error.to_string()),
             Failure::Write(error) => (3, error.to_string()),
             Failure::Target(error) => (3, error.to_string()),
-            Failure::Sim(text) => (3, text.clone()),
+            Failure::Environment(text) => (3, text.clone()),
         };
         if self.json {
             self.document(code, Value::Null, Some(&message));
