@@ -10,7 +10,7 @@
 //! Nothing here knows TOML, the IR or the control law; the words it moves are opaque.
 
 pub mod build;
-mod callgraph;
+pub mod callgraph;
 pub mod emulator;
 pub mod error;
 pub mod host;
@@ -19,6 +19,7 @@ mod process;
 pub mod provision;
 pub mod replay;
 pub mod stack;
+mod thumb;
 pub mod toolchain;
 
 pub use build::{Image, build_image};

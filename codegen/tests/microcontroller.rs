@@ -2,6 +2,8 @@
 //!
 //! Needs a cross compiler and QEMU; without them it fails, or skips if `SPECGEN_ALLOW_MISSING=1`.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
 #[path = "microcontroller/fixture.rs"]
 mod fixture;
 
@@ -135,6 +137,24 @@ fn the_painted_stack_meets_the_static_bound_of_a_deep_call() {
 }
 
 #[test]
+fn frames_read_from_instructions_are_those_of_the_compiler() {
+    let Some(tools) = tools() else { return };
+    let workspace = Workspace::new(&tools, "", "-0.0");
+    for mcu in [Mcu::Mps2An500, Mcu::Mps2An386] {
+        let graph = target::callgraph::CallGraph::read(&build(&workspace, mcu).elf).unwrap();
+        let said: Vec<_> = graph
+            .functions
+            .values()
+            .filter(|f| f.from_compiler)
+            .collect();
+        assert!(said.len() >= 5, "{said:?}");
+        for function in said {
+            assert_eq!(function.frame, function.pushed, "{mcu:?} {function:?}");
+        }
+    }
+}
+
+#[test]
 fn what_no_bound_can_follow_is_reported() {
     let Some(tools) = tools() else { return };
     let items = "
@@ -144,7 +164,7 @@ fn what_no_bound_can_follow_is_reported() {
             let table: [fn(u32) -> u32; 2] = core::hint::black_box([even, odd]);
             table[n as usize & 1](n) as f64
         }
-        core::arch::global_asm!(\".thumb_func\", \".type bare,%function\", \".globl bare\", \"bare: bx lr\", \".size bare, . - bare\");
+        core::arch::global_asm!(\".thumb_func\", \".type bare,%function\", \".globl bare\", \"bare: mov r3, sp; mov sp, r3; bx lr\", \".size bare, . - bare\");
         unsafe extern \"C\" { fn bare(); }";
     let extra = "{ unsafe { bare() }; even(7) as f64 + either(input.setpoint[0] as u32) }";
     let image = build(&Workspace::new(&tools, items, extra), Mcu::Mps2An500);

@@ -1,3 +1,41 @@
-//! Developer commands.
+//! Developer commands: `cargo xtask setup`, `cargo xtask test`, `cargo xtask bless`.
 
-fn main() {}
+mod generated;
+mod run;
+mod setup;
+mod steps;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+const USAGE: &str = "usage: cargo xtask COMMAND
+
+  setup   installs what the tests need: a cross compiler for Cortex-M and QEMU
+  test    setup, then formatting, lints, every test, documentation, freshness of generated files
+  bless   writes the generated files that are committed anew
+
+With SPECGEN_ALLOW_MISSING=1, what needs a tool that cannot be installed is skipped, and said so.";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match words[..] {
+        ["setup"] => steps::setup(),
+        ["test"] => steps::test(&root()),
+        ["bless"] => steps::bless(&root()),
+        ["help" | "--help" | "-h"] => {
+            println!("{USAGE}");
+            ExitCode::SUCCESS
+        }
+        _ => {
+            eprintln!("{USAGE}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// The repository: this crate stands directly below it.
+fn root() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here).to_owned()
+}

@@ -1,9 +1,10 @@
 //! Who calls whom in a linked Thumb-2 image, read from its instructions.
 //!
-//! The branches themselves are decoded (ARM DDI 0403, A7.7), so that neither relocations nor a disassembler
-//! is needed; mapping symbols tell code from data. What cannot be followed is kept, never dropped.
+//! The branches themselves are decoded, so that neither relocations nor a disassembler is needed; mapping
+//! symbols tell code from data. What cannot be followed is kept, never dropped.
 
 use super::error::TargetError;
+use super::thumb::{self, Branch};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,8 +15,12 @@ pub struct Function {
     pub name: String,
     /// Bytes of code and literals.
     pub size: u64,
-    /// Bytes of stack that it takes for itself, as the compiler says; `None` for assembly.
+    /// Bytes of stack that it takes for itself: as the compiler says, else as its instructions say, else unknown.
     pub frame: Option<u64>,
+    /// Whether [`Function::frame`] is what the compiler says.
+    pub from_compiler: bool,
+    /// The frame from its instructions alone.
+    pub pushed: Option<u64>,
     /// Addresses of the functions that it calls or ends in.
     pub calls: BTreeSet<u64>,
     /// Addresses of calls and jumps through a register.
@@ -79,16 +84,22 @@ impl CallGraph {
                 next.min(section_end) - address
             };
             let length = usize::try_from(size).unwrap_or(usize::MAX).min(code.len());
+            let instructions = thumb::decode(address, &code[..length], &marks);
+            let pushed = thumb::frame(&instructions);
             let mut function = Function {
                 name: aliases.first().cloned().unwrap_or_default(),
                 size,
-                frame: frames.get(&address).copied(),
+                frame: frames.get(&address).copied().or(pushed),
+                from_compiler: frames.contains_key(&address),
+                pushed,
                 calls: BTreeSet::new(),
                 indirect: Vec::new(),
                 strays: Vec::new(),
             };
-            for (place, branch) in branches(address, &code[..length], &marks) {
-                function.add(place, branch, address..address + size, &names);
+            for instruction in &instructions {
+                if let Some(branch) = instruction.branch() {
+                    function.add(instruction.place, branch, address..address + size, &names);
+                }
             }
             functions.insert(address, function);
         }
@@ -180,147 +191,9 @@ fn uleb128(data: &[u8]) -> Option<(u64, &[u8])> {
     None
 }
 
-/// A way out of the straight line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Branch {
-    Call(u64),
-    Jump(u64),
-    Register,
-}
-
-/// Branches of the code that stands at `address`, each with its own address.
-fn branches(address: u64, code: &[u8], marks: &BTreeMap<u64, bool>) -> Vec<(u64, Branch)> {
-    let half = |at: usize| {
-        code.get(at..at + 2)
-            .map(|b| u16::from_le_bytes([b[0], b[1]]))
-    };
-    let mut found = Vec::new();
-    let mut at = 0;
-    while let Some(first) = half(at) {
-        let place = address + at as u64;
-        // Code unless the last mark at or before here says data.
-        if marks
-            .range(..=place)
-            .next_back()
-            .is_some_and(|(_, &is_code)| !is_code)
-        {
-            at += 2;
-            continue;
-        }
-        if first >> 11 < 0b11101 {
-            found.extend(narrow(place, first).map(|branch| (place, branch)));
-            at += 2;
-        } else {
-            found.extend(
-                half(at + 2)
-                    .and_then(|second| wide(place, first, second))
-                    .map(|branch| (place, branch)),
-            );
-            at += 4;
-        }
-    }
-    found
-}
-
-/// A 16-bit instruction.
-fn narrow(place: u64, op: u16) -> Option<Branch> {
-    const LINK_REGISTER: u16 = 14;
-    let register = (op >> 3) & 0xf;
-    match op {
-        // BLX rM; BX rM except BX LR, a return; MOV PC, rM.
-        _ if op & 0xff87 == 0x4780 => Some(Branch::Register),
-        _ if op & 0xff87 == 0x4700 && register != LINK_REGISTER => Some(Branch::Register),
-        _ if op & 0xff87 == 0x4687 && register != LINK_REGISTER => Some(Branch::Register),
-        // B<cond>, conditions 14 and 15 are UDF and SVC.
-        _ if op >> 12 == 0b1101 && (op >> 8) & 0xf < 14 => {
-            Some(Branch::Jump(target(place, u32::from(op & 0xff) << 1, 9)))
-        }
-        _ if op >> 11 == 0b11100 => {
-            Some(Branch::Jump(target(place, u32::from(op & 0x7ff) << 1, 12)))
-        }
-        _ => None,
-    }
-}
-
-/// A 32-bit instruction.
-fn wide(place: u64, first: u16, second: u16) -> Option<Branch> {
-    let (high, low) = (u32::from(first), u32::from(second));
-    if first >> 11 == 0b11110 && second >> 15 == 1 {
-        let (sign, j1, j2) = ((high >> 10) & 1, (low >> 13) & 1, (low >> 11) & 1);
-        let far = (sign << 24)
-            | ((j1 ^ sign ^ 1) << 23)
-            | ((j2 ^ sign ^ 1) << 22)
-            | ((high & 0x3ff) << 12)
-            | ((low & 0x7ff) << 1);
-        let near =
-            (sign << 20) | (j2 << 19) | (j1 << 18) | ((high & 0x3f) << 12) | ((low & 0x7ff) << 1);
-        return match second & 0x5000 {
-            // BL, and BLX to ARM code, whose target is a multiple of four.
-            0x5000 => Some(Branch::Call(target(place, far, 25))),
-            0x4000 => Some(Branch::Call(target(place, far, 25) & !3)),
-            0x1000 => Some(Branch::Jump(target(place, far, 25))),
-            _ if (first >> 6) & 0xf < 14 => Some(Branch::Jump(target(place, near, 21))),
-            _ => None,
-        };
-    }
-    // LDR PC, [...] except from the stack, which is a return.
-    let loads_pc = first & 0xff70 == 0xf850 && second >> 12 == 15;
-    (loads_pc && first & 0xf != 13).then_some(Branch::Register)
-}
-
-/// Target of a branch whose offset has so many bits; the program counter reads as four bytes ahead.
-fn target(place: u64, offset: u32, bits: u32) -> u64 {
-    let shift = 32 - bits;
-    let offset = (offset << shift).cast_signed() >> shift;
-    place.wrapping_add(4).wrapping_add_signed(i64::from(offset))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Encodings as GNU `as` prints them for code at 0x1000.
-    #[test]
-    fn branches_are_decoded() {
-        let decode = |bytes: &[u8]| branches(0x1000, bytes, &BTreeMap::new());
-        // bl 0x1000 + 4 - 8 (itself minus four): f7ff fffc
-        assert_eq!(
-            decode(&[0xff, 0xf7, 0xfc, 0xff]),
-            [(0x1000, Branch::Call(0x0ffc))]
-        );
-        // b.w .+0x1000: f000 bffe
-        assert_eq!(
-            decode(&[0x00, 0xf0, 0xfe, 0xbf]),
-            [(0x1000, Branch::Jump(0x2000))]
-        );
-        // beq.w .+0x104: f000 8080
-        assert_eq!(
-            decode(&[0x00, 0xf0, 0x80, 0x80]),
-            [(0x1000, Branch::Jump(0x1104))]
-        );
-        // b . : e7fe; beq . : d0fe
-        assert_eq!(decode(&[0xfe, 0xe7]), [(0x1000, Branch::Jump(0x1000))]);
-        assert_eq!(decode(&[0xfe, 0xd0]), [(0x1000, Branch::Jump(0x1000))]);
-        // blx r3; bx r2; bx lr; ldr pc, [sp], #4; ldr.w pc, [r0]
-        assert_eq!(decode(&[0x98, 0x47]), [(0x1000, Branch::Register)]);
-        assert_eq!(decode(&[0x10, 0x47]), [(0x1000, Branch::Register)]);
-        assert_eq!(decode(&[0x70, 0x47]), []);
-        assert_eq!(decode(&[0x5d, 0xf8, 0x04, 0xfb]), []);
-        assert_eq!(
-            decode(&[0xd0, 0xf8, 0x00, 0xf0]),
-            [(0x1000, Branch::Register)]
-        );
-    }
-
-    #[test]
-    fn data_between_code_is_not_decoded() {
-        let marks = BTreeMap::from([(0x1000, true), (0x1002, false), (0x1004, true)]);
-        let code = [0x98, 0x47, 0x98, 0x47, 0x98, 0x47];
-        assert_eq!(
-            branches(0x1000, &code, &marks),
-            [(0x1000, Branch::Register), (0x1004, Branch::Register)]
-        );
-    }
 
     #[test]
     fn uleb128_reads_several_bytes_and_refuses_a_cut_one() {

@@ -1,6 +1,7 @@
 //! Static bound of the stack that one call of `controller::step` can use.
 //!
-//! Sum of the frames along the deepest path of the call graph, from the compiler's own `.stack_sizes`.
+//! Sum of the frames along the deepest path of the call graph. A frame is what the compiler's `.stack_sizes`
+//! says; for assembly and precompiled libraries, which have none, what the instructions push.
 //! The bound holds only if [`StackBound::is_complete`]; what stands against it is listed, not ignored.
 //! Interrupts come on top: 8 words each, 26 with the FPU.
 
@@ -24,7 +25,7 @@ pub struct StackBound {
     pub recursion: Vec<Vec<String>>,
     /// Functions that call or jump through a register.
     pub indirect: Vec<String>,
-    /// Functions whose frame is unknown (assembly, or a precompiled library); counted as 0.
+    /// Functions that move the stack pointer by what only a run can tell; their frame counts as 0.
     pub unsized_functions: Vec<String>,
     /// Functions that branch to what is no function.
     pub strays: Vec<String>,

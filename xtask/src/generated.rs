@@ -1,0 +1,183 @@
+//! Committed files that a program writes: checked to be what it would write today, or written anew.
+
+use crate::run::Outcome;
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+/// Files by path relative to [`Generated::folder`], with `/` between the parts.
+pub type Files = BTreeMap<String, String>;
+
+/// A folder whose every file is generated.
+pub struct Generated {
+    /// Relative to the repository.
+    pub folder: &'static str,
+    /// What it ought to hold, given the repository; or what stands against generating it.
+    pub make: fn(&Path) -> Result<Files, String>,
+}
+
+/// All of them. `cargo xtask test` compares, `cargo xtask bless` writes.
+const GENERATED: &[Generated] = &[];
+
+/// Compares every folder with what would be generated.
+pub fn check(root: &Path) -> Outcome {
+    let stale = match all(root, GENERATED, differences) {
+        Ok(stale) => stale,
+        Err(why) => return Outcome::Failed(why),
+    };
+    if stale.is_empty() {
+        return Outcome::Passed;
+    }
+    for line in &stale {
+        println!("{line}");
+    }
+    Outcome::Failed(format!(
+        "{} files differ; run: cargo xtask bless",
+        stale.len()
+    ))
+}
+
+/// Writes every folder anew.
+pub fn bless(root: &Path) -> Outcome {
+    match all(root, GENERATED, replace) {
+        Ok(written) => {
+            for line in &written {
+                println!("{line}");
+            }
+            Outcome::Passed
+        }
+        Err(why) => Outcome::Failed(why),
+    }
+}
+
+/// Generates each folder and hands it to `act`; gathers what that says.
+fn all(
+    root: &Path,
+    list: &[Generated],
+    act: fn(&Path, &str, &Files) -> io::Result<Vec<String>>,
+) -> Result<Vec<String>, String> {
+    let mut lines = Vec::new();
+    for generated in list {
+        let files = (generated.make)(root).map_err(|why| format!("{}: {why}", generated.folder))?;
+        lines.extend(
+            act(root, generated.folder, &files)
+                .map_err(|error| format!("{}: {error}", generated.folder))?,
+        );
+    }
+    Ok(lines)
+}
+
+/// One line per file that is missing, has another text, or should not be there.
+fn differences(root: &Path, folder: &str, files: &Files) -> io::Result<Vec<String>> {
+    let mut lines = Vec::new();
+    let mut present = committed(&root.join(folder))?;
+    for (path, text) in files {
+        match present.remove(path) {
+            None => lines.push(format!("missing: {folder}/{path}")),
+            Some(found) if found != text.as_bytes() => {
+                lines.push(format!(
+                    "stale: {folder}/{path}, first in line {}",
+                    first_difference(&found, text)
+                ));
+            }
+            Some(_) => {}
+        }
+    }
+    lines.extend(
+        present
+            .keys()
+            .map(|path| format!("not generated: {folder}/{path}")),
+    );
+    Ok(lines)
+}
+
+/// Makes the folder hold exactly these files; one line per change.
+fn replace(root: &Path, folder: &str, files: &Files) -> io::Result<Vec<String>> {
+    let lines = differences(root, folder, files)?;
+    let base = root.join(folder);
+    for path in committed(&base)?
+        .keys()
+        .filter(|path| !files.contains_key(*path))
+    {
+        fs::remove_file(base.join(path))?;
+    }
+    for (path, text) in files {
+        let file = base.join(path);
+        if let Some(parent) = file.parent() {
+            fs::create_dir_all(parent)?;
+        }
+        fs::write(file, text)?;
+    }
+    Ok(lines)
+}
+
+/// Number of the first line that differs, counted from 1.
+fn first_difference(found: &[u8], text: &str) -> usize {
+    let same = found
+        .iter()
+        .zip(text.as_bytes())
+        .take_while(|(a, b)| a == b)
+        .count();
+    text.as_bytes()
+        .iter()
+        .take(same)
+        .filter(|&&byte| byte == b'\n')
+        .count()
+        + 1
+}
+
+/// Files below `folder` as they stand, without cargo's `target`; empty if there is no such folder.
+fn committed(folder: &Path) -> io::Result<BTreeMap<String, Vec<u8>>> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![(folder.to_owned(), String::new())];
+    while let Some((path, prefix)) = open.pop() {
+        let entries = match fs::read_dir(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            entries => entries?,
+        };
+        for entry in entries {
+            let entry = entry?;
+            let name = format!("{prefix}{}", entry.file_name().display());
+            if !entry.file_type()?.is_dir() {
+                found.insert(name, fs::read(entry.path())?);
+            } else if entry.file_name() != "target" {
+                open.push((entry.path(), format!("{name}/")));
+            }
+        }
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_of_difference_is_found_and_blessing_mends_it() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("made");
+        fs::create_dir_all(folder.join("src")).unwrap();
+        fs::write(folder.join("src/same.rs"), "a\n").unwrap();
+        fs::write(folder.join("src/stale.rs"), "a\nb\nc\n").unwrap();
+        fs::write(folder.join("extra.rs"), "").unwrap();
+        let files: Files = [
+            ("src/same.rs", "a\n"),
+            ("src/stale.rs", "a\nb\nd\n"),
+            ("new/missing.rs", "x"),
+        ]
+        .map(|(path, text)| (path.to_owned(), text.to_owned()))
+        .into();
+
+        let found = differences(root.path(), "made", &files).unwrap();
+        let expected = [
+            "missing: made/new/missing.rs",
+            "stale: made/src/stale.rs, first in line 3",
+            "not generated: made/extra.rs",
+        ];
+        assert_eq!(found, expected);
+        assert_eq!(replace(root.path(), "made", &files).unwrap(), expected);
+        assert_eq!(differences(root.path(), "made", &files).unwrap(), [""; 0]);
+        assert!(!folder.join("extra.rs").exists());
+    }
+}

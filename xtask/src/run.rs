@@ -1,0 +1,72 @@
+//! Runs cargo, and keeps the list of what was done and how it went.
+
+use std::path::Path;
+use std::process::{Command, ExitCode};
+use std::time::{Duration, Instant};
+
+/// How a step ended.
+pub enum Outcome {
+    /// As it should.
+    Passed,
+    /// It could not be run, which was allowed; why.
+    Skipped(String),
+    /// What went wrong and how to mend it.
+    Failed(String),
+}
+
+/// Steps done so far.
+#[derive(Default)]
+pub struct Report {
+    steps: Vec<(String, Outcome, Duration)>,
+}
+
+impl Report {
+    /// Does a step, in view. Later steps are done whether or not it passes.
+    pub fn step(&mut self, name: &str, work: impl FnOnce() -> Outcome) {
+        println!("\n=== {name}");
+        let start = Instant::now();
+        let outcome = work();
+        self.steps.push((name.to_owned(), outcome, start.elapsed()));
+    }
+
+    /// Whether a step failed.
+    pub fn has_failed(&self) -> bool {
+        self.steps
+            .iter()
+            .any(|(_, outcome, _)| matches!(outcome, Outcome::Failed(_)))
+    }
+
+    /// Prints one line per step; fails if one failed.
+    pub fn finish(self) -> ExitCode {
+        println!("\n=== summary");
+        for (name, outcome, took) in &self.steps {
+            let (word, detail) = match outcome {
+                Outcome::Passed => ("ok", ""),
+                Outcome::Skipped(why) => ("SKIPPED", why.as_str()),
+                Outcome::Failed(why) => ("FAILED", why.as_str()),
+            };
+            println!("{word:8}{name:28}{:6.1} s  {detail}", took.as_secs_f64());
+        }
+        if self.has_failed() {
+            ExitCode::FAILURE
+        } else {
+            ExitCode::SUCCESS
+        }
+    }
+}
+
+/// Cargo in the repository, the one that runs this.
+pub fn cargo(root: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root).args(arguments);
+    command
+}
+
+/// Runs it in view; `mend` says what to do if it fails.
+pub fn expect_success(mut command: Command, mend: &str) -> Outcome {
+    match command.status() {
+        Ok(status) if status.success() => Outcome::Passed,
+        Ok(status) => Outcome::Failed(format!("{status}; {mend}")),
+        Err(error) => Outcome::Failed(format!("{}: {error}", command.get_program().display())),
+    }
+}

@@ -1,0 +1,52 @@
+//! What has to be on the machine before anything can be tested.
+
+use crate::run::Outcome;
+use specgen::target;
+use std::process::{Command, Stdio};
+
+/// The cross compiler and QEMU, installed if need be.
+pub fn microcontroller() -> Outcome {
+    match target::provision::provision(&mut |line| println!("{line}")) {
+        Ok(_) => Outcome::Passed,
+        Err(error) => missing(format!("{error}")),
+    }
+}
+
+/// A part of the Rust toolchain that comes on its own, such as `clippy`; installed if need be.
+pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
+    let works = || {
+        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+        let mut command = Command::new(cargo);
+        command
+            .args([subcommand, "--version"])
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        command.status().is_ok_and(|status| status.success())
+    };
+    if works() {
+        return Ok(());
+    }
+    println!("running: rustup component add {name}");
+    // Whether it helped is asked of cargo itself.
+    let _ = Command::new("rustup")
+        .args(["component", "add", name])
+        .status();
+    if works() {
+        return Ok(());
+    }
+    Err(missing(format!(
+        "{name} is not installed; install it with: rustup component add {name}"
+    )))
+}
+
+/// A failure, unless the user allows that something is missing.
+fn missing(why: String) -> Outcome {
+    if std::env::var_os(target::ALLOW_MISSING).is_some_and(|value| value == "1") {
+        Outcome::Skipped(why)
+    } else {
+        Outcome::Failed(format!(
+            "{why}   ({}=1 skips what needs it)",
+            target::ALLOW_MISSING
+        ))
+    }
+}
