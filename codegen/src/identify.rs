@@ -86,7 +86,9 @@ pub struct Identified {
 const AT_MINIMUM: f64 = 0.002;
 /// A turn of the drive is a reversal when it goes back by this many grid intervals.
 const REVERSAL: f64 = 0.5;
-/// The falls alone are fitted if they excite at least this share of the cells that all branches excite.
+/// A record counts as first-order reversal curves if at least this share of its rises starts in saturation.
+const FIRST_ORDER: f64 = 0.9;
+/// Of such a record the falls alone are fitted if they excite at least this share of the cells that all branches excite.
 const FALLS_SUFFICE: f64 = 0.99;
 /// A residual above this share of the range means that the model does not hold.
 const POOR_FIT_PERCENT: f64 = 3.0;
@@ -193,6 +195,8 @@ struct Used {
     first: usize,
     branches: Vec<Branch>,
     curves: usize,
+    /// Whether the record consists of first-order reversal curves.
+    first_order: bool,
 }
 
 fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<Used> {
@@ -204,16 +208,26 @@ fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<Use
     };
     let branches = branches::branches(&record.drive, first, REVERSAL * plane.interval());
     let curves = coverage::check_curves(&branches, plane, findings);
-    if findings.any_error() { None } else { Some(Used { first, branches, curves }) }
+    if findings.any_error() {
+        return None;
+    }
+    let rises = branches.iter().filter(|b| b.rising);
+    let from_saturation = rises.clone().filter(|b| record.drive[b.first] <= plane.range[0] + tolerance).count();
+    let first_order = from_saturation as f64 >= FIRST_ORDER * rises.count() as f64;
+    Some(Used { first, branches, curves, first_order })
 }
 
-/// Normal equations over the falls if they excite the plane as well as all branches do, else over all branches.
+/// Normal equations over the falls of first-order reversal curves, if they excite the plane as well as all branches do,
+/// else over all branches: in other records it takes the rises to tell apart cells that only switch off together.
 fn select(plane: &Plane, record: &Record, used: &Used, target: Vec<f64>) -> (Normal, Branches, Vec<bool>) {
     let falls: Vec<Branch> = used.branches.iter().copied().filter(|b| !b.rising).collect();
     let targets = [target];
     let all = normal::accumulate(plane, record, used.first, &used.branches, &targets);
-    let descending = normal::accumulate(plane, record, used.first, &falls, &targets);
     let excited_by_all = coverage::excited(all.gram.diagonal().iter().copied());
+    if !used.first_order {
+        return (all, Branches::All, excited_by_all);
+    }
+    let descending = normal::accumulate(plane, record, used.first, &falls, &targets);
     let excited_by_falls = coverage::excited(descending.gram.diagonal().iter().copied());
     if share(&excited_by_falls) >= FALLS_SUFFICE * share(&excited_by_all) {
         (descending, Branches::Descending, excited_by_falls)

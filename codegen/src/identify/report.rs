@@ -8,7 +8,8 @@ use serde::Serialize;
 pub enum Branches {
     /// Falls from a reversal only: by definition E(up, down) is the displacement lost in them.
     Descending,
-    /// Rises and falls: the falls alone do not excite every cell that the record excites.
+    /// Rises and falls: the record holds more than first-order reversal curves, or its falls alone do not excite
+    /// every cell that it excites.
     All,
 }
 

@@ -47,6 +47,8 @@ pub struct Validation {
     pub record: String,
     /// Samples at the beginning, before the drive first moves, that are not compared.
     pub samples_skipped: usize,
+    /// Samples behind a jump of the drive that are not compared: the actuator is still ringing.
+    pub samples_after_jumps: usize,
     /// Samples compared.
     pub samples: usize,
     /// Of the compared displacement, m.
@@ -59,13 +61,18 @@ pub struct Validation {
     pub starts: Vec<StartResult>,
 }
 
+/// A step between two samples by this share of the drive range is a jump, which a rate-independent model cannot follow.
+const JUMP: f64 = 0.1;
+/// Samples that are not compared from a jump on.
+const SETTLING: usize = 200;
 /// Swings of a demagnetisation.
 const SWINGS: u32 = 100;
 
 /// Runs the table forward over `record`, with `dead_time` (s) taken from the identification's report.
 ///
 /// The state at the start is unknown: three histories are tried, all results are given, the best one is named.
-/// Samples before the drive first moves are skipped: they say nothing about hysteresis.
+/// Samples before the drive first moves are skipped: they say nothing about hysteresis. So are 200 samples from each
+/// jump of the drive by more than 10 % of the table's range in one sampling interval.
 ///
 /// # Errors
 /// If the drive of the record never moves, or leaves the range of the table by more than 2 %.
@@ -86,17 +93,19 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
         return Err(findings.into_diagnostics());
     };
     let displacement = dead_time::delayed(record, dead_time);
-    let (bottom, top) = sanity::extent(&displacement[first..]);
+    let compared = compared(&record.drive, first, JUMP * (plane.range[1] - plane.range[0]));
+    let time: Vec<f64> = compared.iter().map(|&k| record.time[k]).collect();
+    let (bottom, top) = sanity::extent(&compared.iter().map(|&k| displacement[k]).collect::<Vec<_>>());
     let range = top - bottom;
     let run = |start: Start| {
-        let mut errors = Vec::with_capacity(displacement.len() - first);
+        let mut all = Vec::with_capacity(displacement.len() - first);
         let memory = history(start, &plane, record.drive[first]);
         normal::each_row_from(memory, &plane, &record.drive, first, |k, row| {
-            errors.push(displacement[k] - regressor::evaluate(row, &table.nodes));
+            all.push(displacement[k] - regressor::evaluate(row, &table.nodes));
         });
-        let time = &record.time[first..];
-        let line = Line::fit(time, &errors);
-        for (e, t) in errors.iter_mut().zip(time) {
+        let mut errors: Vec<f64> = compared.iter().map(|&k| all[k - first]).collect();
+        let line = Line::fit(&time, &errors);
+        for (e, t) in errors.iter_mut().zip(&time) {
             *e -= line.at(*t);
         }
         let (rms, max) = rms_and_max(&errors);
@@ -108,12 +117,28 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
     Ok(Validation {
         record: record.shown_as.clone(),
         samples_skipped: first,
-        samples: record.time.len() - first,
+        samples_after_jumps: record.time.len() - first - compared.len(),
+        samples: compared.len(),
         displacement_range: range,
         dead_time,
         best,
         starts: starts.to_vec(),
     })
+}
+
+/// Samples from `first` on, without those that follow a step of the drive of more than `jump` (V).
+fn compared(drive: &[f64], first: usize, jump: f64) -> Vec<usize> {
+    let mut settled = first;
+    let mut compared = Vec::with_capacity(drive.len() - first);
+    for k in first..drive.len() {
+        if k > first && (drive[k] - drive[k - 1]).abs() > jump {
+            settled = k + SETTLING;
+        }
+        if k >= settled {
+            compared.push(k);
+        }
+    }
+    compared
 }
 
 /// Memory after the assumed history, with the drive at `drive` (V).
