@@ -52,6 +52,8 @@ enum Command {
     Sim(sim::Arguments),
     /// Identify the Everett table of a leg from a reversal-curve record.
     Identify(identify::Arguments),
+    /// Simulate the reversal-curve experiment that `identify` needs, on the reference leg or another.
+    Forc(sim::ForcArguments),
     /// Print the intermediate representation of a spec: every constant of its controller.
     DumpIr {
         /// The spec file.
@@ -69,6 +71,7 @@ pub fn run() -> ExitCode {
         Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
         Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
+        Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
         Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),
     };
     match done {

@@ -5,6 +5,7 @@
 //! ```
 //! Each phase is a module, and data flows one way. ARCHITECTURE.md has the invariants.
 
+pub mod cli;
 pub mod compile;
 pub mod diagnostic;
 pub mod everett;
@@ -16,4 +17,5 @@ pub mod model;
 pub mod spec;
 pub mod stability;
 pub mod target;
+pub mod verify;
 pub mod workspace;

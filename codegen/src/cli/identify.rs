@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Ui, write_file};
 use crate::compile::Refused;
 use crate::diagnostic::Diagnostic;
 use crate::identify::{self, Options, Report, Validation};
@@ -54,7 +54,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         None => None,
     };
     if let Some(output) = &arguments.output {
-        write_new(output, &identify::write_table_csv(&identified.table))?;
+        write_file(output, identify::write_table_csv(&identified.table).as_bytes())?;
     }
     let mut text = format!("{shown}: {}\n", summary(&identified.report));
     if let Some(validation) = &validation {
@@ -83,19 +83,6 @@ fn validate(path: &Path, identified: &identify::Identified) -> Result<Validation
 
 fn refused(findings: Vec<Diagnostic>) -> Failure {
     Failure::from(Refused { source: None, findings })
-}
-
-/// Writes beside the target and renames, so that a failure leaves no half file.
-fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
-    let failed = |error: std::io::Error| Failure::Environment(format!("could not write `{}`: {error}", path.display()));
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    std::io::Write::write_all(&mut file, text.as_bytes()).map_err(failed)?;
-    file.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
 }
 
 /// A report in one line.

@@ -1,6 +1,7 @@
 //! What the user sees: results on standard output, findings and progress on standard error.
 
 use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
@@ -69,8 +70,13 @@ impl Ui {
         if findings.is_empty() {
             return;
         }
+        // Findings about data files need no spec to point into.
+        let nothing = SpecSource { display_name: String::new(), text: String::new(), dir: PathBuf::new() };
+        let source = source.unwrap_or(&nothing);
         if self.json {
-            self.findings.extend(diagnostic::to_json(findings, source));
+            if let Value::Array(list) = diagnostic::to_json(findings, source) {
+                self.findings.extend(list);
+            }
         } else {
             let color = std::io::stderr().is_terminal();
             anstream::eprint!("{}", diagnostic::render(findings, source, color));
@@ -126,4 +132,17 @@ impl Ui {
         });
         self.out(&format!("{document:#}\n"));
     }
+}
+
+/// Writes beside the target and renames, so that a failure leaves no half file.
+pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let failed = |error: std::io::Error| Failure::Environment(format!("could not write `{}`: {error}", path.display()));
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
+    file.write_all(bytes).map_err(failed)?;
+    file.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
 }
