@@ -223,12 +223,12 @@ fn select(plane: &Plane, record: &Record, used: &Used, target: Vec<f64>) -> (Nor
     let falls: Vec<Branch> = used.branches.iter().copied().filter(|b| !b.rising).collect();
     let targets = [target];
     let all = normal::accumulate(plane, record, used.first, &used.branches, &targets);
-    let excited_by_all = coverage::excited(all.gram.diagonal().iter().copied());
+    let excited_by_all = coverage::excited(plane, &all.gram);
     if !used.first_order {
         return (all, Branches::All, excited_by_all);
     }
     let descending = normal::accumulate(plane, record, used.first, &falls, &targets);
-    let excited_by_falls = coverage::excited(descending.gram.diagonal().iter().copied());
+    let excited_by_falls = coverage::excited(plane, &descending.gram);
     if share(&excited_by_falls) >= FALLS_SUFFICE * share(&excited_by_all) {
         (descending, Branches::Descending, excited_by_falls)
     } else {

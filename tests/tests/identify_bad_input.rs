@@ -192,16 +192,15 @@ fn records_that_do_not_cover_the_plane() {
 
 #[test]
 fn a_part_of_the_plane_that_no_curve_enters_is_named() {
-    // Reversals at 25 V, then only at 75 V and above: the cells between are never separated from each other by a reversal,
-    // and none of the small loops at the top goes below 50 V but the last.
-    let drive = [25.0, 75.0, 80.0, 90.0, 100.0].iter().fold(Drive::at(0.0, 100.0), |d, top| d.ramp(*top, 50.0).ramp(50.0, 50.0));
-    let drive = drive.ramp(0.0, 50.0).ramp(100.0, 50.0);
+    // No reversal between 25 V and 75 V: cells in that band of up_thresholds always switch off together.
+    let drive = [6.25, 12.5, 18.75, 25.0, 75.0, 81.25, 87.5, 93.75, 100.0];
+    let drive = drive.iter().fold(Drive::at(0.0, 100.0), |drive, top| drive.ramp(*top, 50.0).ramp(0.0, 50.0));
     let rows: Vec<_> = drive.time().iter().zip(&drive.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
     let record = read(csv(&rows).as_bytes()).unwrap();
-    if let Ok(result) = identify(&record, &Options::new(16, RANGE)) {
-        let shown: Vec<_> = result.warnings.iter().map(|d| format!("{} {}", d.code, d.message)).collect();
-        assert!(result.report.excited_share <= 1.0, "{shown:?}");
-    }
+    let result = identify(&record, &Options::new(16, RANGE)).unwrap();
+    let warning = result.warnings.iter().find(|d| d.code == "W0609").unwrap();
+    assert!(warning.message.contains("up_threshold 25.000 to 75.000 V, down_threshold 0.000 to 68.750 V"), "{}", warning.message);
+    assert!((0.3..0.7).contains(&result.report.excited_share), "{}", result.report.excited_share);
 }
 
 #[test]

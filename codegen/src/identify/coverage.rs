@@ -1,5 +1,7 @@
 //! Does a record excite the plane that the spec declares? Checks that need the drive range and the grid.
 
+use nalgebra::DMatrix;
+
 use super::Options;
 use super::branches::Branch;
 use super::findings::Findings;
@@ -16,7 +18,7 @@ const BEYOND: f64 = 0.02;
 const UNIT_RATIO: f64 = 100.0;
 /// Reversal curves below this number identify nothing.
 const MIN_CURVES: usize = 3;
-/// Σ(φ − φ̄)² of a cell, in samples, from which it counts as excited: it has switched within a branch.
+/// Σ(φ − φ̄)², in samples, from which a cell or a difference of two cells counts as excited.
 const EXCITED: f64 = 0.25;
 
 /// Checks the options and returns the plane.
@@ -80,12 +82,45 @@ pub(crate) fn check_curves(branches: &[Branch], plane: &Plane, findings: &mut Fi
     curves
 }
 
-/// Which cells a Gram matrix over weights excites, from its diagonal.
-pub(crate) fn excited(diagonal: impl Iterator<Item = f64>) -> Vec<bool> {
-    diagonal.map(|energy| energy > EXCITED).collect()
+/// Which cells the record excites: they switch within a branch, and not only together with their neighbours.
+///
+/// `gram` is Σ(φ − φ̄)(φ − φ̄)ᵀ over the weights, so dᵀGd is what the record holds about the combination d of cells.
+/// Tried are single cells, differences of two neighbours, and the mixed difference of four: rises alone tell rows of
+/// cells apart and falls alone columns, and only a reversal between them tells apart the four.
+pub(crate) fn excited(plane: &Plane, gram: &DMatrix<f64>) -> Vec<bool> {
+    let mut excited = vec![true; gram.nrows()];
+    let mut require = |cells: &[(usize, usize)]| {
+        // Signs of the mixed difference: neighbours alternate.
+        let terms: Vec<(usize, f64)> = cells
+            .iter()
+            .filter(|(up, down)| *up <= plane.grid && down < up)
+            .map(|&(up, down)| (EverettTable::index(up, down), if (up + down) % 2 == 0 { 1.0 } else { -1.0 }))
+            .collect();
+        if terms.len() < cells.len() {
+            return;
+        }
+        let mut energy = 0.0;
+        for &(a, sign_a) in &terms {
+            for &(b, sign_b) in &terms {
+                energy += sign_a * sign_b * gram[(a, b)];
+            }
+        }
+        if energy <= EXCITED {
+            terms.iter().for_each(|&(cell, _)| excited[cell] = false);
+        }
+    };
+    for up in 1..=plane.grid {
+        for down in 0..up {
+            require(&[(up, down)]);
+            require(&[(up, down), (up + 1, down)]);
+            require(&[(up, down), (up, down + 1)]);
+            require(&[(up, down), (up + 1, down), (up, down + 1), (up + 1, down + 1)]);
+        }
+    }
+    excited
 }
 
-/// Warns of cells that were never excited and names the part of the plane they lie in.
+/// Warns of cells that were not [`excited`] and names the part of the plane they lie in.
 pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Findings) {
     let missing = excited.iter().filter(|e| !**e).count();
     if missing == 0 {
@@ -100,7 +135,7 @@ pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Find
         }
     }
     let message = format!(
-        "{missing} of {} cells of the plane were never excited (up_threshold {:.3} to {:.3} V, down_threshold {:.3} to {:.3} V); their weights are interpolated",
+        "{missing} of {} cells of the plane were never excited apart from their neighbours (up_threshold {:.3} to {:.3} V, down_threshold {:.3} to {:.3} V); their weights are interpolated",
         excited.len(), up[0], up[1], down[0], down[1],
     );
     findings.warning("W0609", None, message, "add reversal curves that turn back in that part of the range");
