@@ -36,10 +36,16 @@ pub enum Failure {
 /// # Errors
 /// [`Failure::Singular`] if a principal submatrix of `gram` is not positive definite, else see [`Failure`].
 pub fn solve(gram: &DMatrix<f64>, rhs: &[f64]) -> Result<Solution, Failure> {
-    solve_with(gram, rhs, PATIENCE)
+    solve_with(gram, rhs, usize::MAX, PATIENCE)
 }
 
-fn solve_with(gram: &DMatrix<f64>, rhs: &[f64], patience: usize) -> Result<Solution, Failure> {
+/// `fewest` is the number of wrong signs that counts as the best so far: 0 leaves only the backup rule once `patience` is used up.
+fn solve_with(
+    gram: &DMatrix<f64>,
+    rhs: &[f64],
+    mut fewest: usize,
+    patience: usize,
+) -> Result<Solution, Failure> {
     let n = rhs.len();
     let mut scale = Vec::with_capacity(n);
     for k in 0..n {
@@ -56,7 +62,6 @@ fn solve_with(gram: &DMatrix<f64>, rhs: &[f64], patience: usize) -> Result<Solut
     let limit = 5 * n + 50;
 
     let mut free = vec![true; n];
-    let mut fewest = usize::MAX;
     let mut left = patience;
     for iteration in 1..=limit {
         let weights = restricted(gram, &scale, &target, &free)?;
@@ -198,7 +203,7 @@ mod tests {
         let gram = a.transpose() * &a + DMatrix::identity(n, n) * 1e-3;
         let rhs: Vec<f64> = (0..n).map(|_| uniform() - 0.5).collect();
         let full = solve(&gram, &rhs).unwrap();
-        let backup = solve_with(&gram, &rhs, 0).unwrap();
+        let backup = solve_with(&gram, &rhs, 0, 0).unwrap();
         assert!(
             backup.iterations > full.iterations,
             "{} against {}",
