@@ -58,7 +58,12 @@ impl Options {
     /// Usual choices: no drift within a branch, dead time estimated where the record allows it.
     #[must_use]
     pub const fn new(grid: usize, drive: [f64; 2]) -> Self {
-        Self { grid, drive, drift: false, dead_time: DeadTime::Estimate }
+        Self {
+            grid,
+            drive,
+            drift: false,
+            dead_time: DeadTime::Estimate,
+        }
     }
 }
 
@@ -104,13 +109,21 @@ pub fn identify(record: &Record, options: &Options) -> Result<Identified, Vec<Di
         Some((table, report)) if !findings.any_error() => {
             let mut warnings = record.warnings.clone();
             warnings.extend(findings.into_diagnostics());
-            Ok(Identified { table, report, warnings })
+            Ok(Identified {
+                table,
+                report,
+                warnings,
+            })
         }
         _ => Err(findings.into_diagnostics()),
     }
 }
 
-fn identify_checked(record: &Record, options: &Options, findings: &mut Findings) -> Option<(EverettTable, Report)> {
+fn identify_checked(
+    record: &Record,
+    options: &Options,
+    findings: &mut Findings,
+) -> Option<(EverettTable, Report)> {
     let plane = coverage::plane(options, findings)?;
     coverage::check_range(record, &plane, findings);
     if findings.any_error() {
@@ -138,7 +151,12 @@ fn identify_checked(record: &Record, options: &Options, findings: &mut Findings)
         Ok(solution) => solution,
         Err(failure) => {
             let message = format!("the weights cannot be determined ({failure:?})");
-            findings.error("E0610", None, message, "choose a smaller grid, or record more reversal curves");
+            findings.error(
+                "E0610",
+                None,
+                message,
+                "choose a smaller grid, or record more reversal curves",
+            );
             return None;
         }
     };
@@ -146,11 +164,20 @@ fn identify_checked(record: &Record, options: &Options, findings: &mut Findings)
     let zero_weights = weights.iter().filter(|w| **w == 0.0).count();
     let mut nodes = weights;
     normal::weights_to_nodes(plane.grid, &mut nodes);
-    let table = EverettTable { grid: plane.grid, drive_min: plane.range[0], drive_max: plane.range[1], nodes };
+    let table = EverettTable {
+        grid: plane.grid,
+        drive_min: plane.range[0],
+        drive_max: plane.range[1],
+        nodes,
+    };
 
     let residual = Residual::of(&plane, record, &used, &displacement, &table);
-    let fitted_branches: Vec<Branch> =
-        used.branches.iter().copied().filter(|b| fitted == Branches::All || !b.rising).collect();
+    let fitted_branches: Vec<Branch> = used
+        .branches
+        .iter()
+        .copied()
+        .filter(|b| fitted == Branches::All || !b.rising)
+        .collect();
     let percent = 100.0 / residual.range;
     let (fit_rms, fit_max) = trend::rms_and_max(&residual.detrended);
     let branch_rms = residual.within(&fitted_branches, used.first);
@@ -183,8 +210,16 @@ fn identify_checked(record: &Record, options: &Options, findings: &mut Findings)
         kkt_violation: nnls::kkt_violation(&normal.gram, &normal.rhs[0], &solution.weights),
     };
     if report.fit_rms_percent > POOR_FIT_PERCENT {
-        let message = format!("the fitted table misses the record by {:.2} % rms of its range", report.fit_rms_percent);
-        findings.warning("W0611", None, message, "is the record one actuator at one load, without steps or lost samples?");
+        let message = format!(
+            "the fitted table misses the record by {:.2} % rms of its range",
+            report.fit_rms_percent
+        );
+        findings.warning(
+            "W0611",
+            None,
+            message,
+            "is the record one actuator at one load, without steps or lost samples?",
+        );
     }
     Some((table, report))
 }
@@ -203,7 +238,12 @@ fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<Use
     let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
     let Some(first) = branches::first_usable(record, tolerance) else {
         let message = "the drive never rises from its minimum".to_owned();
-        findings.error("E0607", None, message, "start at the lowest drive, then rise to each reversal and fall back");
+        findings.error(
+            "E0607",
+            None,
+            message,
+            "start at the lowest drive, then rise to each reversal and fall back",
+        );
         return None;
     };
     let branches = branches::branches(&record.drive, first, REVERSAL * plane.interval());
@@ -212,23 +252,41 @@ fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<Use
         return None;
     }
     let rises = branches.iter().filter(|b| b.rising);
-    let from_saturation = rises.clone().filter(|b| record.drive[b.first] <= plane.range[0] + tolerance).count();
+    let from_saturation = rises
+        .clone()
+        .filter(|b| record.drive[b.first] <= plane.range[0] + tolerance)
+        .count();
     let first_order = from_saturation as f64 >= FIRST_ORDER * rises.count() as f64;
-    Some(Used { first, branches, curves, first_order })
+    Some(Used {
+        first,
+        branches,
+        curves,
+        first_order,
+    })
 }
 
 /// Normal equations over the falls of first-order reversal curves, if they excite the plane as well as all branches do,
 /// else over all branches: in other records it takes the rises to tell apart cells that only switch off together.
-fn select(plane: &Plane, record: &Record, used: &Used, target: Vec<f64>) -> (Normal, Branches, Vec<bool>) {
-    let falls: Vec<Branch> = used.branches.iter().copied().filter(|b| !b.rising).collect();
+fn select(
+    plane: &Plane,
+    record: &Record,
+    used: &Used,
+    target: Vec<f64>,
+) -> (Normal, Branches, Vec<bool>) {
+    let falls: Vec<Branch> = used
+        .branches
+        .iter()
+        .copied()
+        .filter(|b| !b.rising)
+        .collect();
     let targets = [target];
     let all = normal::accumulate(plane, record, used.first, &used.branches, &targets);
-    let excited_by_all = coverage::excited(all.gram.diagonal().iter().copied());
+    let excited_by_all = coverage::excited(plane, &all.gram);
     if !used.first_order {
         return (all, Branches::All, excited_by_all);
     }
     let descending = normal::accumulate(plane, record, used.first, &falls, &targets);
-    let excited_by_falls = coverage::excited(descending.gram.diagonal().iter().copied());
+    let excited_by_falls = coverage::excited(plane, &descending.gram);
     if share(&excited_by_falls) >= FALLS_SUFFICE * share(&excited_by_all) {
         (descending, Branches::Descending, excited_by_falls)
     } else {
@@ -263,16 +321,31 @@ struct Residual {
 }
 
 impl Residual {
-    fn of(plane: &Plane, record: &Record, used: &Used, displacement: &[f64], table: &EverettTable) -> Self {
+    fn of(
+        plane: &Plane,
+        record: &Record,
+        used: &Used,
+        displacement: &[f64],
+        table: &EverettTable,
+    ) -> Self {
         let mut plain = Vec::with_capacity(displacement.len() - used.first);
         normal::each_row(plane, &record.drive, used.first, |k, row| {
             plain.push(displacement[k] - regressor::evaluate(row, &table.nodes));
         });
         let time = &record.time[used.first..];
         let line = trend::Line::fit(time, &plain);
-        let detrended = plain.iter().zip(time).map(|(r, t)| r - line.at(*t)).collect();
+        let detrended = plain
+            .iter()
+            .zip(time)
+            .map(|(r, t)| r - line.at(*t))
+            .collect();
         let (low, high) = sanity::extent(&displacement[used.first..]);
-        Self { plain, detrended, line, range: high - low }
+        Self {
+            plain,
+            detrended,
+            line,
+            range: high - low,
+        }
     }
 
     /// Root mean square over `branches` with the mean of each branch removed, m.
@@ -284,6 +357,10 @@ impl Residual {
             sum = part.iter().fold(sum, |s, r| s + (r - mean) * (r - mean));
             count += part.len() as f64;
         }
-        if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
+        if count > 0.0 {
+            (sum / count).sqrt()
+        } else {
+            0.0
+        }
     }
 }

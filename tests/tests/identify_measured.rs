@@ -2,14 +2,26 @@
 //!
 //! Each test prints that it is skipped where the data is absent.
 
-use std::path::{Path, PathBuf};
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests may fail the test"
+)]
 
-use specgen::identify::{DeadTime, Identified, Options, Record, identify, read_record, validate};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use specgen::everett::EverettTable;
+use specgen::identify::{
+    Branches, DeadTime, Identified, Options, Record, Validation, identify, read_record, validate,
+};
 
 const DRIVE: [f64; 2] = [-90.0, 90.0];
 
 fn data(name: &str) -> Option<Record> {
-    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/piezo-forc").join(name);
+    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../shared/data/piezo-forc")
+        .join(name);
     if path.exists() {
         return Some(read_record(&path, name).unwrap_or_else(|d| panic!("{d:#?}")));
     }
@@ -17,24 +29,152 @@ fn data(name: &str) -> Option<Record> {
     None
 }
 
-fn identified(record: &Record, options: &Options) -> Identified {
-    let started = std::time::Instant::now();
+fn found(record: &Record, options: &Options) -> Identified {
     let result = identify(record, options).unwrap_or_else(|d| panic!("{d:#?}"));
-    println!("N = {}: {:.2} s", options.grid, started.elapsed().as_secs_f64());
-    println!("{}", serde_json::to_string_pretty(&result.report).unwrap());
+    assert!(result.warnings.is_empty(), "{:#?}", result.warnings);
+    let r = &result.report;
+    println!(
+        "{} N={}: fit {:.3} % rms {:.2} % max, within branches {:.3} %, dead time {:.3} ms ({}), {} of {} weights zero, {} factorisations",
+        r.record,
+        r.grid,
+        r.fit_rms_percent,
+        r.fit_max_percent,
+        r.branch_rms_percent,
+        r.dead_time * 1e3,
+        r.dead_time_basis,
+        r.zero_weights,
+        r.weights,
+        r.solver_iterations,
+    );
     result
+}
+
+fn predicted(table: &EverettTable, record: &Record, dead_time: f64) -> Validation {
+    let validation = validate(table, record, dead_time).unwrap();
+    let each: Vec<String> = validation
+        .starts
+        .iter()
+        .map(|s| format!("{:?} {:.3} %", s.start, s.rms_percent))
+        .collect();
+    println!(
+        "  predicts {} to {:.3} % rms; by assumed start: {}",
+        record.shown_as,
+        validation.best.rms_percent,
+        each.join(", ")
+    );
+    validation
 }
 
 #[test]
 fn measured_record_is_fitted_and_predicts_another_one() {
-    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv")) else { return };
-    let grids: Vec<usize> = std::env::var("GRIDS").map_or(vec![32], |g| g.split(',').map(|n| n.parse().unwrap()).collect());
-    for grid in grids {
-        for dead_time in [DeadTime::Estimate, DeadTime::Fixed(0.0)] {
-            let options = Options { dead_time, ..Options::new(grid, DRIVE) };
-            let found = identified(&forc, &options);
-            let validation = validate(&found.table, &triangle, found.report.dead_time).unwrap();
-            println!("{}", serde_json::to_string_pretty(&validation).unwrap());
+    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv"))
+    else {
+        return;
+    };
+    let result = found(&forc, &Options::new(32, DRIVE));
+    let report = &result.report;
+    assert_eq!(report.branches, Branches::Descending);
+    assert_eq!(report.reversal_curves, 50);
+    assert_eq!(report.excited_share, 1.0);
+    // The drive rests at -90 V for 1.5 s while the displacement rings and creeps.
+    assert_eq!(report.samples_skipped, 15_000);
+    assert!(report.kkt_violation < 1e-10);
+    assert!(
+        report.fit_rms_percent <= 0.25,
+        "fit {} %",
+        report.fit_rms_percent
+    );
+    let validation = predicted(&result.table, &triangle, report.dead_time);
+    // The record ends with a jump from -81 V to -5 V in one sample.
+    assert_eq!(validation.samples_after_jumps, 1);
+    assert!(
+        validation.best.rms_percent <= 0.85,
+        "prediction {} %",
+        validation.best.rms_percent
+    );
+    assert!(
+        validation.starts.iter().all(|s| s.rms_percent <= 1.35),
+        "whatever the start: {:?}",
+        validation.starts
+    );
+}
+
+/// The limits hold without the dead time too, which a static table cannot know.
+#[test]
+fn the_table_alone_stays_within_the_limits() {
+    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv"))
+    else {
+        return;
+    };
+    let result = found(
+        &forc,
+        &Options {
+            dead_time: DeadTime::Fixed(0.0),
+            ..Options::new(32, DRIVE)
+        },
+    );
+    assert!(
+        result.report.fit_rms_percent <= 0.5,
+        "fit {} %",
+        result.report.fit_rms_percent
+    );
+    let validation = predicted(&result.table, &triangle, 0.0);
+    assert!(
+        validation.best.rms_percent <= 1.2,
+        "prediction {} %",
+        validation.best.rms_percent
+    );
+}
+
+#[test]
+fn a_table_without_hysteresis_fails_the_limits() {
+    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv"))
+    else {
+        return;
+    };
+    let result = found(&forc, &Options::new(32, DRIVE));
+    let mut straight = result.table.clone();
+    for up in 1..=32 {
+        for down in 0..up {
+            let gain = straight.node(32, 0) / 32.0;
+            straight.nodes[EverettTable::index(up, down)] = gain * (up - down) as f64;
+        }
+    }
+    assert!(
+        predicted(&straight, &triangle, result.report.dead_time)
+            .best
+            .rms_percent
+            > 2.0
+    );
+}
+
+#[test]
+fn all_three_rates_and_all_grids_identify() {
+    let Some(triangle) = data("validate-triangle-50hz.csv") else {
+        return;
+    };
+    for name in ["forc-20hz.csv", "forc-40hz.csv", "forc-100hz.csv"] {
+        let Some(forc) = data(name) else { return };
+        let grids: &[usize] = if name == "forc-20hz.csv" {
+            &[8, 16, 25, 32, 64]
+        } else {
+            &[8, 16, 25, 32]
+        };
+        for &grid in grids {
+            let started = Instant::now();
+            let result = found(&forc, &Options::new(grid, DRIVE));
+            println!("  {:.2} s", started.elapsed().as_secs_f64());
+            assert!(
+                result.report.fit_rms_percent <= 0.5,
+                "fit {} %",
+                result.report.fit_rms_percent
+            );
+            let validation = predicted(&result.table, &triangle, result.report.dead_time);
+            assert!(
+                validation.best.rms_percent <= 1.35,
+                "prediction {} %",
+                validation.best.rms_percent
+            );
         }
     }
 }

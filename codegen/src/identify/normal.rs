@@ -26,7 +26,13 @@ pub struct Normal {
 
 /// Calls `visit(sample, row)` for every sample from `first` on, with negative saturation before it.
 pub fn each_row(plane: &Plane, drive: &[f64], first: usize, visit: impl FnMut(usize, &[Term])) {
-    each_row_from(Staircase::negative_saturation(plane.range), plane, drive, first, visit);
+    each_row_from(
+        Staircase::negative_saturation(plane.range),
+        plane,
+        drive,
+        first,
+        visit,
+    );
 }
 
 /// Like [`each_row`], with another memory before sample `first`.
@@ -49,7 +55,13 @@ pub fn each_row_from(
 ///
 /// `targets[k][n]` is the k-th target of sample n.
 #[must_use]
-pub fn accumulate(plane: &Plane, record: &Record, first: usize, branches: &[Branch], targets: &[Vec<f64>]) -> Normal {
+pub fn accumulate(
+    plane: &Plane,
+    record: &Record,
+    first: usize,
+    branches: &[Branch],
+    targets: &[Vec<f64>],
+) -> Normal {
     let nodes = plane.nodes();
     let mut sums = Sums::new(nodes, targets.len());
     let mut pending = branches.iter().peekable();
@@ -64,13 +76,19 @@ pub fn accumulate(plane: &Plane, record: &Record, first: usize, branches: &[Bran
             sums.close_branch();
             pending.next();
             // The sample of a reversal ends one branch and starts the next.
-            if !pending.peek().is_some_and(|next| next.first <= k) {
+            if pending.peek().is_none_or(|next| next.first > k) {
                 break;
             }
         }
     });
     sums.close_branch();
-    let Sums { mut gram, mut rhs, energy, samples, .. } = sums;
+    let Sums {
+        mut gram,
+        mut rhs,
+        energy,
+        samples,
+        ..
+    } = sums;
     mirror(&mut gram);
     for column in 0..nodes {
         nodes_to_weights(plane.grid, gram.column_mut(column).as_mut_slice());
@@ -82,7 +100,12 @@ pub fn accumulate(plane: &Plane, record: &Record, first: usize, branches: &[Bran
     for b in &mut rhs {
         nodes_to_weights(plane.grid, b);
     }
-    Normal { gram, rhs, energy, samples }
+    Normal {
+        gram,
+        rhs,
+        energy,
+        samples,
+    }
 }
 
 /// Running sums over Everett nodes.
@@ -107,9 +130,20 @@ struct BranchSums {
 
 impl Sums {
     fn new(nodes: usize, targets: usize) -> Self {
-        let branch =
-            BranchSums { samples: 0, row: vec![0.0; nodes], touched: Vec::new(), origin: vec![0.0; targets], target: vec![0.0; targets] };
-        Self { gram: DMatrix::zeros(nodes, nodes), rhs: vec![vec![0.0; nodes]; targets], energy: vec![0.0; targets], samples: 0, branch }
+        let branch = BranchSums {
+            samples: 0,
+            row: vec![0.0; nodes],
+            touched: Vec::new(),
+            origin: vec![0.0; targets],
+            target: vec![0.0; targets],
+        };
+        Self {
+            gram: DMatrix::zeros(nodes, nodes),
+            rhs: vec![vec![0.0; nodes]; targets],
+            energy: vec![0.0; targets],
+            samples: 0,
+            branch,
+        }
     }
 
     fn add(&mut self, row: &[Term], targets: &[Vec<f64>], sample: usize) {

@@ -30,7 +30,7 @@ pub struct Report {
     pub reversal_curves: usize,
     /// Branches in the fit; each has a free offset.
     pub branches: Branches,
-    /// Share of the cells that the record excites.
+    /// Share of the cells that the record excites: they switch, and not only together with a neighbouring cell.
     pub excited_share: f64,
     /// Difference of the largest and smallest displacement behind the skipped samples.
     pub displacement_range: f64,
