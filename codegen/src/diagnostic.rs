@@ -1,6 +1,15 @@
 //! What the compiler tells its user about the spec file or a record.
 
+pub mod codes;
+mod json;
+mod position;
+mod render;
+
+use std::fmt::Write as _;
 use std::ops::Range;
+
+pub use json::to_json;
+pub use render::render;
 
 /// How bad a finding is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -44,4 +53,27 @@ pub struct Diagnostic {
     pub message: String,
     /// How to mend it.
     pub help: String,
+}
+
+const MARKDOWN_HEAD: &str = "\
+<!-- Generated from the registry in codegen/src/diagnostic/codes.rs; do not edit. -->
+
+# Findings
+
+Every finding has a code that keeps its meaning. E: refused, nothing is written. W: pointed out, nothing is refused.
+";
+
+/// The registry of codes as Markdown; `docs/diagnostics.md` is this text.
+#[must_use]
+pub fn reference_markdown() -> String {
+    let mut text = MARKDOWN_HEAD.to_owned();
+    for code in codes::REGISTRY {
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "\n## {}: {}\n\n{}\n",
+            code.id, code.title, code.explanation
+        );
+    }
+    text
 }

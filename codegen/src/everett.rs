@@ -31,6 +31,12 @@ impl EverettTable {
         if up == down { 0.0 } else { self.nodes[Self::index(up, down)] }
     }
 
+    /// Threshold u_k in V, for 0 ≤ `k` ≤ N.
+    #[must_use]
+    pub fn threshold(&self, k: usize) -> f64 {
+        self.drive_min + k as f64 * (self.drive_max - self.drive_min) / self.grid as f64
+    }
+
     /// Preisach weight of the cell between thresholds `up`−1..`up` and `down`..`down`+1, in metres.
     ///
     /// For `down` = `up` − 1 this is the (reversible) weight of the diagonal triangle.

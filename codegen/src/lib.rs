@@ -5,10 +5,15 @@
 //! ```
 //! Each phase is a module, and data flows one way. ARCHITECTURE.md has the invariants.
 
+pub mod compile;
 pub mod diagnostic;
 pub mod everett;
+pub mod emit;
 pub mod identify;
+pub mod ir;
+pub mod lower;
 pub mod model;
 pub mod spec;
 pub mod stability;
 pub mod target;
+pub mod workspace;

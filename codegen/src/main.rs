@@ -1,3 +1,5 @@
 //! The `specgen` command.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    specgen::cli::run()
+}

@@ -1,1 +1,167 @@
 //! Stability of the adaptation, decided when compiling.
+//!
+//! Two checks over the declared interval of λ = ρ/ρ̂:
+//!
+//! 1. **Jury**, for a leg that follows its voltage at once (Appendix B): EWMA 0 < λω < 2, the corrected (AII.18); PCC (AII.19),
+//!    of which λ < 4/(2ω_Σ − ω_Π) binds.
+//! 2. **Spectral radius** of the sampled loop with the leg's own dynamics: amplifier lag and axial resonance, exactly
+//!    discretised over one run (the drive is held), closed by the filter form of the run-to-run law. This limit is lower:
+//!    the integrator meets the resonance.
+
+mod jury;
+mod sampled;
+
+use crate::diagnostic::{Diagnostic, Place, Severity};
+use crate::model::{Adaptation, AdaptationMode, Model};
+
+pub use jury::{ewma_limit, pcc_limit, pcc_satisfies_jury};
+pub use sampled::{LegDynamics, spectral_radius};
+
+/// A radius above this is refused. The limit is 1; a small weight rightly has a radius just below it, so what is kept
+/// off here is rounding, not slowness.
+pub const LARGEST_RADIUS: f64 = 1.0 - 1e-6;
+/// Values of λ looked at, evenly spaced over the interval, ends included.
+const RATIOS: u32 = 9;
+
+/// What was found for a stable spec.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Margins {
+    /// Largest λ that the static test allows for these weights; none where the law does not adapt.
+    pub static_gain_limit: Option<f64>,
+    /// Largest spectral radius of the sampled leg over the λ interval.
+    pub spectral_radius: f64,
+    /// Largest level weight (drift weight in proportion) that would be stable over the λ interval.
+    pub largest_level_weight: Option<f64>,
+}
+
+/// Checks the weights of `model`.
+///
+/// # Errors
+/// One finding at the weight's place in the spec, naming the largest weight that would do.
+pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
+    let adaptation = &model.adaptation;
+    let dynamics = LegDynamics::of(model);
+    let (static_gain_limit, largest) = match adaptation.mode {
+        AdaptationMode::Invhys => {
+            return Ok(Margins { static_gain_limit: None, spectral_radius: 0.0, largest_level_weight: None });
+        }
+        AdaptationMode::Ewma => (ewma_limit(adaptation.level_weight), largest_level_weight(&dynamics, adaptation)),
+        AdaptationMode::Pcc => (
+            pcc_limit(adaptation.level_weight, adaptation.drift_weight),
+            largest_level_weight(&dynamics, adaptation),
+        ),
+    };
+    let highest_ratio = adaptation.gain_ratio[1];
+    let mut findings = Vec::new();
+    if highest_ratio >= static_gain_limit {
+        findings.push(refusal(
+            model,
+            "E0501",
+            format!(
+                "the adaptation is unstable even on a leg without dynamics: with these weights λ = ρ/ρ̂ must stay below \
+                 {static_gain_limit:.4}, but gain_ratio goes up to {highest_ratio} (Jury, {})",
+                match adaptation.mode {
+                    AdaptationMode::Pcc => "AII.19",
+                    _ => "AII.18 corrected to 0 < λω < 2",
+                }
+            ),
+            largest,
+        ));
+    }
+    let spectral_radius = worst_radius(&dynamics, adaptation, 1.0);
+    if findings.is_empty() && spectral_radius > LARGEST_RADIUS {
+        findings.push(refusal(
+            model,
+            "E0502",
+            format!(
+                "the adaptation is unstable on this leg: the sampled loop (run of {} s, amplifier lag {} s, resonance {} Hz, ζ {}) \
+                 has spectral radius {spectral_radius:.4} somewhere in gain_ratio {:?}; it must be below {LARGEST_RADIUS}",
+                dynamics.run, dynamics.lag, model.actuator.resonance, dynamics.damping_ratio, adaptation.gain_ratio
+            ),
+            largest,
+        ));
+    }
+    if findings.is_empty() {
+        Ok(Margins { static_gain_limit: Some(static_gain_limit), spectral_radius, largest_level_weight: Some(largest) })
+    } else {
+        Err(findings)
+    }
+}
+
+/// Largest spectral radius over the λ interval with both weights scaled by `scale`.
+fn worst_radius(dynamics: &LegDynamics, adaptation: &Adaptation, scale: f64) -> f64 {
+    let [low, high] = adaptation.gain_ratio;
+    (0..RATIOS)
+        .map(|k| low + (high - low) * f64::from(k) / f64::from(RATIOS - 1))
+        .map(|ratio| {
+            let drift = match adaptation.mode {
+                AdaptationMode::Pcc => Some(scale * adaptation.drift_weight),
+                _ => None,
+            };
+            spectral_radius(dynamics, scale * adaptation.level_weight, drift, ratio)
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Largest level weight, drift weight in proportion, below which every weight is stable. Found by scanning upwards and
+/// bisecting the first crossing: beyond a first unstable stretch a loop may be stable again, but nobody should rely on it.
+fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation) -> f64 {
+    let largest_scale = 1.0 / adaptation.level_weight.max(adaptation.drift_weight);
+    let stable = |scale: f64| {
+        let statically = match adaptation.mode {
+            AdaptationMode::Pcc => pcc_limit(scale * adaptation.level_weight, scale * adaptation.drift_weight),
+            _ => ewma_limit(scale * adaptation.level_weight),
+        };
+        adaptation.gain_ratio[1] < statically && worst_radius(dynamics, adaptation, scale) <= LARGEST_RADIUS
+    };
+    // Four decades up to the largest weight there is.
+    let steps = 400;
+    let scale_at = |k: i32| largest_scale * 10f64.powf(-4.0 * (1.0 - f64::from(k) / f64::from(steps)));
+    let Some(first_stable) = (0..=steps).find(|&k| stable(scale_at(k))) else {
+        return 0.0;
+    };
+    let Some(first_unstable) = (first_stable..=steps).find(|&k| !stable(scale_at(k))) else {
+        return largest_scale * adaptation.level_weight;
+    };
+    let (mut low, mut high) = (scale_at(first_unstable - 1), scale_at(first_unstable));
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if stable(middle) { low = middle } else { high = middle }
+    }
+    low * adaptation.level_weight
+}
+
+/// `largest` is rounded down to what the message shows, so that the number shown is itself accepted.
+fn refusal(model: &Model, code: &'static str, message: String, largest: f64) -> Diagnostic {
+    let bandwidth = model.spans.contains_key("adaptation.level_bandwidth");
+    let key = if bandwidth { "adaptation.level_bandwidth" } else { "adaptation.level_weight" };
+    let pcc = model.adaptation.mode == AdaptationMode::Pcc;
+    let run = model.timing.period * f64::from(model.adaptation.run_interval);
+    let shown = |value: f64| {
+        let digits = 10f64.powi(3 - value.abs().log10().floor() as i32);
+        (value * digits).floor() / digits
+    };
+    let help = if largest <= 0.0 {
+        "no weight adapts this leg at this run interval: lengthen the run (run_interval, timing.period), or check \
+         actuator.resonance, actuator.damping_ratio and amplifier.lag"
+            .to_owned()
+    } else {
+        let proportion = model.adaptation.drift_weight / model.adaptation.level_weight;
+        let level = if bandwidth { shown(largest / run) } else { shown(largest) };
+        let (name, unit) = if bandwidth { ("level_bandwidth", " rad/s") } else { ("level_weight", "") };
+        let drift = if pcc {
+            format!(" (with the drift weight in the same proportion: {:.4e}{unit})", shown(level * proportion))
+        } else {
+            String::new()
+        };
+        format!("the largest stable {name} is {level}{unit}{drift}; or lengthen the run, or narrow gain_ratio")
+    };
+    Diagnostic {
+        severity: Severity::Error,
+        code,
+        key: key.to_owned(),
+        place: model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec),
+        message,
+        help,
+    }
+}

@@ -1,0 +1,85 @@
+//! The command line: arguments in, text or JSON out, exit code.
+//!
+//! Exit codes: 0 good, 1 the spec, a record or a budget fails, 2 usage, 3 environment (a missing tool, a full disk).
+
+mod build;
+mod check;
+mod identify;
+mod sim;
+mod ui;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use ui::{Failure, Ui};
+
+/// Compiles one description of a piezo-driven Stewart platform into a `no_std` Rust controller.
+#[derive(Parser, Debug)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Examples:\n  specgen platform.toml -o controller    compile, write a workspace, build and measure it\n  \
+                  specgen check platform.toml            every finding, nothing written\n  \
+                  specgen sim platform.toml              the paper's leg experiment with the emitted controller\n  \
+                  specgen identify record.csv --drive -90:90 --grid 32\n\n\
+                  Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    build: build::Arguments,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Options of every command.
+#[derive(Args, Debug, Clone, Copy)]
+struct Common {
+    /// Print the result as JSON on standard output.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Report every finding about a spec; write nothing.
+    Check(check::Arguments),
+    /// Run the paper's leg experiment with the emitted controller against a simulated plant.
+    Sim(sim::Arguments),
+    /// Identify the Everett table of a leg from a reversal-curve record.
+    Identify(identify::Arguments),
+    /// Print the intermediate representation of a spec: every constant of its controller.
+    DumpIr {
+        /// The spec file.
+        spec: PathBuf,
+    },
+}
+
+/// Runs the command that the process was started with.
+#[must_use]
+pub fn run() -> ExitCode {
+    let cli = Cli::parse();
+    let mut ui = Ui::new(cli.common.json);
+    let done = match &cli.command {
+        None => build::run(&cli.build, &mut ui),
+        Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
+        Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
+        Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
+        Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => ExitCode::from(ui.failed(&failure)),
+    }
+}
+
+fn dump_ir(spec: &std::path::Path, ui: &mut Ui) -> Result<(), Failure> {
+    let compiled = crate::compile::compile(spec)?;
+    ui.findings(Some(&compiled.source), &compiled.findings);
+    ui.out(&crate::workspace::ir_text(&compiled.ir));
+    Ok(())
+}

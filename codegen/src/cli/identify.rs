@@ -1,0 +1,117 @@
+//! `specgen identify`: a reversal-curve record in, an Everett table and its figures out.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+
+use super::ui::{Failure, Ui};
+use crate::compile::Refused;
+use crate::diagnostic::Diagnostic;
+use crate::identify::{self, Options, Report, Validation};
+
+/// Arguments of `identify`.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// Reversal-curve record: CSV with columns time_s, drive_V, displacement_um.
+    record: PathBuf,
+    /// Voltage range of the table, V.
+    #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
+    drive: [f64; 2],
+    /// Cells per axis of the Preisach grid.
+    #[arg(long, default_value_t = 32)]
+    grid: usize,
+    /// Another record of the same leg, not used for the fit, to judge the table by.
+    #[arg(long, value_name = "RECORD")]
+    validate: Option<PathBuf>,
+    /// Write the table (CSV: up_V, down_V, everett_um) here.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+fn range(text: &str) -> Result<[f64; 2], String> {
+    let expected = || format!("expected two voltages such as 0:100, found `{text}`");
+    let (low, high) = text.split_once(':').ok_or_else(expected)?;
+    let number = |part: &str| part.trim().trim_end_matches('V').trim().parse::<f64>().map_err(|_| expected());
+    let (low, high) = (number(low)?, number(high)?);
+    if low.is_finite() && high.is_finite() && low < high {
+        Ok([low, high])
+    } else {
+        Err(format!("the lower voltage must be below the upper one, found `{text}`"))
+    }
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let shown = arguments.record.display().to_string();
+    let options = Options::new(arguments.grid, arguments.drive);
+    let identified = identify::read_record(&arguments.record, &shown)
+        .and_then(|record| identify::identify(&record, &options))
+        .map_err(refused)?;
+    ui.findings(None, &identified.warnings);
+    let validation = match &arguments.validate {
+        Some(path) => Some(validate(path, &identified).map_err(refused)?),
+        None => None,
+    };
+    if let Some(output) = &arguments.output {
+        write_new(output, &identify::write_table_csv(&identified.table))?;
+    }
+    let mut text = format!("{shown}: {}\n", summary(&identified.report));
+    if let Some(validation) = &validation {
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{}: predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm (start taken as {:?})",
+            validation.record,
+            validation.best.rms_percent,
+            validation.best.max_percent,
+            validation.displacement_range * 1e6,
+            validation.best.start
+        );
+    }
+    if let Some(output) = &arguments.output {
+        let _ = writeln!(text, "wrote {}", output.display());
+    }
+    ui.result(&text, json!({ "report": identified.report, "validation": validation }));
+    Ok(())
+}
+
+fn validate(path: &Path, identified: &identify::Identified) -> Result<Validation, Vec<Diagnostic>> {
+    let record = identify::read_record(path, &path.display().to_string())?;
+    identify::validate(&identified.table, &record, identified.report.dead_time)
+}
+
+fn refused(findings: Vec<Diagnostic>) -> Failure {
+    Failure::from(Refused { source: None, findings })
+}
+
+/// Writes beside the target and renames, so that a failure leaves no half file.
+fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
+    let failed = |error: std::io::Error| Failure::Environment(format!("could not write `{}`: {error}", path.display()));
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
+    std::io::Write::write_all(&mut file, text.as_bytes()).map_err(failed)?;
+    file.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}
+
+/// A report in one line.
+pub fn summary(report: &Report) -> String {
+    format!(
+        "{} reversal curves, fit {:.2} nm rms ({:.3} % of {:.2} µm), noise {:.2} nm, drift {:.3} nm/s, dead time {:.3} ms, \
+         {} of {} weights zero, {:.1} % of the plane excited",
+        report.reversal_curves,
+        report.fit_rms * 1e9,
+        report.fit_rms_percent,
+        report.displacement_range * 1e6,
+        report.noise_floor * 1e9,
+        report.drift * 1e9,
+        report.dead_time * 1e3,
+        report.zero_weights,
+        report.weights,
+        report.excited_share * 100.0
+    )
+}

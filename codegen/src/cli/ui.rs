@@ -1,0 +1,129 @@
+//! What the user sees: results on standard output, findings and progress on standard error.
+
+use std::io::{IsTerminal, Write};
+
+use serde_json::{Value, json};
+
+use crate::compile::Refused;
+use crate::diagnostic::{self, Diagnostic, Severity};
+use crate::spec::SpecSource;
+use crate::target::TargetError;
+use crate::workspace::WriteError;
+
+/// Why a command did not succeed, by exit code.
+#[derive(Debug)]
+pub enum Failure {
+    /// The spec or a record is refused.
+    Refused(Box<Refused>),
+    /// A declared budget is exceeded, a comparison failed: exit code 1, in words.
+    Gate(String),
+    /// Arguments that make no sense together.
+    Usage(String),
+    /// The output could not be written.
+    Write(WriteError),
+    /// A tool is missing or failed.
+    Target(TargetError),
+    /// The file system or the simulator said no.
+    Environment(String),
+}
+
+impl From<Refused> for Failure {
+    fn from(refused: Refused) -> Self {
+        Self::Refused(Box::new(refused))
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        Self::Write(error)
+    }
+}
+
+impl From<TargetError> for Failure {
+    fn from(error: TargetError) -> Self {
+        Self::Target(error)
+    }
+}
+
+/// Output in one of two forms.
+pub struct Ui {
+    json: bool,
+    findings: Vec<Value>,
+}
+
+impl Ui {
+    /// Text, or one JSON document at the end.
+    pub fn new(json: bool) -> Self {
+        Self { json, findings: Vec::new() }
+    }
+
+    /// A line about what is being done, for the eyes only.
+    pub fn progress(&self, line: &str) {
+        if !self.json {
+            anstream::eprintln!("{line}");
+        }
+    }
+
+    /// Shows findings now (text) or keeps them for the document (JSON).
+    pub fn findings(&mut self, source: Option<&SpecSource>, findings: &[Diagnostic]) {
+        if findings.is_empty() {
+            return;
+        }
+        if self.json {
+            self.findings.extend(diagnostic::to_json(findings, source));
+        } else {
+            let color = std::io::stderr().is_terminal();
+            anstream::eprint!("{}", diagnostic::render(findings, source, color));
+        }
+    }
+
+    /// The result: `text` for people, `value` for programs.
+    pub fn result(&self, text: &str, value: Value) {
+        if self.json {
+            self.document(0, value, None);
+        } else {
+            self.out(text);
+        }
+    }
+
+    /// Plain text on standard output. A closed pipe is the reader's business, not an error of ours.
+    pub fn out(&self, text: &str) {
+        let _ = std::io::stdout().write_all(text.as_bytes());
+    }
+
+    /// Reports a failure; returns the exit code.
+    pub fn failed(&mut self, failure: &Failure) -> u8 {
+        let (code, message) = match failure {
+            Failure::Refused(refused) => {
+                self.findings(refused.source.as_ref(), &refused.findings);
+                let errors = refused.findings.iter().filter(|f| f.severity == Severity::Error).count();
+                let what = refused.source.as_ref().map_or("the input", |s| s.display_name.as_str());
+                let s = if errors == 1 { "" } else { "s" };
+                (1, format!("{what} is refused: {errors} error{s}; nothing was written"))
+            }
+            Failure::Gate(text) => (1, text.clone()),
+            Failure::Usage(text) => (2, text.clone()),
+            Failure::Write(error @ WriteError::Occupied { .. }) => (1, error.to_string()),
+            Failure::Write(error) => (3, error.to_string()),
+            Failure::Target(error) => (3, error.to_string()),
+            Failure::Environment(text) => (3, text.clone()),
+        };
+        if self.json {
+            self.document(code, Value::Null, Some(&message));
+        } else {
+            anstream::eprintln!("error: {message}");
+        }
+        code
+    }
+
+    fn document(&self, exit_code: u8, result: Value, error: Option<&str>) {
+        let document = json!({
+            "specgen": env!("CARGO_PKG_VERSION"),
+            "exit_code": exit_code,
+            "error": error,
+            "findings": self.findings,
+            "result": result,
+        });
+        self.out(&format!("{document:#}\n"));
+    }
+}

@@ -1,0 +1,115 @@
+//! The compiler as one function: spec file to the files of a workspace. Touches no output.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::emit;
+use crate::everett::EverettTable;
+use crate::identify;
+use crate::ir::Ir;
+use crate::lower::lower;
+use crate::model::Model;
+use crate::spec::{self, SpecSource};
+use crate::stability::{self, Margins};
+use crate::workspace;
+
+/// A spec that compiled.
+#[derive(Debug)]
+pub struct Compiled {
+    /// The file as read.
+    pub source: SpecSource,
+    /// What it says.
+    pub model: Model,
+    /// How each record was identified, in the order of `hysteresis.records`.
+    pub records: Vec<identify::Report>,
+    /// Stability of the adaptation.
+    pub margins: Margins,
+    /// Every constant of the controller.
+    pub ir: Ir,
+    /// Files of the workspace: path, text.
+    pub files: BTreeMap<String, String>,
+    /// Warnings and notes.
+    pub findings: Vec<Diagnostic>,
+}
+
+/// A spec that was refused: at least one finding is an error.
+#[derive(Debug)]
+pub struct Refused {
+    /// The file, if it could be read.
+    pub source: Option<SpecSource>,
+    /// All findings of the run.
+    pub findings: Vec<Diagnostic>,
+}
+
+/// Everything short of writing: reads, checks, identifies, lowers, emits.
+///
+/// # Errors
+/// The spec or a record is refused. Later phases run only on what earlier ones accepted, so a second run may find more.
+pub fn compile(path: &Path) -> Result<Compiled, Refused> {
+    let source = SpecSource::read(path).map_err(|finding| Refused { source: None, findings: vec![finding] })?;
+    let (model, mut findings) = spec::load(&source);
+    let Some(model) = model else {
+        return Err(Refused { source: Some(source), findings });
+    };
+    // Stability and records do not depend on each other: report both.
+    let margins = stability::check(&model).map_err(|found| findings.extend(found));
+    let identified = identify_records(&source, &model).map_err(|found| findings.extend(found));
+    let (Ok(margins), Ok(identified)) = (margins, identified) else {
+        return Err(Refused { source: Some(source), findings });
+    };
+    findings.extend(identified.findings);
+    let ir = match lower(&model, &identified.tables, &digest(&source, &identified.bytes)) {
+        Ok(ir) => ir,
+        Err(found) => {
+            findings.extend(found);
+            return Err(Refused { source: Some(source), findings });
+        }
+    };
+    let files = workspace::files(&ir, &emit::emit(&ir));
+    debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
+    Ok(Compiled { source, model, records: identified.reports, margins, ir, files, findings })
+}
+
+/// What the records of a spec yield.
+struct IdentifiedRecords {
+    tables: Vec<EverettTable>,
+    reports: Vec<identify::Report>,
+    findings: Vec<Diagnostic>,
+    /// Name and content of each file, for the digest.
+    bytes: Vec<(String, Vec<u8>)>,
+}
+
+fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedRecords, Vec<Diagnostic>> {
+    let options = identify::Options::new(model.hysteresis.grid, model.actuator.voltage);
+    let mut result =
+        IdentifiedRecords { tables: Vec::new(), reports: Vec::new(), findings: Vec::new(), bytes: Vec::new() };
+    let mut errors = Vec::new();
+    for name in &model.hysteresis.records {
+        let path = source.dir.join(name);
+        let one = identify::read_record(&path, name).and_then(|record| identify::identify(&record, &options));
+        match one {
+            Ok(identified) => {
+                result.tables.push(identified.table);
+                result.reports.push(identified.report);
+                result.findings.extend(identified.warnings);
+            }
+            Err(found) => errors.extend(found),
+        }
+        result.bytes.push((name.clone(), std::fs::read(&path).unwrap_or_default()));
+    }
+    if errors.is_empty() { Ok(result) } else { Err(errors) }
+}
+
+/// Digest of what the controller depends on: the text of the spec (line ends as `\n`) and the records by name and content.
+/// Not the folder it lies in.
+fn digest(source: &SpecSource, records: &[(String, Vec<u8>)]) -> String {
+    let mut all = source.text.replace("\r\n", "\n").into_bytes();
+    for (name, bytes) in records {
+        all.push(0);
+        all.extend(name.as_bytes());
+        all.push(0);
+        all.extend(workspace::sha256(bytes).as_bytes());
+    }
+    workspace::sha256(&all)
+}

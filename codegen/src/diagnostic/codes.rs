@@ -1,0 +1,143 @@
+//! The registry of finding codes. A code never changes its meaning; a retired one is not used again.
+//!
+//! `docs/diagnostics.md` is generated from here, see [`super::reference_markdown`].
+
+/// What a code stands for.
+#[derive(Debug, Clone, Copy)]
+pub struct Code {
+    /// Such as `E0102`: E for an error, W for a warning.
+    pub id: &'static str,
+    /// A few words.
+    pub title: &'static str,
+    /// Why it is refused or pointed out, and how to mend it.
+    pub explanation: &'static str,
+}
+
+macro_rules! codes {
+    ($($name:ident = $id:literal, $title:literal, $explanation:literal;)*) => {
+        $(#[doc = concat!($id, ": ", $title, ".")] pub const $name: &str = $id;)*
+        /// Every code, in order.
+        pub const REGISTRY: &[Code] = &[$(Code { id: $id, title: $title, explanation: $explanation }),*];
+    };
+}
+
+codes! {
+    UNREADABLE = "E0101", "the spec file cannot be read",
+        "The path does not exist, is a folder, or may not be read. Check the path and its permissions.";
+    TOO_LARGE = "E0102", "the spec file is too large",
+        "A spec is a few kilobytes; more than 1 MiB is surely another file. Measurements belong in CSV files that the spec names.";
+    NOT_TEXT = "E0103", "the spec file is not UTF-8 text",
+        "The message names the first byte that is not UTF-8. Save the file as UTF-8 (editors often call Latin-1 \"ANSI\").";
+    SYNTAX = "E0104", "TOML syntax",
+        "The text is not TOML at the place shown. Values and keys are checked only once the syntax is right.";
+    EMPTY = "E0105", "the spec file is empty",
+        "There is nothing in it but white space and comments. Start from a copy of `specs/minimal.toml`.";
+    UNQUOTED = "E0106", "a text without quotes",
+        "TOML wants quotes around every text, and a quantity is a text: `mass = \"1.195 kg\"`.";
+    UNKNOWN_SECTION = "E0201", "unknown section",
+        "No section has this name. If the name is near a known one, that one is suggested, and the keys below are checked as if it stood there.";
+    UNKNOWN_KEY = "E0202", "unknown key",
+        "The section has no such key. A key that nobody reads would be a setting that silently does nothing.";
+    MISSING_SECTION = "E0203", "missing section",
+        "The section has keys that must be given. The help shows it as it may be written.";
+    MISSING_KEY = "E0204", "missing key",
+        "The key has no default: no value would be right for every platform.";
+    DUPLICATE = "E0205", "given twice",
+        "A key or a section may be given once only. Which of the two counts would be a guess.";
+    WRONG_TYPE = "E0206", "wrong kind of value",
+        "A number stands where a text is due, a text where a number is due, or the like.";
+    WRONG_COUNT = "E0207", "wrong number of values",
+        "The array has more or fewer values than the key takes.";
+    UNIT_MISSING = "E0208", "a number without unit",
+        "A value with a dimension is written with its unit, in quotes: `\"150 mm\"`. A bare number would leave the unit to guesswork.";
+    BAD_QUANTITY = "E0209", "not a quantity",
+        "A quantity is a number and a unit: `\"1.195 kg\"`, `\"3.26e7 g mm^2\"`, `\"40 V/ms\"`, `\"0.012 pi rad\"`. After a slash, group what stands below it: `N/(m s)`.";
+    UNKNOWN_UNIT = "E0210", "unknown unit",
+        "Units are m, g, s, min, V, N, Hz, rad, deg, arcmin, arcsec, Pa, J, W and B with the prefixes f p n u m c d k M G T (Ki Mi Gi for B). Upper and lower case matter.";
+    WRONG_DIMENSION = "E0211", "wrong dimension",
+        "The unit measures something else than the key wants, such as a voltage where a length is due. Radians count: a rotational stiffness is in N m/rad, a bandwidth in rad/s and not in Hz.";
+    NOT_FINITE = "E0212", "not a finite number",
+        "NaN and infinity are no physical values, and a number may be too large or too small for a double.";
+    UNKNOWN_CHOICE = "E0213", "unknown choice",
+        "The key takes one of a few words, listed in the help.";
+    ALTERNATIVES = "E0214", "one of two keys",
+        "A weight may be given per run or as a bandwidth, not both; a mode that uses the weight needs one of them.";
+    OUT_OF_RANGE = "E0301", "out of range",
+        "The value lies outside what the key takes. `docs/spec-reference.md` lists the ranges.";
+    WRONG_ORDER = "E0302", "limits in the wrong order",
+        "The first of the two values must be the smaller one.";
+    VOLTAGE_OUTSIDE_DAC = "E0303", "voltage limits outside the converter's range",
+        "The controller would ask for voltages that the converter cannot make.";
+    RECORD_COUNT = "E0304", "one or six records",
+        "Either one record identifies all legs, or each leg has its own.";
+    RECORD_PATH = "E0305", "record path not relative",
+        "Records are named relative to the spec, with forward slashes, so that the folder can move to another machine.";
+    RECORD_UNREADABLE = "E0306", "record cannot be read",
+        "The file does not exist beside the spec, is a folder, or may not be read.";
+    BANDWIDTH_TOO_HIGH = "E0307", "bandwidth too high",
+        "The weight per run, bandwidth x period x run_interval, would exceed 1. The help names the largest bandwidth that would do.";
+    BAD_NAME = "E0308", "not a name",
+        "The name becomes part of file and symbol names: a letter first, then letters, digits, `-` and `_`, at most 64 characters.";
+    CENTER_OUTSIDE_LEG = "E0309", "mass centre outside the leg",
+        "A mass centre is measured from its own joint and lies between the two joints.";
+    INERTIA_UNPHYSICAL = "E0310", "no body has this inertia",
+        "The inertia matrix of a body is positive definite, and none of its principal moments exceeds the sum of the other two.";
+    GYRATION = "E0311", "mass and inertia do not fit the size",
+        "The radius of gyration, sqrt(I/m), is far from the size of the part: almost always a slip of the unit. The paper prints 1.195 g for 1.195 kg, which gives 5.2 m on a platform of 0.1 m.";
+    DEGENERATE_GEOMETRY = "E0312", "the legs do not hold the platform",
+        "The six legs leave a motion free at rest, or nearly so: no controller can hold it. Change radii, angles or height.";
+    WORKSPACE_UNREACHABLE = "E0313", "workspace out of reach",
+        "One axis alone needs a leg motion beyond the stroke. The paper's pi/72 rad needs 4.4 mm from legs of 60 um.";
+    SLEW_BELOW_CODE = "E0314", "slew rate below one converter code per tick",
+        "Within one period the voltage may change by less than one code, so that it could never move.";
+    BUDGET_NOT_WHOLE = "E0315", "not a whole number of bytes",
+        "Memory is counted in whole bytes.";
+    STROKE_MISMATCH = "W0301", "stroke, gain and voltage do not fit",
+        "stacks x stack_gain x voltage range is far from the stroke: one of the four is probably wrong, or the stroke is never used.";
+    RESONANCE_ALIASED = "W0302", "resonance above half the tick rate",
+        "The gauges cannot see it as what it is. The stability check uses the sampled model and remains valid.";
+    SENSOR_NOISE = "W0303", "gauge noise large against its range",
+        "More than a hundredth of the range: probably a slip of the unit. The paper prints 2.2 um for 2.2 nm.";
+    SENSOR_RANGE = "W0304", "gauge range does not fit the stroke",
+        "The range leaves out the displacement at rest, or is far smaller or larger than the stroke.";
+    DOUBLE_ON_SINGLE = "W0305", "double precision on a single-precision FPU",
+        "The Cortex-M4F computes f64 in software, some twenty times slower.";
+    GYRATION_ODD = "W0306", "mass and inertia fit the size badly",
+        "The radius of gyration is unusual for the size of the platform, though possible.";
+    UNUSED_WEIGHT = "W0307", "weight that the mode does not use",
+        "The key is checked and kept for a later change of mode, but has no effect at start-up.";
+    TRUNCATED = "W0001", "further findings left out",
+        "Only the first findings are shown; mend them and run again.";
+}
+
+/// The entry of `id`.
+#[must_use]
+pub fn find(id: &str) -> Option<&'static Code> {
+    REGISTRY.iter().find(|code| code.id == id)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_are_unique_and_well_formed() {
+        for (i, code) in REGISTRY.iter().enumerate() {
+            assert!(
+                REGISTRY[..i].iter().all(|other| other.id != code.id),
+                "{} twice",
+                code.id
+            );
+            assert!(
+                code.id.len() == 5 && code.id.starts_with(['E', 'W']),
+                "{}",
+                code.id
+            );
+            assert!(
+                code.id[1..].bytes().all(|b| b.is_ascii_digit()),
+                "{}",
+                code.id
+            );
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Findings for people: file, line, column, the line itself with a mark below it, and how to mend it.
+
+use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
+
+use super::position::{self, Lines};
+use super::{Diagnostic, Place, Severity};
+use crate::spec::SpecSource;
+
+/// Longest piece of a line that is shown, characters. Far below what would make a message unreadable.
+const MAX_SHOWN: usize = 160;
+
+/// Where a terminal would break; fixed, so that the same findings give the same text everywhere.
+const WIDTH: usize = 140;
+
+/// Every finding in turn, and a last line that counts them; empty if there is none.
+#[must_use]
+pub fn render(diagnostics: &[Diagnostic], source: &SpecSource, color: bool) -> String {
+    let renderer = if color {
+        Renderer::styled()
+    } else {
+        Renderer::plain()
+    }
+    .term_width(WIDTH);
+    let lines = Lines::new(&source.text);
+    let mut text = String::new();
+    for diagnostic in diagnostics {
+        text.push_str(&one(diagnostic, source, &lines, &renderer));
+        text.push_str("\n\n");
+    }
+    if !diagnostics.is_empty() {
+        text.push_str(&count(diagnostics));
+        text.push('\n');
+    }
+    text
+}
+
+fn count(diagnostics: &[Diagnostic]) -> String {
+    let of = |severity| {
+        diagnostics
+            .iter()
+            .filter(|d| d.severity == severity)
+            .count()
+    };
+    let plural = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
+    format!(
+        "{}, {}",
+        plural(of(Severity::Error), "error"),
+        plural(of(Severity::Warning), "warning")
+    )
+}
+
+fn one(
+    diagnostic: &Diagnostic,
+    source: &SpecSource,
+    lines: &Lines<'_>,
+    renderer: &Renderer,
+) -> String {
+    let level = match diagnostic.severity {
+        Severity::Error => Level::ERROR,
+        Severity::Warning => Level::WARNING,
+        Severity::Note => Level::NOTE,
+    };
+    let message = visible(&diagnostic.message);
+    let help = visible(&diagnostic.help);
+    let title = level.primary_title(message).id(diagnostic.code);
+    let group: Group<'_> = match &diagnostic.place {
+        Place::Whole => title.element(Level::HELP.message(help)),
+        Place::File { path, line } => {
+            let origin = Origin::path(visible(path));
+            title
+                .element(if let Some(line) = line {
+                    origin.line(*line)
+                } else {
+                    origin
+                })
+                .element(Level::HELP.message(help))
+        }
+        Place::Spec(span) => {
+            let spot = lines.spot(span);
+            let window = position::window(spot.line_text, spot.in_line.clone(), MAX_SHOWN);
+            let path = visible(&source.display_name);
+            if window.cut_left {
+                // The snippet would count the column from the cut: say where it is, and show the piece below.
+                let origin = Origin::path(path).line(spot.line).char_column(spot.column);
+                let snippet = Snippet::source(window.text)
+                    .line_start(spot.line)
+                    .annotation(AnnotationKind::Primary.span(window.span));
+                title
+                    .element(origin)
+                    .element(snippet)
+                    .element(Level::HELP.message(help))
+            } else {
+                let snippet = Snippet::source(window.text)
+                    .path(path)
+                    .line_start(spot.line)
+                    .annotation(AnnotationKind::Primary.span(window.span));
+                title.element(snippet).element(Level::HELP.message(help))
+            }
+        }
+    };
+    renderer.render(&[group])
+}
+
+/// Control characters (a terminal would obey them) as escapes; line breaks of our own texts stay.
+fn visible(text: &str) -> String {
+    text.chars()
+        .flat_map(|c| {
+            if c.is_control() && c != '\n' {
+                c.escape_default().collect::<Vec<_>>()
+            } else {
+                vec![c]
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,63 @@
+//! `src/lib.rs`: documentation of the controller and its public names. Reads the name, digest and scalar of the IR.
+
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+
+use super::literal;
+use crate::ir::Ir;
+
+pub fn emit(ir: &Ir) -> TokenStream {
+    let title = format!(" Controller of platform `{}`.", ir.name);
+    let scalar = format_ident!("f{}", ir.scalar.bits().to_string());
+    let bits = literal::count(ir.scalar.bits() as usize);
+    let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
+    quote! {
+        #![doc = #title]
+        #![doc = ""]
+        #![doc = " [`step`] is one control tick: pose or leg set-point and six gauge readings in, six voltages out. It is the hysteresis"]
+        #![doc = " feed-forward of the paper (section 3, Fig. 5, Appendix B) on six legs, fed by the leg kinematics (1), (2), (AI.1)–(AI.4):"]
+        #![doc = ""]
+        #![doc = " ```text"]
+        #![doc = " T = Δl(h_d)                         kinematics     pose to leg displacements"]
+        #![doc = " m = Y − ρ̂X ;  δ̂, φ̂ ← m             adaptation     (AII.3), (AII.5), (AII.6)"]
+        #![doc = " u = Γ⁻¹(T − δ̂ − φ̂)                  hysteresis     inverse Preisach model, (AII.2), (AII.4)"]
+        #![doc = " code, ρ̂X = Γ(voltage(code))         limits         voltage, slew rate, converter; what was really requested"]
+        #![doc = " ```"]
+        #![doc = ""]
+        #![doc = " SI units throughout (m, rad, V, s); poses are measured from rest in the base frame {B}. No panic, no allocation, no"]
+        #![doc = " `unsafe`; every voltage is finite and within limits whatever the inputs. `Config` holds what may change while running,"]
+        #![doc = " `State` what the controller remembers."]
+        #![doc = ""]
+        #![doc = " Generated code carries no licence restriction of its own: use it as you like."]
+        #![no_std]
+        #![forbid(unsafe_code)]
+        #![deny(missing_docs)]
+
+        mod config;
+        pub mod hysteresis;
+        pub mod kinematics;
+        pub mod limits;
+        mod state;
+        mod step;
+        mod words;
+
+        pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};
+        pub use specgen_runtime::{CodeLimits, Law};
+        pub use state::{LegState, State};
+        pub use step::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, TickInput, TickOutput, actuate, step};
+        pub use words::{CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS};
+
+        /// Floating-point type of this controller; from `controller.scalar`.
+        pub type Real = #scalar;
+        /// Width of [`Real`].
+        pub const SCALAR_BITS: u32 = #bits;
+        /// Number of legs.
+        pub const LEGS: usize = 6;
+        /// Name of the platform.
+        pub const SPEC_NAME: &str = #name;
+        /// SHA-256 of the spec and of the records it names.
+        pub const SPEC_DIGEST: &str = #digest;
+        /// Version of the compiler.
+        pub const SPECGEN_VERSION: &str = #version;
+    }
+}

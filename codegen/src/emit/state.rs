@@ -1,0 +1,70 @@
+//! `src/state.rs`: what the controller remembers. The same for every spec; sizes come from the other files.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use crate::ir::Ir;
+
+pub fn emit(_ir: &Ir) -> TokenStream {
+    quote! {
+        #![doc = " What the controller remembers from tick to tick. No NaN or infinity is ever stored here."]
+
+        use specgen_runtime::{Digest, Estimate};
+
+        use crate::hysteresis::Memory;
+        use crate::{LEGS, Real, limits};
+
+        /// State of one leg.
+        #[derive(Debug, Clone, Copy)]
+        pub struct LegState {
+            /// Reversal memory; its displacement is q̂ = ρ̂X, what was really requested, m.
+            pub memory: Memory,
+            /// δ̂ and φ̂, m.
+            pub estimate: Estimate<Real>,
+            /// Converter code now held at the output.
+            pub code: i32,
+        }
+
+        /// State of the controller.
+        #[derive(Debug, Clone, Copy)]
+        pub struct State {
+            /// Legs 0 to 5.
+            pub legs: [LegState; LEGS],
+            /// T: leg displacements demanded by the last accepted set-point, m.
+            pub demand: [Real; LEGS],
+            /// Ticks since the last run ended.
+            pub ticks_in_run: u32,
+        }
+
+        impl Default for State {
+            fn default() -> Self {
+                Self::new()
+            }
+        }
+
+        impl State {
+            /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there, no correction.
+            #[must_use]
+            pub const fn new() -> Self {
+                let leg = LegState { memory: Memory::new(), estimate: Estimate::new(), code: limits::CODES[0] };
+                Self { legs: [leg; LEGS], demand: [0.0; LEGS], ticks_in_run: 0 }
+            }
+
+            /// Fingerprint of everything that later ticks depend on, for comparing two machines bit for bit.
+            #[must_use]
+            pub fn digest(&self) -> u64 {
+                let mut digest = Digest::new();
+                for leg in &self.legs {
+                    leg.memory.digest(&mut digest);
+                    leg.estimate.digest(&mut digest);
+                    digest.word(leg.code as u32 as u64);
+                }
+                for demand in &self.demand {
+                    digest.real(*demand);
+                }
+                digest.word(self.ticks_in_run as u64);
+                digest.finish()
+            }
+        }
+    }
+}

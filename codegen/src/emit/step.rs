@@ -1,0 +1,133 @@
+//! `src/step.rs`: one control tick. The order of the stages; constants come from the other files.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use crate::ir::Ir;
+
+pub fn emit(_ir: &Ir) -> TokenStream {
+    quote! {
+        #![doc = " One control tick."]
+        #![doc = ""]
+        #![doc = " At time t_n the interval that voltage u_n was held over has just ended and Y_n is read; the set-point is that of the"]
+        #![doc = " END of the interval that begins now, T_{n+1}, and the voltages that come out are held over it."]
+
+        use specgen_runtime::{Law, Real as _};
+
+        use crate::hysteresis::{TABLES, Table};
+        use crate::limits::{self, DAC};
+        use crate::{Config, LEGS, LegState, Real, SetpointKind, State, kinematics};
+
+        /// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
+        pub const LEG_LIMITED: u32 = 0x3f;
+        /// Bits 8 to 13: gauge not finite or out of range; the leg's estimates were held.
+        pub const GAUGE_FAULT: u32 = 0x3f00;
+        /// Bit 16: set-point not finite or out of bounds; the last accepted one was held.
+        pub const SETPOINT_FAULT: u32 = 0x1_0000;
+
+        /// What a tick reads.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct TickInput {
+            /// Set-point for the end of the coming interval: pose from rest (m, rad) or leg displacements (m), as
+            /// [`Config::setpoint`] says.
+            pub setpoint: [Real; 6],
+            /// Gauge reading Y of each leg, m, zero at rest.
+            pub displacement: [Real; LEGS],
+        }
+
+        /// What a tick yields. Every number is finite.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct TickOutput {
+            /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
+            pub voltage: [Real; LEGS],
+            /// q̂ = ρ̂X: displacement really requested of each leg, after all limits, m.
+            pub requested: [Real; LEGS],
+            /// T: displacement demanded of each leg, m.
+            pub demand: [Real; LEGS],
+            /// δ̂ of each leg, m.
+            pub level: [Real; LEGS],
+            /// φ̂ of each leg, m.
+            pub drift: [Real; LEGS],
+            /// Converter code of each leg.
+            pub dac_code: [i32; LEGS],
+            /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`].
+            pub status: u32,
+        }
+
+        /// One control tick. See the module for the timing.
+        pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
+            let accepted = take_setpoint(config, state, input);
+            let run_ends = count_run(config, state);
+            let mut output = TickOutput {
+                voltage: [0.0; LEGS],
+                requested: [0.0; LEGS],
+                demand: state.demand,
+                level: [0.0; LEGS],
+                drift: [0.0; LEGS],
+                dac_code: [0; LEGS],
+                status: if accepted { 0 } else { SETPOINT_FAULT },
+            };
+            for index in 0..LEGS {
+                let leg = &mut state.legs[index];
+                let gauge = input.displacement[index];
+                let gauge_good = limits::gauge_is_accepted(gauge);
+                if config.law() == Law::Invhys || (run_ends && gauge_good) {
+                    adapt(config, leg, gauge);
+                }
+                let limited = actuate(config, leg, &TABLES[index], state.demand[index]);
+                output.voltage[index] = DAC.voltage(leg.code);
+                output.requested[index] = leg.memory.displacement();
+                output.level[index] = leg.estimate.level;
+                output.drift[index] = leg.estimate.drift;
+                output.dac_code[index] = leg.code;
+                output.status |= (limited as u32) << index | (!gauge_good as u32) << (8 + index);
+            }
+            output
+        }
+
+        /// T = Δl(h_d), or T itself. A set-point that is not accepted leaves the last demand standing.
+        #[inline]
+        fn take_setpoint(config: &Config, state: &mut State, input: &TickInput) -> bool {
+            let accepted = match config.setpoint() {
+                SetpointKind::Pose => kinematics::pose_is_accepted(&input.setpoint),
+                SetpointKind::Leg => limits::leg_setpoint_is_accepted(&input.setpoint),
+            };
+            if accepted {
+                state.demand = match config.setpoint() {
+                    SetpointKind::Pose => kinematics::leg_displacements(&input.setpoint),
+                    SetpointKind::Leg => input.setpoint,
+                };
+            }
+            accepted
+        }
+
+        /// Whether a run of `run_interval` ticks ends with this reading.
+        #[inline]
+        fn count_run(config: &Config, state: &mut State) -> bool {
+            let ticks = state.ticks_in_run.saturating_add(1);
+            let ends = ticks >= config.run_interval();
+            state.ticks_in_run = if ends { 0 } else { ticks };
+            ends
+        }
+
+        /// m = Y − ρ̂X, then (AII.3) or (AII.5), (AII.6).
+        #[inline]
+        fn adapt(config: &Config, leg: &mut LegState, gauge: Real) {
+            let model_error = gauge - leg.memory.displacement();
+            leg.estimate.update(config.law(), config.level_weight(), config.drift_weight(), model_error);
+        }
+
+        /// u = Γ⁻¹(T − δ̂ − φ̂) as a permitted code; the memory then holds what that code really requests. Returns whether a
+        /// limit of table, voltage or slew rate held the leg back.
+        #[inline]
+        pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, demand: Real) -> bool {
+            let request = demand - leg.estimate.correction();
+            let out_of_reach = !(request >= Real::ZERO && request <= table.full_displacement());
+            let drive = leg.memory.solve(table, request);
+            let (code, held_back) = DAC.code(drive, leg.code, config.code_limits());
+            leg.code = code;
+            leg.memory.apply(table, DAC.drive(code));
+            out_of_reach || held_back
+        }
+    }
+}

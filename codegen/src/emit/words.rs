@@ -1,0 +1,149 @@
+//! `src/words.rs`: inputs, outputs and config as named 64-bit words, for traces and links. The same for every spec.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use super::literal;
+use crate::ir::{Ir, LEGS};
+
+pub fn emit(ir: &Ir) -> TokenStream {
+    let per_leg = |names: &[&str]| -> Vec<String> {
+        names.iter().flat_map(|name| (0..LEGS).map(move |leg| format!("{name}[{leg}]"))).collect()
+    };
+    let inputs = per_leg(&["setpoint", "displacement"]);
+    let mut outputs = per_leg(&["voltage", "requested", "demand", "level", "drift", "dac_code"]);
+    outputs.push("status".to_owned());
+    let config = [
+        "mode", "setpoint_kind", "level_weight", "drift_weight", "run_interval", "max_step_codes", "code_min", "code_max",
+    ];
+    let description = format!(
+        "name={}\ndigest={}\nversion={}\nscalar_bits={}\nleg_gain={:?}\nperiod={:?}\ngrid={}\ndrive_range={:?},{:?}\nconfig_names={}\ninput_names={}\noutput_names={}\n",
+        ir.name,
+        ir.digest,
+        ir.specgen_version,
+        ir.scalar.bits(),
+        ir.defaults.leg_gain,
+        ir.defaults.period,
+        ir.hysteresis.grid,
+        ir.actuation.voltage[0],
+        ir.actuation.voltage[1],
+        config.join(","),
+        inputs.join(","),
+        outputs.join(","),
+    );
+    let (input_words, output_words, config_words) =
+        (literal::count(inputs.len()), literal::count(outputs.len()), literal::count(config.len()));
+    quote! {
+        #![doc = " Inputs, outputs and settings as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target"]
+        #![doc = " reads and writes these, so that two of them can be compared bit for bit."]
+
+        use specgen_runtime::{CodeLimits, Law, Real as _};
+
+        use crate::{Config, ConfigError, LEGS, Real, SetpointKind, TickInput, TickOutput};
+
+        /// Words of a tick's input.
+        pub const INPUT_WORDS: usize = #input_words;
+        /// Words of a tick's output.
+        pub const OUTPUT_WORDS: usize = #output_words;
+        /// Words of the settings.
+        pub const CONFIG_WORDS: usize = #config_words;
+        /// Names of the input words.
+        pub const INPUT_NAMES: [&str; INPUT_WORDS] = [#(#inputs),*];
+        /// Names of the output words.
+        pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] = [#(#outputs),*];
+        /// Names of the settings. `mode` is 0 invhys, 1 ewma, 2 pcc; `setpoint_kind` is 0 pose, 1 leg.
+        pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = [#(#config),*];
+
+        /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
+        pub const DESCRIPTION: &str = #description;
+
+        impl TickInput {
+            /// From words in the order of [`INPUT_NAMES`].
+            #[must_use]
+            pub fn from_words(words: &[u64; INPUT_WORDS]) -> Self {
+                let mut input = Self { setpoint: [0.0; LEGS], displacement: [0.0; LEGS] };
+                for index in 0..LEGS {
+                    input.setpoint[index] = Real::from_word(words[index]);
+                    input.displacement[index] = Real::from_word(words[LEGS + index]);
+                }
+                input
+            }
+        }
+
+        impl TickOutput {
+            /// Words in the order of [`OUTPUT_NAMES`].
+            #[must_use]
+            pub fn to_words(&self) -> [u64; OUTPUT_WORDS] {
+                let mut words = [0; OUTPUT_WORDS];
+                for index in 0..LEGS {
+                    words[index] = self.voltage[index].to_word();
+                    words[LEGS + index] = self.requested[index].to_word();
+                    words[2 * LEGS + index] = self.demand[index].to_word();
+                    words[3 * LEGS + index] = self.level[index].to_word();
+                    words[4 * LEGS + index] = self.drift[index].to_word();
+                    words[5 * LEGS + index] = self.dac_code[index] as u32 as u64;
+                }
+                words[6 * LEGS] = self.status as u64;
+                words
+            }
+        }
+
+        impl Config {
+            /// From words in the order of [`CONFIG_NAMES`].
+            ///
+            /// # Errors
+            /// The first word that is out of range.
+            pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
+                let law = match words[0] {
+                    0 => Law::Invhys,
+                    1 => Law::Ewma,
+                    2 => Law::Pcc,
+                    _ => return Err(ConfigError { word: 0 }),
+                };
+                let setpoint = match words[1] {
+                    0 => SetpointKind::Pose,
+                    1 => SetpointKind::Leg,
+                    _ => return Err(ConfigError { word: 1 }),
+                };
+                let run_interval = if words[4] > u32::MAX as u64 { 0 } else { words[4] as u32 };
+                let limits = CodeLimits { max_step: code(words[5]), min: code(words[6]), max: code(words[7]) };
+                Self::new()
+                    .with_law(law)
+                    .with_setpoint(setpoint)
+                    .with_weights(Real::from_word(words[2]), Real::from_word(words[3]))?
+                    .with_run_interval(run_interval)?
+                    .with_code_limits(limits)
+            }
+
+            /// Words in the order of [`CONFIG_NAMES`].
+            #[must_use]
+            pub fn to_words(&self) -> [u64; CONFIG_WORDS] {
+                let law = match self.law() {
+                    Law::Invhys => 0,
+                    Law::Ewma => 1,
+                    Law::Pcc => 2,
+                };
+                let setpoint = match self.setpoint() {
+                    SetpointKind::Pose => 0,
+                    SetpointKind::Leg => 1,
+                };
+                let limits = self.code_limits();
+                [
+                    law,
+                    setpoint,
+                    self.level_weight().to_word(),
+                    self.drift_weight().to_word(),
+                    self.run_interval() as u64,
+                    limits.max_step as u32 as u64,
+                    limits.min as u32 as u64,
+                    limits.max as u32 as u64,
+                ]
+            }
+        }
+
+        /// A code from its word; anything that is no code becomes −1, which no limit accepts.
+        fn code(word: u64) -> i32 {
+            if word > i32::MAX as u64 { -1 } else { word as i32 }
+        }
+    }
+}

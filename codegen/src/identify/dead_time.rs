@@ -1,0 +1,106 @@
+//! Dead time between the drive column and the displacement column: amplifier lag, filters, sensor processing.
+//!
+//! A dead time widens the measured loop in proportion to the rate. It can be told from hysteresis only when the
+//! record holds branches of different rates; on a record of one rate, creep and hysteresis would be mistaken for it,
+//! and the estimate is refused.
+
+use nalgebra::{Cholesky, DVector};
+
+use super::branches::Branch;
+use super::normal::accumulate;
+use super::record::Record;
+use super::regressor::Plane;
+use super::{prior, sanity};
+
+/// Ratio of the fast to the slow branches (90 % and 10 % quantile of |du/dt|) from which a dead time can be identified.
+const RATE_RATIO: f64 = 2.0;
+/// Longest dead time tried, sampling intervals.
+const LONGEST: usize = 16;
+/// Dead times tried per sampling interval.
+const PER_INTERVAL: usize = 2;
+/// The residual must fall by this share, or the dead time is zero.
+const WORTHWHILE: f64 = 0.1;
+
+/// Estimates the dead time in s, at most 16 sampling intervals; the text says how it was decided.
+#[must_use]
+pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch]) -> (f64, String) {
+    let (slow, fast) = rates(record, branches);
+    if fast < RATE_RATIO * slow {
+        let why = format!("not identifiable: the branches run at {slow:.3} to {fast:.3} V/s, less than {RATE_RATIO} times apart");
+        return (0.0, why);
+    }
+    let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
+    let step = sanity::median(&mut intervals) / PER_INTERVAL as f64;
+    let tried: Vec<f64> = (0..=LONGEST * PER_INTERVAL).map(|k| k as f64 * step).collect();
+    let scale = 1.0 / record.displacement_range();
+    let targets: Vec<Vec<f64>> = tried.iter().map(|&tau| scaled(&delayed(record, tau), scale)).collect();
+    let mut normal = accumulate(plane, record, first, branches, &targets);
+    prior::add(plane.grid, &mut normal.gram);
+    let Some(factor) = Cholesky::new(normal.gram) else {
+        return (0.0, "not identifiable: the record does not determine the table".to_owned());
+    };
+    let residual: Vec<f64> = normal
+        .rhs
+        .iter()
+        .zip(&normal.energy)
+        .map(|(rhs, energy)| {
+            let rhs = DVector::from_column_slice(rhs);
+            energy - factor.solve(&rhs).dot(&rhs)
+        })
+        .collect();
+    let best = (0..tried.len()).fold(0, |best, k| if residual[k] < residual[best] { k } else { best });
+    let gain = 1.0 - (residual[best] / residual[0]).sqrt();
+    if best + 1 == tried.len() {
+        return (0.0, format!("not credible: the fit still improves at {} s", tried[best]));
+    }
+    if best == 0 || gain.is_nan() || gain < WORTHWHILE {
+        return (0.0, format!("none: the best one lowers the residual by less than {:.0} %", WORTHWHILE * 100.0));
+    }
+    // Vertex of the parabola through the best one and its neighbours.
+    let (a, b, c) = (residual[best - 1], residual[best], residual[best + 1]);
+    let tau = tried[best] + 0.5 * step * (a - c) / (a - 2.0 * b + c);
+    (tau, format!("estimated: lowers the residual of the branches by {:.0} %", gain * 100.0))
+}
+
+/// 10 % and 90 % quantile of the mean rates of the branches, V/s.
+fn rates(record: &Record, branches: &[Branch]) -> (f64, f64) {
+    let mut rates: Vec<f64> = branches
+        .iter()
+        .map(|b| {
+            let last = b.end - 1;
+            ((record.drive[last] - record.drive[b.first]) / (record.time[last] - record.time[b.first])).abs()
+        })
+        .collect();
+    rates.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| rates.get((share * rates.len() as f64) as usize).copied().unwrap_or(0.0);
+    (at(0.1), at(0.9))
+}
+
+/// Displacement (m) at each sample's time + `tau` (s), interpolated; held at the last value behind the end.
+#[must_use]
+pub fn delayed(record: &Record, tau: f64) -> Vec<f64> {
+    if tau == 0.0 {
+        return record.displacement.clone();
+    }
+    let (time, y) = (&record.time, &record.displacement);
+    let mut next = 0;
+    time.iter()
+        .map(|t| {
+            while next < time.len() && time[next] < t + tau {
+                next += 1;
+            }
+            match (next.checked_sub(1), time.get(next)) {
+                (Some(before), Some(after)) => {
+                    let share = (t + tau - time[before]) / (after - time[before]);
+                    y[before] + share * (y[next] - y[before])
+                }
+                (None, _) => y[0],
+                (Some(last), None) => y[last],
+            }
+        })
+        .collect()
+}
+
+fn scaled(values: &[f64], scale: f64) -> Vec<f64> {
+    values.iter().map(|v| v * scale).collect()
+}

@@ -1,0 +1,206 @@
+//! Normal equations of the fit, accumulated sparsely over Everett nodes and turned into cell weights by sums.
+//!
+//! Each branch has a free offset of its own, which is projected out by centring the branch.
+//! Slow drift and creep between the curves then cannot bend the table.
+
+use nalgebra::DMatrix;
+
+use super::branches::Branch;
+use super::record::Record;
+use super::regressor::{Plane, Term};
+use super::staircase::Staircase;
+use crate::everett::EverettTable;
+
+/// Σ over the samples of φφᵀ, φ·y and y², each centred in its branch. φ_c is the displacement of a unit weight in cell c.
+#[derive(Debug, Clone)]
+pub struct Normal {
+    /// Gram matrix over weights, symmetric.
+    pub gram: DMatrix<f64>,
+    /// One right-hand side for each target, over weights.
+    pub rhs: Vec<Vec<f64>>,
+    /// Σ of the squares of each centred target.
+    pub energy: Vec<f64>,
+    /// Samples used.
+    pub samples: usize,
+}
+
+/// Calls `visit(sample, row)` for every sample from `first` on, with negative saturation before it.
+pub fn each_row(plane: &Plane, drive: &[f64], first: usize, visit: impl FnMut(usize, &[Term])) {
+    each_row_from(Staircase::negative_saturation(plane.range), plane, drive, first, visit);
+}
+
+/// Like [`each_row`], with another memory before sample `first`.
+pub fn each_row_from(
+    mut memory: Staircase,
+    plane: &Plane,
+    drive: &[f64],
+    first: usize,
+    mut visit: impl FnMut(usize, &[Term]),
+) {
+    let mut row = Vec::new();
+    for (k, &u) in drive.iter().enumerate().skip(first) {
+        memory.push(u);
+        plane.row(&memory, &mut row);
+        visit(k, &row);
+    }
+}
+
+/// Normal equations over `branches` (in ascending order; neighbours may share one sample).
+///
+/// `targets[k][n]` is the k-th target of sample n.
+#[must_use]
+pub fn accumulate(plane: &Plane, record: &Record, first: usize, branches: &[Branch], targets: &[Vec<f64>]) -> Normal {
+    let nodes = plane.nodes();
+    let mut sums = Sums::new(nodes, targets.len());
+    let mut pending = branches.iter().peekable();
+    each_row(plane, &record.drive, first, |k, row| {
+        while let Some(branch) = pending.peek() {
+            if k >= branch.first {
+                sums.add(row, targets, k);
+            }
+            if k + 1 < branch.end {
+                break;
+            }
+            sums.close_branch();
+            pending.next();
+            // The sample of a reversal ends one branch and starts the next.
+            if !pending.peek().is_some_and(|next| next.first <= k) {
+                break;
+            }
+        }
+    });
+    sums.close_branch();
+    let Sums { mut gram, mut rhs, energy, samples, .. } = sums;
+    mirror(&mut gram);
+    for column in 0..nodes {
+        nodes_to_weights(plane.grid, gram.column_mut(column).as_mut_slice());
+    }
+    gram.transpose_mut();
+    for column in 0..nodes {
+        nodes_to_weights(plane.grid, gram.column_mut(column).as_mut_slice());
+    }
+    for b in &mut rhs {
+        nodes_to_weights(plane.grid, b);
+    }
+    Normal { gram, rhs, energy, samples }
+}
+
+/// Running sums over Everett nodes.
+struct Sums {
+    /// Lower triangle.
+    gram: DMatrix<f64>,
+    rhs: Vec<Vec<f64>>,
+    energy: Vec<f64>,
+    samples: usize,
+    branch: BranchSums,
+}
+
+/// Sums of the branch under way.
+struct BranchSums {
+    samples: usize,
+    row: Vec<f64>,
+    touched: Vec<usize>,
+    /// First value of each target in the branch; targets are taken relative to it, which keeps the sums small.
+    origin: Vec<f64>,
+    target: Vec<f64>,
+}
+
+impl Sums {
+    fn new(nodes: usize, targets: usize) -> Self {
+        let branch =
+            BranchSums { samples: 0, row: vec![0.0; nodes], touched: Vec::new(), origin: vec![0.0; targets], target: vec![0.0; targets] };
+        Self { gram: DMatrix::zeros(nodes, nodes), rhs: vec![vec![0.0; nodes]; targets], energy: vec![0.0; targets], samples: 0, branch }
+    }
+
+    fn add(&mut self, row: &[Term], targets: &[Vec<f64>], sample: usize) {
+        let branch = &mut self.branch;
+        for (k, target) in targets.iter().enumerate() {
+            if branch.samples == 0 {
+                branch.origin[k] = target[sample];
+            }
+            let y = target[sample] - branch.origin[k];
+            branch.target[k] += y;
+            self.energy[k] += y * y;
+            for &(node, c) in row {
+                self.rhs[k][node] += c * y;
+            }
+        }
+        branch.samples += 1;
+        for &(a, ca) in row {
+            if branch.row[a] == 0.0 {
+                branch.touched.push(a);
+            }
+            branch.row[a] += ca;
+            for &(b, cb) in row {
+                if a >= b {
+                    self.gram[(a, b)] += ca * cb;
+                }
+            }
+        }
+    }
+
+    /// Subtracts the mean of the branch: Σ(x − x̄)(y − ȳ) = Σxy − ΣxΣy/n.
+    fn close_branch(&mut self) {
+        let branch = &mut self.branch;
+        if branch.samples == 0 {
+            return;
+        }
+        branch.touched.sort_unstable();
+        branch.touched.dedup();
+        let share = 1.0 / branch.samples as f64;
+        for (k, &sum) in branch.target.iter().enumerate() {
+            self.energy[k] -= sum * sum * share;
+            for &node in &branch.touched {
+                self.rhs[k][node] -= branch.row[node] * sum * share;
+            }
+        }
+        for &a in &branch.touched {
+            for &b in branch.touched.iter().take_while(|b| **b <= a) {
+                self.gram[(a, b)] -= branch.row[a] * branch.row[b] * share;
+            }
+        }
+        for &node in &branch.touched {
+            branch.row[node] = 0.0;
+        }
+        branch.touched.clear();
+        branch.target.fill(0.0);
+        self.samples += branch.samples;
+        branch.samples = 0;
+    }
+}
+
+fn mirror(gram: &mut DMatrix<f64>) {
+    for column in 0..gram.ncols() {
+        for row in 0..column {
+            gram[(row, column)] = gram[(column, row)];
+        }
+    }
+}
+
+/// Gradient over nodes to gradient over weights, in place: the weight of cell (a, b) adds to every node with up ≥ a, down ≤ b.
+fn nodes_to_weights(grid: usize, values: &mut [f64]) {
+    for up in 1..=grid {
+        for down in 1..up {
+            values[EverettTable::index(up, down)] += values[EverettTable::index(up, down - 1)];
+        }
+    }
+    for up in (1..grid).rev() {
+        for down in 0..up {
+            values[EverettTable::index(up, down)] += values[EverettTable::index(up + 1, down)];
+        }
+    }
+}
+
+/// Cell weights to Everett nodes, in place: E(i, j) is the sum of the weights with up ≤ i, down ≥ j.
+pub fn weights_to_nodes(grid: usize, values: &mut [f64]) {
+    for up in 1..=grid {
+        for down in (0..up.saturating_sub(1)).rev() {
+            values[EverettTable::index(up, down)] += values[EverettTable::index(up, down + 1)];
+        }
+    }
+    for up in 2..=grid {
+        for down in 0..up - 1 {
+            values[EverettTable::index(up, down)] += values[EverettTable::index(up - 1, down)];
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! What is assumed about weights that the record leaves undetermined: neighbouring cells have similar weights.
+
+use nalgebra::DMatrix;
+
+use crate::everett::EverettTable;
+
+/// Penalty on the squared difference of neighbouring weights, as a share of the mean diagonal of the Gram matrix.
+///
+/// Chosen so that it decides where the record says nothing (a cell that no branch crosses) and does not show where
+/// it does: a cell that switches in one sample of a thousand outweighs it.
+const SMOOTHNESS: f64 = 1e-6;
+/// Share of the mean diagonal that keeps the matrix positive definite in floating point.
+const RIDGE: f64 = 1e-12;
+
+/// Adds the penalty to `gram` (both triangles) and returns its strength, in the unit of `gram`.
+///
+/// Neighbours share an edge in the plane. The triangles on the diagonal also hold the reversible part and are much
+/// heavier than the cells beside them: they are neighbours of each other only.
+pub fn add(grid: usize, gram: &mut DMatrix<f64>) -> f64 {
+    let count = gram.nrows();
+    let mean = (0..count).fold(0.0, |sum, k| sum + gram[(k, k)]) / count as f64;
+    let strength = SMOOTHNESS * mean;
+    for k in 0..count {
+        gram[(k, k)] += RIDGE * mean;
+    }
+    for up in 1..=grid {
+        for down in 0..up {
+            let cell = EverettTable::index(up, down);
+            if down + 1 == up {
+                if up < grid {
+                    tie(gram, cell, EverettTable::index(up + 1, down + 1), strength);
+                }
+                continue;
+            }
+            if up < grid {
+                tie(gram, cell, EverettTable::index(up + 1, down), strength);
+            }
+            if down + 2 < up {
+                tie(gram, cell, EverettTable::index(up, down + 1), strength);
+            }
+        }
+    }
+    strength
+}
+
+fn tie(gram: &mut DMatrix<f64>, a: usize, b: usize, strength: f64) {
+    gram[(a, a)] += strength;
+    gram[(b, b)] += strength;
+    gram[(a, b)] -= strength;
+    gram[(b, a)] -= strength;
+}

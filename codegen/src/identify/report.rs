@@ -1,0 +1,71 @@
+//! What identification tells about its result.
+
+use serde::Serialize;
+
+/// Which branches the table was fitted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Branches {
+    /// Falls from a reversal only: by definition E(up, down) is the displacement lost in them.
+    Descending,
+    /// Rises and falls: the record holds more than first-order reversal curves, or its falls alone do not excite
+    /// every cell that it excites.
+    All,
+}
+
+/// Result figures of an identification. Lengths in m, times in s; percentages are of `displacement_range`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Name of the record.
+    pub record: String,
+    /// N.
+    pub grid: usize,
+    /// Samples in the record.
+    pub samples: usize,
+    /// Samples at the beginning that are not used, since the state is unknown or still settling.
+    pub samples_skipped: usize,
+    /// Samples in the least-squares fit.
+    pub samples_fitted: usize,
+    /// Reversal curves found.
+    pub reversal_curves: usize,
+    /// Branches in the fit; each has a free offset.
+    pub branches: Branches,
+    /// Share of the cells that the record excites.
+    pub excited_share: f64,
+    /// Difference of the largest and smallest displacement behind the skipped samples.
+    pub displacement_range: f64,
+    /// Residual over all samples that are not skipped, rising and falling, after one offset and one linear drift.
+    pub fit_rms: f64,
+    /// Largest absolute value of that residual.
+    pub fit_max: f64,
+    /// `fit_rms` in % of the range.
+    pub fit_rms_percent: f64,
+    /// `fit_max` in % of the range.
+    pub fit_max_percent: f64,
+    /// Residual of the fitted branches with their own offsets: hysteresis alone, without drift and creep between curves.
+    pub branch_rms: f64,
+    /// `branch_rms` in % of the range.
+    pub branch_rms_percent: f64,
+    /// Displacement in negative saturation at the middle of the used time.
+    pub offset: f64,
+    /// Drift in m/s: median slope of the displacement over the returns to negative saturation. Creep is part of it.
+    pub drift: f64,
+    /// Returns from which the drift was taken.
+    pub drift_returns: usize,
+    /// Whether the drift was removed from the branches too.
+    pub drift_removed: bool,
+    /// Time by which the displacement lags the drive, s.
+    pub dead_time: f64,
+    /// How the dead time was decided.
+    pub dead_time_basis: String,
+    /// Standard deviation of white noise on the displacement.
+    pub noise_floor: f64,
+    /// Weights that are zero because the data would make them negative.
+    pub zero_weights: usize,
+    /// Weights in all.
+    pub weights: usize,
+    /// Factorisations of the solver.
+    pub solver_iterations: usize,
+    /// Largest relative violation of the optimality conditions.
+    pub kkt_violation: f64,
+}

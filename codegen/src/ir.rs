@@ -1,0 +1,178 @@
+//! Intermediate representation: every constant of the emitted controller, computed, rounded and in order.
+//!
+//! Plain data. Lowering fills it, emitters print it and do no arithmetic of their own. `specgen dump-ir` shows it.
+//! Numbers are already rounded to the controller's scalar, so that the text is the constant.
+
+use serde::Serialize;
+
+/// Number of legs.
+pub const LEGS: usize = 6;
+
+/// Floating-point type of the emitted code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scalar {
+    /// IEEE 754 binary32.
+    F32,
+    /// IEEE 754 binary64.
+    F64,
+}
+
+impl Scalar {
+    /// Width in bits.
+    #[must_use]
+    pub fn bits(self) -> u32 {
+        match self {
+            Self::F32 => 32,
+            Self::F64 => 64,
+        }
+    }
+
+    /// `value` rounded to this type.
+    #[must_use]
+    pub fn round(self, value: f64) -> f64 {
+        match self {
+            Self::F32 => f64::from(value as f32),
+            Self::F64 => value,
+        }
+    }
+
+    /// Distance from 1 to the next number.
+    #[must_use]
+    pub fn epsilon(self) -> f64 {
+        match self {
+            Self::F32 => f64::from(f32::EPSILON),
+            Self::F64 => f64::EPSILON,
+        }
+    }
+}
+
+/// A controller, down to its constants.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ir {
+    /// Platform name.
+    pub name: String,
+    /// SHA-256 of spec and records, hex.
+    pub digest: String,
+    /// Version of the compiler.
+    pub specgen_version: String,
+    /// Arithmetic.
+    pub scalar: Scalar,
+    /// Pose to leg displacements.
+    pub kinematics: Kinematics,
+    /// Preisach tables.
+    pub hysteresis: Hysteresis,
+    /// Converter and limits.
+    pub actuation: Actuation,
+    /// What inputs are believed.
+    pub bounds: Bounds,
+    /// Config at start-up.
+    pub defaults: Defaults,
+}
+
+/// Leg kinematics in difference form.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Kinematics {
+    /// r₀ = P₀ + P_i − B_i at rest (AI.2), base frame, m.
+    pub rest_leg: [[f64; 3]; LEGS],
+    /// P_i in the platform frame (AI.4), m.
+    pub platform_joint: [[f64; 3]; LEGS],
+    /// l₀ = |r₀|, m.
+    pub rest_length: [f64; LEGS],
+    /// Taylor coefficients of sin x / x in x², after the leading 1.
+    pub sine: Vec<f64>,
+    /// Taylor coefficients of (1 − cos x) / x² in x².
+    pub versine: Vec<f64>,
+    /// Newton steps for the root of Δl² + 2 l₀ Δl = s.
+    pub newton_steps: u32,
+    /// Largest |Δl| over the accepted poses, m (bound; sizes the Newton steps).
+    pub largest_displacement: f64,
+}
+
+/// Preisach tables.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hysteresis {
+    /// N, cells per axis.
+    pub grid: usize,
+    /// Capacity of the reversal memory, extrema.
+    pub memory: usize,
+    /// Distinct tables: E(i, j) for i = 0..=N, j = 0..=i, with the zero diagonal, m.
+    pub tables: Vec<Vec<f64>>,
+    /// Table of each leg.
+    pub table_of_leg: [usize; LEGS],
+}
+
+/// Converter and limits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Actuation {
+    /// Voltage of code 0, V.
+    pub volts_at_zero: f64,
+    /// V per code.
+    pub volts_per_code: f64,
+    /// Drive of code 0, cells.
+    pub cells_at_zero: f64,
+    /// Cells per code.
+    pub cells_per_code: f64,
+    /// Codes per cell.
+    pub codes_per_cell: f64,
+    /// Lowest code whose voltage is within limits.
+    pub code_min: i32,
+    /// Highest such code.
+    pub code_max: i32,
+    /// Voltage limits the codes come from, V.
+    pub voltage: [f64; 2],
+}
+
+/// What inputs are believed; anything else is a fault.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Bounds {
+    /// |pose component| from rest: m ×3, rad ×3.
+    pub pose: [f64; 6],
+    /// Leg displacement set-point, m.
+    pub leg: [f64; 2],
+    /// Gauge reading, m.
+    pub sensor: [f64; 2],
+}
+
+/// Config at start-up.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Defaults {
+    /// Adaptation law.
+    pub law: Law,
+    /// Meaning of the set-point.
+    pub setpoint: Setpoint,
+    /// ω or ω1 per run.
+    pub level_weight: f64,
+    /// ω2 per run.
+    pub drift_weight: f64,
+    /// Ticks per run.
+    pub run_interval: u32,
+    /// Slew limit, codes per tick.
+    pub max_step: i32,
+    /// Control period the slew limit was derived for, s.
+    pub period: f64,
+    /// ρ̂ of a leg, m/V: the virtual drive X is q̂/ρ̂.
+    pub leg_gain: f64,
+}
+
+/// Adaptation law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Law {
+    /// Inverse Preisach alone.
+    Invhys,
+    /// (AII.3).
+    Ewma,
+    /// (AII.5), (AII.6).
+    Pcc,
+}
+
+/// Meaning of the six set-point numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Setpoint {
+    /// Pose from rest.
+    Pose,
+    /// Leg displacements.
+    Leg,
+}

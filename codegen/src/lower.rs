@@ -1,0 +1,87 @@
+//! Model and tables to IR: all arithmetic on constants happens here.
+//!
+//! Trigonometry goes through `libm`, so that the same spec gives the same bytes on every machine.
+
+mod actuation;
+mod kinematics;
+
+use crate::diagnostic::Diagnostic;
+use crate::everett::EverettTable;
+use crate::ir::{Bounds, Defaults, Hysteresis, Ir, LEGS, Law, Scalar, Setpoint};
+use crate::model::{self, Model};
+
+/// Beyond this many strokes a leg set-point is a mistake, not a demand to saturate on.
+const LEG_SETPOINT_STROKES: f64 = 2.0;
+
+/// Computes every constant of the controller.
+///
+/// `tables` holds one Everett table for all legs or one for each; `digest` is the hex digest of spec and records.
+///
+/// # Errors
+/// Findings about values that cannot be turned into a controller (a slew limit below one code per tick, voltage limits
+/// without a code between them), with their place in the spec.
+pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir, Vec<Diagnostic>> {
+    let scalar = match model.controller.scalar {
+        model::Scalar::F32 => Scalar::F32,
+        model::Scalar::F64 => Scalar::F64,
+    };
+    let hysteresis = hysteresis(model, tables, scalar);
+    let (actuation, max_step) = actuation::lower(model, scalar)?;
+    let stroke = model.actuator.stroke;
+    let round = |value| scalar.round(value);
+    let [tx, ty, tz] = model.workspace.translation;
+    let [rx, ry, rz] = model.workspace.rotation;
+    Ok(Ir {
+        name: model.name.clone(),
+        digest: digest.to_owned(),
+        specgen_version: env!("CARGO_PKG_VERSION").to_owned(),
+        scalar,
+        kinematics: kinematics::lower(model, scalar),
+        hysteresis,
+        actuation,
+        bounds: Bounds {
+            pose: [tx, ty, tz, rx, ry, rz].map(round),
+            leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
+            sensor: model.sensor.range.map(round),
+        },
+        defaults: Defaults {
+            law: match model.adaptation.mode {
+                model::AdaptationMode::Invhys => Law::Invhys,
+                model::AdaptationMode::Ewma => Law::Ewma,
+                model::AdaptationMode::Pcc => Law::Pcc,
+            },
+            setpoint: match model.controller.setpoint {
+                model::SetpointKind::Pose => Setpoint::Pose,
+                model::SetpointKind::Leg => Setpoint::Leg,
+            },
+            level_weight: round(model.adaptation.level_weight),
+            drift_weight: round(model.adaptation.drift_weight),
+            run_interval: model.adaptation.run_interval,
+            max_step,
+            period: model.timing.period,
+            leg_gain: model.actuator.leg_gain(),
+        },
+    })
+}
+
+/// Tables in the layout of the controller, each distinct one once.
+fn hysteresis(model: &Model, tables: &[EverettTable], scalar: Scalar) -> Hysteresis {
+    let mut distinct: Vec<Vec<f64>> = Vec::new();
+    let mut table_of_leg = [0; LEGS];
+    for (leg, of_leg) in table_of_leg.iter_mut().enumerate() {
+        let table = &tables[if tables.len() == LEGS { leg } else { 0 }];
+        let nodes: Vec<f64> = (0..=table.grid)
+            .flat_map(|up| (0..=up).map(move |down| scalar.round(table.node(up, down))))
+            .collect();
+        *of_leg = distinct.iter().position(|known| *known == nodes).unwrap_or_else(|| {
+            distinct.push(nodes);
+            distinct.len() - 1
+        });
+    }
+    Hysteresis {
+        grid: model.hysteresis.grid,
+        memory: model.hysteresis.memory,
+        tables: distinct,
+        table_of_leg,
+    }
+}

@@ -1,0 +1,147 @@
+//! Checked values to the [`Model`].
+
+use super::fields::Fields;
+use crate::model::{
+    Actuator, Adaptation, AdaptationMode, Amplifier, ControllerOptions, Dac, Gains, Geometry,
+    Hysteresis, LegBody, Mcu, Model, RigidBody, Scalar, Sensor, SetpointKind, Target, Timing,
+    Workspace,
+};
+
+/// The model, or `None` if a value is missing: then there is a finding for it.
+pub(super) fn model(f: &Fields) -> Option<Model> {
+    Some(Model {
+        name: f.name("name")?.to_owned(),
+        geometry: geometry(f)?,
+        platform: RigidBody {
+            mass: f.number("platform.mass")?,
+            inertia: f.list("platform.inertia")?,
+            products: f.list("platform.products")?,
+            center_of_mass: f.list("platform.center_of_mass")?,
+        },
+        leg: LegBody {
+            fixed_mass: f.number("leg.fixed_mass")?,
+            extensible_mass: f.number("leg.extensible_mass")?,
+            fixed_inertia: f.number("leg.fixed_inertia")?,
+            extensible_inertia: f.number("leg.extensible_inertia")?,
+            fixed_center: f.number("leg.fixed_center")?,
+            extensible_center: f.number("leg.extensible_center")?,
+        },
+        actuator: Actuator {
+            stacks: f.whole("actuator.stacks")?,
+            stack_gain: f.number("actuator.stack_gain")?,
+            stroke: f.number("actuator.stroke")?,
+            voltage: f.list("actuator.voltage")?,
+            slew_rate: f.number("actuator.slew_rate")?,
+            axial_stiffness: f.number("actuator.axial_stiffness")?,
+            resonance: f.number("actuator.resonance")?,
+            damping_ratio: f.number("actuator.damping_ratio")?,
+        },
+        amplifier: Amplifier {
+            lag: f.number("amplifier.lag")?,
+            noise: f.number("amplifier.noise")?,
+        },
+        dac: Dac {
+            bits: f.whole("dac.bits")?,
+            range: f.list("dac.range")?,
+        },
+        sensor: Sensor {
+            range: f.list("sensor.range")?,
+            noise: f.number("sensor.noise")?,
+            bits: f.whole("sensor.bits")?,
+        },
+        hysteresis: Hysteresis {
+            grid: f.whole("hysteresis.grid")?,
+            memory: f.whole("hysteresis.memory")?,
+            records: f.texts("hysteresis.records")?.to_vec(),
+        },
+        adaptation: adaptation(f)?,
+        gains: gains(f),
+        timing: Timing {
+            period: f.number("timing.period")?,
+        },
+        workspace: Workspace {
+            translation: f.list("workspace.translation")?,
+            rotation: f.list("workspace.rotation")?,
+        },
+        controller: ControllerOptions {
+            scalar: if f.choice("controller.scalar")? == "f32" {
+                Scalar::F32
+            } else {
+                Scalar::F64
+            },
+            setpoint: if f.choice("controller.setpoint")? == "leg" {
+                SetpointKind::Leg
+            } else {
+                SetpointKind::Pose
+            },
+        },
+        target: target(f)?,
+        spans: f.spans(),
+    })
+}
+
+pub(super) fn geometry(f: &Fields) -> Option<Geometry> {
+    Some(Geometry {
+        base_radius: f.number("geometry.base_radius")?,
+        platform_radius: f.number("geometry.platform_radius")?,
+        base_angle: f.number("geometry.base_angle")?,
+        platform_angle: f.number("geometry.platform_angle")?,
+        height: f.number("geometry.height")?,
+    })
+}
+
+fn adaptation(f: &Fields) -> Option<Adaptation> {
+    Some(Adaptation {
+        mode: mode(f)?,
+        // A mode that needs a weight has one: the check has seen to it. Zero leaves the estimate as it is.
+        level_weight: weight(f, "level").unwrap_or(0.0),
+        drift_weight: weight(f, "drift").unwrap_or(0.0),
+        run_interval: f.whole("adaptation.run_interval")?,
+        gain_ratio: f.list("adaptation.gain_ratio")?,
+    })
+}
+
+pub(super) fn mode(f: &Fields) -> Option<AdaptationMode> {
+    Some(match f.choice("adaptation.mode")? {
+        "pcc" => AdaptationMode::Pcc,
+        "ewma" => AdaptationMode::Ewma,
+        _ => AdaptationMode::Invhys,
+    })
+}
+
+/// Weight per run of "level" or "drift", given as such or as a bandwidth: ω = Ω · period · run_interval.
+pub(super) fn weight(f: &Fields, which: &str) -> Option<f64> {
+    if let Some(weight) = f.number(&format!("adaptation.{which}_weight")) {
+        return Some(weight);
+    }
+    let run: u32 = f.whole("adaptation.run_interval")?;
+    Some(
+        f.number(&format!("adaptation.{which}_bandwidth"))?
+            * f.number("timing.period")?
+            * f64::from(run),
+    )
+}
+
+fn gains(f: &Fields) -> Option<Gains> {
+    Some(Gains {
+        proportional: f.list("gains.proportional")?,
+        integral: f.list("gains.integral")?,
+        derivative: f.list("gains.derivative")?,
+        environment: f.list("gains.environment")?,
+    })
+}
+
+fn target(f: &Fields) -> Option<Target> {
+    let bytes = |key: &str| f.number(key).map(|bytes| bytes as u64);
+    Some(Target {
+        mcu: if f.choice("target.mcu")? == "mps2-an386" {
+            Mcu::Mps2An386
+        } else {
+            Mcu::Mps2An500
+        },
+        flash: bytes("target.budget.flash"),
+        ram: bytes("target.budget.ram"),
+        stack: bytes("target.budget.stack"),
+        instructions: f.whole("target.budget.instructions"),
+    })
+}

@@ -1,0 +1,73 @@
+//! Checks across several values, none of which needs a record or a long computation.
+//!
+//! Each check reads what it needs; if a value is missing or wrong, that has its own finding and the check is left out
+//! (the `?` on `Option`). So one run finds everything.
+
+mod adaptation;
+mod electrical;
+mod mechanics;
+mod records;
+
+use std::path::Path;
+
+use super::fields::Fields;
+use super::findings::Findings;
+use crate::diagnostic::codes;
+
+/// A check: `None` if a value that it needs is missing.
+type Check = fn(&Fields, &mut Findings) -> Option<()>;
+
+const CHECKS: &[Check] = &[
+    mechanics::mass_centers_inside_leg,
+    mechanics::leg_gyration,
+    mechanics::platform_inertia,
+    mechanics::platform_gyration,
+    mechanics::geometry_holds,
+    mechanics::workspace_in_reach,
+    electrical::limits_in_order,
+    electrical::voltage_inside_dac,
+    electrical::slew_moves_a_code,
+    electrical::stroke_fits_gain,
+    electrical::resonance_below_tick_rate,
+    electrical::sensor_fits,
+    electrical::scalar_fits_fpu,
+    electrical::budget_in_bytes,
+    adaptation::alternatives,
+    adaptation::weights_for_mode,
+    adaptation::bandwidths_fit_period,
+    adaptation::gain_ratio_in_order,
+];
+
+/// Runs every check. `dir` is the folder that records are relative to.
+pub(super) fn all(fields: &Fields, dir: &Path, findings: &mut Findings) {
+    for check in CHECKS {
+        // `None` says that a value is missing, which is reported already.
+        let _ = check(fields, findings);
+    }
+    let _ = records::readable(fields, dir, findings);
+}
+
+/// Reports [`codes::WRONG_ORDER`] unless the first value of `path` is below the second, or equal where that is allowed.
+fn in_order(
+    fields: &Fields,
+    findings: &mut Findings,
+    path: &str,
+    equal_allowed: bool,
+) -> Option<()> {
+    let [low, high] = fields.list::<2>(path)?;
+    if high > low || (equal_allowed && high >= low) {
+        return Some(());
+    }
+    let message =
+        format!("`{path}` ends where it starts or before: the first value must be the smaller one");
+    let key = path.rsplit('.').next().unwrap_or(path);
+    let example = super::keys::key(path).map_or("", |key| key.example);
+    findings.error(
+        codes::WRONG_ORDER,
+        path,
+        fields.span(path),
+        message,
+        format!("write the smaller value first, as in {key} = {example}"),
+    );
+    Some(())
+}

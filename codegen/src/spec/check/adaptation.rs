@@ -1,0 +1,130 @@
+//! Weights, bandwidths and modes of the run-to-run adaptation. Stability needs the sampled leg and comes later.
+
+use super::in_order;
+use crate::diagnostic::codes;
+use crate::model::AdaptationMode;
+use crate::spec::build;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+use crate::spec::text::number;
+
+const WHICH: [&str; 2] = ["level", "drift"];
+
+fn uses(mode: AdaptationMode, which: &str) -> bool {
+    match mode {
+        AdaptationMode::Invhys => false,
+        AdaptationMode::Ewma => which == "level",
+        AdaptationMode::Pcc => true,
+    }
+}
+
+pub(super) fn alternatives(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for which in WHICH {
+        let (weight, bandwidth) = (
+            format!("adaptation.{which}_weight"),
+            format!("adaptation.{which}_bandwidth"),
+        );
+        if f.given(&weight) && f.given(&bandwidth) {
+            findings.error(
+                codes::ALTERNATIVES,
+                &bandwidth,
+                f.span(&bandwidth),
+                format!("`{bandwidth}` stands beside `{weight}`: each sets the weight of the {which} estimate"),
+                "keep one of the two and take the other out".to_owned(),
+            );
+        }
+    }
+    Some(())
+}
+
+pub(super) fn weights_for_mode(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let mode = build::mode(f)?;
+    let word = f.choice("adaptation.mode")?;
+    for which in WHICH {
+        let (weight, bandwidth) = (
+            format!("adaptation.{which}_weight"),
+            format!("adaptation.{which}_bandwidth"),
+        );
+        let given = [&weight, &bandwidth].into_iter().find(|path| f.given(path));
+        match given {
+            None if uses(mode, which) && !findings.mentions(&[&weight, &bandwidth]) => findings.error(
+                codes::ALTERNATIVES,
+                &weight,
+                f.span("adaptation.mode"),
+                format!("mode \"{word}\" needs `{weight}` or `{bandwidth}`"),
+                match which {
+                    "level" => "write level_weight = 0.252, the paper's omega_1 per run, or level_bandwidth = \"450 rad/s\"",
+                    _ => "write drift_weight = 0.011, the paper's omega_2 per run, or drift_bandwidth = \"20 rad/s\"; mode \"ewma\" needs neither",
+                }
+                .to_owned(),
+            ),
+            Some(path) if !uses(mode, which) => findings.warning(
+                codes::UNUSED_WEIGHT,
+                path,
+                f.span(path),
+                format!("mode \"{word}\" does not use `{path}`"),
+                "take it out, or choose the mode that uses it: \"ewma\" takes the level, \"pcc\" level and drift".to_owned(),
+            ),
+            _ => {}
+        }
+    }
+    Some(())
+}
+
+pub(super) fn bandwidths_fit_period(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let period = f.number("timing.period")?;
+    let run: u32 = f.whole("adaptation.run_interval")?;
+    let interval = period * f64::from(run);
+    for which in WHICH {
+        let path = format!("adaptation.{which}_bandwidth");
+        let Some(bandwidth) = f.number(&path) else {
+            continue;
+        };
+        if bandwidth * interval > 1.0 {
+            findings.error(
+                codes::BANDWIDTH_TOO_HIGH,
+                &path,
+                f.span(&path),
+                format!(
+                    "{} rad/s over a run of {} s ({run} ticks) is a weight of {}, expected at most 1",
+                    number(bandwidth),
+                    number(interval),
+                    number(bandwidth * interval)
+                ),
+                format!("at most \"{} rad/s\" would do; or shorten `timing.period` or `adaptation.run_interval`", rounded_down(1.0 / interval)),
+            );
+        }
+    }
+    Some(())
+}
+
+pub(super) fn gain_ratio_in_order(f: &Fields, findings: &mut Findings) -> Option<()> {
+    in_order(f, findings, "adaptation.gain_ratio", true)
+}
+
+/// To four digits and never above `value`: what a message recommends must pass.
+fn rounded_down(value: f64) -> String {
+    let shown: f64 = number(value).parse().unwrap_or(value);
+    if shown <= value {
+        number(value)
+    } else {
+        number(value * (1.0 - 1e-3))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recommended_bandwidth_is_never_above_the_limit() {
+        for i in 1..2000 {
+            let value = 7.0 * f64::from(i) / 3.0;
+            let shown: f64 = rounded_down(value).parse().expect("a number");
+            assert!(
+                shown <= value && shown > 0.99 * value,
+                "{shown} for {value}"
+            );
+        }
+    }
+}

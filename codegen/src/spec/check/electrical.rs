@@ -1,0 +1,195 @@
+//! Actuator, amplifier, converter, gauge and target.
+
+use super::in_order;
+use crate::diagnostic::codes;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+use crate::spec::text::number;
+
+pub(super) fn limits_in_order(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for path in ["actuator.voltage", "dac.range", "sensor.range"] {
+        // A list that is missing has its own finding; the others are still checked.
+        let _ = in_order(f, findings, path, false);
+    }
+    Some(())
+}
+
+pub(super) fn voltage_inside_dac(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let limits = f.list::<2>("actuator.voltage")?;
+    let [low, high] = f.list::<2>("dac.range")?;
+    for (i, limit) in limits.into_iter().enumerate() {
+        if low < high && (limit < low || limit > high) {
+            findings.error(
+                codes::VOLTAGE_OUTSIDE_DAC,
+                &format!("actuator.voltage[{i}]"),
+                f.item_span("actuator.voltage", i),
+                format!("{} V is outside the converter's range of {} V to {} V", number(limit), number(low), number(high)),
+                "narrow `actuator.voltage`, or widen `dac.range` if the amplifier's gain is not in it yet: it is in volts at the stack".to_owned(),
+            );
+        }
+    }
+    Some(())
+}
+
+pub(super) fn slew_moves_a_code(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let bits: u32 = f.whole("dac.bits")?;
+    let [low, high] = f.list::<2>("dac.range")?;
+    let (slew, period) = (f.number("actuator.slew_rate")?, f.number("timing.period")?);
+    let code = (high - low) / (2_f64.powi(bits as i32) - 1.0);
+    if low < high && slew * period < code {
+        findings.error(
+            codes::SLEW_BELOW_CODE,
+            "actuator.slew_rate",
+            f.span("actuator.slew_rate"),
+            format!(
+                "in one period of {} s the voltage may change by {} V, less than one converter code of {} V",
+                number(period),
+                number(slew * period),
+                number(code)
+            ),
+            format!("at least {} V/s moves one code per tick; check the unit (V/ms or V/s)", number(code / period)),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let stacks = f.integer("actuator.stacks")? as f64;
+    let (gain, stroke) = (
+        f.number("actuator.stack_gain")?,
+        f.number("actuator.stroke")?,
+    );
+    let [low, high] = f.list::<2>("actuator.voltage")?;
+    let travel = stacks * gain * (high - low);
+    if low < high && !(0.5..=2.0).contains(&(travel / stroke)) {
+        findings.warning(
+            codes::STROKE_MISMATCH,
+            "actuator.stroke",
+            f.span("actuator.stroke"),
+            format!(
+                "{} stacks of {} um/V over {} V give {} um, but the stroke is {} um",
+                number(stacks),
+                number(gain * 1e6),
+                number(high - low),
+                number(travel * 1e6),
+                number(stroke * 1e6)
+            ),
+            "check `stacks`, `stack_gain` (of one stack, not of the leg), `voltage` and `stroke`"
+                .to_owned(),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn resonance_below_tick_rate(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let (resonance, period) = (f.number("actuator.resonance")?, f.number("timing.period")?);
+    if resonance * period > 0.5 {
+        findings.warning(
+            codes::RESONANCE_ALIASED,
+            "actuator.resonance",
+            f.span("actuator.resonance"),
+            format!(
+                "the resonance at {} Hz is above half the tick rate of {} Hz",
+                number(resonance),
+                number(1.0 / period)
+            ),
+            format!(
+                "a period below {} us would show it to the gauges",
+                number(0.5e6 / resonance)
+            ),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let [low, high] = f.list::<2>("sensor.range")?;
+    let span = high - low;
+    if span <= 0.0 {
+        return None;
+    }
+    let path = "sensor.range";
+    if low > 0.0 || high < 0.0 {
+        findings.warning(
+            codes::SENSOR_RANGE,
+            path,
+            f.span(path),
+            format!(
+                "the gauge's range of {} um to {} um leaves out 0, the displacement at rest",
+                number(low * 1e6),
+                number(high * 1e6)
+            ),
+            "give the range as displacement of the leg from rest".to_owned(),
+        );
+    }
+    if let Some(stroke) = f.number("actuator.stroke")
+        && !(0.05..=100.0).contains(&(span / stroke))
+    {
+        findings.warning(
+            codes::SENSOR_RANGE,
+            path,
+            f.span(path),
+            format!(
+                "the gauge spans {} um, but the stroke is {} um",
+                number(span * 1e6),
+                number(stroke * 1e6)
+            ),
+            "check the units of `sensor.range` and `actuator.stroke`".to_owned(),
+        );
+    }
+    let noise = f.number("sensor.noise")?;
+    if noise > 0.01 * span {
+        findings.warning(
+            codes::SENSOR_NOISE,
+            "sensor.noise",
+            f.span("sensor.noise"),
+            format!(
+                "a noise of {} nm rms is more than a hundredth of the range of {} um",
+                number(noise * 1e9),
+                number(span * 1e6)
+            ),
+            "check the unit: nm or um".to_owned(),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn scalar_fits_fpu(f: &Fields, findings: &mut Findings) -> Option<()> {
+    if f.choice("target.mcu")? == "mps2-an386" && f.choice("controller.scalar")? == "f64" {
+        let path = if f.given("controller.scalar") {
+            "controller.scalar"
+        } else {
+            "target.mcu"
+        };
+        findings.warning(
+            codes::DOUBLE_ON_SINGLE,
+            path,
+            f.span(path),
+            "the Cortex-M4F of mps2-an386 computes f64 in software".to_owned(),
+            "write, in [controller]: scalar = \"f32\"; or choose mcu = \"mps2-an500\"".to_owned(),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn budget_in_bytes(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for path in [
+        "target.budget.flash",
+        "target.budget.ram",
+        "target.budget.stack",
+    ] {
+        let Some(bytes) = f.number(path) else {
+            continue;
+        };
+        if bytes.fract() != 0.0 {
+            findings.error(
+                codes::BUDGET_NOT_WHOLE,
+                path,
+                f.span(path),
+                format!("`{path}` is {bytes} bytes, expected a whole number of bytes"),
+                format!("write \"{} B\", or another whole amount", bytes.round()),
+            );
+        }
+    }
+    Some(())
+}

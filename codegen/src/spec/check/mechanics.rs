@@ -1,0 +1,311 @@
+//! Masses, inertias and geometry: could this platform exist, and does it hold?
+
+use std::f64::consts::FRAC_PI_3;
+
+use nalgebra::{Matrix3, Matrix6, RowVector6, Vector3};
+
+use crate::diagnostic::codes;
+use crate::model::Geometry;
+use crate::spec::build;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+use crate::spec::text::number;
+
+/// Legs at rest: lengths in m, and the rows of dl/dh per m and rad.
+struct Legs {
+    lengths: [f64; 6],
+    jacobian: Matrix6<f64>,
+}
+
+/// (1), (2) and the derivative of (AI.1) at the rest pose P = (0, 0, height), R = I:
+/// dl_i/dh = [s_i, P_i × s_i], with s_i from B_i to P_i.
+fn legs_at_rest(geometry: &Geometry) -> Legs {
+    let on_circle =
+        |radius: f64, angle: f64| Vector3::new(radius * angle.cos(), radius * angle.sin(), 0.0);
+    let mut legs = Legs {
+        lengths: [0.0; 6],
+        jacobian: Matrix6::zeros(),
+    };
+    for i in 0..6_usize {
+        // Base pairs sit about 60°, 180°, 300°, platform pairs about 0°, 120°, 240°.
+        let base_side = if i % 2 == 0 { -0.5 } else { 0.5 };
+        let base_pair = (2 * (i / 2) + 1) as f64 * FRAC_PI_3;
+        let platform_pair = (2 * i.div_ceil(2)) as f64 * FRAC_PI_3;
+        let base = on_circle(
+            geometry.base_radius,
+            base_pair + base_side * geometry.base_angle,
+        );
+        let joint = on_circle(
+            geometry.platform_radius,
+            platform_pair - base_side * geometry.platform_angle,
+        );
+        let leg = Vector3::new(0.0, 0.0, geometry.height) + joint - base;
+        let direction = leg.normalize();
+        let turn = joint.cross(&direction);
+        legs.lengths[i] = leg.norm();
+        legs.jacobian.set_row(
+            i,
+            &RowVector6::new(
+                direction.x,
+                direction.y,
+                direction.z,
+                turn.x,
+                turn.y,
+                turn.z,
+            ),
+        );
+    }
+    legs
+}
+
+fn shortest_leg(f: &Fields) -> Option<f64> {
+    let legs = legs_at_rest(&build::geometry(f)?);
+    Some(
+        legs.lengths
+            .into_iter()
+            .fold(f64::INFINITY, |a, b| if b < a { b } else { a }),
+    )
+}
+
+pub(super) fn mass_centers_inside_leg(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let length = shortest_leg(f)?;
+    for (path, joint) in [
+        ("leg.fixed_center", "base"),
+        ("leg.extensible_center", "platform"),
+    ] {
+        let Some(center) = f.number(path) else {
+            continue;
+        };
+        if center >= length {
+            findings.error(
+                codes::CENTER_OUTSIDE_LEG,
+                path,
+                f.span(path),
+                format!(
+                    "`{path}` is {} mm from the {joint} joint, but a leg is only {} mm long at rest",
+                    number(center * 1e3),
+                    number(length * 1e3)
+                ),
+                format!("give less than {} mm, or mend [geometry]", number(length * 1e3)),
+            );
+        }
+    }
+    Some(())
+}
+
+pub(super) fn leg_gyration(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let length = shortest_leg(f)?;
+    for part in ["fixed", "extensible"] {
+        let path = format!("leg.{part}_inertia");
+        let (Some(inertia), Some(mass)) = (f.number(&path), f.number(&format!("leg.{part}_mass")))
+        else {
+            continue;
+        };
+        let radius = (inertia / mass).sqrt();
+        // A rod as long as the leg has 0.29 of its length.
+        if radius > length || radius < length * 1e-3 {
+            findings.error(
+                codes::GYRATION,
+                &path,
+                f.span(&path),
+                format!(
+                    "the {part} part of a leg has a radius of gyration of {} mm (from {} kg and {} kg m^2), but a leg is {} mm long",
+                    number(radius * 1e3),
+                    number(mass),
+                    number(inertia),
+                    number(length * 1e3)
+                ),
+                format!("check the units of `{path}` and `leg.{part}_mass`: kg or g, mm^2 or m^2"),
+            );
+        }
+    }
+    Some(())
+}
+
+pub(super) fn platform_inertia(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let [xx, yy, zz] = f.list::<3>("platform.inertia")?;
+    let [xy, xz, yz] = f.list::<3>("platform.products")?;
+    let mut principal: [f64; 3] = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+        .symmetric_eigenvalues()
+        .into();
+    principal.sort_by(f64::total_cmp);
+    let [small, middle, large] = principal;
+    // The last digit of a flat plate's data must not decide.
+    let unphysical = if small <= 0.0 {
+        "is not positive definite"
+    } else if large > (small + middle) * (1.0 + 1e-6) {
+        "breaks the triangle inequality: the largest exceeds the sum of the others"
+    } else {
+        return Some(());
+    };
+    let list = principal.map(|moment| number(moment * 1e9)).join(", ");
+    findings.error(
+        codes::INERTIA_UNPHYSICAL,
+        "platform.inertia",
+        f.span("platform.inertia"),
+        format!("no body has this inertia: with principal moments {list} g mm^2 it {unphysical}"),
+        "check the three moments and `platform.products` against the CAD data, units and signs included".to_owned(),
+    );
+    Some(())
+}
+
+pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let mass = f.number("platform.mass")?;
+    let moments = f.list::<3>("platform.inertia")?;
+    let size = f.number("geometry.platform_radius")?;
+    let radii = moments.map(|moment| (moment / mass).sqrt());
+    let largest = radii
+        .into_iter()
+        .fold(0.0, |a, b| if b > a { b } else { a });
+    let ratio = largest / size;
+    if (0.1..=3.0).contains(&ratio) {
+        return Some(());
+    }
+    let message = format!(
+        "mass and inertia give a radius of gyration of {} m, but the platform's joint circle has a radius of {} m",
+        number(largest),
+        number(size)
+    );
+    // The mass that a disc of this inertia and size would have shows which unit slipped.
+    let fitting = moments
+        .into_iter()
+        .fold(0.0, |a, b| if b > a { b } else { a })
+        / (size * size);
+    let help = format!(
+        "check the units of `platform.mass` (now {} kg; a mass near {} kg would fit) and `platform.inertia`",
+        number(mass),
+        number(fitting)
+    );
+    let (path, span) = ("platform.mass", f.span("platform.mass"));
+    if (0.02..=10.0).contains(&ratio) {
+        findings.warning(codes::GYRATION_ODD, path, span, message, help);
+    } else {
+        findings.error(codes::GYRATION, path, span, message, help);
+    }
+    Some(())
+}
+
+pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let geometry = build::geometry(f)?;
+    let mut jacobian = legs_at_rest(&geometry).jacobian;
+    // Rotations in lengths at the joint circle, so that the condition has no unit.
+    for column in 3..6 {
+        jacobian
+            .column_mut(column)
+            .unscale_mut(geometry.platform_radius);
+    }
+    let singular = jacobian.singular_values();
+    let condition = singular.max() / singular.min();
+    if condition.is_finite() && condition < 1e4 {
+        return Some(());
+    }
+    findings.error(
+        codes::DEGENERATE_GEOMETRY,
+        "geometry.height",
+        f.span("geometry.height"),
+        format!("the six legs hardly hold the platform: the condition number of their Jacobian at rest is {}", number(condition)),
+        "make the height comparable to the radii and the joint pairs close (small base_angle and platform_angle)".to_owned(),
+    );
+    Some(())
+}
+
+/// Whether each axis alone, within its bound, needs no more than the stroke. The whole box may need more: the
+/// controller limits each leg.
+pub(super) fn workspace_in_reach(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let jacobian = legs_at_rest(&build::geometry(f)?).jacobian;
+    let stroke = f.number("actuator.stroke")?;
+    for (path, first, unit, scale) in [
+        ("workspace.translation", 0, "um", 1e6),
+        ("workspace.rotation", 3, "mrad", 1e3),
+    ] {
+        let Some(bounds) = f.list::<3>(path) else {
+            continue;
+        };
+        for (axis, bound) in bounds.into_iter().enumerate() {
+            let steepest = jacobian.column(first + axis).amax();
+            if bound * steepest <= stroke {
+                continue;
+            }
+            findings.error(
+                codes::WORKSPACE_UNREACHABLE,
+                &format!("{path}[{axis}]"),
+                f.item_span(path, axis),
+                format!(
+                    "this bound needs a leg motion of {} um, but the stroke is {} um",
+                    number(bound * steepest * 1e6),
+                    number(stroke * 1e6)
+                ),
+                format!(
+                    "at most {} {unit} can be reached on this axis alone; check the unit (rad, mrad, urad)",
+                    number(stroke / steepest * scale)
+                ),
+            );
+        }
+    }
+    Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reference() -> Geometry {
+        Geometry {
+            base_radius: 0.15,
+            platform_radius: 0.1,
+            base_angle: 0.0377,
+            platform_angle: 0.0377,
+            height: 0.18,
+        }
+    }
+
+    fn leg_lengths(g: &Geometry, pose: [f64; 6]) -> [f64; 6] {
+        // Angles of (1) and (2), written out.
+        let third = 2.0 * FRAC_PI_3;
+        let (b, p) = (g.base_angle / 2.0, g.platform_angle / 2.0);
+        let base = [
+            FRAC_PI_3 - b,
+            FRAC_PI_3 + b,
+            3.0 * FRAC_PI_3 - b,
+            3.0 * FRAC_PI_3 + b,
+            5.0 * FRAC_PI_3 - b,
+            5.0 * FRAC_PI_3 + b,
+        ];
+        let platform = [
+            p,
+            third - p,
+            third + p,
+            2.0 * third - p,
+            2.0 * third + p,
+            -p,
+        ];
+        let turn = nalgebra::Rotation3::from_euler_angles(pose[3], pose[4], pose[5]);
+        std::array::from_fn(|i| {
+            let joint = Vector3::new(platform[i].cos(), platform[i].sin(), 0.0) * g.platform_radius;
+            let anchor = Vector3::new(base[i].cos(), base[i].sin(), 0.0) * g.base_radius;
+            (Vector3::new(pose[0], pose[1], g.height + pose[2]) + turn * joint - anchor).norm()
+        })
+    }
+
+    #[test]
+    fn the_jacobian_is_the_derivative_of_the_leg_lengths() {
+        let geometry = reference();
+        let legs = legs_at_rest(&geometry);
+        for axis in 0..6 {
+            let step = 1e-6;
+            let mut pose = [0.0; 6];
+            pose[axis] = step;
+            let ahead = leg_lengths(&geometry, pose);
+            pose[axis] = -step;
+            let behind = leg_lengths(&geometry, pose);
+            for leg in 0..6 {
+                let difference = (ahead[leg] - behind[leg]) / (2.0 * step);
+                assert!(
+                    (difference - legs.jacobian[(leg, axis)]).abs() < 1e-8,
+                    "leg {leg}, axis {axis}"
+                );
+            }
+        }
+        assert!((legs.lengths[0] - leg_lengths(&geometry, [0.0; 6])[0]).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,84 @@
+//! The measurement files that a spec names: their number, their paths, and that they can be opened.
+
+use std::fs::File;
+use std::path::Path;
+
+use crate::diagnostic::codes;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+use crate::spec::text;
+
+const KEY: &str = "hysteresis.records";
+
+pub(in crate::spec) fn readable(f: &Fields, dir: &Path, findings: &mut Findings) -> Option<()> {
+    let records = f.texts(KEY)?;
+    if !matches!(records.len(), 1 | 6) {
+        findings.error(
+            codes::RECORD_COUNT,
+            KEY,
+            f.span(KEY),
+            format!("`{KEY}` names {} files, expected 1 or 6", records.len()),
+            "name one file for all legs, or six: one for each leg, in the order of the joints"
+                .to_owned(),
+        );
+    }
+    for (i, record) in records.iter().enumerate() {
+        let finding = if is_relative(record) {
+            cannot_open(&dir.join(record)).map(|reason| {
+                (
+                    codes::RECORD_UNREADABLE,
+                    format!(
+                        "the record \"{}\" cannot be read: {reason}",
+                        text::shorten(record)
+                    ),
+                    "name a CSV file relative to the folder of the spec, with forward slashes"
+                        .to_owned(),
+                )
+            })
+        } else {
+            Some((
+                codes::RECORD_PATH,
+                format!(
+                    "\"{}\" is not a path relative to the spec",
+                    text::shorten(record)
+                ),
+                "put the file beside the spec and name it as in \"records/leg1.csv\"".to_owned(),
+            ))
+        };
+        if let Some((code, message, help)) = finding {
+            findings.error(
+                code,
+                &format!("{KEY}[{i}]"),
+                f.item_span(KEY, i),
+                message,
+                help,
+            );
+        }
+    }
+    Some(())
+}
+
+/// Relative on every system: no root, no drive, no backslash.
+fn is_relative(path: &str) -> bool {
+    let drive = path.as_bytes().get(1) == Some(&b':');
+    !path.trim().is_empty() && !path.starts_with('/') && !path.contains('\\') && !drive
+}
+
+fn cannot_open(path: &Path) -> Option<String> {
+    if path.is_dir() {
+        return Some("it is a folder".to_owned());
+    }
+    if !path.is_file() {
+        // Opening a device or a pipe could wait for ever.
+        let exists = path.try_exists().unwrap_or(false);
+        return Some(
+            if exists {
+                "it is not a regular file"
+            } else {
+                "there is no such file"
+            }
+            .to_owned(),
+        );
+    }
+    File::open(path).err().map(|error| error.to_string())
+}

@@ -1,0 +1,117 @@
+//! The values that were read, by key path, in SI.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// A value that stands where its key wants it, of the right kind and in range.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Parsed {
+    /// A quantity (SI) or a number; one or a list.
+    Numbers(Vec<f64>),
+    Integer(i64),
+    Choice(&'static str),
+    Name(String),
+    Texts(Vec<String>),
+}
+
+/// One value and where it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Field {
+    pub(super) parsed: Parsed,
+    /// The value, or the section's name if the value is a default.
+    pub(super) span: Range<usize>,
+    /// The values of a list.
+    pub(super) items: Vec<Range<usize>>,
+    /// Whether it stands in the file.
+    pub(super) given: bool,
+}
+
+/// All values of a spec that could be read. What is missing or wrong has its finding already, so that a check
+/// that needs it is simply left out.
+#[derive(Debug, Default)]
+pub(super) struct Fields {
+    map: BTreeMap<String, Field>,
+}
+
+impl Fields {
+    pub(super) fn insert(&mut self, path: String, field: Field) {
+        self.map.insert(path, field);
+    }
+
+    pub(super) fn get(&self, path: &str) -> Option<&Field> {
+        self.map.get(path)
+    }
+
+    /// Whether the key stands in the file with a good value.
+    pub(super) fn given(&self, path: &str) -> bool {
+        self.get(path).is_some_and(|field| field.given)
+    }
+
+    pub(super) fn number(&self, path: &str) -> Option<f64> {
+        self.list::<1>(path).map(|[value]| value)
+    }
+
+    pub(super) fn list<const N: usize>(&self, path: &str) -> Option<[f64; N]> {
+        match &self.get(path)?.parsed {
+            Parsed::Numbers(values) => values.as_slice().try_into().ok(),
+            _ => None,
+        }
+    }
+
+    pub(super) fn integer(&self, path: &str) -> Option<i64> {
+        match self.get(path)?.parsed {
+            Parsed::Integer(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// An integer whose range in the key table fits `T`.
+    pub(super) fn whole<T: TryFrom<i64>>(&self, path: &str) -> Option<T> {
+        T::try_from(self.integer(path)?).ok()
+    }
+
+    pub(super) fn choice(&self, path: &str) -> Option<&'static str> {
+        match self.get(path)?.parsed {
+            Parsed::Choice(word) => Some(word),
+            _ => None,
+        }
+    }
+
+    pub(super) fn name(&self, path: &str) -> Option<&str> {
+        match &self.get(path)?.parsed {
+            Parsed::Name(text) => Some(text),
+            _ => None,
+        }
+    }
+
+    pub(super) fn texts(&self, path: &str) -> Option<&[String]> {
+        match &self.get(path)?.parsed {
+            Parsed::Texts(texts) => Some(texts),
+            _ => None,
+        }
+    }
+
+    /// Where the value at `path` stands; the start of the file if it is not known.
+    pub(super) fn span(&self, path: &str) -> Range<usize> {
+        self.get(path).map_or(0..0, |field| field.span.clone())
+    }
+
+    /// Where the value `index` of the list at `path` stands.
+    pub(super) fn item_span(&self, path: &str, index: usize) -> Range<usize> {
+        self.get(path)
+            .and_then(|field| field.items.get(index).cloned())
+            .unwrap_or_else(|| self.span(path))
+    }
+
+    /// Where every value stands, lists item by item too: `actuator.voltage` and `actuator.voltage[1]`.
+    pub(super) fn spans(&self) -> BTreeMap<String, Range<usize>> {
+        let mut spans = BTreeMap::new();
+        for (path, field) in &self.map {
+            spans.insert(path.clone(), field.span.clone());
+            for (i, item) in field.items.iter().enumerate() {
+                spans.insert(format!("{path}[{i}]"), item.clone());
+            }
+        }
+        spans
+    }
+}

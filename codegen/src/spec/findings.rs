@@ -1,0 +1,116 @@
+//! Collects what a run finds, so that no check has to stop at the first mistake.
+
+use std::ops::Range;
+
+use crate::diagnostic::{Diagnostic, Place, Severity, codes};
+
+/// More findings than this are cut: a file with so many is not a spec with mistakes.
+pub(super) const MAX_FINDINGS: usize = 100;
+
+/// Findings of one run over one spec.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    list: Vec<Diagnostic>,
+    left_out: usize,
+}
+
+impl Findings {
+    pub(super) fn error(
+        &mut self,
+        code: &'static str,
+        key: &str,
+        span: Range<usize>,
+        message: String,
+        help: String,
+    ) {
+        self.push(Severity::Error, code, key, Place::Spec(span), message, help);
+    }
+
+    pub(super) fn warning(
+        &mut self,
+        code: &'static str,
+        key: &str,
+        span: Range<usize>,
+        message: String,
+        help: String,
+    ) {
+        self.push(
+            Severity::Warning,
+            code,
+            key,
+            Place::Spec(span),
+            message,
+            help,
+        );
+    }
+
+    fn push(
+        &mut self,
+        severity: Severity,
+        code: &'static str,
+        key: &str,
+        place: Place,
+        message: String,
+        help: String,
+    ) {
+        self.list.push(Diagnostic {
+            severity,
+            code,
+            key: key.to_owned(),
+            place,
+            message,
+            help,
+        });
+    }
+
+    /// Counts findings that were not even made.
+    pub(super) fn leave_out(&mut self, count: usize) {
+        self.left_out += count;
+    }
+
+    /// Drops the findings that `predicate` refuses.
+    pub(super) fn retain(&mut self, predicate: impl FnMut(&Diagnostic) -> bool) {
+        self.list.retain(predicate);
+    }
+
+    /// Whether there is a finding about one of these keys.
+    pub(super) fn mentions(&self, keys: &[&str]) -> bool {
+        self.list.iter().any(|d| keys.contains(&d.key.as_str()))
+    }
+
+    pub(super) fn all(&self) -> &[Diagnostic] {
+        &self.list
+    }
+
+    pub(super) fn has_errors(&self) -> bool {
+        self.list.iter().any(|d| d.severity == Severity::Error)
+    }
+
+    /// In the order of the file, at most [`MAX_FINDINGS`], errors never pushed out by warnings.
+    pub(super) fn finish(mut self) -> Vec<Diagnostic> {
+        let start = |d: &Diagnostic| match &d.place {
+            Place::Spec(span) => span.start,
+            Place::File { .. } | Place::Whole => usize::MAX,
+        };
+        let total = self.list.len() + self.left_out;
+        if self.list.len() > MAX_FINDINGS {
+            self.list
+                .sort_by_key(|d| (std::cmp::Reverse(d.severity), start(d)));
+            self.list.truncate(MAX_FINDINGS);
+        }
+        self.list
+            .sort_by(|a, b| (start(a), &a.key, a.code).cmp(&(start(b), &b.key, b.code)));
+        if total > self.list.len() {
+            let shown = self.list.len();
+            self.push(
+                Severity::Warning,
+                codes::TRUNCATED,
+                "",
+                Place::Whole,
+                format!("{} further findings are not shown", total - shown),
+                "mend the ones shown and run again".to_owned(),
+            );
+        }
+        self.list
+    }
+}

@@ -1,0 +1,266 @@
+//! The rows of the key table.
+
+use super::{Dimension, Item, Key, Presence, Range, SCHEMA_VERSION, Section, Shape};
+use Presence::{Default, InsteadOf, Optional, Required};
+
+const fn row(
+    name: &'static str,
+    shape: Shape,
+    presence: Presence,
+    symbol: &'static str,
+    example: &'static str,
+    doc: &'static str,
+) -> Key {
+    Key {
+        name,
+        shape,
+        presence,
+        doc,
+        symbol,
+        example,
+    }
+}
+
+const fn one(dimension: Dimension, range: Range, unit: &'static str) -> Shape {
+    Shape::One(item(dimension, range, unit))
+}
+
+const fn item(dimension: Dimension, range: Range, unit: &'static str) -> Item {
+    Item::Quantity {
+        dimension,
+        range,
+        unit,
+    }
+}
+
+const fn integer(min: i64, max: i64) -> Shape {
+    Shape::One(Item::Integer(min, max))
+}
+
+const RADIUS: Range = Range::closed(1e-3, 10.0);
+const JOINT_ANGLE: Range = Range::open(0.0, 2.0 * std::f64::consts::FRAC_PI_3);
+const BODY_MASS: Range = Range::closed(1e-6, 1e4);
+const MOMENT: Range = Range::above(0.0, 1e4);
+const PRODUCT: Item = item(Dimension::INERTIA, Range::closed(-1e4, 1e4), "g mm^2");
+const CENTER: Item = item(Dimension::LENGTH, Range::closed(-10.0, 10.0), "mm");
+const LEG_CENTER: Shape = one(Dimension::LENGTH, Range::closed(0.0, 10.0), "mm");
+const VOLTS: Item = item(Dimension::VOLTAGE, Range::closed(-1e4, 1e4), "V");
+const READING: Item = item(Dimension::LENGTH, Range::closed(-0.1, 0.1), "um");
+const WEIGHT: Shape = Shape::One(Item::Number(Range::above(0.0, 1.0)));
+const BANDWIDTH: Shape = one(Dimension::ANGULAR_RATE, Range::above(0.0, 1e6), "rad/s");
+const RATIO: Item = Item::Number(Range::above(0.0, 10.0));
+const TRAVEL: Item = item(Dimension::LENGTH, Range::closed(0.0, 0.1), "um");
+// The controller's series for small angles are sized by this bound.
+const TURN: Item = item(Dimension::ANGLE, Range::closed(0.0, 0.5), "mrad");
+const GAIN: Range = Range::closed(0.0, 1e15);
+const BYTES: Shape = one(
+    Dimension::MEMORY,
+    Range::closed(1.0, 1_099_511_627_776.0),
+    "KiB",
+);
+
+const fn gains(
+    along: Dimension,
+    along_unit: &'static str,
+    about: Dimension,
+    about_unit: &'static str,
+) -> [Item; 6] {
+    let (a, t) = (item(along, GAIN, along_unit), item(about, GAIN, about_unit));
+    [a, a, a, t, t, t]
+}
+
+const STIFFNESSES: &[Item] = &gains(
+    Dimension::STIFFNESS,
+    "N/m",
+    Dimension::TURN_STIFFNESS,
+    "N m/rad",
+);
+const STIFFNESS_RATES: &[Item] = &gains(
+    Dimension::STIFFNESS_RATE,
+    "N/(m s)",
+    Dimension::TURN_STIFFNESS_RATE,
+    "N m/(rad s)",
+);
+const DAMPINGS: &[Item] = &gains(
+    Dimension::DAMPING,
+    "N s/m",
+    Dimension::TURN_DAMPING,
+    "N m s/rad",
+);
+
+/// Every section, in the order of the reference. Sections that hold others come before them.
+// One row a line: this is a table.
+#[rustfmt::skip]
+pub const SECTIONS: &[Section] = &[
+    Section {
+        name: "",
+        optional: false,
+        doc: "The keys before the first section.",
+        keys: &[
+            row("schema", integer(SCHEMA_VERSION, SCHEMA_VERSION), Required, "", "1", "Version of this language."),
+            row(
+                "name",
+                Shape::One(Item::Name),
+                Required,
+                "",
+                "\"reference\"",
+                "Name of the platform: a letter, then letters, digits, `-` and `_`.",
+            ),
+        ],
+    },
+    Section {
+        name: "geometry",
+        optional: false,
+        doc: "Joint circles of base and platform, equations (1) and (2), and the pose at rest.",
+        keys: &[
+            row("base_radius", one(Dimension::LENGTH, RADIUS, "mm"), Required, "r_B", "\"150 mm\"", "Radius of the circle through the six base joints."),
+            row("platform_radius", one(Dimension::LENGTH, RADIUS, "mm"), Required, "r_P", "\"100 mm\"", "Radius of the circle through the six platform joints."),
+            row("base_angle", one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Required, "alpha_B", "\"0.012 pi rad\"", "Angle between the two base joints of a pair."),
+            row("platform_angle", one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Required, "alpha_P", "\"0.012 pi rad\"", "Angle between the two platform joints of a pair."),
+            row("height", one(Dimension::LENGTH, RADIUS, "mm"), Required, "P_z", "\"180 mm\"", "Height of the platform's joint plane above the base's at rest."),
+        ],
+    },
+    Section {
+        name: "platform",
+        optional: false,
+        doc: "The moving platform as a rigid body, in its own frame {P}, Table 4.",
+        keys: &[
+            row("mass", one(Dimension::MASS, BODY_MASS, "kg"), Required, "m", "\"1.195 kg\"", "Mass with everything that is mounted on it."),
+            row("inertia", Shape::List(&[item(Dimension::INERTIA, MOMENT, "g mm^2"); 3]), Required, "I_xx I_yy I_zz", "[\"3.26e7 g mm^2\", \"3.26e7 g mm^2\", \"9.7e6 g mm^2\"]", "Moments of inertia about the centre of mass."),
+            row("products", Shape::List(&[PRODUCT; 3]), Default("[\"0 g mm^2\", \"0 g mm^2\", \"0 g mm^2\"]"), "I_xy I_xz I_yz", "[\"0 g mm^2\", \"0 g mm^2\", \"0 g mm^2\"]", "Entries of the inertia matrix off the diagonal: I_xy is minus the integral of x y dm."),
+            row("center_of_mass", Shape::List(&[CENTER; 3]), Default("[\"0 mm\", \"0 mm\", \"0 mm\"]"), "", "[\"0 mm\", \"0 mm\", \"0 mm\"]", "Centre of mass, from the centre of the platform joints."),
+        ],
+    },
+    Section {
+        name: "leg",
+        optional: false,
+        doc: "The two parts of a leg, the same for all six, Table 4.",
+        keys: &[
+            row("fixed_mass", one(Dimension::MASS, BODY_MASS, "g"), Required, "m_s", "\"90.26 g\"", "Mass of the part at the base joint."),
+            row("extensible_mass", one(Dimension::MASS, BODY_MASS, "g"), Required, "m_e", "\"73.62 g\"", "Mass of the part at the platform joint."),
+            row("fixed_inertia", one(Dimension::INERTIA, MOMENT, "g mm^2"), Required, "I_s", "\"1.07e5 g mm^2\"", "Moment of inertia of the base-side part about a transverse axis through its mass centre."),
+            row("extensible_inertia", one(Dimension::INERTIA, MOMENT, "g mm^2"), Required, "I_e", "\"5.27e4 g mm^2\"", "The same of the platform-side part."),
+            row("fixed_center", LEG_CENTER, Required, "l_s", "\"50 mm\"", "Mass centre of the base-side part, from the base joint."),
+            row("extensible_center", LEG_CENTER, Required, "l_e", "\"50 mm\"", "Mass centre of the platform-side part, from the platform joint."),
+        ],
+    },
+    Section {
+        name: "actuator",
+        optional: false,
+        doc: "The piezo stacks of a leg.",
+        keys: &[
+            row("stacks", integer(1, 1000), Required, "", "5", "Stacks in series in one leg."),
+            row("stack_gain", one(Dimension::PIEZO_GAIN, Range::closed(1e-12, 1e-4), "um/V"), Required, "rho", "\"0.1262 um/V\"", "Displacement per volt of one stack; a leg has `stacks` times that."),
+            row("stroke", one(Dimension::LENGTH, Range::closed(1e-9, 0.01), "um"), Required, "", "\"60 um\"", "Free stroke of a leg."),
+            row("voltage", Shape::List(&[VOLTS; 2]), Required, "", "[\"0 V\", \"100 V\"]", "Smallest and largest voltage that the controller may ask for."),
+            row("slew_rate", one(Dimension::SLEW_RATE, Range::closed(1e-3, 1e12), "V/ms"), Required, "", "\"40 V/ms\"", "Fastest change of voltage that amplifier and stack stand."),
+            row("axial_stiffness", one(Dimension::STIFFNESS, Range::closed(1.0, 1e12), "N/m"), Required, "k_a", "\"1e7 N/m\"", "Axial stiffness of a leg."),
+            row("resonance", one(Dimension::FREQUENCY, Range::closed(0.1, 1e7), "Hz"), Required, "", "\"870 Hz\"", "First axial resonance of a leg as mounted."),
+            row("damping_ratio", Shape::One(Item::Number(Range::open(0.0, 1.0))), Required, "zeta", "0.1", "Damping ratio of that resonance."),
+        ],
+    },
+    Section {
+        name: "amplifier",
+        optional: false,
+        doc: "Power amplifier between converter and stack. No lag is the cautious default: lag damps the resonance.",
+        keys: &[
+            row("lag", one(Dimension::TIME, Range::closed(0.0, 10.0), "ms"), Default("\"0 ms\""), "", "\"0.35 ms\"", "Time constant of its first-order lag."),
+            row("noise", one(Dimension::VOLTAGE, Range::closed(0.0, 100.0), "mV"), Default("\"0 V\""), "", "\"2 mV\"", "Output noise, rms."),
+        ],
+    },
+    Section {
+        name: "dac",
+        optional: false,
+        doc: "Converter that drives the amplifier, in volts at the stack.",
+        keys: &[
+            row("bits", integer(8, 24), Required, "", "16", "Resolution."),
+            row("range", Shape::List(&[VOLTS; 2]), Required, "", "[\"0 V\", \"150 V\"]", "Voltage at code 0 and at full scale."),
+        ],
+    },
+    Section {
+        name: "sensor",
+        optional: false,
+        doc: "Displacement gauge of a leg.",
+        keys: &[
+            row("range", Shape::List(&[READING; 2]), Required, "", "[\"-2 um\", \"48 um\"]", "Smallest and largest displacement that it can report."),
+            row("noise", one(Dimension::LENGTH, Range::closed(0.0, 1e-3), "nm"), Default("\"0 nm\""), "", "\"2.2 nm\"", "Noise, rms."),
+            row("bits", integer(8, 32), Required, "", "16", "Resolution of its converter over the range."),
+        ],
+    },
+    Section {
+        name: "hysteresis",
+        optional: false,
+        doc: "The inverse Preisach model and the measurements that identify it.",
+        keys: &[
+            row("grid", integer(2, 256), Default("32"), "N", "32", "Intervals per axis of the Preisach plane; the table grows and the error falls with its square."),
+            row("memory", integer(8, 256), Default("64"), "", "64", "Reversals that the controller can remember."),
+            row("records", Shape::Records, Required, "", "[\"records/reference-forc.csv\"]", "Reversal-curve files, relative to the spec: one for all legs, or six."),
+        ],
+    },
+    Section {
+        name: "adaptation",
+        optional: false,
+        doc: "Run-to-run adaptation, Appendix B. A mode that uses a weight needs it, as weight per run or as bandwidth.",
+        keys: &[
+            row("mode", Shape::One(Item::Choice(&["invhys", "ewma", "pcc"])), Default("\"invhys\""), "", "\"pcc\"", "Inverse model alone; with the level estimate (AII.3); with level and drift (AII.5), (AII.6)."),
+            row("level_weight", WEIGHT, InsteadOf("level_bandwidth"), "omega_1", "0.252", "Weight of a new reading in the level estimate, per run."),
+            row("level_bandwidth", BANDWIDTH, InsteadOf("level_weight"), "", "\"450 rad/s\"", "The same as a bandwidth: weight = bandwidth x period x run_interval."),
+            row("drift_weight", WEIGHT, InsteadOf("drift_bandwidth"), "omega_2", "0.011", "Weight of a new reading in the drift estimate, per run."),
+            row("drift_bandwidth", BANDWIDTH, InsteadOf("drift_weight"), "", "\"20 rad/s\"", "The same as a bandwidth."),
+            row("run_interval", integer(1, 1_000_000), Default("1"), "", "1", "Control ticks per run."),
+            row("gain_ratio", Shape::List(&[RATIO; 2]), Default("[0.9, 1.1]"), "lambda", "[0.9, 1.1]", "Smallest and largest true gain over modelled gain for which the loop must be stable."),
+        ],
+    },
+    Section {
+        name: "gains",
+        optional: true,
+        doc: "Diagonal gains of (7) in the order x, y, z, theta_x, theta_y, theta_z. Held for the task-space controller.",
+        keys: &[
+            row("proportional", Shape::List(STIFFNESSES), Required, "k_p", "[\"5e6 N/m\", \"5e6 N/m\", \"2e7 N/m\", \"1e5 N m/rad\", \"1e5 N m/rad\", \"5e4 N m/rad\"]", "Proportional gain."),
+            row("integral", Shape::List(STIFFNESS_RATES), Required, "k_I", "[\"4e7 N/(m s)\", \"4e7 N/(m s)\", \"2e8 N/(m s)\", \"1e6 N m/(rad s)\", \"1e6 N m/(rad s)\", \"5e5 N m/(rad s)\"]", "Integral gain."),
+            row("derivative", Shape::List(DAMPINGS), Required, "k_v", "[\"0 N s/m\", \"0 N s/m\", \"0 N s/m\", \"0 N m s/rad\", \"0 N m s/rad\", \"0 N m s/rad\"]", "Derivative gain."),
+            row("environment", Shape::List(STIFFNESSES), Required, "K_e", "[\"0 N/m\", \"0 N/m\", \"0 N/m\", \"0 N m/rad\", \"0 N m/rad\", \"0 N m/rad\"]", "Stiffness of the work piece that the platform presses on."),
+        ],
+    },
+    Section {
+        name: "timing",
+        optional: false,
+        doc: "Control timing.",
+        keys: &[row("period", one(Dimension::TIME, Range::closed(1e-6, 10.0), "us"), Required, "T_s", "\"200 us\"", "Control period.")],
+    },
+    Section {
+        name: "workspace",
+        optional: false,
+        doc: "Bounds on the pose that may be asked for, from rest.",
+        keys: &[
+            row("translation", Shape::List(&[TRAVEL; 3]), Required, "", "[\"40 um\", \"40 um\", \"40 um\"]", "Bounds on |x|, |y|, |z|."),
+            row("rotation", Shape::List(&[TURN; 3]), Required, "", "[\"0.6 mrad\", \"0.6 mrad\", \"0.6 mrad\"]", "Bounds on |theta_x|, |theta_y|, |theta_z|."),
+        ],
+    },
+    Section {
+        name: "controller",
+        optional: false,
+        doc: "What is emitted.",
+        keys: &[
+            row("scalar", Shape::One(Item::Choice(&["f32", "f64"])), Default("\"f64\""), "", "\"f64\"", "Arithmetic of the controller."),
+            row("setpoint", Shape::One(Item::Choice(&["pose", "leg"])), Default("\"pose\""), "", "\"pose\"", "What the six set-point numbers are at start-up: a pose, or leg displacements."),
+        ],
+    },
+    Section {
+        name: "target",
+        optional: false,
+        doc: "What it runs on.",
+        keys: &[row("mcu", Shape::One(Item::Choice(&["mps2-an500", "mps2-an386"])), Default("\"mps2-an500\""), "", "\"mps2-an500\"", "Cortex-M7 with double-precision FPU, or Cortex-M4F with single precision.")],
+    },
+    Section {
+        name: "target.budget",
+        optional: false,
+        doc: "What it may use there; a build that needs more is refused.",
+        keys: &[
+            row("flash", BYTES, Optional, "", "\"128 KiB\"", "Flash."),
+            row("ram", BYTES, Optional, "", "\"32 KiB\"", "RAM, stack included."),
+            row("stack", BYTES, Optional, "", "\"2 KiB\"", "Stack of one tick."),
+            row("instructions", integer(1, 1_000_000_000), Optional, "", "3000", "Mean instructions per tick."),
+        ],
+    },
+];

@@ -1,0 +1,166 @@
+//! The wording of findings about one value.
+
+use toml::de::DeValue;
+
+use super::keys::{Item, Key, Range, Shape};
+use super::quantity::{self, Dimension, Problem};
+use super::text;
+use crate::diagnostic::codes;
+
+/// "a number", "a text" and so on, with article.
+pub(super) fn kind_of(value: &DeValue<'_>) -> &'static str {
+    match value {
+        DeValue::String(_) => "a text",
+        DeValue::Integer(_) => "a whole number",
+        DeValue::Float(_) => "a number",
+        DeValue::Boolean(_) => "true or false",
+        DeValue::Datetime(_) => "a date",
+        DeValue::Array(_) => "an array",
+        DeValue::Table(_) => "a section",
+    }
+}
+
+/// The example of the key, or of the one item that `path` names ("gains.integral\[3\]").
+pub(super) fn example_of(key: &Key, path: &str) -> String {
+    let index: Option<usize> = path
+        .rsplit_once('[')
+        .and_then(|(_, rest)| rest.trim_end_matches(']').parse().ok());
+    let items = key.example.trim_start_matches('[').trim_end_matches(']');
+    index
+        .and_then(|i| items.split(", ").nth(i))
+        .unwrap_or(key.example)
+        .to_owned()
+}
+
+/// The item that `path` names.
+fn item_of(key: &Key, path: &str) -> Option<Item> {
+    match key.shape {
+        Shape::One(item) => Some(item),
+        Shape::List(items) => {
+            let index = path
+                .rsplit_once('[')
+                .and_then(|(_, rest)| rest.trim_end_matches(']').parse::<usize>().ok());
+            items.get(index.unwrap_or(0)).copied()
+        }
+        Shape::Records => None,
+    }
+}
+
+/// "1 mm to 10000 mm" in the unit of the item.
+pub(super) fn range_of(item: Item) -> String {
+    match item {
+        Item::Integer(min, max) if min == max => format!("{min}"),
+        Item::Integer(min, max) => format!("{min} to {max}"),
+        Item::Number(range) => bounds(range, 1.0, ""),
+        Item::Quantity { range, unit, .. } => {
+            let scale = quantity::unit_value(unit).map_or(1.0, |one| one.value);
+            bounds(range, scale, unit)
+        }
+        Item::Choice(words) => text::alternatives(words),
+        Item::Name => "a name".to_owned(),
+    }
+}
+
+fn bounds(range: Range, scale: f64, unit: &str) -> String {
+    let space = if unit.is_empty() { "" } else { " " };
+    let low = format!("{}{space}{unit}", text::number(range.min / scale));
+    let high = format!("{}{space}{unit}", text::number(range.max / scale));
+    match (range.min_included, range.max_included) {
+        (true, true) => format!("{low} to {high}"),
+        (false, true) => format!("more than {low} and at most {high}"),
+        (true, false) => format!("at least {low} and less than {high}"),
+        (false, false) => format!("more than {low} and less than {high}"),
+    }
+}
+
+pub(super) fn range_help(key: &Key, path: &str) -> String {
+    let range = item_of(key, path).map_or_else(String::new, |item| format!(": {}", range_of(item)));
+    format!(
+        "give a value in range{range}, such as {}. {}",
+        example_of(key, path),
+        key.doc
+    )
+}
+
+/// Message and help for a unit that measures something else.
+pub(super) fn wrong_dimension(
+    key: &Key,
+    path: &str,
+    found: &str,
+    is: Dimension,
+    wanted: Dimension,
+) -> (String, String) {
+    let message = format!(
+        "`{path}` is \"{}\": this is {}, expected {}",
+        text::shorten(found),
+        is.describe(),
+        wanted.describe()
+    );
+    let hint = if is == Dimension::FREQUENCY && wanted == Dimension::ANGULAR_RATE {
+        "1 Hz is 2 pi rad/s; "
+    } else if is.without_angle() != wanted.without_angle() {
+        ""
+    } else if is == is.without_angle() {
+        "name the angle in the unit; "
+    } else {
+        "mind the angle in the unit; "
+    };
+    (
+        message,
+        format!(
+            "{hint}write {} in a form such as {}",
+            wanted.describe(),
+            example_of(key, path)
+        ),
+    )
+}
+
+/// Code, message and help for a text that is not a quantity.
+pub(super) fn bad_quantity(
+    key: &Key,
+    path: &str,
+    found: &str,
+    problem: &Problem,
+) -> (&'static str, String, String) {
+    let example = example_of(key, path);
+    let such_as = format!("write a number and a unit, such as {example}");
+    let is = format!("`{path}` is \"{}\"", text::shorten(found));
+    match problem {
+        Problem::TooLong => (
+            codes::BAD_QUANTITY,
+            format!("{is}: longer than {} characters", quantity::MAX_LENGTH),
+            such_as,
+        ),
+        Problem::NoNumber => (codes::BAD_QUANTITY, format!("{is}: a quantity starts with a number"), such_as),
+        Problem::Comma => (
+            codes::BAD_QUANTITY,
+            format!("{is}: a comma in a number"),
+            "write the decimals after a point and no commas between thousands, such as \"1.5 mm\" or \"1500 mm\"".to_owned(),
+        ),
+        Problem::UnknownUnit(unit, meant) => (
+            codes::UNKNOWN_UNIT,
+            format!("{is}: unknown unit {}", text::quote(unit)),
+            meant.map_or(format!("write a unit as in {example}; upper and lower case matter"), |m| {
+                format!("did you mean \"{m}\"? Upper and lower case matter")
+            }),
+        ),
+        Problem::AmbiguousQuotient => (
+            codes::BAD_QUANTITY,
+            format!("{is}: what stands below the slash?"),
+            "group it, as in \"N/(m s)\", or write what stands above first, as in \"N s/m\"".to_owned(),
+        ),
+        Problem::BadPower => (
+            codes::BAD_QUANTITY,
+            format!("{is}: the power of a unit is a whole number from -9 to 9"),
+            format!("write the power as in \"mm^2\" or \"s^-1\"; expected a form such as {example}"),
+        ),
+        Problem::Unexpected(character) => {
+            (codes::BAD_QUANTITY, format!("{is}: {character} does not belong there"), such_as)
+        }
+        Problem::NotFinite => (codes::NOT_FINITE, format!("{is}, which is not a finite number"), such_as),
+        Problem::Overflow => (codes::NOT_FINITE, format!("{is}: too large for a double"), such_as),
+        Problem::Underflow => {
+            (codes::NOT_FINITE, format!("{is}: too small for a double, yet not zero"), format!("write 0 or {such_as}"))
+        }
+    }
+}

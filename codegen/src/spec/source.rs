@@ -1,0 +1,121 @@
+//! The spec file as text.
+
+// A finding is larger than clippy likes in a Result; there is one per run, and its type is shared by every phase.
+#![expect(clippy::result_large_err)]
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use crate::diagnostic::{Diagnostic, Place, Severity, codes};
+
+/// Largest spec file, bytes.
+pub const MAX_BYTES: usize = 1 << 20;
+
+/// Text of a spec, and where it came from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SpecSource {
+    /// Path as messages show it.
+    pub display_name: String,
+    /// The whole text, without byte-order mark. Spans count its bytes.
+    pub text: String,
+    /// Folder that file names in the spec are relative to.
+    pub dir: PathBuf,
+}
+
+impl SpecSource {
+    /// Reads the file at `path`.
+    ///
+    /// # Errors
+    /// One finding (E0101 to E0103) if it cannot be opened, is larger than [`MAX_BYTES`], or is not UTF-8.
+    pub fn read(path: &Path) -> Result<Self, Diagnostic> {
+        let display_name = path.display().to_string();
+        let bytes = read_bytes(path, &display_name)?;
+        let text = into_text(bytes, &display_name)?;
+        let dir = path
+            .parent()
+            .filter(|p| !p.as_os_str().is_empty())
+            .unwrap_or(Path::new("."));
+        Ok(Self {
+            display_name,
+            text,
+            dir: dir.to_path_buf(),
+        })
+    }
+}
+
+fn finding(
+    code: &'static str,
+    path: &str,
+    line: Option<usize>,
+    message: String,
+    help: &str,
+) -> Diagnostic {
+    Diagnostic {
+        severity: Severity::Error,
+        code,
+        key: String::new(),
+        place: Place::File {
+            path: path.to_owned(),
+            line,
+        },
+        message,
+        help: help.to_owned(),
+    }
+}
+
+fn read_bytes(path: &Path, shown: &str) -> Result<Vec<u8>, Diagnostic> {
+    let unreadable = |reason: String, help: &str| {
+        finding(
+            codes::UNREADABLE,
+            shown,
+            None,
+            format!("the spec file cannot be read: {reason}"),
+            help,
+        )
+    };
+    if path.is_dir() {
+        return Err(unreadable(
+            "this is a folder".to_owned(),
+            "name the .toml file in it",
+        ));
+    }
+    let file = File::open(path)
+        .map_err(|e| unreadable(e.to_string(), "check the path and its permissions"))?;
+    let mut bytes = Vec::new();
+    // One byte past the limit tells "too large" without reading an endless file.
+    file.take(MAX_BYTES as u64 + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|e| unreadable(e.to_string(), "check that it is a regular file"))?;
+    if bytes.len() > MAX_BYTES {
+        return Err(finding(
+            codes::TOO_LARGE,
+            shown,
+            None,
+            "the spec file is larger than 1 MiB, expected a few kilobytes".to_owned(),
+            "name the .toml spec; measurements belong in CSV files that the spec refers to",
+        ));
+    }
+    Ok(bytes)
+}
+
+fn into_text(bytes: Vec<u8>, shown: &str) -> Result<String, Diagnostic> {
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let offset = error.utf8_error().valid_up_to();
+        let bytes = error.as_bytes();
+        let line = 1 + bytes[..offset].iter().filter(|b| **b == b'\n').count();
+        // `valid_up_to` is before the end: the byte there is the one that failed.
+        let byte = bytes.get(offset).copied().unwrap_or_default();
+        finding(
+            codes::NOT_TEXT,
+            shown,
+            Some(line),
+            format!("the spec file is not UTF-8 text: byte {offset} (line {line}) is 0x{byte:02x}"),
+            "save the file as UTF-8; a unit may be written without special characters, such as \"um\" or \"deg\"",
+        )
+    })?;
+    Ok(text
+        .strip_prefix('\u{feff}')
+        .map(str::to_owned)
+        .unwrap_or(text))
+}

@@ -1,0 +1,233 @@
+//! TOML text to a tree with spans, and what is wrong with the syntax.
+//!
+//! The parser recovers, so that several mistakes are reported in one run. Where all of them leave the tree whole
+//! (a key given twice, a text without quotes), the values are checked as well.
+
+use std::ops::Range;
+
+use toml::de::DeTable;
+
+use super::findings::{Findings, MAX_FINDINGS};
+use super::text;
+use crate::diagnostic::codes;
+
+/// A parsed file.
+pub(super) struct Parsed<'a> {
+    pub(super) root: DeTable<'a>,
+    /// Whether the tree is worth checking.
+    pub(super) whole: bool,
+}
+
+/// Parses `source`, with one finding per syntax error.
+pub(super) fn parse<'a>(source: &'a str, findings: &mut Findings) -> Parsed<'a> {
+    let (root, errors) = DeTable::parse_recoverable(source);
+    let mut whole = true;
+    for error in errors.iter().take(MAX_FINDINGS) {
+        let span = text::clamp(source, error.span().unwrap_or(0..0));
+        whole &= report(source, span, error.message(), findings);
+    }
+    let left_out = errors.len().saturating_sub(MAX_FINDINGS);
+    findings.leave_out(left_out);
+    Parsed {
+        root: root.into_inner(),
+        whole: whole && left_out == 0,
+    }
+}
+
+/// Reports one syntax error; whether the tree is still whole.
+fn report(source: &str, span: Range<usize>, message: &str, findings: &mut Findings) -> bool {
+    let found = &source[span.clone()];
+    // These two phrases are the parser's; a test pins them, so that an update that changes them is noticed.
+    if message.starts_with("duplicate key") {
+        duplicate(source, span, findings);
+        return true;
+    }
+    if message.starts_with("string values must be quoted") && !found.trim().is_empty() {
+        findings.error(
+            codes::UNQUOTED,
+            "",
+            span.clone(),
+            format!("{} is a text without quotes", text::quote(found)),
+            format!(
+                "texts and quantities stand in quotes: write \"{}\"",
+                text::shorten(found.trim())
+            ),
+        );
+        return true;
+    }
+    let missing_value = message.starts_with("string values must be quoted");
+    findings.error(
+        codes::SYNTAX,
+        "",
+        span,
+        if missing_value {
+            "there is no value here".to_owned()
+        } else {
+            format!("this is not TOML: {message}")
+        },
+        if missing_value {
+            "write a value after the equals sign, or take the line out".to_owned()
+        } else {
+            help_for(message).to_owned()
+        },
+    );
+    false
+}
+
+fn help_for(message: &str) -> &'static str {
+    if message.contains("unclosed array")
+        || message.contains("in array")
+        || message.contains("array elements")
+    {
+        "an array is written [\"0 V\", \"100 V\"]: a comma between values, a bracket at each end"
+    } else if message.contains("unclosed table") {
+        "a section starts with its name in brackets on a line of its own: [geometry]"
+    } else if message.contains("basic string")
+        || message.contains("literal string")
+        || message.contains("escape")
+    {
+        "a text starts and ends with a quote on the same line; write a backslash twice"
+    } else if message.contains("recurs") {
+        "a spec nests no deeper than a section and an array"
+    } else {
+        "a line is a section [name], a key = value, or a # comment"
+    }
+}
+
+fn duplicate(source: &str, span: Range<usize>, findings: &mut Findings) {
+    let name = &source[span.clone()];
+    let (header, is_header) = header_before(source, span.start);
+    let (key, first) = if is_header {
+        (
+            name.to_owned(),
+            first_line(source, 0, &span, |line| header_name(line) == Some(header)),
+        )
+    } else {
+        let key = if header.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{header}.{name}")
+        };
+        // Before its section, a key of the same name belongs elsewhere.
+        let from = section_start(source, header);
+        (
+            key,
+            first_line(source, from, &span, |line| key_name(line) == Some(name)),
+        )
+    };
+    let before = first.map_or_else(|| "before".to_owned(), |line| format!("on line {line}"));
+    let what = if is_header { "section" } else { "key" };
+    findings.error(
+        codes::DUPLICATE,
+        &text::shorten(&key),
+        span.clone(),
+        format!(
+            "{what} {} is given twice, first {before}",
+            text::quote(name)
+        ),
+        format!("keep one of the two: which {what} counts would be a guess"),
+    );
+}
+
+/// The section header that is in force at `offset`, and whether `offset` is on that header itself.
+fn header_before(source: &str, offset: usize) -> (&str, bool) {
+    let line_start = source[..offset].rfind('\n').map_or(0, |i| i + 1);
+    let line_end = source[offset..]
+        .find('\n')
+        .map_or(source.len(), |i| offset + i);
+    if let Some(name) = header_name(&source[line_start..line_end]) {
+        return (name, true);
+    }
+    (
+        source[..line_start]
+            .lines()
+            .rev()
+            .find_map(header_name)
+            .unwrap_or(""),
+        false,
+    )
+}
+
+fn section_start(source: &str, header: &str) -> usize {
+    lines_with_offsets(source)
+        .find(|(_, line)| header_name(line) == Some(header))
+        .map_or(0, |(offset, _)| offset)
+}
+
+/// Number (from 1) of the first line between byte `from` and the line of `span` that `matches`.
+fn first_line(
+    source: &str,
+    from: usize,
+    span: &Range<usize>,
+    matches: impl Fn(&str) -> bool,
+) -> Option<usize> {
+    let line_start = source[..span.start].rfind('\n').map_or(0, |i| i + 1);
+    lines_with_offsets(&source[..line_start])
+        .enumerate()
+        .find(|(_, (offset, line))| *offset >= from && matches(line))
+        .map(|(index, _)| index + 1)
+}
+
+fn lines_with_offsets(source: &str) -> impl Iterator<Item = (usize, &str)> {
+    let mut offset = 0;
+    source.split_inclusive('\n').map(move |line| {
+        let start = offset;
+        offset += line.len();
+        (start, line)
+    })
+}
+
+/// "geometry" of "[geometry]  # comment"; only bare names and dots, as every section has.
+fn header_name(line: &str) -> Option<&str> {
+    let inner = line.trim_start().strip_prefix('[')?.trim_start_matches('[');
+    let name = inner[..inner.find(']')?].trim();
+    let bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
+    (!name.is_empty() && name.chars().all(bare)).then_some(name)
+}
+
+fn key_name(line: &str) -> Option<&str> {
+    line.split_once('=').map(|(key, _)| key.trim())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn codes_of(source: &str) -> Vec<&'static str> {
+        let mut findings = Findings::default();
+        parse(source, &mut findings);
+        findings.all().iter().map(|d| d.code).collect()
+    }
+
+    #[test]
+    fn several_mistakes_are_found_in_one_run() {
+        let found = codes_of("a = 3 mm\na = 4\nb = \"x\nc = 5\n[d\n");
+        assert_eq!(
+            found.iter().filter(|c| **c == codes::DUPLICATE).count(),
+            1,
+            "{found:?}"
+        );
+        assert_eq!(
+            found.iter().filter(|c| **c == codes::UNQUOTED).count(),
+            1,
+            "{found:?}"
+        );
+        assert_eq!(
+            found.iter().filter(|c| **c == codes::SYNTAX).count(),
+            2,
+            "{found:?}"
+        );
+    }
+
+    #[test]
+    fn a_duplicate_names_its_path_and_first_line() {
+        let mut findings = Findings::default();
+        parse("x = 1\n[a]\ny = 1\n[b]\nx = 2\nx = 3\n", &mut findings);
+        assert_eq!(findings.all()[0].key, "b.x");
+        assert!(
+            findings.all()[0].message.contains("line 5"),
+            "{}",
+            findings.all()[0].message
+        );
+    }
+}

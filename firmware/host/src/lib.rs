@@ -1,0 +1,123 @@
+//! The controller as a shared library with a C ABI.
+//!
+//! A simulator loads it and steps the very code that the microcontroller runs. The library is `no_std` and its panic
+//! handler calls a function that does not exist: **it links only if no panic path is left** in the controller.
+//!
+//! Words are as in `controller::INPUT_NAMES`, `OUTPUT_NAMES`, `CONFIG_NAMES`. `Config` and `State` live in memory of the
+//! caller, of the size and alignment that [`specgen_layout`] states.
+//! Pointers are not verified here: a caller in a safe language wraps this once and checks [`specgen_abi_version`] first.
+#![no_std]
+#![deny(missing_docs)]
+
+use core::mem::{align_of, size_of};
+
+use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput};
+
+/// Version of this interface.
+const ABI_VERSION: u32 = 1;
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    unsafe extern "C" {
+        fn specgen_panic_path_remains() -> !;
+    }
+    // SAFETY: never linked; see the crate documentation.
+    unsafe { specgen_panic_path_remains() }
+}
+
+/// Version of this interface; callers refuse any other than the one they were written for.
+#[unsafe(no_mangle)]
+pub extern "C" fn specgen_abi_version() -> u32 {
+    ABI_VERSION
+}
+
+/// What this controller is: `key=value` lines in UTF-8, see `controller::DESCRIPTION`.
+///
+/// # Safety
+/// `text` and `length` point to writable memory. The text lives as long as the library is loaded.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_describe(text: *mut *const u8, length: *mut usize) {
+    // SAFETY: the caller's duty.
+    unsafe {
+        text.write(controller::DESCRIPTION.as_ptr());
+        length.write(controller::DESCRIPTION.len());
+    }
+}
+
+/// Memory that the caller provides, in bytes: 0 size of `State`, 1 its alignment, 2 size of `Config`, 3 its alignment;
+/// anything else gives 0.
+#[unsafe(no_mangle)]
+pub extern "C" fn specgen_layout(what: u32) -> usize {
+    match what {
+        0 => size_of::<State>(),
+        1 => align_of::<State>(),
+        2 => size_of::<Config>(),
+        3 => align_of::<Config>(),
+        _ => 0,
+    }
+}
+
+/// The spec's settings as words.
+///
+/// # Safety
+/// `words` points to `CONFIG_WORDS` writable words.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_config_default(words: *mut u64) {
+    // SAFETY: the caller's duty.
+    unsafe { words.cast::<[u64; CONFIG_WORDS]>().write(Config::new().to_words()) }
+}
+
+/// Makes a `Config` of words: returns 0, or one more than the index of the first word out of range (then `config` is as
+/// it was).
+///
+/// # Safety
+/// `words` points to `CONFIG_WORDS` words, `config` to memory for a `Config`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_config_load(config: *mut u8, words: *const u64) -> i32 {
+    // SAFETY: the caller's duty.
+    let words = unsafe { words.cast::<[u64; CONFIG_WORDS]>().read() };
+    match Config::from_words(&words) {
+        Ok(checked) => {
+            // SAFETY: the caller's duty.
+            unsafe { config.cast::<Config>().write(checked) };
+            0
+        }
+        Err(error) => error.word as i32 + 1,
+    }
+}
+
+/// Puts a `State` at reset.
+///
+/// # Safety
+/// `state` points to memory for a `State`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_state_reset(state: *mut u8) {
+    // SAFETY: the caller's duty.
+    unsafe { state.cast::<State>().write(State::new()) }
+}
+
+/// One control tick.
+///
+/// # Safety
+/// `config` holds a loaded `Config`, `state` a `State` put at reset before; `input` points to `INPUT_WORDS` words,
+/// `output` to `OUTPUT_WORDS` writable words. No two threads step the same state at once.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_step(config: *const u8, state: *mut u8, input: *const u64, output: *mut u64) {
+    // SAFETY: the caller's duty.
+    let (config, state, input) = unsafe {
+        (&*config.cast::<Config>(), &mut *state.cast::<State>(), &*input.cast::<[u64; INPUT_WORDS]>())
+    };
+    let words = controller::step(config, state, &TickInput::from_words(input)).to_words();
+    // SAFETY: the caller's duty.
+    unsafe { output.cast::<[u64; OUTPUT_WORDS]>().write(words) }
+}
+
+/// Fingerprint of a `State`.
+///
+/// # Safety
+/// `state` holds a `State` put at reset before.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_state_digest(state: *const u8) -> u64 {
+    // SAFETY: the caller's duty.
+    unsafe { (*state.cast::<State>()).digest() }
+}

@@ -1,0 +1,82 @@
+//! Run-to-run adaptation of one leg: EWMA and PCC in the filter form of Fig. 5 with Ĝ_p = ρ̂.
+//!
+//! ```text
+//! m_n = Y_n − ρ̂ X_n                                                      model error of run n
+//! EWMA:  δ̂_n = ω m_n + (1−ω) δ̂_{n−1}                                      (AII.3)
+//! PCC:   δ̂_n = ω1 m_n + (1−ω1) δ̂_{n−1}                                    (AII.5)
+//!        φ̂_n = ω2 (m_n − δ̂_{n−1}) + (1−ω2) φ̂_{n−1}                       (AII.6), with the old δ̂
+//! next request: ρ̂ X_{n+1} = T_{n+1} − δ̂_n − φ̂_n                          (AII.2), (AII.4)
+//! ```
+//! ρ̂ X is the displacement really requested, after every limit: that is the anti-windup. The integrator form
+//! (AII.8), (AII.13) belongs to another error (Y − Ŷ); it must not be fed with m.
+
+use crate::digest::Digest;
+use crate::real::Real;
+
+/// Which estimates are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Law {
+    /// None: inverse Preisach alone.
+    Invhys,
+    /// δ̂ by (AII.3).
+    Ewma,
+    /// δ̂ and φ̂ by (AII.5) and (AII.6).
+    Pcc,
+}
+
+/// Estimates of one leg, m. Zero at reset.
+#[derive(Debug, Clone, Copy)]
+pub struct Estimate<T> {
+    /// δ̂: offset between the leg and its model.
+    pub level: T,
+    /// φ̂: what δ̂ lags behind when the offset drifts; zero under EWMA.
+    pub drift: T,
+}
+
+impl<T: Real> Default for Estimate<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Estimate<T> {
+    /// No correction.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            level: T::ZERO,
+            drift: T::ZERO,
+        }
+    }
+
+    /// Displacement to take off the demand before the inverse, δ̂ + φ̂, m.
+    #[inline]
+    #[must_use]
+    pub fn correction(&self) -> T {
+        self.level + self.drift
+    }
+
+    /// End of a run: `model_error` is m = Y − ρ̂X (m, finite), the weights are per run and within (0, 1].
+    #[inline]
+    pub fn update(&mut self, law: Law, level_weight: T, drift_weight: T, model_error: T) {
+        let old_level = self.level;
+        match law {
+            Law::Invhys => *self = Self::new(),
+            Law::Ewma => {
+                self.level = level_weight * model_error + (T::ONE - level_weight) * old_level;
+                self.drift = T::ZERO;
+            }
+            Law::Pcc => {
+                self.level = level_weight * model_error + (T::ONE - level_weight) * old_level;
+                self.drift =
+                    drift_weight * (model_error - old_level) + (T::ONE - drift_weight) * self.drift;
+            }
+        }
+    }
+
+    /// Adds the estimates to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        digest.real(self.level);
+        digest.real(self.drift);
+    }
+}

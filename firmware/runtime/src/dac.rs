@@ -1,0 +1,73 @@
+//! From a drive to a converter code, with the voltage and slew limits kept in integers.
+//!
+//! A voltage leaves the controller only as `volts_at_zero + code · volts_per_code` with
+//! `code_min ≤ code ≤ code_max`, so it is finite and within limits whatever happened before.
+
+use crate::real::Real;
+
+/// A converter with straight binary codes, and how its codes lie on the Everett grid.
+#[derive(Debug, Clone, Copy)]
+pub struct Dac<T> {
+    /// Voltage of code 0, V.
+    pub volts_at_zero: T,
+    /// Voltage step, V.
+    pub volts_per_code: T,
+    /// Drive of code 0, cells of the Everett grid.
+    pub cells_at_zero: T,
+    /// Drive step, cells.
+    pub cells_per_code: T,
+    /// Codes in one cell.
+    pub codes_per_cell: T,
+}
+
+/// What the codes may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CodeLimits {
+    /// Lowest code.
+    pub min: i32,
+    /// Highest code, ≥ `min`.
+    pub max: i32,
+    /// Largest change from one tick to the next, ≥ 1 (slew rate × control period).
+    pub max_step: i32,
+}
+
+impl<T: Real> Dac<T> {
+    /// The permitted code nearest to `drive` (cells) when the present code is `previous`, and whether a limit held it back.
+    #[inline]
+    #[must_use]
+    pub fn code(&self, drive: T, previous: i32, limits: CodeLimits) -> (i32, bool) {
+        let wanted = ((drive - self.cells_at_zero) * self.codes_per_cell + T::HALF).truncate();
+        let stepped = within(
+            wanted,
+            previous.saturating_sub(limits.max_step),
+            previous.saturating_add(limits.max_step),
+        );
+        let code = within(stepped, limits.min, limits.max);
+        (code, code != wanted)
+    }
+
+    /// Drive of `code`, cells.
+    #[inline]
+    #[must_use]
+    pub fn drive(&self, code: i32) -> T {
+        self.cells_at_zero + T::from_i32(code) * self.cells_per_code
+    }
+
+    /// Voltage of `code`, V.
+    #[inline]
+    #[must_use]
+    pub fn voltage(&self, code: i32) -> T {
+        self.volts_at_zero + T::from_i32(code) * self.volts_per_code
+    }
+}
+
+#[inline]
+fn within(value: i32, low: i32, high: i32) -> i32 {
+    if value > high {
+        high
+    } else if value < low {
+        low
+    } else {
+        value
+    }
+}

@@ -1,0 +1,41 @@
+//! Fingerprint of a state: FNV-1a, word by word. For comparing two runs, not against forgery.
+
+use crate::real::Real;
+
+/// Running 64-bit digest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Digest(u64);
+
+impl Default for Digest {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Digest {
+    /// The empty digest (FNV-1a offset basis).
+    #[must_use]
+    pub const fn new() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+
+    /// Adds a word.
+    #[inline]
+    pub fn word(&mut self, word: u64) {
+        self.0 = (self.0 ^ word).wrapping_mul(0x0000_0100_0000_01b3);
+        // Eight bytes at once leave the high bits of the word unmixed below; fold them down.
+        self.0 ^= self.0 >> 32;
+    }
+
+    /// Adds a number by its bits.
+    #[inline]
+    pub fn real<T: Real>(&mut self, value: T) {
+        self.word(value.to_word());
+    }
+
+    /// The digest so far.
+    #[must_use]
+    pub const fn finish(self) -> u64 {
+        self.0
+    }
+}

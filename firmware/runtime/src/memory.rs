@@ -1,0 +1,252 @@
+//! Reversal memory: the Preisach model on line, forward and inverse, in bounded storage.
+//!
+//! The state of a Preisach model is the staircase of past extrema that later drives have not wiped out. With
+//! extrema p₀ < p₂ < … (minima) and p₁ > p₃ > … (maxima), p₀ being negative saturation, and f_k the displacement at p_k,
+//!
+//! ```text
+//! rising  from a minimum p_k:  f(x) = f_k + E(x, p_k)     until x ≥ p_{k−1}, which wipes p_{k−1} and p_k out
+//! falling from a maximum p_k:  f(x) = f_k − E(p_k, x)     until x ≤ p_{k−1}, likewise
+//! ```
+//! The inverse walks the same staircase by displacement, then solves one branch ([`Everett::rise`], [`Everett::fall`]).
+
+use crate::digest::Digest;
+use crate::everett::Everett;
+use crate::real::{Real, saturate};
+
+/// Staircase of at most `CAP` ≥ 4 extrema. Drives in cells of the Everett grid, displacements in m.
+///
+/// Reset state: drive 0 after negative saturation, displacement 0; a real leg reaches it by a sweep to the
+/// upper voltage limit and back.
+#[derive(Debug, Clone, Copy)]
+pub struct ReversalMemory<T, const CAP: usize> {
+    /// p_k; even k are minima, odd k maxima; p₀ = 0. Only the first `len` count.
+    extrema: [T; CAP],
+    /// f_k.
+    displacements: [T; CAP],
+    /// Stored extrema, 1..=CAP.
+    len: usize,
+    drive: T,
+    displacement: T,
+    /// Pairs dropped because the memory was full.
+    dropped: u32,
+}
+
+impl<T: Real, const CAP: usize> Default for ReversalMemory<T, CAP> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
+    const FITS: () = assert!(
+        CAP >= 4,
+        "a reversal memory needs room for a loop within a loop"
+    );
+
+    /// Negative saturation: drive 0, displacement 0.
+    #[must_use]
+    pub const fn new() -> Self {
+        let () = Self::FITS;
+        Self {
+            extrema: [T::ZERO; CAP],
+            displacements: [T::ZERO; CAP],
+            len: 1,
+            drive: T::ZERO,
+            displacement: T::ZERO,
+            dropped: 0,
+        }
+    }
+
+    /// The drive last applied, cells.
+    #[inline]
+    #[must_use]
+    pub fn drive(&self) -> T {
+        self.drive
+    }
+
+    /// The displacement that the model gives for the drive last applied, m.
+    #[inline]
+    #[must_use]
+    pub fn displacement(&self) -> T {
+        self.displacement
+    }
+
+    /// Number of extrema in memory, 1..=CAP.
+    #[must_use]
+    pub fn depth(&self) -> usize {
+        self.len
+    }
+
+    /// How many pairs of extrema were given up for want of room since reset.
+    #[must_use]
+    pub fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    /// Γ: applies `drive` (cells, held within 0..=N) and returns the displacement, m.
+    ///
+    /// `drive` must be finite.
+    #[inline]
+    pub fn apply<const N: usize, const NODES: usize>(
+        &mut self,
+        table: &Everett<T, N, NODES>,
+        drive: T,
+    ) -> T {
+        let drive = saturate(drive, T::ZERO, table.full_scale());
+        if drive == self.drive {
+            return self.displacement;
+        }
+        let rising = drive > self.drive;
+        if rising != self.is_rising() {
+            self.push(table);
+        }
+        self.displacement = if rising {
+            while self.len >= 3 && drive >= self.extremum(self.len - 2) {
+                self.len -= 2;
+            }
+            let top = self.len - 1;
+            self.displacement_at(top) + table.value(drive, self.extremum(top))
+        } else {
+            while self.len >= 4 && drive <= self.extremum(self.len - 2) {
+                self.len -= 2;
+            }
+            let top = self.len - 1;
+            if drive <= T::ZERO {
+                self.len = 1;
+                T::ZERO
+            } else {
+                self.displacement_at(top) - table.value(self.extremum(top), drive)
+            }
+        };
+        self.drive = drive;
+        self.displacement
+    }
+
+    /// Γ⁻¹: the drive (cells) that [`ReversalMemory::apply`] would turn into `displacement` (m, held within the reach
+    /// of the table). Does not change the memory.
+    ///
+    /// `displacement` must be finite.
+    #[inline]
+    #[must_use]
+    pub fn solve<const N: usize, const NODES: usize>(
+        &self,
+        table: &Everett<T, N, NODES>,
+        displacement: T,
+    ) -> T {
+        let wanted = saturate(displacement, T::ZERO, table.full_displacement());
+        if wanted == self.displacement {
+            return self.drive;
+        }
+        let rising = wanted > self.displacement;
+        // The branch starts at the last extremum if the direction stays, else where the drive is now; `next` is the
+        // number of extrema below that start.
+        let (mut start, mut at_start, mut next) = if rising == self.is_rising() {
+            let top = self.len - 1;
+            (self.extremum(top), self.displacement_at(top), top)
+        } else {
+            (self.drive, self.displacement, self.len)
+        };
+        // Walk outwards: each pair whose inner loop the wanted displacement leaves is (would be) wiped out.
+        while next >= 2 {
+            let bound = self.displacement_at(next - 1);
+            let leaves = if rising {
+                wanted >= bound
+            } else {
+                wanted <= bound
+            };
+            if !leaves {
+                break;
+            }
+            next -= 2;
+            start = self.extremum(next);
+            at_start = self.displacement_at(next);
+        }
+        if rising {
+            table.rise(start, wanted - at_start)
+        } else {
+            table.fall(start, at_start - wanted)
+        }
+    }
+
+    /// Adds everything that the future depends on to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        digest.word(self.len as u64);
+        digest.word(u64::from(self.dropped));
+        digest.real(self.drive);
+        digest.real(self.displacement);
+        for (extremum, displacement) in self.extrema.iter().zip(&self.displacements).take(self.len)
+        {
+            digest.real(*extremum);
+            digest.real(*displacement);
+        }
+    }
+
+    /// The branch since the last extremum goes up (it left a minimum).
+    #[inline]
+    fn is_rising(&self) -> bool {
+        self.len % 2 == 1
+    }
+
+    /// Bounded reads: `k` < `len` ≤ CAP always holds, the comparison shows it to the compiler.
+    #[inline]
+    fn extremum(&self, k: usize) -> T {
+        self.extrema[if k < CAP { k } else { CAP - 1 }]
+    }
+
+    #[inline]
+    fn displacement_at(&self, k: usize) -> T {
+        self.displacements[if k < CAP { k } else { CAP - 1 }]
+    }
+
+    /// Makes the present point the newest extremum.
+    #[inline]
+    fn push<const N: usize, const NODES: usize>(&mut self, table: &Everett<T, N, NODES>) {
+        if self.len >= CAP {
+            self.drop_least(table);
+        }
+        let k = if self.len < CAP { self.len } else { CAP - 1 };
+        self.extrema[k] = self.drive;
+        self.displacements[k] = self.displacement;
+        self.len = k + 1;
+    }
+
+    /// Forgets the pair of neighbouring extrema that matters least.
+    ///
+    /// Removing p_i and p_{i+1} changes every later displacement by the Everett rectangle of the four neighbours,
+    /// w_i = E(p_{i−1}, p_i) − E(p_i, p_{i+1}) + E(p_{i+1}, p_{i+2}) − E(p_{i−1}, p_{i+2}) in absolute value. The pair with
+    /// the smallest w goes (the innermost loop would be wrong: up to 3.9 µm); p₀ stays. Three of the four terms are
+    /// differences of stored displacements.
+    #[cold]
+    #[inline(never)]
+    fn drop_least<const N: usize, const NODES: usize>(&mut self, table: &Everett<T, N, NODES>) {
+        let mut least = T::ZERO;
+        let mut shift = T::ZERO;
+        let mut at = 0;
+        for i in 1..CAP - 1 {
+            let (outer, at_outer) = (self.extremum(i - 1), self.displacement_at(i - 1));
+            let (inner, at_inner) = if i + 2 < CAP {
+                (self.extremum(i + 2), self.displacement_at(i + 2))
+            } else {
+                (self.drive, self.displacement)
+            };
+            let direct = if outer < inner {
+                at_outer + table.value(inner, outer)
+            } else {
+                at_outer - table.value(outer, inner)
+            };
+            let change = direct - at_inner;
+            if at == 0 || change.abs() < least {
+                (least, shift, at) = (change.abs(), change, i);
+            }
+        }
+        for k in 1..CAP - 2 {
+            if k >= at {
+                self.extrema[k] = self.extrema[k + 2];
+                self.displacements[k] = self.displacements[k + 2] + shift;
+            }
+        }
+        self.displacement = self.displacement + shift;
+        self.len = CAP - 2;
+        self.dropped = self.dropped.saturating_add(1);
+    }
+}

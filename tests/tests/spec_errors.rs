@@ -1,0 +1,631 @@
+//! Bad input to the spec reader: every key wrong in every way, and the corpus with the text that a user sees.
+
+mod support {
+    #![allow(dead_code)] // shared with other tests, which use other parts
+    pub mod specs;
+}
+
+use std::fs;
+
+use specgen::diagnostic::{Diagnostic, Place, codes, render, to_json};
+use specgen::spec::keys::{Item, Key, Presence, SECTIONS, Section, Shape};
+use specgen::spec::{self, SpecSource};
+use support::specs::{errors, every_key, folder_with_records, line_of, root, source, spec_files};
+
+#[test]
+fn every_spec_of_the_repository_is_accepted_without_a_warning() {
+    let folder = folder_with_records();
+    for path in spec_files() {
+        let text = fs::read_to_string(&path).expect("readable");
+        let source = source(&text, "spec.toml", &folder);
+        let (model, findings) = spec::load(&source);
+        assert!(
+            findings.is_empty(),
+            "{}:\n{}",
+            path.display(),
+            render(&findings, &source, false)
+        );
+        assert!(model.is_some());
+    }
+}
+
+/// One changed line in a spec that has every key, and what must come of it.
+struct Case<'a> {
+    key: &'static Key,
+    path: &'a str,
+    /// What stands in the place of the key's line.
+    lines: String,
+    code: &'static str,
+    /// Key path of the finding.
+    about: String,
+    what: &'a str,
+}
+
+/// A spec with every key, and where each key's line is.
+struct Bench {
+    folder: tempfile::TempDir,
+    cases: usize,
+}
+
+impl Bench {
+    /// The text with the line of `section`.`key` replaced, and the number of that line.
+    fn with(section: &Section, key: &Key, lines: &str) -> (String, usize) {
+        let mut text = every_key();
+        // The bandwidths are not in the text: they take the line of the weight.
+        let stands_for = match key.presence {
+            Presence::InsteadOf(other) if key.name.ends_with("_bandwidth") => other,
+            _ => key.name,
+        };
+        let header = if section.name.is_empty() {
+            String::new()
+        } else {
+            format!("[{}]\n", section.name)
+        };
+        let from = text.find(&header).expect("section") + header.len();
+        let start = if text[from..].starts_with(&format!("{stands_for} = ")) {
+            from
+        } else {
+            from + text[from..]
+                .find(&format!("\n{stands_for} = "))
+                .expect("key")
+                + 1
+        };
+        let end = start + text[start..].find('\n').expect("line end") + 1;
+        text.replace_range(start..end, lines);
+        let line = 1 + text[..start].matches('\n').count();
+        (text, line)
+    }
+
+    fn findings(&self, text: &str) -> Vec<Diagnostic> {
+        let source = source(text, "spec.toml", &self.folder);
+        let (model, findings) = spec::load(&source);
+        assert_eq!(model.is_none(), !errors(&findings).is_empty());
+        // Rendering must take whatever loading finds.
+        assert!(
+            findings.is_empty() || render(&findings, &source, false).contains(findings[0].code)
+        );
+        findings
+    }
+
+    /// The one line is to blame: the finding is there, on it, and nothing else is reported anywhere else.
+    fn check(&mut self, section: &Section, case: Case<'_>, line_offset: usize) {
+        let (text, line) = Self::with(section, case.key, &case.lines);
+        let findings = self.findings(&text);
+        let hint = format!(
+            "{} {}: {:?} gave {findings:#?}",
+            case.path, case.what, case.lines
+        );
+        let found = errors(&findings)
+            .into_iter()
+            .find(|d| d.code == case.code && d.key == case.about);
+        let found =
+            found.unwrap_or_else(|| panic!("no {} about {}: {hint}", case.code, case.about));
+        assert_eq!(line_of(found, &text), line + line_offset, "{hint}");
+        for d in errors(&findings) {
+            assert_eq!(line_of(d, &text), line + line_offset, "a follow-up: {hint}");
+            assert!(!d.help.is_empty() && !d.message.is_empty(), "{hint}");
+        }
+        self.cases += 1;
+    }
+}
+
+fn items(key: &Key) -> Vec<Item> {
+    match key.shape {
+        Shape::One(item) => vec![item],
+        Shape::List(items) => items.to_vec(),
+        Shape::Records => Vec::new(),
+    }
+}
+
+/// The key's line with its value, or the value `index` of its list, replaced.
+fn line_with(key: &Key, index: usize, literal: &str) -> String {
+    match key.shape {
+        Shape::One(_) => format!("{} = {literal}\n", key.name),
+        Shape::List(_) | Shape::Records => {
+            let inner = key.example.trim_matches(['[', ']']);
+            let mut values: Vec<&str> = inner.split(", ").collect();
+            values[index] = literal;
+            format!("{} = [{}]\n", key.name, values.join(", "))
+        }
+    }
+}
+
+/// Bad literals for an item: what is wrong, the text, the code.
+fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
+    let mut bad = vec![
+        ("wrong type", "true".to_owned(), codes::WRONG_TYPE),
+        ("table", "{ a = 1 }".to_owned(), codes::WRONG_TYPE),
+    ];
+    match item {
+        Item::Quantity { unit, range, .. } => {
+            bad.push(("no unit", "3".to_owned(), codes::UNIT_MISSING));
+            bad.push(("no unit", "3.5".to_owned(), codes::UNIT_MISSING));
+            bad.push(("no unit", "\"3\"".to_owned(), codes::UNIT_MISSING));
+            bad.push(("wrong unit", "\"3 W\"".to_owned(), codes::WRONG_DIMENSION));
+            bad.push(("unknown unit", "\"3 foot\"".to_owned(), codes::UNKNOWN_UNIT));
+            bad.push((
+                "unknown unit",
+                format!("\"3 {unit} foot\""),
+                codes::UNKNOWN_UNIT,
+            ));
+            bad.push(("no number", format!("\"{unit}\""), codes::BAD_QUANTITY));
+            bad.push(("empty", "\"\"".to_owned(), codes::BAD_QUANTITY));
+            bad.push(("not finite", "nan".to_owned(), codes::NOT_FINITE));
+            bad.push(("not finite", "-inf".to_owned(), codes::NOT_FINITE));
+            bad.push(("not finite", format!("\"nan {unit}\""), codes::NOT_FINITE));
+            bad.push(("overflow", format!("\"1e400 {unit}\""), codes::NOT_FINITE));
+            bad.push(("underflow", format!("\"1e-400 {unit}\""), codes::NOT_FINITE));
+            bad.push(("too large", format!("\"1e30 {unit}\""), codes::OUT_OF_RANGE));
+            bad.push((
+                "too small",
+                format!("\"-1e30 {unit}\""),
+                codes::OUT_OF_RANGE,
+            ));
+            if !range.contains(0.0) {
+                bad.push(("zero", format!("\"0 {unit}\""), codes::OUT_OF_RANGE));
+            }
+        }
+        Item::Number(range) => {
+            bad.push(("text", "\"0.1\"".to_owned(), codes::WRONG_TYPE));
+            bad.push(("not finite", "nan".to_owned(), codes::NOT_FINITE));
+            bad.push(("not finite", "inf".to_owned(), codes::NOT_FINITE));
+            bad.push(("overflow", "1e999".to_owned(), codes::NOT_FINITE));
+            bad.push(("underflow", "1e-999".to_owned(), codes::NOT_FINITE));
+            bad.push((
+                "too large",
+                format!("{:?}", range.max * 1.01),
+                codes::OUT_OF_RANGE,
+            ));
+            bad.push(("too small", "-0.001".to_owned(), codes::OUT_OF_RANGE));
+        }
+        Item::Integer(min, max) => {
+            bad.push(("text", format!("\"{min}\""), codes::WRONG_TYPE));
+            bad.push(("fraction", format!("{min}.5"), codes::WRONG_TYPE));
+            bad.push(("not finite", "nan".to_owned(), codes::NOT_FINITE));
+            bad.push(("too small", (min - 1).to_string(), codes::OUT_OF_RANGE));
+            bad.push(("too large", (max + 1).to_string(), codes::OUT_OF_RANGE));
+            bad.push((
+                "beyond 64 bits",
+                "99999999999999999999".to_owned(),
+                codes::OUT_OF_RANGE,
+            ));
+        }
+        Item::Choice(words) => {
+            bad.push((
+                "unknown word",
+                "\"other\"".to_owned(),
+                codes::UNKNOWN_CHOICE,
+            ));
+            bad.push((
+                "capitals",
+                format!("\"{}\"", words[0].to_uppercase()),
+                codes::UNKNOWN_CHOICE,
+            ));
+            bad.push(("number", "1".to_owned(), codes::WRONG_TYPE));
+        }
+        Item::Name => {
+            for name in ["", "1st", "two words", "größe", "a/b"] {
+                bad.push(("not a name", format!("\"{name}\""), codes::BAD_NAME));
+            }
+            bad.push((
+                "too long",
+                format!("\"{}\"", "a".repeat(65)),
+                codes::BAD_NAME,
+            ));
+        }
+    }
+    bad
+}
+
+#[test]
+fn every_key_is_checked_in_every_way() {
+    let mut bench = Bench {
+        folder: folder_with_records(),
+        cases: 0,
+    };
+    assert!(errors(&bench.findings(&every_key())).is_empty());
+    for section in SECTIONS {
+        for key in section.keys {
+            let path = section.path(key.name);
+            let case = |lines: String, code, about: &str, what| Case {
+                key,
+                path: &path,
+                lines,
+                code,
+                about: about.to_owned(),
+                what,
+            };
+            for (i, item) in items(key).into_iter().enumerate() {
+                let about = if matches!(key.shape, Shape::List(_)) {
+                    format!("{path}[{i}]")
+                } else {
+                    path.clone()
+                };
+                for (what, literal, code) in bad_literals(item) {
+                    bench.check(
+                        section,
+                        case(line_with(key, i, &literal), code, &about, what),
+                        0,
+                    );
+                }
+            }
+            if !matches!(key.shape, Shape::One(_)) {
+                bench.check(
+                    section,
+                    case(
+                        format!("{} = 1\n", key.name),
+                        codes::WRONG_TYPE,
+                        &path,
+                        "not an array",
+                    ),
+                    0,
+                );
+            }
+            if matches!(key.shape, Shape::List(_)) {
+                let longer = format!("{}, {}]", key.example.trim_end_matches(']'), "1");
+                bench.check(
+                    section,
+                    case(
+                        format!("{} = {longer}\n", key.name),
+                        codes::WRONG_COUNT,
+                        &path,
+                        "too many",
+                    ),
+                    0,
+                );
+                bench.check(
+                    section,
+                    case(
+                        format!("{} = []\n", key.name),
+                        codes::WRONG_COUNT,
+                        &path,
+                        "empty",
+                    ),
+                    0,
+                );
+            }
+            let good = format!("{} = {}\n", key.name, key.example);
+            bench.check(
+                section,
+                case(format!("{good}{good}"), codes::DUPLICATE, &path, "twice"),
+                1,
+            );
+            let slip = format!("{}x = {}\n", key.name, key.example);
+            bench.check(
+                section,
+                case(
+                    slip.clone(),
+                    codes::UNKNOWN_KEY,
+                    &section.path(&format!("{}x", key.name)),
+                    "misspelt",
+                ),
+                0,
+            );
+            let (text, _) = Bench::with(section, key, &slip);
+            let help = &errors(&bench.findings(&text))[0].help;
+            assert!(help.contains(&format!("`{}`", key.name)), "{path}: {help}");
+        }
+    }
+    // Fewer would mean that the loops above have come to skip something.
+    assert!(bench.cases > 1000, "{} cases", bench.cases);
+    println!("{} cases", bench.cases);
+}
+
+#[test]
+fn every_key_may_be_missing_only_if_it_has_a_default() {
+    let bench = Bench {
+        folder: folder_with_records(),
+        cases: 0,
+    };
+    for section in SECTIONS {
+        for key in section.keys {
+            let path = section.path(key.name);
+            let (text, _) = Bench::with(section, key, "");
+            let findings = bench.findings(&text);
+            let errors = errors(&findings);
+            match key.presence {
+                Presence::Required => {
+                    assert_eq!(errors.len(), 1, "{path}: {findings:#?}");
+                    assert_eq!(
+                        (errors[0].code, errors[0].key.as_str()),
+                        (codes::MISSING_KEY, path.as_str())
+                    );
+                    assert!(
+                        errors[0].help.contains(key.name),
+                        "{path}: {}",
+                        errors[0].help
+                    );
+                    let header = if section.name.is_empty() {
+                        String::new()
+                    } else {
+                        format!("[{}]", section.name)
+                    };
+                    let line = 1 + text[..text.find(&header).expect("header")]
+                        .matches('\n')
+                        .count();
+                    assert_eq!(
+                        line_of(errors[0], &text),
+                        line,
+                        "{path} points at its section"
+                    );
+                }
+                Presence::InsteadOf(_) => {
+                    assert_eq!(errors.len(), 1, "{path}: {findings:#?}");
+                    assert_eq!(errors[0].code, codes::ALTERNATIVES, "{path}");
+                    assert!(!errors[0].help.is_empty());
+                }
+                // Without its mode the adaptation rests; the weights are then pointed out, not refused.
+                Presence::Default(_) | Presence::Optional => {
+                    assert!(errors.is_empty(), "{path}: {findings:#?}")
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_section_may_be_missing_only_if_nothing_in_it_is_required() {
+    let bench = Bench {
+        folder: folder_with_records(),
+        cases: 0,
+    };
+    let whole = every_key();
+    for section in SECTIONS
+        .iter()
+        .filter(|s| !s.name.is_empty() && s.name != "target")
+    {
+        let start = whole
+            .find(&format!("[{}]\n", section.name))
+            .expect("section");
+        let end = whole[start + 1..]
+            .find("\n[")
+            .map_or(whole.len(), |i| start + 2 + i);
+        let text = format!("{}{}", &whole[..start], &whole[end..]);
+        let findings = bench.findings(&text);
+        let errors = errors(&findings);
+        if section.is_required() {
+            assert_eq!(errors.len(), 1, "{}: {findings:#?}", section.name);
+            assert_eq!(
+                (errors[0].code, errors[0].key.as_str()),
+                (codes::MISSING_SECTION, section.name)
+            );
+            assert!(errors[0].help.contains(section.keys[0].name));
+        } else {
+            assert!(errors.is_empty(), "{}: {findings:#?}", section.name);
+        }
+    }
+}
+
+#[test]
+fn all_findings_of_a_file_come_in_one_run() {
+    let mut text = every_key();
+    for (good, bad) in [
+        ("base_radius = \"150 mm\"", "base_radius = 150"),
+        ("mass = \"1.195 kg\"", "mass = 1.195 kg"),
+        ("stacks = 5", "stacks = 5\nstacks = 6"),
+        ("period = \"200 us\"", "perod = \"200 V\""),
+        ("bits = 16", "bits = 160"),
+        ("mode = \"pcc\"", "mode = \"pxc\""),
+        ("[sensor]", "[sensors]"),
+    ] {
+        assert!(text.contains(good), "{good}");
+        text = text.replacen(good, bad, 1);
+    }
+    let bench = Bench {
+        folder: folder_with_records(),
+        cases: 0,
+    };
+    let findings = bench.findings(&text);
+    let found: Vec<&str> = errors(&findings).iter().map(|d| d.code).collect();
+    for code in [
+        codes::UNIT_MISSING,
+        codes::UNQUOTED,
+        codes::DUPLICATE,
+        codes::UNKNOWN_KEY,
+        codes::WRONG_DIMENSION,
+        codes::OUT_OF_RANGE,
+        codes::UNKNOWN_CHOICE,
+        codes::UNKNOWN_SECTION,
+    ] {
+        assert_eq!(
+            found.iter().filter(|c| **c == code).count(),
+            1,
+            "{code} in {found:?}"
+        );
+    }
+    assert_eq!(found.len(), 8, "{findings:#?}");
+}
+
+/// The text that a user sees, against the committed one; SPECGEN_BLESS=1 writes it.
+#[test]
+fn the_corpus_is_rendered_as_committed() {
+    let folder = folder_with_records();
+    let corpus = root().join("tests/corpus");
+    let mut files: Vec<_> = fs::read_dir(&corpus)
+        .expect("tests/corpus")
+        .map(|e| e.expect("readable").path())
+        .collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "toml"));
+    files.sort();
+    assert!(files.len() >= 20, "{} files in the corpus", files.len());
+    let bless = std::env::var_os("SPECGEN_BLESS").is_some();
+    let mut stale = Vec::new();
+    for path in files {
+        let name = path
+            .file_name()
+            .expect("a name")
+            .to_string_lossy()
+            .into_owned();
+        let mut source = SpecSource::read(&path).expect("the corpus is UTF-8");
+        source.display_name.clone_from(&name);
+        source.dir = folder.path().join("specs");
+        let (model, findings) = spec::load(&source);
+        // "ok-…" must pass, everything else be refused.
+        assert_eq!(
+            model.is_some(),
+            name.starts_with("ok-"),
+            "{name}:\n{}",
+            render(&findings, &source, false)
+        );
+        let text = render(&findings, &source, false);
+        let expected = path.with_extension("txt");
+        if bless {
+            fs::write(&expected, &text).expect("written");
+        } else if fs::read_to_string(&expected).unwrap_or_default() != text {
+            stale.push(format!("{name}, now:\n{text}"));
+        }
+    }
+    assert!(
+        stale.is_empty(),
+        "SPECGEN_BLESS=1 cargo test -p specgen-tests --test spec_errors accepts:\n{}",
+        stale.join("\n")
+    );
+}
+
+#[test]
+fn json_names_file_line_and_column() {
+    let folder = folder_with_records();
+    let text = every_key().replace("height = \"180 mm\"", "height = \"180 V\"");
+    let source = source(&text, "my.toml", &folder);
+    let (_, findings) = spec::load(&source);
+    let json = to_json(&findings, &source);
+    let line = 1 + text
+        .lines()
+        .position(|l| l.starts_with("height"))
+        .expect("there");
+    assert_eq!(json[0]["code"], codes::WRONG_DIMENSION);
+    assert_eq!(json[0]["severity"], "error");
+    assert_eq!(json[0]["key"], "geometry.height");
+    assert_eq!(json[0]["file"], "my.toml");
+    assert_eq!(json[0]["line"], line);
+    assert_eq!(json[0]["column"], 10);
+    assert!(
+        json[0]["help"]
+            .as_str()
+            .is_some_and(|help| help.contains("180 mm"))
+    );
+}
+
+mod files {
+    //! What is wrong with the file itself.
+
+    use super::*;
+    use std::path::Path;
+
+    fn refusal(path: &Path) -> Diagnostic {
+        let finding = SpecSource::read(path).expect_err("refused");
+        assert!(!finding.help.is_empty());
+        let source = SpecSource {
+            display_name: "x".into(),
+            text: String::new(),
+            dir: ".".into(),
+        };
+        let shown = render(std::slice::from_ref(&finding), &source, false);
+        assert!(
+            shown.contains(finding.code) && shown.contains("help"),
+            "{shown}"
+        );
+        finding
+    }
+
+    #[test]
+    fn missing_file_and_folder() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        assert_eq!(
+            refusal(&folder.path().join("none.toml")).code,
+            codes::UNREADABLE
+        );
+        let finding = refusal(folder.path());
+        assert_eq!(finding.code, codes::UNREADABLE);
+        assert!(finding.message.contains("folder"));
+    }
+
+    #[test]
+    fn binary_names_byte_and_line() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("binary.toml");
+        fs::write(&path, b"schema = 1\nname = \"gr\xf6\xdfe\"\n").expect("written");
+        let finding = refusal(&path);
+        assert_eq!(finding.code, codes::NOT_TEXT);
+        assert!(
+            finding.message.contains("byte 21 (line 2) is 0xf6"),
+            "{}",
+            finding.message
+        );
+        assert!(matches!(finding.place, Place::File { line: Some(2), .. }));
+    }
+
+    #[test]
+    fn huge_file_is_refused_and_just_fitting_one_is_read() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder.path().join("huge.toml");
+        fs::write(&path, vec![b'#'; spec::MAX_BYTES + 1]).expect("written");
+        assert_eq!(refusal(&path).code, codes::TOO_LARGE);
+        fs::write(&path, vec![b'#'; spec::MAX_BYTES]).expect("written");
+        let source = SpecSource::read(&path).expect("fits");
+        let (model, findings) = spec::load(&source);
+        assert!(model.is_none());
+        assert_eq!(findings[0].code, codes::EMPTY);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_name_that_is_not_utf8_is_read_and_shown() {
+        use std::os::unix::ffi::OsStrExt as _;
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = folder
+            .path()
+            .join(std::ffi::OsStr::from_bytes(b"pl\xffatform.toml"));
+        fs::write(&path, "schema = 2\n").expect("written");
+        let source = SpecSource::read(&path).expect("read");
+        let (_, findings) = spec::load(&source);
+        assert!(render(&findings, &source, true).contains("pl\u{fffd}atform.toml"));
+    }
+
+    #[test]
+    fn byte_order_mark_line_ends_and_tabs_change_nothing() {
+        let folder = folder_with_records();
+        let path = folder.path().join("specs/windows.toml");
+        let plain = every_key();
+        fs::write(
+            &path,
+            format!(
+                "\u{feff}{}",
+                plain.replace('\n', "\r\n").replace(" = ", "\t=\t")
+            ),
+        )
+        .expect("written");
+        let (windows, findings) = spec::load(&SpecSource::read(&path).expect("read"));
+        assert!(errors(&findings).is_empty(), "{findings:#?}");
+        fs::write(&path, plain).expect("written");
+        let (unix, _) = spec::load(&SpecSource::read(&path).expect("read"));
+        let (mut windows, mut unix) = (windows.expect("model"), unix.expect("model"));
+        assert_ne!(windows.spans, unix.spans);
+        windows.spans.clear();
+        unix.spans.clear();
+        assert_eq!(windows, unix);
+    }
+
+    #[test]
+    fn records_are_looked_for_beside_the_spec() {
+        let folder = folder_with_records();
+        for (record, code) in [
+            ("records/none.csv", codes::RECORD_UNREADABLE),
+            ("records", codes::RECORD_UNREADABLE),
+            ("records/leg1.csv\\u0000", codes::RECORD_UNREADABLE),
+            ("", codes::RECORD_PATH),
+            ("/etc/hosts", codes::RECORD_PATH),
+            ("C:/leg.csv", codes::RECORD_PATH),
+            ("records\\\\leg1.csv", codes::RECORD_PATH),
+        ] {
+            let text = every_key().replace("records/reference-forc.csv", record);
+            let (_, findings) = spec::load(&source(&text, "spec.toml", &folder));
+            let errors = errors(&findings);
+            assert_eq!(errors.len(), 1, "{record}: {findings:#?}");
+            assert_eq!(
+                (errors[0].code, errors[0].key.as_str()),
+                (code, "hysteresis.records[0]")
+            );
+        }
+    }
+}

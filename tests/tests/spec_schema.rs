@@ -1,0 +1,105 @@
+//! The published JSON Schema and the generated documents against the key table and the specs.
+
+mod support {
+    #![allow(dead_code)] // shared with other tests, which use other parts
+    pub mod specs;
+}
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::{Value, json};
+use specgen::{diagnostic, spec};
+use support::specs::{every_key, root, spec_files};
+
+fn validator() -> jsonschema::Validator {
+    let schema: Value = serde_json::from_str(&spec::json_schema()).expect("the schema is JSON");
+    jsonschema::draft7::new(&schema).expect("the schema is a draft-07 schema")
+}
+
+fn as_json(text: &str) -> Value {
+    toml::from_str(text).expect("TOML")
+}
+
+#[test]
+fn every_spec_of_the_repository_is_valid() {
+    let validator = validator();
+    for path in spec_files() {
+        let value = as_json(&fs::read_to_string(&path).expect("readable"));
+        let problems: Vec<String> = validator
+            .iter_errors(&value)
+            .map(|e| format!("{}: {e}", e.instance_path()))
+            .collect();
+        assert!(problems.is_empty(), "{}: {problems:?}", path.display());
+    }
+}
+
+/// What an editor should mark.
+#[test]
+fn bad_specs_are_invalid() {
+    let validator = validator();
+    let good = as_json(&every_key());
+    assert!(validator.is_valid(&good));
+    let changes: [(&str, Value); 11] = [
+        ("/name", json!("two words")),
+        ("/schema", json!(2)),
+        ("/geometry/height", json!(180)),
+        ("/geometry/height", json!("tall")),
+        ("/geometry/height", json!("1,5 mm")),
+        ("/geometry/heigth", json!("180 mm")),
+        ("/dac/bits", json!(4)),
+        ("/dac/range", json!(["0 V"])),
+        ("/adaptation/mode", json!("pid")),
+        ("/adaptation/level_bandwidth", json!("450 rad/s")),
+        ("/hysteresis/records", json!(["a.csv", "b.csv"])),
+    ];
+    for (pointer, value) in changes {
+        let mut bad = good.clone();
+        let (parent, name) = pointer.rsplit_once('/').expect("a pointer");
+        bad.pointer_mut(parent)
+            .and_then(Value::as_object_mut)
+            .expect("a table")
+            .insert(name.to_owned(), value.clone());
+        assert!(!validator.is_valid(&bad), "{pointer} = {value}");
+    }
+    for pointer in ["/geometry/height", "/timing", "/gains/integral"] {
+        let mut bad = good.clone();
+        let (parent, name) = pointer.rsplit_once('/').expect("a pointer");
+        bad.pointer_mut(parent)
+            .and_then(Value::as_object_mut)
+            .expect("a table")
+            .remove(name)
+            .expect("was there");
+        assert!(!validator.is_valid(&bad), "{pointer} missing");
+    }
+}
+
+/// With SPECGEN_BLESS=1 in the environment the file is written instead.
+fn assert_fresh(path: &Path, text: &str) {
+    if std::env::var_os("SPECGEN_BLESS").is_some() {
+        fs::write(path, text).expect("written");
+        return;
+    }
+    let committed = fs::read_to_string(path).unwrap_or_default();
+    assert!(
+        committed == text,
+        "{} is stale: run SPECGEN_BLESS=1 cargo test -p specgen-tests --test spec_schema",
+        path.display()
+    );
+}
+
+#[test]
+fn generated_documents_are_fresh() {
+    assert_fresh(
+        &root().join("specs/platform.schema.json"),
+        &spec::json_schema(),
+    );
+    assert_fresh(
+        &root().join("docs/spec-reference.md"),
+        &spec::reference_markdown(),
+    );
+    assert_fresh(
+        &root().join("docs/diagnostics.md"),
+        &diagnostic::reference_markdown(),
+    );
+}
