@@ -15,6 +15,7 @@ pub mod emulator;
 pub mod error;
 pub mod host;
 pub mod image;
+mod panics;
 mod process;
 pub mod provision;
 pub mod replay;

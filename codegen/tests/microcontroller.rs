@@ -215,14 +215,25 @@ fn constants_of_the_controller_count_as_flash() {
 #[test]
 fn a_panic_path_is_refused_in_our_words_on_both_machines() {
     let Some(tools) = tools() else { return };
-    let items = "static TABLE: [f64; 3] = [1.0, 2.0, 3.0];";
-    let workspace = Workspace::new(&tools, items, "TABLE[input.setpoint[0] as usize]");
+    let items = "static TABLE: [f64; 3] = [1.0, 2.0, 3.0];
+fn lookup(x: f64) -> f64 {
+    /* the line that the test looks for */ TABLE[x as usize]
+}";
+    let workspace = Workspace::new(&tools, items, "lookup(input.setpoint[0])");
     let error = build_image(workspace.dir(), Mcu::Mps2An500, &target_dir()).unwrap_err();
     assert!(matches!(error, TargetError::PanicPath { .. }), "{error}");
+    let message = error.to_string();
+    assert!(message.contains("index without a bound"), "{message}");
+    let source = std::fs::read_to_string(workspace.dir().join("controller/src/lib.rs")).unwrap();
+    let line = 1 + source
+        .lines()
+        .position(|line| line.contains("the test looks for"))
+        .unwrap();
     assert!(
-        error.to_string().contains("index without a bound"),
-        "{error}"
+        message.contains(&format!("controller/src/lib.rs:{line}, inlined at ")),
+        "{message}"
     );
+    println!("{message}");
     assert!(!error.is_environment());
     let error = target::host::build_library(workspace.dir(), &target_dir()).unwrap_err();
     assert!(matches!(error, TargetError::PanicPath { .. }), "{error}");

@@ -1,6 +1,7 @@
 //! Builds DIR/qemu of an emitted workspace into an image.
 
 use super::error::TargetError;
+use super::panics;
 use super::process::{self, Finished};
 use super::toolchain::{self, Toolchain};
 use crate::model::Mcu;
@@ -49,15 +50,29 @@ pub fn build_image_with(
     let what = format!("{} for {}", package.display(), mcu.machine());
     // A folder per part: they differ in flags only, and cargo would build everything again at each change.
     let target_dir = target_dir.join(mcu.machine());
-    let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
     let request = BuildRequest {
         package: &package,
         target_dir: &target_dir,
         rustc_args: &[],
         locked: true,
     };
-    let executable = cargo_artifact(&mut command, &request, &what, |message| {
-        message["executable"].as_str().map(PathBuf::from)
+    let link = |command: &mut Command| {
+        cargo_artifact(command, &request, &what, |message| {
+            message["executable"].as_str().map(PathBuf::from)
+        })
+    };
+    let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
+    let executable = link(&mut command).map_err(|error| match error {
+        TargetError::PanicPath { what, text } => {
+            // Once more without the proof, to see where the panic paths are.
+            let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
+            let traced = link(command.env("SPECGEN_LOCATE_PANICS", "1"));
+            let sites = traced.and_then(|image| panics::sites(&image.bytes));
+            // The first error stands whether or not the search for its cause succeeds.
+            let text = sites.map_or(text, |sites| sites.join("\n"));
+            TargetError::PanicPath { what, text }
+        }
+        other => other,
     })?;
     Ok(Image {
         mcu,
@@ -177,18 +192,10 @@ fn failure(what: &str, finished: &Finished) -> TargetError {
             text,
         };
     }
-    if finished.stderr.contains("specgen_panic_path_remains") {
-        let text = finished
-            .stderr
-            .lines()
-            .map(str::trim)
-            .filter(|line| {
-                line.contains("specgen_panic_path_remains") || line.starts_with(">>> referenced by")
-            })
-            .filter(|line| !line.contains("\"-o\""))
-            .take(6)
-            .collect::<Vec<_>>()
-            .join("\n");
+    let is_proof =
+        |line: &&str| line.contains("undefined") && line.contains("specgen_panic_path_remains");
+    if let Some(line) = finished.stderr.lines().find(is_proof) {
+        let text = line.trim().to_owned();
         return TargetError::PanicPath {
             what: what.to_owned(),
             text,

@@ -21,8 +21,8 @@ pub struct Function {
     pub from_compiler: bool,
     /// The frame from its instructions alone.
     pub pushed: Option<u64>,
-    /// Addresses of the functions that it calls or ends in.
-    pub calls: BTreeSet<u64>,
+    /// Addresses of the functions that it calls or ends in, each with the addresses where it does.
+    pub calls: BTreeMap<u64, Vec<u64>>,
     /// Addresses of calls and jumps through a register.
     pub indirect: Vec<u64>,
     /// Branch targets outside of it that are no function's start.
@@ -92,7 +92,7 @@ impl CallGraph {
                 frame: frames.get(&address).copied().or(pushed),
                 from_compiler: frames.contains_key(&address),
                 pushed,
-                calls: BTreeSet::new(),
+                calls: BTreeMap::new(),
                 indirect: Vec::new(),
                 strays: Vec::new(),
             };
@@ -120,7 +120,7 @@ impl Function {
             // A jump within the function, its own start included, is a loop.
             Branch::Jump(target) if own.contains(&target) => {}
             Branch::Call(target) | Branch::Jump(target) if names.contains_key(&target) => {
-                self.calls.insert(target);
+                self.calls.entry(target).or_default().push(place);
             }
             Branch::Call(target) | Branch::Jump(target) => self.strays.push(target),
         }

@@ -27,7 +27,7 @@ pub enum TargetError {
     PanicPath {
         /// What was being built.
         what: String,
-        /// The useful part of what the linker printed.
+        /// The places, one a line, where they could be found; else what the linker printed.
         text: String,
     },
     /// The emulator ended without a result.

@@ -141,7 +141,7 @@ impl Walk<'_> {
         };
         self.open.push(address);
         let mut below = (0, None);
-        for &callee in &function.calls {
+        for &callee in function.calls.keys() {
             let bytes = self.visit(callee);
             // A callee that needs nothing still belongs on the path, but not one that is still open.
             let closed = self.deepest.contains_key(&callee);
