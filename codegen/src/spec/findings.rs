@@ -98,8 +98,8 @@ impl Findings {
                 .sort_by_key(|d| (std::cmp::Reverse(d.severity), start(d)));
             self.list.truncate(MAX_FINDINGS);
         }
-        self.list
-            .sort_by(|a, b| (start(a), &a.key, a.code).cmp(&(start(b), &b.key, b.code)));
+        // Stable: at one place the order of the key table remains.
+        self.list.sort_by_key(start);
         if total > self.list.len() {
             let shown = self.list.len();
             self.push(

@@ -160,7 +160,7 @@ pub(super) fn bad_quantity(
         Problem::NotFinite => (codes::NOT_FINITE, format!("{is}, which is not a finite number"), such_as),
         Problem::Overflow => (codes::NOT_FINITE, format!("{is}: too large for a double"), such_as),
         Problem::Underflow => {
-            (codes::NOT_FINITE, format!("{is}: too small for a double, yet not zero"), format!("write 0 or {such_as}"))
+            (codes::NOT_FINITE, format!("{is}: too small for a double, yet not zero"), format!("write 0, or a value that a double can hold, such as {example}"))
         }
     }
 }

@@ -133,6 +133,7 @@ impl Reader<'_> {
         };
         let help = match (meant, elsewhere(section, written)) {
             (Some(meant), _) => format!("did you mean `{meant}`?"),
+            (None, Some(path)) if is_table => format!("did you mean `{path}`?"),
             (None, Some(path)) => format!("`{path}` exists: did it slip out of its section?"),
             (None, None) => format!("take it out; {}", known_names(section, is_table)),
         };
@@ -169,7 +170,7 @@ impl Reader<'_> {
             ),
             format!(
                 "write it as a section of its own:\n{}",
-                section.example(true)
+                section.example(true).trim_end()
             ),
         );
     }
@@ -257,7 +258,11 @@ impl Reader<'_> {
                     section.name,
                     end..end,
                     format!("section [{}] is missing", section.name),
-                    format!("{} Write:\n{}", section.doc, section.example(true)),
+                    format!(
+                        "{} Write:\n{}",
+                        section.doc,
+                        section.example(true).trim_end()
+                    ),
                 );
             } else if !section.optional {
                 // The place of its defaults is the start of the file.

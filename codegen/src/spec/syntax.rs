@@ -9,7 +9,7 @@ use toml::de::DeTable;
 
 use super::findings::{Findings, MAX_FINDINGS};
 use super::text;
-use crate::diagnostic::codes;
+use crate::diagnostic::{Place, codes};
 
 /// A parsed file.
 pub(super) struct Parsed<'a> {
@@ -43,17 +43,12 @@ fn report(source: &str, span: Range<usize>, message: &str, findings: &mut Findin
         return true;
     }
     if message.starts_with("string values must be quoted") && !found.trim().is_empty() {
-        findings.error(
-            codes::UNQUOTED,
-            "",
-            span.clone(),
-            format!("{} is a text without quotes", text::quote(found)),
-            format!(
-                "texts and quantities stand in quotes: write \"{}\"",
-                text::shorten(found.trim())
-            ),
-        );
+        unquoted(source, span, findings);
         return true;
+    }
+    if let Some(word) = bare_word(source, &span, message) {
+        unquoted(source, word, findings);
+        return false;
     }
     let missing_value = message.starts_with("string values must be quoted");
     findings.error(
@@ -73,6 +68,58 @@ fn report(source: &str, span: Range<usize>, message: &str, findings: &mut Findin
     );
     false
 }
+
+/// Reports a text without quotes, once for each place.
+fn unquoted(source: &str, span: Range<usize>, findings: &mut Findings) {
+    let place = Place::Spec(span.clone());
+    if findings.all().iter().any(|d| d.place == place) {
+        return;
+    }
+    let found = &source[span.clone()];
+    findings.error(
+        codes::UNQUOTED,
+        "",
+        span,
+        format!("{} is a text without quotes", text::quote(found)),
+        format!(
+            "texts and quantities stand in quotes: write \"{}\"",
+            text::shorten(found.trim())
+        ),
+    );
+}
+
+/// The text without quotes that the parser took for a bad number or truth value: `150mm`, `f32`, `invhys`.
+fn bare_word(source: &str, span: &Range<usize>, message: &str) -> Option<Range<usize>> {
+    if !SCALAR_PHRASES
+        .iter()
+        .any(|phrase| message.starts_with(phrase))
+    {
+        return None;
+    }
+    let delimiter = |c: char| {
+        matches!(
+            c,
+            '=' | ',' | '[' | ']' | '{' | '}' | '#' | '"' | '\'' | '\n' | '\r'
+        )
+    };
+    let start = source[..span.start].rfind(delimiter).map_or(0, |i| i + 1);
+    let end = source[span.start..]
+        .find(delimiter)
+        .map_or(source.len(), |i| span.start + i);
+    let word = source[start..end].trim();
+    let start = start + source[start..end].find(word)?;
+    word.contains(|c: char| c.is_alphabetic())
+        .then_some(start..start + word.len())
+}
+
+/// How the parser speaks of a value that is no number, date or truth value.
+const SCALAR_PHRASES: &[&str] = &[
+    "invalid boolean",
+    "invalid float",
+    "invalid integer",
+    "invalid date-time",
+    "unexpected leading zero",
+];
 
 fn help_for(message: &str) -> &'static str {
     if message.contains("unclosed array")
@@ -115,16 +162,13 @@ fn duplicate(source: &str, span: Range<usize>, findings: &mut Findings) {
             first_line(source, from, &span, |line| key_name(line) == Some(name)),
         )
     };
-    let before = first.map_or_else(|| "before".to_owned(), |line| format!("on line {line}"));
+    let before = first.map_or_else(String::new, |line| format!(", first on line {line}"));
     let what = if is_header { "section" } else { "key" };
     findings.error(
         codes::DUPLICATE,
         &text::shorten(&key),
         span.clone(),
-        format!(
-            "{what} {} is given twice, first {before}",
-            text::quote(name)
-        ),
+        format!("{what} {} is given twice{before}", text::quote(name)),
         format!("keep one of the two: which {what} counts would be a guess"),
     );
 }
@@ -217,6 +261,33 @@ mod tests {
             2,
             "{found:?}"
         );
+    }
+
+    #[test]
+    fn words_that_look_like_numbers_are_texts_without_quotes() {
+        for word in [
+            "f32",
+            "invhys",
+            "true_north",
+            "nm",
+            "150mm",
+            "1.195kg",
+            "40V/ms",
+            "0.6mrad",
+            "-2um",
+            "60 µm",
+            "0x mm",
+        ] {
+            let mut findings = Findings::default();
+            parse(&format!("a = {word} # comment\n"), &mut findings);
+            let messages: Vec<_> = findings
+                .all()
+                .iter()
+                .map(|d| (d.code, d.message.clone()))
+                .collect();
+            let expected = format!("`{word}` is a text without quotes");
+            assert_eq!(messages, [(codes::UNQUOTED, expected)], "{word}");
+        }
     }
 
     #[test]

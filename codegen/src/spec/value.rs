@@ -81,9 +81,10 @@ impl ValueReader<'_> {
                 self.path,
                 text::clamp(self.source, value.span()),
                 format!(
-                    "`{}` has {} values, expected {}",
+                    "`{}` has {} value{}, expected {}",
                     self.path,
                     array.len(),
+                    if array.len() == 1 { "" } else { "s" },
                     items.len()
                 ),
                 format!(

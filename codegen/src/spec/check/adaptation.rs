@@ -86,9 +86,10 @@ pub(super) fn bandwidths_fit_period(f: &Fields, findings: &mut Findings) -> Opti
                 &path,
                 f.span(&path),
                 format!(
-                    "{} rad/s over a run of {} s ({run} ticks) is a weight of {}, expected at most 1",
+                    "{} rad/s over a run of {} s ({run} tick{}) is a weight of {}, expected at most 1",
                     number(bandwidth),
                     number(interval),
+                    if run == 1 { "" } else { "s" },
                     number(bandwidth * interval)
                 ),
                 format!("at most \"{} rad/s\" would do; or shorten `timing.period` or `adaptation.run_interval`", rounded_down(1.0 / interval)),

@@ -58,6 +58,9 @@ fn legs_at_rest(geometry: &Geometry) -> Legs {
     legs
 }
 
+/// Radii of gyration that a platform usually has, in radii of its joint circle.
+const SOUND: std::ops::RangeInclusive<f64> = 0.1..=3.0;
+
 fn shortest_leg(f: &Fields) -> Option<f64> {
     let legs = legs_at_rest(&build::geometry(f)?);
     Some(
@@ -158,7 +161,7 @@ pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<(
         .into_iter()
         .fold(0.0, |a, b| if b > a { b } else { a });
     let ratio = largest / size;
-    if (0.1..=3.0).contains(&ratio) {
+    if SOUND.contains(&ratio) {
         return Some(());
     }
     let message = format!(
@@ -166,15 +169,15 @@ pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<(
         number(largest),
         number(size)
     );
-    // The mass that a disc of this inertia and size would have shows which unit slipped.
-    let fitting = moments
+    // A slip between g and kg is the usual one: say so if the mass would then fit.
+    let slip = [1e3, 1e-3]
         .into_iter()
-        .fold(0.0, |a, b| if b > a { b } else { a })
-        / (size * size);
+        .find(|factor: &f64| SOUND.contains(&(ratio / factor.sqrt())));
+    let did_you_mean = slip.map_or_else(String::new, |factor| {
+        format!("did you mean \"{} kg\"? ", number(mass * factor))
+    });
     let help = format!(
-        "check the units of `platform.mass` (now {} kg; a mass near {} kg would fit) and `platform.inertia`",
-        number(mass),
-        number(fitting)
+        "{did_you_mean}check the units of `platform.mass` (kg or g) and `platform.inertia` (mm^2 or m^2)"
     );
     let (path, span) = ("platform.mass", f.span("platform.mass"));
     if (0.02..=10.0).contains(&ratio) {
