@@ -15,6 +15,9 @@ use crate::trajectory::LegTrajectory;
 /// Legs of a platform.
 pub const LEGS: usize = 6;
 
+/// Longest control interval, s.
+const LONGEST_INTERVAL: f64 = 60.0;
+
 /// One leg with what surrounds it.
 #[derive(Debug, Clone)]
 struct Channel<P> {
@@ -107,7 +110,7 @@ impl fmt::Display for RunError {
             Self::Timing { interval, duration } => {
                 write!(
                     f,
-                    "a control interval of {interval} s in a trajectory of {duration} s; expected 1 to 100,000,000 ticks"
+                    "a control interval of {interval} s in a trajectory of {duration} s; expected 1 to 100,000,000 ticks of at most {LONGEST_INTERVAL} s"
                 )
             }
         }
@@ -176,7 +179,7 @@ impl<P: Plant> Rig<P> {
         let duration = trajectory.duration();
         // The slack keeps the last tick when the ratio is whole but for rounding.
         let ticks = libm::floor(duration / interval + 1e-6);
-        if !(interval > 0.0 && (1.0..=1e8).contains(&ticks)) {
+        if !(interval > 0.0 && interval <= LONGEST_INTERVAL && (1.0..=1e8).contains(&ticks)) {
             return Err(RunError::Timing { interval, duration });
         }
         let ticks = ticks as usize;

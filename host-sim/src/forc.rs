@@ -48,10 +48,11 @@ impl ReversalExperiment {
     /// The reference figures come from a leg as built: a saturating pre-cycle before the curves leaves creep in them and
     /// raises the Invhys error at 0.1 Hz from 127 to 138 nm.
     pub fn run<P: Plant>(&self, leg: &mut P, gauge: &mut Gauge) -> ReversalRecord {
-        let interval = self.drive_max / f64::from(self.intervals);
         let rows = self.rows_per_interval.max(1);
-        let row_drive = interval / f64::from(rows);
-        let row_time = row_drive / self.rate;
+        let levels = f64::from(self.intervals) * f64::from(rows);
+        // One division, so that a grid node has the same bits whatever the rows between.
+        let drive_at = |level: u32| f64::from(level) * self.drive_max / levels;
+        let row_time = self.drive_max / levels / self.rate;
         let updates = steps_within(row_time, self.update);
         let update = row_time / f64::from(updates);
 
@@ -65,12 +66,11 @@ impl ReversalExperiment {
         let mut elapsed = 0_u32;
         for curve in 1..=self.intervals {
             let peak = curve * rows;
-            // Drives in units of `row_drive`, so that going up and down meets the same values to the bit.
             let path = (1..=peak)
                 .map(|level| (level - 1, level))
                 .chain((0..peak).rev().map(|level| (level + 1, level)));
             for (from, to) in path {
-                let (start, end) = (f64::from(from) * row_drive, f64::from(to) * row_drive);
+                let (start, end) = (drive_at(from), drive_at(to));
                 let displacement = leg.ramp(start, end, row_time, update);
                 elapsed += 1;
                 record.rows.push(ReversalRow {
@@ -157,8 +157,10 @@ mod tests {
 
     #[test]
     fn peaks_and_nodes_are_rows_exactly_and_rise_and_fall_meet_them() {
+        // Three rows per interval: a third of 3.125 V is not a binary fraction.
         let fast = ReversalExperiment {
             rate: 2000.0,
+            rows_per_interval: 3,
             ..ReversalExperiment::reference(32)
         };
         let record = record(&fast, &NoiseParameters::NONE);

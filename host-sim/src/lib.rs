@@ -15,13 +15,13 @@ pub mod controller;
 pub mod description;
 pub mod forc;
 pub mod noise;
+#[cfg(any(test, feature = "oracle"))]
+pub mod oracle;
 pub mod plant;
+pub mod replay;
 pub mod scenario;
 pub mod stimulus;
 pub mod table;
 pub mod trace;
 pub mod trajectory;
 pub mod word;
-
-#[cfg(test)]
-mod oracle;

@@ -1,17 +1,18 @@
-//! A small controller in plain f64, written apart from the emitted one: it checks the plant, and stays as its oracle.
+//! A small controller in plain f64, written apart from the emitted one: an oracle for it and for the plant's figures.
+//! For tests (feature `oracle`); slow, with a memory without bounds.
 //!
 //! Everett table read off the record's nodes; forward model from the list of all extrema that are not wiped out;
 //! inverse by bisection on that forward model; run-to-run adaptation (AII.3), (AII.5), (AII.6) in the filter form.
 
 use crate::closed_loop::LEGS;
 use crate::controller::{ControllerError, TickController};
-use crate::description::{Description, tests::six_legs};
+use crate::description::Description;
 use crate::forc::ReversalRecord;
 use crate::word::Scalar;
 
 /// E(u_i, u_j) in m on the nodes u_k = k·interval.
-#[derive(Debug, Clone)]
-pub(crate) struct Table {
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
     intervals: usize,
     interval: f64,
     nodes: Vec<Vec<f64>>,
@@ -19,7 +20,8 @@ pub(crate) struct Table {
 
 impl Table {
     /// From a record whose rows meet every node: peak minus the falling branch.
-    pub(crate) fn from_record(record: &ReversalRecord, intervals: usize, drive_max: f64) -> Self {
+    #[must_use]
+    pub fn from_record(record: &ReversalRecord, intervals: usize, drive_max: f64) -> Self {
         let interval = drive_max / intervals as f64;
         let mut nodes = vec![vec![0.0; intervals + 1]; intervals + 1];
         let mut peak: Option<(usize, f64)> = None;
@@ -43,7 +45,9 @@ impl Table {
         }
     }
 
-    pub(crate) fn everett(&self, up: f64, down: f64) -> f64 {
+    /// E(up, down) in m for 0 ≤ `down` ≤ `up` ≤ full drive (V): bilinear in the squares, linear in the diagonal triangles.
+    #[must_use]
+    pub fn everett(&self, up: f64, down: f64) -> f64 {
         let cell = |x: f64| ((x / self.interval) as usize).min(self.intervals - 1);
         let (i, j) = (cell(up), cell(down));
         let (s, t) = (
@@ -114,7 +118,7 @@ struct Leg {
 }
 
 /// See the module.
-pub(crate) struct Oracle {
+pub struct Oracle {
     table: Table,
     drive_max: f64,
     /// DAC step in V; 0 for none.
@@ -128,7 +132,9 @@ const LEVEL_WEIGHT: f64 = 0.252;
 const DRIFT_WEIGHT: f64 = 0.011;
 
 impl Oracle {
-    pub(crate) fn new(table: Table, drive_max: f64, lsb: f64) -> Self {
+    /// Six legs with one table; `drive_max` in V; `lsb` is the DAC's step in V, 0 for a continuous drive.
+    #[must_use]
+    pub fn new(table: Table, drive_max: f64, lsb: f64) -> Self {
         let rest = Leg {
             memory: Memory(vec![0.0]),
             requested: 0.0,
@@ -142,8 +148,35 @@ impl Oracle {
             lsb,
             mode: 0,
             legs,
-            description: six_legs(Scalar::F64),
+            description: description(),
         }
+    }
+}
+
+/// The emitted controller's interface, as far as it goes here.
+fn description() -> Description {
+    let six = |stem: &str| {
+        (0..LEGS)
+            .map(move |leg| format!("{stem}[{leg}]"))
+            .collect::<Vec<_>>()
+    };
+    Description {
+        name: "oracle".to_owned(),
+        digest: "0".to_owned(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        scalar: Scalar::F64,
+        config_names: ["mode", "level_weight", "drift_weight"]
+            .map(str::to_owned)
+            .to_vec(),
+        input_names: [six("setpoint"), six("displacement")].concat(),
+        output_names: [
+            six("voltage"),
+            six("requested"),
+            six("demand"),
+            six("level"),
+            six("drift"),
+        ]
+        .concat(),
     }
 }
 
@@ -207,5 +240,83 @@ impl TickController for Oracle {
         self.legs.iter().fold(0, |digest: u64, leg| {
             digest.rotate_left(7) ^ leg.requested.to_bits() ^ leg.level.to_bits()
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+
+    use super::*;
+    use crate::forc::ReversalExperiment;
+    use crate::noise::Gauge;
+    use crate::plant::{LegParameters, LegPlant, NoiseParameters};
+
+    const N: usize = 8;
+
+    fn table() -> Table {
+        let experiment = ReversalExperiment {
+            rate: 2000.0,
+            rows_per_interval: 3,
+            ..ReversalExperiment::reference(8)
+        };
+        let mut leg = LegPlant::new(&LegParameters::reference());
+        let record = experiment.run(&mut leg, &mut Gauge::new(&NoiseParameters::NONE, 0, 0));
+        Table::from_record(&record, N, 100.0)
+    }
+
+    #[test]
+    fn the_memory_agrees_with_a_sum_over_relays() {
+        // One relay per cell of the Preisach plane, driven on the nodes, where a cell is wholly up or down.
+        let table = table();
+        let node = |up: usize, down: usize| table.nodes[up][down];
+        let mut relays = [[false; N]; N];
+        let mut memory = Memory(vec![0.0]);
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let mut deepest = 0;
+        for _ in 0..20_000 {
+            let level = (rng.next_u64() % (N as u64 + 1)) as usize;
+            memory = memory.moved_to(level as f64 * table.interval);
+            let mut sum = 0.0;
+            for (up, row) in relays.iter_mut().enumerate() {
+                for (down, relay) in row.iter_mut().enumerate().take(up + 1) {
+                    // Relay of thresholds between nodes up, up + 1 and down, down + 1.
+                    if level > up {
+                        *relay = true;
+                    } else if level <= down {
+                        *relay = false;
+                    }
+                    let weight = node(up + 1, down)
+                        - node(up, down)
+                        - if down < up {
+                            node(up + 1, down + 1) - node(up, down + 1)
+                        } else {
+                            0.0
+                        };
+                    if *relay {
+                        sum += weight;
+                    }
+                }
+            }
+            let found = memory.displacement(&table);
+            assert!((found - sum).abs() < 1e-18, "{:?}: {found} {sum}", memory.0);
+            deepest = deepest.max(memory.0.len());
+        }
+        assert!(deepest >= 6, "{deepest}");
+    }
+
+    #[test]
+    fn what_is_requested_is_what_was_demanded_within_the_range() {
+        let mut oracle = Oracle::new(table(), 100.0, 0.0);
+        let mut output = vec![0; 30];
+        for k in 0..500 {
+            let demand = 30e-6 + 25e-6 * libm::sin(0.37 * f64::from(k));
+            let input: Vec<u64> = [[demand.to_bits(); 6], [0; 6]].concat();
+            oracle.step(&input, &mut output);
+            assert!((f64::from_bits(output[6]) - demand).abs() < 1e-18);
+        }
+        oracle.step(&[[1.0_f64.to_bits(); 6], [0; 6]].concat(), &mut output);
+        assert!((f64::from_bits(output[0]) - 100.0).abs() < 1e-12);
     }
 }

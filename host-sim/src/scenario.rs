@@ -26,7 +26,7 @@ pub struct LegScenario {
 }
 
 impl LegScenario {
-    /// Six legs, pre-cycled, settled and zeroed as their parameters say.
+    /// Six legs, pre-cycled, settled and zeroed as the parameters of the first leg say.
     ///
     /// `noise` replaces the noise in the parameters of all legs (`NoiseParameters::NONE` for none);
     /// `samples_per_period` is N_s (≥ 1): the control interval is 1/(N_s f).

@@ -172,7 +172,7 @@ impl LegParameters {
             }
         };
         use Bound::{Above, AtLeast, AtMost, Below};
-        expect("u_max", self.u_max, Above(0.0), AtMost(10_000.0));
+        expect("u_max", self.u_max, Above(0.0), AtMost(1000.0));
         expect(
             "gain_um_per_V",
             self.gain_um_per_v,
@@ -186,14 +186,14 @@ impl LegParameters {
         expect("tau_amp_s", self.tau_amp_s, AtLeast(0.0), AtMost(10.0));
         expect("fn_hz", self.fn_hz, Above(0.0), AtMost(1e6));
         expect("zeta", self.zeta, AtLeast(0.0), Below(1.0));
-        expect("settle_s", self.settle_s, AtLeast(0.0), AtMost(3600.0));
+        expect("settle_s", self.settle_s, AtLeast(0.0), AtMost(600.0));
         expect(
             "forc_rate_V_per_s",
             self.forc_rate_v_per_s,
-            Above(0.0),
+            AtLeast(1.0),
             AtMost(1e6),
         );
-        expect("step_s", self.step_s, AtLeast(1e-8), AtMost(1e-3));
+        expect("step_s", self.step_s, AtLeast(1e-6), AtMost(1e-3));
         expect(
             "noise.sensor_nm_rms",
             self.noise.sensor_nm_rms,
@@ -348,7 +348,7 @@ mod tests {
     fn findings_name_file_field_value_and_expectation() {
         assert_eq!(
             refused("\"u_max\": 100.0", "\"u_max\": -5"),
-            "leg.json: not a usable leg plant\n  `u_max` is -5; expected a number > 0 and <= 10000"
+            "leg.json: not a usable leg plant\n  `u_max` is -5; expected a number > 0 and <= 1000"
         );
         assert!(refused("45.0\n", "-45.0\n").contains("`play_thresholds_V[23]` is -45"));
         assert!(
