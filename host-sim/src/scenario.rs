@@ -109,7 +109,10 @@ impl LegScenario {
 }
 
 /// The spec's configuration with another mode, and leg displacements as set-points.
-fn select(controller: &mut dyn TickController, mode: u32) -> Result<(), ControllerError> {
+///
+/// # Errors
+/// If the controller has no such word or refuses the mode.
+pub fn select(controller: &mut dyn TickController, mode: u32) -> Result<(), ControllerError> {
     let mut words = controller.default_config();
     let description = controller.description();
     description.set_config(&mut words, "mode", f64::from(mode))?;
