@@ -62,7 +62,7 @@ mod tests {
     fn trace(constant: u64) -> Trace {
         let setpoints = Setpoints::Leg {
             stroke: 6e-5,
-            nodes: vec![3e-5],
+            everett: vec![vec![0.0], vec![6e-5, 0.0]],
         };
         let description = six_legs(Scalar::F64);
         let recording = record(&description, &setpoints, 2000, 5).unwrap();

@@ -18,8 +18,9 @@ pub enum Setpoints {
     Leg {
         /// Displacement at full drive E(u_max, 0), m.
         stroke: f64,
-        /// E(u_k, 0) of the grid's thresholds, m, rising: a demand for one of them from rest reverses exactly on it.
-        nodes: Vec<f64>,
+        /// E(u_i, u_j) in m on the grid's thresholds: row i = 0..=N, in each the columns j = 0..=i. A demand made up of
+        /// them reverses on thresholds, in loops within loops. Empty for a controller without a table.
+        everett: Vec<Vec<f64>>,
     },
     /// A pose from rest.
     Pose {
@@ -135,8 +136,8 @@ struct Generator<'a> {
     phase: [f64; LEGS],
     speed: [f64; LEGS],
     last: [f64; LEGS],
-    /// Alternates reversals between a node and the bottom.
-    high: bool,
+    /// Drive of each leg on the grid.
+    walks: [Walk; LEGS],
 }
 
 impl<'a> Generator<'a> {
@@ -156,7 +157,7 @@ impl<'a> Generator<'a> {
             phase: [0.0; LEGS],
             speed: [0.0; LEGS],
             last: center,
-            high: false,
+            walks: std::array::from_fn(|_| Walk::default()),
         }
     }
 
@@ -177,11 +178,13 @@ impl<'a> Generator<'a> {
                     core::f64::consts::TAU / libm::exp(2.3 + 4.6 * unit(&mut self.rng));
             }
         }
+        if kind == Kind::Thresholds {
+            self.walks = std::array::from_fn(|_| Walk::default());
+        }
     }
 
     fn row(&mut self, kind: Kind) -> ([f64; LEGS], [f64; LEGS]) {
         let before = self.last;
-        self.high = !self.high;
         for leg in 0..LEGS {
             self.last[leg] = match kind {
                 Kind::Smooth => {
@@ -205,24 +208,21 @@ impl<'a> Generator<'a> {
         (self.last, reading)
     }
 
-    /// Alternately a node and the bottom of the range: with readings as demanded and no adaptation, each reverses on it.
+    /// The next reversal on the grid: with readings as demanded and no adaptation, the drive turns on a threshold.
+    /// The first demand of a stretch is 0, which wipes out what was before.
     fn threshold(&mut self, leg: usize) -> f64 {
-        let count = match self.setpoints {
-            Setpoints::Leg { nodes, .. } => nodes.len() as u64,
+        let grid = match self.setpoints {
+            Setpoints::Leg { everett, .. } => everett.len().saturating_sub(1),
             Setpoints::Pose { .. } => 0,
         };
-        if count == 0 {
-            // A pose meets no threshold exactly: its bounds and zero stand in.
-            return if self.high {
-                self.center[leg] + self.half[leg]
-            } else {
-                self.center[leg] - self.half[leg]
-            };
+        if grid == 0 {
+            // A pose meets no threshold exactly: its bounds and its centre stand in.
+            return self.center[leg] + self.half[leg] * (self.below(3) as f64 - 1.0);
         }
-        let pick = self.below(count) as usize;
+        let pick = self.below(grid as u64) as usize;
         match self.setpoints {
-            Setpoints::Leg { nodes, .. } if self.high => nodes[pick],
-            _ => 0.0,
+            Setpoints::Leg { everett, .. } => self.walks[leg].reverse(pick, everett),
+            Setpoints::Pose { .. } => 0.0,
         }
     }
 
@@ -234,6 +234,56 @@ impl<'a> Generator<'a> {
             return specials[pick];
         }
         scalar.encode(value)
+    }
+}
+
+/// Reversals of one leg's drive that are not wiped out, as grid levels: minimum 0, maximum, minimum, ...
+/// Empty before the first row of a stretch.
+#[derive(Debug, Clone, Default)]
+struct Walk {
+    extrema: Vec<usize>,
+}
+
+impl Walk {
+    /// Turns round and moves on by 1 + `pick` levels, or as far as the grid goes; returns the displacement there, m.
+    ///
+    /// Ending exactly on an earlier extremum happens often: there the smallest change decides whether it is wiped out.
+    fn reverse(&mut self, pick: usize, everett: &[Vec<f64>]) -> f64 {
+        let Some(&last) = self.extrema.last() else {
+            self.extrema.push(0);
+            return 0.0;
+        };
+        let rising = self.extrema.len() % 2 == 1;
+        let level = if rising {
+            (last + 1 + pick).min(everett.len() - 1)
+        } else {
+            last.saturating_sub(1 + pick)
+        };
+        while self.extrema.len() >= 3 {
+            let outer = self.extrema[self.extrema.len() - 2];
+            if (rising && level < outer) || (!rising && level > outer) {
+                break;
+            }
+            self.extrema.truncate(self.extrema.len() - 2);
+        }
+        if level == 0 {
+            self.extrema.clear();
+        }
+        self.extrema.push(level);
+        let between = |up: usize, down: usize| {
+            everett
+                .get(up)
+                .and_then(|row| row.get(down))
+                .copied()
+                .unwrap_or(0.0)
+        };
+        self.extrema.windows(2).fold(0.0, |sum, pair| {
+            if pair[1] > pair[0] {
+                sum + between(pair[1], pair[0])
+            } else {
+                sum - between(pair[0], pair[1])
+            }
+        })
     }
 }
 
@@ -278,10 +328,18 @@ mod tests {
     use super::*;
     use crate::description::tests::six_legs;
 
+    /// N = 32; E depends on d = i − j alone: d (32 + d)/2048 of 60 µm.
+    fn everett() -> Vec<Vec<f64>> {
+        let stroke = |levels: f64| levels * (32.0 + levels) * 60e-6 / 2048.0;
+        (0..=32)
+            .map(|up| (0..=up).map(|down| stroke(f64::from(up - down))).collect())
+            .collect()
+    }
+
     fn leg_setpoints() -> Setpoints {
         Setpoints::Leg {
             stroke: 60e-6,
-            nodes: (1..=32).map(|k| f64::from(k) * 1.875e-6).collect(),
+            everett: everett(),
         }
     }
 
@@ -333,24 +391,45 @@ mod tests {
     fn demands_leave_both_limits_and_reverse_on_every_node() {
         let setpoints = leg_setpoints();
         let recording = record(&six_legs(Scalar::F64), &setpoints, 100_000, 1).unwrap();
-        let Setpoints::Leg { stroke, nodes } = setpoints else {
+        let Setpoints::Leg { stroke, everett } = setpoints else {
             panic!()
         };
         let leg: Vec<f64> = recording.rows().map(|row| f64::from_bits(row[2])).collect();
-        let share = |test: &dyn Fn(f64) -> bool| leg.iter().filter(|q| test(**q)).count();
-        assert!(share(&|q| q > stroke && q < 1.0) > 1000);
-        assert!(share(&|q| q < 0.0 && q > -1.0) > 1000);
-        for node in nodes {
+        assert!(leg.iter().filter(|q| **q > stroke && **q < 1.0).count() > 1000);
+        assert!(leg.iter().filter(|q| **q < 0.0 && **q > -1.0).count() > 1000);
+        for (level, row) in everett.iter().enumerate().skip(1) {
+            // Up from rest onto the threshold, and down again.
+            let node = row[0];
             let reversals = leg
                 .windows(3)
-                .filter(|w| w[1].to_bits() == node.to_bits() && w[0] < node && w[2] < node);
-            assert!(reversals.count() > 10, "{node}");
+                .filter(|w| w[0] == 0.0 && w[1].to_bits() == node.to_bits() && w[2] < node);
+            assert!(reversals.count() > 5, "{level}");
         }
         // Most rows have no special number, so that a controller with a fault latch is seen to run.
         let finite = recording
             .rows()
             .filter(|row| row.iter().all(|word| f64::from_bits(*word).is_finite()));
         assert!(finite.count() > 85_000);
+    }
+
+    #[test]
+    fn a_walk_reverses_within_loops_and_wipes_them_out() {
+        let everett = everett();
+        let mut walk = Walk::default();
+        let mut go = |pick| {
+            let q = walk.reverse(pick, &everett);
+            (walk.extrema.clone(), q)
+        };
+        assert_eq!(go(9), (vec![0], 0.0));
+        assert_eq!(go(19), (vec![0, 20], everett[20][0]));
+        assert_eq!(go(9), (vec![0, 20, 10], everett[20][0] - everett[20][10]));
+        assert_eq!(go(4).0, [0, 20, 10, 15]);
+        // Exactly onto the earlier minimum: the inner loop closes.
+        assert_eq!(go(4).0, [0, 20, 10]);
+        // Onto the earlier maximum, and beyond the grid.
+        assert_eq!(go(9), (vec![0, 20], everett[20][0]));
+        assert_eq!(go(99).0, [0]);
+        assert_eq!(go(99).0, [0, 32]);
     }
 
     #[test]

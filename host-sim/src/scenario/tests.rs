@@ -1,6 +1,6 @@
 //! The figures of the feasibility study (`leg-feedforward.md` §2 and §5), with the oracle in the loop.
 //!
-//! The record is taken from the leg as built, without noise; the study's table is the comparison, in nm.
+//! The record is taken from the leg as built; the study's table is the comparison, in nm.
 
 use super::*;
 use crate::forc::ReversalExperiment;
@@ -9,14 +9,15 @@ use crate::oracle::{Oracle, Table};
 
 const DAC_LSB: f64 = 150.0 / 65535.0;
 
-fn oracle(parameters: &LegParameters, intervals: u32, lsb: f64) -> Oracle {
+/// `noise` is that of the gauge while the record is taken.
+fn oracle(parameters: &LegParameters, intervals: u32, lsb: f64, noise: &NoiseParameters) -> Oracle {
     let mut leg = LegPlant::new(parameters);
     let experiment = ReversalExperiment {
         rows_per_interval: 1,
         update: parameters.step_s,
         ..ReversalExperiment::reference(intervals)
     };
-    let record = experiment.run(&mut leg, &mut Gauge::new(&NoiseParameters::NONE, 0, 0));
+    let record = experiment.run(&mut leg, &mut Gauge::new(noise, 1, 0));
     Oracle::new(
         Table::from_record(&record, intervals as usize, 100.0),
         100.0,
@@ -46,7 +47,7 @@ fn report(title: &str, found: &[f64], expected: &[f64]) {
 fn noise_free_n16_figures_are_within_5_percent_of_the_study() {
     let study = [142.3, 230.0, 495.5, 9.00, 12.91, 21.81, 8.57, 10.96, 18.14];
     let parameters = LegParameters::reference();
-    let mut controller = oracle(&parameters, 16, 0.0);
+    let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);
     let table = scenario(&parameters, &NoiseParameters::NONE)
         .tracking(&mut controller, &TRACKING_FREQUENCIES)
         .unwrap();
@@ -64,7 +65,7 @@ fn noise_free_n16_figures_are_within_5_percent_of_the_study() {
 fn n32_figures_with_noise_meet_the_bounds_and_rank() {
     let study = [127.1, 232.2, 498.3, 6.0, 11.8, 20.4, 5.5, 9.4, 16.4];
     let parameters = LegParameters::reference();
-    let mut controller = oracle(&parameters, 32, DAC_LSB);
+    let mut controller = oracle(&parameters, 32, DAC_LSB, &parameters.noise);
     let table = scenario(&parameters, &parameters.noise)
         .tracking(&mut controller, &TRACKING_FREQUENCIES)
         .unwrap();
@@ -93,7 +94,7 @@ fn slopes_fall_with_frequency_as_table_1_says() {
     let paper = [1.0, 0.9844, 0.9797, 0.9774, 0.9735, 0.9704];
     let study = [1.0, 0.9804, 0.9734, 0.9719, 0.9672, 0.9640];
     let parameters = LegParameters::reference();
-    let mut controller = oracle(&parameters, 32, DAC_LSB);
+    let mut controller = oracle(&parameters, 32, DAC_LSB, &parameters.noise);
     let table = scenario(&parameters, &NoiseParameters::NONE)
         .linearity(&mut controller, &LINEARITY_FREQUENCIES)
         .unwrap();
@@ -117,7 +118,7 @@ fn halving_the_step_changes_the_figures_by_less_than_the_stated_bound() {
         step_s: 0.5 * parameters.step_s,
         ..parameters.clone()
     };
-    let mut controller = oracle(&parameters, 16, 0.0);
+    let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);
     let mut run = |parameters: &LegParameters| {
         figures(
             &scenario(parameters, &NoiseParameters::NONE)
@@ -142,7 +143,7 @@ fn legs_may_differ() {
         gain_um_per_v: parameters.gain_um_per_v * (1.0 + 0.01 * leg as f64),
         ..parameters.clone()
     });
-    let mut controller = oracle(&parameters, 16, 0.0);
+    let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);
     let table = LegScenario::new(&legs, &NoiseParameters::NONE, 1, 100)
         .tracking(&mut controller, &[10.0])
         .unwrap();
