@@ -1,5 +1,8 @@
 //! Bad input to the spec reader: every key wrong in every way, and the corpus with the text that a user sees.
 
+// Clippy sees the helpers of an integration test as production code.
+#![allow(clippy::expect_used, clippy::panic)]
+
 mod support {
     #![allow(dead_code)] // shared with other tests, which use other parts
     pub mod specs;

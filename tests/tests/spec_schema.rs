@@ -1,5 +1,8 @@
 //! The published JSON Schema and the generated documents against the key table and the specs.
 
+// Clippy sees the helpers of an integration test as production code.
+#![allow(clippy::expect_used, clippy::panic)]
+
 mod support {
     #![allow(dead_code)] // shared with other tests, which use other parts
     pub mod specs;
