@@ -11,7 +11,7 @@
 mod jury;
 mod sampled;
 
-use crate::diagnostic::{Diagnostic, Place, Severity};
+use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::model::{Adaptation, AdaptationMode, Model};
 
 pub use jury::{ewma_limit, pcc_limit, pcc_satisfies_jury};
@@ -56,7 +56,7 @@ pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
     if highest_ratio >= static_gain_limit {
         findings.push(refusal(
             model,
-            "E0501",
+            codes::UNSTABLE_STATIC,
             format!(
                 "the adaptation is unstable even on a leg without dynamics: with these weights λ = ρ/ρ̂ must stay below \
                  {static_gain_limit:.4}, but gain_ratio goes up to {highest_ratio} (Jury, {})",
@@ -72,7 +72,7 @@ pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
     if findings.is_empty() && spectral_radius > LARGEST_RADIUS {
         findings.push(refusal(
             model,
-            "E0502",
+            codes::UNSTABLE_SAMPLED,
             format!(
                 "the adaptation is unstable on this leg: the sampled loop (run of {} s, amplifier lag {} s, resonance {} Hz, ζ {}) \
                  has spectral radius {spectral_radius:.4} somewhere in gain_ratio {:?}; it must be below {LARGEST_RADIUS}",

@@ -1,1 +1,198 @@
 //! Helpers that the cross-crate tests share. The tests themselves are in `tests/tests/`.
+//!
+//! Controllers are emitted into `target/tests`, built there for the host and for the emulated microcontrollers, and run
+//! through their words: what is tested is what a user gets.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use host_sim::controller::{Controller, TickController};
+use host_sim::description::Description;
+use host_sim::replay;
+use host_sim::stimulus::{self, InputRecording, Setpoints};
+use host_sim::trace::Trace;
+use specgen::compile::{Compiled, compile};
+use specgen::model::Mcu;
+use specgen::target::{self, Image};
+use specgen::workspace;
+
+/// The repository.
+#[must_use]
+pub fn repository() -> PathBuf {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.parent().unwrap_or(here).to_owned()
+}
+
+/// Where tests build.
+#[must_use]
+pub fn scratch() -> PathBuf {
+    repository().join("target/tests")
+}
+
+/// A compiled spec with its workspace on disk.
+pub struct Emitted {
+    /// What compiled.
+    pub compiled: Compiled,
+    /// The workspace.
+    pub dir: PathBuf,
+}
+
+/// One build at a time: cargo would lock anyway, and print about it.
+static BUILD: Mutex<()> = Mutex::new(());
+
+impl Emitted {
+    /// Compiles a spec of `specs/` with `edits` (old text, new text) and writes its workspace to `target/tests/<name>`.
+    ///
+    /// # Panics
+    /// If an edit finds nothing to replace, or the spec is refused.
+    #[must_use]
+    pub fn new(name: &str, spec: &str, edits: &[(&str, &str)]) -> Self {
+        let compiled = compile_edited(name, spec, edits);
+        let dir = scratch().join(name);
+        let _ = fs::remove_dir_all(&dir);
+        workspace::write(&dir, &compiled.files).expect("the folder was just removed");
+        Self { compiled, dir }
+    }
+
+    /// The emitted crate as a host library.
+    ///
+    /// # Panics
+    /// If it does not build.
+    #[must_use]
+    pub fn library(&self) -> PathBuf {
+        let _one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
+        target::host::build_library(&self.dir, &scratch().join("build")).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// The emitted crate, loaded.
+    ///
+    /// # Panics
+    /// If it does not build or load.
+    #[must_use]
+    pub fn controller(&self) -> Controller {
+        Controller::load(&self.library()).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// The emitted crate for a microcontroller; none, with a line that says so, where tools are missing and
+    /// `SPECGEN_ALLOW_MISSING=1` permits it.
+    ///
+    /// # Panics
+    /// If it does not build.
+    #[must_use]
+    pub fn image(&self, mcu: Mcu) -> Option<Image> {
+        if let Err(missing) = target::available() {
+            if std::env::var_os("SPECGEN_ALLOW_MISSING").is_some_and(|value| value == "1") {
+                println!("skipped: {missing}");
+                return None;
+            }
+            panic!("{missing}");
+        }
+        let _one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(target::build_image(&self.dir, mcu, &scratch().join("build")).unwrap_or_else(|error| panic!("{error}")))
+    }
+
+    /// Input rows of every kind that a tick may meet, for leg or pose set-points.
+    ///
+    /// # Panics
+    /// If the controller lacks a word.
+    #[must_use]
+    pub fn stimulus(&self, description: &Description, pose: bool, rows: usize, seed: u64) -> InputRecording {
+        let ir = &self.compiled.ir;
+        let stroke = self.compiled.model.actuator.stroke;
+        let setpoints = if pose {
+            Setpoints::Pose { bounds: ir.bounds.pose, stroke }
+        } else {
+            let nodes = &ir.hysteresis.tables[0];
+            let everett = (0..=ir.hysteresis.grid).map(|up| nodes[up * (up + 1) / 2..][..=up].to_vec()).collect();
+            Setpoints::Leg { stroke, everett }
+        };
+        stimulus::record(description, &setpoints, rows, seed).expect("the controller has set-point and gauge words")
+    }
+}
+
+/// Compiles a spec of `specs/` after edits of its text.
+///
+/// # Panics
+/// If an edit finds nothing to replace, or the spec is refused.
+#[must_use]
+pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)]) -> Compiled {
+    let specs = repository().join("specs");
+    let mut text = fs::read_to_string(specs.join(spec)).expect("a spec of this repository");
+    for (old, new) in edits {
+        assert!(text.contains(old), "{spec} has no `{old}`");
+        text = text.replace(old, new);
+    }
+    // Beside a copy of the records, as a user would have it.
+    let folder = scratch().join("specs").join(name).join("features");
+    let records = scratch().join("specs").join(name).join("records");
+    for folder in [&folder, &records] {
+        fs::create_dir_all(folder).expect("target is writable");
+    }
+    for record in fs::read_dir(specs.join("records")).expect("records").map_while(Result::ok) {
+        fs::copy(record.path(), records.join(record.file_name())).expect("target is writable");
+    }
+    let text = text.replace("\"records/", "\"../records/");
+    let path = folder.join("platform.toml");
+    fs::write(&path, text).expect("target is writable");
+    compile(&path).unwrap_or_else(|refused| panic!("{name} is refused: {:#?}", refused.findings))
+}
+
+/// The host's trace of recorded inputs, with the spec's settings but for the named ones.
+///
+/// # Panics
+/// If the controller has no such setting or refuses it.
+#[must_use]
+pub fn host_trace(controller: &mut Controller, settings: &[(&str, f64)], inputs: &InputRecording) -> (Trace, Vec<u64>) {
+    let mut words = controller.default_config();
+    for (name, value) in settings {
+        controller.description().set_config(&mut words, name, *value).expect("a setting of the controller");
+    }
+    controller.configure(&words).expect("a permitted setting");
+    (replay::replay(controller, inputs), words)
+}
+
+/// Numbers of an output word over a trace, by name.
+///
+/// # Panics
+/// If the controller has no such word.
+#[must_use]
+pub fn column(trace: &Trace, name: &str) -> Vec<f64> {
+    let description = trace.description();
+    let place = description.input_names.len() + description.output(name).expect("an output word");
+    trace.rows().map(|row| description.scalar.decode(row[place])).collect()
+}
+
+/// Integers of an output word over a trace, by name.
+///
+/// # Panics
+/// If the controller has no such word.
+#[must_use]
+pub fn integers(trace: &Trace, name: &str) -> Vec<u64> {
+    let description = trace.description();
+    let place = description.input_names.len() + description.output(name).expect("an output word");
+    trace.rows().map(|row| row[place]).collect()
+}
+
+/// Text files below `dir`, by path relative to it.
+///
+/// # Panics
+/// If one cannot be read.
+#[must_use]
+pub fn sources(dir: &Path) -> BTreeMap<String, String> {
+    let mut files = BTreeMap::new();
+    let mut open = vec![dir.to_owned()];
+    while let Some(folder) = open.pop() {
+        for entry in fs::read_dir(&folder).expect("a folder").map_while(Result::ok) {
+            let path = entry.path();
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                let name = path.strip_prefix(dir).expect("below it").display().to_string();
+                files.insert(name, fs::read_to_string(&path).expect("text"));
+            }
+        }
+    }
+    files
+}

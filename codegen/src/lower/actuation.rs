@@ -1,6 +1,6 @@
 //! Voltage limits and slew rate as converter codes, and the codes on the Everett grid.
 
-use crate::diagnostic::{Diagnostic, Place, Severity};
+use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::ir::{Actuation, Scalar};
 use crate::model::Model;
 
@@ -29,7 +29,7 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<(Actuation, i32), V
     if code_max - code_min < 2 * model.hysteresis.grid as i32 {
         findings.push(finding(
             model,
-            "E0410",
+            codes::TOO_FEW_CODES,
             "dac.bits",
             format!(
                 "the converter has only {} codes between {volts_min} V and {volts_max} V, fewer than two per cell of the {}-cell Preisach grid",
@@ -43,7 +43,7 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<(Actuation, i32), V
     if step < 1.0 {
         findings.push(finding(
             model,
-            "E0411",
+            codes::SLEW_TOO_SLOW,
             "actuator.slew_rate",
             format!(
                 "{} V/s moves the output by {:.3} converter codes in a control period of {} s; it must be at least one",

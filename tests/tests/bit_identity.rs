@@ -1,0 +1,114 @@
+//! Host, Cortex-M7 and Cortex-M4F compute the same bits: every output word and the state digest of every tick, from one
+//! recorded input with saturation, reversals on thresholds, ±0, subnormals, NaN and infinities.
+
+use host_sim::controller::TickController;
+use host_sim::trace::{Trace, first_difference};
+use specgen::model::Mcu;
+use specgen::verify;
+use specgen_tests::{Emitted, column, host_trace, integers};
+use std::fs;
+
+/// Ticks of the main comparison.
+const TICKS: usize = 100_000;
+/// A converter whose codes meet every threshold of the grid: 2.5 mV a code, 1250 codes a cell.
+const ALIGNED: (&str, &str) = ("[\"0 V\", \"150 V\"]", "[\"0 V\", \"163.8375 V\"]");
+const CODES_PER_CELL: i64 = 1250;
+const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+
+/// Set-points and law of a run, with its length.
+const RUNS: [(&str, bool, f64, usize); 3] =
+    [("legs, pcc", false, 2.0, TICKS), ("legs, invhys", false, 0.0, TICKS / 5), ("poses, ewma", true, 1.0, TICKS / 5)];
+
+fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
+    let emitted = Emitted::new(name, "reference.toml", edits);
+    let mut controller = emitted.controller();
+    let description = controller.description().clone();
+    for (what, pose, mode, ticks) in RUNS {
+        let inputs = emitted.stimulus(&description, pose, ticks, 7);
+        let kind = if pose { 0.0 } else { 1.0 };
+        let (host, config) = host_trace(&mut controller, &[("mode", mode), ("setpoint_kind", kind)], &inputs);
+        covers(&host, what, pose);
+        for mcu in mcus {
+            let Some(image) = emitted.image(*mcu) else { continue };
+            let (target, _) = verify::replay(&image, &config, &host).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(target.len(), ticks);
+            let difference = first_difference(&host, &target);
+            assert!(difference.is_none(), "{name}, {what}, {mcu:?}: {}", difference.unwrap());
+            println!("{name}, {what}, {mcu:?}: {ticks} ticks, no differing word");
+        }
+    }
+}
+
+/// The recording really holds what it is meant to hold.
+fn covers(trace: &Trace, what: &str, pose: bool) {
+    let status = integers(trace, "status");
+    let count = |mask: u64| status.iter().filter(|word| *word & mask != 0).count();
+    assert!(count(0x3f) > 100, "{what}: saturation");
+    assert!(count(0x3f00) > 100, "{what}: gauge faults");
+    assert!(count(0x1_0000) > 100, "{what}: set-point faults");
+    let first_leg = 1 | 0x100 | 0x1_0000;
+    assert!(status.iter().filter(|word| **word & first_leg == 0).count() > 1000, "{what}: undisturbed ticks of a leg");
+    if !pose && what.contains("invhys") {
+        let codes: Vec<i64> = integers(trace, "dac_code[0]").iter().map(|code| *code as i64).collect();
+        let on_threshold = codes
+            .windows(3)
+            .filter(|w| w[1] % CODES_PER_CELL == 0 && (w[1] - w[0]).signum() * (w[2] - w[1]).signum() < 0)
+            .count();
+        assert!(on_threshold > 20, "{what}: only {on_threshold} reversals on thresholds");
+    }
+    let inputs = trace.description().input_names.len();
+    let scalar = trace.description().scalar;
+    let numbers = || trace.rows().flat_map(|row| row[..inputs].iter()).map(|word| scalar.decode(*word));
+    assert!(numbers().any(f64::is_nan) && numbers().any(f64::is_infinite), "{what}: NaN and infinity");
+    assert!(numbers().any(|x| x == 0.0 && x.is_sign_negative()), "{what}: −0");
+    let smallest = if scalar.bits() == 32 { f64::from(f32::MIN_POSITIVE) } else { f64::MIN_POSITIVE };
+    assert!(numbers().any(|x| x != 0.0 && x.abs() < smallest), "{what}: subnormals");
+    for leg in 0..6 {
+        for name in ["voltage", "requested", "demand", "level", "drift"] {
+            assert!(column(trace, &format!("{name}[{leg}]")).iter().all(|x| x.is_finite()), "{what}: {name}[{leg}]");
+        }
+        assert!(column(trace, &format!("voltage[{leg}]")).iter().all(|u| (0.0..=100.0).contains(u)), "{what}: limits");
+    }
+}
+
+#[test]
+fn f64_on_the_host_and_the_m7_is_equal_in_every_bit() {
+    compare("bits-f64", &[ALIGNED], &[Mcu::Mps2An500]);
+}
+
+#[test]
+fn f32_on_the_host_the_m7_and_the_m4f_is_equal_in_every_bit() {
+    compare("bits-f32", &[ALIGNED, F32], &[Mcu::Mps2An500, Mcu::Mps2An386]);
+}
+
+/// The comparison is falsifiable: one flipped ulp of one constant of the controller on one side is found, and named.
+#[test]
+fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
+    let good = Emitted::new("ulp-good", "reference.toml", &[ALIGNED]);
+    let Some(image) = good.image(Mcu::Mps2An500) else { return };
+    let ir = &good.compiled.ir;
+    let table_value = ir.hysteresis.tables[0][20 * 21 / 2 + 3];
+    let cases = [
+        ("controller/src/hysteresis.rs", table_value, false, "requested"),
+        ("controller/src/kinematics.rs", ir.kinematics.rest_leg[2][0], true, "demand[2]"),
+        ("controller/src/limits.rs", ir.actuation.volts_per_code, false, "voltage"),
+    ];
+    for (file, value, pose, signal) in cases {
+        let bad = Emitted::new("ulp-bad", "reference.toml", &[ALIGNED]);
+        let path = bad.dir.join(file);
+        let text = fs::read_to_string(&path).unwrap();
+        let (old, new) = (format!("{value:?}"), format!("{:?}", f64::from_bits(value.to_bits() + 1)));
+        assert!(text.contains(&old), "{file} has no {old}");
+        fs::write(&path, text.replacen(&old, &new, 1)).unwrap();
+
+        let mut controller = bad.controller();
+        let inputs = bad.stimulus(&controller.description().clone(), pose, 3000, 7);
+        let kind = if pose { 0.0 } else { 1.0 };
+        let (host, config) = host_trace(&mut controller, &[("setpoint_kind", kind)], &inputs);
+        let (target, _) = verify::replay(&image, &config, &host).unwrap_or_else(|error| panic!("{error}"));
+        let difference = first_difference(&host, &target).unwrap_or_else(|| panic!("{file}: the flipped ulp was not seen"));
+        let text = difference.to_string();
+        println!("{file}: {text}");
+        assert!(text.starts_with("tick ") && text.contains(signal), "{file}: {text}");
+    }
+}
