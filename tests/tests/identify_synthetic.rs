@@ -12,7 +12,8 @@ use identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::everett::EverettTable;
 use specgen::identify::regressor::{Plane, evaluate};
 use specgen::identify::{
-    Branches, DeadTime, Identified, Options, Record, Staircase, Start, identify, validate,
+    Branches, DeadTime, Identified, Options, Record, Staircase, Start, identify, read_table_csv,
+    validate, write_table_csv,
 };
 
 const NM: f64 = 1e-9;
@@ -429,4 +430,32 @@ fn two_runs_give_the_same_bits() {
         bits(found(&drive, y.clone(), &options)),
         bits(found(&drive, y, &options))
     );
+}
+
+#[test]
+fn a_table_survives_its_csv_file_and_a_broken_file_is_refused() {
+    let table = random_table(7, [-90.0, 90.0], 40e-6, 0.3, 81);
+    let text = write_table_csv(&table);
+    assert!(text.starts_with("up_V,down_V,everett_um\n"));
+    let back = read_table_csv(&text, "everett.csv").unwrap();
+    assert_eq!(
+        (back.grid, back.drive_min, back.drive_max),
+        (7, -90.0, 90.0)
+    );
+    assert!(worst_node(&table, &back) < 1e-20);
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.swap(3, 9);
+    for broken in [
+        lines.join("\n"),
+        text.replacen("up_V", "upV", 1),
+        text.replacen('.', "x", 1),
+        text[..text.len() / 2].to_owned(),
+        String::new(),
+    ] {
+        let all = read_table_csv(&broken, "everett.csv").unwrap_err();
+        assert!(
+            all.iter().all(|d| d.code == "E0613" && !d.help.is_empty()),
+            "{all:?}"
+        );
+    }
 }

@@ -7,7 +7,7 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::branches::Branch;
-use super::normal::accumulate;
+use super::normal::{Weighting, accumulate};
 use super::record::Record;
 use super::regressor::Plane;
 use super::{prior, sanity};
@@ -46,7 +46,7 @@ pub fn estimate(
         .iter()
         .map(|&tau| scaled(&delayed(record, tau), scale))
         .collect();
-    let mut normal = accumulate(plane, record, first, branches, &targets);
+    let mut normal = accumulate(plane, record, first, branches, &targets, Weighting::Even);
     prior::add(plane.grid, &mut normal.gram);
     let Some(factor) = Cholesky::new(normal.gram) else {
         return (

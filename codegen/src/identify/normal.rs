@@ -51,6 +51,31 @@ pub fn each_row_from(
     }
 }
 
+/// How much each sample counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weighting {
+    /// All the same.
+    Even,
+    /// Most where the drive is at a threshold of the grid, see [`node_weight`].
+    AtNodes,
+}
+
+/// Least weight of a sample, half-way between two thresholds.
+const BETWEEN: f64 = 0.01;
+/// How steeply the weight falls off.
+const STEEPNESS: i32 = 6;
+
+/// Weight of a sample with the drive at `drive` (V): 1 at a threshold, [`BETWEEN`] half-way to the next.
+///
+/// The table is linear between thresholds while the actuator is curved there. Fitted evenly, the table would leave the
+/// curve at the nodes to meet it half-way; weighted so, it holds the measured values at its nodes, as the classical
+/// reading does, and samples beside the nodes still average the noise.
+fn node_weight(plane: &Plane, drive: f64) -> f64 {
+    let position = (drive - plane.range[0]) / plane.interval();
+    let off = (position - position.round()).abs();
+    BETWEEN + (1.0 - BETWEEN) * (1.0 - 2.0 * off).powi(STEEPNESS)
+}
+
 /// Normal equations over `branches` (in ascending order; neighbours may share one sample).
 ///
 /// `targets[k][n]` is the k-th target of sample n.
@@ -61,14 +86,19 @@ pub fn accumulate(
     first: usize,
     branches: &[Branch],
     targets: &[Vec<f64>],
+    weighting: Weighting,
 ) -> Normal {
     let nodes = plane.nodes();
     let mut sums = Sums::new(nodes, targets.len());
     let mut pending = branches.iter().peekable();
     each_row(plane, &record.drive, first, |k, row| {
+        let weight = match weighting {
+            Weighting::Even => 1.0,
+            Weighting::AtNodes => node_weight(plane, record.drive[k]),
+        };
         while let Some(branch) = pending.peek() {
             if k >= branch.first {
-                sums.add(row, targets, k);
+                sums.add(row, targets, k, weight);
             }
             if k + 1 < branch.end {
                 break;
@@ -121,6 +151,7 @@ struct Sums {
 /// Sums of the branch under way.
 struct BranchSums {
     samples: usize,
+    weight: f64,
     row: Vec<f64>,
     touched: Vec<usize>,
     /// First value of each target in the branch; targets are taken relative to it, which keeps the sums small.
@@ -132,6 +163,7 @@ impl Sums {
     fn new(nodes: usize, targets: usize) -> Self {
         let branch = BranchSums {
             samples: 0,
+            weight: 0.0,
             row: vec![0.0; nodes],
             touched: Vec::new(),
             origin: vec![0.0; targets],
@@ -146,34 +178,35 @@ impl Sums {
         }
     }
 
-    fn add(&mut self, row: &[Term], targets: &[Vec<f64>], sample: usize) {
+    fn add(&mut self, row: &[Term], targets: &[Vec<f64>], sample: usize, weight: f64) {
         let branch = &mut self.branch;
         for (k, target) in targets.iter().enumerate() {
             if branch.samples == 0 {
                 branch.origin[k] = target[sample];
             }
             let y = target[sample] - branch.origin[k];
-            branch.target[k] += y;
-            self.energy[k] += y * y;
+            branch.target[k] += weight * y;
+            self.energy[k] += weight * y * y;
             for &(node, c) in row {
-                self.rhs[k][node] += c * y;
+                self.rhs[k][node] += weight * c * y;
             }
         }
         branch.samples += 1;
+        branch.weight += weight;
         for &(a, ca) in row {
             if branch.row[a] == 0.0 {
                 branch.touched.push(a);
             }
-            branch.row[a] += ca;
+            branch.row[a] += weight * ca;
             for &(b, cb) in row {
                 if a >= b {
-                    self.gram[(a, b)] += ca * cb;
+                    self.gram[(a, b)] += weight * ca * cb;
                 }
             }
         }
     }
 
-    /// Subtracts the mean of the branch: Σ(x − x̄)(y − ȳ) = Σxy − ΣxΣy/n.
+    /// Subtracts the mean of the branch: Σw(x − x̄)(y − ȳ) = Σwxy − ΣwxΣwy/Σw.
     fn close_branch(&mut self) {
         let branch = &mut self.branch;
         if branch.samples == 0 {
@@ -181,7 +214,7 @@ impl Sums {
         }
         branch.touched.sort_unstable();
         branch.touched.dedup();
-        let share = 1.0 / branch.samples as f64;
+        let share = 1.0 / branch.weight;
         for (k, &sum) in branch.target.iter().enumerate() {
             self.energy[k] -= sum * sum * share;
             for &node in &branch.touched {
@@ -198,6 +231,7 @@ impl Sums {
         }
         branch.touched.clear();
         branch.target.fill(0.0);
+        branch.weight = 0.0;
         self.samples += branch.samples;
         branch.samples = 0;
     }
