@@ -9,14 +9,14 @@
 //! the falls are fitted, with most weight on samples near the thresholds of the grid: the result is the classical
 //! E(u_i, u_j) = f(u_i) − f_{u_i}(u_j) with less noise, for any spacing of the curves, and without negative weights.
 
-pub mod branches;
+mod branches;
 mod columns;
 mod coverage;
 mod dead_time;
 mod export;
 mod findings;
 pub mod nnls;
-pub mod normal;
+mod normal;
 mod prior;
 mod record;
 pub mod regressor;
@@ -137,7 +137,7 @@ fn identify_checked(
     }
     let scale = 1.0 / record.displacement_range();
     let target: Vec<f64> = displacement.iter().map(|y| y * scale).collect();
-    let (mut normal, fitted, excited) = selection::select(&plane, record, &used, target);
+    let (mut normal, fitted, excited) = selection::select(&plane, record, &used, &target);
     coverage::check_excited(&plane, &excited, findings);
 
     prior::add(plane.grid, &mut normal.gram);

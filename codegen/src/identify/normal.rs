@@ -62,9 +62,6 @@ pub enum Weighting {
 
 /// Least weight of a sample, half-way between two thresholds.
 const BETWEEN: f64 = 0.01;
-/// How steeply the weight falls off.
-const STEEPNESS: i32 = 6;
-
 /// Weight of a sample with the drive at `drive` (V): 1 at a threshold, [`BETWEEN`] half-way to the next.
 ///
 /// The table is linear between thresholds while the actuator is curved there. Fitted evenly, the table would leave the
@@ -73,23 +70,29 @@ const STEEPNESS: i32 = 6;
 fn node_weight(plane: &Plane, drive: f64) -> f64 {
     let position = (drive - plane.range[0]) / plane.interval();
     let off = (position - position.round()).abs();
-    BETWEEN + (1.0 - BETWEEN) * (1.0 - 2.0 * off).powi(STEEPNESS)
+    let near = 1.0 - 2.0 * off;
+    // Sixth power, written out: the rounding of `powi` is the compiler's choice.
+    let cubed = near * near * near;
+    BETWEEN + (1.0 - BETWEEN) * cubed * cubed
 }
 
 /// Normal equations over `branches` (in ascending order; neighbours may share one sample).
 ///
-/// `targets[k][n]` is the k-th target of sample n.
+/// `fill` writes the targets of a sample, `targets` in number; it is called with samples in ascending order, and again
+/// with the last one where two branches share it.
 #[must_use]
 pub fn accumulate(
     plane: &Plane,
     record: &Record,
     first: usize,
     branches: &[Branch],
-    targets: &[Vec<f64>],
     weighting: Weighting,
+    targets: usize,
+    mut fill: impl FnMut(usize, &mut [f64]),
 ) -> Normal {
     let nodes = plane.nodes();
-    let mut sums = Sums::new(nodes, targets.len());
+    let mut sums = Sums::new(nodes, targets);
+    let mut values = vec![0.0; targets];
     let mut pending = branches.iter().peekable();
     each_row(plane, &record.drive, first, |k, row| {
         let weight = match weighting {
@@ -98,7 +101,8 @@ pub fn accumulate(
         };
         while let Some(branch) = pending.peek() {
             if k >= branch.first {
-                sums.add(row, targets, k, weight);
+                fill(k, &mut values);
+                sums.add(row, &values, weight);
             }
             if k + 1 < branch.end {
                 break;
@@ -178,13 +182,13 @@ impl Sums {
         }
     }
 
-    fn add(&mut self, row: &[Term], targets: &[Vec<f64>], sample: usize, weight: f64) {
+    fn add(&mut self, row: &[Term], targets: &[f64], weight: f64) {
         let branch = &mut self.branch;
-        for (k, target) in targets.iter().enumerate() {
+        for (k, &target) in targets.iter().enumerate() {
             if branch.samples == 0 {
-                branch.origin[k] = target[sample];
+                branch.origin[k] = target;
             }
-            let y = target[sample] - branch.origin[k];
+            let y = target - branch.origin[k];
             branch.target[k] += weight * y;
             self.energy[k] += weight * y * y;
             for &(node, c) in row {

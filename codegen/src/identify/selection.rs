@@ -69,11 +69,20 @@ pub(crate) fn select(
     plane: &Plane,
     record: &Record,
     used: &Used,
-    target: Vec<f64>,
+    target: &[f64],
 ) -> (Normal, Branches, Vec<bool>) {
-    let targets = [target];
     let over = |branches: &[Branch], weighting| {
-        normal::accumulate(plane, record, used.first, branches, &targets, weighting)
+        normal::accumulate(
+            plane,
+            record,
+            used.first,
+            branches,
+            weighting,
+            1,
+            |k, values| {
+                values[0] = target[k];
+            },
+        )
     };
     let all = over(&used.branches, Weighting::Even);
     let excited_by_all = coverage::excited(plane, &all.gram);
