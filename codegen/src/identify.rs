@@ -99,17 +99,17 @@ const POOR_FIT_PERCENT: f64 = 3.0;
 /// range never reached, too few reversal curves.
 pub fn identify(record: &Record, options: &Options) -> Result<Identified, Vec<Diagnostic>> {
     let mut findings = Findings::new(&record.shown_as);
-    match identify_checked(record, options, &mut findings) {
-        Some((table, report)) if !findings.any_error() => {
-            let mut warnings = record.warnings.clone();
-            warnings.extend(findings.into_diagnostics());
-            Ok(Identified {
-                table,
-                report,
-                warnings,
-            })
-        }
-        _ => Err(findings.into_diagnostics()),
+    let found = identify_checked(record, options, &mut findings);
+    let refused = findings.any_error();
+    let mut all = record.warnings.clone();
+    all.extend(findings.into_diagnostics());
+    match found {
+        Some((table, report)) if !refused => Ok(Identified {
+            table,
+            report,
+            warnings: all,
+        }),
+        _ => Err(all),
     }
 }
 

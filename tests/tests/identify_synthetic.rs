@@ -156,6 +156,37 @@ fn noise_offset_drift_and_an_irregular_start_are_tolerated() {
     }
 }
 
+/// The drive column is a measurement too: every sample is a tiny reversal, and the minimum is not met exactly.
+#[test]
+fn noise_on_the_drive_column_is_tolerated() {
+    let range = [0.0, 100.0];
+    let truth = random_table(16, range, 40e-6, 0.3, 25);
+    let drive = Drive::at(0.0, 1000.0).reversal_curves(16, range, 50.0);
+    let y = response(
+        &truth,
+        Staircase::negative_saturation(range),
+        &drive.samples,
+    );
+    let mut random = generator(25);
+    let measured: Vec<f64> = drive
+        .samples
+        .iter()
+        .map(|u| u + 0.01 * normal(&mut random))
+        .collect();
+    let record = Record::from_columns("made.csv", drive.time(), measured, y).unwrap();
+    let result = identify(&record, &Options::new(16, range)).unwrap();
+    let worst = worst_node(&truth, &result.table);
+    println!(
+        "10 mV on the drive: worst node {:.2} nm, {} curves",
+        worst / NM,
+        result.report.reversal_curves
+    );
+    assert_eq!(result.report.reversal_curves, 16);
+    assert_eq!(result.report.branches, Branches::Descending);
+    // 10 mV are about 4 nm; the highest of noisy samples overstates each reversal by some 30 mV.
+    assert!(worst < 20.0 * NM);
+}
+
 /// Random reversals instead of first-order curves: the memory is deep, and rises are needed too.
 #[test]
 fn a_record_of_random_reversals_identifies_the_table() {

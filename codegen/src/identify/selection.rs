@@ -7,7 +7,7 @@ use super::normal::{self, Normal, Weighting};
 use super::record::Record;
 use super::regressor::Plane;
 use super::report::Branches;
-use super::trend;
+use super::{sanity, trend};
 
 /// Share of the drive range within which the drive counts as being at its minimum.
 const AT_MINIMUM: f64 = 0.002;
@@ -49,9 +49,10 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
         return None;
     }
     let rises = branches.iter().filter(|b| b.rising);
+    let minimum = at_minimum(record, plane);
     let from_saturation = rises
         .clone()
-        .filter(|b| record.drive[b.first] <= plane.range[0] + tolerance)
+        .filter(|b| record.drive[b.first] <= minimum)
         .count();
     let first_order = from_saturation as f64 >= FIRST_ORDER * rises.count() as f64;
     Some(Used {
@@ -113,11 +114,17 @@ pub(crate) fn drift_of_returns(
     branches: &[Branch],
     plane: &Plane,
 ) -> (f64, usize) {
-    let [low, high] = plane.range;
+    let minimum = at_minimum(record, plane);
     let returns: Vec<(f64, f64)> = branches
         .iter()
-        .filter(|b| b.rising && record.drive[b.first] <= low + AT_MINIMUM * (high - low))
+        .filter(|b| b.rising && record.drive[b.first] <= minimum)
         .map(|b| (record.time[b.first], record.displacement[b.first]))
         .collect();
     (trend::median_slope(&returns), returns.len())
+}
+
+/// Drive in V up to which it counts as being at its minimum.
+fn at_minimum(record: &Record, plane: &Plane) -> f64 {
+    let (low, _) = sanity::extent(&record.drive);
+    low + AT_MINIMUM * (plane.range[1] - plane.range[0])
 }
