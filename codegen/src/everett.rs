@@ -6,7 +6,7 @@
 /// (first-order reversal), for thresholds `u_k = drive_min + k·(drive_max − drive_min)/grid`, i > j.
 /// E(u, u) = 0. Between nodes the controller interpolates bilinearly in square cells and linearly in
 /// the triangles on the diagonal, so that the weight of a diagonal cell is reversible.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct EverettTable {
     /// Number of intervals N, 2 to 256.
     pub grid: usize,

@@ -12,7 +12,8 @@ use identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::everett::EverettTable;
 use specgen::identify::regressor::{Plane, evaluate};
 use specgen::identify::{
-    Branches, DeadTime, Identified, Options, Record, Staircase, Start, identify, validate,
+    Branches, DeadTime, Identified, Options, Record, Staircase, Start, identify, read_table_csv,
+    validate, write_table_csv,
 };
 
 const NM: f64 = 1e-9;
@@ -153,6 +154,37 @@ fn noise_offset_drift_and_an_irregular_start_are_tolerated() {
         assert_eq!(result.report.reversal_curves, 16);
         assert_monotone(&result.table);
     }
+}
+
+/// The drive column is a measurement too: every sample is a tiny reversal, and the minimum is not met exactly.
+#[test]
+fn noise_on_the_drive_column_is_tolerated() {
+    let range = [0.0, 100.0];
+    let truth = random_table(16, range, 40e-6, 0.3, 25);
+    let drive = Drive::at(0.0, 1000.0).reversal_curves(16, range, 50.0);
+    let y = response(
+        &truth,
+        Staircase::negative_saturation(range),
+        &drive.samples,
+    );
+    let mut random = generator(25);
+    let measured: Vec<f64> = drive
+        .samples
+        .iter()
+        .map(|u| u + 0.01 * normal(&mut random))
+        .collect();
+    let record = Record::from_columns("made.csv", drive.time(), measured, y).unwrap();
+    let result = identify(&record, &Options::new(16, range)).unwrap();
+    let worst = worst_node(&truth, &result.table);
+    println!(
+        "10 mV on the drive: worst node {:.2} nm, {} curves",
+        worst / NM,
+        result.report.reversal_curves
+    );
+    assert_eq!(result.report.reversal_curves, 16);
+    assert_eq!(result.report.branches, Branches::Descending);
+    // 10 mV are about 4 nm; the highest of noisy samples overstates each reversal by some 30 mV.
+    assert!(worst < 20.0 * NM);
 }
 
 /// Random reversals instead of first-order curves: the memory is deep, and rises are needed too.
@@ -429,4 +461,32 @@ fn two_runs_give_the_same_bits() {
         bits(found(&drive, y.clone(), &options)),
         bits(found(&drive, y, &options))
     );
+}
+
+#[test]
+fn a_table_survives_its_csv_file_and_a_broken_file_is_refused() {
+    let table = random_table(7, [-90.0, 90.0], 40e-6, 0.3, 81);
+    let text = write_table_csv(&table);
+    assert!(text.starts_with("up_V,down_V,everett_um\n"));
+    let back = read_table_csv(&text, "everett.csv").unwrap();
+    assert_eq!(
+        (back.grid, back.drive_min, back.drive_max),
+        (7, -90.0, 90.0)
+    );
+    assert!(worst_node(&table, &back) < 1e-20);
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines.swap(3, 9);
+    for broken in [
+        lines.join("\n"),
+        text.replacen("up_V", "upV", 1),
+        text.replacen('.', "x", 1),
+        text[..text.len() / 2].to_owned(),
+        String::new(),
+    ] {
+        let all = read_table_csv(&broken, "everett.csv").unwrap_err();
+        assert!(
+            all.iter().all(|d| d.code == "E0613" && !d.help.is_empty()),
+            "{all:?}"
+        );
+    }
 }

@@ -63,7 +63,7 @@ pub fn branches(drive: &[f64], first: usize, retreat: f64) -> Vec<Branch> {
             rising,
         });
     }
-    found.retain(|b| b.end > b.first + 2);
+    found.retain(|b| b.end > b.first + 1);
     found
 }
 

@@ -7,7 +7,7 @@
 use nalgebra::{Cholesky, DVector};
 
 use super::branches::Branch;
-use super::normal::accumulate;
+use super::normal::{Weighting, accumulate};
 use super::record::Record;
 use super::regressor::Plane;
 use super::{prior, sanity};
@@ -42,11 +42,21 @@ pub fn estimate(
         .map(|k| k as f64 * step)
         .collect();
     let scale = 1.0 / record.displacement_range();
-    let targets: Vec<Vec<f64>> = tried
-        .iter()
-        .map(|&tau| scaled(&delayed(record, tau), scale))
-        .collect();
-    let mut normal = accumulate(plane, record, first, branches, &targets);
+    let mut shifts: Vec<Shift> = tried.iter().map(|&tau| Shift { tau, next: 0 }).collect();
+    let fill = |k: usize, values: &mut [f64]| {
+        for (value, shift) in values.iter_mut().zip(&mut shifts) {
+            *value = scale * shift.displacement(record, k);
+        }
+    };
+    let mut normal = accumulate(
+        plane,
+        record,
+        first,
+        branches,
+        Weighting::Even,
+        tried.len(),
+        fill,
+    );
     prior::add(plane.grid, &mut normal.gram);
     let Some(factor) = Cholesky::new(normal.gram) else {
         return (
@@ -122,28 +132,34 @@ fn rates(record: &Record, branches: &[Branch]) -> (f64, f64) {
 /// Displacement (m) at each sample's time + `tau` (s), interpolated; held at the last value behind the end.
 #[must_use]
 pub fn delayed(record: &Record, tau: f64) -> Vec<f64> {
-    if tau == 0.0 {
-        return record.displacement.clone();
-    }
-    let (time, y) = (&record.time, &record.displacement);
-    let mut next = 0;
-    time.iter()
-        .map(|t| {
-            while next < time.len() && time[next] < t + tau {
-                next += 1;
-            }
-            match (next.checked_sub(1), time.get(next)) {
-                (Some(before), Some(after)) => {
-                    let share = (t + tau - time[before]) / (after - time[before]);
-                    y[before] + share * (y[next] - y[before])
-                }
-                (None, _) => y[0],
-                (Some(last), None) => y[last],
-            }
-        })
+    let mut shift = Shift { tau, next: 0 };
+    (0..record.time.len())
+        .map(|k| shift.displacement(record, k))
         .collect()
 }
 
-fn scaled(values: &[f64], scale: f64) -> Vec<f64> {
-    values.iter().map(|v| v * scale).collect()
+/// Reads a displacement `tau` later than asked for, for samples in ascending order.
+struct Shift {
+    /// s, ≥ 0.
+    tau: f64,
+    /// First sample that may lie behind the time asked for last.
+    next: usize,
+}
+
+impl Shift {
+    fn displacement(&mut self, record: &Record, sample: usize) -> f64 {
+        let (time, y) = (&record.time, &record.displacement);
+        let wanted = time[sample] + self.tau;
+        while self.next < time.len() && time[self.next] < wanted {
+            self.next += 1;
+        }
+        match (self.next.checked_sub(1), time.get(self.next)) {
+            (Some(before), Some(after)) => {
+                let share = (wanted - time[before]) / (after - time[before]);
+                y[before] + share * (y[self.next] - y[before])
+            }
+            (None, _) => y[0],
+            (Some(last), None) => y[last],
+        }
+    }
 }

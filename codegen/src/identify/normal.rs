@@ -51,24 +51,58 @@ pub fn each_row_from(
     }
 }
 
+/// How much each sample counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weighting {
+    /// All the same.
+    Even,
+    /// Most where the drive is at a threshold of the grid, see [`node_weight`].
+    AtNodes,
+}
+
+/// Least weight of a sample, half-way between two thresholds.
+const BETWEEN: f64 = 0.01;
+/// Weight of a sample with the drive at `drive` (V): 1 at a threshold, [`BETWEEN`] half-way to the next.
+///
+/// The table is linear between thresholds while the actuator is curved there. Fitted evenly, the table would leave the
+/// curve at the nodes to meet it half-way; weighted so, it holds the measured values at its nodes, as the classical
+/// reading does, and samples beside the nodes still average the noise.
+fn node_weight(plane: &Plane, drive: f64) -> f64 {
+    let position = (drive - plane.range[0]) / plane.interval();
+    let off = (position - position.round()).abs();
+    let near = 1.0 - 2.0 * off;
+    // Sixth power, written out: the rounding of `powi` is the compiler's choice.
+    let cubed = near * near * near;
+    BETWEEN + (1.0 - BETWEEN) * cubed * cubed
+}
+
 /// Normal equations over `branches` (in ascending order; neighbours may share one sample).
 ///
-/// `targets[k][n]` is the k-th target of sample n.
+/// `fill` writes the targets of a sample, `targets` in number; it is called with samples in ascending order, and again
+/// with the last one where two branches share it.
 #[must_use]
 pub fn accumulate(
     plane: &Plane,
     record: &Record,
     first: usize,
     branches: &[Branch],
-    targets: &[Vec<f64>],
+    weighting: Weighting,
+    targets: usize,
+    mut fill: impl FnMut(usize, &mut [f64]),
 ) -> Normal {
     let nodes = plane.nodes();
-    let mut sums = Sums::new(nodes, targets.len());
+    let mut sums = Sums::new(nodes, targets);
+    let mut values = vec![0.0; targets];
     let mut pending = branches.iter().peekable();
     each_row(plane, &record.drive, first, |k, row| {
+        let weight = match weighting {
+            Weighting::Even => 1.0,
+            Weighting::AtNodes => node_weight(plane, record.drive[k]),
+        };
         while let Some(branch) = pending.peek() {
             if k >= branch.first {
-                sums.add(row, targets, k);
+                fill(k, &mut values);
+                sums.add(row, &values, weight);
             }
             if k + 1 < branch.end {
                 break;
@@ -121,6 +155,7 @@ struct Sums {
 /// Sums of the branch under way.
 struct BranchSums {
     samples: usize,
+    weight: f64,
     row: Vec<f64>,
     touched: Vec<usize>,
     /// First value of each target in the branch; targets are taken relative to it, which keeps the sums small.
@@ -132,6 +167,7 @@ impl Sums {
     fn new(nodes: usize, targets: usize) -> Self {
         let branch = BranchSums {
             samples: 0,
+            weight: 0.0,
             row: vec![0.0; nodes],
             touched: Vec::new(),
             origin: vec![0.0; targets],
@@ -146,34 +182,35 @@ impl Sums {
         }
     }
 
-    fn add(&mut self, row: &[Term], targets: &[Vec<f64>], sample: usize) {
+    fn add(&mut self, row: &[Term], targets: &[f64], weight: f64) {
         let branch = &mut self.branch;
-        for (k, target) in targets.iter().enumerate() {
+        for (k, &target) in targets.iter().enumerate() {
             if branch.samples == 0 {
-                branch.origin[k] = target[sample];
+                branch.origin[k] = target;
             }
-            let y = target[sample] - branch.origin[k];
-            branch.target[k] += y;
-            self.energy[k] += y * y;
+            let y = target - branch.origin[k];
+            branch.target[k] += weight * y;
+            self.energy[k] += weight * y * y;
             for &(node, c) in row {
-                self.rhs[k][node] += c * y;
+                self.rhs[k][node] += weight * c * y;
             }
         }
         branch.samples += 1;
+        branch.weight += weight;
         for &(a, ca) in row {
             if branch.row[a] == 0.0 {
                 branch.touched.push(a);
             }
-            branch.row[a] += ca;
+            branch.row[a] += weight * ca;
             for &(b, cb) in row {
                 if a >= b {
-                    self.gram[(a, b)] += ca * cb;
+                    self.gram[(a, b)] += weight * ca * cb;
                 }
             }
         }
     }
 
-    /// Subtracts the mean of the branch: Σ(x − x̄)(y − ȳ) = Σxy − ΣxΣy/n.
+    /// Subtracts the mean of the branch: Σw(x − x̄)(y − ȳ) = Σwxy − ΣwxΣwy/Σw.
     fn close_branch(&mut self) {
         let branch = &mut self.branch;
         if branch.samples == 0 {
@@ -181,7 +218,7 @@ impl Sums {
         }
         branch.touched.sort_unstable();
         branch.touched.dedup();
-        let share = 1.0 / branch.samples as f64;
+        let share = 1.0 / branch.weight;
         for (k, &sum) in branch.target.iter().enumerate() {
             self.energy[k] -= sum * sum * share;
             for &node in &branch.touched {
@@ -198,6 +235,7 @@ impl Sums {
         }
         branch.touched.clear();
         branch.target.fill(0.0);
+        branch.weight = 0.0;
         self.samples += branch.samples;
         branch.samples = 0;
     }

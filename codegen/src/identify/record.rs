@@ -16,7 +16,7 @@ pub const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// A measured record in SI units, checked sample by sample.
 ///
-/// The three columns have equal length, at least [`sanity::MIN_SAMPLES`]; every value is finite;
+/// The three columns have equal length, at least 100; every value is finite;
 /// time increases strictly and has no gaps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {

@@ -1,0 +1,130 @@
+//! Chooses what a record is fitted to: from which sample on, which branches, how weighted.
+
+use super::branches::{self, Branch};
+use super::coverage;
+use super::findings::Findings;
+use super::normal::{self, Normal, Weighting};
+use super::record::Record;
+use super::regressor::Plane;
+use super::report::Branches;
+use super::{sanity, trend};
+
+/// Share of the drive range within which the drive counts as being at its minimum.
+const AT_MINIMUM: f64 = 0.002;
+/// A turn of the drive is a reversal when it goes back by this many grid intervals.
+const REVERSAL: f64 = 0.5;
+/// A record counts as first-order reversal curves if at least this share of its rises starts in saturation.
+const FIRST_ORDER: f64 = 0.9;
+/// Of such a record the falls alone are fitted if they excite at least this share of the cells that all branches excite.
+const FALLS_SUFFICE: f64 = 0.99;
+
+/// The part of a record that identification uses.
+pub(crate) struct Used {
+    /// First sample; the drive is at its minimum there and rises after it.
+    pub(crate) first: usize,
+    /// Between the reversals behind it, in order.
+    pub(crate) branches: Vec<Branch>,
+    /// Falls from a reversal.
+    pub(crate) curves: usize,
+    /// Whether the record consists of first-order reversal curves.
+    first_order: bool,
+}
+
+/// Finds the usable part; refuses a record with too few reversal curves.
+pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) -> Option<Used> {
+    let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
+    let Some(first) = branches::first_usable(record, tolerance) else {
+        let message = "the drive never rises from its minimum".to_owned();
+        findings.error(
+            "E0607",
+            None,
+            message,
+            "start at the lowest drive, then rise to each reversal and fall back",
+        );
+        return None;
+    };
+    let branches = branches::branches(&record.drive, first, REVERSAL * plane.interval());
+    let curves = coverage::check_curves(&branches, plane, findings);
+    if findings.any_error() {
+        return None;
+    }
+    let rises = branches.iter().filter(|b| b.rising);
+    let minimum = at_minimum(record, plane);
+    let from_saturation = rises
+        .clone()
+        .filter(|b| record.drive[b.first] <= minimum)
+        .count();
+    let first_order = from_saturation as f64 >= FIRST_ORDER * rises.count() as f64;
+    Some(Used {
+        first,
+        branches,
+        curves,
+        first_order,
+    })
+}
+
+/// Normal equations over the falls of first-order reversal curves, if they excite the plane as well as all branches do,
+/// else over all branches: in other records it takes the rises to tell apart cells that only switch off together.
+/// The third value says of each cell whether the chosen branches excite it.
+pub(crate) fn select(
+    plane: &Plane,
+    record: &Record,
+    used: &Used,
+    target: &[f64],
+) -> (Normal, Branches, Vec<bool>) {
+    let over = |branches: &[Branch], weighting| {
+        normal::accumulate(
+            plane,
+            record,
+            used.first,
+            branches,
+            weighting,
+            1,
+            |k, values| {
+                values[0] = target[k];
+            },
+        )
+    };
+    let all = over(&used.branches, Weighting::Even);
+    let excited_by_all = coverage::excited(plane, &all.gram);
+    if used.first_order {
+        let falls = falls(&used.branches);
+        let excited_by_falls = coverage::excited(plane, &over(&falls, Weighting::Even).gram);
+        if share(&excited_by_falls) >= FALLS_SUFFICE * share(&excited_by_all) {
+            let normal = over(&falls, Weighting::AtNodes);
+            return (normal, Branches::Descending, excited_by_falls);
+        }
+    }
+    (all, Branches::All, excited_by_all)
+}
+
+/// The branches in which the drive falls.
+pub(crate) fn falls(branches: &[Branch]) -> Vec<Branch> {
+    branches.iter().copied().filter(|b| !b.rising).collect()
+}
+
+/// Share of the cells that are true.
+pub(crate) fn share(excited: &[bool]) -> f64 {
+    excited.iter().filter(|e| **e).count() as f64 / excited.len() as f64
+}
+
+/// Drift in m/s over the returns to negative saturation, and their number.
+pub(crate) fn drift_of_returns(
+    record: &Record,
+    branches: &[Branch],
+    plane: &Plane,
+) -> (f64, usize) {
+    let minimum = at_minimum(record, plane);
+    let returns: Vec<(f64, f64)> = branches
+        .iter()
+        .filter(|b| b.rising && record.drive[b.first] <= minimum)
+        .map(|b| (record.time[b.first], record.displacement[b.first]))
+        .collect();
+    (trend::median_slope(&returns), returns.len())
+}
+
+/// Drive in V up to which it counts as being at its minimum.
+fn at_minimum(record: &Record, plane: &Plane) -> f64 {
+    let (low, _) = sanity::extent(&record.drive);
+    low + AT_MINIMUM * (plane.range[1] - plane.range[0])
+}
