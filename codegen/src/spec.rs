@@ -12,6 +12,7 @@ mod fields;
 mod findings;
 pub mod keys;
 mod messages;
+mod names;
 pub mod quantity;
 mod read;
 mod reference;

@@ -1,1 +1,27 @@
 //! Plants, scenarios and traces around an emitted controller.
+//!
+//! ```text
+//! trajectory ─► closed loop ─► controller (emitted, or any TickController) ─► plant ×6 ─► gauge ─┐
+//!                    ▲                                                                           │
+//!                    └───────────────────────────── reading ◄────────────────────────────────────┘
+//!                    └─► trace (bits) and tracking (metres) ─► tables
+//! ```
+//! Quantities are in SI units at every public function (m, V, s, Hz) unless a name says otherwise
+//! (`_um`, `_nm`); plant parameter files and records use µm, as measurement files do.
+//! Everything is a function of its parameters and of a seed: two runs give the same bits.
+
+pub mod closed_loop;
+pub mod controller;
+pub mod description;
+pub mod forc;
+pub mod noise;
+#[cfg(any(test, feature = "oracle"))]
+pub mod oracle;
+pub mod plant;
+pub mod replay;
+pub mod scenario;
+pub mod stimulus;
+pub mod table;
+pub mod trace;
+pub mod trajectory;
+pub mod word;

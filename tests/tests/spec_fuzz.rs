@@ -2,6 +2,9 @@
 //!
 //! 20,000 inputs by default; SPECGEN_FUZZ sets another number. The seed is fixed: a failure repeats.
 
+// Clippy sees the helpers of an integration test as production code.
+#![allow(clippy::expect_used, clippy::panic)]
+
 mod support {
     #![allow(dead_code)] // shared with other tests, which use other parts
     pub mod specs;

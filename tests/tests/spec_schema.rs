@@ -1,5 +1,8 @@
 //! The published JSON Schema and the generated documents against the key table and the specs.
 
+// Clippy sees the helpers of an integration test as production code.
+#![allow(clippy::expect_used, clippy::panic)]
+
 mod support {
     #![allow(dead_code)] // shared with other tests, which use other parts
     pub mod specs;
@@ -101,5 +104,52 @@ fn generated_documents_are_fresh() {
     assert_fresh(
         &root().join("docs/diagnostics.md"),
         &diagnostic::reference_markdown(),
+    );
+}
+
+/// Every file below `folder` whose name ends in `.rs`, sorted.
+fn rust_files(folder: &Path, files: &mut Vec<std::path::PathBuf>) {
+    for entry in fs::read_dir(folder).expect("readable") {
+        let path = entry.expect("readable").path();
+        if path.is_dir() {
+            rust_files(&path, files);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            files.push(path);
+        }
+    }
+    files.sort();
+}
+
+/// The codes that stand in `text` as literals: a quote, E or W, four digits, a quote.
+fn code_literals(text: &str) -> Vec<&str> {
+    text.split('"')
+        .filter(|piece| piece.len() == 5 && piece.starts_with(['E', 'W']))
+        .filter(|piece| piece[1..].bytes().all(|b| b.is_ascii_digit()))
+        .collect()
+}
+
+#[test]
+fn every_code_in_the_compiler_is_in_the_registry() {
+    assert_eq!(
+        code_literals(r#"f("E0101", "W0", "E010x", "W0301")"#),
+        ["E0101", "W0301"]
+    );
+    let mut files = Vec::new();
+    rust_files(&root().join("codegen/src"), &mut files);
+    let mut found = 0;
+    for path in files {
+        let text = fs::read_to_string(&path).expect("readable");
+        for code in code_literals(&text) {
+            found += 1;
+            assert!(
+                diagnostic::codes::find(code).is_some(),
+                "{code} in {} is not in diagnostic/codes.rs",
+                path.display()
+            );
+        }
+    }
+    assert!(
+        found >= diagnostic::codes::REGISTRY.len(),
+        "{found} literals"
     );
 }

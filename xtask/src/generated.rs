@@ -6,19 +6,30 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+mod make;
+
 /// Files by path relative to [`Generated::folder`], with `/` between the parts.
 pub type Files = BTreeMap<String, String>;
 
-/// A folder whose every file is generated.
+/// A folder of generated files.
 pub struct Generated {
     /// Relative to the repository.
     pub folder: &'static str,
+    /// Whether every file in it is generated, so that any other is an error.
+    pub whole: bool,
     /// What it ought to hold, given the repository; or what stands against generating it.
     pub make: fn(&Path) -> Result<Files, String>,
 }
 
 /// All of them. `cargo xtask test` compares, `cargo xtask bless` writes.
-const GENERATED: &[Generated] = &[];
+const GENERATED: &[Generated] = &[
+    // Records first: what is compiled below reads them.
+    Generated { folder: "specs/records", whole: true, make: make::records },
+    Generated { folder: "specs", whole: false, make: make::schema },
+    Generated { folder: "docs", whole: false, make: make::docs },
+    Generated { folder: "firmware/controller", whole: true, make: make::reference_controller },
+    Generated { folder: "tests/golden", whole: true, make: make::goldens },
+];
 
 /// Compares every folder with what would be generated.
 pub fn check(root: &Path) -> Outcome {
@@ -55,13 +66,13 @@ pub fn bless(root: &Path) -> Outcome {
 fn all(
     root: &Path,
     list: &[Generated],
-    act: fn(&Path, &str, &Files) -> io::Result<Vec<String>>,
+    act: fn(&Path, &Generated, &Files) -> io::Result<Vec<String>>,
 ) -> Result<Vec<String>, String> {
     let mut lines = Vec::new();
     for generated in list {
         let files = (generated.make)(root).map_err(|why| format!("{}: {why}", generated.folder))?;
         lines.extend(
-            act(root, generated.folder, &files)
+            act(root, generated, &files)
                 .map_err(|error| format!("{}: {error}", generated.folder))?,
         );
     }
@@ -69,7 +80,8 @@ fn all(
 }
 
 /// One line per file that is missing, has another text, or should not be there.
-fn differences(root: &Path, folder: &str, files: &Files) -> io::Result<Vec<String>> {
+fn differences(root: &Path, generated: &Generated, files: &Files) -> io::Result<Vec<String>> {
+    let folder = generated.folder;
     let mut lines = Vec::new();
     let mut present = committed(&root.join(folder))?;
     for (path, text) in files {
@@ -84,23 +96,20 @@ fn differences(root: &Path, folder: &str, files: &Files) -> io::Result<Vec<Strin
             Some(_) => {}
         }
     }
-    lines.extend(
-        present
-            .keys()
-            .map(|path| format!("not generated: {folder}/{path}")),
-    );
+    if generated.whole {
+        lines.extend(present.keys().map(|path| format!("not generated: {folder}/{path}")));
+    }
     Ok(lines)
 }
 
 /// Makes the folder hold exactly these files; one line per change.
-fn replace(root: &Path, folder: &str, files: &Files) -> io::Result<Vec<String>> {
-    let lines = differences(root, folder, files)?;
-    let base = root.join(folder);
-    for path in committed(&base)?
-        .keys()
-        .filter(|path| !files.contains_key(*path))
-    {
-        fs::remove_file(base.join(path))?;
+fn replace(root: &Path, generated: &Generated, files: &Files) -> io::Result<Vec<String>> {
+    let lines = differences(root, generated, files)?;
+    let base = root.join(generated.folder);
+    if generated.whole {
+        for path in committed(&base)?.keys().filter(|path| !files.contains_key(*path)) {
+            fs::remove_file(base.join(path))?;
+        }
     }
     for (path, text) in files {
         let file = base.join(path);
@@ -169,15 +178,16 @@ mod tests {
         .map(|(path, text)| (path.to_owned(), text.to_owned()))
         .into();
 
-        let found = differences(root.path(), "made", &files).unwrap();
+        let made = Generated { folder: "made", whole: true, make: |_| Ok(Files::new()) };
+        let found = differences(root.path(), &made, &files).unwrap();
         let expected = [
             "missing: made/new/missing.rs",
             "stale: made/src/stale.rs, first in line 3",
             "not generated: made/extra.rs",
         ];
         assert_eq!(found, expected);
-        assert_eq!(replace(root.path(), "made", &files).unwrap(), expected);
-        assert_eq!(differences(root.path(), "made", &files).unwrap(), [""; 0]);
+        assert_eq!(replace(root.path(), &made, &files).unwrap(), expected);
+        assert_eq!(differences(root.path(), &made, &files).unwrap(), [""; 0]);
         assert!(!folder.join("extra.rs").exists());
     }
 }

@@ -6,11 +6,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use host_sim::controller::{Controller, TickController};
+use host_sim::controller::Controller;
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
-use host_sim::plant::{LegParameters, LegPlant, NoiseParameters, REFERENCE_LEG};
-use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, TRACKING_FREQUENCIES};
+use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
+use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, TRACKING_FREQUENCIES, select};
 use host_sim::table::{LinearityTable, TrackingTable};
 use serde_json::json;
 
@@ -56,16 +56,10 @@ pub struct PlantArguments {
 
 impl PlantArguments {
     fn read(&self) -> Result<(LegParameters, NoiseParameters), Failure> {
-        let (text, shown) = match &self.plant {
-            Some(path) => {
-                let text = fs::read_to_string(path)
-                    .map_err(|error| Failure::Gate(format!("could not read plant `{}`: {error}", path.display())))?;
-                (text, path.display().to_string())
-            }
-            None => (REFERENCE_LEG.to_owned(), "the reference leg".to_owned()),
+        let parameters = match &self.plant {
+            Some(path) => LegParameters::load(path).map_err(|error| Failure::Gate(error.to_string()))?,
+            None => LegParameters::reference(),
         };
-        let parameters =
-            LegParameters::from_json(&text).map_err(|error| Failure::Gate(format!("plant `{shown}`: {error}")))?;
         let noise = if self.no_noise { NoiseParameters::NONE } else { parameters.noise };
         Ok((parameters, noise))
     }
@@ -103,8 +97,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             ("tables.json".to_owned(), format!("{:#}\n", json!({ "tracking": tracking, "linearity": linearity })).into_bytes()),
         ];
         for (mode, word) in MODES {
+            select(&mut controller, word).map_err(|error| environment(&error))?;
             for frequency in TRACKING_FREQUENCIES {
-                host_sim::scenario::select(&mut controller, word).map_err(|error| environment(&error))?;
                 let run = scenario.run(&mut controller, frequency).map_err(|error| environment(&error))?;
                 let stem = format!("trace-{mode}-{frequency}hz");
                 files.push((format!("{stem}.csv"), run.trace.to_csv().into_bytes()));
@@ -133,12 +127,14 @@ fn text(name: &str, tracking: &TrackingTable, linearity: &LinearityTable) -> Str
         out.push('\n');
     }
     let _ = writeln!(out, "{name}: slope of Y on q̂, as a ratio to that at 0.1 Hz (paper's Table 1)");
-    let ratios = linearity.slope_ratios();
-    for ((row, ratio), paper) in linearity.rows.iter().zip(&ratios).zip(PAPER_TABLE_1) {
+    for (row, paper) in linearity.rows.iter().zip(PAPER_TABLE_1) {
         let _ = writeln!(
             out,
-            "  {:>5} Hz  slope {:.4}  offset {:>8.1} nm  ratio {ratio:.4} ({paper:.4})",
-            row.frequency_hz, row.slope, row.offset_nm
+            "  {:>5} Hz  λ {:.4}  offset {:>8.1} nm  ratio {:.4} ({paper:.4})",
+            row.frequency_hz,
+            row.gain_ratio,
+            row.offset_um * 1e3,
+            row.relative_slope
         );
     }
     out

@@ -1,6 +1,7 @@
 //! The registry of finding codes. A code never changes its meaning; a retired one is not used again.
 //!
-//! `docs/diagnostics.md` is generated from here, see [`super::reference_markdown`].
+//! `docs/diagnostics.md` is generated from here, see [`super::reference_markdown`]. E01: file and syntax, E02: keys and
+//! values, E03: ranges and consistency, E04: stability and lowering, E05: records, E06: identification.
 
 /// What a code stands for.
 #[derive(Debug, Clone, Copy)]
@@ -92,6 +93,70 @@ codes! {
         "Within one period the voltage may change by less than one code, so that it could never move.";
     BUDGET_NOT_WHOLE = "E0315", "not a whole number of bytes",
         "Memory is counted in whole bytes.";
+    UNSTABLE_STATIC = "E0401", "adaptation unstable on any leg",
+        "With these weights and the declared gain_ratio the loop grows even on a leg without dynamics (Appendix B). The help names the largest weight that would do.";
+    UNSTABLE_SAMPLED = "E0402", "adaptation unstable on this leg",
+        "The sampled loop of amplifier lag, resonance and adaptation has a spectral radius of 1 or more. The help names the largest weight that would do; a longer run helps as well.";
+    TOO_FEW_CODES = "E0410", "converter too coarse for the grid",
+        "There are fewer than two converter codes to a cell of the Preisach grid.";
+    SLEW_TOO_SLOW = "E0411", "slew rate too slow for the converter",
+        "The slew limit, in converter codes per tick, rounds down to none.";
+    RECORD_IO = "E0501", "a record cannot be opened",
+        "The CSV file does not exist or may not be read.";
+    RECORD_TOO_LARGE = "E0502", "a record is too large",
+        "Record at a lower rate, or keep every n-th sample.";
+    RECORD_NOT_TEXT = "E0503", "a record is not UTF-8 text",
+        "Export it as CSV text in UTF-8.";
+    RECORD_HEADER = "E0504", "a record without its columns",
+        "The first line names the columns, time, drive and displacement, with their units. The help shows it.";
+    RECORD_COLUMN_TWICE = "E0505", "a column given twice",
+        "Which of the two counts would be a guess.";
+    RECORD_VALUE = "E0506", "a value that is not a number",
+        "Values are plain numbers with a decimal point; every line has all columns.";
+    RECORD_LENGTHS = "E0507", "columns of different length",
+        "Every sample has a time, a drive and a displacement.";
+    RECORD_NOT_FINITE = "E0508", "a value that is not finite",
+        "NaN and infinity are no measurements.";
+    RECORD_TOO_SHORT = "E0509", "too few samples",
+        "Record more samples per reversal curve.";
+    RECORD_TIME = "E0510", "time does not rise",
+        "Every sample is later than the one before. Is the time column the right one, with enough digits?";
+    RECORD_GAP = "E0511", "a gap in the record",
+        "A reversal of the drive may be missing in it.";
+    RECORD_CONSTANT = "E0512", "a signal that never changes",
+        "The drive or the displacement is the same in every sample. Is the channel connected?";
+    RECORD_STUCK = "E0513", "displacement stuck or clipped",
+        "The displacement stays the same while the drive moves: the gauge is at the end of its range or disconnected.";
+    RECORD_RELATION = "E0514", "displacement does not follow the drive",
+        "It falls when the drive rises, or hardly follows it: a sign or a column is wrong.";
+    RECORD_UNIT = "W0515", "displacement in another unit?",
+        "The range is far from what a piezo actuator does; the column is in micrometres.";
+    GRID_NOT_IDENTIFIABLE = "E0601", "grid beyond identification",
+        "A table of that size cannot be fitted to a record.";
+    DRIVE_RANGE_EMPTY = "E0602", "empty drive range",
+        "The lowest voltage comes first.";
+    DRIVE_UNIT = "E0603", "drive in another unit?",
+        "The drive column is in volts at the stack.";
+    COLUMNS_SWAPPED = "E0604", "columns swapped?",
+        "Drive and displacement seem to have changed places.";
+    DRIVE_RANGE = "E0605", "record outside the declared drive range",
+        "The range of the record and the voltage limits of the spec must fit.";
+    NOT_EXCITED = "E0606", "record misses an end of the range",
+        "Between the curves the drive falls to the lowest voltage, and the last curves rise to the highest.";
+    TOO_FEW_CURVES = "E0607", "too few reversal curves",
+        "A grid needs about as many curves as it has intervals; or choose a coarser grid.";
+    FEW_CURVES = "W0608", "few reversal curves",
+        "Weights between the curves are interpolated.";
+    CELLS_INTERPOLATED = "W0609", "cells that were never excited",
+        "Their weights are interpolated from their neighbours.";
+    NOT_DETERMINED = "E0610", "weights not determined",
+        "Choose a coarser grid, or record more reversal curves.";
+    POOR_FIT = "W0611", "the table fits the record poorly",
+        "Is the record one actuator at one load, without steps or lost samples?";
+    VALIDATION_IDLE = "E0612", "validation record hardly moves",
+        "Validate with a record that moves the drive through the table's range.";
+    TABLE_FILE = "E0613", "not a table file",
+        "A table file is as `identify` writes it: three columns, the nodes of a triangle of rising thresholds.";
     STROKE_MISMATCH = "W0301", "stroke, gain and voltage do not fit",
         "stacks x stack_gain x voltage range is far from the stroke: one of the four is probably wrong, or the stroke is never used.";
     RESONANCE_ALIASED = "W0302", "resonance above half the tick rate",

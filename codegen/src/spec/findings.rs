@@ -7,6 +7,9 @@ use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 /// More findings than this are cut: a file with so many is not a spec with mistakes.
 pub(super) const MAX_FINDINGS: usize = 100;
 
+/// More are not even kept: a megabyte of slips would take a hundred megabytes of messages.
+const MAX_KEPT: usize = 5000;
+
 /// Findings of one run over one spec.
 #[derive(Debug, Default)]
 pub(super) struct Findings {
@@ -53,6 +56,10 @@ impl Findings {
         message: String,
         help: String,
     ) {
+        if self.list.len() >= MAX_KEPT {
+            self.left_out += 1;
+            return;
+        }
         self.list.push(Diagnostic {
             severity,
             code,

@@ -93,6 +93,6 @@ fn symbol(key: &Key) -> String {
     if key.symbol.is_empty() {
         String::new()
     } else {
-        format!("{}: ", key.symbol.replace('_', "\\_"))
+        format!("{}: ", key.symbol)
     }
 }

@@ -133,7 +133,7 @@ fn describe(key: &Key) -> String {
     };
     let range = match key.shape {
         Shape::One(item @ (Item::Quantity { .. } | Item::Number(_) | Item::Integer(..))) => {
-            format!(" {}.", range_of(item))
+            format!(" Range: {}.", range_of(item))
         }
         _ => String::new(),
     };

@@ -4,7 +4,7 @@
 //! handler calls a function that does not exist: **it links only if no panic path is left** in the controller.
 //!
 //! Words are as in `controller::INPUT_NAMES`, `OUTPUT_NAMES`, `CONFIG_NAMES`. `Config` and `State` live in memory of the
-//! caller, of the size and alignment that [`specgen_layout`] states.
+//! caller, of the size and alignment that [`specgen_describe`] states.
 //! Pointers are not verified here: a caller in a safe language wraps this once and checks [`specgen_abi_version`] first.
 #![no_std]
 #![deny(missing_docs)]
@@ -31,7 +31,8 @@ pub extern "C" fn specgen_abi_version() -> u32 {
     ABI_VERSION
 }
 
-/// What this controller is: `key=value` lines in UTF-8, see `controller::DESCRIPTION`.
+/// What this controller is: `key=value` lines in UTF-8, those of `controller::DESCRIPTION` and `state_bytes`,
+/// `state_align`, `config_bytes`, `config_align`.
 ///
 /// # Safety
 /// `text` and `length` point to writable memory. The text lives as long as the library is loaded.
@@ -39,22 +40,58 @@ pub extern "C" fn specgen_abi_version() -> u32 {
 pub unsafe extern "C" fn specgen_describe(text: *mut *const u8, length: *mut usize) {
     // SAFETY: the caller's duty.
     unsafe {
-        text.write(controller::DESCRIPTION.as_ptr());
-        length.write(controller::DESCRIPTION.len());
+        text.write(DESCRIPTION.as_ptr());
+        length.write(DESCRIPTION.len());
     }
 }
 
-/// Memory that the caller provides, in bytes: 0 size of `State`, 1 its alignment, 2 size of `Config`, 3 its alignment;
-/// anything else gives 0.
-#[unsafe(no_mangle)]
-pub extern "C" fn specgen_layout(what: u32) -> usize {
-    match what {
-        0 => size_of::<State>(),
-        1 => align_of::<State>(),
-        2 => size_of::<Config>(),
-        3 => align_of::<Config>(),
-        _ => 0,
+/// Keys of the memory that the caller provides, with their values.
+const MEMORY: [(&str, usize); 4] = [
+    ("state_bytes=", size_of::<State>()),
+    ("state_align=", align_of::<State>()),
+    ("config_bytes=", size_of::<Config>()),
+    ("config_align=", align_of::<Config>()),
+];
+/// Decimal digits of each value, leading zeros included.
+const DIGITS: usize = 8;
+const DESCRIPTION_LENGTH: usize = {
+    let mut length = controller::DESCRIPTION.len();
+    let mut k = 0;
+    while k < MEMORY.len() {
+        length += MEMORY[k].0.len() + DIGITS + 1;
+        k += 1;
     }
+    length
+};
+static DESCRIPTION: [u8; DESCRIPTION_LENGTH] = describe();
+
+/// The controller's own description, then the lines of [`MEMORY`]; evaluated by the compiler.
+const fn describe() -> [u8; DESCRIPTION_LENGTH] {
+    let mut text = [b'\n'; DESCRIPTION_LENGTH];
+    let mut end = append(&mut text, 0, controller::DESCRIPTION);
+    let mut k = 0;
+    while k < MEMORY.len() {
+        let (key, mut value) = MEMORY[k];
+        end = append(&mut text, end, key);
+        let mut digit = DIGITS;
+        while digit > 0 {
+            digit -= 1;
+            text[end + digit] = b'0' + (value % 10) as u8;
+            value /= 10;
+        }
+        end += DIGITS + 1;
+        k += 1;
+    }
+    text
+}
+
+const fn append(text: &mut [u8; DESCRIPTION_LENGTH], start: usize, piece: &str) -> usize {
+    let mut k = 0;
+    while k < piece.len() {
+        text[start + k] = piece.as_bytes()[k];
+        k += 1;
+    }
+    start + k
 }
 
 /// The spec's settings as words.
@@ -65,6 +102,19 @@ pub extern "C" fn specgen_layout(what: u32) -> usize {
 pub unsafe extern "C" fn specgen_config_default(words: *mut u64) {
     // SAFETY: the caller's duty.
     unsafe { words.cast::<[u64; CONFIG_WORDS]>().write(Config::new().to_words()) }
+}
+
+/// Whether words make a `Config`: 0, or one more than the index of the first word out of range.
+///
+/// # Safety
+/// `words` points to `CONFIG_WORDS` words.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_config_check(words: *const u64) -> i32 {
+    // SAFETY: the caller's duty.
+    match Config::from_words(&unsafe { words.cast::<[u64; CONFIG_WORDS]>().read() }) {
+        Ok(_) => 0,
+        Err(error) => error.word as i32 + 1,
+    }
 }
 
 /// Makes a `Config` of words: returns 0, or one more than the index of the first word out of range (then `config` is as

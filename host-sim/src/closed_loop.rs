@@ -1,0 +1,426 @@
+//! Six legs under a controller, tick by tick.
+//!
+//! At tick n (time t_n) the controller gets the set-point for the end of the coming interval, T_{n+1}, and the gauge
+//! readings Y_n; its voltages are held until t_{n+1}, where Y_{n+1} is read.
+
+use std::fmt;
+
+use crate::controller::{ControllerError, TickController};
+use crate::description::DescriptionError;
+use crate::noise::{Gauge, Gaussian, amplifier};
+use crate::plant::{NoiseParameters, Plant};
+use crate::trace::Trace;
+use crate::trajectory::LegTrajectory;
+
+/// Legs of a platform.
+pub const LEGS: usize = 6;
+
+/// Longest control interval, s.
+const LONGEST_INTERVAL: f64 = 60.0;
+
+/// One leg with what surrounds it.
+#[derive(Debug, Clone)]
+struct Channel<P> {
+    leg: P,
+    gauge: Gauge,
+    amplifier: Gaussian,
+}
+
+/// Six legs with gauges and amplifiers.
+#[derive(Debug, Clone)]
+pub struct Rig<P> {
+    channels: [Channel<P>; LEGS],
+}
+
+/// What is done to the legs before the gauges are zeroed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Preparation {
+    /// Peak of the saturating pre-cycle 0 → peak → 0, V.
+    pub peak: f64,
+    /// Its slope, V/s.
+    pub rate: f64,
+    /// Rest at 0 V after it, s.
+    pub settle: f64,
+    /// Longest time a drive value is held while ramping, s.
+    pub update: f64,
+}
+
+/// What the legs did, in metres.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracking {
+    /// Time between samples, s.
+    pub interval: f64,
+    /// One sample per tick, at its end.
+    pub samples: Vec<TrackingSample>,
+}
+
+/// The end of one tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackingSample {
+    /// t_n, s.
+    pub time: f64,
+    /// T_n, m.
+    pub target: [f64; LEGS],
+    /// q̂_n = ρ̂ X_n, the displacement that the controller requested, m.
+    pub requested: [f64; LEGS],
+    /// Y_n, m.
+    pub measured: [f64; LEGS],
+}
+
+/// A closed-loop run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Every word.
+    pub trace: Trace,
+    /// The same in metres, with the reading at the end of each tick.
+    pub tracking: Tracking,
+}
+
+/// Why a run ended early.
+#[derive(Debug)]
+pub enum RunError {
+    /// The controller lacks a word that the loop needs, or refuses a configuration.
+    Controller(ControllerError),
+    /// It asked for a voltage that is not a number.
+    NotFinite {
+        /// Tick, counted from 0.
+        tick: usize,
+        /// Leg, counted from 0.
+        leg: usize,
+    },
+    /// The run cannot be laid out.
+    Timing {
+        /// Control interval, s.
+        interval: f64,
+        /// Length of the trajectory, s.
+        duration: f64,
+    },
+}
+
+impl fmt::Display for RunError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Controller(error) => error.fmt(f),
+            Self::NotFinite { tick, leg } => {
+                write!(
+                    f,
+                    "tick {tick}: the controller's voltage[{leg}] is not finite, which its design forbids; report this as a defect of specgen with the spec"
+                )
+            }
+            Self::Timing { interval, duration } => {
+                write!(
+                    f,
+                    "a control interval of {interval} s in a trajectory of {duration} s; expected 1 to 100,000,000 ticks of at most {LONGEST_INTERVAL} s"
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for RunError {}
+
+impl From<ControllerError> for RunError {
+    fn from(error: ControllerError) -> Self {
+        Self::Controller(error)
+    }
+}
+
+impl From<DescriptionError> for RunError {
+    fn from(error: DescriptionError) -> Self {
+        Self::Controller(error.into())
+    }
+}
+
+impl<P: Plant> Rig<P> {
+    /// Legs as built, each with its own stream of noise from one seed.
+    #[must_use]
+    pub fn new(legs: [P; LEGS], noise: &NoiseParameters, seed: u64) -> Self {
+        let mut index = 0;
+        let channels = legs.map(|leg| {
+            let channel = Channel {
+                leg,
+                gauge: Gauge::new(noise, seed, index),
+                amplifier: amplifier(noise, seed, index),
+            };
+            index += 1;
+            channel
+        });
+        Self { channels }
+    }
+
+    /// Pre-cycle, rest, then zeroes the gauges.
+    pub fn prepare(&mut self, preparation: &Preparation) {
+        let Preparation {
+            peak,
+            rate,
+            settle,
+            update,
+        } = *preparation;
+        for Channel { leg, gauge, .. } in &mut self.channels {
+            leg.ramp(0.0, peak, peak / rate, update);
+            leg.ramp(peak, 0.0, peak / rate, update);
+            if settle > 0.0 {
+                leg.hold(0.0, settle);
+            }
+            gauge.zero_at(leg.displacement());
+        }
+    }
+
+    /// Runs `controller`, reset to power-up, over a leg trajectory with ticks of `interval` (s).
+    ///
+    /// # Errors
+    /// If the controller lacks a word that the loop needs, a voltage is not finite, or there would be no tick.
+    pub fn run(
+        &mut self,
+        controller: &mut dyn TickController,
+        trajectory: &dyn LegTrajectory,
+        interval: f64,
+    ) -> Result<Run, RunError> {
+        let duration = trajectory.duration();
+        // The slack keeps the last tick when the ratio is whole but for rounding.
+        let ticks = libm::floor(duration / interval + 1e-6);
+        if !(interval > 0.0 && interval <= LONGEST_INTERVAL && (1.0..=1e8).contains(&ticks)) {
+            return Err(RunError::Timing { interval, duration });
+        }
+        let ticks = ticks as usize;
+
+        let wiring = Wiring::of(controller)?;
+        let mut trace = Trace::new(controller.description().clone());
+        let mut samples = Vec::with_capacity(ticks);
+        let scalar = controller.description().scalar;
+        let mut input = vec![0; controller.description().input_names.len()];
+        let mut output = vec![0; controller.description().output_names.len()];
+        controller.reset();
+        let mut measured = self.read();
+        for tick in 0..ticks {
+            let time = (tick + 1) as f64 * interval;
+            let target = trajectory.displacements(time);
+            for leg in 0..LEGS {
+                input[wiring.setpoint[leg]] = scalar.encode(target[leg]);
+                input[wiring.displacement[leg]] = scalar.encode(measured[leg]);
+            }
+            controller.step(&input, &mut output);
+            trace.push(&input, &output, controller.state_digest());
+
+            let mut requested = [0.0; LEGS];
+            for (leg, channel) in self.channels.iter_mut().enumerate() {
+                let voltage = scalar.decode(output[wiring.voltage[leg]]);
+                if !voltage.is_finite() {
+                    return Err(RunError::NotFinite { tick, leg });
+                }
+                requested[leg] = scalar.decode(output[wiring.requested[leg]]);
+                channel
+                    .leg
+                    .hold(voltage + channel.amplifier.draw(), interval);
+            }
+            measured = self.read();
+            samples.push(TrackingSample {
+                time,
+                target,
+                requested,
+                measured,
+            });
+        }
+        Ok(Run {
+            trace,
+            tracking: Tracking { interval, samples },
+        })
+    }
+
+    fn read(&mut self) -> [f64; LEGS] {
+        self.channels
+            .each_mut()
+            .map(|channel| channel.gauge.read(channel.leg.displacement()))
+    }
+}
+
+/// Places of the words that the loop connects.
+struct Wiring {
+    setpoint: [usize; LEGS],
+    displacement: [usize; LEGS],
+    voltage: [usize; LEGS],
+    requested: [usize; LEGS],
+}
+
+impl Wiring {
+    fn of(controller: &dyn TickController) -> Result<Self, DescriptionError> {
+        let description = controller.description();
+        let six = |stem: &str, find: &dyn Fn(&str) -> Result<usize, DescriptionError>| {
+            let mut places = [0; LEGS];
+            for (leg, place) in places.iter_mut().enumerate() {
+                *place = find(&format!("{stem}[{leg}]"))?;
+            }
+            Ok::<_, DescriptionError>(places)
+        };
+        Ok(Self {
+            setpoint: six("setpoint", &|name| description.input(name))?,
+            displacement: six("displacement", &|name| description.input(name))?,
+            voltage: six("voltage", &|name| description.output(name))?,
+            requested: six("requested", &|name| description.output(name))?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::{Description, tests::six_legs};
+    use crate::word::Scalar;
+
+    /// A leg of 1 µm/V, at once; it notes what it was told.
+    #[derive(Clone, Default)]
+    struct Spring {
+        drive: f64,
+    }
+
+    impl Plant for Spring {
+        fn hold(&mut self, drive: f64, _interval: f64) -> f64 {
+            self.drive = drive;
+            self.displacement()
+        }
+        fn displacement(&self) -> f64 {
+            5e-6 + self.drive * 1e-6
+        }
+        fn reset(&mut self) {
+            self.drive = 0.0;
+        }
+    }
+
+    /// Outputs setpoint · 1e6 V, requests the set-point, and counts ticks in its digest.
+    struct Follower {
+        description: Description,
+        ticks: u64,
+        gain: f64,
+    }
+
+    impl TickController for Follower {
+        fn description(&self) -> &Description {
+            &self.description
+        }
+        fn default_config(&self) -> Vec<u64> {
+            vec![0; 3]
+        }
+        fn configure(&mut self, _words: &[u64]) -> Result<(), ControllerError> {
+            Ok(())
+        }
+        fn reset(&mut self) {
+            self.ticks = 0;
+        }
+        fn step(&mut self, input: &[u64], output: &mut [u64]) {
+            let scalar = self.description.scalar;
+            for leg in 0..LEGS {
+                let setpoint = scalar.decode(input[leg]);
+                output[leg] = scalar.encode(setpoint * self.gain);
+                output[LEGS + leg] = input[leg];
+            }
+            self.ticks += 1;
+        }
+        fn state_digest(&self) -> u64 {
+            self.ticks
+        }
+    }
+
+    /// Rises by 1 µm per s per leg number.
+    struct Slope;
+
+    impl LegTrajectory for Slope {
+        fn duration(&self) -> f64 {
+            1.0
+        }
+        fn displacements(&self, time: f64) -> [f64; LEGS] {
+            std::array::from_fn(|leg| time * 1e-6 * (leg + 1) as f64)
+        }
+    }
+
+    fn rig() -> Rig<Spring> {
+        let mut rig = Rig::new(
+            std::array::from_fn(|_| Spring::default()),
+            &NoiseParameters::NONE,
+            1,
+        );
+        rig.prepare(&Preparation {
+            peak: 100.0,
+            rate: 20.0,
+            settle: 0.7,
+            update: 1e-2,
+        });
+        rig
+    }
+
+    fn follower(gain: f64) -> Follower {
+        Follower {
+            description: six_legs(Scalar::F64),
+            ticks: 99,
+            gain,
+        }
+    }
+
+    #[test]
+    fn the_setpoint_is_that_of_the_end_of_the_interval_and_readings_are_from_zero() {
+        let run = rig().run(&mut follower(1e6), &Slope, 0.1).unwrap();
+        assert_eq!(run.trace.len(), 10);
+        assert_eq!(run.tracking.samples.len(), 10);
+        let first = run.trace.rows().next().unwrap();
+        assert_eq!(f64::from_bits(first[2]), 0.1 * 1e-6 * 3.0);
+        assert_eq!(f64::from_bits(first[6 + 2]), 0.0);
+        for (row, sample) in run.trace.rows().skip(1).zip(&run.tracking.samples) {
+            for leg in 0..LEGS {
+                assert!((sample.measured[leg] - sample.target[leg]).abs() < 1e-20);
+                assert_eq!(f64::from_bits(row[6 + leg]), sample.measured[leg]);
+            }
+        }
+        // Reset before the run, and one digest per tick.
+        assert_eq!(
+            run.trace.rows().map(|row| row[49]).collect::<Vec<_>>(),
+            (1..=10).collect::<Vec<_>>()
+        );
+    }
+
+    #[test]
+    fn a_voltage_that_is_not_finite_ends_the_run() {
+        let error = rig()
+            .run(&mut follower(f64::NAN), &Slope, 0.1)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.starts_with("tick 0: the controller's voltage[0] is not finite"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn an_impossible_interval_or_a_missing_word_is_refused() {
+        for interval in [0.0, -1.0, f64::NAN, 2.0, 1e-12] {
+            assert!(
+                matches!(
+                    rig().run(&mut follower(1e6), &Slope, interval),
+                    Err(RunError::Timing { .. })
+                ),
+                "{interval}"
+            );
+        }
+        let mut controller = follower(1e6);
+        controller.description.output_names[3] = "volts".to_owned();
+        let error = rig()
+            .run(&mut controller, &Slope, 0.1)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("no word `voltage[3]`"), "{error}");
+    }
+
+    #[test]
+    fn noise_repeats_with_its_seed() {
+        let noise = NoiseParameters {
+            sensor_nm_rms: 2.0,
+            adc_lsb_nm: 0.76,
+            dac_lsb_mv: 0.0,
+            amplifier_mv_rms: 2.0,
+        };
+        let run = |seed| {
+            let mut rig = Rig::new(std::array::from_fn(|_| Spring::default()), &noise, seed);
+            rig.run(&mut follower(1e6), &Slope, 0.1).unwrap().trace
+        };
+        assert_eq!(run(3), run(3));
+        assert_ne!(run(3), run(4));
+    }
+}

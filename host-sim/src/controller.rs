@@ -1,0 +1,401 @@
+//! Runs an emitted controller's host shared library; the only module with unsafe code.
+//!
+//! The library's C interface, version 1: `specgen_abi_version`, `_describe`, `_config_default`, `_config_check`,
+//! `_config_load`, `_state_reset`, `_step`, `_state_digest`.
+#![allow(unsafe_code)]
+
+use std::alloc::{Layout, alloc_zeroed, dealloc, handle_alloc_error};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::ptr::NonNull;
+
+use libloading::Library;
+
+use crate::description::{Description, DescriptionError, fields};
+
+/// Version of the C interface that this module speaks.
+pub const ABI_VERSION: u32 = 1;
+
+/// Something that runs one control tick: the emitted controller, or a stand-in in a test.
+pub trait TickController {
+    /// Names and arithmetic.
+    fn description(&self) -> &Description;
+
+    /// Configuration words of the spec.
+    fn default_config(&self) -> Vec<u64>;
+
+    /// Takes a configuration; state is kept.
+    ///
+    /// # Errors
+    /// If the number of words is wrong or a word is refused; the configuration in force then stays.
+    fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError>;
+
+    /// State as at power-up.
+    fn reset(&mut self);
+
+    /// One tick.
+    ///
+    /// # Panics
+    /// If `input` or `output` has not as many words as the description names.
+    fn step(&mut self, input: &[u64], output: &mut [u64]);
+
+    /// Digest of the state.
+    fn state_digest(&self) -> u64;
+}
+
+/// Why a controller cannot be run.
+#[derive(Debug)]
+pub enum ControllerError {
+    /// The library cannot be opened, or lacks a function.
+    Load {
+        /// The file.
+        path: PathBuf,
+        /// What the loader says.
+        cause: libloading::Error,
+    },
+    /// It speaks another version of the interface.
+    Abi {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        found: u32,
+    },
+    /// Its self-description is unusable.
+    Description(DescriptionError),
+    /// A configuration of the wrong length.
+    ConfigLength {
+        /// Number of words given.
+        given: usize,
+        /// Number of words of the controller.
+        expected: usize,
+    },
+    /// A configuration word is refused.
+    Config {
+        /// Name of the word.
+        name: String,
+        /// Its bits.
+        word: u64,
+    },
+}
+
+impl fmt::Display for ControllerError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Load { path, cause } => {
+                write!(
+                    f,
+                    "{}: not a controller library: {}; build the host library of the emitted workspace and name its file",
+                    path.display(),
+                    reasons(cause)
+                )
+            }
+            Self::Abi { path, found } => {
+                write!(
+                    f,
+                    "{}: interface version {found}, expected {ABI_VERSION}; build it with this specgen",
+                    path.display()
+                )
+            }
+            Self::Description(error) => error.fmt(f),
+            Self::ConfigLength { given, expected } => {
+                write!(
+                    f,
+                    "{given} configuration words; this controller has {expected}"
+                )
+            }
+            Self::Config { name, word } => {
+                write!(
+                    f,
+                    "the controller refuses configuration word `{name}` = {word:016x}; its range is in the spec's documentation"
+                )
+            }
+        }
+    }
+}
+
+/// An error with the reasons behind it, which the loader keeps apart.
+fn reasons(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut next = error.source();
+    while let Some(error) = next {
+        text.push_str(": ");
+        text.push_str(&error.to_string());
+        next = error.source();
+    }
+    text
+}
+
+impl std::error::Error for ControllerError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Load { cause, .. } => Some(cause),
+            Self::Description(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+impl From<DescriptionError> for ControllerError {
+    fn from(error: DescriptionError) -> Self {
+        Self::Description(error)
+    }
+}
+
+/// The library's functions. Valid while the library is loaded.
+struct Functions {
+    config_default: unsafe extern "C" fn(*mut u64),
+    config_check: unsafe extern "C" fn(*const u64) -> i32,
+    config_load: unsafe extern "C" fn(*mut u8, *const u64) -> i32,
+    state_reset: unsafe extern "C" fn(*mut u8),
+    step: unsafe extern "C" fn(*const u8, *mut u8, *const u64, *mut u64),
+    state_digest: unsafe extern "C" fn(*const u8) -> u64,
+}
+
+/// An emitted controller with one configuration and one state.
+pub struct Controller {
+    description: Description,
+    functions: Functions,
+    config: Buffer,
+    state: Buffer,
+    /// Last, so that it is unloaded after everything else.
+    _library: Library,
+}
+
+impl Controller {
+    /// Loads a controller's host library, with the spec's configuration and the power-up state.
+    ///
+    /// # Errors
+    /// If the file is no such library, speaks another version, or describes itself badly.
+    pub fn load(path: &Path) -> Result<Self, ControllerError> {
+        let failed = |cause| ControllerError::Load {
+            path: path.to_owned(),
+            cause,
+        };
+        // SAFETY: loading runs the library's initialisers. The caller names a controller library; an emitted one has none.
+        let library = unsafe { Library::new(path) }.map_err(failed)?;
+
+        // SAFETY: the types are those of interface version 1; the version function itself is the same in every version,
+        // and is asked before any other is called. The pointers are used only while `library` lives, see `Controller`.
+        let (describe, functions) = unsafe {
+            let abi_version: unsafe extern "C" fn() -> u32 =
+                *library.get(b"specgen_abi_version\0").map_err(failed)?;
+            let found = abi_version();
+            if found != ABI_VERSION {
+                return Err(ControllerError::Abi {
+                    path: path.to_owned(),
+                    found,
+                });
+            }
+            let describe: unsafe extern "C" fn(*mut *const u8, *mut usize) =
+                *library.get(b"specgen_describe\0").map_err(failed)?;
+            let functions = Functions {
+                config_default: *library.get(b"specgen_config_default\0").map_err(failed)?,
+                config_check: *library.get(b"specgen_config_check\0").map_err(failed)?,
+                config_load: *library.get(b"specgen_config_load\0").map_err(failed)?,
+                state_reset: *library.get(b"specgen_state_reset\0").map_err(failed)?,
+                step: *library.get(b"specgen_step\0").map_err(failed)?,
+                state_digest: *library.get(b"specgen_state_digest\0").map_err(failed)?,
+            };
+            (describe, functions)
+        };
+
+        let mut start = std::ptr::null();
+        let mut length = 0;
+        // SAFETY: both pointers are to live locals.
+        unsafe { describe(&raw mut start, &raw mut length) };
+        let text = if start.is_null() {
+            String::new()
+        } else {
+            // SAFETY: the library points to `length` bytes of its own constant data; they are copied here.
+            String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(start, length) })
+                .into_owned()
+        };
+        let description = Description::parse(&text)?;
+        let state = Buffer::new(layout(&text, "state_bytes", "state_align")?);
+        let config = Buffer::new(layout(&text, "config_bytes", "config_align")?);
+
+        let mut controller = Self {
+            description,
+            functions,
+            config,
+            state,
+            _library: library,
+        };
+        let words = controller.default_config();
+        controller.configure(&words)?;
+        controller.reset();
+        Ok(controller)
+    }
+}
+
+impl TickController for Controller {
+    fn description(&self) -> &Description {
+        &self.description
+    }
+
+    fn default_config(&self) -> Vec<u64> {
+        let mut words = vec![0; self.description.config_names.len()];
+        // SAFETY: as many words as the library says it writes.
+        unsafe { (self.functions.config_default)(words.as_mut_ptr()) };
+        words
+    }
+
+    fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
+        let expected = self.description.config_names.len();
+        if words.len() != expected {
+            return Err(ControllerError::ConfigLength {
+                given: words.len(),
+                expected,
+            });
+        }
+        // SAFETY: as many words as the library says it reads.
+        let mut bad = unsafe { (self.functions.config_check)(words.as_ptr()) };
+        if bad == 0 {
+            // SAFETY: the buffer has the size and alignment that the library asks for; the words as above.
+            bad = unsafe { (self.functions.config_load)(self.config.start(), words.as_ptr()) };
+        }
+        if bad == 0 {
+            return Ok(());
+        }
+        let index = usize::try_from(bad).ok().and_then(|bad| bad.checked_sub(1));
+        let name = index.and_then(|index| self.description.config_names.get(index));
+        Err(ControllerError::Config {
+            name: name.cloned().unwrap_or_else(|| format!("number {bad}")),
+            word: index
+                .and_then(|index| words.get(index).copied())
+                .unwrap_or_default(),
+        })
+    }
+
+    fn reset(&mut self) {
+        // SAFETY: the buffer has the size and alignment that the library asks for.
+        unsafe { (self.functions.state_reset)(self.state.start()) };
+    }
+
+    fn step(&mut self, input: &[u64], output: &mut [u64]) {
+        assert_eq!(
+            input.len(),
+            self.description.input_names.len(),
+            "input words"
+        );
+        assert_eq!(
+            output.len(),
+            self.description.output_names.len(),
+            "output words"
+        );
+        // SAFETY: `load` initialised both buffers; the slices have the lengths that the library says, checked above.
+        unsafe {
+            (self.functions.step)(
+                self.config.start(),
+                self.state.start(),
+                input.as_ptr(),
+                output.as_mut_ptr(),
+            );
+        }
+    }
+
+    fn state_digest(&self) -> u64 {
+        // SAFETY: `load` initialised the state.
+        unsafe { (self.functions.state_digest)(self.state.start()) }
+    }
+}
+
+/// Zeroed memory of a given size and alignment.
+struct Buffer {
+    start: NonNull<u8>,
+    layout: Layout,
+}
+
+impl Buffer {
+    /// `layout` has a size above 0, see [`layout`].
+    fn new(layout: Layout) -> Self {
+        // SAFETY: the size is above 0.
+        let start = unsafe { alloc_zeroed(layout) };
+        match NonNull::new(start) {
+            Some(start) => Self { start, layout },
+            None => handle_alloc_error(layout),
+        }
+    }
+
+    fn start(&self) -> *mut u8 {
+        self.start.as_ptr()
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: allocated in `new` with this layout, and freed once.
+        unsafe { dealloc(self.start.as_ptr(), self.layout) };
+    }
+}
+
+/// Size and alignment under two keys of a description; a size of 0 becomes 1.
+fn layout(
+    text: &str,
+    size_key: &'static str,
+    align_key: &'static str,
+) -> Result<Layout, DescriptionError> {
+    let fields = fields(text);
+    let number = |key: &'static str| -> Result<usize, DescriptionError> {
+        let value = fields.get(key).ok_or(DescriptionError::Missing(key))?;
+        // A gigabyte is far beyond any controller, and an allocation that would abort the process.
+        value
+            .parse()
+            .ok()
+            .filter(|size| *size <= 1 << 30)
+            .ok_or_else(|| DescriptionError::Bad {
+                key,
+                value: (*value).to_owned(),
+                expected: "a number of bytes up to 2^30",
+            })
+    };
+    let (size, align) = (number(size_key)?, number(align_key)?);
+    Layout::from_size_align(size.max(1), align).map_err(|_| DescriptionError::Bad {
+        key: align_key,
+        value: align.to_string(),
+        expected: "a power of two",
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_buffer_has_the_alignment_asked_for_and_starts_zeroed() {
+        for align in [1, 8, 64, 4096] {
+            let buffer = Buffer::new(Layout::from_size_align(100, align).unwrap());
+            assert_eq!(buffer.start() as usize % align, 0);
+            // SAFETY: the first of 100 bytes.
+            assert_eq!(unsafe { *buffer.start() }, 0);
+        }
+    }
+
+    #[test]
+    fn a_bad_layout_is_refused_by_key() {
+        let refused = |text: &str| {
+            layout(text, "state_bytes", "state_align")
+                .unwrap_err()
+                .to_string()
+        };
+        assert!(refused("state_bytes=8\n").contains("lacks `state_align`"));
+        assert!(
+            refused("state_bytes=8\nstate_align=3\n")
+                .contains("`state_align=3`; expected a power of two")
+        );
+        assert!(refused("state_bytes=99999999999\nstate_align=8\n").contains("up to 2^30"));
+        assert!(refused("state_bytes=-1\nstate_align=8\n").contains("`state_bytes=-1`"));
+    }
+
+    #[test]
+    fn a_file_that_is_no_library_is_refused_with_its_name() {
+        let Err(error) = Controller::load(Path::new("no/such/library.so")) else {
+            panic!("loaded")
+        };
+        let text = error.to_string();
+        assert!(
+            text.starts_with("no/such/library.so: not a controller library"),
+            "{text}"
+        );
+    }
+}

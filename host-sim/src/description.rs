@@ -1,0 +1,301 @@
+//! What a controller says about itself: its spec, its arithmetic and the names of its words.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use crate::word::{Scalar, WordKind};
+
+/// Self-description of a controller, as `key=value` lines.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Description {
+    /// Name of the spec.
+    pub name: String,
+    /// Digest of the spec, hexadecimal.
+    pub digest: String,
+    /// Version of the compiler that emitted it.
+    pub version: String,
+    /// Arithmetic.
+    pub scalar: Scalar,
+    /// Configuration words in order.
+    pub config_names: Vec<String>,
+    /// Input words in order.
+    pub input_names: Vec<String>,
+    /// Output words in order.
+    pub output_names: Vec<String>,
+}
+
+/// Why a description or a name was refused.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DescriptionError {
+    /// A key is missing.
+    Missing(&'static str),
+    /// A key has a value that cannot be.
+    Bad {
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        value: String,
+        /// What is expected.
+        expected: &'static str,
+    },
+    /// A word that is asked for is not among the controller's.
+    NoWord {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: Vec<String>,
+    },
+    /// A number that the word cannot hold.
+    NotAWord {
+        /// The word's name.
+        name: String,
+        /// The number.
+        value: f64,
+    },
+}
+
+impl fmt::Display for DescriptionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing(key) => {
+                write!(
+                    f,
+                    "the controller's description lacks `{key}`; it was built by another version of specgen: build it again"
+                )
+            }
+            Self::Bad {
+                key,
+                value,
+                expected,
+            } => {
+                write!(
+                    f,
+                    "the controller's description has `{key}={value}`; expected {expected}: build it again"
+                )
+            }
+            Self::NoWord { name, known } => {
+                write!(
+                    f,
+                    "the controller has no word `{name}`; it has {}",
+                    known.join(", ")
+                )
+            }
+            Self::NotAWord { name, value } => {
+                write!(
+                    f,
+                    "`{name}` cannot be {value}; expected a whole number from 0 to 2^53"
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for DescriptionError {}
+
+impl Description {
+    /// Parses `key=value` lines. Keys that are not known are left alone; they may belong to a later version.
+    ///
+    /// # Errors
+    /// If a key is missing or has a value that cannot be.
+    pub fn parse(text: &str) -> Result<Self, DescriptionError> {
+        let fields = fields(text);
+        let field = |key: &'static str| {
+            fields
+                .get(key)
+                .copied()
+                .ok_or(DescriptionError::Missing(key))
+        };
+        let names = |key| -> Result<Vec<String>, DescriptionError> {
+            let text = field(key)?;
+            Ok(if text.is_empty() {
+                Vec::new()
+            } else {
+                text.split(',').map(str::to_owned).collect()
+            })
+        };
+        let bits = field("scalar_bits")?;
+        let scalar = bits
+            .parse()
+            .ok()
+            .and_then(Scalar::from_bits)
+            .ok_or_else(|| DescriptionError::Bad {
+                key: "scalar_bits",
+                value: bits.to_owned(),
+                expected: "32 or 64",
+            })?;
+        Ok(Self {
+            name: field("name")?.to_owned(),
+            digest: field("digest")?.to_owned(),
+            version: field("version")?.to_owned(),
+            scalar,
+            config_names: names("config_names")?,
+            input_names: names("input_names")?,
+            output_names: names("output_names")?,
+        })
+    }
+
+    /// The lines that [`Description::parse`] reads.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        format!(
+            "name={}\ndigest={}\nversion={}\nscalar_bits={}\nconfig_names={}\ninput_names={}\noutput_names={}\n",
+            self.name,
+            self.digest,
+            self.version,
+            self.scalar.bits(),
+            self.config_names.join(","),
+            self.input_names.join(","),
+            self.output_names.join(",")
+        )
+    }
+
+    /// Place of an input word.
+    ///
+    /// # Errors
+    /// If there is none of that name.
+    pub fn input(&self, name: &str) -> Result<usize, DescriptionError> {
+        position(&self.input_names, name)
+    }
+
+    /// Place of an output word.
+    ///
+    /// # Errors
+    /// If there is none of that name.
+    pub fn output(&self, name: &str) -> Result<usize, DescriptionError> {
+        position(&self.output_names, name)
+    }
+
+    /// Sets one configuration word by name, as a real or an integer according to its kind.
+    ///
+    /// # Errors
+    /// If there is none of that name, or an integer word is given another number.
+    pub fn set_config(
+        &self,
+        words: &mut [u64],
+        name: &str,
+        value: f64,
+    ) -> Result<(), DescriptionError> {
+        let place = position(&self.config_names, name)?;
+        if let Some(slot) = words.get_mut(place) {
+            *slot = self.encode(name, value)?;
+        }
+        Ok(())
+    }
+
+    /// Word of `value` for the signal `name`.
+    ///
+    /// # Errors
+    /// If the signal is an integer and `value` is not one.
+    pub fn encode(&self, name: &str, value: f64) -> Result<u64, DescriptionError> {
+        match WordKind::of(name) {
+            WordKind::Real => Ok(self.scalar.encode(value)),
+            WordKind::Integer
+                if value >= 0.0 && value <= (1_u64 << 53) as f64 && value == libm::trunc(value) =>
+            {
+                Ok(value as u64)
+            }
+            WordKind::Integer => Err(DescriptionError::NotAWord {
+                name: name.to_owned(),
+                value,
+            }),
+        }
+    }
+}
+
+/// The `key=value` lines of a text; the last of equal keys holds.
+pub(crate) fn fields(text: &str) -> BTreeMap<&str, &str> {
+    text.lines()
+        .filter_map(|line| line.split_once('='))
+        .collect()
+}
+
+fn position(names: &[String], name: &str) -> Result<usize, DescriptionError> {
+    names
+        .iter()
+        .position(|known| known == name)
+        .ok_or_else(|| DescriptionError::NoWord {
+            name: name.to_owned(),
+            known: names.to_vec(),
+        })
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// A controller of six legs with the interface of the emitted one.
+    pub(crate) fn six_legs(scalar: Scalar) -> Description {
+        let indexed = |stems: &[&str]| -> Vec<String> {
+            stems
+                .iter()
+                .flat_map(|stem| (0..6).map(move |leg| format!("{stem}[{leg}]")))
+                .collect()
+        };
+        let mut output_names = indexed(&[
+            "voltage",
+            "requested",
+            "demand",
+            "level",
+            "drift",
+            "dac_code",
+        ]);
+        output_names.push("status".to_owned());
+        Description {
+            name: "oracle".to_owned(),
+            digest: "00".to_owned(),
+            version: "0".to_owned(),
+            scalar,
+            config_names: ["mode", "level_weight", "drift_weight"]
+                .map(str::to_owned)
+                .to_vec(),
+            input_names: indexed(&["setpoint", "displacement"]),
+            output_names,
+        }
+    }
+
+    #[test]
+    fn a_description_reads_back_and_unknown_keys_are_left_alone() {
+        let description = six_legs(Scalar::F32);
+        let text = description.to_text() + "colour=blue\n";
+        assert_eq!(Description::parse(&text), Ok(description));
+    }
+
+    #[test]
+    fn what_is_missing_or_bad_is_named() {
+        let text = six_legs(Scalar::F64).to_text();
+        assert_eq!(
+            Description::parse(&text.replace("digest=", "digits=")),
+            Err(DescriptionError::Missing("digest"))
+        );
+        let bad = Description::parse(&text.replace("scalar_bits=64", "scalar_bits=16"))
+            .unwrap_err()
+            .to_string();
+        assert!(bad.contains("`scalar_bits=16`; expected 32 or 64"), "{bad}");
+    }
+
+    #[test]
+    fn configuration_is_set_by_name_and_kind() {
+        let description = six_legs(Scalar::F32);
+        let mut words = [9; 3];
+        description.set_config(&mut words, "mode", 2.0).unwrap();
+        description
+            .set_config(&mut words, "level_weight", 0.5)
+            .unwrap();
+        assert_eq!(words, [2, 0x3F00_0000, 9]);
+        assert!(
+            description
+                .set_config(&mut words, "mode", 0.5)
+                .unwrap_err()
+                .to_string()
+                .contains("`mode` cannot be 0.5")
+        );
+        let unknown = description
+            .set_config(&mut words, "weight", 1.0)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            unknown.contains("no word `weight`; it has mode, level_weight"),
+            "{unknown}"
+        );
+    }
+}

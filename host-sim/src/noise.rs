@@ -1,0 +1,157 @@
+//! What stands between leg and controller: gauge noise and quantisation, amplifier noise.
+//!
+//! The drive converter is the controller's: its voltages are exact codes already.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use crate::plant::NoiseParameters;
+
+/// Seeded white Gaussian noise.
+#[derive(Debug, Clone)]
+pub struct Gaussian {
+    rng: ChaCha8Rng,
+    deviation: f64,
+    /// The second number of a Box–Muller pair.
+    spare: Option<f64>,
+}
+
+impl Gaussian {
+    /// `deviation` in any unit (≥ 0); `stream` separates generators of one seed.
+    #[must_use]
+    pub fn new(deviation: f64, seed: u64, stream: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(stream);
+        Self {
+            rng,
+            deviation,
+            spare: None,
+        }
+    }
+
+    /// The next number. Draws nothing when the deviation is 0.
+    ///
+    /// Box–Muller over `libm` rather than a library's sampler: those call the platform's `log`, whose last bit differs
+    /// between hosts, and a recorded trace must be made anywhere.
+    pub fn draw(&mut self) -> f64 {
+        if self.deviation == 0.0 {
+            return 0.0;
+        }
+        if let Some(spare) = self.spare.take() {
+            return self.deviation * spare;
+        }
+        // 1 − [0, 1) is never 0.
+        let radius = libm::sqrt(-2.0 * libm::log(1.0 - unit(&mut self.rng)));
+        let (sin, cos) = libm::sincos(core::f64::consts::TAU * unit(&mut self.rng));
+        self.spare = Some(radius * sin);
+        self.deviation * radius * cos
+    }
+}
+
+/// Uniform in [0, 1) with 53 bits.
+pub(crate) fn unit(rng: &mut impl Rng) -> f64 {
+    (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// Displacement gauge of one leg: zero, noise, converter.
+#[derive(Debug, Clone)]
+pub struct Gauge {
+    noise: Gaussian,
+    lsb: f64,
+    zero: f64,
+}
+
+impl Gauge {
+    /// Gauge of leg `leg` (0 to 5); each leg has its own noise.
+    #[must_use]
+    pub fn new(noise: &NoiseParameters, seed: u64, leg: u64) -> Self {
+        Self {
+            noise: Gaussian::new(noise.sensor_nm_rms * 1e-9, seed, 2 * leg),
+            lsb: noise.adc_lsb_nm * 1e-9,
+            zero: 0.0,
+        }
+    }
+
+    /// Makes `displacement` (m) read 0. Exact: zeroing averages many readings, so that it adds no noise.
+    pub fn zero_at(&mut self, displacement: f64) {
+        self.zero = displacement;
+    }
+
+    /// Reading (m) of `displacement` (m).
+    pub fn read(&mut self, displacement: f64) -> f64 {
+        let analogue = (displacement - self.zero) + self.noise.draw();
+        if self.lsb > 0.0 {
+            libm::round(analogue / self.lsb) * self.lsb
+        } else {
+            analogue
+        }
+    }
+}
+
+/// Noise of one leg's amplifier, V, drawn once per held voltage.
+#[must_use]
+pub fn amplifier(noise: &NoiseParameters, seed: u64, leg: u64) -> Gaussian {
+    Gaussian::new(noise.amplifier_mv_rms * 1e-3, seed, 2 * leg + 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOISE: NoiseParameters = NoiseParameters {
+        sensor_nm_rms: 2.2,
+        adc_lsb_nm: 0.76,
+        dac_lsb_mv: 2.29,
+        amplifier_mv_rms: 2.0,
+    };
+
+    #[test]
+    fn the_noise_has_the_stated_deviation_and_no_mean() {
+        let mut noise = Gaussian::new(2.0, 1, 0);
+        let count = 100_000;
+        let draws: Vec<f64> = (0..count).map(|_| noise.draw()).collect();
+        let mean = draws.iter().sum::<f64>() / f64::from(count);
+        let square = draws.iter().map(|x| x * x).sum::<f64>() / f64::from(count);
+        let beyond = draws.iter().filter(|x| x.abs() > 4.0).count() as f64 / f64::from(count);
+        assert!(mean.abs() < 0.02, "{mean}");
+        assert!((square.sqrt() - 2.0).abs() < 0.02, "{square}");
+        // A normal distribution has 4.55 % beyond two deviations; a uniform one has none.
+        assert!((beyond - 0.0455).abs() < 0.003, "{beyond}");
+    }
+
+    #[test]
+    fn a_seed_repeats_and_legs_differ() {
+        let readings = |seed, leg| {
+            let mut gauge = Gauge::new(&NOISE, seed, leg);
+            (0..50)
+                .map(|_| gauge.read(1e-6).to_bits())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(readings(7, 2), readings(7, 2));
+        assert_ne!(readings(7, 2), readings(7, 3));
+        assert_ne!(readings(7, 2), readings(8, 2));
+    }
+
+    #[test]
+    fn a_gauge_reads_whole_codes_from_its_zero() {
+        let mut gauge = Gauge::new(
+            &NoiseParameters {
+                sensor_nm_rms: 0.0,
+                ..NOISE
+            },
+            1,
+            0,
+        );
+        gauge.zero_at(5e-6);
+        assert_eq!(gauge.read(5e-6), 0.0);
+        assert!((gauge.read(5e-6 + 1.1e-9) - 0.76e-9).abs() < 1e-18);
+        assert!((gauge.read(5e-6 - 1.2e-9) + 1.52e-9).abs() < 1e-18);
+    }
+
+    #[test]
+    fn without_noise_a_gauge_is_exact() {
+        let mut gauge = Gauge::new(&NoiseParameters::NONE, 1, 0);
+        assert_eq!(gauge.read(1.234_567e-6), 1.234_567e-6);
+        assert_eq!(amplifier(&NoiseParameters::NONE, 1, 0).draw(), 0.0);
+    }
+}

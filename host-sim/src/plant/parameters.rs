@@ -1,0 +1,403 @@
+//! Parameter file of a leg plant: JSON, V, µm and s.
+
+use std::fmt;
+use std::path::Path;
+
+use serde::Deserialize;
+
+/// Parameters of [`super::LegPlant`], field for field as in the file. Its module has the equations.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LegParameters {
+    /// What the plant is called in reports.
+    #[serde(default)]
+    pub name: String,
+    /// Must be `"V, um, s"`: the units of the fields that do not name theirs.
+    pub units: String,
+    /// Full drive u_max, V.
+    pub u_max: f64,
+    /// Gain from volts to µm.
+    #[serde(rename = "gain_um_per_V")]
+    pub gain_um_per_v: f64,
+    /// s2 of the quadratic asymmetry, −1 < s2 < 1.
+    pub s2: f64,
+    /// κ of the rate-dependent thresholds, ≥ 0.
+    pub kappa: f64,
+    /// v0 of the rate-dependent thresholds, V/s.
+    #[serde(rename = "v0_V_per_s")]
+    pub v0_v_per_s: f64,
+    /// Lag of the rate that widens the thresholds, s.
+    pub tau_rate_s: f64,
+    /// Lag of the amplifier, s.
+    pub tau_amp_s: f64,
+    /// Axial resonance, Hz.
+    pub fn_hz: f64,
+    /// Damping ratio of that resonance, below 1.
+    pub zeta: f64,
+    /// r_i of the plays, V.
+    #[serde(rename = "play_thresholds_V")]
+    pub play_thresholds_v: Vec<f64>,
+    /// w_i of the plays.
+    pub play_weights: Vec<f64>,
+    /// a_j of the creep, 1/s.
+    pub creep_rates_per_s: Vec<f64>,
+    /// w_j of the creep, one per rate, shared by the thresholds.
+    pub creep_weights: Vec<f64>,
+    /// r_k of the creep, V.
+    #[serde(rename = "creep_thresholds_V")]
+    pub creep_thresholds_v: Vec<f64>,
+    /// Rest at 0 V between the saturating pre-cycle and the zeroing of the gauge, s.
+    pub settle_s: f64,
+    /// Speed of reversal curves and of the pre-cycle, V/s.
+    #[serde(rename = "forc_rate_V_per_s")]
+    pub forc_rate_v_per_s: f64,
+    /// Longest integration step, s.
+    #[serde(default = "default_step")]
+    pub step_s: f64,
+    /// Noise and quantisation around the leg.
+    pub noise: NoiseParameters,
+}
+
+/// Noise and quantisation around a leg. All zero: none.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseParameters {
+    /// Gauge, white, per reading, nm rms.
+    pub sensor_nm_rms: f64,
+    /// Gauge converter, nm per code; 0 for none.
+    pub adc_lsb_nm: f64,
+    /// Drive converter, mV per code. The controller outputs exact codes, so the plant does not use it.
+    #[serde(rename = "dac_lsb_mV")]
+    pub dac_lsb_mv: f64,
+    /// Amplifier, white, per held voltage, mV rms.
+    #[serde(rename = "amplifier_mV_rms")]
+    pub amplifier_mv_rms: f64,
+}
+
+impl NoiseParameters {
+    /// No noise, no quantisation.
+    pub const NONE: Self = Self {
+        sensor_nm_rms: 0.0,
+        adc_lsb_nm: 0.0,
+        dac_lsb_mv: 0.0,
+        amplifier_mv_rms: 0.0,
+    };
+}
+
+fn default_step() -> f64 {
+    5e-5
+}
+
+/// Why a parameter file was refused.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ParameterError {
+    /// The file.
+    pub file: String,
+    /// Every finding: field, value, what is expected.
+    pub findings: Vec<String>,
+}
+
+impl fmt::Display for ParameterError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: not a usable leg plant", self.file)?;
+        for finding in &self.findings {
+            write!(f, "\n  {finding}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for ParameterError {}
+
+/// The reference leg's parameter file, as shipped.
+pub const REFERENCE_LEG: &str = include_str!("../../plants/reference-leg.json");
+
+impl LegParameters {
+    /// The reference leg.
+    #[must_use]
+    pub fn reference() -> Self {
+        match Self::from_json(REFERENCE_LEG, "reference-leg.json") {
+            Ok(parameters) => parameters,
+            // The text is part of the crate and a test parses it; no input of a user leads here.
+            Err(error) => unreachable!("{error}"),
+        }
+    }
+
+    /// Reads and checks a parameter file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is not JSON of this shape, or a value is out of range: all findings, each with its field.
+    pub fn load(path: &Path) -> Result<Self, ParameterError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| ParameterError {
+            file: file.clone(),
+            findings: vec![format!(
+                "cannot be read as text: {error}; name a JSON file of a leg plant"
+            )],
+        })?;
+        Self::from_json(&text, &file)
+    }
+
+    /// Parses and checks the text of a parameter file; `file` names it in errors.
+    ///
+    /// # Errors
+    /// As [`LegParameters::load`].
+    pub fn from_json(text: &str, file: &str) -> Result<Self, ParameterError> {
+        let parameters: Self = serde_json::from_str(text).map_err(|error| ParameterError {
+            file: file.to_owned(),
+            findings: vec![format!("{error}; compare with plants/reference-leg.json")],
+        })?;
+        let findings = parameters.findings();
+        if findings.is_empty() {
+            Ok(parameters)
+        } else {
+            Err(ParameterError {
+                file: file.to_owned(),
+                findings,
+            })
+        }
+    }
+
+    fn findings(&self) -> Vec<String> {
+        let mut out = Vec::new();
+        if self.units != "V, um, s" {
+            out.push(format!(
+                "`units` is {:?}; expected \"V, um, s\": convert the values",
+                self.units
+            ));
+        }
+        let mut expect = |field: &str, value: f64, low: Bound, high: Bound| {
+            if let Some(finding) = out_of_range(field, value, low, high) {
+                out.push(finding);
+            }
+        };
+        use Bound::{Above, AtLeast, AtMost, Below};
+        expect("u_max", self.u_max, Above(0.0), AtMost(1000.0));
+        expect(
+            "gain_um_per_V",
+            self.gain_um_per_v,
+            Above(0.0),
+            AtMost(1000.0),
+        );
+        expect("s2", self.s2, Above(-1.0), Below(1.0));
+        expect("kappa", self.kappa, AtLeast(0.0), AtMost(10.0));
+        expect("v0_V_per_s", self.v0_v_per_s, Above(0.0), AtMost(1e9));
+        expect("tau_rate_s", self.tau_rate_s, AtLeast(0.0), AtMost(10.0));
+        expect("tau_amp_s", self.tau_amp_s, AtLeast(0.0), AtMost(10.0));
+        expect("fn_hz", self.fn_hz, Above(0.0), AtMost(1e6));
+        expect("zeta", self.zeta, AtLeast(0.0), Below(1.0));
+        expect("settle_s", self.settle_s, AtLeast(0.0), AtMost(600.0));
+        expect(
+            "forc_rate_V_per_s",
+            self.forc_rate_v_per_s,
+            AtLeast(1.0),
+            AtMost(1e6),
+        );
+        expect("step_s", self.step_s, AtLeast(1e-6), AtMost(1e-3));
+        expect(
+            "noise.sensor_nm_rms",
+            self.noise.sensor_nm_rms,
+            AtLeast(0.0),
+            AtMost(1e6),
+        );
+        expect(
+            "noise.adc_lsb_nm",
+            self.noise.adc_lsb_nm,
+            AtLeast(0.0),
+            AtMost(1e6),
+        );
+        expect(
+            "noise.dac_lsb_mV",
+            self.noise.dac_lsb_mv,
+            AtLeast(0.0),
+            AtMost(1e6),
+        );
+        expect(
+            "noise.amplifier_mV_rms",
+            self.noise.amplifier_mv_rms,
+            AtLeast(0.0),
+            AtMost(1e6),
+        );
+        let lists: [(&str, &[f64], Bound, f64); 5] = [
+            (
+                "play_thresholds_V",
+                &self.play_thresholds_v,
+                AtLeast(0.0),
+                1e4,
+            ),
+            ("play_weights", &self.play_weights, AtLeast(0.0), 1e3),
+            (
+                "creep_rates_per_s",
+                &self.creep_rates_per_s,
+                Above(0.0),
+                1e6,
+            ),
+            ("creep_weights", &self.creep_weights, AtLeast(0.0), 1e3),
+            (
+                "creep_thresholds_V",
+                &self.creep_thresholds_v,
+                AtLeast(0.0),
+                1e4,
+            ),
+        ];
+        for (field, values, low, high) in lists {
+            for (index, value) in values.iter().enumerate() {
+                expect(&format!("{field}[{index}]"), *value, low, AtMost(high));
+            }
+        }
+        for (field, values, ..) in lists {
+            let count = values.len();
+            if !(1..=1000).contains(&count) {
+                out.push(format!("`{field}` has {count} values; expected 1 to 1000"));
+            }
+        }
+        let pairs = [
+            (
+                "play_weights",
+                self.play_weights.len(),
+                "play_thresholds_V",
+                self.play_thresholds_v.len(),
+            ),
+            (
+                "creep_weights",
+                self.creep_weights.len(),
+                "creep_rates_per_s",
+                self.creep_rates_per_s.len(),
+            ),
+        ];
+        for (field, count, other, expected) in pairs {
+            if count != expected {
+                out.push(format!(
+                    "`{field}` has {count} values but `{other}` has {expected}; give one for each"
+                ));
+            }
+        }
+        out
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Bound {
+    Above(f64),
+    AtLeast(f64),
+    AtMost(f64),
+    Below(f64),
+}
+
+impl Bound {
+    fn holds(self, value: f64) -> bool {
+        match self {
+            Self::Above(bound) => value > bound,
+            Self::AtLeast(bound) => value >= bound,
+            Self::AtMost(bound) => value <= bound,
+            Self::Below(bound) => value < bound,
+        }
+    }
+}
+
+impl fmt::Display for Bound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Above(bound) => write!(f, "> {bound}"),
+            Self::AtLeast(bound) => write!(f, ">= {bound}"),
+            Self::AtMost(bound) => write!(f, "<= {bound}"),
+            Self::Below(bound) => write!(f, "< {bound}"),
+        }
+    }
+}
+
+/// A NaN holds no bound, so it is found too.
+fn out_of_range(field: &str, value: f64, low: Bound, high: Bound) -> Option<String> {
+    let good = low.holds(value) && high.holds(value);
+    (!good).then(|| format!("`{field}` is {value}; expected a number {low} and {high}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(from: &str, to: &str) -> String {
+        let text = REFERENCE_LEG.replacen(from, to, 1);
+        assert_ne!(text, REFERENCE_LEG, "{from} is not in the file");
+        LegParameters::from_json(&text, "leg.json")
+            .unwrap_err()
+            .to_string()
+    }
+
+    #[test]
+    fn the_shipped_file_is_good() {
+        let reference = LegParameters::reference();
+        assert_eq!(reference.play_weights.len(), 24);
+        assert_eq!(reference.noise.sensor_nm_rms, 2.2);
+    }
+
+    #[test]
+    fn the_shipped_file_has_the_values_of_the_feasibility_study() {
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/reference/leg-plant.json");
+        if !path.exists() {
+            eprintln!("skipped: ../shared is not beside the repository");
+            return;
+        }
+        let mut study = LegParameters::load(&path).unwrap();
+        study.name = "reference-leg".to_owned();
+        assert_eq!(study, LegParameters::reference());
+    }
+
+    #[test]
+    fn findings_name_file_field_value_and_expectation() {
+        assert_eq!(
+            refused("\"u_max\": 100.0", "\"u_max\": -5"),
+            "leg.json: not a usable leg plant\n  `u_max` is -5; expected a number > 0 and <= 1000"
+        );
+        assert!(refused("45.0\n", "-45.0\n").contains("`play_thresholds_V[23]` is -45"));
+        assert!(
+            refused("[0.05, ", "[")
+                .contains("`creep_weights` has 5 values but `creep_rates_per_s` has 4")
+        );
+        assert!(refused("[0.0, 6.0]", "[]").contains("`creep_thresholds_V` has 0 values"));
+        assert!(
+            refused("\"V, um, s\"", "\"V, nm, s\"")
+                .contains("`units` is \"V, nm, s\"; expected \"V, um, s\"")
+        );
+        assert!(
+            refused("\"zeta\": 0.1", "\"zeta\": 1.5")
+                .contains("`zeta` is 1.5; expected a number >= 0 and < 1")
+        );
+    }
+
+    #[test]
+    fn all_findings_come_in_one_run() {
+        let text = REFERENCE_LEG
+            .replace("\"u_max\": 100.0", "\"u_max\": 0")
+            .replace("\"s2\": 0.05", "\"s2\": 3");
+        assert_eq!(
+            LegParameters::from_json(&text, "leg.json")
+                .unwrap_err()
+                .findings
+                .len(),
+            2
+        );
+    }
+
+    #[test]
+    fn missing_unknown_and_mistyped_fields_are_named_with_their_line() {
+        assert!(
+            refused("  \"kappa\": 1.2445442636136678e-06,\n", "").contains("missing field `kappa`")
+        );
+        let unknown = refused("\"kappa\"", "\"capa\"");
+        assert!(
+            unknown.contains("unknown field `capa`") && unknown.contains("line 7"),
+            "{unknown}"
+        );
+        assert!(refused("\"zeta\": 0.1", "\"zeta\": \"0.1\"").contains("invalid type: string"));
+        assert!(refused("\"zeta\": 0.1", "\"zeta\": NaN").contains("line 12"));
+        let absent = LegParameters::load(Path::new("no/such.json"))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            absent.starts_with("no/such.json: not a usable leg plant\n  cannot be read"),
+            "{absent}"
+        );
+    }
+}

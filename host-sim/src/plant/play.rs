@@ -1,0 +1,81 @@
+//! Play operators with rate-dependent thresholds, weighted and added.
+
+/// A sum of play (backlash) operators, w_i · p_i.
+///
+/// Each follows `p ← max(v − r, min(v + r, p))` with r = r_i · (1 + κ ln(1 + |v̇| / v0)), where v̇ is the filtered rate of v.
+/// A leg as built has every p at 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlayBank {
+    thresholds: Vec<f64>,
+    weights: Vec<f64>,
+    states: Vec<f64>,
+    rate_sensitivity: f64,
+    rate_scale: f64,
+}
+
+impl PlayBank {
+    /// `thresholds` r_i in V (≥ 0), `weights` w_i (as many), `rate_sensitivity` κ, `rate_scale` v0 in V/s.
+    #[must_use]
+    pub fn new(
+        thresholds: &[f64],
+        weights: &[f64],
+        rate_sensitivity: f64,
+        rate_scale: f64,
+    ) -> Self {
+        Self {
+            thresholds: thresholds.to_vec(),
+            weights: weights.to_vec(),
+            states: vec![0.0; thresholds.len()],
+            rate_sensitivity,
+            rate_scale,
+        }
+    }
+
+    /// All operators back to 0.
+    pub fn reset(&mut self) {
+        self.states.fill(0.0);
+    }
+
+    /// Moves to voltage `v` (V) at filtered rate `rate` (V/s); returns the weighted sum (V).
+    pub fn advance(&mut self, v: f64, rate: f64) -> f64 {
+        let widening = 1.0 + self.rate_sensitivity * libm::log(1.0 + rate.abs() / self.rate_scale);
+        let mut sum = 0.0;
+        for ((state, threshold), weight) in self
+            .states
+            .iter_mut()
+            .zip(&self.thresholds)
+            .zip(&self.weights)
+        {
+            let r = threshold * widening;
+            if *state < v - r {
+                *state = v - r;
+            } else if *state > v + r {
+                *state = v + r;
+            }
+            sum += weight * *state;
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_play_moves_only_beyond_its_threshold_and_keeps_its_place_inside() {
+        let mut bank = PlayBank::new(&[2.0], &[0.5], 0.0, 20.0);
+        assert_eq!(bank.advance(1.5, 0.0), 0.0);
+        assert_eq!(bank.advance(10.0, 0.0), 4.0);
+        assert_eq!(bank.advance(6.5, 0.0), 4.0);
+        assert_eq!(bank.advance(5.0, 0.0), 3.5);
+    }
+
+    #[test]
+    fn the_threshold_widens_with_the_rate() {
+        let mut bank = PlayBank::new(&[2.0], &[1.0], 0.5, 20.0);
+        // 1 + 0.5 ln(1 + 20(e − 1)/20) = 1.5
+        let rate = 20.0 * (core::f64::consts::E - 1.0);
+        assert!((bank.advance(10.0, -rate) - 7.0).abs() < 1e-12);
+    }
+}

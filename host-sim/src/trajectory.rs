@@ -1,0 +1,106 @@
+//! Set-points over time.
+
+/// A motion of the six legs from time 0.
+pub trait LegTrajectory {
+    /// Length in s.
+    fn duration(&self) -> f64;
+
+    /// Leg displacements in m at `time` (s, 0 to the duration).
+    fn displacements(&self, time: f64) -> [f64; 6];
+}
+
+/// The leg trajectory of the paper's §3, the same on all six legs, as printed:
+///
+/// ```text
+/// q(t) = 1.95 t tf                          0 ≤ t ≤ 2/tf
+/// q(t) = 24 + 20 sin(2π fc t − 8π/9)        2/tf < t ≤ 22/tf        µm, tf = 10 fc / Hz
+/// ```
+/// At t = 2/tf it jumps from 3.9 to 4.0122 µm (+112.2 nm) and its slope falls from 1.95 tf to 0.4386 tf µm/s;
+/// kept, as Table 2 was measured with it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PaperLeg {
+    /// fc in Hz.
+    pub frequency: f64,
+}
+
+impl PaperLeg {
+    /// Scaled time t·tf at which the sine begins.
+    const RAMP_END: f64 = 2.0;
+    /// Scaled time t·tf of the end: two periods after the ramp.
+    const END: f64 = 22.0;
+    /// Relative slack with which a sample at the jump counts as the ramp's last, for t is a rounded product.
+    const SLACK: f64 = 1e-9;
+    /// Mean and amplitude of the sine, µm.
+    const CENTER: f64 = 24.0;
+    const AMPLITUDE: f64 = 20.0;
+
+    fn scaled(&self, time: f64) -> f64 {
+        time * (10.0 * self.frequency)
+    }
+
+    /// Displacement in m at `time` (s).
+    #[must_use]
+    pub fn displacement(&self, time: f64) -> f64 {
+        let scaled = self.scaled(time);
+        let um = if scaled <= Self::RAMP_END * (1.0 + Self::SLACK) {
+            1.95 * scaled
+        } else {
+            let phase =
+                core::f64::consts::TAU * self.frequency * time - 8.0 * core::f64::consts::PI / 9.0;
+            Self::CENTER + Self::AMPLITUDE * libm::sin(phase)
+        };
+        um * 1e-6
+    }
+}
+
+impl LegTrajectory for PaperLeg {
+    fn duration(&self) -> f64 {
+        Self::END / (10.0 * self.frequency)
+    }
+
+    fn displacements(&self, time: f64) -> [f64; 6] {
+        [self.displacement(time); 6]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_jumps_by_112_nm_at_the_end_of_the_ramp_and_ends_where_the_sine_began() {
+        for frequency in [0.1, 1.0, 10.0] {
+            let leg = PaperLeg { frequency };
+            let switch = 0.2 / frequency;
+            let before = leg.displacement(switch);
+            let after = leg.displacement(switch * (1.0 + 1e-8));
+            assert!((before - 3.9e-6).abs() < 1e-15, "{before}");
+            assert!(
+                ((after - before) - 112.2e-9).abs() < 0.1e-9,
+                "{}",
+                after - before
+            );
+            assert!((leg.displacement(leg.duration()) - after).abs() < 1e-11);
+        }
+    }
+
+    #[test]
+    fn the_sample_at_the_jump_belongs_to_the_ramp_at_every_rate() {
+        for frequency in [0.1, 1.0, 10.0, 20.0, 40.0, 50.0] {
+            let leg = PaperLeg { frequency };
+            let period = 1.0 / frequency / 500.0;
+            assert!(leg.displacement(100.0 * period) < 3.91e-6);
+            assert!(leg.displacement(101.0 * period) > 4.01e-6);
+        }
+    }
+
+    #[test]
+    fn it_stays_within_4_and_44_um_after_the_ramp() {
+        let leg = PaperLeg { frequency: 1.0 };
+        let values: Vec<f64> = (101..=1100)
+            .map(|n| leg.displacement(f64::from(n) * 2e-3))
+            .collect();
+        assert!(values.iter().all(|q| (3.99e-6..44.01e-6).contains(q)));
+        assert!(values.iter().any(|q| *q > 43.99e-6));
+    }
+}

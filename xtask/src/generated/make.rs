@@ -1,0 +1,79 @@
+//! What the committed generated files ought to hold.
+
+use super::Files;
+use host_sim::forc::ReversalExperiment;
+use host_sim::noise::Gauge;
+use host_sim::plant::{LegParameters, LegPlant};
+use specgen::compile::{Compiled, compile};
+use specgen::{diagnostic, emit, spec, workspace};
+use std::path::Path;
+
+/// Seed of the gauge noise in the committed records.
+const SEED: u64 = 1;
+/// Reversal curves of the reference record.
+const REFERENCE_CURVES: u32 = 32;
+/// Reversal curves of the records of six different legs.
+const LEG_CURVES: u32 = 8;
+/// Gains of the six legs against the reference leg's.
+const LEG_GAINS: [f64; 6] = [0.95, 1.03, 0.98, 1.05, 1.0, 0.97];
+/// Specs whose emitted crate is kept as a golden: small ones, one per scalar.
+const GOLDENS: [&str; 2] = ["small-grid", "six-records"];
+
+/// Reversal-curve records of simulated legs: the reference leg's is what `specgen forc` writes.
+pub fn records(_: &Path) -> Result<Files, String> {
+    let reference = LegParameters::reference();
+    let mut files = Files::new();
+    files.insert("reference-forc.csv".to_owned(), record(&reference, REFERENCE_CURVES, 0));
+    for (leg, gain) in (1u64..).zip(LEG_GAINS) {
+        let mut parameters = reference.clone();
+        parameters.gain_um_per_v *= gain;
+        files.insert(format!("leg{leg}.csv"), record(&parameters, LEG_CURVES, leg));
+    }
+    Ok(files)
+}
+
+fn record(parameters: &LegParameters, curves: u32, stream: u64) -> String {
+    let mut leg = LegPlant::new(parameters);
+    let mut gauge = Gauge::new(&parameters.noise, SEED, stream);
+    ReversalExperiment::reference(curves).run(&mut leg, &mut gauge).to_csv()
+}
+
+/// The JSON Schema of specs.
+pub fn schema(_: &Path) -> Result<Files, String> {
+    Ok(Files::from([("platform.schema.json".to_owned(), spec::json_schema())]))
+}
+
+/// References printed from the key table and the registry of findings.
+pub fn docs(_: &Path) -> Result<Files, String> {
+    Ok(Files::from([
+        ("spec-reference.md".to_owned(), spec::reference_markdown()),
+        ("diagnostics.md".to_owned(), diagnostic::reference_markdown()),
+    ]))
+}
+
+/// The controller of the reference spec.
+pub fn reference_controller(root: &Path) -> Result<Files, String> {
+    Ok(emit::emit(&compiled(&root.join("specs/reference.toml"))?.ir))
+}
+
+/// IR and emitted crate of small specs.
+pub fn goldens(root: &Path) -> Result<Files, String> {
+    let mut files = Files::new();
+    for name in GOLDENS {
+        let compiled = compiled(&root.join(format!("specs/features/{name}.toml")))?;
+        files.insert(format!("{name}/ir.json"), workspace::ir_text(&compiled.ir));
+        for (path, text) in emit::emit(&compiled.ir) {
+            // Cargo would take a manifest here for a package of this repository.
+            let path = path.replace("Cargo.toml", "Cargo.toml.golden");
+            files.insert(format!("{name}/{path}"), text);
+        }
+    }
+    Ok(files)
+}
+
+fn compiled(path: &Path) -> Result<Compiled, String> {
+    compile(path).map_err(|refused| {
+        let first = refused.findings.first().map(|finding| finding.message.clone());
+        format!("{} is refused: {}", path.display(), first.unwrap_or_default())
+    })
+}
