@@ -44,10 +44,7 @@ pub struct Tools {
 /// # Errors
 /// [`TargetError::MissingTool`], for the first of the two that is not there.
 pub fn available() -> Result<Tools, TargetError> {
-    Ok(Tools {
-        toolchain: toolchain::find()?,
-        emulator: emulator::Emulator::find()?,
-    })
+    Ok(Tools { toolchain: toolchain::find()?, emulator: emulator::Emulator::find()? })
 }
 
 /// Set to `1`, it turns a missing tool from a failure into a skip that is said.

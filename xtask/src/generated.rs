@@ -43,10 +43,7 @@ pub fn check(root: &Path) -> Outcome {
     for line in &stale {
         println!("{line}");
     }
-    Outcome::Failed(format!(
-        "{} files differ; run: cargo xtask bless",
-        stale.len()
-    ))
+    Outcome::Failed(format!("{} files differ; run: cargo xtask bless", stale.len()))
 }
 
 /// Writes every folder anew.
@@ -71,10 +68,7 @@ fn all(
     let mut lines = Vec::new();
     for generated in list {
         let files = (generated.make)(root).map_err(|why| format!("{}: {why}", generated.folder))?;
-        lines.extend(
-            act(root, generated, &files)
-                .map_err(|error| format!("{}: {error}", generated.folder))?,
-        );
+        lines.extend(act(root, generated, &files).map_err(|error| format!("{}: {error}", generated.folder))?);
     }
     Ok(lines)
 }
@@ -88,10 +82,7 @@ fn differences(root: &Path, generated: &Generated, files: &Files) -> io::Result<
         match present.remove(path) {
             None => lines.push(format!("missing: {folder}/{path}")),
             Some(found) if found != text.as_bytes() => {
-                lines.push(format!(
-                    "stale: {folder}/{path}, first in line {}",
-                    first_difference(&found, text)
-                ));
+                lines.push(format!("stale: {folder}/{path}, first in line {}", first_difference(&found, text)));
             }
             Some(_) => {}
         }
@@ -123,17 +114,8 @@ fn replace(root: &Path, generated: &Generated, files: &Files) -> io::Result<Vec<
 
 /// Number of the first line that differs, counted from 1.
 fn first_difference(found: &[u8], text: &str) -> usize {
-    let same = found
-        .iter()
-        .zip(text.as_bytes())
-        .take_while(|(a, b)| a == b)
-        .count();
-    text.as_bytes()
-        .iter()
-        .take(same)
-        .filter(|&&byte| byte == b'\n')
-        .count()
-        + 1
+    let same = found.iter().zip(text.as_bytes()).take_while(|(a, b)| a == b).count();
+    text.as_bytes().iter().take(same).filter(|&&byte| byte == b'\n').count() + 1
 }
 
 /// Files below `folder` as they stand, without cargo's `target`; empty if there is no such folder.
@@ -170,13 +152,9 @@ mod tests {
         fs::write(folder.join("src/same.rs"), "a\n").unwrap();
         fs::write(folder.join("src/stale.rs"), "a\nb\nc\n").unwrap();
         fs::write(folder.join("extra.rs"), "").unwrap();
-        let files: Files = [
-            ("src/same.rs", "a\n"),
-            ("src/stale.rs", "a\nb\nd\n"),
-            ("new/missing.rs", "x"),
-        ]
-        .map(|(path, text)| (path.to_owned(), text.to_owned()))
-        .into();
+        let files: Files = [("src/same.rs", "a\n"), ("src/stale.rs", "a\nb\nd\n"), ("new/missing.rs", "x")]
+            .map(|(path, text)| (path.to_owned(), text.to_owned()))
+            .into();
 
         let made = Generated { folder: "made", whole: true, make: |_| Ok(Files::new()) };
         let found = differences(root.path(), &made, &files).unwrap();

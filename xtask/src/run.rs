@@ -31,9 +31,7 @@ impl Report {
 
     /// Whether a step failed.
     pub fn has_failed(&self) -> bool {
-        self.steps
-            .iter()
-            .any(|(_, outcome, _)| matches!(outcome, Outcome::Failed(_)))
+        self.steps.iter().any(|(_, outcome, _)| matches!(outcome, Outcome::Failed(_)))
     }
 
     /// Prints one line per step; fails if one failed.
@@ -47,11 +45,7 @@ impl Report {
             };
             println!("{word:8}{name:28}{:6.1} s  {detail}", took.as_secs_f64());
         }
-        if self.has_failed() {
-            ExitCode::FAILURE
-        } else {
-            ExitCode::SUCCESS
-        }
+        if self.has_failed() { ExitCode::FAILURE } else { ExitCode::SUCCESS }
     }
 }
 

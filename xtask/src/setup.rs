@@ -17,10 +17,7 @@ pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
     let works = || {
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let mut command = Command::new(cargo);
-        command
-            .args([subcommand, "--version"])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
+        command.args([subcommand, "--version"]).stdout(Stdio::null()).stderr(Stdio::null());
         command.status().is_ok_and(|status| status.success())
     };
     if works() {
@@ -28,15 +25,11 @@ pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
     }
     println!("running: rustup component add {name}");
     // Whether it helped is asked of cargo itself.
-    let _ = Command::new("rustup")
-        .args(["component", "add", name])
-        .status();
+    let _ = Command::new("rustup").args(["component", "add", name]).status();
     if works() {
         return Ok(());
     }
-    Err(missing(format!(
-        "{name} is not installed; install it with: rustup component add {name}"
-    )))
+    Err(missing(format!("{name} is not installed; install it with: rustup component add {name}")))
 }
 
 /// A failure, unless the user allows that something is missing.
@@ -44,9 +37,6 @@ fn missing(why: String) -> Outcome {
     if std::env::var_os(target::ALLOW_MISSING).is_some_and(|value| value == "1") {
         Outcome::Skipped(why)
     } else {
-        Outcome::Failed(format!(
-            "{why}   ({}=1 skips what needs it)",
-            target::ALLOW_MISSING
-        ))
+        Outcome::Failed(format!("{why}   ({}=1 skips what needs it)", target::ALLOW_MISSING))
     }
 }

@@ -40,26 +40,14 @@ pub fn build_image(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, Tar
 ///
 /// # Errors
 /// As [`build_image`].
-pub fn build_image_with(
-    toolchain: &Toolchain,
-    dir: &Path,
-    mcu: Mcu,
-    target_dir: &Path,
-) -> Result<Image, TargetError> {
+pub fn build_image_with(toolchain: &Toolchain, dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
     let package = dir.join("qemu");
     let what = format!("{} for {}", package.display(), mcu.machine());
     // A folder per part: they differ in flags only, and cargo would build everything again at each change.
     let target_dir = target_dir.join(mcu.machine());
-    let request = BuildRequest {
-        package: &package,
-        target_dir: &target_dir,
-        rustc_args: &[],
-        locked: true,
-    };
+    let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &[], locked: true };
     let link = |command: &mut Command| {
-        cargo_artifact(command, &request, &what, |message| {
-            message["executable"].as_str().map(PathBuf::from)
-        })
+        cargo_artifact(command, &request, &what, |message| message["executable"].as_str().map(PathBuf::from))
     };
     let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
     let executable = link(&mut command).map_err(|error| match error {
@@ -74,11 +62,7 @@ pub fn build_image_with(
         }
         other => other,
     })?;
-    Ok(Image {
-        mcu,
-        elf: executable.bytes,
-        compiler: toolchain.version.clone(),
-    })
+    Ok(Image { mcu, elf: executable.bytes, compiler: toolchain.version.clone() })
 }
 
 impl Mcu {
@@ -140,28 +124,23 @@ pub(super) fn cargo_artifact(
     let lock_path = target_dir.join("specgen.lock");
     let lock = File::create(&lock_path).map_err(|e| TargetError::io("creating", &lock_path, e))?;
     // Cargo's own lock ends with cargo; this one lasts until the artifact is read. Dropping the file frees it.
-    lock.lock()
-        .map_err(|e| TargetError::io("locking", &lock_path, e))?;
-    let scratch = tempfile::tempdir()
-        .map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
+    lock.lock().map_err(|e| TargetError::io("locking", &lock_path, e))?;
+    let scratch = tempfile::tempdir().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
 
     command
         // Cargo reads its configuration from the working folder upwards, so work where the package is.
         .current_dir(package)
         .args(["--message-format=json-render-diagnostics", "--color=never"])
         .arg("--target-dir")
-        .arg(
-            std::path::absolute(target_dir)
-                .map_err(|e| TargetError::io("resolving", target_dir, e))?,
-        );
+        .arg(std::path::absolute(target_dir).map_err(|e| TargetError::io("resolving", target_dir, e))?);
     if request.locked {
         command.arg("--locked");
     }
     if !request.rustc_args.is_empty() {
         command.arg("--").args(request.rustc_args);
     }
-    let finished = process::run(command, scratch.path(), LIMIT)
-        .map_err(|e| TargetError::io("running cargo in", package, e))?;
+    let finished =
+        process::run(command, scratch.path(), LIMIT).map_err(|e| TargetError::io("running cargo in", package, e))?;
     if !finished.success() {
         return Err(failure(what, &finished));
     }
@@ -183,28 +162,15 @@ pub(super) fn cargo_artifact(
 fn failure(what: &str, finished: &Finished) -> TargetError {
     let text = useful_part(&finished.stderr);
     if finished.status.is_none() {
-        let text = format!(
-            "still running after {} s, ended; it had printed:\n{text}",
-            LIMIT.as_secs()
-        );
-        return TargetError::BuildFailed {
-            what: what.to_owned(),
-            text,
-        };
+        let text = format!("still running after {} s, ended; it had printed:\n{text}", LIMIT.as_secs());
+        return TargetError::BuildFailed { what: what.to_owned(), text };
     }
-    let is_proof =
-        |line: &&str| line.contains("undefined") && line.contains("specgen_panic_path_remains");
+    let is_proof = |line: &&str| line.contains("undefined") && line.contains("specgen_panic_path_remains");
     if let Some(line) = finished.stderr.lines().find(is_proof) {
         let text = line.trim().to_owned();
-        return TargetError::PanicPath {
-            what: what.to_owned(),
-            text,
-        };
+        return TargetError::PanicPath { what: what.to_owned(), text };
     }
-    TargetError::BuildFailed {
-        what: what.to_owned(),
-        text,
-    }
+    TargetError::BuildFailed { what: what.to_owned(), text }
 }
 
 /// From the first error on, without the linker's command line, at most forty lines.
@@ -215,11 +181,7 @@ fn useful_part(stderr: &str) -> String {
         .filter(|line| line.len() < 1000)
         .take(40)
         .collect();
-    if lines.is_empty() {
-        stderr.trim_end().to_owned()
-    } else {
-        lines.join("\n")
-    }
+    if lines.is_empty() { stderr.trim_end().to_owned() } else { lines.join("\n") }
 }
 
 #[cfg(test)]
@@ -228,10 +190,8 @@ mod tests {
 
     #[test]
     fn the_report_starts_at_the_first_error_and_leaves_out_the_link_line() {
-        let stderr = format!(
-            "   Compiling a\nwarning: x\nerror: linking failed\n  = note: {}\n  = note: y\n",
-            "z".repeat(2000)
-        );
+        let stderr =
+            format!("   Compiling a\nwarning: x\nerror: linking failed\n  = note: {}\n  = note: y\n", "z".repeat(2000));
         assert_eq!(useful_part(&stderr), "error: linking failed\n  = note: y");
         assert_eq!(useful_part("killed\n"), "killed");
     }

@@ -53,16 +53,11 @@ impl CallGraph {
             let name = symbol.name().map_err(malformed)?;
             if let Some(is_code) = mapping(name) {
                 marks.insert(symbol.address(), is_code);
-            } else if symbol.kind() == SymbolKind::Text
-                && symbol.is_definition()
-                && !name.is_empty()
-            {
+            } else if symbol.kind() == SymbolKind::Text && symbol.is_definition() && !name.is_empty() {
                 let address = symbol.address() & !1;
                 symbols.insert(name.to_owned(), address);
                 let entry = names.entry(address).or_default();
-                entry
-                    .0
-                    .insert(format!("{:#}", rustc_demangle::demangle(name)));
+                entry.0.insert(format!("{:#}", rustc_demangle::demangle(name)));
                 entry.1 = entry.1.max(symbol.size());
             }
         }
@@ -73,16 +68,8 @@ impl CallGraph {
                 continue;
             };
             // Assembly may declare no size: then it reaches to the next function.
-            let next = starts
-                .iter()
-                .find(|&&start| start > address)
-                .copied()
-                .unwrap_or(section_end);
-            let size = if *declared > 0 {
-                *declared
-            } else {
-                next.min(section_end) - address
-            };
+            let next = starts.iter().find(|&&start| start > address).copied().unwrap_or(section_end);
+            let size = if *declared > 0 { *declared } else { next.min(section_end) - address };
             let length = usize::try_from(size).unwrap_or(usize::MAX).min(code.len());
             let instructions = thumb::decode(address, &code[..length], &marks);
             let pushed = thumb::frame(&instructions);
@@ -128,9 +115,7 @@ impl Function {
 }
 
 fn malformed(error: object::Error) -> TargetError {
-    TargetError::MalformedImage {
-        text: error.to_string(),
-    }
+    TargetError::MalformedImage { text: error.to_string() }
 }
 
 /// `$t`, `$d` and their numbered forms: code and data begin here (ARM IHI 0044, 5.5.5).
@@ -143,15 +128,10 @@ fn mapping(name: &str) -> Option<bool> {
 }
 
 /// End of the section that holds the address, and its bytes from there on.
-fn section_at<'a>(
-    file: &object::File<'a>,
-    address: u64,
-) -> Result<Option<(u64, &'a [u8])>, TargetError> {
+fn section_at<'a>(file: &object::File<'a>, address: u64) -> Result<Option<(u64, &'a [u8])>, TargetError> {
     for section in file.sections() {
         let end = section.address() + section.size();
-        if section.kind() == object::SectionKind::Text
-            && (section.address()..end).contains(&address)
-        {
+        if section.kind() == object::SectionKind::Text && (section.address()..end).contains(&address) {
             let data = section.data().map_err(malformed)?;
             // The offset is below the section's size; an image that lies about its data gives no bytes.
             let offset = usize::try_from(address - section.address()).unwrap_or(usize::MAX);
@@ -164,10 +144,7 @@ fn section_at<'a>(
 /// `.stack_sizes`: pairs of a 32-bit address and the frame as ULEB128.
 fn stack_sizes(file: &object::File<'_>) -> Result<BTreeMap<u64, u64>, TargetError> {
     let mut sizes = BTreeMap::new();
-    for section in file
-        .sections()
-        .filter(|section| section.name() == Ok(".stack_sizes"))
-    {
+    for section in file.sections().filter(|section| section.name() == Ok(".stack_sizes")) {
         let mut data = section.data().map_err(malformed)?;
         while let Some((address, rest)) = data.split_first_chunk::<4>() {
             let (size, rest) = uleb128(rest).ok_or_else(|| TargetError::MalformedImage {

@@ -19,19 +19,10 @@ pub struct Emulator {
 /// How the firmware says why it ended: the codes of `firmware/qemu/src/semihosting.rs`.
 const EXITS: [(i32, &str); 6] = [
     (10, "the firmware cannot open config.bin"),
-    (
-        11,
-        "config.bin does not hold as many words as the controller's Config",
-    ),
+    (11, "config.bin does not hold as many words as the controller's Config"),
     (12, "the firmware cannot open input.bin"),
-    (
-        13,
-        "input.bin ends within a row: rows must hold as many words as the controller's TickInput",
-    ),
-    (
-        14,
-        "the firmware cannot write output.bin or stats.bin; is the disk full?",
-    ),
+    (13, "input.bin ends within a row: rows must hold as many words as the controller's TickInput"),
+    (14, "the firmware cannot write output.bin or stats.bin; is the disk full?"),
     (15, "the processor took a fault"),
 ];
 /// Statuses from here on name the word of the configuration that the controller refuses.
@@ -67,20 +58,13 @@ impl Emulator {
         command
             .current_dir(folder)
             .args(["-machine", image.mcu.machine(), "-cpu", image.mcu.core()])
-            .args([
-                "-icount",
-                "shift=10",
-                "-semihosting-config",
-                "enable=on,target=native",
-            ])
+            .args(["-icount", "shift=10", "-semihosting-config", "enable=on,target=native"])
             .args(["-display", "none", "-monitor", "none", "-serial", "none"])
             .args(["-kernel", "image.elf"]);
-        let finished = process::run(&mut command, folder, limit)
-            .map_err(|e| TargetError::io("running", &self.program, e))?;
+        let finished =
+            process::run(&mut command, folder, limit).map_err(|e| TargetError::io("running", &self.program, e))?;
         let Some(status) = finished.status else {
-            return Err(TargetError::EmulatorTimeout {
-                seconds: limit.as_secs(),
-            });
+            return Err(TargetError::EmulatorTimeout { seconds: limit.as_secs() });
         };
         if status.success() {
             return Ok(());
@@ -91,10 +75,7 @@ impl Emulator {
                 code - CONFIG_REFUSED
             ),
             Some(code) => {
-                let words = EXITS
-                    .iter()
-                    .find(|(known, _)| *known == code)
-                    .map(|(_, words)| *words);
+                let words = EXITS.iter().find(|(known, _)| *known == code).map(|(_, words)| *words);
                 words.map_or_else(|| format!("{status}"), ToOwned::to_owned)
             }
             None => format!("{status}"),

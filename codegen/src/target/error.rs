@@ -74,26 +74,15 @@ impl TargetError {
     }
 
     pub(crate) fn io(doing: &str, path: impl Into<PathBuf>, source: std::io::Error) -> Self {
-        Self::Io {
-            doing: doing.to_owned(),
-            path: path.into(),
-            source,
-        }
+        Self::Io { doing: doing.to_owned(), path: path.into(), source }
     }
 }
 
 impl fmt::Display for TargetError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::MissingTool {
-                tool,
-                looked,
-                command,
-            } => {
-                write!(
-                    f,
-                    "{tool} is not installed (looked for {looked}); install it with: {command}"
-                )
+            Self::MissingTool { tool, looked, command } => {
+                write!(f, "{tool} is not installed (looked for {looked}); install it with: {command}")
             }
             Self::BuildFailed { what, text } => write!(f, "building {what} failed:\n{text}"),
             Self::PanicPath { what, text } => write!(
@@ -114,11 +103,7 @@ impl fmt::Display for TargetError {
             }
             Self::BadRequest { text } => write!(f, "this cannot be replayed: {text}"),
             Self::MalformedImage { text } => write!(f, "the image cannot be analysed: {text}"),
-            Self::Io {
-                doing,
-                path,
-                source,
-            } => write!(f, "{doing} {}: {source}", path.display()),
+            Self::Io { doing, path, source } => write!(f, "{doing} {}: {source}", path.display()),
         }
     }
 }

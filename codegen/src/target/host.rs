@@ -28,25 +28,12 @@ pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetErr
     let mut command = clean_command(cargo);
     // `cargo rustc`, so that the link flags below reach this crate alone.
     command.args(["rustc", "--release", "--lib"]);
-    let request = BuildRequest {
-        package: &package,
-        target_dir: &target_dir,
-        rustc_args: &LINK,
-        locked: false,
-    };
-    let library = cargo_artifact(
-        &mut command,
-        &request,
-        &package.display().to_string(),
-        |message| {
-            let is_library = message["target"]["kind"]
-                .as_array()?
-                .iter()
-                .any(|kind| kind == "cdylib");
-            let file = message["filenames"].as_array()?.first()?.as_str()?;
-            is_library.then(|| PathBuf::from(file))
-        },
-    )?;
+    let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &LINK, locked: false };
+    let library = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
+        let is_library = message["target"]["kind"].as_array()?.iter().any(|kind| kind == "cdylib");
+        let file = message["filenames"].as_array()?.first()?.as_str()?;
+        is_library.then(|| PathBuf::from(file))
+    })?;
     keep(&library.path, &library.bytes)
 }
 

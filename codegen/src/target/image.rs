@@ -25,18 +25,10 @@ pub struct Footprint {
 /// # Errors
 /// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
 pub fn footprint(elf: &[u8]) -> Result<Footprint, TargetError> {
-    let malformed = |error: object::Error| TargetError::MalformedImage {
-        text: error.to_string(),
-    };
+    let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
     let file = object::File::parse(elf).map_err(malformed)?;
-    let mut result = Footprint {
-        flash: 0,
-        code: 0,
-        constants: 0,
-        ram: 0,
-        panic_symbols: Vec::new(),
-        allocator_symbols: Vec::new(),
-    };
+    let mut result =
+        Footprint { flash: 0, code: 0, constants: 0, ram: 0, panic_symbols: Vec::new(), allocator_symbols: Vec::new() };
     for section in file.sections().filter(|section| is_loaded(section.flags())) {
         match section.kind() {
             SectionKind::Text => result.code += section.size(),
@@ -73,21 +65,13 @@ fn is_writable(flags: SectionFlags) -> bool {
 }
 
 fn is_panic(name: &str) -> bool {
-    name.contains("panicking")
-        || name.contains("panic_path_remains")
-        || name.contains("begin_unwind")
+    name.contains("panicking") || name.contains("panic_path_remains") || name.contains("begin_unwind")
 }
 
 fn is_allocator(name: &str) -> bool {
-    [
-        "__rust_alloc",
-        "__rust_realloc",
-        "__rg_alloc",
-        "__rdl_alloc",
-        "__rustc::__rust_alloc",
-    ]
-    .iter()
-    .any(|start| name.starts_with(start))
+    ["__rust_alloc", "__rust_realloc", "__rg_alloc", "__rdl_alloc", "__rustc::__rust_alloc"]
+        .iter()
+        .any(|start| name.starts_with(start))
         || name.starts_with("alloc::")
         || matches!(name, "malloc" | "calloc" | "realloc" | "free")
 }
@@ -97,15 +81,10 @@ fn is_allocator(name: &str) -> bool {
 /// # Errors
 /// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
 pub fn exported(elf: &[u8]) -> Result<Vec<String>, TargetError> {
-    let malformed = |error: object::Error| TargetError::MalformedImage {
-        text: error.to_string(),
-    };
+    let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
     let file = object::File::parse(elf).map_err(malformed)?;
     let mut names = Vec::new();
-    for symbol in file
-        .dynamic_symbols()
-        .filter(|symbol| symbol.is_definition())
-    {
+    for symbol in file.dynamic_symbols().filter(|symbol| symbol.is_definition()) {
         names.push(symbol.name().map_err(malformed)?.to_owned());
     }
     names.sort();

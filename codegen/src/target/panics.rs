@@ -19,46 +19,28 @@ pub fn sites(elf: &[u8]) -> Result<Vec<String>, TargetError> {
     let machinery = machinery(&graph);
     let debug = debug_info(elf)?;
     let mut found = Vec::new();
-    for function in graph
-        .functions
-        .iter()
-        .filter(|(address, _)| !machinery.contains(address))
-        .map(|(_, f)| f)
-    {
-        let calls = function
-            .calls
-            .iter()
-            .filter(|(callee, _)| machinery.contains(callee));
+    for function in graph.functions.iter().filter(|(address, _)| !machinery.contains(address)).map(|(_, f)| f) {
+        let calls = function.calls.iter().filter(|(callee, _)| machinery.contains(callee));
         for place in calls.flat_map(|(_, places)| places) {
             found.push((*place, site(&debug, function, *place)?));
         }
     }
     found.sort();
     let mut seen = BTreeSet::new();
-    Ok(found
-        .into_iter()
-        .map(|(_, line)| line)
-        .filter(|line| seen.insert(line.clone()))
-        .collect())
+    Ok(found.into_iter().map(|(_, line)| line).filter(|line| seen.insert(line.clone())).collect())
 }
 
 /// Functions of the core library that reach the panic handler, and the handler.
 fn machinery(graph: &CallGraph) -> BTreeSet<u64> {
     let is_handler = |f: &Function| f.name.ends_with("rust_begin_unwind");
-    let mut found: BTreeSet<u64> = graph
-        .functions
-        .iter()
-        .filter(|(_, f)| is_handler(f))
-        .map(|(&address, _)| address)
-        .collect();
+    let mut found: BTreeSet<u64> =
+        graph.functions.iter().filter(|(_, f)| is_handler(f)).map(|(&address, _)| address).collect();
     loop {
         let reaches = |f: &Function| f.calls.keys().any(|callee| found.contains(callee));
         let more: Vec<u64> = graph
             .functions
             .iter()
-            .filter(|(address, f)| {
-                !found.contains(address) && f.name.starts_with("core::") && reaches(f)
-            })
+            .filter(|(address, f)| !found.contains(address) && f.name.starts_with("core::") && reaches(f))
             .map(|(&address, _)| address)
             .collect();
         if more.is_empty() {
@@ -71,33 +53,23 @@ fn machinery(graph: &CallGraph) -> BTreeSet<u64> {
 type DebugInfo<'a> = Context<EndianSlice<'a, LittleEndian>>;
 
 fn malformed(error: impl std::fmt::Display) -> TargetError {
-    TargetError::MalformedImage {
-        text: error.to_string(),
-    }
+    TargetError::MalformedImage { text: error.to_string() }
 }
 
 fn debug_info(elf: &[u8]) -> Result<DebugInfo<'_>, TargetError> {
     let file = object::File::parse(elf).map_err(malformed)?;
     let section = |id: gimli::SectionId| {
-        let data = file
-            .section_by_name(id.name())
-            .map_or(Ok(&[][..]), |section| section.data());
-        data.map(|data| EndianSlice::new(data, LittleEndian))
-            .map_err(malformed)
+        let data = file.section_by_name(id.name()).map_or(Ok(&[][..]), |section| section.data());
+        data.map(|data| EndianSlice::new(data, LittleEndian)).map_err(malformed)
     };
     Context::from_dwarf(Dwarf::load(section)?).map_err(malformed)
 }
 
 fn site(debug: &DebugInfo<'_>, function: &Function, place: u64) -> Result<String, TargetError> {
-    let mut frames = debug
-        .find_frames(place)
-        .skip_all_loads()
-        .map_err(malformed)?;
+    let mut frames = debug.find_frames(place).skip_all_loads().map_err(malformed)?;
     let mut lines = Vec::new();
     while let Some(frame) = frames.next().map_err(malformed)? {
-        if let Some((file, line)) = frame
-            .location
-            .and_then(|l| Some((l.file?.to_owned(), l.line?)))
+        if let Some((file, line)) = frame.location.and_then(|l| Some((l.file?.to_owned(), l.line?)))
             && !file.contains("library/core/")
         {
             lines.push(format!("{file}:{line}"));
@@ -106,9 +78,5 @@ fn site(debug: &DebugInfo<'_>, function: &Function, place: u64) -> Result<String
     if lines.is_empty() {
         lines.push(format!("{place:#x}"));
     }
-    Ok(format!(
-        "{} (in {})",
-        lines.join(", inlined at "),
-        function.name
-    ))
+    Ok(format!("{} (in {})", lines.join(", inlined at "), function.name))
 }

@@ -57,10 +57,7 @@ pub fn clean_command(program: impl AsRef<OsStr>) -> Command {
 pub fn run(command: &mut Command, scratch: &Path, limit: Duration) -> io::Result<Finished> {
     let out = scratch.join("specgen-stdout.txt");
     let err = scratch.join("specgen-stderr.txt");
-    command
-        .stdin(Stdio::null())
-        .stdout(File::create(&out)?)
-        .stderr(File::create(&err)?);
+    command.stdin(Stdio::null()).stdout(File::create(&out)?).stderr(File::create(&err)?);
     let mut child = command.spawn()?;
     let start = Instant::now();
     let mut pause = Duration::from_millis(1);
@@ -76,30 +73,19 @@ pub fn run(command: &mut Command, scratch: &Path, limit: Duration) -> io::Result
         std::thread::sleep(pause);
         pause = (pause * 2).min(Duration::from_millis(50));
     };
-    let read =
-        |path: &Path| std::fs::read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
-    Ok(Finished {
-        status,
-        stdout: read(&out)?,
-        stderr: read(&err)?,
-    })
+    let read = |path: &Path| std::fs::read(path).map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    Ok(Finished { status, stdout: read(&out)?, stderr: read(&err)? })
 }
 
 /// The first file of that name in the folders of `PATH`.
 pub fn find_in_path(name: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
-    std::env::split_paths(&path)
-        .map(|folder| folder.join(name))
-        .find(|file| file.is_file())
+    std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.is_file())
 }
 
 /// First line that the program prints, or `None` if it cannot be run or fails.
 pub fn first_line(command: &mut Command) -> Option<String> {
-    let output = command
-        .stdin(Stdio::null())
-        .stderr(Stdio::null())
-        .output()
-        .ok()?;
+    let output = command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
     if !output.status.success() {
         return None;
     }

@@ -28,11 +28,7 @@ pub fn provision(say: &mut dyn FnMut(&str)) -> Result<Tools, TargetError> {
         apt_install(&[DEBIAN_EMULATOR], say);
     }
     let tools = available()?;
-    say(&format!(
-        "cross compiler: {} ({})",
-        tools.toolchain.version,
-        tools.toolchain.rustc.display()
-    ));
+    say(&format!("cross compiler: {} ({})", tools.toolchain.version, tools.toolchain.rustc.display()));
     say(&format!("emulator: {}", tools.emulator.version));
     Ok(tools)
 }
@@ -57,17 +53,11 @@ fn apt_install(packages: &[&str], say: &mut dyn FnMut(&str)) {
         return;
     };
     let Some(prefix) = become_root() else {
-        say(&format!(
-            "not root, and sudo wants a password: apt-get install {} is left to you",
-            packages.join(" ")
-        ));
+        say(&format!("not root, and sudo wants a password: apt-get install {} is left to you", packages.join(" ")));
         return;
     };
     let apt_command = || {
-        let mut words = prefix
-            .iter()
-            .map(String::as_str)
-            .chain([apt.to_str().unwrap_or("apt-get")]);
+        let mut words = prefix.iter().map(String::as_str).chain([apt.to_str().unwrap_or("apt-get")]);
         let mut command = Command::new(words.next().unwrap_or("apt-get"));
         command.args(words).env("DEBIAN_FRONTEND", "noninteractive");
         command
@@ -75,18 +65,7 @@ fn apt_install(packages: &[&str], say: &mut dyn FnMut(&str)) {
     // Package lists may be old or absent on a fresh machine; if this fails, the install may still work.
     run(apt_command().args(["update", "-qq"]), say);
     // `--no-remove`: rather fail than replace a compiler that someone installed.
-    run(
-        apt_command()
-            .args([
-                "install",
-                "-y",
-                "-qq",
-                "--no-install-recommends",
-                "--no-remove",
-            ])
-            .args(packages),
-        say,
-    );
+    run(apt_command().args(["install", "-y", "-qq", "--no-install-recommends", "--no-remove"]).args(packages), say);
 }
 
 /// What to put before a command so that it runs as root: nothing, or sudo; `None` if neither works.

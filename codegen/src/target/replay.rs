@@ -72,11 +72,7 @@ impl StageStats {
     /// Mean instructions per call; 0 without calls.
     #[must_use]
     pub fn mean(&self) -> f64 {
-        if self.calls == 0 {
-            0.0
-        } else {
-            self.sum as f64 / self.calls as f64
-        }
+        if self.calls == 0 { 0.0 } else { self.sum as f64 / self.calls as f64 }
     }
 }
 
@@ -105,29 +101,19 @@ pub fn replay(
     let emulator = Emulator::find()?;
     let width = inputs.first().map_or(0, Vec::len);
     if let Some(tick) = inputs.iter().position(|row| row.len() != width) {
-        let text = format!(
-            "input row {tick} has {} words, row 0 has {width}",
-            inputs[tick].len()
-        );
+        let text = format!("input row {tick} has {} words, row 0 has {width}", inputs[tick].len());
         return Err(TargetError::BadRequest { text });
     }
-    let folder = tempfile::tempdir()
-        .map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
+    let folder = tempfile::tempdir().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
     write_words(&folder.path().join("config.bin"), config.iter().copied())?;
-    write_words(
-        &folder.path().join("input.bin"),
-        inputs.iter().flatten().copied(),
-    )?;
+    write_words(&folder.path().join("input.bin"), inputs.iter().flatten().copied())?;
     emulator.run(image, folder.path(), limit)?;
     let stats = parse_stats(&read_words(&folder.path().join("stats.bin"))?)?;
     let words = read_words(&folder.path().join("output.bin"))?;
     let row = stats.output_words + 1;
     // Rows of another width than the controller's could still add up to whole rows.
     if stats.input_words != width && !inputs.is_empty() {
-        let text = format!(
-            "input rows have {width} words, the controller takes {}",
-            stats.input_words
-        );
+        let text = format!("input rows have {width} words, the controller takes {}", stats.input_words);
         return Err(TargetError::BadRequest { text });
     }
     if stats.ticks != inputs.len() as u64 || words.len() != inputs.len() * row {
@@ -139,16 +125,9 @@ pub fn replay(
         );
         return Err(TargetError::MalformedStats { text });
     }
-    let outputs = words
-        .chunks_exact(row)
-        .map(|tick| tick[..row - 1].to_vec())
-        .collect();
+    let outputs = words.chunks_exact(row).map(|tick| tick[..row - 1].to_vec()).collect();
     let digests = words.chunks_exact(row).map(|tick| tick[row - 1]).collect();
-    Ok(ReplayResult {
-        outputs,
-        digests,
-        stats,
-    })
+    Ok(ReplayResult { outputs, digests, stats })
 }
 
 fn write_words(path: &Path, words: impl Iterator<Item = u64>) -> Result<(), TargetError> {
@@ -161,10 +140,7 @@ fn read_words(path: &Path) -> Result<Vec<u64>, TargetError> {
     let (words, rest) = bytes.as_chunks::<8>();
     if !rest.is_empty() {
         let name = path.file_name().unwrap_or_default().display();
-        let text = format!(
-            "{name} has {} bytes, expected whole words of 8",
-            bytes.len()
-        );
+        let text = format!("{name} has {} bytes, expected whole words of 8", bytes.len());
         return Err(TargetError::MalformedStats { text });
     }
     Ok(words.iter().map(|&word| u64::from_le_bytes(word)).collect())
@@ -187,17 +163,10 @@ fn parse_stats(words: &[u64]) -> Result<ReplayStats, TargetError> {
         ));
     }
     if words[15] != 0 {
-        return malformed(format!(
-            "{} measurements took more than 655,000 instructions",
-            words[15]
-        ));
+        return malformed(format!("{} measurements took more than 655,000 instructions", words[15]));
     }
     if words.len() != HEADER.saturating_add(size(words[16]).saturating_mul(RECORD)) {
-        return malformed(format!(
-            "stats.bin has {} words, which is not {} stages",
-            words.len(),
-            words[16]
-        ));
+        return malformed(format!("stats.bin has {} words, which is not {} stages", words.len(), words[16]));
     }
     Ok(ReplayStats {
         ticks: words[2],
@@ -208,19 +177,12 @@ fn parse_stats(words: &[u64]) -> Result<ReplayStats, TargetError> {
         config_bytes: words[7],
         painted_stack: words[8],
         painted_window: words[9],
-        stages: words[HEADER..]
-            .chunks_exact(RECORD)
-            .map(parse_stage)
-            .collect(),
+        stages: words[HEADER..].chunks_exact(RECORD).map(parse_stage).collect(),
     })
 }
 
 fn parse_stage(record: &[u64]) -> StageStats {
-    let name: Vec<u8> = record[..2]
-        .iter()
-        .flat_map(|word| word.to_le_bytes())
-        .take_while(|&byte| byte != 0)
-        .collect();
+    let name: Vec<u8> = record[..2].iter().flat_map(|word| word.to_le_bytes()).take_while(|&byte| byte != 0).collect();
     StageStats {
         name: String::from_utf8_lossy(&name).into_owned(),
         calls: record[2],
@@ -235,9 +197,7 @@ mod tests {
     use super::*;
 
     fn good() -> Vec<u64> {
-        let mut words = vec![
-            MAGIC, VERSION, 3, 8, 12, 37, 100, 64, 500, 8192, 2, 0, 1, 100, 1000, 0, 1,
-        ];
+        let mut words = vec![MAGIC, VERSION, 3, 8, 12, 37, 100, 64, 500, 8192, 2, 0, 1, 100, 1000, 0, 1];
         words.extend([u64::from_le_bytes(*b"step\0\0\0\0"), 0, 3, 10, 60, 30]);
         words
     }
@@ -245,24 +205,10 @@ mod tests {
     #[test]
     fn stats_are_read_as_the_layout_says() {
         let stats = parse_stats(&good()).unwrap();
-        assert_eq!(
-            (
-                stats.ticks,
-                stats.config_words,
-                stats.input_words,
-                stats.output_words
-            ),
-            (3, 8, 12, 37)
-        );
-        assert_eq!(
-            (stats.state_bytes, stats.painted_stack, stats.painted_window),
-            (100, 500, 8192)
-        );
+        assert_eq!((stats.ticks, stats.config_words, stats.input_words, stats.output_words), (3, 8, 12, 37));
+        assert_eq!((stats.state_bytes, stats.painted_stack, stats.painted_window), (100, 500, 8192));
         let step = stats.stage("step").unwrap();
-        assert_eq!(
-            (step.calls, step.smallest, step.largest, step.mean()),
-            (3, 10, 30, 20.0)
-        );
+        assert_eq!((step.calls, step.smallest, step.largest, step.mean()), (3, 10, 30, 20.0));
         assert_eq!(stats.stage("inverse"), None);
     }
 
@@ -279,11 +225,6 @@ mod tests {
         assert!(spoil(15, 4).contains("655,000"));
         assert!(spoil(16, 2).contains("not 2 stages"));
         assert!(spoil(16, u64::MAX).contains("not 18446744073709551615 stages"));
-        assert!(
-            parse_stats(&[])
-                .unwrap_err()
-                .to_string()
-                .contains("0 words")
-        );
+        assert!(parse_stats(&[]).unwrap_err().to_string().contains("0 words"));
     }
 }

@@ -48,60 +48,31 @@ impl StackBound {
 /// [`TargetError::MalformedImage`] if the file is damaged or has no such function.
 pub fn bound(elf: &[u8], root: &str) -> Result<StackBound, TargetError> {
     let graph = CallGraph::read(elf)?;
-    let &start = graph
-        .symbols
-        .get(root)
-        .ok_or_else(|| TargetError::MalformedImage {
-            text: format!(
-                "it has no function `{root}`; was it stripped, or made by another specgen?"
-            ),
-        })?;
-    let mut walk = Walk {
-        graph: &graph,
-        deepest: BTreeMap::new(),
-        open: Vec::new(),
-        cycles: BTreeSet::new(),
-    };
+    let &start = graph.symbols.get(root).ok_or_else(|| TargetError::MalformedImage {
+        text: format!("it has no function `{root}`; was it stripped, or made by another specgen?"),
+    })?;
+    let mut walk = Walk { graph: &graph, deepest: BTreeMap::new(), open: Vec::new(), cycles: BTreeSet::new() };
     let bytes = walk.visit(start);
     let cycles = walk.cycles;
     let deepest = walk.deepest;
 
-    let name = |address: &u64| {
-        graph
-            .functions
-            .get(address)
-            .map_or_else(String::new, |f| f.name.clone())
-    };
-    let reached = || {
-        deepest
-            .keys()
-            .filter_map(|address| graph.functions.get(address))
-    };
+    let name = |address: &u64| graph.functions.get(address).map_or_else(String::new, |f| f.name.clone());
+    let reached = || deepest.keys().filter_map(|address| graph.functions.get(address));
     let mut path = Vec::new();
     let mut next = Some(start);
     while let Some(address) = next {
-        let frame = graph
-            .functions
-            .get(&address)
-            .and_then(|f| f.frame)
-            .unwrap_or(0);
+        let frame = graph.functions.get(&address).and_then(|f| f.frame).unwrap_or(0);
         path.push((name(&address), frame));
         next = deepest.get(&address).and_then(|&(_, callee)| callee);
     }
     let which = |wanted: fn(&super::callgraph::Function) -> bool| {
-        reached()
-            .filter(|f| wanted(f))
-            .map(|f| f.name.clone())
-            .collect::<Vec<_>>()
+        reached().filter(|f| wanted(f)).map(|f| f.name.clone()).collect::<Vec<_>>()
     };
     Ok(StackBound {
         bytes,
         path,
         code_bytes: reached().map(|f| f.size).sum(),
-        recursion: cycles
-            .iter()
-            .map(|cycle| cycle.iter().map(name).collect())
-            .collect(),
+        recursion: cycles.iter().map(|cycle| cycle.iter().map(name).collect()).collect(),
         indirect: which(|f| !f.indirect.is_empty()),
         unsized_functions: which(|f| f.frame.is_none()),
         strays: which(|f| !f.strays.is_empty()),
@@ -127,11 +98,7 @@ impl Walk<'_> {
         }
         if let Some(position) = self.open.iter().position(|&open| open == address) {
             let mut cycle = self.open[position..].to_vec();
-            let lowest = cycle
-                .iter()
-                .enumerate()
-                .min_by_key(|&(_, address)| address)
-                .map_or(0, |(i, _)| i);
+            let lowest = cycle.iter().enumerate().min_by_key(|&(_, address)| address).map_or(0, |(i, _)| i);
             cycle.rotate_left(lowest);
             self.cycles.insert(cycle);
             return 0;

@@ -29,33 +29,18 @@ pub enum Branch {
 
 /// The instructions of the code that stands at `address`. `marks` says where code (true) and data begin.
 pub fn decode(address: u64, code: &[u8], marks: &BTreeMap<u64, bool>) -> Vec<Instruction> {
-    let half = |at: usize| {
-        code.get(at..at + 2)
-            .map(|b| u16::from_le_bytes([b[0], b[1]]))
-    };
+    let half = |at: usize| code.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]]));
     let mut found = Vec::new();
     let mut at = 0;
     while let Some(first) = half(at) {
         let place = address + at as u64;
         // Code unless the last mark at or before here says data.
-        if marks
-            .range(..=place)
-            .next_back()
-            .is_some_and(|(_, &is_code)| !is_code)
-        {
+        if marks.range(..=place).next_back().is_some_and(|(_, &is_code)| !is_code) {
             at += 2;
             continue;
         }
-        let second = if first >> 11 < 0b11101 {
-            None
-        } else {
-            half(at + 2)
-        };
-        found.push(Instruction {
-            place,
-            first,
-            second,
-        });
+        let second = if first >> 11 < 0b11101 { None } else { half(at + 2) };
+        found.push(Instruction { place, first, second });
         at += if first >> 11 < 0b11101 { 2 } else { 4 };
     }
     found
@@ -84,16 +69,12 @@ impl Instruction {
         match op {
             // BLX rM; BX rM and MOV PC, rM except from LR, a return.
             _ if op & 0xff87 == 0x4780 => Some(Branch::Register),
-            _ if matches!(op & 0xff87, 0x4700 | 0x4687) && register != LINK_REGISTER => {
-                Some(Branch::Register)
-            }
+            _ if matches!(op & 0xff87, 0x4700 | 0x4687) && register != LINK_REGISTER => Some(Branch::Register),
             // B<cond>; conditions 14 and 15 are UDF and SVC.
             _ if op >> 12 == 0b1101 && (op >> 8) & 0xf < 14 => {
                 Some(Branch::Jump(self.target(u32::from(op & 0xff) << 1, 9)))
             }
-            _ if op >> 11 == 0b11100 => {
-                Some(Branch::Jump(self.target(u32::from(op & 0x7ff) << 1, 12)))
-            }
+            _ if op >> 11 == 0b11100 => Some(Branch::Jump(self.target(u32::from(op & 0x7ff) << 1, 12))),
             _ => None,
         }
     }
@@ -107,11 +88,7 @@ impl Instruction {
                 | ((j2 ^ sign ^ 1) << 22)
                 | ((high & 0x3ff) << 12)
                 | ((low & 0x7ff) << 1);
-            let near = (sign << 20)
-                | (j2 << 19)
-                | (j1 << 18)
-                | ((high & 0x3f) << 12)
-                | ((low & 0x7ff) << 1);
+            let near = (sign << 20) | (j2 << 19) | (j1 << 18) | ((high & 0x3f) << 12) | ((low & 0x7ff) << 1);
             return match second & 0x5000 {
                 // BL, and BLX to ARM code, whose target is a multiple of four.
                 0x5000 => Some(Branch::Call(self.target(far, 25))),
@@ -131,9 +108,7 @@ impl Instruction {
     fn target(&self, offset: u32, bits: u32) -> u64 {
         let shift = 32 - bits;
         let offset = (offset << shift).cast_signed() >> shift;
-        self.place
-            .wrapping_add(4)
-            .wrapping_add_signed(i64::from(offset))
+        self.place.wrapping_add(4).wrapping_add_signed(i64::from(offset))
     }
 
     /// Bytes by which it lowers the stack pointer; `None` if that depends on the run.
@@ -169,17 +144,13 @@ impl Instruction {
             0xe96d => Some(4 * (low & 0xff)),
             _ if first & 0xffbf == 0xed2d => Some(4 * (low & 0xff)),
             // SUBW SP, SP, #imm12.
-            _ if first & 0xfbff == 0xf2ad && destination == STACK_POINTER => {
-                Some(immediate12(first, second))
-            }
+            _ if first & 0xfbff == 0xf2ad && destination == STACK_POINTER => Some(immediate12(first, second)),
             // SUB.W SP, SP, #constant.
             _ if first & 0xfbef == 0xf1ad && destination == STACK_POINTER => {
                 Some(u64::from(expanded(immediate12(first, second))))
             }
             // ADD.W and ADDW SP, SP, #constant give back.
-            _ if matches!(first & 0xfbef, 0xf10d | 0xf20d) && destination == STACK_POINTER => {
-                Some(0)
-            }
+            _ if matches!(first & 0xfbef, 0xf10d | 0xf20d) && destination == STACK_POINTER => Some(0),
             // Any other data processing into SP, with a register or an immediate operand.
             _ if (first >> 9 == 0b111_0101 || (first >> 11 == 0b11110 && second >> 15 == 0))
                 && destination == STACK_POINTER =>
@@ -245,10 +216,8 @@ mod tests {
     #[test]
     fn data_between_code_is_not_decoded() {
         let marks = BTreeMap::from([(0x1000, true), (0x1002, false), (0x1004, true)]);
-        let places: Vec<u64> = decode(0x1000, &[0x98, 0x47, 0x98, 0x47, 0x98, 0x47], &marks)
-            .iter()
-            .map(|i| i.place)
-            .collect();
+        let places: Vec<u64> =
+            decode(0x1000, &[0x98, 0x47, 0x98, 0x47, 0x98, 0x47], &marks).iter().map(|i| i.place).collect();
         assert_eq!(places, [0x1000, 0x1004]);
     }
 
@@ -256,17 +225,12 @@ mod tests {
     fn what_lowers_the_stack_pointer_is_added_up() {
         // push {r4, r5, lr}; sub sp, #16; vpush {d8}; push.w {r8, r9}; str r11, [sp, #-8]!; sub.w sp, sp, #1024
         let code = [
-            0x30, 0xb5, 0x84, 0xb0, 0x2d, 0xed, 0x02, 0x8b, 0x2d, 0xe9, 0x00, 0x03, 0x4d, 0xf8,
-            0x08, 0xbd, 0xad, 0xf5, 0x80, 0x6d,
+            0x30, 0xb5, 0x84, 0xb0, 0x2d, 0xed, 0x02, 0x8b, 0x2d, 0xe9, 0x00, 0x03, 0x4d, 0xf8, 0x08, 0xbd, 0xad, 0xf5,
+            0x80, 0x6d,
         ];
         assert_eq!(frame(&all(&code)), Some(12 + 16 + 8 + 8 + 8 + 1024));
         // add sp, #16; add.w sp, sp, #1024; msr msp, r0 take nothing.
-        assert_eq!(
-            frame(&all(&[
-                0x04, 0xb0, 0x0d, 0xf5, 0x80, 0x6d, 0x80, 0xf3, 0x08, 0x88
-            ])),
-            Some(0)
-        );
+        assert_eq!(frame(&all(&[0x04, 0xb0, 0x0d, 0xf5, 0x80, 0x6d, 0x80, 0xf3, 0x08, 0x88])), Some(0));
         // mov sp, r0; sub.w sp, sp, r0
         assert_eq!(frame(&all(&[0x85, 0x46])), None);
         assert_eq!(frame(&all(&[0xad, 0xeb, 0x00, 0x0d])), None);

@@ -54,10 +54,7 @@ pub fn find() -> Result<Toolchain, TargetError> {
     if let (Some(rustc), Some(cargo)) = (find_in_path("rustc"), find_in_path("cargo")) {
         candidates.push(Candidate { rustc, cargo });
     }
-    let debian = Candidate {
-        rustc: "/usr/bin/rustc".into(),
-        cargo: "/usr/bin/cargo".into(),
-    };
+    let debian = Candidate { rustc: "/usr/bin/rustc".into(), cargo: "/usr/bin/cargo".into() };
     if debian.rustc.is_file() && debian.cargo.is_file() {
         candidates.push(debian);
     }
@@ -68,20 +65,14 @@ pub fn find() -> Result<Toolchain, TargetError> {
 
 /// The first candidate that serves; linkers are looked for beside every candidate, then in `elsewhere`.
 fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, TargetError> {
-    let probed: Vec<(&Candidate, Sysroot)> = candidates
-        .iter()
-        .filter_map(|candidate| Some((candidate, Sysroot::of(&candidate.rustc)?)))
-        .collect();
+    let probed: Vec<(&Candidate, Sysroot)> =
+        candidates.iter().filter_map(|candidate| Some((candidate, Sysroot::of(&candidate.rustc)?))).collect();
     let mut without_linker = None;
     for (candidate, sysroot) in &probed {
         let Some(core) = sysroot.core() else { continue };
         let linker = if sysroot.rust_lld().is_some() {
             None
-        } else if let Some(linker) = probed
-            .iter()
-            .find_map(|(_, other)| other.rust_lld())
-            .or_else(|| lld(elsewhere))
-        {
+        } else if let Some(linker) = probed.iter().find_map(|(_, other)| other.rust_lld()).or_else(|| lld(elsewhere)) {
             Some(linker)
         } else {
             without_linker = Some(candidate.rustc.clone());
@@ -98,16 +89,12 @@ fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, 
     Err(match without_linker {
         Some(rustc) => TargetError::MissingTool {
             tool: "a linker for ARM images".into(),
-            looked: format!(
-                "rust-lld beside {} and on PATH, ld.lld on PATH",
-                rustc.display()
-            ),
+            looked: format!("rust-lld beside {} and on PATH, ld.lld on PATH", rustc.display()),
             command: "apt-get install lld".into(),
         },
         None => TargetError::MissingTool {
             tool: format!("a Rust compiler for {TRIPLE}"),
-            looked: "the target or rust-src in the rustc on PATH, Debian's rustc-web in /usr"
-                .into(),
+            looked: "the target or rust-src in the rustc on PATH, Debian's rustc-web in /usr".into(),
             command: install_command(),
         },
     })
@@ -116,9 +103,7 @@ fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, 
 /// Words for whoever has neither.
 #[must_use]
 pub fn install_command() -> String {
-    format!(
-        "rustup target add {TRIPLE}   (or, on Debian: apt-get install rustc-web cargo-web rust-web-src)"
-    )
+    format!("rustup target add {TRIPLE}   (or, on Debian: apt-get install rustc-web cargo-web rust-web-src)")
 }
 
 /// The folder a compiler belongs to.
@@ -130,16 +115,10 @@ struct Sysroot {
 
 impl Sysroot {
     fn of(rustc: &Path) -> Option<Self> {
-        let path = PathBuf::from(first_line(
-            clean_command(rustc).args(["--print", "sysroot"]),
-        )?);
+        let path = PathBuf::from(first_line(clean_command(rustc).args(["--print", "sysroot"]))?);
         let host = first_line(clean_command(rustc).args(["--print", "host-tuple"]))?;
         let version = first_line(clean_command(rustc).arg("--version"))?;
-        Some(Self {
-            path,
-            host,
-            version,
-        })
+        Some(Self { path, host, version })
     }
 
     fn core(&self) -> Option<CoreLibrary> {
@@ -154,23 +133,14 @@ impl Sysroot {
     }
 
     fn rust_lld(&self) -> Option<PathBuf> {
-        let file = self
-            .path
-            .join("lib/rustlib")
-            .join(&self.host)
-            .join("bin/rust-lld");
+        let file = self.path.join("lib/rustlib").join(&self.host).join("bin/rust-lld");
         file.is_file().then_some(file)
     }
 }
 
 /// A linker of LLVM's own packages.
 fn lld(folders: &[PathBuf]) -> Option<PathBuf> {
-    ["rust-lld", "ld.lld"].iter().find_map(|name| {
-        folders
-            .iter()
-            .map(|f| f.join(name))
-            .find(|file| file.is_file())
-    })
+    ["rust-lld", "ld.lld"].iter().find_map(|name| folders.iter().map(|f| f.join(name)).find(|file| file.is_file()))
 }
 
 impl Toolchain {
@@ -221,10 +191,7 @@ mod tests {
         );
         fs::write(&rustc, script).unwrap();
         fs::set_permissions(&rustc, fs::Permissions::from_mode(0o755)).unwrap();
-        Candidate {
-            rustc,
-            cargo: sysroot.join("cargo"),
-        }
+        Candidate { rustc, cargo: sysroot.join("cargo") }
     }
 
     const TARGET: &str = "lib/rustlib/thumbv7em-none-eabihf/lib/libcore.rlib";
@@ -271,12 +238,7 @@ mod tests {
         let bare = fake(root.path(), "bare", &[LLD]);
         let error = choose(&[bare], &[]).unwrap_err();
         assert!(error.is_environment());
-        assert!(
-            error
-                .to_string()
-                .contains("rustup target add thumbv7em-none-eabihf"),
-            "{error}"
-        );
+        assert!(error.to_string().contains("rustup target add thumbv7em-none-eabihf"), "{error}");
         let no_linker = fake(root.path(), "debian", &[SOURCE]);
         let error = choose(&[no_linker], &[]).unwrap_err();
         assert!(error.to_string().contains("apt-get install lld"), "{error}");

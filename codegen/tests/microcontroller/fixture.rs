@@ -24,25 +24,14 @@ impl Workspace {
         let root = folder.path();
         put(root, "runtime/Cargo.toml", &manifest("specgen-runtime", ""));
         put(root, "runtime/src/lib.rs", "#![no_std]\n");
-        put(
-            root,
-            "controller/Cargo.toml",
-            &manifest(
-                "controller",
-                "specgen-runtime = { path = \"../runtime\" }\n",
-            ),
-        );
-        put(
-            root,
-            "controller/src/lib.rs",
-            &CONTROLLER
-                .replace("@ITEMS@", items)
-                .replace("@EXTRA@", extra),
-        );
+        put(root, "controller/Cargo.toml", &manifest("controller", "specgen-runtime = { path = \"../runtime\" }\n"));
+        put(root, "controller/src/lib.rs", &CONTROLLER.replace("@ITEMS@", items).replace("@EXTRA@", extra));
         put(root, "host/Cargo.toml", HOST_MANIFEST);
         put(root, "host/src/lib.rs", HOST);
         let repository = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
         copy(&repository.join("firmware/qemu"), &root.join("qemu"));
+        // The repository's stages measure parts that only an emitted controller has.
+        put(root, "qemu/src/stages.rs", STAGES);
         // The committed lock names the real controller; only the path packages are put in its place.
         let status = Command::new(&tools.toolchain.cargo)
             .env("RUSTC", &tools.toolchain.rustc)
@@ -81,9 +70,7 @@ pub fn expected(config: &[u64], inputs: &[Vec<u64>]) -> (Vec<Vec<u64>>, Vec<u64>
         }
         words.push(tick as u64 + 1);
         outputs.push(words);
-        digests.push(level.iter().fold(tick as u64 + 1, |digest, l| {
-            digest.rotate_left(7) ^ l.to_bits()
-        }));
+        digests.push(level.iter().fold(tick as u64 + 1, |digest, l| digest.rotate_left(7) ^ l.to_bits()));
     }
     (outputs, digests)
 }
@@ -111,10 +98,24 @@ fn copy(from: &Path, to: &Path) {
 }
 
 fn manifest(name: &str, dependencies: &str) -> String {
-    format!(
-        "[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[dependencies]\n{dependencies}"
-    )
+    format!("[package]\nname = \"{name}\"\nversion = \"0.1.0\"\nedition = \"2024\"\n\n[dependencies]\n{dependencies}")
 }
+
+const STAGES: &str = r#"
+use crate::instructions::InstructionCounter;
+use crate::stats::Stage;
+use controller::{Config, State, TickInput};
+pub struct Stages { step: Stage, setpoint: Stage }
+impl Stages {
+    pub const fn new() -> Self { Self { step: Stage::new("step"), setpoint: Stage::new("setpoint") } }
+    pub fn add_step(&mut self, instructions: u32) { self.step.add(instructions); }
+    pub fn measure(&mut self, counter: &mut InstructionCounter, _: &Config, _: &State, input: &TickInput) {
+        let (_, instructions) = counter.measure(|| input.setpoint.map(|x| x + 1.0));
+        self.setpoint.add(instructions);
+    }
+    pub fn all(&self) -> [Stage; 2] { [self.step, self.setpoint] }
+}
+"#;
 
 const HOST_MANIFEST: &str = r#"
 [package]

@@ -44,13 +44,7 @@ impl Stage {
             padded[i] = bytes[i];
             i += 1;
         }
-        Self {
-            name: padded,
-            calls: 0,
-            smallest: u64::MAX,
-            sum: 0,
-            largest: 0,
-        }
+        Self { name: padded, calls: 0, smallest: u64::MAX, sum: 0, largest: 0 }
     }
 
     /// Adds one call of so many instructions.
@@ -69,14 +63,7 @@ impl Stage {
     fn words(&self) -> [u64; 6] {
         let name = u128::from_le_bytes(self.name);
         let smallest = if self.calls == 0 { 0 } else { self.smallest };
-        [
-            name as u64,
-            (name >> 64) as u64,
-            self.calls,
-            smallest,
-            self.sum,
-            self.largest,
-        ]
+        [name as u64, (name >> 64) as u64, self.calls, smallest, self.sum, self.largest]
     }
 }
 
