@@ -69,11 +69,7 @@ pub fn reference_markdown() -> String {
     let mut text = MARKDOWN_HEAD.to_owned();
     for code in codes::REGISTRY {
         // Writing to a String cannot fail.
-        let _ = write!(
-            text,
-            "\n## {}: {}\n\n{}\n",
-            code.id, code.title, code.explanation
-        );
+        let _ = write!(text, "\n## {}: {}\n\n{}\n", code.id, code.title, code.explanation);
     }
     text
 }

@@ -172,9 +172,9 @@ pub enum AdaptationMode {
 pub struct Adaptation {
     /// Which estimates are used at start-up.
     pub mode: AdaptationMode,
-    /// ω (EWMA) or ω1 (PCC), per run.
+    /// ω (EWMA) or ω1 (PCC), per run, in (0, 1]; 0 if the mode does not use it and the spec does not give it.
     pub level_weight: f64,
-    /// ω2, per run.
+    /// ω2, per run, in (0, 1]; 0 if the mode does not use it and the spec does not give it.
     pub drift_weight: f64,
     /// Control ticks per run.
     pub run_interval: u32,

@@ -56,8 +56,7 @@ pub fn load(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
             "",
             0..0,
             "the spec is empty".to_owned(),
-            "start from a copy of specs/minimal.toml, or of specs/reference.toml for every key"
-                .to_owned(),
+            "start from a copy of specs/minimal.toml, or of specs/reference.toml for every key".to_owned(),
         );
         return (None, findings.finish());
     }
@@ -67,21 +66,13 @@ pub fn load(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     let fields = read::read(text, &parsed.root, &mut findings);
     check::all(&fields, &source.dir, &mut findings);
     drop_wrong_advice(&mut findings);
-    let model = if findings.has_errors() {
-        None
-    } else {
-        build::model(&fields)
-    };
+    let model = if findings.has_errors() { None } else { build::model(&fields) };
     (model, findings.finish())
 }
 
 /// "Put it in quotes" is no help where the key takes no text at all.
 fn drop_wrong_advice(findings: &mut Findings) {
-    let not_text: Vec<_> = findings
-        .all()
-        .iter()
-        .filter(|d| d.code == codes::WRONG_TYPE)
-        .map(|d| d.place.clone())
-        .collect();
+    let not_text: Vec<_> =
+        findings.all().iter().filter(|d| d.code == codes::WRONG_TYPE).map(|d| d.place.clone()).collect();
     findings.retain(|d| d.code != codes::UNQUOTED || !not_text.contains(&d.place));
 }

@@ -19,32 +19,20 @@ use support::specs::{errors, every_key, folder_with_records, root, source};
 fn the_corpus_is_rendered_as_committed() {
     let folder = folder_with_records();
     let corpus = root().join("tests/corpus");
-    let mut files: Vec<_> = fs::read_dir(&corpus)
-        .expect("tests/corpus")
-        .map(|e| e.expect("readable").path())
-        .collect();
+    let mut files: Vec<_> = fs::read_dir(&corpus).expect("tests/corpus").map(|e| e.expect("readable").path()).collect();
     files.retain(|path| path.extension().is_some_and(|e| e == "toml"));
     files.sort();
     assert!(files.len() >= 20, "{} files in the corpus", files.len());
     let bless = std::env::var_os("SPECGEN_BLESS").is_some();
     let mut stale = Vec::new();
     for path in files {
-        let name = path
-            .file_name()
-            .expect("a name")
-            .to_string_lossy()
-            .into_owned();
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         let mut source = SpecSource::read(&path).expect("the corpus is UTF-8");
         source.display_name.clone_from(&name);
         source.dir = folder.path().join("specs");
         let (model, findings) = spec::load(&source);
         // "ok-…" must pass, everything else be refused.
-        assert_eq!(
-            model.is_some(),
-            name.starts_with("ok-"),
-            "{name}:\n{}",
-            render(&findings, &source, false)
-        );
+        assert_eq!(model.is_some(), name.starts_with("ok-"), "{name}:\n{}", render(&findings, &source, false));
         let text = render(&findings, &source, false);
         let expected = path.with_extension("txt");
         if bless {
@@ -67,21 +55,14 @@ fn json_names_file_line_and_column() {
     let source = source(&text, "my.toml", &folder);
     let (_, findings) = spec::load(&source);
     let json = to_json(&findings, &source);
-    let line = 1 + text
-        .lines()
-        .position(|l| l.starts_with("height"))
-        .expect("there");
+    let line = 1 + text.lines().position(|l| l.starts_with("height")).expect("there");
     assert_eq!(json[0]["code"], codes::WRONG_DIMENSION);
     assert_eq!(json[0]["severity"], "error");
     assert_eq!(json[0]["key"], "geometry.height");
     assert_eq!(json[0]["file"], "my.toml");
     assert_eq!(json[0]["line"], line);
     assert_eq!(json[0]["column"], 10);
-    assert!(
-        json[0]["help"]
-            .as_str()
-            .is_some_and(|help| help.contains("180 mm"))
-    );
+    assert!(json[0]["help"].as_str().is_some_and(|help| help.contains("180 mm")));
 }
 
 /// The text with every section as an inline table or as dotted keys.
@@ -112,8 +93,7 @@ fn sections_dotted_keys_and_inline_tables_mean_the_same() {
     let load = |text: &str| {
         let source = source(text, "spec.toml", &folder);
         let (model, findings) = spec::load(&source);
-        let mut model =
-            model.unwrap_or_else(|| panic!("{text}\n{}", render(&findings, &source, false)));
+        let mut model = model.unwrap_or_else(|| panic!("{text}\n{}", render(&findings, &source, false)));
         model.spans.clear();
         model
     };
@@ -137,19 +117,13 @@ fn hostile_files_are_refused_in_good_time() {
         fill("a={"),
         format!("{}b=1", fill("a.")[..spec::MAX_BYTES - 4].to_owned()),
         fill("\""),
-        format!(
-            "[platform]\nmass = \"{}\"",
-            "9".repeat(spec::MAX_BYTES - 40)
-        ),
+        format!("[platform]\nmass = \"{}\"", "9".repeat(spec::MAX_BYTES - 40)),
         format!("[platform]\nmass = {}", "9".repeat(spec::MAX_BYTES - 40)),
         format!("[hysteresis]\nrecords = [{}]", "\"x\",".repeat(200_000)),
         format!("[geometry]\n{}", numbered),
         format!("[geometry]\n{}", numbered.replace(" = 1", " = 1 m")),
         format!("{} = 1", "x".repeat(spec::MAX_BYTES - 10)),
-        format!(
-            "{}\u{b5} = \u{b5} x",
-            "\u{b5}".repeat(spec::MAX_BYTES / 2 - 10)
-        ),
+        format!("{}\u{b5} = \u{b5} x", "\u{b5}".repeat(spec::MAX_BYTES / 2 - 10)),
     ];
     for text in texts {
         let start = std::time::Instant::now();
@@ -157,19 +131,11 @@ fn hostile_files_are_refused_in_good_time() {
         let (model, findings) = spec::load(&source);
         let shown = render(&findings, &source, false);
         assert!(model.is_none());
-        assert!(
-            (1..=101).contains(&findings.len()),
-            "{} findings",
-            findings.len()
-        );
+        assert!((1..=101).contains(&findings.len()), "{} findings", findings.len());
         assert!(shown.len() < 100_000, "{} characters shown", shown.len());
         // Generous: it takes a tenth of a second in release; a quadratic reader would take minutes.
         let seconds = start.elapsed().as_secs_f64();
-        assert!(
-            seconds < 20.0,
-            "{seconds} s for {}",
-            &text[..20.min(text.len())].escape_debug()
-        );
+        assert!(seconds < 20.0, "{seconds} s for {}", &text[..20.min(text.len())].escape_debug());
         println!(
             "{seconds:.3} s, {} findings: {}",
             findings.len(),
@@ -187,26 +153,16 @@ mod files {
     fn refusal(path: &Path) -> Diagnostic {
         let finding = SpecSource::read(path).expect_err("refused");
         assert!(!finding.help.is_empty());
-        let source = SpecSource {
-            display_name: "x".into(),
-            text: String::new(),
-            dir: ".".into(),
-        };
+        let source = SpecSource { display_name: "x".into(), text: String::new(), dir: ".".into() };
         let shown = render(std::slice::from_ref(&finding), &source, false);
-        assert!(
-            shown.contains(finding.code) && shown.contains("help"),
-            "{shown}"
-        );
+        assert!(shown.contains(finding.code) && shown.contains("help"), "{shown}");
         finding
     }
 
     #[test]
     fn missing_file_and_folder() {
         let folder = tempfile::tempdir().expect("temporary folder");
-        assert_eq!(
-            refusal(&folder.path().join("none.toml")).code,
-            codes::UNREADABLE
-        );
+        assert_eq!(refusal(&folder.path().join("none.toml")).code, codes::UNREADABLE);
         let finding = refusal(folder.path());
         assert_eq!(finding.code, codes::UNREADABLE);
         assert!(finding.message.contains("folder"));
@@ -219,11 +175,7 @@ mod files {
         fs::write(&path, b"schema = 1\nname = \"gr\xf6\xdfe\"\n").expect("written");
         let finding = refusal(&path);
         assert_eq!(finding.code, codes::NOT_TEXT);
-        assert!(
-            finding.message.contains("byte 21 (line 2) is 0xf6"),
-            "{}",
-            finding.message
-        );
+        assert!(finding.message.contains("byte 21 (line 2) is 0xf6"), "{}", finding.message);
         assert!(matches!(finding.place, Place::File { line: Some(2), .. }));
     }
 
@@ -245,9 +197,7 @@ mod files {
     fn a_name_that_is_not_utf8_is_read_and_shown() {
         use std::os::unix::ffi::OsStrExt as _;
         let folder = tempfile::tempdir().expect("temporary folder");
-        let path = folder
-            .path()
-            .join(std::ffi::OsStr::from_bytes(b"pl\xffatform.toml"));
+        let path = folder.path().join(std::ffi::OsStr::from_bytes(b"pl\xffatform.toml"));
         fs::write(&path, "schema = 2\n").expect("written");
         let source = SpecSource::read(&path).expect("read");
         let (_, findings) = spec::load(&source);
@@ -259,14 +209,7 @@ mod files {
         let folder = folder_with_records();
         let path = folder.path().join("specs/windows.toml");
         let plain = every_key();
-        fs::write(
-            &path,
-            format!(
-                "\u{feff}{}",
-                plain.replace('\n', "\r\n").replace(" = ", "\t=\t")
-            ),
-        )
-        .expect("written");
+        fs::write(&path, format!("\u{feff}{}", plain.replace('\n', "\r\n").replace(" = ", "\t=\t"))).expect("written");
         let (windows, findings) = spec::load(&SpecSource::read(&path).expect("read"));
         assert!(errors(&findings).is_empty(), "{findings:#?}");
         fs::write(&path, plain).expect("written");
@@ -294,10 +237,7 @@ mod files {
             let (_, findings) = spec::load(&source(&text, "spec.toml", &folder));
             let errors = errors(&findings);
             assert_eq!(errors.len(), 1, "{record}: {findings:#?}");
-            assert_eq!(
-                (errors[0].code, errors[0].key.as_str()),
-                (code, "hysteresis.records[0]")
-            );
+            assert_eq!((errors[0].code, errors[0].key.as_str()), (code, "hysteresis.records[0]"));
         }
     }
 }

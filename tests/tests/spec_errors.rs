@@ -8,27 +8,20 @@ mod support {
     pub mod specs;
 }
 
-use std::fs;
-
 use specgen::diagnostic::{Diagnostic, codes, render};
 use specgen::spec::keys::{Item, Key, Presence, SECTIONS, Section, Shape};
-use specgen::spec::{self};
+use specgen::spec::{self, SpecSource};
+use specgen::stability;
 use support::specs::{errors, every_key, folder_with_records, line_of, source, spec_files};
 
 #[test]
-fn every_spec_of_the_repository_is_accepted_without_a_warning() {
-    let folder = folder_with_records();
+fn every_spec_of_the_repository_is_accepted_without_a_warning_and_stable() {
     for path in spec_files() {
-        let text = fs::read_to_string(&path).expect("readable");
-        let source = source(&text, "spec.toml", &folder);
+        let source = SpecSource::read(&path).expect("readable");
         let (model, findings) = spec::load(&source);
-        assert!(
-            findings.is_empty(),
-            "{}:\n{}",
-            path.display(),
-            render(&findings, &source, false)
-        );
-        assert!(model.is_some());
+        assert!(findings.is_empty(), "{}", render(&findings, &source, false));
+        let stability = stability::check(&model.expect("no findings"));
+        assert!(stability.is_ok(), "{}: {stability:?}", path.display());
     }
 }
 
@@ -59,19 +52,12 @@ impl Bench {
             Presence::InsteadOf(other) if key.name.ends_with("_bandwidth") => other,
             _ => key.name,
         };
-        let header = if section.name.is_empty() {
-            String::new()
-        } else {
-            format!("[{}]\n", section.name)
-        };
+        let header = if section.name.is_empty() { String::new() } else { format!("[{}]\n", section.name) };
         let from = text.find(&header).expect("section") + header.len();
         let start = if text[from..].starts_with(&format!("{stands_for} = ")) {
             from
         } else {
-            from + text[from..]
-                .find(&format!("\n{stands_for} = "))
-                .expect("key")
-                + 1
+            from + text[from..].find(&format!("\n{stands_for} = ")).expect("key") + 1
         };
         let end = start + text[start..].find('\n').expect("line end") + 1;
         text.replace_range(start..end, lines);
@@ -84,9 +70,7 @@ impl Bench {
         let (model, findings) = spec::load(&source);
         assert_eq!(model.is_none(), !errors(&findings).is_empty());
         // Rendering must take whatever loading finds.
-        assert!(
-            findings.is_empty() || render(&findings, &source, false).contains(findings[0].code)
-        );
+        assert!(findings.is_empty() || render(&findings, &source, false).contains(findings[0].code));
         findings
     }
 
@@ -94,15 +78,9 @@ impl Bench {
     fn check(&mut self, section: &Section, case: Case<'_>, line_offset: usize) {
         let (text, line) = Self::with(section, case.key, &case.lines);
         let findings = self.findings(&text);
-        let hint = format!(
-            "{} {}: {:?} gave {findings:#?}",
-            case.path, case.what, case.lines
-        );
-        let found = errors(&findings)
-            .into_iter()
-            .find(|d| d.code == case.code && d.key == case.about);
-        let found =
-            found.unwrap_or_else(|| panic!("no {} about {}: {hint}", case.code, case.about));
+        let hint = format!("{} {}: {:?} gave {findings:#?}", case.path, case.what, case.lines);
+        let found = errors(&findings).into_iter().find(|d| d.code == case.code && d.key == case.about);
+        let found = found.unwrap_or_else(|| panic!("no {} about {}: {hint}", case.code, case.about));
         assert_eq!(line_of(found, &text), line + line_offset, "{hint}");
         for d in errors(&findings) {
             assert_eq!(line_of(d, &text), line + line_offset, "a follow-up: {hint}");
@@ -146,11 +124,7 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
             bad.push(("no unit", "\"3\"".to_owned(), codes::UNIT_MISSING));
             bad.push(("wrong unit", "\"3 W\"".to_owned(), codes::WRONG_DIMENSION));
             bad.push(("unknown unit", "\"3 foot\"".to_owned(), codes::UNKNOWN_UNIT));
-            bad.push((
-                "unknown unit",
-                format!("\"3 foot {unit}\""),
-                codes::UNKNOWN_UNIT,
-            ));
+            bad.push(("unknown unit", format!("\"3 foot {unit}\""), codes::UNKNOWN_UNIT));
             bad.push(("no number", format!("\"{unit}\""), codes::BAD_QUANTITY));
             bad.push(("empty", "\"\"".to_owned(), codes::BAD_QUANTITY));
             bad.push(("not finite", "nan".to_owned(), codes::NOT_FINITE));
@@ -159,11 +133,7 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
             bad.push(("overflow", format!("\"1e400 {unit}\""), codes::NOT_FINITE));
             bad.push(("underflow", format!("\"1e-400 {unit}\""), codes::NOT_FINITE));
             bad.push(("too large", format!("\"1e30 {unit}\""), codes::OUT_OF_RANGE));
-            bad.push((
-                "too small",
-                format!("\"-1e30 {unit}\""),
-                codes::OUT_OF_RANGE,
-            ));
+            bad.push(("too small", format!("\"-1e30 {unit}\""), codes::OUT_OF_RANGE));
             if !range.contains(0.0) {
                 bad.push(("zero", format!("\"0 {unit}\""), codes::OUT_OF_RANGE));
             }
@@ -174,11 +144,7 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
             bad.push(("not finite", "inf".to_owned(), codes::NOT_FINITE));
             bad.push(("overflow", "1e999".to_owned(), codes::NOT_FINITE));
             bad.push(("underflow", "1e-999".to_owned(), codes::NOT_FINITE));
-            bad.push((
-                "too large",
-                format!("{:?}", range.max * 1.01),
-                codes::OUT_OF_RANGE,
-            ));
+            bad.push(("too large", format!("{:?}", range.max * 1.01), codes::OUT_OF_RANGE));
             bad.push(("too small", "-0.001".to_owned(), codes::OUT_OF_RANGE));
         }
         Item::Integer(min, max) => {
@@ -187,34 +153,18 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
             bad.push(("not finite", "nan".to_owned(), codes::NOT_FINITE));
             bad.push(("too small", (min - 1).to_string(), codes::OUT_OF_RANGE));
             bad.push(("too large", (max + 1).to_string(), codes::OUT_OF_RANGE));
-            bad.push((
-                "beyond 64 bits",
-                "99999999999999999999".to_owned(),
-                codes::OUT_OF_RANGE,
-            ));
+            bad.push(("beyond 64 bits", "99999999999999999999".to_owned(), codes::OUT_OF_RANGE));
         }
         Item::Choice(words) => {
-            bad.push((
-                "unknown word",
-                "\"other\"".to_owned(),
-                codes::UNKNOWN_CHOICE,
-            ));
-            bad.push((
-                "capitals",
-                format!("\"{}\"", words[0].to_uppercase()),
-                codes::UNKNOWN_CHOICE,
-            ));
+            bad.push(("unknown word", "\"other\"".to_owned(), codes::UNKNOWN_CHOICE));
+            bad.push(("capitals", format!("\"{}\"", words[0].to_uppercase()), codes::UNKNOWN_CHOICE));
             bad.push(("number", "1".to_owned(), codes::WRONG_TYPE));
         }
         Item::Name => {
             for name in ["", "1st", "two words", "größe", "a/b"] {
                 bad.push(("not a name", format!("\"{name}\""), codes::BAD_NAME));
             }
-            bad.push((
-                "too long",
-                format!("\"{}\"", "a".repeat(65)),
-                codes::BAD_NAME,
-            ));
+            bad.push(("too long", format!("\"{}\"", "a".repeat(65)), codes::BAD_NAME));
         }
     }
     bad
@@ -222,10 +172,7 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
 
 #[test]
 fn every_key_is_checked_in_every_way() {
-    let mut bench = Bench {
-        folder: folder_with_records(),
-        cases: 0,
-    };
+    let mut bench = Bench { folder: folder_with_records(), cases: 0 };
     assert!(errors(&bench.findings(&every_key())).is_empty());
     for section in SECTIONS {
         for key in section.keys {
@@ -239,69 +186,29 @@ fn every_key_is_checked_in_every_way() {
                 what,
             };
             for (i, item) in items(key).into_iter().enumerate() {
-                let about = if matches!(key.shape, Shape::List(_)) {
-                    format!("{path}[{i}]")
-                } else {
-                    path.clone()
-                };
+                let about = if matches!(key.shape, Shape::List(_)) { format!("{path}[{i}]") } else { path.clone() };
                 for (what, literal, code) in bad_literals(item) {
-                    bench.check(
-                        section,
-                        case(line_with(key, i, &literal), code, &about, what),
-                        0,
-                    );
+                    bench.check(section, case(line_with(key, i, &literal), code, &about, what), 0);
                 }
             }
             if !matches!(key.shape, Shape::One(_)) {
-                bench.check(
-                    section,
-                    case(
-                        format!("{} = 1\n", key.name),
-                        codes::WRONG_TYPE,
-                        &path,
-                        "not an array",
-                    ),
-                    0,
-                );
+                bench.check(section, case(format!("{} = 1\n", key.name), codes::WRONG_TYPE, &path, "not an array"), 0);
             }
             if matches!(key.shape, Shape::List(_)) {
                 let longer = format!("{}, {}]", key.example.trim_end_matches(']'), "1");
                 bench.check(
                     section,
-                    case(
-                        format!("{} = {longer}\n", key.name),
-                        codes::WRONG_COUNT,
-                        &path,
-                        "too many",
-                    ),
+                    case(format!("{} = {longer}\n", key.name), codes::WRONG_COUNT, &path, "too many"),
                     0,
                 );
-                bench.check(
-                    section,
-                    case(
-                        format!("{} = []\n", key.name),
-                        codes::WRONG_COUNT,
-                        &path,
-                        "empty",
-                    ),
-                    0,
-                );
+                bench.check(section, case(format!("{} = []\n", key.name), codes::WRONG_COUNT, &path, "empty"), 0);
             }
             let good = format!("{} = {}\n", key.name, key.example);
-            bench.check(
-                section,
-                case(format!("{good}{good}"), codes::DUPLICATE, &path, "twice"),
-                1,
-            );
+            bench.check(section, case(format!("{good}{good}"), codes::DUPLICATE, &path, "twice"), 1);
             let slip = format!("{}x = {}\n", key.name, key.example);
             bench.check(
                 section,
-                case(
-                    slip.clone(),
-                    codes::UNKNOWN_KEY,
-                    &section.path(&format!("{}x", key.name)),
-                    "misspelt",
-                ),
+                case(slip.clone(), codes::UNKNOWN_KEY, &section.path(&format!("{}x", key.name)), "misspelt"),
                 0,
             );
             let (text, _) = Bench::with(section, key, &slip);
@@ -317,10 +224,7 @@ fn every_key_is_checked_in_every_way() {
 
 #[test]
 fn every_key_may_be_missing_only_if_it_has_a_default() {
-    let bench = Bench {
-        folder: folder_with_records(),
-        cases: 0,
-    };
+    let bench = Bench { folder: folder_with_records(), cases: 0 };
     for section in SECTIONS {
         for key in section.keys {
             let path = section.path(key.name);
@@ -330,28 +234,11 @@ fn every_key_may_be_missing_only_if_it_has_a_default() {
             match key.presence {
                 Presence::Required => {
                     assert_eq!(errors.len(), 1, "{path}: {findings:#?}");
-                    assert_eq!(
-                        (errors[0].code, errors[0].key.as_str()),
-                        (codes::MISSING_KEY, path.as_str())
-                    );
-                    assert!(
-                        errors[0].help.contains(key.name),
-                        "{path}: {}",
-                        errors[0].help
-                    );
-                    let header = if section.name.is_empty() {
-                        String::new()
-                    } else {
-                        format!("[{}]", section.name)
-                    };
-                    let line = 1 + text[..text.find(&header).expect("header")]
-                        .matches('\n')
-                        .count();
-                    assert_eq!(
-                        line_of(errors[0], &text),
-                        line,
-                        "{path} points at its section"
-                    );
+                    assert_eq!((errors[0].code, errors[0].key.as_str()), (codes::MISSING_KEY, path.as_str()));
+                    assert!(errors[0].help.contains(key.name), "{path}: {}", errors[0].help);
+                    let header = if section.name.is_empty() { String::new() } else { format!("[{}]", section.name) };
+                    let line = 1 + text[..text.find(&header).expect("header")].matches('\n').count();
+                    assert_eq!(line_of(errors[0], &text), line, "{path} points at its section");
                 }
                 Presence::InsteadOf(_) => {
                     assert_eq!(errors.len(), 1, "{path}: {findings:#?}");
@@ -369,34 +256,18 @@ fn every_key_may_be_missing_only_if_it_has_a_default() {
 
 #[test]
 fn every_section_may_be_missing_only_if_nothing_in_it_is_required() {
-    let bench = Bench {
-        folder: folder_with_records(),
-        cases: 0,
-    };
+    let bench = Bench { folder: folder_with_records(), cases: 0 };
     let whole = every_key();
-    for section in SECTIONS
-        .iter()
-        .filter(|s| !s.name.is_empty() && s.name != "target")
-    {
-        let start = whole
-            .find(&format!("[{}]\n", section.name))
-            .expect("section");
-        let end = whole[start + 1..]
-            .find("\n[")
-            .map_or(whole.len(), |i| start + 2 + i);
+    for section in SECTIONS.iter().filter(|s| !s.name.is_empty() && s.name != "target") {
+        let start = whole.find(&format!("[{}]\n", section.name)).expect("section");
+        let end = whole[start + 1..].find("\n[").map_or(whole.len(), |i| start + 2 + i);
         let text = format!("{}{}", &whole[..start], &whole[end..]);
         let findings = bench.findings(&text);
         let errors = errors(&findings);
         if section.is_required() {
-            let required = section
-                .keys
-                .iter()
-                .find(|key| key.presence == Presence::Required);
+            let required = section.keys.iter().find(|key| key.presence == Presence::Required);
             assert_eq!(errors.len(), 1, "{}: {findings:#?}", section.name);
-            assert_eq!(
-                (errors[0].code, errors[0].key.as_str()),
-                (codes::MISSING_SECTION, section.name)
-            );
+            assert_eq!((errors[0].code, errors[0].key.as_str()), (codes::MISSING_SECTION, section.name));
             assert!(errors[0].help.contains(required.expect("one").name));
         } else {
             assert!(errors.is_empty(), "{}: {findings:#?}", section.name);
@@ -419,10 +290,7 @@ fn all_findings_of_a_file_come_in_one_run() {
         assert!(text.contains(good), "{good}");
         text = text.replacen(good, bad, 1);
     }
-    let bench = Bench {
-        folder: folder_with_records(),
-        cases: 0,
-    };
+    let bench = Bench { folder: folder_with_records(), cases: 0 };
     let findings = bench.findings(&text);
     let found: Vec<&str> = errors(&findings).iter().map(|d| d.code).collect();
     for code in [
@@ -435,11 +303,7 @@ fn all_findings_of_a_file_come_in_one_run() {
         codes::UNKNOWN_CHOICE,
         codes::UNKNOWN_SECTION,
     ] {
-        assert_eq!(
-            found.iter().filter(|c| **c == code).count(),
-            1,
-            "{code} in {found:?}"
-        );
+        assert_eq!(found.iter().filter(|c| **c == code).count(), 1, "{code} in {found:?}");
     }
     assert_eq!(found.len(), 8, "{findings:#?}");
 }

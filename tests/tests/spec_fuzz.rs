@@ -143,10 +143,7 @@ impl Mutator {
     }
 
     fn swap_lines(&mut self, bytes: &mut Vec<u8>) {
-        let mut lines: Vec<Vec<u8>> = bytes
-            .split_inclusive(|b| *b == b'\n')
-            .map(<[u8]>::to_vec)
-            .collect();
+        let mut lines: Vec<Vec<u8>> = bytes.split_inclusive(|b| *b == b'\n').map(<[u8]>::to_vec).collect();
         if lines.len() > 1 {
             let (a, b) = (self.below(lines.len()), self.below(lines.len()));
             lines.swap(a, b);
@@ -156,11 +153,7 @@ impl Mutator {
 
     fn next(&mut self) -> Vec<u8> {
         // Mostly from a good one, with few changes: what is broken at once is refused by the syntax alone.
-        let pool = if self.below(4) == 0 {
-            self.corpus.len()
-        } else {
-            self.good
-        };
+        let pool = if self.below(4) == 0 { self.corpus.len() } else { self.good };
         let pick = self.below(pool);
         let mut bytes = self.corpus[pick].clone();
         let most = if self.below(2) == 0 { 1 } else { 6 };
@@ -172,22 +165,12 @@ impl Mutator {
 }
 
 fn assert_sound(finding: &Diagnostic, text: &str) {
-    assert!(
-        !finding.message.is_empty() && !finding.help.is_empty(),
-        "{finding:?}"
-    );
+    assert!(!finding.message.is_empty() && !finding.help.is_empty(), "{finding:?}");
     assert!(codes::find(finding.code).is_some(), "{finding:?}");
     match &finding.place {
         Place::Spec(span) => {
-            assert!(
-                span.start <= span.end && span.end <= text.len(),
-                "{finding:?} in {} bytes",
-                text.len()
-            );
-            assert!(
-                text.is_char_boundary(span.start) && text.is_char_boundary(span.end),
-                "{finding:?}"
-            );
+            assert!(span.start <= span.end && span.end <= text.len(), "{finding:?} in {} bytes", text.len());
+            assert!(text.is_char_boundary(span.start) && text.is_char_boundary(span.end), "{finding:?}");
         }
         Place::Whole => assert_eq!(finding.code, codes::TRUNCATED),
         Place::File { .. } => panic!("loading reads no other file: {finding:?}"),
@@ -196,27 +179,17 @@ fn assert_sound(finding: &Diagnostic, text: &str) {
 
 #[test]
 fn mutated_specs_are_read_without_a_panic() {
-    let count = std::env::var("SPECGEN_FUZZ")
-        .map_or(20_000, |n| n.parse().expect("SPECGEN_FUZZ is a number"));
+    let count = std::env::var("SPECGEN_FUZZ").map_or(20_000, |n| n.parse().expect("SPECGEN_FUZZ is a number"));
     let folder = folder_with_records();
-    let mut corpus: Vec<Vec<u8>> = spec_files()
-        .iter()
-        .map(|path| fs::read(path).expect("readable"))
-        .collect();
+    let mut corpus: Vec<Vec<u8>> = spec_files().iter().map(|path| fs::read(path).expect("readable")).collect();
     corpus.push(every_key().into_bytes());
     let good = corpus.len();
-    let mut bad: Vec<_> = fs::read_dir(root().join("tests/corpus"))
-        .expect("corpus")
-        .map(|e| e.expect("readable").path())
-        .collect();
+    let mut bad: Vec<_> =
+        fs::read_dir(root().join("tests/corpus")).expect("corpus").map(|e| e.expect("readable").path()).collect();
     bad.retain(|path| path.extension().is_some_and(|e| e == "toml"));
     bad.sort();
     corpus.extend(bad.iter().map(|path| fs::read(path).expect("readable")));
-    let mut mutator = Mutator {
-        random: ChaCha8Rng::seed_from_u64(2),
-        corpus,
-        good,
-    };
+    let mut mutator = Mutator { random: ChaCha8Rng::seed_from_u64(2), corpus, good };
 
     let (mut accepted, mut refused, mut not_text) = (0, 0, 0);
     let mut seen = std::collections::BTreeMap::new();
@@ -231,9 +204,7 @@ fn mutated_specs_are_read_without_a_panic() {
         };
         let source = source(&text, "fuzz.toml", &folder);
         let (model, findings) = spec::load(&source);
-        findings
-            .iter()
-            .for_each(|finding| assert_sound(finding, &text));
+        findings.iter().for_each(|finding| assert_sound(finding, &text));
         let has_errors = findings.iter().any(|d| d.severity == Severity::Error);
         assert_eq!(model.is_none(), has_errors, "input {i}: {findings:?}");
         for finding in &findings {
@@ -241,34 +212,15 @@ fn mutated_specs_are_read_without_a_panic() {
         }
         // Both renderings of every input, and no control character of the input in the plain one.
         let shown = render(&findings, &source, false);
-        assert!(
-            !shown.contains(|c: char| c.is_control() && c != '\n'),
-            "input {i}: {shown:?}"
-        );
-        assert_eq!(
-            to_json(&findings, &source).as_array().map(Vec::len),
-            Some(findings.len())
-        );
+        assert!(!shown.contains(|c: char| c.is_control() && c != '\n'), "input {i}: {shown:?}");
+        assert_eq!(to_json(&findings, &source).as_array().map(Vec::len), Some(findings.len()));
         if i % 16 == 0 {
             let _ = render(&findings, &source, true);
         }
-        if has_errors {
-            refused += 1
-        } else {
-            accepted += 1
-        }
+        if has_errors { refused += 1 } else { accepted += 1 }
     }
-    println!(
-        "{count} inputs: {accepted} accepted, {refused} refused, {not_text} were not UTF-8\n{seen:?}"
-    );
+    println!("{count} inputs: {accepted} accepted, {refused} refused, {not_text} were not UTF-8\n{seen:?}");
     // Mutations that never pass or never fail would test one half only.
-    assert!(
-        accepted > count / 1000 && refused > count / 10,
-        "{accepted} accepted, {refused} refused"
-    );
-    assert!(
-        count < 10_000 || seen.len() > 25,
-        "only {} codes reached: {seen:?}",
-        seen.len()
-    );
+    assert!(accepted > count / 1000 && refused > count / 10, "{accepted} accepted, {refused} refused");
+    assert!(count < 10_000 || seen.len() > 25, "only {} codes reached: {seen:?}", seen.len());
 }

@@ -29,10 +29,8 @@ fn every_spec_of_the_repository_is_valid() {
     let validator = validator();
     for path in spec_files() {
         let value = as_json(&fs::read_to_string(&path).expect("readable"));
-        let problems: Vec<String> = validator
-            .iter_errors(&value)
-            .map(|e| format!("{}: {e}", e.instance_path()))
-            .collect();
+        let problems: Vec<String> =
+            validator.iter_errors(&value).map(|e| format!("{}: {e}", e.instance_path())).collect();
         assert!(problems.is_empty(), "{}: {problems:?}", path.display());
     }
 }
@@ -59,20 +57,13 @@ fn bad_specs_are_invalid() {
     for (pointer, value) in changes {
         let mut bad = good.clone();
         let (parent, name) = pointer.rsplit_once('/').expect("a pointer");
-        bad.pointer_mut(parent)
-            .and_then(Value::as_object_mut)
-            .expect("a table")
-            .insert(name.to_owned(), value.clone());
+        bad.pointer_mut(parent).and_then(Value::as_object_mut).expect("a table").insert(name.to_owned(), value.clone());
         assert!(!validator.is_valid(&bad), "{pointer} = {value}");
     }
     for pointer in ["/geometry/height", "/timing", "/gains/integral"] {
         let mut bad = good.clone();
         let (parent, name) = pointer.rsplit_once('/').expect("a pointer");
-        bad.pointer_mut(parent)
-            .and_then(Value::as_object_mut)
-            .expect("a table")
-            .remove(name)
-            .expect("was there");
+        bad.pointer_mut(parent).and_then(Value::as_object_mut).expect("a table").remove(name).expect("was there");
         assert!(!validator.is_valid(&bad), "{pointer} missing");
     }
 }
@@ -93,18 +84,9 @@ fn assert_fresh(path: &Path, text: &str) {
 
 #[test]
 fn generated_documents_are_fresh() {
-    assert_fresh(
-        &root().join("specs/platform.schema.json"),
-        &spec::json_schema(),
-    );
-    assert_fresh(
-        &root().join("docs/spec-reference.md"),
-        &spec::reference_markdown(),
-    );
-    assert_fresh(
-        &root().join("docs/diagnostics.md"),
-        &diagnostic::reference_markdown(),
-    );
+    assert_fresh(&root().join("specs/platform.schema.json"), &spec::json_schema());
+    assert_fresh(&root().join("docs/spec-reference.md"), &spec::reference_markdown());
+    assert_fresh(&root().join("docs/diagnostics.md"), &diagnostic::reference_markdown());
 }
 
 /// Every file below `folder` whose name ends in `.rs`, sorted.
@@ -130,10 +112,7 @@ fn code_literals(text: &str) -> Vec<&str> {
 
 #[test]
 fn every_code_in_the_compiler_is_in_the_registry() {
-    assert_eq!(
-        code_literals(r#"f("E0101", "W0", "E010x", "W0301")"#),
-        ["E0101", "W0301"]
-    );
+    assert_eq!(code_literals(r#"f("E0101", "W0", "E010x", "W0301")"#), ["E0101", "W0301"]);
     let mut files = Vec::new();
     rust_files(&root().join("codegen/src"), &mut files);
     let mut found = 0;
@@ -148,8 +127,5 @@ fn every_code_in_the_compiler_is_in_the_registry() {
             );
         }
     }
-    assert!(
-        found >= diagnostic::codes::REGISTRY.len(),
-        "{found} literals"
-    );
+    assert!(found >= diagnostic::codes::REGISTRY.len(), "{found} literals");
 }

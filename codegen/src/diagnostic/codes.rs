@@ -188,21 +188,9 @@ mod tests {
     #[test]
     fn codes_are_unique_and_well_formed() {
         for (i, code) in REGISTRY.iter().enumerate() {
-            assert!(
-                REGISTRY[..i].iter().all(|other| other.id != code.id),
-                "{} twice",
-                code.id
-            );
-            assert!(
-                code.id.len() == 5 && code.id.starts_with(['E', 'W']),
-                "{}",
-                code.id
-            );
-            assert!(
-                code.id[1..].bytes().all(|b| b.is_ascii_digit()),
-                "{}",
-                code.id
-            );
+            assert!(REGISTRY[..i].iter().all(|other| other.id != code.id), "{} twice", code.id);
+            assert!(code.id.len() == 5 && code.id.starts_with(['E', 'W']), "{}", code.id);
+            assert!(code.id[1..].bytes().all(|b| b.is_ascii_digit()), "{}", code.id);
         }
     }
 }

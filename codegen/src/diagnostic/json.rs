@@ -17,11 +17,7 @@ pub fn to_json(diagnostics: &[Diagnostic], source: &SpecSource) -> Value {
             let (file, line, column) = match &d.place {
                 Place::Spec(span) => {
                     let spot = lines.spot(span);
-                    (
-                        Some(source.display_name.as_str()),
-                        Some(spot.line),
-                        Some(spot.column),
-                    )
+                    (Some(source.display_name.as_str()), Some(spot.line), Some(spot.column))
                 }
                 Place::File { path, line } => (Some(path.as_str()), *line, None),
                 Place::Whole => (None, None, None),

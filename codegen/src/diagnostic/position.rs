@@ -24,15 +24,8 @@ pub(super) struct Spot<'a> {
 
 impl<'a> Lines<'a> {
     pub(super) fn new(text: &'a str) -> Self {
-        let breaks = text
-            .bytes()
-            .enumerate()
-            .filter(|(_, b)| *b == b'\n')
-            .map(|(i, _)| i + 1);
-        Self {
-            text,
-            starts: std::iter::once(0).chain(breaks).collect(),
-        }
+        let breaks = text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(i, _)| i + 1);
+        Self { text, starts: std::iter::once(0).chain(breaks).collect() }
     }
 
     /// Any range will do: it is cut to the text and to whole characters.
@@ -44,25 +37,14 @@ impl<'a> Lines<'a> {
         // The first line starts at 0, so that there is one at or before `start`.
         let index = self.starts.partition_point(|s| *s <= start) - 1;
         let line_start = self.starts[index];
-        let line_end = self
-            .starts
-            .get(index + 1)
-            .map_or(self.text.len(), |next| next - 1);
+        let line_end = self.starts.get(index + 1).map_or(self.text.len(), |next| next - 1);
         let line_text = self.text[line_start..line_end].trim_end_matches('\r');
         let from = (start - line_start).min(line_text.len());
-        let mut to = span
-            .end
-            .saturating_sub(line_start)
-            .clamp(from, line_text.len());
+        let mut to = span.end.saturating_sub(line_start).clamp(from, line_text.len());
         while !line_text.is_char_boundary(to) {
             to += 1;
         }
-        Spot {
-            line: index + 1,
-            column: line_text[..from].chars().count() + 1,
-            line_text,
-            in_line: from..to,
-        }
+        Spot { line: index + 1, column: line_text[..from].chars().count() + 1, line_text, in_line: from..to }
     }
 }
 
@@ -79,23 +61,11 @@ pub(super) struct Window {
 pub(super) fn window(line: &str, span: Range<usize>, max: usize) -> Window {
     // Counting a line of a megabyte in full for each finding would be slow.
     if line.len() <= max || line.chars().nth(max).is_none() {
-        return Window {
-            text: line.to_owned(),
-            span,
-            cut_left: false,
-        };
+        return Window { text: line.to_owned(), span, cut_left: false };
     }
-    let before: Vec<usize> = line[..span.start]
-        .char_indices()
-        .rev()
-        .take(max / 4)
-        .map(|(i, _)| i)
-        .collect();
+    let before: Vec<usize> = line[..span.start].char_indices().rev().take(max / 4).map(|(i, _)| i).collect();
     let from = before.last().copied().unwrap_or(span.start);
-    let to = line[from..]
-        .char_indices()
-        .nth(max)
-        .map_or(line.len(), |(i, _)| from + i);
+    let to = line[from..].char_indices().nth(max).map_or(line.len(), |(i, _)| from + i);
     let head = if from > 0 { "…" } else { "" };
     let tail = if to < line.len() { "…" } else { "" };
     let span_end = span.end.min(to);
@@ -115,10 +85,7 @@ mod tests {
     fn lines_and_columns_count_from_one_in_characters() {
         let lines = Lines::new("a = 1\r\n\u{b5} = 22\n");
         let spot = lines.spot(&(12..14));
-        assert_eq!(
-            (spot.line, spot.column, spot.line_text),
-            (2, 5, "\u{b5} = 22")
-        );
+        assert_eq!((spot.line, spot.column, spot.line_text), (2, 5, "\u{b5} = 22"));
         assert_eq!(&spot.line_text[spot.in_line], "22");
         assert_eq!(lines.spot(&(999..1000)).line, 3);
         assert_eq!(lines.spot(&(8..9)).column, 1, "inside a character");

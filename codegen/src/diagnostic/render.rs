@@ -15,12 +15,7 @@ const WIDTH: usize = 140;
 /// Every finding in turn, and a last line that counts them; empty if there is none.
 #[must_use]
 pub fn render(diagnostics: &[Diagnostic], source: &SpecSource, color: bool) -> String {
-    let renderer = if color {
-        Renderer::styled()
-    } else {
-        Renderer::plain()
-    }
-    .term_width(WIDTH);
+    let renderer = if color { Renderer::styled() } else { Renderer::plain() }.term_width(WIDTH);
     let lines = Lines::new(&source.text);
     let mut text = String::new();
     for diagnostic in diagnostics {
@@ -35,26 +30,12 @@ pub fn render(diagnostics: &[Diagnostic], source: &SpecSource, color: bool) -> S
 }
 
 fn count(diagnostics: &[Diagnostic]) -> String {
-    let of = |severity| {
-        diagnostics
-            .iter()
-            .filter(|d| d.severity == severity)
-            .count()
-    };
+    let of = |severity| diagnostics.iter().filter(|d| d.severity == severity).count();
     let plural = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
-    format!(
-        "{}, {}",
-        plural(of(Severity::Error), "error"),
-        plural(of(Severity::Warning), "warning")
-    )
+    format!("{}, {}", plural(of(Severity::Error), "error"), plural(of(Severity::Warning), "warning"))
 }
 
-fn one(
-    diagnostic: &Diagnostic,
-    source: &SpecSource,
-    lines: &Lines<'_>,
-    renderer: &Renderer,
-) -> String {
+fn one(diagnostic: &Diagnostic, source: &SpecSource, lines: &Lines<'_>, renderer: &Renderer) -> String {
     let level = match diagnostic.severity {
         Severity::Error => Level::ERROR,
         Severity::Warning => Level::WARNING,
@@ -68,11 +49,7 @@ fn one(
         Place::File { path, line } => {
             let origin = Origin::path(visible(path));
             title
-                .element(if let Some(line) = line {
-                    origin.line(*line)
-                } else {
-                    origin
-                })
+                .element(if let Some(line) = line { origin.line(*line) } else { origin })
                 .element(Level::HELP.message(help))
         }
         Place::Spec(span) => {
@@ -85,10 +62,7 @@ fn one(
                 let snippet = Snippet::source(window.text)
                     .line_start(spot.line)
                     .annotation(AnnotationKind::Primary.span(window.span));
-                title
-                    .element(origin)
-                    .element(snippet)
-                    .element(Level::HELP.message(help))
+                title.element(origin).element(snippet).element(Level::HELP.message(help))
             } else {
                 let snippet = Snippet::source(window.text)
                     .path(path)
@@ -104,12 +78,6 @@ fn one(
 /// Control characters (a terminal would obey them) as escapes; line breaks of our own texts stay.
 fn visible(text: &str) -> String {
     text.chars()
-        .flat_map(|c| {
-            if c.is_control() && c != '\n' {
-                c.escape_default().collect::<Vec<_>>()
-            } else {
-                vec![c]
-            }
-        })
+        .flat_map(|c| if c.is_control() && c != '\n' { c.escape_default().collect::<Vec<_>>() } else { vec![c] })
         .collect()
 }

@@ -2,9 +2,8 @@
 
 use super::fields::Fields;
 use crate::model::{
-    Actuator, Adaptation, AdaptationMode, Amplifier, ControllerOptions, Dac, Gains, Geometry,
-    Hysteresis, LegBody, Mcu, Model, RigidBody, Scalar, Sensor, SetpointKind, Target, Timing,
-    Workspace,
+    Actuator, Adaptation, AdaptationMode, Amplifier, ControllerOptions, Dac, Gains, Geometry, Hysteresis, LegBody, Mcu,
+    Model, RigidBody, Scalar, Sensor, SetpointKind, Target, Timing, Workspace,
 };
 
 /// The model, or `None` if a value is missing: then there is a finding for it.
@@ -36,14 +35,8 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
             resonance: f.number("actuator.resonance")?,
             damping_ratio: f.number("actuator.damping_ratio")?,
         },
-        amplifier: Amplifier {
-            lag: f.number("amplifier.lag")?,
-            noise: f.number("amplifier.noise")?,
-        },
-        dac: Dac {
-            bits: f.whole("dac.bits")?,
-            range: f.list("dac.range")?,
-        },
+        amplifier: Amplifier { lag: f.number("amplifier.lag")?, noise: f.number("amplifier.noise")? },
+        dac: Dac { bits: f.whole("dac.bits")?, range: f.list("dac.range")? },
         sensor: Sensor {
             range: f.list("sensor.range")?,
             noise: f.number("sensor.noise")?,
@@ -56,24 +49,11 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
         },
         adaptation: adaptation(f)?,
         gains: gains(f),
-        timing: Timing {
-            period: f.number("timing.period")?,
-        },
-        workspace: Workspace {
-            translation: f.list("workspace.translation")?,
-            rotation: f.list("workspace.rotation")?,
-        },
+        timing: Timing { period: f.number("timing.period")? },
+        workspace: Workspace { translation: f.list("workspace.translation")?, rotation: f.list("workspace.rotation")? },
         controller: ControllerOptions {
-            scalar: if f.choice("controller.scalar")? == "f32" {
-                Scalar::F32
-            } else {
-                Scalar::F64
-            },
-            setpoint: if f.choice("controller.setpoint")? == "leg" {
-                SetpointKind::Leg
-            } else {
-                SetpointKind::Pose
-            },
+            scalar: if f.choice("controller.scalar")? == "f32" { Scalar::F32 } else { Scalar::F64 },
+            setpoint: if f.choice("controller.setpoint")? == "leg" { SetpointKind::Leg } else { SetpointKind::Pose },
         },
         target: target(f)?,
         spans: f.spans(),
@@ -115,11 +95,7 @@ pub(super) fn weight(f: &Fields, which: &str) -> Option<f64> {
         return Some(weight);
     }
     let run: u32 = f.whole("adaptation.run_interval")?;
-    Some(
-        f.number(&format!("adaptation.{which}_bandwidth"))?
-            * f.number("timing.period")?
-            * f64::from(run),
-    )
+    Some(f.number(&format!("adaptation.{which}_bandwidth"))? * f.number("timing.period")? * f64::from(run))
 }
 
 fn gains(f: &Fields) -> Option<Gains> {
@@ -134,11 +110,7 @@ fn gains(f: &Fields) -> Option<Gains> {
 fn target(f: &Fields) -> Option<Target> {
     let bytes = |key: &str| f.number(key).map(|bytes| bytes as u64);
     Some(Target {
-        mcu: if f.choice("target.mcu")? == "mps2-an386" {
-            Mcu::Mps2An386
-        } else {
-            Mcu::Mps2An500
-        },
+        mcu: if f.choice("target.mcu")? == "mps2-an386" { Mcu::Mps2An386 } else { Mcu::Mps2An500 },
         flash: bytes("target.budget.flash"),
         ram: bytes("target.budget.ram"),
         stack: bytes("target.budget.stack"),

@@ -48,18 +48,12 @@ pub(super) fn all(fields: &Fields, dir: &Path, findings: &mut Findings) {
 }
 
 /// Reports [`codes::WRONG_ORDER`] unless the first value of `path` is below the second, or equal where that is allowed.
-fn in_order(
-    fields: &Fields,
-    findings: &mut Findings,
-    path: &str,
-    equal_allowed: bool,
-) -> Option<()> {
+fn in_order(fields: &Fields, findings: &mut Findings, path: &str, equal_allowed: bool) -> Option<()> {
     let [low, high] = fields.list::<2>(path)?;
     if high > low || (equal_allowed && high >= low) {
         return Some(());
     }
-    let message =
-        format!("`{path}` ends where it starts or before: the first value must be the smaller one");
+    let message = format!("`{path}` ends where it starts or before: the first value must be the smaller one");
     let key = path.rsplit('.').next().unwrap_or(path);
     let example = super::keys::key(path).map_or("", |key| key.example);
     findings.error(

@@ -98,9 +98,7 @@ impl Fields {
 
     /// Where the value `index` of the list at `path` stands.
     pub(super) fn item_span(&self, path: &str, index: usize) -> Range<usize> {
-        self.get(path)
-            .and_then(|field| field.items.get(index).cloned())
-            .unwrap_or_else(|| self.span(path))
+        self.get(path).and_then(|field| field.items.get(index).cloned()).unwrap_or_else(|| self.span(path))
     }
 
     /// Where every value stands, lists item by item too: `actuator.voltage` and `actuator.voltage[1]`.

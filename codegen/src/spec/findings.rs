@@ -18,56 +18,20 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    pub(super) fn error(
-        &mut self,
-        code: &'static str,
-        key: &str,
-        span: Range<usize>,
-        message: String,
-        help: String,
-    ) {
+    pub(super) fn error(&mut self, code: &'static str, key: &str, span: Range<usize>, message: String, help: String) {
         self.push(Severity::Error, code, key, Place::Spec(span), message, help);
     }
 
-    pub(super) fn warning(
-        &mut self,
-        code: &'static str,
-        key: &str,
-        span: Range<usize>,
-        message: String,
-        help: String,
-    ) {
-        self.push(
-            Severity::Warning,
-            code,
-            key,
-            Place::Spec(span),
-            message,
-            help,
-        );
+    pub(super) fn warning(&mut self, code: &'static str, key: &str, span: Range<usize>, message: String, help: String) {
+        self.push(Severity::Warning, code, key, Place::Spec(span), message, help);
     }
 
-    fn push(
-        &mut self,
-        severity: Severity,
-        code: &'static str,
-        key: &str,
-        place: Place,
-        message: String,
-        help: String,
-    ) {
+    fn push(&mut self, severity: Severity, code: &'static str, key: &str, place: Place, message: String, help: String) {
         if self.list.len() >= MAX_KEPT {
             self.left_out += 1;
             return;
         }
-        self.list.push(Diagnostic {
-            severity,
-            code,
-            key: key.to_owned(),
-            place,
-            message,
-            help,
-        });
+        self.list.push(Diagnostic { severity, code, key: key.to_owned(), place, message, help });
     }
 
     /// Counts findings that were not even made.
@@ -101,8 +65,7 @@ impl Findings {
         };
         let total = self.list.len() + self.left_out;
         if self.list.len() > MAX_FINDINGS {
-            self.list
-                .sort_by_key(|d| (std::cmp::Reverse(d.severity), start(d)));
+            self.list.sort_by_key(|d| (std::cmp::Reverse(d.severity), start(d)));
             self.list.truncate(MAX_FINDINGS);
         }
         // Stable: at one place the order of the key table remains.

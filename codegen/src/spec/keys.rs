@@ -95,34 +95,19 @@ impl Range {
     /// Both bounds allowed.
     #[must_use]
     pub const fn closed(min: f64, max: f64) -> Self {
-        Self {
-            min,
-            max,
-            min_included: true,
-            max_included: true,
-        }
+        Self { min, max, min_included: true, max_included: true }
     }
 
     /// More than `min`, up to `max`.
     #[must_use]
     pub const fn above(min: f64, max: f64) -> Self {
-        Self {
-            min,
-            max,
-            min_included: false,
-            max_included: true,
-        }
+        Self { min, max, min_included: false, max_included: true }
     }
 
     /// Neither bound allowed.
     #[must_use]
     pub const fn open(min: f64, max: f64) -> Self {
-        Self {
-            min,
-            max,
-            min_included: false,
-            max_included: false,
-        }
+        Self { min, max, min_included: false, max_included: false }
     }
 
     /// Whether `value` lies inside.
@@ -151,36 +136,20 @@ impl Section {
     /// Whether a file without this table is refused.
     #[must_use]
     pub fn is_required(&self) -> bool {
-        !self.optional
-            && self
-                .keys
-                .iter()
-                .any(|key| key.presence == Presence::Required)
+        !self.optional && self.keys.iter().any(|key| key.presence == Presence::Required)
     }
 
     /// Key path of one of its keys: `geometry.height`, or `name` before the first table.
     #[must_use]
     pub fn path(&self, key: &str) -> String {
-        if self.name.is_empty() {
-            key.to_owned()
-        } else {
-            format!("{}.{key}", self.name)
-        }
+        if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
     }
 
     /// The section as it may be written, from the examples of its keys.
     #[must_use]
     pub fn example(&self, required_only: bool) -> String {
-        let mut text = if self.name.is_empty() {
-            String::new()
-        } else {
-            format!("[{}]\n", self.name)
-        };
-        for key in self
-            .keys
-            .iter()
-            .filter(|key| !required_only || key.presence == Presence::Required)
-        {
+        let mut text = if self.name.is_empty() { String::new() } else { format!("[{}]\n", self.name) };
+        for key in self.keys.iter().filter(|key| !required_only || key.presence == Presence::Required) {
             text.push_str(&format!("{} = {}\n", key.name, key.example));
         }
         text
@@ -197,8 +166,5 @@ pub fn section(name: &str) -> Option<&'static Section> {
 #[must_use]
 pub fn key(path: &str) -> Option<&'static Key> {
     let (section_name, key_name) = path.rsplit_once('.').unwrap_or(("", path));
-    section(section_name)?
-        .keys
-        .iter()
-        .find(|key| key.name == key_name)
+    section(section_name)?.keys.iter().find(|key| key.name == key_name)
 }

@@ -22,14 +22,9 @@ pub(super) fn kind_of(value: &DeValue<'_>) -> &'static str {
 
 /// The example of the key, or of the one item that `path` names ("gains.integral\[3\]").
 pub(super) fn example_of(key: &Key, path: &str) -> String {
-    let index: Option<usize> = path
-        .rsplit_once('[')
-        .and_then(|(_, rest)| rest.trim_end_matches(']').parse().ok());
+    let index: Option<usize> = path.rsplit_once('[').and_then(|(_, rest)| rest.trim_end_matches(']').parse().ok());
     let items = key.example.trim_start_matches('[').trim_end_matches(']');
-    index
-        .and_then(|i| items.split(", ").nth(i))
-        .unwrap_or(key.example)
-        .to_owned()
+    index.and_then(|i| items.split(", ").nth(i)).unwrap_or(key.example).to_owned()
 }
 
 /// The item that `path` names.
@@ -37,9 +32,7 @@ fn item_of(key: &Key, path: &str) -> Option<Item> {
     match key.shape {
         Shape::One(item) => Some(item),
         Shape::List(items) => {
-            let index = path
-                .rsplit_once('[')
-                .and_then(|(_, rest)| rest.trim_end_matches(']').parse::<usize>().ok());
+            let index = path.rsplit_once('[').and_then(|(_, rest)| rest.trim_end_matches(']').parse::<usize>().ok());
             items.get(index.unwrap_or(0)).copied()
         }
         Shape::Records => None,
@@ -75,11 +68,7 @@ fn bounds(range: Range, scale: f64, unit: &str) -> String {
 
 pub(super) fn range_help(key: &Key, path: &str) -> String {
     let range = item_of(key, path).map_or_else(String::new, |item| format!(": {}", range_of(item)));
-    format!(
-        "give a value in range{range}, such as {}. {}",
-        example_of(key, path),
-        key.doc
-    )
+    format!("give a value in range{range}, such as {}. {}", example_of(key, path), key.doc)
 }
 
 /// Message and help for a unit that measures something else.
@@ -90,12 +79,8 @@ pub(super) fn wrong_dimension(
     is: Dimension,
     wanted: Dimension,
 ) -> (String, String) {
-    let message = format!(
-        "`{path}` is \"{}\": this is {}, expected {}",
-        text::shorten(found),
-        is.describe(),
-        wanted.describe()
-    );
+    let message =
+        format!("`{path}` is \"{}\": this is {}, expected {}", text::shorten(found), is.describe(), wanted.describe());
     let hint = if is == Dimension::FREQUENCY && wanted == Dimension::ANGULAR_RATE {
         "1 Hz is 2 pi rad/s; "
     } else if is.without_angle() != wanted.without_angle() {
@@ -105,37 +90,24 @@ pub(super) fn wrong_dimension(
     } else {
         "mind the angle in the unit; "
     };
-    (
-        message,
-        format!(
-            "{hint}write {} in a form such as {}",
-            wanted.describe(),
-            example_of(key, path)
-        ),
-    )
+    (message, format!("{hint}write {} in a form such as {}", wanted.describe(), example_of(key, path)))
 }
 
 /// Code, message and help for a text that is not a quantity.
-pub(super) fn bad_quantity(
-    key: &Key,
-    path: &str,
-    found: &str,
-    problem: &Problem,
-) -> (&'static str, String, String) {
+pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem) -> (&'static str, String, String) {
     let example = example_of(key, path);
     let such_as = format!("write a number and a unit, such as {example}");
     let is = format!("`{path}` is \"{}\"", text::shorten(found));
     match problem {
-        Problem::TooLong => (
-            codes::BAD_QUANTITY,
-            format!("{is}: longer than {} characters", quantity::MAX_LENGTH),
-            such_as,
-        ),
+        Problem::TooLong => {
+            (codes::BAD_QUANTITY, format!("{is}: longer than {} characters", quantity::MAX_LENGTH), such_as)
+        }
         Problem::NoNumber => (codes::BAD_QUANTITY, format!("{is}: a quantity starts with a number"), such_as),
         Problem::Comma => (
             codes::BAD_QUANTITY,
             format!("{is}: a comma in a number"),
-            "write the decimals after a point and no commas between thousands, such as \"1.5 mm\" or \"1500 mm\"".to_owned(),
+            "write the decimals after a point and no commas between thousands, such as \"1.5 mm\" or \"1500 mm\""
+                .to_owned(),
         ),
         Problem::UnknownUnit(unit, meant) => (
             codes::UNKNOWN_UNIT,
@@ -159,8 +131,10 @@ pub(super) fn bad_quantity(
         }
         Problem::NotFinite => (codes::NOT_FINITE, format!("{is}, which is not a finite number"), such_as),
         Problem::Overflow => (codes::NOT_FINITE, format!("{is}: too large for a double"), such_as),
-        Problem::Underflow => {
-            (codes::NOT_FINITE, format!("{is}: too small for a double, yet not zero"), format!("write 0, or a value that a double can hold, such as {example}"))
-        }
+        Problem::Underflow => (
+            codes::NOT_FINITE,
+            format!("{is}: too small for a double, yet not zero"),
+            format!("write 0, or a value that a double can hold, such as {example}"),
+        ),
     }
 }

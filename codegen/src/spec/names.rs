@@ -13,10 +13,7 @@ pub(super) fn lookup(section: &'static Section, name: &str) -> Option<Meaning> {
     if let Some(key) = section.keys.iter().find(|key| key.name == name) {
         return Some(Meaning::Key(key));
     }
-    SECTIONS
-        .iter()
-        .find(|inner| child_name(section, inner) == Some(name))
-        .map(Meaning::Section)
+    SECTIONS.iter().find(|inner| child_name(section, inner) == Some(name)).map(Meaning::Section)
 }
 
 /// "budget" for `target.budget` within `target`, `None` if `inner` does not stand directly in `outer`.
@@ -30,35 +27,20 @@ pub(super) fn child_name(outer: &Section, inner: &'static Section) -> Option<&'s
 
 /// A key or section of this name in another place.
 pub(super) fn elsewhere(section: &Section, name: &str) -> Option<String> {
-    SECTIONS
-        .iter()
-        .filter(|other| other.name != section.name)
-        .find_map(|other| {
-            if other.name.rsplit('.').next() == Some(name) {
-                return Some(format!("[{}]", other.name));
-            }
-            other
-                .keys
-                .iter()
-                .find(|key| key.name == name)
-                .map(|key| other.path(key.name))
-        })
+    SECTIONS.iter().filter(|other| other.name != section.name).find_map(|other| {
+        if other.name.rsplit('.').next() == Some(name) {
+            return Some(format!("[{}]", other.name));
+        }
+        other.keys.iter().find(|key| key.name == name).map(|key| other.path(key.name))
+    })
 }
 
 pub(super) fn known_names(section: &Section, sections: bool) -> String {
     let names: Vec<&str> = if sections {
-        SECTIONS
-            .iter()
-            .map(|s| s.name)
-            .filter(|name| !name.is_empty())
-            .collect()
+        SECTIONS.iter().map(|s| s.name).filter(|name| !name.is_empty()).collect()
     } else {
         section.keys.iter().map(|key| key.name).collect()
     };
-    let what = if sections {
-        "the sections are"
-    } else {
-        "the keys here are"
-    };
+    let what = if sections { "the sections are" } else { "the keys here are" };
     format!("{what} {}", names.join(", "))
 }

@@ -70,10 +70,7 @@ pub enum Problem {
 /// The first thing that is wrong, with its place in `text`.
 pub fn parse(text: &str) -> Result<Quantity, QuantityError> {
     if text.len() > MAX_LENGTH {
-        return Err(QuantityError {
-            range: 0..text.len(),
-            problem: Problem::TooLong,
-        });
+        return Err(QuantityError { range: 0..text.len(), problem: Problem::TooLong });
     }
     let (negative, number, unit_start) = parse_number(text)?;
     let scale = unit_parser::parse(text, unit_start)?;
@@ -88,21 +85,12 @@ pub fn parse(text: &str) -> Result<Quantity, QuantityError> {
     }
     let everything = 0..text.len();
     if !value.is_finite() {
-        return Err(QuantityError {
-            range: everything,
-            problem: Problem::Overflow,
-        });
+        return Err(QuantityError { range: everything, problem: Problem::Overflow });
     }
     if value == 0.0 && !number.is_zero() {
-        return Err(QuantityError {
-            range: everything,
-            problem: Problem::Underflow,
-        });
+        return Err(QuantityError { range: everything, problem: Problem::Underflow });
     }
-    Ok(Quantity {
-        value: if negative { -value } else { value },
-        dimension: scale.dimension,
-    })
+    Ok(Quantity { value: if negative { -value } else { value }, dimension: scale.dimension })
 }
 
 /// SI value of one `unit` such as "mm" or "N m/rad"; `None` if it is not a unit.
@@ -125,10 +113,7 @@ fn parse_number(text: &str) -> Result<(bool, Decimal, usize), QuantityError> {
     let digits_start = start + sign_length;
     let body = &text[digits_start..];
     let word: String = body.chars().take_while(|c| c.is_alphabetic()).collect();
-    if matches!(
-        word.to_ascii_lowercase().as_str(),
-        "nan" | "inf" | "infinity"
-    ) {
+    if matches!(word.to_ascii_lowercase().as_str(), "nan" | "inf" | "infinity") {
         return fail(start..digits_start + word.len(), Problem::NotFinite);
     }
 
@@ -148,10 +133,7 @@ fn parse_number(text: &str) -> Result<(bool, Decimal, usize), QuantityError> {
         digits.push_str(&body[whole + 1..whole + 1 + fraction]);
     }
     if body[length..].starts_with(',') {
-        return fail(
-            digits_start + length..digits_start + length + 1,
-            Problem::Comma,
-        );
+        return fail(digits_start + length..digits_start + length + 1, Problem::Comma);
     }
     let (exponent, exponent_length) = parse_exponent(&body[length..]);
     length += exponent_length;

@@ -16,12 +16,7 @@ use crate::diagnostic::codes;
 
 /// Reads every value of `root`; what is wrong goes to `findings`.
 pub(super) fn read(source: &str, root: &DeTable<'_>, findings: &mut Findings) -> Fields {
-    let mut reader = Reader {
-        source,
-        fields: Fields::default(),
-        findings,
-        seen: BTreeSet::new(),
-    };
+    let mut reader = Reader { source, fields: Fields::default(), findings, seen: BTreeSet::new() };
     reader.table("", root, None);
     reader.missing_sections();
     reader.fields
@@ -37,24 +32,15 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// Reads the table of `section_name`, whose header stands at `header`.
-    fn table(
-        &mut self,
-        section_name: &'static str,
-        table: &DeTable<'_>,
-        header: Option<Range<usize>>,
-    ) {
+    fn table(&mut self, section_name: &'static str, table: &DeTable<'_>, header: Option<Range<usize>>) {
         let Some(section) = keys::section(section_name) else {
             return;
         };
         self.seen.insert(section.name);
         let mut found: BTreeMap<&'static str, ()> = BTreeMap::new();
         // A section may hold sections only and no key of its own: its place is then the first name in it.
-        let header = header.or_else(|| {
-            table
-                .iter()
-                .map(|(name, _)| text::clamp(self.source, name.span()))
-                .min_by_key(|s| s.start)
-        });
+        let header = header
+            .or_else(|| table.iter().map(|(name, _)| text::clamp(self.source, name.span())).min_by_key(|s| s.start));
         let header = header.unwrap_or(0..0);
         for (name, value) in table {
             match self.meaning(section, table, name) {
@@ -66,11 +52,7 @@ impl Reader<'_> {
                 None => {}
             }
         }
-        for key in section
-            .keys
-            .iter()
-            .filter(|key| !found.contains_key(key.name))
-        {
+        for key in section.keys.iter().filter(|key| !found.contains_key(key.name)) {
             self.absent(section, key, &header);
         }
     }
@@ -86,23 +68,13 @@ impl Reader<'_> {
         if let Some(exact) = lookup(section, written) {
             return Some(exact);
         }
-        let is_table = table
-            .get(written)
-            .is_some_and(|value| value.get_ref().is_table());
+        let is_table = table.get(written).is_some_and(|value| value.get_ref().is_table());
         let candidates = |wants_table: bool| {
-            let sections = SECTIONS
-                .iter()
-                .filter(move |_| wants_table)
-                .filter_map(|s| child_name(section, s));
-            let keys = section
-                .keys
-                .iter()
-                .filter(move |_| !wants_table)
-                .map(|key| key.name);
+            let sections = SECTIONS.iter().filter(move |_| wants_table).filter_map(|s| child_name(section, s));
+            let keys = section.keys.iter().filter(move |_| !wants_table).map(|key| key.name);
             sections.chain(keys)
         };
-        let meant = text::nearest(written, candidates(is_table))
-            .filter(|meant| !table.contains_key(*meant));
+        let meant = text::nearest(written, candidates(is_table)).filter(|meant| !table.contains_key(*meant));
         self.unknown(section, name, is_table, meant);
         meant.and_then(|meant| lookup(section, meant))
     }
@@ -116,16 +88,8 @@ impl Reader<'_> {
     ) {
         let written = name.get_ref().as_ref();
         let path = section.path(&text::shorten(written));
-        let (code, what) = if is_table {
-            (codes::UNKNOWN_SECTION, "section")
-        } else {
-            (codes::UNKNOWN_KEY, "key")
-        };
-        let place = if section.name.is_empty() {
-            String::new()
-        } else {
-            format!(" in [{}]", section.name)
-        };
+        let (code, what) = if is_table { (codes::UNKNOWN_SECTION, "section") } else { (codes::UNKNOWN_KEY, "key") };
+        let place = if section.name.is_empty() { String::new() } else { format!(" in [{}]", section.name) };
         let help = match (meant, elsewhere(section, written)) {
             (Some(meant), _) => format!("did you mean `{meant}`?"),
             (None, Some(path)) if is_table => format!("did you mean `{path}`?"),
@@ -133,13 +97,7 @@ impl Reader<'_> {
             (None, None) => format!("take it out; {}", known_names(section, is_table)),
         };
         let span = text::clamp(self.source, name.span());
-        self.findings.error(
-            code,
-            &path,
-            span,
-            format!("unknown {what} {}{place}", text::quote(written)),
-            help,
-        );
+        self.findings.error(code, &path, span, format!("unknown {what} {}{place}", text::quote(written)), help);
     }
 
     fn section(
@@ -159,25 +117,14 @@ impl Reader<'_> {
             codes::WRONG_TYPE,
             section.name,
             span,
-            format!(
-                "`{}` is {is}, expected the section [{}]",
-                section.name, section.name
-            ),
-            format!(
-                "write it as a section of its own:\n{}",
-                section.example(true).trim_end()
-            ),
+            format!("`{}` is {is}, expected the section [{}]", section.name, section.name),
+            format!("write it as a section of its own:\n{}", section.example(true).trim_end()),
         );
     }
 
     fn value(&mut self, section: &Section, key: &'static Key, value: &Spanned<DeValue<'_>>) {
         let path = section.path(key.name);
-        let mut reader = ValueReader {
-            source: self.source,
-            key,
-            path: &path,
-            findings: self.findings,
-        };
+        let mut reader = ValueReader { source: self.source, key, path: &path, findings: self.findings };
         if let Some(field) = reader.read(value) {
             self.fields.insert(path, field);
         }
@@ -198,10 +145,7 @@ impl Reader<'_> {
                     &path,
                     header.clone(),
                     format!("`{path}` is missing"),
-                    format!(
-                        "write, {place}: {} = {}. {}",
-                        key.name, key.example, key.doc
-                    ),
+                    format!("write, {place}: {} = {}. {}", key.name, key.example, key.doc),
                 );
             }
             Presence::Default(literal) => self.default(section, key, literal, header),
@@ -209,35 +153,16 @@ impl Reader<'_> {
         }
     }
 
-    fn default(
-        &mut self,
-        section: &'static Section,
-        key: &'static Key,
-        literal: &str,
-        header: &Range<usize>,
-    ) {
+    fn default(&mut self, section: &'static Section, key: &'static Key, literal: &str, header: &Range<usize>) {
         // A default is read as if it stood in the file; a test reads every default of the key table.
         let Ok(value) = DeValue::parse(literal) else {
             return;
         };
         let path = section.path(key.name);
-        let mut reader = ValueReader {
-            source: literal,
-            key,
-            path: &path,
-            findings: self.findings,
-        };
+        let mut reader = ValueReader { source: literal, key, path: &path, findings: self.findings };
         if let Some(field) = reader.read(&value) {
             let items = field.items.iter().map(|_| header.clone()).collect();
-            self.fields.insert(
-                path,
-                Field {
-                    span: header.clone(),
-                    items,
-                    given: false,
-                    ..field
-                },
-            );
+            self.fields.insert(path, Field { span: header.clone(), items, given: false, ..field });
         }
     }
 
@@ -253,11 +178,7 @@ impl Reader<'_> {
                     section.name,
                     end..end,
                     format!("section [{}] is missing", section.name),
-                    format!(
-                        "{} Write:\n{}",
-                        section.doc,
-                        section.example(true).trim_end()
-                    ),
+                    format!("{} Write:\n{}", section.doc, section.example(true).trim_end()),
                 );
             } else if !section.optional {
                 // The place of its defaults is the start of the file.
@@ -285,17 +206,8 @@ mod tests {
                     let value = DeValue::parse(literal).expect(literal);
                     let mut findings = Findings::default();
                     let path = section.path(key.name);
-                    let mut reader = ValueReader {
-                        source: literal,
-                        key,
-                        path: &path,
-                        findings: &mut findings,
-                    };
-                    assert!(
-                        reader.read(&value).is_some(),
-                        "{path} = {literal}: {:?}",
-                        findings.all()
-                    );
+                    let mut reader = ValueReader { source: literal, key, path: &path, findings: &mut findings };
+                    assert!(reader.read(&value).is_some(), "{path} = {literal}: {:?}", findings.all());
                 }
             }
         }
@@ -306,11 +218,7 @@ mod tests {
         for section in SECTIONS {
             for key in section.keys {
                 if let Presence::InsteadOf(other) = key.presence {
-                    let back = section
-                        .keys
-                        .iter()
-                        .find(|k| k.name == other)
-                        .map(|k| k.presence);
+                    let back = section.keys.iter().find(|k| k.name == other).map(|k| k.presence);
                     assert_eq!(back, Some(Presence::InsteadOf(key.name)));
                 }
             }

@@ -26,16 +26,9 @@ File names are relative to the spec and use forward slashes.
 pub fn reference_markdown() -> String {
     let mut text = HEAD.to_owned();
     for section in SECTIONS {
-        let title = if section.name.is_empty() {
-            "Before the first section".to_owned()
-        } else {
-            format!("[{}]", section.name)
-        };
-        let optional = if section.optional {
-            " Optional; if it is there, it is there whole."
-        } else {
-            ""
-        };
+        let title =
+            if section.name.is_empty() { "Before the first section".to_owned() } else { format!("[{}]", section.name) };
+        let optional = if section.optional { " Optional; if it is there, it is there whole." } else { "" };
         // Writing to a String cannot fail.
         let _ = write!(
             text,
@@ -90,9 +83,5 @@ fn absence(key: &Key) -> String {
 }
 
 fn symbol(key: &Key) -> String {
-    if key.symbol.is_empty() {
-        String::new()
-    } else {
-        format!("{}: ", key.symbol)
-    }
+    if key.symbol.is_empty() { String::new() } else { format!("{}: ", key.symbol) }
 }

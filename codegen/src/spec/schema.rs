@@ -9,17 +9,15 @@ use super::keys::{Item, Key, MAX_NAME, Presence, SECTIONS, Section, Shape};
 use super::messages::range_of;
 
 /// A sign, a number, and a unit that starts with a letter, a degree sign or a bracket.
-const QUANTITY_PATTERN: &str = r"^\s*[+\-\u2212]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+\-]?[0-9]+)?\s*[A-Za-z\u00b0\u00b5\u03bc\u03c0(][^,]*$";
+const QUANTITY_PATTERN: &str =
+    r"^\s*[+\-\u2212]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+\-]?[0-9]+)?\s*[A-Za-z\u00b0\u00b5\u03bc\u03c0(][^,]*$";
 
 /// The schema as pretty-printed JSON with a final newline; `specs/platform.schema.json` is this text.
 #[must_use]
 pub fn json_schema() -> String {
     let mut root = table("");
     let mut schema = Map::new();
-    schema.insert(
-        "$schema".into(),
-        json!("http://json-schema.org/draft-07/schema#"),
-    );
+    schema.insert("$schema".into(), json!("http://json-schema.org/draft-07/schema#"));
     schema.insert("title".into(), json!("specgen platform spec"));
     schema.append(&mut root);
     // Only strings, numbers, arrays and maps with string keys: serialising them cannot fail.
@@ -76,9 +74,7 @@ fn exclusive_pairs(section: &Section) -> Vec<Value> {
         .keys
         .iter()
         .filter_map(|key| match key.presence {
-            Presence::InsteadOf(other) if key.name < other => {
-                Some(json!({"not": {"required": [key.name, other]}}))
-            }
+            Presence::InsteadOf(other) if key.name < other => Some(json!({"not": {"required": [key.name, other]}})),
             _ => None,
         })
         .collect()
@@ -90,15 +86,7 @@ fn key_schema(key: &Key) -> Value {
         Shape::List(items) => {
             let mut array = Map::new();
             array.insert("type".into(), json!("array"));
-            array.insert(
-                "items".into(),
-                Value::Array(
-                    items
-                        .iter()
-                        .map(|i| Value::Object(item_schema(*i)))
-                        .collect(),
-                ),
-            );
+            array.insert("items".into(), Value::Array(items.iter().map(|i| Value::Object(item_schema(*i))).collect()));
             array.insert("minItems".into(), json!(items.len()));
             array.insert("maxItems".into(), json!(items.len()));
             array
@@ -126,11 +114,7 @@ fn key_schema(key: &Key) -> Value {
 }
 
 fn describe(key: &Key) -> String {
-    let symbol = if key.symbol.is_empty() {
-        String::new()
-    } else {
-        format!(" {}.", key.symbol)
-    };
+    let symbol = if key.symbol.is_empty() { String::new() } else { format!(" {}.", key.symbol) };
     let range = match key.shape {
         Shape::One(item @ (Item::Quantity { .. } | Item::Number(_) | Item::Integer(..))) => {
             format!(" Range: {}.", range_of(item))
@@ -144,16 +128,8 @@ fn item_schema(item: Item) -> Map<String, Value> {
     let value = match item {
         Item::Quantity { .. } => json!({"type": "string", "pattern": QUANTITY_PATTERN}),
         Item::Number(range) => {
-            let low = if range.min_included {
-                "minimum"
-            } else {
-                "exclusiveMinimum"
-            };
-            let high = if range.max_included {
-                "maximum"
-            } else {
-                "exclusiveMaximum"
-            };
+            let low = if range.min_included { "minimum" } else { "exclusiveMinimum" };
+            let high = if range.max_included { "maximum" } else { "exclusiveMaximum" };
             json!({"type": "number", low: range.min, high: range.max})
         }
         Item::Integer(min, max) if min == max => json!({"const": min}),

@@ -4,7 +4,7 @@
 #![expect(clippy::result_large_err)]
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
@@ -32,33 +32,17 @@ impl SpecSource {
         let display_name = path.display().to_string();
         let bytes = read_bytes(path, &display_name)?;
         let text = into_text(bytes, &display_name)?;
-        let dir = path
-            .parent()
-            .filter(|p| !p.as_os_str().is_empty())
-            .unwrap_or(Path::new("."));
-        Ok(Self {
-            display_name,
-            text,
-            dir: dir.to_path_buf(),
-        })
+        let dir = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Ok(Self { display_name, text, dir: dir.to_path_buf() })
     }
 }
 
-fn finding(
-    code: &'static str,
-    path: &str,
-    line: Option<usize>,
-    message: String,
-    help: &str,
-) -> Diagnostic {
+fn finding(code: &'static str, path: &str, line: Option<usize>, message: String, help: &str) -> Diagnostic {
     Diagnostic {
         severity: Severity::Error,
         code,
         key: String::new(),
-        place: Place::File {
-            path: path.to_owned(),
-            line,
-        },
+        place: Place::File { path: path.to_owned(), line },
         message,
         help: help.to_owned(),
     }
@@ -66,22 +50,19 @@ fn finding(
 
 fn read_bytes(path: &Path, shown: &str) -> Result<Vec<u8>, Diagnostic> {
     let unreadable = |reason: String, help: &str| {
-        finding(
-            codes::UNREADABLE,
-            shown,
-            None,
-            format!("the spec file cannot be read: {reason}"),
-            help,
-        )
+        finding(codes::UNREADABLE, shown, None, format!("the spec file cannot be read: {reason}"), help)
     };
     if path.is_dir() {
-        return Err(unreadable(
-            "this is a folder".to_owned(),
-            "name the .toml file in it",
-        ));
+        return Err(unreadable("this is a folder".to_owned(), "name the .toml file in it"));
     }
-    let file = File::open(path)
-        .map_err(|e| unreadable(e.to_string(), "check the path and its permissions"))?;
+    let file = File::open(path).map_err(|error| {
+        let reason = match error.kind() {
+            ErrorKind::NotFound => "there is no such file".to_owned(),
+            ErrorKind::PermissionDenied => "reading it is not permitted".to_owned(),
+            _ => error.to_string(),
+        };
+        unreadable(reason, "check the path and its permissions")
+    })?;
     let mut bytes = Vec::new();
     // One byte past the limit tells "too large" without reading an endless file.
     file.take(MAX_BYTES as u64 + 1)
@@ -114,8 +95,5 @@ fn into_text(bytes: Vec<u8>, shown: &str) -> Result<String, Diagnostic> {
             "save the file as UTF-8; a unit may be written without special characters, such as \"um\" or \"deg\"",
         )
     })?;
-    Ok(text
-        .strip_prefix('\u{feff}')
-        .map(str::to_owned)
-        .unwrap_or(text))
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }

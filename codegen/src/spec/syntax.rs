@@ -28,10 +28,7 @@ pub(super) fn parse<'a>(source: &'a str, findings: &mut Findings) -> Parsed<'a> 
     }
     let left_out = errors.len().saturating_sub(MAX_FINDINGS);
     findings.leave_out(left_out);
-    Parsed {
-        root: root.into_inner(),
-        whole: whole && left_out == 0,
-    }
+    Parsed { root: root.into_inner(), whole: whole && left_out == 0 }
 }
 
 /// Reports one syntax error; whether the tree is still whole.
@@ -55,11 +52,7 @@ fn report(source: &str, span: Range<usize>, message: &str, findings: &mut Findin
         codes::SYNTAX,
         "",
         span,
-        if missing_value {
-            "there is no value here".to_owned()
-        } else {
-            format!("this is not TOML: {message}")
-        },
+        if missing_value { "there is no value here".to_owned() } else { format!("this is not TOML: {message}") },
         if missing_value {
             "write a value after the equals sign, or take the line out".to_owned()
         } else {
@@ -81,58 +74,33 @@ fn unquoted(source: &str, span: Range<usize>, findings: &mut Findings) {
         "",
         span,
         format!("{} is a text without quotes", text::quote(found)),
-        format!(
-            "texts and quantities stand in quotes: write \"{}\"",
-            text::shorten(found.trim())
-        ),
+        format!("texts and quantities stand in quotes: write \"{}\"", text::shorten(found.trim())),
     );
 }
 
 /// The text without quotes that the parser took for a bad number or truth value: `150mm`, `f32`, `invhys`.
 fn bare_word(source: &str, span: &Range<usize>, message: &str) -> Option<Range<usize>> {
-    if !SCALAR_PHRASES
-        .iter()
-        .any(|phrase| message.starts_with(phrase))
-    {
+    if !SCALAR_PHRASES.iter().any(|phrase| message.starts_with(phrase)) {
         return None;
     }
-    let delimiter = |c: char| {
-        matches!(
-            c,
-            '=' | ',' | '[' | ']' | '{' | '}' | '#' | '"' | '\'' | '\n' | '\r'
-        )
-    };
+    let delimiter = |c: char| matches!(c, '=' | ',' | '[' | ']' | '{' | '}' | '#' | '"' | '\'' | '\n' | '\r');
     let start = source[..span.start].rfind(delimiter).map_or(0, |i| i + 1);
-    let end = source[span.start..]
-        .find(delimiter)
-        .map_or(source.len(), |i| span.start + i);
+    let end = source[span.start..].find(delimiter).map_or(source.len(), |i| span.start + i);
     let word = source[start..end].trim();
     let start = start + source[start..end].find(word)?;
-    word.contains(|c: char| c.is_alphabetic())
-        .then_some(start..start + word.len())
+    word.contains(|c: char| c.is_alphabetic()).then_some(start..start + word.len())
 }
 
 /// How the parser speaks of a value that is no number, date or truth value.
-const SCALAR_PHRASES: &[&str] = &[
-    "invalid boolean",
-    "invalid float",
-    "invalid integer",
-    "invalid date-time",
-    "unexpected leading zero",
-];
+const SCALAR_PHRASES: &[&str] =
+    &["invalid boolean", "invalid float", "invalid integer", "invalid date-time", "unexpected leading zero"];
 
 fn help_for(message: &str) -> &'static str {
-    if message.contains("unclosed array")
-        || message.contains("in array")
-        || message.contains("array elements")
-    {
+    if message.contains("unclosed array") || message.contains("in array") || message.contains("array elements") {
         "an array is written [\"0 V\", \"100 V\"]: a comma between values, a bracket at each end"
     } else if message.contains("unclosed table") {
         "a section starts with its name in brackets on a line of its own: [geometry]"
-    } else if message.contains("basic string")
-        || message.contains("literal string")
-        || message.contains("escape")
-    {
+    } else if message.contains("basic string") || message.contains("literal string") || message.contains("escape") {
         "a text starts and ends with a quote on the same line; write a backslash twice"
     } else if message.contains("recurs") {
         "a spec nests no deeper than a section and an array"
@@ -145,22 +113,12 @@ fn duplicate(source: &str, span: Range<usize>, findings: &mut Findings) {
     let name = &source[span.clone()];
     let (header, is_header) = header_before(source, span.start);
     let (key, first) = if is_header {
-        (
-            name.to_owned(),
-            first_line(source, 0, &span, |line| header_name(line) == Some(header)),
-        )
+        (name.to_owned(), first_line(source, 0, &span, |line| header_name(line) == Some(header)))
     } else {
-        let key = if header.is_empty() {
-            name.to_owned()
-        } else {
-            format!("{header}.{name}")
-        };
+        let key = if header.is_empty() { name.to_owned() } else { format!("{header}.{name}") };
         // Before its section, a key of the same name belongs elsewhere.
         let from = section_start(source, header);
-        (
-            key,
-            first_line(source, from, &span, |line| key_name(line) == Some(name)),
-        )
+        (key, first_line(source, from, &span, |line| key_name(line) == Some(name)))
     };
     let before = first.map_or_else(String::new, |line| format!(", first on line {line}"));
     let what = if is_header { "section" } else { "key" };
@@ -176,35 +134,19 @@ fn duplicate(source: &str, span: Range<usize>, findings: &mut Findings) {
 /// The section header that is in force at `offset`, and whether `offset` is on that header itself.
 fn header_before(source: &str, offset: usize) -> (&str, bool) {
     let line_start = source[..offset].rfind('\n').map_or(0, |i| i + 1);
-    let line_end = source[offset..]
-        .find('\n')
-        .map_or(source.len(), |i| offset + i);
+    let line_end = source[offset..].find('\n').map_or(source.len(), |i| offset + i);
     if let Some(name) = header_name(&source[line_start..line_end]) {
         return (name, true);
     }
-    (
-        source[..line_start]
-            .lines()
-            .rev()
-            .find_map(header_name)
-            .unwrap_or(""),
-        false,
-    )
+    (source[..line_start].lines().rev().find_map(header_name).unwrap_or(""), false)
 }
 
 fn section_start(source: &str, header: &str) -> usize {
-    lines_with_offsets(source)
-        .find(|(_, line)| header_name(line) == Some(header))
-        .map_or(0, |(offset, _)| offset)
+    lines_with_offsets(source).find(|(_, line)| header_name(line) == Some(header)).map_or(0, |(offset, _)| offset)
 }
 
 /// Number (from 1) of the first line between byte `from` and the line of `span` that `matches`.
-fn first_line(
-    source: &str,
-    from: usize,
-    span: &Range<usize>,
-    matches: impl Fn(&str) -> bool,
-) -> Option<usize> {
+fn first_line(source: &str, from: usize, span: &Range<usize>, matches: impl Fn(&str) -> bool) -> Option<usize> {
     let line_start = source[..span.start].rfind('\n').map_or(0, |i| i + 1);
     lines_with_offsets(&source[..line_start])
         .enumerate()
@@ -246,45 +188,19 @@ mod tests {
     #[test]
     fn several_mistakes_are_found_in_one_run() {
         let found = codes_of("a = 3 mm\na = 4\nb = \"x\nc = 5\n[d\n");
-        assert_eq!(
-            found.iter().filter(|c| **c == codes::DUPLICATE).count(),
-            1,
-            "{found:?}"
-        );
-        assert_eq!(
-            found.iter().filter(|c| **c == codes::UNQUOTED).count(),
-            1,
-            "{found:?}"
-        );
-        assert_eq!(
-            found.iter().filter(|c| **c == codes::SYNTAX).count(),
-            2,
-            "{found:?}"
-        );
+        assert_eq!(found.iter().filter(|c| **c == codes::DUPLICATE).count(), 1, "{found:?}");
+        assert_eq!(found.iter().filter(|c| **c == codes::UNQUOTED).count(), 1, "{found:?}");
+        assert_eq!(found.iter().filter(|c| **c == codes::SYNTAX).count(), 2, "{found:?}");
     }
 
     #[test]
     fn words_that_look_like_numbers_are_texts_without_quotes() {
-        for word in [
-            "f32",
-            "invhys",
-            "true_north",
-            "nm",
-            "150mm",
-            "1.195kg",
-            "40V/ms",
-            "0.6mrad",
-            "-2um",
-            "60 µm",
-            "0x mm",
-        ] {
+        for word in
+            ["f32", "invhys", "true_north", "nm", "150mm", "1.195kg", "40V/ms", "0.6mrad", "-2um", "60 µm", "0x mm"]
+        {
             let mut findings = Findings::default();
             parse(&format!("a = {word} # comment\n"), &mut findings);
-            let messages: Vec<_> = findings
-                .all()
-                .iter()
-                .map(|d| (d.code, d.message.clone()))
-                .collect();
+            let messages: Vec<_> = findings.all().iter().map(|d| (d.code, d.message.clone())).collect();
             let expected = format!("`{word}` is a text without quotes");
             assert_eq!(messages, [(codes::UNQUOTED, expected)], "{word}");
         }
@@ -295,10 +211,6 @@ mod tests {
         let mut findings = Findings::default();
         parse("x = 1\n[a]\ny = 1\n[b]\nx = 2\nx = 3\n", &mut findings);
         assert_eq!(findings.all()[0].key, "b.x");
-        assert!(
-            findings.all()[0].message.contains("line 5"),
-            "{}",
-            findings.all()[0].message
-        );
+        assert!(findings.all()[0].message.contains("line 5"), "{}", findings.all()[0].message);
     }
 }

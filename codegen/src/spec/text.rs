@@ -23,11 +23,7 @@ pub(super) fn quote(found: &str) -> String {
 fn printable(c: char) -> Vec<char> {
     let hidden = c.is_control()
         || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}');
-    if hidden {
-        c.escape_default().collect()
-    } else {
-        vec![c]
-    }
+    if hidden { c.escape_default().collect() } else { vec![c] }
 }
 
 /// `span` cut to the text and moved outward to whole characters.
@@ -73,22 +69,14 @@ pub(super) fn alternatives(words: &[&str]) -> String {
 }
 
 /// The candidate that `name` is probably a slip of.
-pub(super) fn nearest<'a>(
-    name: &str,
-    candidates: impl Iterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub(super) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     // Nothing that long is a slip of a key, and the distance costs the product of the lengths.
     if name.len() > 64 {
         return None;
     }
     let limit = (name.chars().count() / 3).max(1);
     candidates
-        .map(|candidate| {
-            (
-                strsim::damerau_levenshtein(&name.to_lowercase(), candidate),
-                candidate,
-            )
-        })
+        .map(|candidate| (strsim::damerau_levenshtein(&name.to_lowercase(), candidate), candidate))
         .filter(|(distance, _)| *distance <= limit)
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, candidate)| candidate)
@@ -100,13 +88,8 @@ mod tests {
 
     #[test]
     fn numbers_are_short() {
-        for (value, expected) in [
-            (0.15, "0.15"),
-            (5.223_02, "5.223"),
-            (6e-5, "6e-5"),
-            (4200.0, "4200"),
-            (-1e7, "-1e7"),
-        ] {
+        for (value, expected) in [(0.15, "0.15"), (5.223_02, "5.223"), (6e-5, "6e-5"), (4200.0, "4200"), (-1e7, "-1e7")]
+        {
             assert_eq!(number(value), expected);
         }
     }
@@ -114,10 +97,7 @@ mod tests {
     #[test]
     fn the_nearest_name_is_near() {
         let names = ["base_radius", "height"];
-        assert_eq!(
-            nearest("base_radus", names.into_iter()),
-            Some("base_radius")
-        );
+        assert_eq!(nearest("base_radus", names.into_iter()), Some("base_radius"));
         assert_eq!(nearest("heihgt", names.into_iter()), Some("height"));
         assert_eq!(nearest("voltage", names.into_iter()), None);
     }

@@ -46,34 +46,18 @@ impl ValueReader<'_> {
             Shape::List(items) => self.list(items, value)?,
             Shape::Records => self.records(value)?,
         };
-        Some(Field {
-            parsed,
-            span,
-            items,
-            given: true,
-        })
+        Some(Field { parsed, span, items, given: true })
     }
 
-    fn list(
-        &mut self,
-        items: &'static [Item],
-        value: &Spanned<DeValue<'_>>,
-    ) -> Option<(Parsed, Vec<Range<usize>>)> {
+    fn list(&mut self, items: &'static [Item], value: &Spanned<DeValue<'_>>) -> Option<(Parsed, Vec<Range<usize>>)> {
         let DeValue::Array(array) = value.get_ref() else {
-            return self.wrong_type(
-                self.path,
-                value,
-                &format!("an array of {} values", items.len()),
-                None,
-            );
+            return self.wrong_type(self.path, value, &format!("an array of {} values", items.len()), None);
         };
         let mut numbers = Vec::new();
         let mut spans = Vec::new();
         for (i, (item, element)) in items.iter().zip(array.iter()).enumerate() {
             spans.push(text::clamp(self.source, element.span()));
-            if let Some(Scalar::Number(number)) =
-                self.scalar(*item, &format!("{}[{i}]", self.path), element)
-            {
+            if let Some(Scalar::Number(number)) = self.scalar(*item, &format!("{}[{i}]", self.path), element) {
                 numbers.push(number);
             }
         }
@@ -89,12 +73,7 @@ impl ValueReader<'_> {
                     if array.len() == 1 { "" } else { "s" },
                     items.len()
                 ),
-                format!(
-                    "write {} values: {} = {}",
-                    items.len(),
-                    self.key.name,
-                    self.key.example
-                ),
+                format!("write {} values: {} = {}", items.len(), self.key.name, self.key.example),
             );
             return None;
         }
@@ -123,54 +102,28 @@ impl ValueReader<'_> {
             Item::Quantity { .. } => self.quantity(item, path, value).map(Scalar::Number),
             Item::Number(range) => {
                 let number = self.plain_number(path, value)?;
-                self.in_range(
-                    range.contains(number),
-                    item,
-                    path,
-                    value,
-                    &text::number(number),
-                )?;
+                self.in_range(range.contains(number), item, path, value, &text::number(number))?;
                 Some(Scalar::Number(number))
             }
             Item::Integer(min, max) => {
                 let integer = self.integer(path, value)?;
-                self.in_range(
-                    (min..=max).contains(&integer),
-                    item,
-                    path,
-                    value,
-                    &integer.to_string(),
-                )?;
+                self.in_range((min..=max).contains(&integer), item, path, value, &integer.to_string())?;
                 Some(Scalar::Integer(integer))
             }
             Item::Choice(words) => {
                 let DeValue::String(found) = value.get_ref() else {
-                    return self.wrong_type(
-                        path,
-                        value,
-                        &format!("one of {}", text::alternatives(words)),
-                        None,
-                    );
+                    return self.wrong_type(path, value, &format!("one of {}", text::alternatives(words)), None);
                 };
                 let known = words.iter().find(|word| **word == found.as_ref());
                 if known.is_none() {
                     let meant = text::nearest(found, words.iter().copied());
-                    let did_you_mean =
-                        meant.map_or_else(String::new, |word| format!("did you mean \"{word}\"? "));
+                    let did_you_mean = meant.map_or_else(String::new, |word| format!("did you mean \"{word}\"? "));
                     self.findings.error(
                         codes::UNKNOWN_CHOICE,
                         path,
                         text::clamp(self.source, value.span()),
-                        format!(
-                            "`{path}` is \"{}\", expected {}",
-                            text::shorten(found),
-                            text::alternatives(words)
-                        ),
-                        format!(
-                            "{did_you_mean}write {}. {}",
-                            text::alternatives(words),
-                            self.key.doc
-                        ),
+                        format!("`{path}` is \"{}\", expected {}", text::shorten(found), text::alternatives(words)),
+                        format!("{did_you_mean}write {}. {}", text::alternatives(words), self.key.doc),
                     );
                 }
                 known.map(|word| Scalar::Choice(word))
@@ -184,28 +137,21 @@ impl ValueReader<'_> {
             return self.wrong_type(path, value, "a name in quotes", None);
         };
         let allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
-        let good =
-            found.starts_with(|c: char| c.is_ascii_alphabetic()) && found.chars().all(allowed);
+        let good = found.starts_with(|c: char| c.is_ascii_alphabetic()) && found.chars().all(allowed);
         if good && found.len() <= MAX_NAME {
             return Some(found.to_string());
         }
-        let mended: String = found
-            .chars()
-            .map(|c| if allowed(c) { c } else { '-' })
-            .take(MAX_NAME)
-            .collect();
+        let mended: String = found.chars().map(|c| if allowed(c) { c } else { '-' }).take(MAX_NAME).collect();
         let mended = mended.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
-        let such_as = if mended.is_empty() {
-            "my-platform"
-        } else {
-            mended
-        };
+        let such_as = if mended.is_empty() { "my-platform" } else { mended };
         self.findings.error(
             codes::BAD_NAME,
             path,
             text::clamp(self.source, value.span()),
             format!("`{path}` is \"{}\", which is not a name", text::shorten(found)),
-            format!("use a letter, then letters, digits, - and _, at most {MAX_NAME} characters, such as \"{such_as}\""),
+            format!(
+                "use a letter, then letters, digits, - and _, at most {MAX_NAME} characters, such as \"{such_as}\""
+            ),
         );
         None
     }
@@ -237,16 +183,12 @@ impl ValueReader<'_> {
         expected: &str,
         mend: Option<String>,
     ) -> Option<T> {
-        let help =
-            mend.unwrap_or_else(|| format!("write {} = {}", self.key.name, self.key.example));
+        let help = mend.unwrap_or_else(|| format!("write {} = {}", self.key.name, self.key.example));
         self.findings.error(
             codes::WRONG_TYPE,
             path,
             text::clamp(self.source, value.span()),
-            format!(
-                "`{path}` is {}, expected {expected}",
-                messages::kind_of(value.get_ref())
-            ),
+            format!("`{path}` is {}, expected {expected}", messages::kind_of(value.get_ref())),
             help,
         );
         None

@@ -9,10 +9,7 @@ use specgen::spec::keys::{Presence, SECTIONS};
 
 /// Folder of the repository.
 pub fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .expect("tests/ is in the repository")
-        .to_path_buf()
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ is in the repository").to_path_buf()
 }
 
 /// Every spec of the repository, sorted.
@@ -39,15 +36,7 @@ pub fn folder_with_records() -> tempfile::TempDir {
     fs::create_dir_all(dir.path().join("records")).expect("created");
     fs::create_dir_all(dir.path().join("specs/records")).expect("created");
     for place in ["records", "specs/records"] {
-        for name in [
-            "reference-forc",
-            "leg1",
-            "leg2",
-            "leg3",
-            "leg4",
-            "leg5",
-            "leg6",
-        ] {
+        for name in ["reference-forc", "leg1", "leg2", "leg3", "leg4", "leg5", "leg6"] {
             fs::write(dir.path().join(place).join(format!("{name}.csv")), "").expect("written");
         }
     }
@@ -56,11 +45,7 @@ pub fn folder_with_records() -> tempfile::TempDir {
 
 /// `text` as if it stood in `folder`/specs/`name`; "../records" and "records" both exist there.
 pub fn source(text: &str, name: &str, folder: &tempfile::TempDir) -> SpecSource {
-    SpecSource {
-        display_name: name.to_owned(),
-        text: text.to_owned(),
-        dir: folder.path().join("specs"),
-    }
+    SpecSource { display_name: name.to_owned(), text: text.to_owned(), dir: folder.path().join("specs") }
 }
 
 /// A spec with every key of the key table but the bandwidths, each on a line of its own.
@@ -71,8 +56,7 @@ pub fn every_key() -> String {
             text.push_str(&format!("[{}]\n", section.name));
         }
         for key in section.keys {
-            let is_bandwidth =
-                matches!(key.presence, Presence::InsteadOf(_)) && key.name.ends_with("_bandwidth");
+            let is_bandwidth = matches!(key.presence, Presence::InsteadOf(_)) && key.name.ends_with("_bandwidth");
             if !is_bandwidth {
                 text.push_str(&format!("{} = {}\n", key.name, key.example));
             }
@@ -92,8 +76,5 @@ pub fn line_of(diagnostic: &Diagnostic, text: &str) -> usize {
 
 /// The errors among `diagnostics`.
 pub fn errors(diagnostics: &[Diagnostic]) -> Vec<&Diagnostic> {
-    diagnostics
-        .iter()
-        .filter(|d| d.severity == Severity::Error)
-        .collect()
+    diagnostics.iter().filter(|d| d.severity == Severity::Error).collect()
 }

@@ -20,10 +20,7 @@ fn uses(mode: AdaptationMode, which: &str) -> bool {
 
 pub(super) fn alternatives(f: &Fields, findings: &mut Findings) -> Option<()> {
     for which in WHICH {
-        let (weight, bandwidth) = (
-            format!("adaptation.{which}_weight"),
-            format!("adaptation.{which}_bandwidth"),
-        );
+        let (weight, bandwidth) = (format!("adaptation.{which}_weight"), format!("adaptation.{which}_bandwidth"));
         if f.given(&weight) && f.given(&bandwidth) {
             findings.error(
                 codes::ALTERNATIVES,
@@ -41,10 +38,7 @@ pub(super) fn weights_for_mode(f: &Fields, findings: &mut Findings) -> Option<()
     let mode = build::mode(f)?;
     let word = f.choice("adaptation.mode")?;
     for which in WHICH {
-        let (weight, bandwidth) = (
-            format!("adaptation.{which}_weight"),
-            format!("adaptation.{which}_bandwidth"),
-        );
+        let (weight, bandwidth) = (format!("adaptation.{which}_weight"), format!("adaptation.{which}_bandwidth"));
         let given = [&weight, &bandwidth].into_iter().find(|path| f.given(path));
         match given {
             None if uses(mode, which) && !findings.mentions(&[&weight, &bandwidth]) => findings.error(
@@ -92,7 +86,10 @@ pub(super) fn bandwidths_fit_period(f: &Fields, findings: &mut Findings) -> Opti
                     if run == 1 { "" } else { "s" },
                     number(bandwidth * interval)
                 ),
-                format!("at most \"{} rad/s\" would do; or shorten `timing.period` or `adaptation.run_interval`", rounded_down(1.0 / interval)),
+                format!(
+                    "at most \"{} rad/s\" would do; or shorten `timing.period` or `adaptation.run_interval`",
+                    rounded_down(1.0 / interval)
+                ),
             );
         }
     }
@@ -106,11 +103,7 @@ pub(super) fn gain_ratio_in_order(f: &Fields, findings: &mut Findings) -> Option
 /// To four digits and never above `value`: what a message recommends must pass.
 fn rounded_down(value: f64) -> String {
     let shown: f64 = number(value).parse().unwrap_or(value);
-    if shown <= value {
-        number(value)
-    } else {
-        number(value * (1.0 - 1e-3))
-    }
+    if shown <= value { number(value) } else { number(value * (1.0 - 1e-3)) }
 }
 
 #[cfg(test)]
@@ -122,10 +115,7 @@ mod tests {
         for i in 1..2000 {
             let value = 7.0 * f64::from(i) / 3.0;
             let shown: f64 = rounded_down(value).parse().expect("a number");
-            assert!(
-                shown <= value && shown > 0.99 * value,
-                "{shown} for {value}"
-            );
+            assert!(shown <= value && shown > 0.99 * value, "{shown} for {value}");
         }
     }
 }

@@ -55,10 +55,7 @@ pub(super) fn slew_moves_a_code(f: &Fields, findings: &mut Findings) -> Option<(
 
 pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()> {
     let stacks = f.integer("actuator.stacks")? as f64;
-    let (gain, stroke) = (
-        f.number("actuator.stack_gain")?,
-        f.number("actuator.stroke")?,
-    );
+    let (gain, stroke) = (f.number("actuator.stack_gain")?, f.number("actuator.stroke")?);
     let [low, high] = f.list::<2>("actuator.voltage")?;
     let travel = stacks * gain * (high - low);
     if low < high && !(0.5..=2.0).contains(&(travel / stroke)) {
@@ -74,8 +71,7 @@ pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()
                 number(travel * 1e6),
                 number(stroke * 1e6)
             ),
-            "check `stacks`, `stack_gain` (of one stack, not of the leg), `voltage` and `stroke`"
-                .to_owned(),
+            "check `stacks`, `stack_gain` (of one stack, not of the leg), `voltage` and `stroke`".to_owned(),
         );
     }
     Some(())
@@ -93,10 +89,7 @@ pub(super) fn resonance_below_tick_rate(f: &Fields, findings: &mut Findings) -> 
                 number(resonance),
                 number(1.0 / period)
             ),
-            format!(
-                "a period below {} us would show it to the gauges",
-                number(0.5e6 / resonance)
-            ),
+            format!("a period below {} us would show it to the gauges", number(0.5e6 / resonance)),
         );
     }
     Some(())
@@ -129,11 +122,7 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
             codes::SENSOR_RANGE,
             path,
             f.span(path),
-            format!(
-                "the gauge spans {} um, but the stroke is {} um",
-                number(span * 1e6),
-                number(stroke * 1e6)
-            ),
+            format!("the gauge spans {} um, but the stroke is {} um", number(span * 1e6), number(stroke * 1e6)),
             "check the units of `sensor.range` and `actuator.stroke`".to_owned(),
         );
     }
@@ -156,11 +145,7 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
 
 pub(super) fn scalar_fits_fpu(f: &Fields, findings: &mut Findings) -> Option<()> {
     if f.choice("target.mcu")? == "mps2-an386" && f.choice("controller.scalar")? == "f64" {
-        let path = if f.given("controller.scalar") {
-            "controller.scalar"
-        } else {
-            "target.mcu"
-        };
+        let path = if f.given("controller.scalar") { "controller.scalar" } else { "target.mcu" };
         findings.warning(
             codes::DOUBLE_ON_SINGLE,
             path,
@@ -173,11 +158,7 @@ pub(super) fn scalar_fits_fpu(f: &Fields, findings: &mut Findings) -> Option<()>
 }
 
 pub(super) fn budget_in_bytes(f: &Fields, findings: &mut Findings) -> Option<()> {
-    for path in [
-        "target.budget.flash",
-        "target.budget.ram",
-        "target.budget.stack",
-    ] {
+    for path in ["target.budget.flash", "target.budget.ram", "target.budget.stack"] {
         let Some(bytes) = f.number(path) else {
             continue;
         };

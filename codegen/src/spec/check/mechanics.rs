@@ -20,40 +20,20 @@ struct Legs {
 /// (1), (2) and the derivative of (AI.1) at the rest pose P = (0, 0, height), R = I:
 /// dl_i/dh = [s_i, P_i × s_i], with s_i from B_i to P_i.
 fn legs_at_rest(geometry: &Geometry) -> Legs {
-    let on_circle =
-        |radius: f64, angle: f64| Vector3::new(radius * angle.cos(), radius * angle.sin(), 0.0);
-    let mut legs = Legs {
-        lengths: [0.0; 6],
-        jacobian: Matrix6::zeros(),
-    };
+    let on_circle = |radius: f64, angle: f64| Vector3::new(radius * angle.cos(), radius * angle.sin(), 0.0);
+    let mut legs = Legs { lengths: [0.0; 6], jacobian: Matrix6::zeros() };
     for i in 0..6_usize {
         // Base pairs sit about 60°, 180°, 300°, platform pairs about 0°, 120°, 240°.
         let base_side = if i % 2 == 0 { -0.5 } else { 0.5 };
         let base_pair = (2 * (i / 2) + 1) as f64 * FRAC_PI_3;
         let platform_pair = (2 * i.div_ceil(2)) as f64 * FRAC_PI_3;
-        let base = on_circle(
-            geometry.base_radius,
-            base_pair + base_side * geometry.base_angle,
-        );
-        let joint = on_circle(
-            geometry.platform_radius,
-            platform_pair - base_side * geometry.platform_angle,
-        );
+        let base = on_circle(geometry.base_radius, base_pair + base_side * geometry.base_angle);
+        let joint = on_circle(geometry.platform_radius, platform_pair - base_side * geometry.platform_angle);
         let leg = Vector3::new(0.0, 0.0, geometry.height) + joint - base;
         let direction = leg.normalize();
         let turn = joint.cross(&direction);
         legs.lengths[i] = leg.norm();
-        legs.jacobian.set_row(
-            i,
-            &RowVector6::new(
-                direction.x,
-                direction.y,
-                direction.z,
-                turn.x,
-                turn.y,
-                turn.z,
-            ),
-        );
+        legs.jacobian.set_row(i, &RowVector6::new(direction.x, direction.y, direction.z, turn.x, turn.y, turn.z));
     }
     legs
 }
@@ -63,19 +43,12 @@ const SOUND: std::ops::RangeInclusive<f64> = 0.1..=3.0;
 
 fn shortest_leg(f: &Fields) -> Option<f64> {
     let legs = legs_at_rest(&build::geometry(f)?);
-    Some(
-        legs.lengths
-            .into_iter()
-            .fold(f64::INFINITY, |a, b| if b < a { b } else { a }),
-    )
+    Some(legs.lengths.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a }))
 }
 
 pub(super) fn mass_centers_inside_leg(f: &Fields, findings: &mut Findings) -> Option<()> {
     let length = shortest_leg(f)?;
-    for (path, joint) in [
-        ("leg.fixed_center", "base"),
-        ("leg.extensible_center", "platform"),
-    ] {
+    for (path, joint) in [("leg.fixed_center", "base"), ("leg.extensible_center", "platform")] {
         let Some(center) = f.number(path) else {
             continue;
         };
@@ -100,8 +73,7 @@ pub(super) fn leg_gyration(f: &Fields, findings: &mut Findings) -> Option<()> {
     let length = shortest_leg(f)?;
     for part in ["fixed", "extensible"] {
         let path = format!("leg.{part}_inertia");
-        let (Some(inertia), Some(mass)) = (f.number(&path), f.number(&format!("leg.{part}_mass")))
-        else {
+        let (Some(inertia), Some(mass)) = (f.number(&path), f.number(&format!("leg.{part}_mass"))) else {
             continue;
         };
         let radius = (inertia / mass).sqrt();
@@ -128,9 +100,7 @@ pub(super) fn leg_gyration(f: &Fields, findings: &mut Findings) -> Option<()> {
 pub(super) fn platform_inertia(f: &Fields, findings: &mut Findings) -> Option<()> {
     let [xx, yy, zz] = f.list::<3>("platform.inertia")?;
     let [xy, xz, yz] = f.list::<3>("platform.products")?;
-    let mut principal: [f64; 3] = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-        .symmetric_eigenvalues()
-        .into();
+    let mut principal: [f64; 3] = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).symmetric_eigenvalues().into();
     principal.sort_by(f64::total_cmp);
     let [small, middle, large] = principal;
     // The last digit of a flat plate's data must not decide.
@@ -157,9 +127,7 @@ pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<(
     let moments = f.list::<3>("platform.inertia")?;
     let size = f.number("geometry.platform_radius")?;
     let radii = moments.map(|moment| (moment / mass).sqrt());
-    let largest = radii
-        .into_iter()
-        .fold(0.0, |a, b| if b > a { b } else { a });
+    let largest = radii.into_iter().fold(0.0, |a, b| if b > a { b } else { a });
     let ratio = largest / size;
     if SOUND.contains(&ratio) {
         return Some(());
@@ -170,15 +138,11 @@ pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<(
         number(size)
     );
     // A slip between g and kg is the usual one: say so if the mass would then fit.
-    let slip = [1e3, 1e-3]
-        .into_iter()
-        .find(|factor: &f64| SOUND.contains(&(ratio / factor.sqrt())));
-    let did_you_mean = slip.map_or_else(String::new, |factor| {
-        format!("did you mean \"{} kg\"? ", number(mass * factor))
-    });
-    let help = format!(
-        "{did_you_mean}check the units of `platform.mass` (kg or g) and `platform.inertia` (mm^2 or m^2)"
-    );
+    let slip = [1e3, 1e-3].into_iter().find(|factor: &f64| SOUND.contains(&(ratio / factor.sqrt())));
+    let did_you_mean =
+        slip.map_or_else(String::new, |factor| format!("did you mean \"{} kg\"? ", number(mass * factor)));
+    let help =
+        format!("{did_you_mean}check the units of `platform.mass` (kg or g) and `platform.inertia` (mm^2 or m^2)");
     let (path, span) = ("platform.mass", f.span("platform.mass"));
     if (0.02..=10.0).contains(&ratio) {
         findings.warning(codes::GYRATION_ODD, path, span, message, help);
@@ -193,9 +157,7 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
     let mut jacobian = legs_at_rest(&geometry).jacobian;
     // Rotations in lengths at the joint circle, so that the condition has no unit.
     for column in 3..6 {
-        jacobian
-            .column_mut(column)
-            .unscale_mut(geometry.platform_radius);
+        jacobian.column_mut(column).unscale_mut(geometry.platform_radius);
     }
     let singular = jacobian.singular_values();
     let condition = singular.max() / singular.min();
@@ -206,8 +168,12 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
         codes::DEGENERATE_GEOMETRY,
         "geometry.height",
         f.span("geometry.height"),
-        format!("the six legs hardly hold the platform: the condition number of their Jacobian at rest is {}", number(condition)),
-        "make the height comparable to the radii and the joint pairs close (small base_angle and platform_angle)".to_owned(),
+        format!(
+            "the six legs hardly hold the platform: the condition number of their Jacobian at rest is {}",
+            number(condition)
+        ),
+        "make the height comparable to the radii and the joint pairs close (small base_angle and platform_angle)"
+            .to_owned(),
     );
     Some(())
 }
@@ -217,10 +183,8 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
 pub(super) fn workspace_in_reach(f: &Fields, findings: &mut Findings) -> Option<()> {
     let jacobian = legs_at_rest(&build::geometry(f)?).jacobian;
     let stroke = f.number("actuator.stroke")?;
-    for (path, first, unit, scale) in [
-        ("workspace.translation", 0, "um", 1e6),
-        ("workspace.rotation", 3, "mrad", 1e3),
-    ] {
+    for (path, first, unit, scale) in [("workspace.translation", 0, "um", 1e6), ("workspace.rotation", 3, "mrad", 1e3)]
+    {
         let Some(bounds) = f.list::<3>(path) else {
             continue;
         };
@@ -253,13 +217,7 @@ mod tests {
     use super::*;
 
     fn reference() -> Geometry {
-        Geometry {
-            base_radius: 0.15,
-            platform_radius: 0.1,
-            base_angle: 0.0377,
-            platform_angle: 0.0377,
-            height: 0.18,
-        }
+        Geometry { base_radius: 0.15, platform_radius: 0.1, base_angle: 0.0377, platform_angle: 0.0377, height: 0.18 }
     }
 
     fn leg_lengths(g: &Geometry, pose: [f64; 6]) -> [f64; 6] {
@@ -274,14 +232,7 @@ mod tests {
             5.0 * FRAC_PI_3 - b,
             5.0 * FRAC_PI_3 + b,
         ];
-        let platform = [
-            p,
-            third - p,
-            third + p,
-            2.0 * third - p,
-            2.0 * third + p,
-            -p,
-        ];
+        let platform = [p, third - p, third + p, 2.0 * third - p, 2.0 * third + p, -p];
         let turn = nalgebra::Rotation3::from_euler_angles(pose[3], pose[4], pose[5]);
         std::array::from_fn(|i| {
             let joint = Vector3::new(platform[i].cos(), platform[i].sin(), 0.0) * g.platform_radius;
@@ -303,10 +254,7 @@ mod tests {
             let behind = leg_lengths(&geometry, pose);
             for leg in 0..6 {
                 let difference = (ahead[leg] - behind[leg]) / (2.0 * step);
-                assert!(
-                    (difference - legs.jacobian[(leg, axis)]).abs() < 1e-8,
-                    "leg {leg}, axis {axis}"
-                );
+                assert!((difference - legs.jacobian[(leg, axis)]).abs() < 1e-8, "leg {leg}, axis {axis}");
             }
         }
         assert!((legs.lengths[0] - leg_lengths(&geometry, [0.0; 6])[0]).abs() < 1e-15);

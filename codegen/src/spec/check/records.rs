@@ -18,8 +18,7 @@ pub(in crate::spec) fn readable(f: &Fields, dir: &Path, findings: &mut Findings)
             KEY,
             f.span(KEY),
             format!("`{KEY}` names {} files, expected 1 or 6", records.len()),
-            "name one file for all legs, or six: one for each leg, in the order of the joints"
-                .to_owned(),
+            "name one file for all legs, or six: one for each leg, in the order of the joints".to_owned(),
         );
     }
     for (i, record) in records.iter().enumerate() {
@@ -27,32 +26,19 @@ pub(in crate::spec) fn readable(f: &Fields, dir: &Path, findings: &mut Findings)
             cannot_open(&dir.join(record)).map(|reason| {
                 (
                     codes::RECORD_UNREADABLE,
-                    format!(
-                        "the record \"{}\" cannot be read: {reason}",
-                        text::shorten(record)
-                    ),
-                    "name a CSV file relative to the folder of the spec, with forward slashes"
-                        .to_owned(),
+                    format!("the record \"{}\" cannot be read: {reason}", text::shorten(record)),
+                    "name a CSV file relative to the folder of the spec, with forward slashes".to_owned(),
                 )
             })
         } else {
             Some((
                 codes::RECORD_PATH,
-                format!(
-                    "\"{}\" is not a path relative to the spec",
-                    text::shorten(record)
-                ),
+                format!("\"{}\" is not a path relative to the spec", text::shorten(record)),
                 "put the file beside the spec and name it as in \"records/leg1.csv\"".to_owned(),
             ))
         };
         if let Some((code, message, help)) = finding {
-            findings.error(
-                code,
-                &format!("{KEY}[{i}]"),
-                f.item_span(KEY, i),
-                message,
-                help,
-            );
+            findings.error(code, &format!("{KEY}[{i}]"), f.item_span(KEY, i), message, help);
         }
     }
     Some(())
@@ -71,14 +57,7 @@ fn cannot_open(path: &Path) -> Option<String> {
     if !path.is_file() {
         // Opening a device or a pipe could wait for ever.
         let exists = path.try_exists().unwrap_or(false);
-        return Some(
-            if exists {
-                "it is not a regular file"
-            } else {
-                "there is no such file"
-            }
-            .to_owned(),
-        );
+        return Some(if exists { "it is not a regular file" } else { "there is no such file" }.to_owned());
     }
     File::open(path).err().map(|error| error.to_string())
 }

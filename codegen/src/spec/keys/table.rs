@@ -11,14 +11,7 @@ const fn row(
     example: &'static str,
     doc: &'static str,
 ) -> Key {
-    Key {
-        name,
-        shape,
-        presence,
-        doc,
-        symbol,
-        example,
-    }
+    Key { name, shape, presence, doc, symbol, example }
 }
 
 const fn one(dimension: Dimension, range: Range, unit: &'static str) -> Shape {
@@ -26,11 +19,7 @@ const fn one(dimension: Dimension, range: Range, unit: &'static str) -> Shape {
 }
 
 const fn item(dimension: Dimension, range: Range, unit: &'static str) -> Item {
-    Item::Quantity {
-        dimension,
-        range,
-        unit,
-    }
+    Item::Quantity { dimension, range, unit }
 }
 
 const fn integer(min: i64, max: i64) -> Shape {
@@ -53,40 +42,17 @@ const TRAVEL: Item = item(Dimension::LENGTH, Range::closed(0.0, 0.1), "um");
 // The controller's series for small angles are sized by this bound.
 const TURN: Item = item(Dimension::ANGLE, Range::closed(0.0, 0.5), "mrad");
 const GAIN: Range = Range::closed(0.0, 1e15);
-const BYTES: Shape = one(
-    Dimension::MEMORY,
-    Range::closed(1.0, 1_099_511_627_776.0),
-    "KiB",
-);
+const BYTES: Shape = one(Dimension::MEMORY, Range::closed(1.0, 1_099_511_627_776.0), "KiB");
 
-const fn gains(
-    along: Dimension,
-    along_unit: &'static str,
-    about: Dimension,
-    about_unit: &'static str,
-) -> [Item; 6] {
+const fn gains(along: Dimension, along_unit: &'static str, about: Dimension, about_unit: &'static str) -> [Item; 6] {
     let (a, t) = (item(along, GAIN, along_unit), item(about, GAIN, about_unit));
     [a, a, a, t, t, t]
 }
 
-const STIFFNESSES: &[Item] = &gains(
-    Dimension::STIFFNESS,
-    "N/m",
-    Dimension::TURN_STIFFNESS,
-    "N m/rad",
-);
-const STIFFNESS_RATES: &[Item] = &gains(
-    Dimension::STIFFNESS_RATE,
-    "N/(m s)",
-    Dimension::TURN_STIFFNESS_RATE,
-    "N m/(rad s)",
-);
-const DAMPINGS: &[Item] = &gains(
-    Dimension::DAMPING,
-    "N s/m",
-    Dimension::TURN_DAMPING,
-    "N m s/rad",
-);
+const STIFFNESSES: &[Item] = &gains(Dimension::STIFFNESS, "N/m", Dimension::TURN_STIFFNESS, "N m/rad");
+const STIFFNESS_RATES: &[Item] =
+    &gains(Dimension::STIFFNESS_RATE, "N/(m s)", Dimension::TURN_STIFFNESS_RATE, "N m/(rad s)");
+const DAMPINGS: &[Item] = &gains(Dimension::DAMPING, "N s/m", Dimension::TURN_DAMPING, "N m s/rad");
 
 /// Every section, in the order of the reference. Sections that hold others come before them.
 // One row a line: this is a table.

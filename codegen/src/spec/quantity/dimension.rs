@@ -80,10 +80,7 @@ impl Dimension {
         NAMES
             .iter()
             .find(|(dimension, _)| *dimension == self)
-            .map_or_else(
-                || format!("a quantity in {}", self.in_base_units()),
-                |(_, name)| (*name).to_owned(),
-            )
+            .map_or_else(|| format!("a quantity in {}", self.in_base_units()), |(_, name)| (*name).to_owned())
     }
 
     /// The dimension in base units: "kg m^2 s^-2".
@@ -119,10 +116,7 @@ const NAMES: &[(Dimension, &str)] = &[
     (Dimension::STIFFNESS_RATE, "a stiffness per time"),
     (Dimension::DAMPING, "a damping"),
     (Dimension::TURN_STIFFNESS, "a rotational stiffness"),
-    (
-        Dimension::TURN_STIFFNESS_RATE,
-        "a rotational stiffness per time",
-    ),
+    (Dimension::TURN_STIFFNESS_RATE, "a rotational stiffness per time"),
     (Dimension::TURN_DAMPING, "a rotational damping"),
     (Dimension::new([2, 1, -2, 0, 0, 0]), "a torque or an energy"),
     (Dimension::new([2, 1, -3, 0, 0, 0]), "a power"),

@@ -27,22 +27,13 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    const ONE: Self = Self {
-        dimension: Dimension::NONE,
-        power_of_ten: 0,
-        times: Vec::new(),
-        over: Vec::new(),
-    };
+    const ONE: Self = Self { dimension: Dimension::NONE, power_of_ten: 0, times: Vec::new(), over: Vec::new() };
 
     fn multiply(&mut self, other: &Self, power: i8) -> Option<()> {
         self.dimension = self.dimension.times(other.dimension, power)?;
         self.power_of_ten += other.power_of_ten * i64::from(power);
         for _ in 0..power.unsigned_abs() {
-            let (times, over) = if power > 0 {
-                (&other.times, &other.over)
-            } else {
-                (&other.over, &other.times)
-            };
+            let (times, over) = if power > 0 { (&other.times, &other.over) } else { (&other.over, &other.times) };
             self.times.extend_from_slice(times);
             self.over.extend_from_slice(over);
             // `pi` has no dimension to run out of range, so that its powers are bounded here.
@@ -127,17 +118,13 @@ impl UnitParser<'_> {
         let power = self.power()?;
         scale
             .multiply(&base, direction * power)
-            .ok_or(QuantityError {
-                range: start..self.at,
-                problem: Problem::BadPower,
-            })
+            .ok_or(QuantityError { range: start..self.at, problem: Problem::BadPower })
     }
 
     fn name(&mut self) -> Result<Scale, QuantityError> {
         let start = self.at;
-        let length = self.text[start..]
-            .find(|c: char| !(c.is_alphabetic() || c == '°'))
-            .unwrap_or(self.text.len() - start);
+        let length =
+            self.text[start..].find(|c: char| !(c.is_alphabetic() || c == '°')).unwrap_or(self.text.len() - start);
         if length == 0 {
             return self.unexpected();
         }
@@ -160,16 +147,11 @@ impl UnitParser<'_> {
         let start = self.at;
         let rest = &self.text[start..];
         if let Some(after) = rest.strip_prefix('^') {
-            let length = after
-                .find(|c: char| !(c.is_ascii_digit() || c == '-'))
-                .unwrap_or(after.len());
+            let length = after.find(|c: char| !(c.is_ascii_digit() || c == '-')).unwrap_or(after.len());
             self.at += 1 + length;
             return match after[..length].parse::<i8>() {
                 Ok(power) if (-9..=9).contains(&power) => Ok(power),
-                _ => Err(QuantityError {
-                    range: start..self.at,
-                    problem: Problem::BadPower,
-                }),
+                _ => Err(QuantityError { range: start..self.at, problem: Problem::BadPower }),
             };
         }
         for (mark, power) in [("²", 2), ("³", 3), ("⁻¹", -1), ("⁻²", -2)] {
@@ -194,9 +176,6 @@ impl UnitParser<'_> {
             Some(c) => (format!("\"{}\"", c.escape_debug()), c.len_utf8()),
             None => ("the end".to_owned(), 0),
         };
-        Err(QuantityError {
-            range: self.at..self.at + length,
-            problem: Problem::Unexpected(found),
-        })
+        Err(QuantityError { range: self.at..self.at + length, problem: Problem::Unexpected(found) })
     }
 }

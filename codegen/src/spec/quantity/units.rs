@@ -46,28 +46,11 @@ struct Entry {
 }
 
 const fn entry(names: &'static [&'static str], dimension: Dimension, power_of_ten: i32) -> Entry {
-    Entry {
-        names,
-        dimension,
-        power_of_ten,
-        constant: None,
-        prefixes: Prefixes::Si,
-    }
+    Entry { names, dimension, power_of_ten, constant: None, prefixes: Prefixes::Si }
 }
 
-const fn scaled(
-    names: &'static [&'static str],
-    dimension: Dimension,
-    digits: &'static str,
-    exponent: i64,
-) -> Entry {
-    Entry {
-        names,
-        dimension,
-        power_of_ten: 0,
-        constant: Some(Constant { digits, exponent }),
-        prefixes: Prefixes::None,
-    }
+const fn scaled(names: &'static [&'static str], dimension: Dimension, digits: &'static str, exponent: i64) -> Entry {
+    Entry { names, dimension, power_of_ten: 0, constant: Some(Constant { digits, exponent }), prefixes: Prefixes::None }
 }
 
 const UNITS: &[Entry] = &[
@@ -81,38 +64,12 @@ const UNITS: &[Entry] = &[
     entry(&["Pa"], Dimension::new([-1, 1, -2, 0, 0, 0]), 0),
     entry(&["J"], Dimension::new([2, 1, -2, 0, 0, 0]), 0),
     entry(&["W"], Dimension::new([2, 1, -3, 0, 0, 0]), 0),
-    Entry {
-        names: &["B"],
-        dimension: Dimension::MEMORY,
-        power_of_ten: 0,
-        constant: None,
-        prefixes: Prefixes::Memory,
-    },
+    Entry { names: &["B"], dimension: Dimension::MEMORY, power_of_ten: 0, constant: None, prefixes: Prefixes::Memory },
     scaled(&["min"], Dimension::TIME, "60", 0),
-    scaled(
-        &["pi", "π"],
-        Dimension::NONE,
-        "314159265358979323846264338327950288419716939937510582097494",
-        -59,
-    ),
-    scaled(
-        &["deg", "°"],
-        Dimension::ANGLE,
-        "174532925199432957692369076848861271344287188854172545609719",
-        -61,
-    ),
-    scaled(
-        &["arcmin"],
-        Dimension::ANGLE,
-        "290888208665721596153948461414768785573811981423620909349532",
-        -63,
-    ),
-    scaled(
-        &["arcsec"],
-        Dimension::ANGLE,
-        "484813681109535993589914102357947975956353302372701515582553",
-        -65,
-    ),
+    scaled(&["pi", "π"], Dimension::NONE, "314159265358979323846264338327950288419716939937510582097494", -59),
+    scaled(&["deg", "°"], Dimension::ANGLE, "174532925199432957692369076848861271344287188854172545609719", -61),
+    scaled(&["arcmin"], Dimension::ANGLE, "290888208665721596153948461414768785573811981423620909349532", -63),
+    scaled(&["arcsec"], Dimension::ANGLE, "484813681109535993589914102357947975956353302372701515582553", -65),
 ];
 
 /// Micro is accepted as ASCII u, micro sign U+00B5 and Greek mu U+03BC.
@@ -133,27 +90,9 @@ const SI_PREFIXES: &[(&str, i32)] = &[
 ];
 
 const BINARY_PREFIXES: &[(&str, Constant)] = &[
-    (
-        "Ki",
-        Constant {
-            digits: "1024",
-            exponent: 0,
-        },
-    ),
-    (
-        "Mi",
-        Constant {
-            digits: "1048576",
-            exponent: 0,
-        },
-    ),
-    (
-        "Gi",
-        Constant {
-            digits: "1073741824",
-            exponent: 0,
-        },
-    ),
+    ("Ki", Constant { digits: "1024", exponent: 0 }),
+    ("Mi", Constant { digits: "1048576", exponent: 0 }),
+    ("Gi", Constant { digits: "1073741824", exponent: 0 }),
 ];
 
 /// Words that people write for a unit, and the unit.
@@ -185,18 +124,14 @@ const ALIASES: &[(&str, &str)] = &[
 
 /// Every prefix with an SI unit that engineers use here, for suggestions.
 const COMMON: &[&str] = &[
-    "m", "mm", "um", "nm", "g", "kg", "mg", "s", "ms", "us", "ns", "V", "mV", "kV", "N", "mN",
-    "kN", "Hz", "kHz", "MHz", "rad", "mrad", "urad", "nrad", "deg", "B", "kB", "MB", "KiB", "MiB",
+    "m", "mm", "um", "nm", "g", "kg", "mg", "s", "ms", "us", "ns", "V", "mV", "kV", "N", "mN", "kN", "Hz", "kHz",
+    "MHz", "rad", "mrad", "urad", "nrad", "deg", "B", "kB", "MB", "KiB", "MiB",
 ];
 
 /// The unit called `name`, with its prefix resolved.
 #[must_use]
 pub fn find(name: &str) -> Option<Unit> {
-    let bare = |e: &Entry| Unit {
-        dimension: e.dimension,
-        power_of_ten: e.power_of_ten,
-        constant: e.constant,
-    };
+    let bare = |e: &Entry| Unit { dimension: e.dimension, power_of_ten: e.power_of_ten, constant: e.constant };
     if let Some(found) = UNITS.iter().find(|e| e.names.contains(&name)) {
         return Some(bare(found));
     }
@@ -208,20 +143,14 @@ pub fn find(name: &str) -> Option<Unit> {
             if e.prefixes == Prefixes::Memory
                 && let Some((_, constant)) = BINARY_PREFIXES.iter().find(|(p, _)| *p == prefix)
             {
-                return Some(Unit {
-                    constant: Some(*constant),
-                    ..bare(e)
-                });
+                return Some(Unit { constant: Some(*constant), ..bare(e) });
             }
             if let Some((_, power)) = SI_PREFIXES.iter().find(|(p, _)| *p == prefix) {
                 // A part of a byte means nothing.
                 if e.prefixes == Prefixes::Memory && *power < 3 {
                     continue;
                 }
-                return Some(Unit {
-                    power_of_ten: e.power_of_ten + power,
-                    ..bare(e)
-                });
+                return Some(Unit { power_of_ten: e.power_of_ten + power, ..bare(e) });
             }
         }
     }
@@ -236,12 +165,7 @@ pub fn suggest(name: &str) -> Option<&'static str> {
         .iter()
         .find(|(alias, _)| *alias == lower)
         .map(|(_, unit)| *unit)
-        .or_else(|| {
-            COMMON
-                .iter()
-                .find(|unit| unit.to_lowercase() == lower)
-                .copied()
-        })
+        .or_else(|| COMMON.iter().find(|unit| unit.to_lowercase() == lower).copied())
 }
 
 #[cfg(test)]
@@ -250,19 +174,11 @@ mod tests {
 
     #[test]
     fn angle_constants_agree_with_pi() {
-        for (name, divisor) in [
-            ("deg", 180.0),
-            ("arcmin", 10_800.0),
-            ("arcsec", 648_000.0),
-            ("pi", 1.0),
-        ] {
+        for (name, divisor) in [("deg", 180.0), ("arcmin", 10_800.0), ("arcsec", 648_000.0), ("pi", 1.0)] {
             let unit = find(name).expect(name);
             let value = unit.constant.expect(name).decimal().to_f64();
             let expected = std::f64::consts::PI / divisor;
-            assert!(
-                (value - expected).abs() <= f64::EPSILON * expected,
-                "{name}: {value} and {expected}"
-            );
+            assert!((value - expected).abs() <= f64::EPSILON * expected, "{name}: {value} and {expected}");
         }
     }
 
@@ -279,12 +195,7 @@ mod tests {
     #[test]
     fn bytes_take_no_small_prefix() {
         assert!(find("mB").is_none());
-        assert_eq!(
-            find("KiB")
-                .and_then(|u| u.constant)
-                .map(|c| c.decimal().to_f64()),
-            Some(1024.0)
-        );
+        assert_eq!(find("KiB").and_then(|u| u.constant).map(|c| c.decimal().to_f64()), Some(1024.0));
         assert_eq!(find("kB").map(|u| u.power_of_ten), Some(3));
     }
 }

@@ -12,18 +12,8 @@ use crate::spec::quantity::{self, Dimension};
 use crate::spec::{messages, text};
 
 impl ValueReader<'_> {
-    pub(super) fn quantity(
-        &mut self,
-        item: Item,
-        path: &str,
-        value: &Spanned<DeValue<'_>>,
-    ) -> Option<f64> {
-        let Item::Quantity {
-            dimension,
-            range,
-            unit,
-        } = item
-        else {
+    pub(super) fn quantity(&mut self, item: Item, path: &str, value: &Spanned<DeValue<'_>>) -> Option<f64> {
+        let Item::Quantity { dimension, range, unit } = item else {
             return None;
         };
         let span = text::clamp(self.source, value.span());
@@ -35,11 +25,7 @@ impl ValueReader<'_> {
                 return None;
             }
             _ => {
-                let expected = format!(
-                    "{} such as {}",
-                    dimension.describe(),
-                    messages::example_of(self.key, path)
-                );
+                let expected = format!("{} such as {}", dimension.describe(), messages::example_of(self.key, path));
                 return self.wrong_type(path, value, &expected, None);
             }
         };
@@ -49,31 +35,18 @@ impl ValueReader<'_> {
                 None
             }
             Ok(quantity) if quantity.dimension != dimension => {
-                let (message, help) =
-                    messages::wrong_dimension(self.key, path, found, quantity.dimension, dimension);
-                self.findings
-                    .error(codes::WRONG_DIMENSION, path, span, message, help);
+                let (message, help) = messages::wrong_dimension(self.key, path, found, quantity.dimension, dimension);
+                self.findings.error(codes::WRONG_DIMENSION, path, span, message, help);
                 None
             }
             Ok(quantity) => {
-                self.in_range(
-                    range.contains(quantity.value),
-                    item,
-                    path,
-                    value,
-                    &text::shorten(found),
-                )?;
+                self.in_range(range.contains(quantity.value), item, path, value, &text::shorten(found))?;
                 // -0.0 and 0.0 would be two different models.
-                Some(if quantity.value == 0.0 {
-                    0.0
-                } else {
-                    quantity.value
-                })
+                Some(if quantity.value == 0.0 { 0.0 } else { quantity.value })
             }
             Err(error) => {
                 let place = self.inside(&span, found, &error.range);
-                let (code, message, help) =
-                    messages::bad_quantity(self.key, path, found, &error.problem);
+                let (code, message, help) = messages::bad_quantity(self.key, path, found, &error.problem);
                 self.findings.error(code, path, place, message, help);
                 None
             }
@@ -84,17 +57,14 @@ impl ValueReader<'_> {
     fn inside(&self, span: &Range<usize>, found: &str, range: &Range<usize>) -> Range<usize> {
         let written = &self.source[span.clone()];
         match written.find(found) {
-            Some(offset) if !found.is_empty() => {
-                span.start + offset + range.start..span.start + offset + range.end
-            }
+            Some(offset) if !found.is_empty() => span.start + offset + range.start..span.start + offset + range.end,
             _ => span.clone(),
         }
     }
 
     fn unit_missing(&mut self, path: &str, span: Range<usize>, number: f64, unit: &str) {
         let form = format!("\"{} {unit}\"", text::number(number));
-        let message =
-            format!("`{path}` is a number without unit, expected a quantity such as {form}");
+        let message = format!("`{path}` is a number without unit, expected a quantity such as {form}");
         self.findings.error(
             codes::UNIT_MISSING,
             path,
@@ -108,12 +78,9 @@ impl ValueReader<'_> {
         let (written, number) = match value.get_ref() {
             DeValue::Float(float) => (float.as_str(), float.as_str().parse::<f64>().ok()),
             // Through i64, so that 0x10 counts as well.
-            DeValue::Integer(integer) => (
-                integer.as_str(),
-                i64::from_str_radix(integer.as_str(), integer.radix())
-                    .ok()
-                    .map(|i| i as f64),
-            ),
+            DeValue::Integer(integer) => {
+                (integer.as_str(), i64::from_str_radix(integer.as_str(), integer.radix()).ok().map(|i| i as f64))
+            }
             DeValue::String(found) => {
                 let is_number = found.trim().parse::<f64>().is_ok_and(f64::is_finite);
                 let mend = is_number.then(|| format!("write {} without quotes", found.trim()));
@@ -124,9 +91,7 @@ impl ValueReader<'_> {
         let mantissa = written.split(['e', 'E']).next().unwrap_or_default();
         let vanished = number == Some(0.0) && mantissa.bytes().any(|b| (b'1'..=b'9').contains(&b));
         match number {
-            Some(number) if number.is_finite() && !vanished => {
-                Some(if number == 0.0 { 0.0 } else { number })
-            }
+            Some(number) if number.is_finite() && !vanished => Some(if number == 0.0 { 0.0 } else { number }),
             _ => {
                 self.findings.error(
                     codes::NOT_FINITE,
@@ -136,10 +101,7 @@ impl ValueReader<'_> {
                         "`{path}` is {}, which is not a finite number that a double can hold",
                         text::shorten(written)
                     ),
-                    format!(
-                        "write a finite value, such as {}",
-                        messages::example_of(self.key, path)
-                    ),
+                    format!("write a finite value, such as {}", messages::example_of(self.key, path)),
                 );
                 None
             }
@@ -171,16 +133,11 @@ impl ValueReader<'_> {
                     self.plain_number(path, value);
                     return None;
                 }
-                let mend = (number.fract() == 0.0)
-                    .then(|| format!("write {number} without the decimal point"));
+                let mend = (number.fract() == 0.0).then(|| format!("write {number} without the decimal point"));
                 self.wrong_type(path, value, expected, mend)
             }
             DeValue::String(found) => {
-                let mend = found
-                    .trim()
-                    .parse::<i64>()
-                    .ok()
-                    .map(|number| format!("write {number} without quotes"));
+                let mend = found.trim().parse::<i64>().ok().map(|number| format!("write {number} without quotes"));
                 self.wrong_type(path, value, expected, mend)
             }
             _ => self.wrong_type(path, value, expected, None),
