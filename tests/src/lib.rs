@@ -63,7 +63,9 @@ impl Emitted {
     #[must_use]
     pub fn library(&self) -> PathBuf {
         let _one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
-        target::host::build_library(&self.dir, &scratch().join("build")).unwrap_or_else(|error| panic!("{error}"))
+        // A target folder of its own: cargo names the crates of a workspace by their place in it, so two workspaces would
+        // take each other's builds for their own.
+        target::host::build_library(&self.dir, &self.dir.join("target")).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// The emitted crate, loaded.
