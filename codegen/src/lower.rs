@@ -5,6 +5,8 @@
 mod actuation;
 mod kinematics;
 
+pub use kinematics::joint_positions;
+
 use crate::diagnostic::Diagnostic;
 use crate::everett::EverettTable;
 use crate::ir::{Bounds, Defaults, Hysteresis, Ir, LEGS, Law, Scalar, Setpoint};

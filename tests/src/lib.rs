@@ -49,7 +49,16 @@ impl Emitted {
     /// If an edit finds nothing to replace, or the spec is refused.
     #[must_use]
     pub fn new(name: &str, spec: &str, edits: &[(&str, &str)]) -> Self {
-        let compiled = compile_edited(name, spec, edits);
+        Self::with_records(name, spec, edits, &[])
+    }
+
+    /// The same with further records: name, CSV text.
+    ///
+    /// # Panics
+    /// As [`Emitted::new`].
+    #[must_use]
+    pub fn with_records(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, String)]) -> Self {
+        let compiled = compile_edited(name, spec, edits, records);
         let dir = scratch().join(name);
         let _ = fs::remove_dir_all(&dir);
         workspace::write(&dir, &compiled.files).expect("the folder was just removed");
@@ -114,12 +123,12 @@ impl Emitted {
     }
 }
 
-/// Compiles a spec of `specs/` after edits of its text.
+/// Compiles a spec of `specs/` after edits of its text, with further records beside those of `specs/records/`.
 ///
 /// # Panics
 /// If an edit finds nothing to replace, or the spec is refused.
 #[must_use]
-pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)]) -> Compiled {
+pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)], more: &[(&str, String)]) -> Compiled {
     let specs = repository().join("specs");
     let mut text = fs::read_to_string(specs.join(spec)).expect("a spec of this repository");
     for (old, new) in edits {
@@ -134,6 +143,9 @@ pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)]) -> Compile
     }
     for record in fs::read_dir(specs.join("records")).expect("records").map_while(Result::ok) {
         fs::copy(record.path(), records.join(record.file_name())).expect("target is writable");
+    }
+    for (file, text) in more {
+        fs::write(records.join(file), text).expect("target is writable");
     }
     let text = text.replace("\"records/", "\"../records/");
     let path = folder.join("platform.toml");

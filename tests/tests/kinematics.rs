@@ -1,0 +1,182 @@
+//! Leg displacements of the emitted controllers against the textbook formula |P + R P_i − B_i| − l₀, computed apart.
+
+use host_sim::controller::TickController;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use specgen::lower::joint_positions;
+use specgen_tests::Emitted;
+
+const POSES: usize = 20_000;
+const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+/// ±60 µm and ±0.6 mrad.
+const WIDE: (&str, &str) = ("[\"40 um\", \"40 um\", \"40 um\"]", "[\"60 um\", \"60 um\", \"60 um\"]");
+/// A travel that piezo legs of that stroke reach in every axis.
+const STROKE: (&str, &str) = ("stroke          = \"60 um\"", "stroke          = \"200 um\"");
+
+fn poses() -> Vec<[f64; 6]> {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let mut unit = || rng.next_u64() as f64 / 2f64.powi(63) - 1.0;
+    (0..POSES).map(|_| [60e-6, 60e-6, 60e-6, 0.6e-3, 0.6e-3, 0.6e-3].map(|bound| bound * unit())).collect()
+}
+
+/// Leg displacements that the controller derives from poses; its arithmetic rounds the pose first.
+fn emitted(name: &str, edits: &[(&str, &str)], poses: &[[f64; 6]]) -> (Vec<[f64; 6]>, Vec<[f64; 6]>) {
+    let mut controller = Emitted::new(name, "reference.toml", edits).controller();
+    let description = controller.description().clone();
+    let demand = description.output("demand[0]").expect("an output word");
+    let mut output = vec![0; description.output_names.len()];
+    let mut rounded = Vec::new();
+    let mut displacements = Vec::new();
+    for pose in poses {
+        let words = pose.map(|value| description.scalar.encode(value));
+        let mut input = words.to_vec();
+        input.extend([description.scalar.encode(0.0); 6]);
+        controller.step(&input, &mut output);
+        rounded.push(words.map(|word| description.scalar.decode(word)));
+        displacements.push(std::array::from_fn(|leg| description.scalar.decode(output[demand + leg])));
+    }
+    (rounded, displacements)
+}
+
+/// Σ of exact products and sums as an unevaluated pair (Dekker, Knuth): about 32 digits, for an oracle without cancellation.
+#[derive(Clone, Copy)]
+struct Pair(f64, f64);
+
+impl Pair {
+    fn sum(a: f64, b: f64) -> Self {
+        let s = a + b;
+        let t = s - a;
+        Self(s, (a - (s - t)) + (b - t))
+    }
+    fn of(x: f64) -> Self {
+        Self(x, 0.0)
+    }
+    fn add(self, other: Self) -> Self {
+        let Self(s, e) = Self::sum(self.0, other.0);
+        Self::sum(s, e + self.1 + other.1)
+    }
+    fn mul(self, other: Self) -> Self {
+        let p = self.0 * other.0;
+        let e = f64::mul_add(self.0, other.0, -p) + self.0 * other.1 + self.1 * other.0;
+        Self::sum(p, e)
+    }
+    fn neg(self) -> Self {
+        Self(-self.0, -self.1)
+    }
+    fn sqrt(self) -> Self {
+        let root = Self::of(self.0.sqrt());
+        // One Newton step in pairs: r + (x − r²) / 2r.
+        let rest = self.add(root.mul(root).neg());
+        root.add(Self::of((rest.0 + rest.1) / (2.0 * root.0)))
+    }
+    /// sin and cos of a small angle by series in pairs.
+    fn sin_cos(angle: f64) -> (Self, Self) {
+        let (mut sin, mut cos) = (Self::of(0.0), Self::of(0.0));
+        let mut term = Self::of(1.0);
+        for k in 0..24_u32 {
+            match k % 4 {
+                0 => cos = cos.add(term),
+                1 => sin = sin.add(term),
+                2 => cos = cos.add(term.neg()),
+                _ => sin = sin.add(term.neg()),
+            }
+            // 1/(k+1) as a pair.
+            let n = f64::from(k + 1);
+            let inverse = 1.0 / n;
+            let inverse = Self::sum(inverse, -f64::mul_add(inverse, n, -1.0) / n);
+            term = term.mul(Self::of(angle)).mul(inverse);
+        }
+        (sin, cos)
+    }
+}
+
+/// |P + R P_i − B_i| − l₀ with R = Rz Ry Rx, in pairs.
+fn textbook(pose: &[f64; 6], base: &[[f64; 3]; 6], platform: &[[f64; 3]; 6], height: f64) -> [f64; 6] {
+    let [(sx, cx), (sy, cy), (sz, cz)] = [pose[3], pose[4], pose[5]].map(Pair::sin_cos);
+    let r = [
+        [cy.mul(cz), sx.mul(sy).mul(cz).add(cx.mul(sz).neg()), cx.mul(sy).mul(cz).add(sx.mul(sz))],
+        [cy.mul(sz), sx.mul(sy).mul(sz).add(cx.mul(cz)), cx.mul(sy).mul(sz).add(sx.mul(cz).neg())],
+        [sy.neg(), sx.mul(cy), cx.mul(cy)],
+    ];
+    let rest = [0.0, 0.0, height];
+    std::array::from_fn(|leg| {
+        let length = |turned: [Pair; 3], moved: [f64; 3]| {
+            let square = (0..3).fold(Pair::of(0.0), |sum, k| {
+                let part = turned[k].add(Pair::of(moved[k])).add(Pair::of(rest[k])).add(Pair::of(-base[leg][k]));
+                sum.add(part.mul(part))
+            });
+            square.sqrt()
+        };
+        let p = platform[leg];
+        let turned = std::array::from_fn(|k| {
+            (0..3).fold(Pair::of(0.0), |sum, j| sum.add(r[k][j].mul(Pair::of(p[j]))))
+        });
+        let difference = length(turned, [pose[0], pose[1], pose[2]]).add(length(p.map(Pair::of), [0.0; 3]).neg());
+        difference.0 + difference.1
+    })
+}
+
+fn worst(a: &[[f64; 6]], b: &[[f64; 6]]) -> f64 {
+    a.iter().flatten().zip(b.iter().flatten()).fold(0.0, |worst, (a, b)| f64::max(worst, (a - b).abs()))
+}
+
+#[test]
+fn f64_is_exact_to_a_femtometre_and_f32_to_50_picometres() {
+    let poses = poses();
+    let reference = Emitted::new("kinematics-geometry", "reference.toml", &[WIDE, STROKE]);
+    let geometry = &reference.compiled.model.geometry;
+    let (base, platform) = joint_positions(geometry);
+    let exact = |poses: &[[f64; 6]]| -> Vec<[f64; 6]> {
+        poses.iter().map(|pose| textbook(pose, &base, &platform, geometry.height)).collect()
+    };
+
+    let (same, double) = emitted("kinematics-f64", &[WIDE, STROKE], &poses);
+    assert_eq!(same, poses);
+    let error = worst(&double, &exact(&poses));
+    println!("f64 against the textbook formula in 32 digits: {:.2e} nm", error * 1e9);
+    assert!(error <= 1e-18, "{error:e} m");
+
+    let (rounded, single) = emitted("kinematics-f32", &[WIDE, STROKE, F32], &poses);
+    let error = worst(&single, &exact(&rounded));
+    let with_rounding = worst(&single, &double);
+    println!("f32 against f64: {:.4} nm on the same pose, {:.4} nm with the pose rounded", error * 1e9, with_rounding * 1e9);
+    assert!(error <= 0.05e-9 && with_rounding <= 0.05e-9, "{error:e} m, {with_rounding:e} m");
+
+    // What the difference form is for: the plain formula in f32.
+    let plain = plain_f32(&rounded, &base, &platform, geometry.height);
+    let error = worst(&plain, &exact(&rounded));
+    println!("the plain formula in f32: {:.1} nm", error * 1e9);
+    assert!(error > 10e-9);
+}
+
+/// |P + R P_i − B_i| − l₀ in f32 as one writes it first.
+fn plain_f32(poses: &[[f64; 6]], base: &[[f64; 3]; 6], platform: &[[f64; 3]; 6], height: f64) -> Vec<[f64; 6]> {
+    let length = |pose: [f32; 6], leg: usize| {
+        let [x, y, z, a, b, c] = pose;
+        let ((sx, cx), (sy, cy), (sz, cz)) = (a.sin_cos(), b.sin_cos(), c.sin_cos());
+        let p = platform[leg].map(|v| v as f32);
+        let r = [
+            x + cy * cz * p[0] + (sx * sy * cz - cx * sz) * p[1] - base[leg][0] as f32,
+            y + cy * sz * p[0] + (sx * sy * sz + cx * cz) * p[1] - base[leg][1] as f32,
+            z + height as f32 - sy * p[0] + sx * cy * p[1] - base[leg][2] as f32,
+        ];
+        (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]).sqrt()
+    };
+    let displacements =
+        |pose: &[f64; 6]| std::array::from_fn(|leg| f64::from(length(pose.map(|v| v as f32), leg) - length([0.0; 6], leg)));
+    poses.iter().map(displacements).collect()
+}
+
+#[test]
+fn an_upward_move_lengthens_every_leg_and_a_turn_about_x_lifts_the_side_with_positive_y() {
+    let poses = [[0.0, 0.0, 10e-6, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.1e-3, 0.0, 0.0]];
+    let emitted_crate = Emitted::new("kinematics-signs", "reference.toml", &[]);
+    let (_, platform) = joint_positions(&emitted_crate.compiled.model.geometry);
+    let (_, displacements) = emitted("kinematics-signs", &[], &poses);
+    assert!(displacements[0].iter().all(|d| (8e-6..8.3e-6).contains(d)), "{:?}", displacements[0]);
+    for (displacement, p) in displacements[1].iter().zip(&platform) {
+        if p[1].abs() > 0.05 {
+            assert_eq!(displacement.signum(), p[1].signum(), "{displacement:e} at y = {}", p[1]);
+        }
+    }
+}
