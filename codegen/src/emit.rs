@@ -35,10 +35,8 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
         ("src/words.rs", words::emit(ir)),
     ];
     let header = format::header(ir);
-    let mut files: EmittedCrate = sources
-        .into_iter()
-        .map(|(path, tokens)| (path.to_owned(), format::source(&header, tokens)))
-        .collect();
+    let mut files: EmittedCrate =
+        sources.into_iter().map(|(path, tokens)| (path.to_owned(), format::source(&header, tokens))).collect();
     files.insert("Cargo.toml".to_owned(), manifest::emit(ir));
     files
 }

@@ -28,11 +28,7 @@ impl EverettTable {
     /// Node value E(u_up, u_down) in metres; zero on the diagonal.
     #[must_use]
     pub fn node(&self, up: usize, down: usize) -> f64 {
-        if up == down {
-            0.0
-        } else {
-            self.nodes[Self::index(up, down)]
-        }
+        if up == down { 0.0 } else { self.nodes[Self::index(up, down)] }
     }
 
     /// Threshold u_k in V, for 0 ≤ `k` ≤ N.
@@ -50,7 +46,6 @@ impl EverettTable {
         if down + 1 == up {
             return self.node(up, down);
         }
-        self.node(up, down) - self.node(up - 1, down) - self.node(up, down + 1)
-            + self.node(up - 1, down + 1)
+        self.node(up, down) - self.node(up - 1, down) - self.node(up, down + 1) + self.node(up - 1, down + 1)
     }
 }

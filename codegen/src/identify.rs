@@ -60,12 +60,7 @@ impl Options {
     /// Usual choices: no drift within a branch, dead time estimated where the record allows it.
     #[must_use]
     pub const fn new(grid: usize, drive: [f64; 2]) -> Self {
-        Self {
-            grid,
-            drive,
-            drift: false,
-            dead_time: DeadTime::Estimate,
-        }
+        Self { grid, drive, drift: false, dead_time: DeadTime::Estimate }
     }
 }
 
@@ -104,20 +99,12 @@ pub fn identify(record: &Record, options: &Options) -> Result<Identified, Vec<Di
     let mut all = record.warnings.clone();
     all.extend(findings.into_diagnostics());
     match found {
-        Some((table, report)) if !refused => Ok(Identified {
-            table,
-            report,
-            warnings: all,
-        }),
+        Some((table, report)) if !refused => Ok(Identified { table, report, warnings: all }),
         _ => Err(all),
     }
 }
 
-fn identify_checked(
-    record: &Record,
-    options: &Options,
-    findings: &mut Findings,
-) -> Option<(EverettTable, Report)> {
+fn identify_checked(record: &Record, options: &Options, findings: &mut Findings) -> Option<(EverettTable, Report)> {
     let plane = coverage::plane(options, findings)?;
     coverage::check_range(record, &plane, findings);
     if findings.any_error() {
@@ -181,10 +168,7 @@ fn identify_checked(
         kkt_violation: nnls::kkt_violation(&normal.gram, &normal.rhs[0], &solution.weights),
     };
     if report.fit_rms_percent > POOR_FIT_PERCENT {
-        let message = format!(
-            "the fitted table misses the record by {:.2} % rms of its range",
-            report.fit_rms_percent
-        );
+        let message = format!("the fitted table misses the record by {:.2} % rms of its range", report.fit_rms_percent);
         findings.warning(
             "W0611",
             None,
@@ -211,10 +195,5 @@ fn table_of(plane: &Plane, weights: &[f64], unit: f64) -> EverettTable {
     let mut nodes: Vec<f64> = weights.iter().map(|w| w * unit).collect();
     normal::weights_to_nodes(plane.grid, &mut nodes);
     let [drive_min, drive_max] = plane.range;
-    EverettTable {
-        grid: plane.grid,
-        drive_min,
-        drive_max,
-        nodes,
-    }
+    EverettTable { grid: plane.grid, drive_min, drive_max, nodes }
 }

@@ -8,8 +8,8 @@
 pub mod cli;
 pub mod compile;
 pub mod diagnostic;
-pub mod everett;
 pub mod emit;
+pub mod everett;
 pub mod identify;
 pub mod ir;
 pub mod lower;

@@ -72,18 +72,12 @@ fn hysteresis(model: &Model, tables: &[EverettTable], scalar: Scalar) -> Hystere
     let mut table_of_leg = [0; LEGS];
     for (leg, of_leg) in table_of_leg.iter_mut().enumerate() {
         let table = &tables[if tables.len() == LEGS { leg } else { 0 }];
-        let nodes: Vec<f64> = (0..=table.grid)
-            .flat_map(|up| (0..=up).map(move |down| scalar.round(table.node(up, down))))
-            .collect();
+        let nodes: Vec<f64> =
+            (0..=table.grid).flat_map(|up| (0..=up).map(move |down| scalar.round(table.node(up, down)))).collect();
         *of_leg = distinct.iter().position(|known| *known == nodes).unwrap_or_else(|| {
             distinct.push(nodes);
             distinct.len() - 1
         });
     }
-    Hysteresis {
-        grid: model.hysteresis.grid,
-        memory: model.hysteresis.memory,
-        tables: distinct,
-        table_of_leg,
-    }
+    Hysteresis { grid: model.hysteresis.grid, memory: model.hysteresis.memory, tables: distinct, table_of_leg }
 }

@@ -46,10 +46,9 @@ pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
             return Ok(Margins { static_gain_limit: None, spectral_radius: 0.0, largest_level_weight: None });
         }
         AdaptationMode::Ewma => (ewma_limit(adaptation.level_weight), largest_level_weight(&dynamics, adaptation)),
-        AdaptationMode::Pcc => (
-            pcc_limit(adaptation.level_weight, adaptation.drift_weight),
-            largest_level_weight(&dynamics, adaptation),
-        ),
+        AdaptationMode::Pcc => {
+            (pcc_limit(adaptation.level_weight, adaptation.drift_weight), largest_level_weight(&dynamics, adaptation))
+        }
     };
     let highest_ratio = adaptation.gain_ratio[1];
     let mut findings = Vec::new();

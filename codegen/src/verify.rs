@@ -27,8 +27,7 @@ pub fn exercise(library: &Path, model: &Model, ir: &Ir, ticks: u32) -> Result<Tr
     let mut controller = Controller::load(library)?;
     let description = controller.description().clone();
     let mut trace = Trace::new(description.clone());
-    let mut noise: Vec<Gaussian> =
-        (0..LEGS as u64).map(|leg| Gaussian::new(model.sensor.noise, SEED, leg)).collect();
+    let mut noise: Vec<Gaussian> = (0..LEGS as u64).map(|leg| Gaussian::new(model.sensor.noise, SEED, leg)).collect();
     let mut input = vec![0; description.input_names.len()];
     let mut output = vec![0; description.output_names.len()];
     let mut reading = [0.0; LEGS];
@@ -49,10 +48,12 @@ pub fn exercise(library: &Path, model: &Model, ir: &Ir, ticks: u32) -> Result<Tr
 
 /// A slow motion in all six axes about the middle of the stroke, within the accepted set-points.
 fn setpoint(model: &Model, ir: &Ir, time: f64) -> [f64; 6] {
-    let reach = ir.hysteresis.tables.iter().filter_map(|nodes| nodes.get(nodes.len() - 1 - ir.hysteresis.grid)).fold(
-        model.actuator.stroke,
-        |least, full| if *full < least { *full } else { least },
-    );
+    let reach = ir
+        .hysteresis
+        .tables
+        .iter()
+        .filter_map(|nodes| nodes.get(nodes.len() - 1 - ir.hysteresis.grid))
+        .fold(model.actuator.stroke, |least, full| if *full < least { *full } else { least });
     let swing = |axis: u32| libm::sin(TAU * (2.0 + 0.7 * f64::from(axis)) * time + f64::from(axis));
     match ir.defaults.setpoint {
         Setpoint::Leg => [0, 1, 2, 3, 4, 5].map(|leg| reach * (0.5 + 0.3 * swing(leg))),
@@ -172,7 +173,11 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<(Measureme
 ///
 /// # Errors
 /// As [`target::replay()`].
-pub fn replay(image: &Image, config: &[u64], host: &Trace) -> Result<(Trace, target::replay::ReplayStats), TargetError> {
+pub fn replay(
+    image: &Image,
+    config: &[u64],
+    host: &Trace,
+) -> Result<(Trace, target::replay::ReplayStats), TargetError> {
     let inputs_per_row = host.description().input_names.len();
     let inputs: Vec<Vec<u64>> = host.rows().map(|row| row[..inputs_per_row].to_vec()).collect();
     let result = target::replay(image, config, &inputs, LIMIT)?;

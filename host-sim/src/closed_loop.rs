@@ -137,11 +137,8 @@ impl<P: Plant> Rig<P> {
     pub fn new(legs: [P; LEGS], noise: &NoiseParameters, seed: u64) -> Self {
         let mut index = 0;
         let channels = legs.map(|leg| {
-            let channel = Channel {
-                leg,
-                gauge: Gauge::new(noise, seed, index),
-                amplifier: amplifier(noise, seed, index),
-            };
+            let channel =
+                Channel { leg, gauge: Gauge::new(noise, seed, index), amplifier: amplifier(noise, seed, index) };
             index += 1;
             channel
         });
@@ -150,12 +147,7 @@ impl<P: Plant> Rig<P> {
 
     /// Pre-cycle, rest, then zeroes the gauges.
     pub fn prepare(&mut self, preparation: &Preparation) {
-        let Preparation {
-            peak,
-            rate,
-            settle,
-            update,
-        } = *preparation;
+        let Preparation { peak, rate, settle, update } = *preparation;
         for Channel { leg, gauge, .. } in &mut self.channels {
             leg.ramp(0.0, peak, peak / rate, update);
             leg.ramp(peak, 0.0, peak / rate, update);
@@ -209,28 +201,16 @@ impl<P: Plant> Rig<P> {
                     return Err(RunError::NotFinite { tick, leg });
                 }
                 requested[leg] = scalar.decode(output[wiring.requested[leg]]);
-                channel
-                    .leg
-                    .hold(voltage + channel.amplifier.draw(), interval);
+                channel.leg.hold(voltage + channel.amplifier.draw(), interval);
             }
             measured = self.read();
-            samples.push(TrackingSample {
-                time,
-                target,
-                requested,
-                measured,
-            });
+            samples.push(TrackingSample { time, target, requested, measured });
         }
-        Ok(Run {
-            trace,
-            tracking: Tracking { interval, samples },
-        })
+        Ok(Run { trace, tracking: Tracking { interval, samples } })
     }
 
     fn read(&mut self) -> [f64; LEGS] {
-        self.channels
-            .each_mut()
-            .map(|channel| channel.gauge.read(channel.leg.displacement()))
+        self.channels.each_mut().map(|channel| channel.gauge.read(channel.leg.displacement()))
     }
 }
 
@@ -333,26 +313,13 @@ mod tests {
     }
 
     fn rig() -> Rig<Spring> {
-        let mut rig = Rig::new(
-            std::array::from_fn(|_| Spring::default()),
-            &NoiseParameters::NONE,
-            1,
-        );
-        rig.prepare(&Preparation {
-            peak: 100.0,
-            rate: 20.0,
-            settle: 0.7,
-            update: 1e-2,
-        });
+        let mut rig = Rig::new(std::array::from_fn(|_| Spring::default()), &NoiseParameters::NONE, 1);
+        rig.prepare(&Preparation { peak: 100.0, rate: 20.0, settle: 0.7, update: 1e-2 });
         rig
     }
 
     fn follower(gain: f64) -> Follower {
-        Follower {
-            description: six_legs(Scalar::F64),
-            ticks: 99,
-            gain,
-        }
+        Follower { description: six_legs(Scalar::F64), ticks: 99, gain }
     }
 
     #[test]
@@ -370,52 +337,32 @@ mod tests {
             }
         }
         // Reset before the run, and one digest per tick.
-        assert_eq!(
-            run.trace.rows().map(|row| row[49]).collect::<Vec<_>>(),
-            (1..=10).collect::<Vec<_>>()
-        );
+        assert_eq!(run.trace.rows().map(|row| row[49]).collect::<Vec<_>>(), (1..=10).collect::<Vec<_>>());
     }
 
     #[test]
     fn a_voltage_that_is_not_finite_ends_the_run() {
-        let error = rig()
-            .run(&mut follower(f64::NAN), &Slope, 0.1)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.starts_with("tick 0: the controller's voltage[0] is not finite"),
-            "{error}"
-        );
+        let error = rig().run(&mut follower(f64::NAN), &Slope, 0.1).unwrap_err().to_string();
+        assert!(error.starts_with("tick 0: the controller's voltage[0] is not finite"), "{error}");
     }
 
     #[test]
     fn an_impossible_interval_or_a_missing_word_is_refused() {
         for interval in [0.0, -1.0, f64::NAN, 2.0, 1e-12] {
             assert!(
-                matches!(
-                    rig().run(&mut follower(1e6), &Slope, interval),
-                    Err(RunError::Timing { .. })
-                ),
+                matches!(rig().run(&mut follower(1e6), &Slope, interval), Err(RunError::Timing { .. })),
                 "{interval}"
             );
         }
         let mut controller = follower(1e6);
         controller.description.output_names[3] = "volts".to_owned();
-        let error = rig()
-            .run(&mut controller, &Slope, 0.1)
-            .unwrap_err()
-            .to_string();
+        let error = rig().run(&mut controller, &Slope, 0.1).unwrap_err().to_string();
         assert!(error.contains("no word `voltage[3]`"), "{error}");
     }
 
     #[test]
     fn noise_repeats_with_its_seed() {
-        let noise = NoiseParameters {
-            sensor_nm_rms: 2.0,
-            adc_lsb_nm: 0.76,
-            dac_lsb_mv: 0.0,
-            amplifier_mv_rms: 2.0,
-        };
+        let noise = NoiseParameters { sensor_nm_rms: 2.0, adc_lsb_nm: 0.76, dac_lsb_mv: 0.0, amplifier_mv_rms: 2.0 };
         let run = |seed| {
             let mut rig = Rig::new(std::array::from_fn(|_| Spring::default()), &noise, seed);
             rig.run(&mut follower(1e6), &Slope, 0.1).unwrap().trace

@@ -98,10 +98,7 @@ impl fmt::Display for ControllerError {
             }
             Self::Description(error) => error.fmt(f),
             Self::ConfigLength { given, expected } => {
-                write!(
-                    f,
-                    "{given} configuration words; this controller has {expected}"
-                )
+                write!(f, "{given} configuration words; this controller has {expected}")
             }
             Self::Config { name, word } => {
                 write!(
@@ -167,24 +164,17 @@ impl Controller {
     /// # Errors
     /// If the file is no such library, speaks another version, or describes itself badly.
     pub fn load(path: &Path) -> Result<Self, ControllerError> {
-        let failed = |cause| ControllerError::Load {
-            path: path.to_owned(),
-            cause,
-        };
+        let failed = |cause| ControllerError::Load { path: path.to_owned(), cause };
         // SAFETY: loading runs the library's initialisers. The caller names a controller library; an emitted one has none.
         let library = unsafe { Library::new(path) }.map_err(failed)?;
 
         // SAFETY: the types are those of interface version 1; the version function itself is the same in every version,
         // and is asked before any other is called. The pointers are used only while `library` lives, see `Controller`.
         let (describe, functions) = unsafe {
-            let abi_version: unsafe extern "C" fn() -> u32 =
-                *library.get(b"specgen_abi_version\0").map_err(failed)?;
+            let abi_version: unsafe extern "C" fn() -> u32 = *library.get(b"specgen_abi_version\0").map_err(failed)?;
             let found = abi_version();
             if found != ABI_VERSION {
-                return Err(ControllerError::Abi {
-                    path: path.to_owned(),
-                    found,
-                });
+                return Err(ControllerError::Abi { path: path.to_owned(), found });
             }
             let describe: unsafe extern "C" fn(*mut *const u8, *mut usize) =
                 *library.get(b"specgen_describe\0").map_err(failed)?;
@@ -207,20 +197,13 @@ impl Controller {
             String::new()
         } else {
             // SAFETY: the library points to `length` bytes of its own constant data; they are copied here.
-            String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(start, length) })
-                .into_owned()
+            String::from_utf8_lossy(unsafe { std::slice::from_raw_parts(start, length) }).into_owned()
         };
         let description = Description::parse(&text)?;
         let state = Buffer::new(layout(&text, "state_bytes", "state_align")?);
         let config = Buffer::new(layout(&text, "config_bytes", "config_align")?);
 
-        let mut controller = Self {
-            description,
-            functions,
-            config,
-            state,
-            _library: library,
-        };
+        let mut controller = Self { description, functions, config, state, _library: library };
         let words = controller.default_config();
         controller.configure(&words)?;
         controller.reset();
@@ -243,10 +226,7 @@ impl TickController for Controller {
     fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
         let expected = self.description.config_names.len();
         if words.len() != expected {
-            return Err(ControllerError::ConfigLength {
-                given: words.len(),
-                expected,
-            });
+            return Err(ControllerError::ConfigLength { given: words.len(), expected });
         }
         // SAFETY: as many words as the library says it reads.
         let mut bad = unsafe { (self.functions.config_check)(words.as_ptr()) };
@@ -261,9 +241,7 @@ impl TickController for Controller {
         let name = index.and_then(|index| self.description.config_names.get(index));
         Err(ControllerError::Config {
             name: name.cloned().unwrap_or_else(|| format!("number {bad}")),
-            word: index
-                .and_then(|index| words.get(index).copied())
-                .unwrap_or_default(),
+            word: index.and_then(|index| words.get(index).copied()).unwrap_or_default(),
         })
     }
 
@@ -273,24 +251,11 @@ impl TickController for Controller {
     }
 
     fn step(&mut self, input: &[u64], output: &mut [u64]) {
-        assert_eq!(
-            input.len(),
-            self.description.input_names.len(),
-            "input words"
-        );
-        assert_eq!(
-            output.len(),
-            self.description.output_names.len(),
-            "output words"
-        );
+        assert_eq!(input.len(), self.description.input_names.len(), "input words");
+        assert_eq!(output.len(), self.description.output_names.len(), "output words");
         // SAFETY: `load` initialised both buffers; the slices have the lengths that the library says, checked above.
         unsafe {
-            (self.functions.step)(
-                self.config.start(),
-                self.state.start(),
-                input.as_ptr(),
-                output.as_mut_ptr(),
-            );
+            (self.functions.step)(self.config.start(), self.state.start(), input.as_ptr(), output.as_mut_ptr());
         }
     }
 
@@ -330,24 +295,16 @@ impl Drop for Buffer {
 }
 
 /// Size and alignment under two keys of a description; a size of 0 becomes 1.
-fn layout(
-    text: &str,
-    size_key: &'static str,
-    align_key: &'static str,
-) -> Result<Layout, DescriptionError> {
+fn layout(text: &str, size_key: &'static str, align_key: &'static str) -> Result<Layout, DescriptionError> {
     let fields = fields(text);
     let number = |key: &'static str| -> Result<usize, DescriptionError> {
         let value = fields.get(key).ok_or(DescriptionError::Missing(key))?;
         // A gigabyte is far beyond any controller, and an allocation that would abort the process.
-        value
-            .parse()
-            .ok()
-            .filter(|size| *size <= 1 << 30)
-            .ok_or_else(|| DescriptionError::Bad {
-                key,
-                value: (*value).to_owned(),
-                expected: "a number of bytes up to 2^30",
-            })
+        value.parse().ok().filter(|size| *size <= 1 << 30).ok_or_else(|| DescriptionError::Bad {
+            key,
+            value: (*value).to_owned(),
+            expected: "a number of bytes up to 2^30",
+        })
     };
     let (size, align) = (number(size_key)?, number(align_key)?);
     Layout::from_size_align(size.max(1), align).map_err(|_| DescriptionError::Bad {
@@ -373,29 +330,17 @@ mod tests {
 
     #[test]
     fn a_bad_layout_is_refused_by_key() {
-        let refused = |text: &str| {
-            layout(text, "state_bytes", "state_align")
-                .unwrap_err()
-                .to_string()
-        };
+        let refused = |text: &str| layout(text, "state_bytes", "state_align").unwrap_err().to_string();
         assert!(refused("state_bytes=8\n").contains("lacks `state_align`"));
-        assert!(
-            refused("state_bytes=8\nstate_align=3\n")
-                .contains("`state_align=3`; expected a power of two")
-        );
+        assert!(refused("state_bytes=8\nstate_align=3\n").contains("`state_align=3`; expected a power of two"));
         assert!(refused("state_bytes=99999999999\nstate_align=8\n").contains("up to 2^30"));
         assert!(refused("state_bytes=-1\nstate_align=8\n").contains("`state_bytes=-1`"));
     }
 
     #[test]
     fn a_file_that_is_no_library_is_refused_with_its_name() {
-        let Err(error) = Controller::load(Path::new("no/such/library.so")) else {
-            panic!("loaded")
-        };
+        let Err(error) = Controller::load(Path::new("no/such/library.so")) else { panic!("loaded") };
         let text = error.to_string();
-        assert!(
-            text.starts_with("no/such/library.so: not a controller library"),
-            "{text}"
-        );
+        assert!(text.starts_with("no/such/library.so: not a controller library"), "{text}");
     }
 }

@@ -63,28 +63,14 @@ impl fmt::Display for DescriptionError {
                     "the controller's description lacks `{key}`; it was built by another version of specgen: build it again"
                 )
             }
-            Self::Bad {
-                key,
-                value,
-                expected,
-            } => {
-                write!(
-                    f,
-                    "the controller's description has `{key}={value}`; expected {expected}: build it again"
-                )
+            Self::Bad { key, value, expected } => {
+                write!(f, "the controller's description has `{key}={value}`; expected {expected}: build it again")
             }
             Self::NoWord { name, known } => {
-                write!(
-                    f,
-                    "the controller has no word `{name}`; it has {}",
-                    known.join(", ")
-                )
+                write!(f, "the controller has no word `{name}`; it has {}", known.join(", "))
             }
             Self::NotAWord { name, value } => {
-                write!(
-                    f,
-                    "`{name}` cannot be {value}; expected a whole number from 0 to 2^53"
-                )
+                write!(f, "`{name}` cannot be {value}; expected a whole number from 0 to 2^53")
             }
         }
     }
@@ -99,30 +85,17 @@ impl Description {
     /// If a key is missing or has a value that cannot be.
     pub fn parse(text: &str) -> Result<Self, DescriptionError> {
         let fields = fields(text);
-        let field = |key: &'static str| {
-            fields
-                .get(key)
-                .copied()
-                .ok_or(DescriptionError::Missing(key))
-        };
+        let field = |key: &'static str| fields.get(key).copied().ok_or(DescriptionError::Missing(key));
         let names = |key| -> Result<Vec<String>, DescriptionError> {
             let text = field(key)?;
-            Ok(if text.is_empty() {
-                Vec::new()
-            } else {
-                text.split(',').map(str::to_owned).collect()
-            })
+            Ok(if text.is_empty() { Vec::new() } else { text.split(',').map(str::to_owned).collect() })
         };
         let bits = field("scalar_bits")?;
-        let scalar = bits
-            .parse()
-            .ok()
-            .and_then(Scalar::from_bits)
-            .ok_or_else(|| DescriptionError::Bad {
-                key: "scalar_bits",
-                value: bits.to_owned(),
-                expected: "32 or 64",
-            })?;
+        let scalar = bits.parse().ok().and_then(Scalar::from_bits).ok_or_else(|| DescriptionError::Bad {
+            key: "scalar_bits",
+            value: bits.to_owned(),
+            expected: "32 or 64",
+        })?;
         Ok(Self {
             name: field("name")?.to_owned(),
             digest: field("digest")?.to_owned(),
@@ -169,12 +142,7 @@ impl Description {
     ///
     /// # Errors
     /// If there is none of that name, or an integer word is given another number.
-    pub fn set_config(
-        &self,
-        words: &mut [u64],
-        name: &str,
-        value: f64,
-    ) -> Result<(), DescriptionError> {
+    pub fn set_config(&self, words: &mut [u64], name: &str, value: f64) -> Result<(), DescriptionError> {
         let place = position(&self.config_names, name)?;
         if let Some(slot) = words.get_mut(place) {
             *slot = self.encode(name, value)?;
@@ -189,34 +157,24 @@ impl Description {
     pub fn encode(&self, name: &str, value: f64) -> Result<u64, DescriptionError> {
         match WordKind::of(name) {
             WordKind::Real => Ok(self.scalar.encode(value)),
-            WordKind::Integer
-                if value >= 0.0 && value <= (1_u64 << 53) as f64 && value == libm::trunc(value) =>
-            {
+            WordKind::Integer if value >= 0.0 && value <= (1_u64 << 53) as f64 && value == libm::trunc(value) => {
                 Ok(value as u64)
             }
-            WordKind::Integer => Err(DescriptionError::NotAWord {
-                name: name.to_owned(),
-                value,
-            }),
+            WordKind::Integer => Err(DescriptionError::NotAWord { name: name.to_owned(), value }),
         }
     }
 }
 
 /// The `key=value` lines of a text; the last of equal keys holds.
 pub(crate) fn fields(text: &str) -> BTreeMap<&str, &str> {
-    text.lines()
-        .filter_map(|line| line.split_once('='))
-        .collect()
+    text.lines().filter_map(|line| line.split_once('=')).collect()
 }
 
 fn position(names: &[String], name: &str) -> Result<usize, DescriptionError> {
     names
         .iter()
         .position(|known| known == name)
-        .ok_or_else(|| DescriptionError::NoWord {
-            name: name.to_owned(),
-            known: names.to_vec(),
-        })
+        .ok_or_else(|| DescriptionError::NoWord { name: name.to_owned(), known: names.to_vec() })
 }
 
 #[cfg(test)]
@@ -226,28 +184,16 @@ pub(crate) mod tests {
     /// A controller of six legs with the interface of the emitted one.
     pub(crate) fn six_legs(scalar: Scalar) -> Description {
         let indexed = |stems: &[&str]| -> Vec<String> {
-            stems
-                .iter()
-                .flat_map(|stem| (0..6).map(move |leg| format!("{stem}[{leg}]")))
-                .collect()
+            stems.iter().flat_map(|stem| (0..6).map(move |leg| format!("{stem}[{leg}]"))).collect()
         };
-        let mut output_names = indexed(&[
-            "voltage",
-            "requested",
-            "demand",
-            "level",
-            "drift",
-            "dac_code",
-        ]);
+        let mut output_names = indexed(&["voltage", "requested", "demand", "level", "drift", "dac_code"]);
         output_names.push("status".to_owned());
         Description {
             name: "oracle".to_owned(),
             digest: "00".to_owned(),
             version: "0".to_owned(),
             scalar,
-            config_names: ["mode", "level_weight", "drift_weight"]
-                .map(str::to_owned)
-                .to_vec(),
+            config_names: ["mode", "level_weight", "drift_weight"].map(str::to_owned).to_vec(),
             input_names: indexed(&["setpoint", "displacement"]),
             output_names,
         }
@@ -263,13 +209,8 @@ pub(crate) mod tests {
     #[test]
     fn what_is_missing_or_bad_is_named() {
         let text = six_legs(Scalar::F64).to_text();
-        assert_eq!(
-            Description::parse(&text.replace("digest=", "digits=")),
-            Err(DescriptionError::Missing("digest"))
-        );
-        let bad = Description::parse(&text.replace("scalar_bits=64", "scalar_bits=16"))
-            .unwrap_err()
-            .to_string();
+        assert_eq!(Description::parse(&text.replace("digest=", "digits=")), Err(DescriptionError::Missing("digest")));
+        let bad = Description::parse(&text.replace("scalar_bits=64", "scalar_bits=16")).unwrap_err().to_string();
         assert!(bad.contains("`scalar_bits=16`; expected 32 or 64"), "{bad}");
     }
 
@@ -278,24 +219,12 @@ pub(crate) mod tests {
         let description = six_legs(Scalar::F32);
         let mut words = [9; 3];
         description.set_config(&mut words, "mode", 2.0).unwrap();
-        description
-            .set_config(&mut words, "level_weight", 0.5)
-            .unwrap();
+        description.set_config(&mut words, "level_weight", 0.5).unwrap();
         assert_eq!(words, [2, 0x3F00_0000, 9]);
         assert!(
-            description
-                .set_config(&mut words, "mode", 0.5)
-                .unwrap_err()
-                .to_string()
-                .contains("`mode` cannot be 0.5")
+            description.set_config(&mut words, "mode", 0.5).unwrap_err().to_string().contains("`mode` cannot be 0.5")
         );
-        let unknown = description
-            .set_config(&mut words, "weight", 1.0)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            unknown.contains("no word `weight`; it has mode, level_weight"),
-            "{unknown}"
-        );
+        let unknown = description.set_config(&mut words, "weight", 1.0).unwrap_err().to_string();
+        assert!(unknown.contains("no word `weight`; it has mode, level_weight"), "{unknown}");
     }
 }

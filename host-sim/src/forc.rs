@@ -27,13 +27,7 @@ impl ReversalExperiment {
     /// N curves to 100 V at 20 V/s, 0.39 V and 19.5 ms between rows for N = 32.
     #[must_use]
     pub fn reference(intervals: u32) -> Self {
-        Self {
-            intervals,
-            drive_max: 100.0,
-            rate: 20.0,
-            rows_per_interval: 8,
-            update: 5e-5,
-        }
+        Self { intervals, drive_max: 100.0, rate: 20.0, rows_per_interval: 8, update: 5e-5 }
     }
 
     /// Length in s.
@@ -57,18 +51,13 @@ impl ReversalExperiment {
         let update = row_time / f64::from(updates);
 
         let mut record = ReversalRecord {
-            rows: vec![ReversalRow {
-                time: 0.0,
-                drive: 0.0,
-                displacement: gauge.read(leg.displacement()),
-            }],
+            rows: vec![ReversalRow { time: 0.0, drive: 0.0, displacement: gauge.read(leg.displacement()) }],
         };
         let mut elapsed = 0_u32;
         for curve in 1..=self.intervals {
             let peak = curve * rows;
-            let path = (1..=peak)
-                .map(|level| (level - 1, level))
-                .chain((0..peak).rev().map(|level| (level + 1, level)));
+            let path =
+                (1..=peak).map(|level| (level - 1, level)).chain((0..peak).rev().map(|level| (level + 1, level)));
             for (from, to) in path {
                 let (start, end) = (drive_at(from), drive_at(to));
                 let displacement = leg.ramp(start, end, row_time, update);
@@ -120,16 +109,8 @@ impl ReversalRecord {
 /// Decimal with at most `digits` after the point and no trailing zeros; −0 becomes 0.
 fn trimmed(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
-    let text = if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.')
-    } else {
-        &text
-    };
-    if text == "-0" {
-        "0".to_owned()
-    } else {
-        text.to_owned()
-    }
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 #[cfg(test)]
@@ -146,10 +127,7 @@ mod tests {
     fn thirty_two_curves_take_165_s_and_sixteen_85_s() {
         assert_eq!(ReversalExperiment::reference(32).duration(), 165.0);
         assert_eq!(ReversalExperiment::reference(16).duration(), 85.0);
-        let short = ReversalExperiment {
-            rate: 2000.0,
-            ..ReversalExperiment::reference(16)
-        };
+        let short = ReversalExperiment { rate: 2000.0, ..ReversalExperiment::reference(16) };
         let record = record(&short, &NoiseParameters::NONE);
         assert!((record.rows.last().unwrap().time - short.duration()).abs() < 1e-12);
         assert_eq!(record.rows.len(), 1 + 8 * 16 * 17);
@@ -158,11 +136,7 @@ mod tests {
     #[test]
     fn peaks_and_nodes_are_rows_exactly_and_rise_and_fall_meet_them() {
         // Three rows per interval: a third of 3.125 V is not a binary fraction.
-        let fast = ReversalExperiment {
-            rate: 2000.0,
-            rows_per_interval: 3,
-            ..ReversalExperiment::reference(32)
-        };
+        let fast = ReversalExperiment { rate: 2000.0, rows_per_interval: 3, ..ReversalExperiment::reference(32) };
         let record = record(&fast, &NoiseParameters::NONE);
         let peaks: Vec<f64> = record
             .rows
@@ -170,17 +144,8 @@ mod tests {
             .filter(|w| w[1].drive > w[0].drive && w[1].drive > w[2].drive)
             .map(|w| w[1].drive)
             .collect();
-        assert_eq!(
-            peaks,
-            (1..=32).map(|k| f64::from(k) * 3.125).collect::<Vec<_>>()
-        );
-        let node = |k: u32| {
-            record
-                .rows
-                .iter()
-                .filter(|row| row.drive == f64::from(k) * 3.125)
-                .count()
-        };
+        assert_eq!(peaks, (1..=32).map(|k| f64::from(k) * 3.125).collect::<Vec<_>>());
+        let node = |k: u32| record.rows.iter().filter(|row| row.drive == f64::from(k) * 3.125).count();
         assert_eq!(node(32), 1);
         assert_eq!(node(31), 3);
         assert_eq!(node(1), 63);
@@ -188,10 +153,7 @@ mod tests {
 
     #[test]
     fn the_csv_is_small_and_reads_back_to_a_hundredth_of_a_nanometre() {
-        let fast = ReversalExperiment {
-            rate: 2000.0,
-            ..ReversalExperiment::reference(32)
-        };
+        let fast = ReversalExperiment { rate: 2000.0, ..ReversalExperiment::reference(32) };
         let record = record(&fast, &LegParameters::reference().noise);
         let csv = record.to_csv();
         assert!(csv.len() < 300_000, "{}", csv.len());

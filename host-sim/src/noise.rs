@@ -22,11 +22,7 @@ impl Gaussian {
     pub fn new(deviation: f64, seed: u64, stream: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);
-        Self {
-            rng,
-            deviation,
-            spare: None,
-        }
+        Self { rng, deviation, spare: None }
     }
 
     /// The next number. Draws nothing when the deviation is 0.
@@ -80,11 +76,7 @@ impl Gauge {
     /// Reading (m) of `displacement` (m).
     pub fn read(&mut self, displacement: f64) -> f64 {
         let analogue = (displacement - self.zero) + self.noise.draw();
-        if self.lsb > 0.0 {
-            libm::round(analogue / self.lsb) * self.lsb
-        } else {
-            analogue
-        }
+        if self.lsb > 0.0 { libm::round(analogue / self.lsb) * self.lsb } else { analogue }
     }
 }
 
@@ -98,12 +90,8 @@ pub fn amplifier(noise: &NoiseParameters, seed: u64, leg: u64) -> Gaussian {
 mod tests {
     use super::*;
 
-    const NOISE: NoiseParameters = NoiseParameters {
-        sensor_nm_rms: 2.2,
-        adc_lsb_nm: 0.76,
-        dac_lsb_mv: 2.29,
-        amplifier_mv_rms: 2.0,
-    };
+    const NOISE: NoiseParameters =
+        NoiseParameters { sensor_nm_rms: 2.2, adc_lsb_nm: 0.76, dac_lsb_mv: 2.29, amplifier_mv_rms: 2.0 };
 
     #[test]
     fn the_noise_has_the_stated_deviation_and_no_mean() {
@@ -123,9 +111,7 @@ mod tests {
     fn a_seed_repeats_and_legs_differ() {
         let readings = |seed, leg| {
             let mut gauge = Gauge::new(&NOISE, seed, leg);
-            (0..50)
-                .map(|_| gauge.read(1e-6).to_bits())
-                .collect::<Vec<_>>()
+            (0..50).map(|_| gauge.read(1e-6).to_bits()).collect::<Vec<_>>()
         };
         assert_eq!(readings(7, 2), readings(7, 2));
         assert_ne!(readings(7, 2), readings(7, 3));
@@ -134,14 +120,7 @@ mod tests {
 
     #[test]
     fn a_gauge_reads_whole_codes_from_its_zero() {
-        let mut gauge = Gauge::new(
-            &NoiseParameters {
-                sensor_nm_rms: 0.0,
-                ..NOISE
-            },
-            1,
-            0,
-        );
+        let mut gauge = Gauge::new(&NoiseParameters { sensor_nm_rms: 0.0, ..NOISE }, 1, 0);
         gauge.zero_at(5e-6);
         assert_eq!(gauge.read(5e-6), 0.0);
         assert!((gauge.read(5e-6 + 1.1e-9) - 0.76e-9).abs() < 1e-18);

@@ -38,11 +38,7 @@ impl Table {
                 nodes[top][level] = at_top - row.displacement;
             }
         }
-        Self {
-            intervals,
-            interval,
-            nodes,
-        }
+        Self { intervals, interval, nodes }
     }
 
     /// E(up, down) in m for 0 ≤ `down` ≤ `up` ≤ full drive (V): bilinear in the squares, linear in the diagonal triangles.
@@ -50,10 +46,7 @@ impl Table {
     pub fn everett(&self, up: f64, down: f64) -> f64 {
         let cell = |x: f64| ((x / self.interval) as usize).min(self.intervals - 1);
         let (i, j) = (cell(up), cell(down));
-        let (s, t) = (
-            up / self.interval - i as f64,
-            down / self.interval - j as f64,
-        );
+        let (s, t) = (up / self.interval - i as f64, down / self.interval - j as f64);
         if i == j {
             return self.nodes[i + 1][i] * (s - t);
         }
@@ -99,11 +92,7 @@ impl Memory {
     fn displacement(&self, table: &Table) -> f64 {
         let mut sum = 0.0;
         for pair in self.0.windows(2) {
-            sum += if pair[1] > pair[0] {
-                table.everett(pair[1], pair[0])
-            } else {
-                -table.everett(pair[0], pair[1])
-            };
+            sum += if pair[1] > pair[0] { table.everett(pair[1], pair[0]) } else { -table.everett(pair[0], pair[1]) };
         }
         sum
     }
@@ -135,48 +124,23 @@ impl Oracle {
     /// Six legs with one table; `drive_max` in V; `lsb` is the DAC's step in V, 0 for a continuous drive.
     #[must_use]
     pub fn new(table: Table, drive_max: f64, lsb: f64) -> Self {
-        let rest = Leg {
-            memory: Memory(vec![0.0]),
-            requested: 0.0,
-            level: 0.0,
-            drift: 0.0,
-        };
+        let rest = Leg { memory: Memory(vec![0.0]), requested: 0.0, level: 0.0, drift: 0.0 };
         let legs = std::array::from_fn(|_| rest.clone());
-        Self {
-            table,
-            drive_max,
-            lsb,
-            mode: 0,
-            legs,
-            description: description(),
-        }
+        Self { table, drive_max, lsb, mode: 0, legs, description: description() }
     }
 }
 
 /// The emitted controller's interface, as far as it goes here.
 fn description() -> Description {
-    let six = |stem: &str| {
-        (0..LEGS)
-            .map(move |leg| format!("{stem}[{leg}]"))
-            .collect::<Vec<_>>()
-    };
+    let six = |stem: &str| (0..LEGS).map(move |leg| format!("{stem}[{leg}]")).collect::<Vec<_>>();
     Description {
         name: "oracle".to_owned(),
         digest: "0".to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scalar: Scalar::F64,
-        config_names: ["mode", "level_weight", "drift_weight"]
-            .map(str::to_owned)
-            .to_vec(),
+        config_names: ["mode", "level_weight", "drift_weight"].map(str::to_owned).to_vec(),
         input_names: [six("setpoint"), six("displacement")].concat(),
-        output_names: [
-            six("voltage"),
-            six("requested"),
-            six("demand"),
-            six("level"),
-            six("drift"),
-        ]
-        .concat(),
+        output_names: [six("voltage"), six("requested"), six("demand"), six("level"), six("drift")].concat(),
     }
 }
 
@@ -195,10 +159,7 @@ impl TickController for Oracle {
     }
 
     fn reset(&mut self) {
-        *self = Self {
-            mode: self.mode,
-            ..Self::new(self.table.clone(), self.drive_max, self.lsb)
-        };
+        *self = Self { mode: self.mode, ..Self::new(self.table.clone(), self.drive_max, self.lsb) };
     }
 
     fn step(&mut self, input: &[u64], output: &mut [u64]) {
@@ -237,9 +198,9 @@ impl TickController for Oracle {
     }
 
     fn state_digest(&self) -> u64 {
-        self.legs.iter().fold(0, |digest: u64, leg| {
-            digest.rotate_left(7) ^ leg.requested.to_bits() ^ leg.level.to_bits()
-        })
+        self.legs
+            .iter()
+            .fold(0, |digest: u64, leg| digest.rotate_left(7) ^ leg.requested.to_bits() ^ leg.level.to_bits())
     }
 }
 
@@ -256,11 +217,7 @@ mod tests {
     const N: usize = 8;
 
     fn table() -> Table {
-        let experiment = ReversalExperiment {
-            rate: 2000.0,
-            rows_per_interval: 3,
-            ..ReversalExperiment::reference(8)
-        };
+        let experiment = ReversalExperiment { rate: 2000.0, rows_per_interval: 3, ..ReversalExperiment::reference(8) };
         let mut leg = LegPlant::new(&LegParameters::reference());
         let record = experiment.run(&mut leg, &mut Gauge::new(&NoiseParameters::NONE, 0, 0));
         Table::from_record(&record, N, 100.0)
@@ -289,11 +246,7 @@ mod tests {
                     }
                     let weight = node(up + 1, down)
                         - node(up, down)
-                        - if down < up {
-                            node(up + 1, down + 1) - node(up, down + 1)
-                        } else {
-                            0.0
-                        };
+                        - if down < up { node(up + 1, down + 1) - node(up, down + 1) } else { 0.0 };
                     if *relay {
                         sum += weight;
                     }

@@ -60,30 +60,17 @@ mod tests {
     }
 
     fn trace(constant: u64) -> Trace {
-        let setpoints = Setpoints::Leg {
-            stroke: 6e-5,
-            everett: vec![vec![0.0], vec![6e-5, 0.0]],
-        };
+        let setpoints = Setpoints::Leg { stroke: 6e-5, everett: vec![vec![0.0], vec![6e-5, 0.0]] };
         let description = six_legs(Scalar::F64);
         let recording = record(&description, &setpoints, 2000, 5).unwrap();
-        replay(
-            &mut Mixer {
-                description,
-                constant,
-                sum: 77,
-            },
-            &recording,
-        )
+        replay(&mut Mixer { description, constant, sum: 77 }, &recording)
     }
 
     #[test]
     fn a_replay_repeats_to_the_bit_and_shows_one_changed_constant() {
         assert_eq!(first_difference(&trace(1), &trace(1)), None);
         let found = first_difference(&trace(1), &trace(2)).unwrap().to_string();
-        assert!(
-            found.contains("voltage[") && found.ends_with("(1 ulp)"),
-            "{found}"
-        );
+        assert!(found.contains("voltage[") && found.ends_with("(1 ulp)"), "{found}");
     }
 
     #[test]

@@ -31,12 +31,7 @@ impl LegScenario {
     /// `noise` replaces the noise in the parameters of all legs (`NoiseParameters::NONE` for none);
     /// `samples_per_period` is N_s (≥ 1): the control interval is 1/(N_s f).
     #[must_use]
-    pub fn new(
-        legs: &[LegParameters; LEGS],
-        noise: &NoiseParameters,
-        seed: u64,
-        samples_per_period: u32,
-    ) -> Self {
+    pub fn new(legs: &[LegParameters; LEGS], noise: &NoiseParameters, seed: u64, samples_per_period: u32) -> Self {
         let first = &legs[0];
         let mut prepared = Rig::new(legs.each_ref().map(LegPlant::new), noise, seed);
         prepared.prepare(&Preparation {
@@ -45,25 +40,16 @@ impl LegScenario {
             settle: first.settle_s,
             update: first.step_s,
         });
-        Self {
-            prepared,
-            samples_per_period: samples_per_period.max(1),
-        }
+        Self { prepared, samples_per_period: samples_per_period.max(1) }
     }
 
     /// Runs the paper's leg trajectory at `frequency` (Hz) with the controller as configured.
     ///
     /// # Errors
     /// As [`Rig::run`].
-    pub fn run(
-        &self,
-        controller: &mut dyn TickController,
-        frequency: f64,
-    ) -> Result<Run, RunError> {
+    pub fn run(&self, controller: &mut dyn TickController, frequency: f64) -> Result<Run, RunError> {
         let interval = 1.0 / frequency / f64::from(self.samples_per_period);
-        self.prepared
-            .clone()
-            .run(controller, &PaperLeg { frequency }, interval)
+        self.prepared.clone().run(controller, &PaperLeg { frequency }, interval)
     }
 
     /// Table 2: every mode at every frequency. The controller keeps the last mode; other configuration words are the spec's.
@@ -80,9 +66,7 @@ impl LegScenario {
             select(controller, word)?;
             for &frequency in frequencies {
                 let run = self.run(controller, frequency)?;
-                table
-                    .rows
-                    .push(TrackingRow::of(mode, frequency, &run.tracking));
+                table.rows.push(TrackingRow::of(mode, frequency, &run.tracking));
             }
         }
         Ok(table)
@@ -116,11 +100,7 @@ pub fn select(controller: &mut dyn TickController, mode: u32) -> Result<(), Cont
     let mut words = controller.default_config();
     let description = controller.description();
     description.set_config(&mut words, "mode", f64::from(mode))?;
-    if description
-        .config_names
-        .iter()
-        .any(|name| name == "setpoint_kind")
-    {
+    if description.config_names.iter().any(|name| name == "setpoint_kind") {
         description.set_config(&mut words, "setpoint_kind", SETPOINT_LEG)?;
     }
     controller.configure(&words)

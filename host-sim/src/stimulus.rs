@@ -49,10 +49,7 @@ impl InputRecording {
     /// The words in little-endian, as a target reads them; no header.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
-        self.words
-            .iter()
-            .flat_map(|word| word.to_le_bytes())
-            .collect()
+        self.words.iter().flat_map(|word| word.to_le_bytes()).collect()
     }
 }
 
@@ -69,15 +66,8 @@ enum Kind {
 
 /// Order in which stretches follow each other. Rows that no sensor gives are one stretch in seven, so that a controller
 /// that answers them with a fault is also seen to run and to recover.
-const CYCLE: [Kind; 7] = [
-    Kind::Smooth,
-    Kind::White,
-    Kind::Thresholds,
-    Kind::Saturating,
-    Kind::Hold,
-    Kind::Special,
-    Kind::White,
-];
+const CYCLE: [Kind; 7] =
+    [Kind::Smooth, Kind::White, Kind::Thresholds, Kind::Saturating, Kind::Hold, Kind::Special, Kind::White];
 
 /// Shortest and longest stretch, rows.
 const STRETCH: (u64, u64) = (20, 200);
@@ -143,9 +133,7 @@ struct Generator<'a> {
 impl<'a> Generator<'a> {
     fn new(setpoints: &'a Setpoints, seed: u64) -> Self {
         let (center, half, half_stroke) = match setpoints {
-            Setpoints::Leg { stroke, .. } => {
-                ([0.5 * stroke; LEGS], [0.5 * stroke; LEGS], 0.5 * stroke)
-            }
+            Setpoints::Leg { stroke, .. } => ([0.5 * stroke; LEGS], [0.5 * stroke; LEGS], 0.5 * stroke),
             Setpoints::Pose { bounds, stroke } => ([0.0; LEGS], *bounds, 0.5 * stroke),
         };
         Self {
@@ -174,8 +162,7 @@ impl<'a> Generator<'a> {
         if kind == Kind::Smooth {
             for leg in 0..LEGS {
                 // 10 to 1000 rows per period.
-                self.speed[leg] =
-                    core::f64::consts::TAU / libm::exp(2.3 + 4.6 * unit(&mut self.rng));
+                self.speed[leg] = core::f64::consts::TAU / libm::exp(2.3 + 4.6 * unit(&mut self.rng));
             }
         }
         if kind == Kind::Thresholds {
@@ -201,9 +188,7 @@ impl<'a> Generator<'a> {
         let reading = match self.setpoints {
             Setpoints::Leg { .. } if kind == Kind::Thresholds => before,
             Setpoints::Leg { .. } => before.map(|q| q + 0.01 * self.half_stroke * self.symmetric()),
-            Setpoints::Pose { .. } => {
-                std::array::from_fn(|_| self.half_stroke * (1.0 + 0.9 * self.symmetric()))
-            }
+            Setpoints::Pose { .. } => std::array::from_fn(|_| self.half_stroke * (1.0 + 0.9 * self.symmetric())),
         };
         (self.last, reading)
     }
@@ -254,11 +239,7 @@ impl Walk {
             return 0.0;
         };
         let rising = self.extrema.len() % 2 == 1;
-        let level = if rising {
-            (last + 1 + pick).min(everett.len() - 1)
-        } else {
-            last.saturating_sub(1 + pick)
-        };
+        let level = if rising { (last + 1 + pick).min(everett.len() - 1) } else { last.saturating_sub(1 + pick) };
         while self.extrema.len() >= 3 {
             let outer = self.extrema[self.extrema.len() - 2];
             if (rising && level < outer) || (!rising && level > outer) {
@@ -270,19 +251,9 @@ impl Walk {
             self.extrema.clear();
         }
         self.extrema.push(level);
-        let between = |up: usize, down: usize| {
-            everett
-                .get(up)
-                .and_then(|row| row.get(down))
-                .copied()
-                .unwrap_or(0.0)
-        };
+        let between = |up: usize, down: usize| everett.get(up).and_then(|row| row.get(down)).copied().unwrap_or(0.0);
         self.extrema.windows(2).fold(0.0, |sum, pair| {
-            if pair[1] > pair[0] {
-                sum + between(pair[1], pair[0])
-            } else {
-                sum - between(pair[0], pair[1])
-            }
+            if pair[1] > pair[0] { sum + between(pair[1], pair[0]) } else { sum - between(pair[0], pair[1]) }
         })
     }
 }
@@ -331,23 +302,15 @@ mod tests {
     /// N = 32; E depends on d = i − j alone: d (32 + d)/2048 of 60 µm.
     fn everett() -> Vec<Vec<f64>> {
         let stroke = |levels: f64| levels * (32.0 + levels) * 60e-6 / 2048.0;
-        (0..=32)
-            .map(|up| (0..=up).map(|down| stroke(f64::from(up - down))).collect())
-            .collect()
+        (0..=32).map(|up| (0..=up).map(|down| stroke(f64::from(up - down))).collect()).collect()
     }
 
     fn leg_setpoints() -> Setpoints {
-        Setpoints::Leg {
-            stroke: 60e-6,
-            everett: everett(),
-        }
+        Setpoints::Leg { stroke: 60e-6, everett: everett() }
     }
 
     fn pose_setpoints() -> Setpoints {
-        Setpoints::Pose {
-            bounds: [40e-6, 40e-6, 40e-6, 6e-4, 6e-4, 6e-4],
-            stroke: 60e-6,
-        }
+        Setpoints::Pose { bounds: [40e-6, 40e-6, 40e-6, 6e-4, 6e-4, 6e-4], stroke: 60e-6 }
     }
 
     #[test]
@@ -366,14 +329,8 @@ mod tests {
             let recording = record(&six_legs(scalar), &pose_setpoints(), 100_000, 1).unwrap();
             let seen: BTreeSet<u64> = recording.words.iter().copied().collect();
             let patterns = specials(scalar);
-            assert!(
-                patterns.iter().all(|word| seen.contains(word)),
-                "{scalar:?}"
-            );
-            assert_eq!(
-                patterns.iter().collect::<BTreeSet<_>>().len(),
-                patterns.len()
-            );
+            assert!(patterns.iter().all(|word| seen.contains(word)), "{scalar:?}");
+            assert_eq!(patterns.iter().collect::<BTreeSet<_>>().len(), patterns.len());
             let values = patterns.map(|word| scalar.decode(word));
             assert_eq!(values.iter().filter(|x| x.is_nan()).count(), 6);
             assert_eq!(values.iter().filter(|x| x.is_infinite()).count(), 2);
@@ -391,24 +348,18 @@ mod tests {
     fn demands_leave_both_limits_and_reverse_on_every_node() {
         let setpoints = leg_setpoints();
         let recording = record(&six_legs(Scalar::F64), &setpoints, 100_000, 1).unwrap();
-        let Setpoints::Leg { stroke, everett } = setpoints else {
-            panic!()
-        };
+        let Setpoints::Leg { stroke, everett } = setpoints else { panic!() };
         let leg: Vec<f64> = recording.rows().map(|row| f64::from_bits(row[2])).collect();
         assert!(leg.iter().filter(|q| **q > stroke && **q < 1.0).count() > 1000);
         assert!(leg.iter().filter(|q| **q < 0.0 && **q > -1.0).count() > 1000);
         for (level, row) in everett.iter().enumerate().skip(1) {
             // Up from rest onto the threshold, and down again.
             let node = row[0];
-            let reversals = leg
-                .windows(3)
-                .filter(|w| w[0] == 0.0 && w[1].to_bits() == node.to_bits() && w[2] < node);
+            let reversals = leg.windows(3).filter(|w| w[0] == 0.0 && w[1].to_bits() == node.to_bits() && w[2] < node);
             assert!(reversals.count() > 5, "{level}");
         }
         // Most rows have no special number, so that a controller with a fault latch is seen to run.
-        let finite = recording
-            .rows()
-            .filter(|row| row.iter().all(|word| f64::from_bits(*word).is_finite()));
+        let finite = recording.rows().filter(|row| row.iter().all(|word| f64::from_bits(*word).is_finite()));
         assert!(finite.count() > 85_000);
     }
 
@@ -436,11 +387,6 @@ mod tests {
     fn a_controller_without_setpoints_is_refused() {
         let mut description = six_legs(Scalar::F64);
         description.input_names.truncate(3);
-        assert!(
-            record(&description, &leg_setpoints(), 10, 1)
-                .unwrap_err()
-                .to_string()
-                .contains("`setpoint[3]`")
-        );
+        assert!(record(&description, &leg_setpoints(), 10, 1).unwrap_err().to_string().contains("`setpoint[3]`"));
     }
 }

@@ -59,10 +59,7 @@ impl TrackingTable {
     /// Error of one run in nm, if it was made.
     #[must_use]
     pub fn rmse_nm(&self, mode: &str, frequency: f64) -> Option<f64> {
-        self.rows
-            .iter()
-            .find(|row| row.mode == mode && row.frequency_hz == frequency)
-            .map(|row| row.rmse_nm)
+        self.rows.iter().find(|row| row.mode == mode && row.frequency_hz == frequency).map(|row| row.rmse_nm)
     }
 
     /// CSV, one line per run.
@@ -75,11 +72,7 @@ impl TrackingTable {
         }
         out.push('\n');
         for row in &self.rows {
-            let _ = write!(
-                out,
-                "{},{},{:.4},{:.4}",
-                row.mode, row.frequency_hz, row.rmse_nm, row.peak_nm
-            );
+            let _ = write!(out, "{},{},{:.4},{:.4}", row.mode, row.frequency_hz, row.rmse_nm, row.peak_nm);
             for value in row.leg_rmse_nm {
                 let _ = write!(out, ",{value:.4}");
             }
@@ -108,9 +101,7 @@ impl TrackingTable {
         for mode in modes {
             let _ = write!(out, "\n{mode:<8}");
             for frequency in &frequencies {
-                let cell = self
-                    .rmse_nm(mode, *frequency)
-                    .map_or_else(|| "-".to_owned(), |value| format!("{value:.1}"));
+                let cell = self.rmse_nm(mode, *frequency).map_or_else(|| "-".to_owned(), |value| format!("{value:.1}"));
                 let _ = write!(out, "{cell:>12}");
             }
         }
@@ -135,19 +126,10 @@ impl Line {
         let count = points.len() as f64;
         let mean_x = points.iter().map(|(x, _)| x).sum::<f64>() / count;
         let mean_y = points.iter().map(|(_, y)| y).sum::<f64>() / count;
-        let spread: f64 = points
-            .iter()
-            .map(|(x, _)| (x - mean_x) * (x - mean_x))
-            .sum();
-        let product: f64 = points
-            .iter()
-            .map(|(x, y)| (x - mean_x) * (y - mean_y))
-            .sum();
+        let spread: f64 = points.iter().map(|(x, _)| (x - mean_x) * (x - mean_x)).sum();
+        let product: f64 = points.iter().map(|(x, y)| (x - mean_x) * (y - mean_y)).sum();
         let slope = product / spread;
-        (spread > 0.0).then_some(Self {
-            slope,
-            offset: mean_y - slope * mean_x,
-        })
+        (spread > 0.0).then_some(Self { slope, offset: mean_y - slope * mean_x })
     }
 }
 
@@ -197,16 +179,8 @@ impl LinearityTable {
     pub fn to_csv(&self) -> String {
         let mut out = String::from("frequency_Hz,gain_ratio,offset_um,relative_slope\n");
         for row in &self.rows {
-            let LinearityRow {
-                frequency_hz,
-                gain_ratio,
-                offset_um,
-                relative_slope,
-            } = row;
-            let _ = writeln!(
-                out,
-                "{frequency_hz},{gain_ratio:.6},{offset_um:.5},{relative_slope:.6}"
-            );
+            let LinearityRow { frequency_hz, gain_ratio, offset_um, relative_slope } = row;
+            let _ = writeln!(out, "{frequency_hz},{gain_ratio:.6},{offset_um:.5},{relative_slope:.6}");
         }
         out
     }
@@ -216,16 +190,8 @@ impl LinearityTable {
     pub fn to_text(&self) -> String {
         let mut out = String::from("        Hz    slope/model   offset um   slope/first\n");
         for row in &self.rows {
-            let LinearityRow {
-                frequency_hz,
-                gain_ratio,
-                offset_um,
-                relative_slope,
-            } = row;
-            let _ = writeln!(
-                out,
-                "{frequency_hz:>10}{gain_ratio:>15.4}{offset_um:>12.4}{relative_slope:>14.4}"
-            );
+            let LinearityRow { frequency_hz, gain_ratio, offset_um, relative_slope } = row;
+            let _ = writeln!(out, "{frequency_hz:>10}{gain_ratio:>15.4}{offset_um:>12.4}{relative_slope:>14.4}");
         }
         out
     }
@@ -241,18 +207,10 @@ mod tests {
             .map(|n| {
                 let target = [n as f64 * 1e-6; LEGS];
                 let measured = target.map(|t| gain * t + offset);
-                TrackingSample {
-                    time: n as f64,
-                    target,
-                    requested: target,
-                    measured,
-                }
+                TrackingSample { time: n as f64, target, requested: target, measured }
             })
             .collect();
-        Tracking {
-            interval: 1.0,
-            samples,
-        }
+        Tracking { interval: 1.0, samples }
     }
 
     #[test]
@@ -283,9 +241,7 @@ mod tests {
         let mut table = TrackingTable::default();
         for (mode, gain) in [("invhys", 0.9), ("pcc", 1.0)] {
             for frequency in [0.1, 10.0] {
-                table
-                    .rows
-                    .push(TrackingRow::of(mode, frequency, &tracking(3, gain, 0.0)));
+                table.rows.push(TrackingRow::of(mode, frequency, &tracking(3, gain, 0.0)));
             }
         }
         assert_eq!(
@@ -294,10 +250,7 @@ mod tests {
         );
         assert_eq!(
             table.to_csv().lines().nth(1),
-            Some(&*format!(
-                "invhys,0.1,129.0994,200.0000{}",
-                ",129.0994".repeat(6)
-            ))
+            Some(&*format!("invhys,0.1,129.0994,200.0000{}", ",129.0994".repeat(6)))
         );
         assert_eq!(table.rmse_nm("ewma", 0.1), None);
     }

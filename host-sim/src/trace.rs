@@ -50,14 +50,8 @@ pub enum TraceError {
 impl fmt::Display for TraceError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotATrace => write!(
-                f,
-                "not a trace: it does not begin with SPGTRACE; record it again"
-            ),
-            Self::Version(found) => write!(
-                f,
-                "trace format {found}, expected {VERSION}; record it with this version"
-            ),
+            Self::NotATrace => write!(f, "not a trace: it does not begin with SPGTRACE; record it again"),
+            Self::Version(found) => write!(f, "trace format {found}, expected {VERSION}; record it with this version"),
             Self::Length { expected, found } => {
                 write!(
                     f,
@@ -75,10 +69,7 @@ impl Trace {
     /// An empty trace of a controller.
     #[must_use]
     pub fn new(description: Description) -> Self {
-        Self {
-            description,
-            words: Vec::new(),
-        }
+        Self { description, words: Vec::new() }
     }
 
     /// A trace from rows that a target recorded.
@@ -92,10 +83,7 @@ impl Trace {
             return Ok(trace);
         }
         let found = trace.words.len() as u64 * 8;
-        Err(TraceError::Length {
-            expected: trace.words.len().next_multiple_of(width) as u64 * 8,
-            found,
-        })
+        Err(TraceError::Length { expected: trace.words.len().next_multiple_of(width) as u64 * 8, found })
     }
 
     /// Whose run it is.
@@ -136,13 +124,8 @@ impl Trace {
     /// Names of the columns: inputs, outputs, `state_digest`.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         let description = &self.description;
-        let names = description
-            .input_names
-            .iter()
-            .chain(&description.output_names);
-        names
-            .map(String::as_str)
-            .chain(std::iter::once("state_digest"))
+        let names = description.input_names.iter().chain(&description.output_names);
+        names.map(String::as_str).chain(std::iter::once("state_digest"))
     }
 
     /// Adds a tick.
@@ -150,16 +133,8 @@ impl Trace {
     /// # Panics
     /// If `input` or `output` has not as many words as the description names.
     pub fn push(&mut self, input: &[u64], output: &[u64], digest: u64) {
-        assert_eq!(
-            input.len(),
-            self.description.input_names.len(),
-            "input words"
-        );
-        assert_eq!(
-            output.len(),
-            self.description.output_names.len(),
-            "output words"
-        );
+        assert_eq!(input.len(), self.description.input_names.len(), "input words");
+        assert_eq!(output.len(), self.description.output_names.len(), "output words");
         self.words.extend_from_slice(input);
         self.words.extend_from_slice(output);
         self.words.push(digest);
@@ -189,10 +164,7 @@ impl Trace {
     /// If they are not a whole trace of this version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, TraceError> {
         let mut rest = bytes;
-        let cut = |expected: u64| TraceError::Length {
-            expected,
-            found: bytes.len() as u64,
-        };
+        let cut = |expected: u64| TraceError::Length { expected, found: bytes.len() as u64 };
         if take::<8>(&mut rest) != Some(*MAGIC) {
             return Err(TraceError::NotATrace);
         }
@@ -202,11 +174,8 @@ impl Trace {
         }
         let header = u64::from(take(&mut rest).map(u32::from_le_bytes).ok_or(cut(24))?);
         let text = rest.split_off(..header as usize).ok_or(cut(24 + header))?;
-        let description =
-            Description::parse(&String::from_utf8_lossy(text)).map_err(TraceError::Description)?;
-        let rows = take(&mut rest)
-            .map(u64::from_le_bytes)
-            .ok_or(cut(24 + header))?;
+        let description = Description::parse(&String::from_utf8_lossy(text)).map_err(TraceError::Description)?;
+        let rows = take(&mut rest).map(u64::from_le_bytes).ok_or(cut(24 + header))?;
 
         let mut trace = Self::new(description);
         // Saturating: a damaged count must not wrap around to one that fits.
@@ -224,9 +193,7 @@ impl Trace {
     /// in hexadecimal; units in the column names.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let titles: Vec<String> = std::iter::once("tick".to_owned())
-            .chain(self.columns().map(title))
-            .collect();
+        let titles: Vec<String> = std::iter::once("tick".to_owned()).chain(self.columns().map(title)).collect();
         let kinds: Vec<WordKind> = self.columns().map(WordKind::of).collect();
         let mut out = titles.join(",");
         out.push('\n');
@@ -278,9 +245,7 @@ mod tests {
     fn sample(scalar: Scalar) -> Trace {
         let mut trace = Trace::new(six_legs(scalar));
         for tick in 0..3_u64 {
-            let input: Vec<u64> = (0..12)
-                .map(|k| scalar.encode((tick * 100 + k) as f64 + 0.1))
-                .collect();
+            let input: Vec<u64> = (0..12).map(|k| scalar.encode((tick * 100 + k) as f64 + 0.1)).collect();
             let output: Vec<u64> = (0..37).map(|k| scalar.encode(k as f64)).collect();
             trace.push(&input, &output, tick ^ 0xdead_beef);
         }
@@ -293,10 +258,7 @@ mod tests {
         let bytes = trace.to_bytes();
         assert_eq!(bytes.len() % 8, 0);
         assert_eq!(Trace::from_bytes(&bytes), Ok(trace.clone()));
-        assert_eq!(
-            Trace::from_words(trace.description().clone(), trace.words().to_vec()),
-            Ok(trace)
-        );
+        assert_eq!(Trace::from_words(trace.description().clone(), trace.words().to_vec()), Ok(trace));
     }
 
     #[test]
@@ -308,27 +270,14 @@ mod tests {
         let mut longer = bytes.clone();
         longer.push(0);
         let error = Trace::from_bytes(&longer).unwrap_err().to_string();
-        assert!(
-            error.contains(&format!(
-                "{} bytes, expected {}",
-                bytes.len() + 1,
-                bytes.len()
-            )),
-            "{error}"
-        );
+        assert!(error.contains(&format!("{} bytes, expected {}", bytes.len() + 1, bytes.len())), "{error}");
         let mut other = bytes.clone();
         other[8] = 9;
         assert_eq!(Trace::from_bytes(&other), Err(TraceError::Version(9)));
         let text = u32::from_le_bytes(bytes[12..16].try_into().unwrap()) as usize;
         let mut count = bytes;
         count[16 + text..24 + text].fill(0xff);
-        assert!(matches!(
-            Trace::from_bytes(&count),
-            Err(TraceError::Length {
-                expected: u64::MAX,
-                ..
-            })
-        ));
+        assert!(matches!(Trace::from_bytes(&count), Err(TraceError::Length { expected: u64::MAX, .. })));
     }
 
     #[test]
@@ -346,8 +295,7 @@ mod tests {
             let header = lines.next().unwrap();
             assert!(header.starts_with("tick,setpoint[0],"), "{header}");
             assert!(
-                header.contains(",displacement[0]_m,")
-                    && header.contains(",voltage[5]_V,requested[0]_m"),
+                header.contains(",displacement[0]_m,") && header.contains(",voltage[5]_V,requested[0]_m"),
                 "{header}"
             );
             assert!(header.ends_with(",status,state_digest"), "{header}");

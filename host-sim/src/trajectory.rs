@@ -45,8 +45,7 @@ impl PaperLeg {
         let um = if scaled <= Self::RAMP_END * (1.0 + Self::SLACK) {
             1.95 * scaled
         } else {
-            let phase =
-                core::f64::consts::TAU * self.frequency * time - 8.0 * core::f64::consts::PI / 9.0;
+            let phase = core::f64::consts::TAU * self.frequency * time - 8.0 * core::f64::consts::PI / 9.0;
             Self::CENTER + Self::AMPLITUDE * libm::sin(phase)
         };
         um * 1e-6
@@ -75,11 +74,7 @@ mod tests {
             let before = leg.displacement(switch);
             let after = leg.displacement(switch * (1.0 + 1e-8));
             assert!((before - 3.9e-6).abs() < 1e-15, "{before}");
-            assert!(
-                ((after - before) - 112.2e-9).abs() < 0.1e-9,
-                "{}",
-                after - before
-            );
+            assert!(((after - before) - 112.2e-9).abs() < 0.1e-9, "{}", after - before);
             assert!((leg.displacement(leg.duration()) - after).abs() < 1e-11);
         }
     }
@@ -97,9 +92,7 @@ mod tests {
     #[test]
     fn it_stays_within_4_and_44_um_after_the_ramp() {
         let leg = PaperLeg { frequency: 1.0 };
-        let values: Vec<f64> = (101..=1100)
-            .map(|n| leg.displacement(f64::from(n) * 2e-3))
-            .collect();
+        let values: Vec<f64> = (101..=1100).map(|n| leg.displacement(f64::from(n) * 2e-3)).collect();
         assert!(values.iter().all(|q| (3.99e-6..44.01e-6).contains(q)));
         assert!(values.iter().any(|q| *q > 43.99e-6));
     }

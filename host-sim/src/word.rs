@@ -66,11 +66,7 @@ impl Scalar {
     /// Position in the order of all numbers: negative ones mirrored below the positive ones.
     fn rank(self, word: u64) -> u64 {
         let sign = 1_u64 << (self.bits() - 1);
-        if word & sign == 0 {
-            word | sign
-        } else {
-            !word & (sign | (sign - 1))
-        }
+        if word & sign == 0 { word | sign } else { !word & (sign | (sign - 1)) }
     }
 }
 
@@ -101,11 +97,7 @@ impl WordKind {
     #[must_use]
     pub fn of(name: &str) -> Self {
         let stem = name.split('[').next().unwrap_or(name);
-        if INTEGERS.contains(&stem) {
-            Self::Integer
-        } else {
-            Self::Real
-        }
+        if INTEGERS.contains(&stem) { Self::Integer } else { Self::Real }
     }
 }
 
@@ -116,14 +108,8 @@ mod tests {
     #[test]
     fn words_round_trip_in_both_types() {
         for value in [0.0, -0.0, 1.5, -2.25, f64::INFINITY] {
-            assert_eq!(
-                Scalar::F64.decode(Scalar::F64.encode(value)).to_bits(),
-                value.to_bits()
-            );
-            assert_eq!(
-                Scalar::F32.decode(Scalar::F32.encode(value)).to_bits(),
-                value.to_bits()
-            );
+            assert_eq!(Scalar::F64.decode(Scalar::F64.encode(value)).to_bits(), value.to_bits());
+            assert_eq!(Scalar::F32.decode(Scalar::F32.encode(value)).to_bits(), value.to_bits());
         }
         assert_eq!(Scalar::F32.encode(-1.0), 0xBF80_0000);
     }

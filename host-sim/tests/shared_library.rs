@@ -35,25 +35,13 @@ fn library(name: &str, source: &str) -> Option<PathBuf> {
     std::fs::write(&text, source).unwrap();
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let run = Command::new(rustc)
-        .args([
-            "--edition",
-            "2024",
-            "--crate-type",
-            "cdylib",
-            "-C",
-            "panic=abort",
-            "-o",
-        ])
+        .args(["--edition", "2024", "--crate-type", "cdylib", "-C", "panic=abort", "-o"])
         .arg(&file)
         .arg(&text)
         .output();
     match run {
         Ok(output) => {
-            assert!(
-                output.status.success(),
-                "{}",
-                String::from_utf8_lossy(&output.stderr)
-            );
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
             Some(file)
         }
         Err(error) => {
@@ -102,17 +90,9 @@ fn a_refused_word_is_named_and_the_configuration_in_force_stays() {
     };
     let mut controller = Controller::load(&file).unwrap();
     let error = controller.configure(&[9.0_f64.to_bits(), 101]).unwrap_err();
-    assert!(
-        error.to_string().contains("`limit` = 0000000000000065"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("`limit` = 0000000000000065"), "{error}");
     let error = controller.configure(&[0]).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("1 configuration words; this controller has 2"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("1 configuration words; this controller has 2"), "{error}");
     let mut output = [0; 2];
     controller.step(&[1.0_f64.to_bits()], &mut output);
     assert_eq!(output[0], 2.0_f64.to_bits());
@@ -123,35 +103,20 @@ fn another_interface_version_and_a_missing_function_are_refused() {
     let Some(file) = library("toy_abi", &SOURCE.replace("ABI", "7")) else {
         return;
     };
-    assert!(
-        refusal(&file)
-            .to_string()
-            .contains("interface version 7, expected 1")
-    );
-    let source = SOURCE
-        .replace("ABI", "1")
-        .replace("specgen_state_digest", "other");
+    assert!(refusal(&file).to_string().contains("interface version 7, expected 1"));
+    let source = SOURCE.replace("ABI", "1").replace("specgen_state_digest", "other");
     let Some(file) = library("toy_lacks", &source) else {
         return;
     };
     let text = refusal(&file).to_string();
-    assert!(
-        text.contains("specgen_state_digest") && text.contains("libtoy_lacks.so"),
-        "{text}"
-    );
+    assert!(text.contains("specgen_state_digest") && text.contains("libtoy_lacks.so"), "{text}");
 }
 
 #[test]
 fn a_bad_description_is_refused() {
-    let source = SOURCE
-        .replace("ABI", "1")
-        .replace("scalar_bits=64", "scalar_bits=80");
+    let source = SOURCE.replace("ABI", "1").replace("scalar_bits=64", "scalar_bits=80");
     let Some(file) = library("toy_scalar", &source) else {
         return;
     };
-    assert!(
-        refusal(&file)
-            .to_string()
-            .contains("`scalar_bits=80`; expected 32 or 64")
-    );
+    assert!(refusal(&file).to_string().contains("`scalar_bits=80`; expected 32 or 64"));
 }

@@ -106,7 +106,8 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
         let kind = if pose { 0.0 } else { 1.0 };
         let (host, config) = host_trace(&mut controller, &[("setpoint_kind", kind)], &inputs);
         let (target, _) = verify::replay(&image, &config, &host).unwrap_or_else(|error| panic!("{error}"));
-        let difference = first_difference(&host, &target).unwrap_or_else(|| panic!("{file}: the flipped ulp was not seen"));
+        let difference =
+            first_difference(&host, &target).unwrap_or_else(|| panic!("{file}: the flipped ulp was not seen"));
         let text = difference.to_string();
         println!("{file}: {text}");
         assert!(text.starts_with("tick ") && text.contains(signal), "{file}: {text}");

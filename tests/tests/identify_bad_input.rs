@@ -1,10 +1,6 @@
 //! Every way in which a record can be wrong gives a message that names the place and the mend, and nothing panics.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "helpers of tests may fail the test"
-)]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
 mod identify_support;
 
@@ -26,22 +22,14 @@ fn good() -> Vec<[f64; 3]> {
         play = play.clamp(u - 4.0, u + 4.0);
         [t, *u, 0.4 * u + 0.2 * play]
     };
-    drive
-        .time()
-        .into_iter()
-        .zip(&drive.samples)
-        .map(row)
-        .collect()
+    drive.time().into_iter().zip(&drive.samples).map(row).collect()
 }
 
 fn csv(rows: &[[f64; 3]]) -> String {
-    rows.iter().fold(
-        "time_s,drive_V,displacement_um\n".to_owned(),
-        |mut text, [t, u, y]| {
-            writeln!(text, "{t},{u},{y}").unwrap();
-            text
-        },
-    )
+    rows.iter().fold("time_s,drive_V,displacement_um\n".to_owned(), |mut text, [t, u, y]| {
+        writeln!(text, "{t},{u},{y}").unwrap();
+        text
+    })
 }
 
 fn read(bytes: &[u8]) -> Result<Record, Vec<Diagnostic>> {
@@ -57,10 +45,7 @@ fn errors(bytes: &[u8]) -> Vec<Diagnostic> {
         Ok(_) => panic!("must be refused"),
         Err(all) => {
             for d in &all {
-                assert!(
-                    matches!(&d.place, Place::File { path, .. } if path == "record.csv"),
-                    "{d:?}"
-                );
+                assert!(matches!(&d.place, Place::File { path, .. } if path == "record.csv"), "{d:?}");
             }
             all
         }
@@ -69,9 +54,7 @@ fn errors(bytes: &[u8]) -> Vec<Diagnostic> {
 
 /// Asserts one finding whose code and message fit, and returns its line.
 fn expect(all: &[Diagnostic], code: &str, text: &str) -> Option<usize> {
-    let fitting = all
-        .iter()
-        .find(|d| d.code == code && d.message.contains(text));
+    let fitting = all.iter().find(|d| d.code == code && d.message.contains(text));
     let found = fitting.unwrap_or_else(|| panic!("no {code} with `{text}` in {all:#?}"));
     assert!(!found.help.is_empty(), "{found:?}");
     match &found.place {
@@ -98,47 +81,20 @@ fn the_good_record_is_accepted() {
 #[test]
 fn byte_order_mark_windows_lines_comments_and_column_order_are_accepted() {
     let mut text = "\u{feff}# made by hand\r\nDisplacement_um, note ,TIME_S,drive_v\r\n".to_owned();
-    good()
-        .iter()
-        .for_each(|[t, u, y]| write!(text, "{y},x,{t},{u}\r\n").unwrap());
+    good().iter().for_each(|[t, u, y]| write!(text, "{y},x,{t},{u}\r\n").unwrap());
     let record = read(text.as_bytes()).unwrap();
-    assert_eq!(
-        record.drive,
-        good().iter().map(|r| r[1]).collect::<Vec<_>>()
-    );
+    assert_eq!(record.drive, good().iter().map(|r| r[1]).collect::<Vec<_>>());
 }
 
 #[test]
 fn files_that_are_no_text() {
-    expect(
-        &read_record(Path::new("no/such/file.csv"), "record.csv").unwrap_err(),
-        "E0501",
-        "cannot be read",
-    );
-    expect(
-        &read_record(&std::env::temp_dir(), "record.csv").unwrap_err(),
-        "E0501",
-        "cannot be read",
-    );
+    expect(&read_record(Path::new("no/such/file.csv"), "record.csv").unwrap_err(), "E0501", "cannot be read");
+    expect(&read_record(&std::env::temp_dir(), "record.csv").unwrap_err(), "E0501", "cannot be read");
     expect(&errors(b""), "E0504", "is empty");
     expect(&errors(b"\n\n"), "E0504", "is empty");
-    assert_eq!(
-        expect(
-            &errors(b"time_s,drive_V,displacement_um\n0,1,\xff\n"),
-            "E0503",
-            "0xff"
-        ),
-        Some(2)
-    );
-    assert_eq!(
-        expect(&errors(b"\x7fELF\x00\x01"), "E0503", "0x00"),
-        Some(1)
-    );
-    expect(
-        &errors(b"time_s,drive_V,displacement_um\n"),
-        "E0509",
-        "has 0 samples",
-    );
+    assert_eq!(expect(&errors(b"time_s,drive_V,displacement_um\n0,1,\xff\n"), "E0503", "0xff"), Some(2));
+    assert_eq!(expect(&errors(b"\x7fELF\x00\x01"), "E0503", "0x00"), Some(1));
+    expect(&errors(b"time_s,drive_V,displacement_um\n"), "E0509", "has 0 samples");
 }
 
 #[test]
@@ -146,10 +102,7 @@ fn a_huge_file_is_refused_without_reading_it_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("huge.csv");
     // A sparse file: a length, but no blocks.
-    std::fs::File::create(&path)
-        .unwrap()
-        .set_len(1 << 40)
-        .unwrap();
+    std::fs::File::create(&path).unwrap().set_len(1 << 40).unwrap();
     let all = read_record(&path, "record.csv").unwrap_err();
     expect(&all, "E0502", "larger than 256 MiB");
 }
@@ -157,15 +110,8 @@ fn a_huge_file_is_refused_without_reading_it_whole() {
 #[test]
 fn columns() {
     let text = csv(&good());
-    expect(
-        &errors(text.replacen("drive_V", "drve_V", 1).as_bytes()),
-        "E0504",
-        "`drive_V` is missing",
-    );
-    let all = errors(
-        text.replacen("displacement_um", "displacement_nm", 1)
-            .as_bytes(),
-    );
+    expect(&errors(text.replacen("drive_V", "drve_V", 1).as_bytes()), "E0504", "`drive_V` is missing");
+    let all = errors(text.replacen("displacement_um", "displacement_nm", 1).as_bytes());
     assert!(all[0].help.contains("another unit"), "{all:?}");
     let all = errors(text.replace(',', ";").as_bytes());
     assert_eq!(all.len(), 3, "all three columns are reported: {all:?}");
@@ -183,72 +129,36 @@ fn bad_numbers_are_all_reported_with_line_and_column_and_counted() {
     assert_eq!(expect(&all, "E0506", "`drive_V` is `abc`"), Some(5));
     assert_eq!(expect(&all, "E0508", "`drive_V` is `NaN`"), Some(6));
     assert_eq!(expect(&all, "E0508", "`displacement_um` is `inf`"), Some(7));
-    assert_eq!(
-        expect(&all, "E0506", "`displacement_um` is missing"),
-        Some(8)
-    );
+    assert_eq!(expect(&all, "E0506", "`displacement_um` is missing"), Some(8));
     for line in &mut lines[10..52] {
         *line = "0,x,0".to_owned();
     }
     let all = errors(lines.join("\n").as_bytes());
-    assert!(
-        all.iter().any(|d| d.message.contains("more lines")),
-        "{all:?}"
-    );
+    assert!(all.iter().any(|d| d.message.contains("more lines")), "{all:?}");
     assert!(all.len() < 15, "{} findings", all.len());
 }
 
 #[test]
 fn time() {
-    assert_eq!(
-        expect(
-            &errors(changed(|r| r[40][0] = r[39][0]).as_bytes()),
-            "E0510",
-            "must increase"
-        ),
-        Some(42)
-    );
-    expect(
-        &errors(changed(|r| r.iter_mut().for_each(|r| r[0] = -r[0])).as_bytes()),
-        "E0510",
-        "must increase",
-    );
+    assert_eq!(expect(&errors(changed(|r| r[40][0] = r[39][0]).as_bytes()), "E0510", "must increase"), Some(42));
+    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[0] = -r[0])).as_bytes()), "E0510", "must increase");
     let gap = changed(|r| {
         r.drain(300..350);
     });
-    assert_eq!(
-        expect(&errors(gap.as_bytes()), "E0511", "between 2.99 s and 3.5 s"),
-        Some(302)
-    );
-    expect(
-        &errors(changed(|r| r.truncate(50)).as_bytes()),
-        "E0509",
-        "has 50 samples",
-    );
+    assert_eq!(expect(&errors(gap.as_bytes()), "E0511", "between 2.99 s and 3.5 s"), Some(302));
+    expect(&errors(changed(|r| r.truncate(50)).as_bytes()), "E0509", "has 50 samples");
 }
 
 #[test]
 fn signals_that_do_not_move_or_do_not_fit() {
-    expect(
-        &errors(changed(|r| r.iter_mut().for_each(|r| r[1] = 3.0)).as_bytes()),
-        "E0512",
-        "`drive_V` is 3",
-    );
-    expect(
-        &errors(changed(|r| r.iter_mut().for_each(|r| r[2] = 3.0)).as_bytes()),
-        "E0512",
-        "`displacement_um` is 3",
-    );
+    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[1] = 3.0)).as_bytes()), "E0512", "`drive_V` is 3");
+    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[2] = 3.0)).as_bytes()), "E0512", "`displacement_um` is 3");
     expect(
         &errors(changed(|r| r.iter_mut().for_each(|r| r[2] = r[2].min(40.0))).as_bytes()),
         "E0513",
         "is limited at 40",
     );
-    expect(
-        &errors(changed(|r| r[200..300].iter_mut().for_each(|r| r[2] = 9.0)).as_bytes()),
-        "E0513",
-        "is stuck at 9",
-    );
+    expect(&errors(changed(|r| r[200..300].iter_mut().for_each(|r| r[2] = 9.0)).as_bytes()), "E0513", "is stuck at 9");
     expect(
         &errors(changed(|r| r.iter_mut().for_each(|r| r[2] = -r[2])).as_bytes()),
         "E0514",
@@ -256,25 +166,13 @@ fn signals_that_do_not_move_or_do_not_fit() {
     );
     let mut random = generator(1);
     let mut noise = || (random.next_u64() >> 40) as f64 * 1e-6;
-    expect(
-        &errors(changed(|r| r.iter_mut().for_each(|r| r[2] = noise())).as_bytes()),
-        "E0514",
-        "hardly follows",
-    );
+    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[2] = noise())).as_bytes()), "E0514", "hardly follows");
 }
 
 #[test]
 fn wrong_units_and_swapped_columns() {
-    expect(
-        &errors(changed(|r| r.iter_mut().for_each(|r| r[1] *= 1e3)).as_bytes()),
-        "E0603",
-        "in mV?",
-    );
-    expect(
-        &errors(changed(|r| r.iter_mut().for_each(|r| r[1] *= 1e-3)).as_bytes()),
-        "E0603",
-        "in kV?",
-    );
+    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[1] *= 1e3)).as_bytes()), "E0603", "in mV?");
+    expect(&errors(changed(|r| r.iter_mut().for_each(|r| r[1] *= 1e-3)).as_bytes()), "E0603", "in kV?");
     // The displacement of 60 um stands in the drive column, the 100 V in the other.
     expect(
         &errors(changed(|r| r.iter_mut().for_each(|r| r.swap(1, 2))).as_bytes()),
@@ -282,72 +180,27 @@ fn wrong_units_and_swapped_columns() {
         "spec declares 0 V to 100 V",
     );
     let record = read(changed(|r| r.iter_mut().for_each(|r| r[2] *= 1e3)).as_bytes()).unwrap();
-    assert!(
-        record
-            .warnings
-            .iter()
-            .any(|d| d.code == "W0515" && d.message.contains("in nm?")),
-        "{:?}",
-        record.warnings
-    );
-    assert!(
-        record
-            .warnings
-            .iter()
-            .all(|d| d.severity == Severity::Warning)
-    );
+    assert!(record.warnings.iter().any(|d| d.code == "W0515" && d.message.contains("in nm?")), "{:?}", record.warnings);
+    assert!(record.warnings.iter().all(|d| d.severity == Severity::Warning));
 }
 
 #[test]
 fn records_that_do_not_cover_the_plane() {
     let narrow = Drive::at(0.0, 100.0).reversal_curves(8, [0.0, 60.0], 50.0);
-    let rows: Vec<_> = narrow
-        .time()
-        .iter()
-        .zip(&narrow.samples)
-        .map(|(t, u)| [*t, *u, 0.5 * u])
-        .collect();
-    expect(
-        &errors(csv(&rows).as_bytes()),
-        "E0606",
-        "no cell with an up_threshold above 60 V",
-    );
+    let rows: Vec<_> = narrow.time().iter().zip(&narrow.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
+    expect(&errors(csv(&rows).as_bytes()), "E0606", "no cell with an up_threshold above 60 V");
     let high = Drive::at(40.0, 100.0).reversal_curves(8, [40.0, 100.0], 50.0);
-    let rows: Vec<_> = high
-        .time()
-        .iter()
-        .zip(&high.samples)
-        .map(|(t, u)| [*t, *u, 0.5 * u])
-        .collect();
-    expect(
-        &errors(csv(&rows).as_bytes()),
-        "E0606",
-        "no cell with a down_threshold below 40 V",
-    );
+    let rows: Vec<_> = high.time().iter().zip(&high.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
+    expect(&errors(csv(&rows).as_bytes()), "E0606", "no cell with a down_threshold below 40 V");
     let wide = Drive::at(0.0, 100.0).reversal_curves(8, [0.0, 150.0], 50.0);
-    let rows: Vec<_> = wide
-        .time()
-        .iter()
-        .zip(&wide.samples)
-        .map(|(t, u)| [*t, *u, 0.5 * u])
-        .collect();
+    let rows: Vec<_> = wide.time().iter().zip(&wide.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
     expect(&errors(csv(&rows).as_bytes()), "E0605", "0 V to 150 V");
     let one = Drive::at(0.0, 100.0).reversal_curves(1, RANGE, 50.0);
-    let rows: Vec<_> = one
-        .time()
-        .iter()
-        .zip(&one.samples)
-        .map(|(t, u)| [*t, *u, 0.5 * u])
-        .collect();
+    let rows: Vec<_> = one.time().iter().zip(&one.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
     expect(&errors(csv(&rows).as_bytes()), "E0607", "1 reversal curves");
-    let rise: Vec<_> = (0..200)
-        .map(|k| [f64::from(k) * 0.01, f64::from(k) * 0.5, f64::from(k) * 0.3])
-        .collect();
+    let rise: Vec<_> = (0..200).map(|k| [f64::from(k) * 0.01, f64::from(k) * 0.5, f64::from(k) * 0.3]).collect();
     expect(&errors(csv(&rise).as_bytes()), "E0607", "0 reversal curves");
-    let fall: Vec<_> = rise
-        .iter()
-        .map(|[t, u, y]| [*t, 99.5 - u, 60.0 - y])
-        .collect();
+    let fall: Vec<_> = rise.iter().map(|[t, u, y]| [*t, 99.5 - u, 60.0 - y]).collect();
     expect(&errors(csv(&fall).as_bytes()), "E0607", "never rises");
 }
 
@@ -355,53 +208,27 @@ fn records_that_do_not_cover_the_plane() {
 fn a_part_of_the_plane_that_no_curve_enters_is_named() {
     // No reversal between 25 V and 75 V: cells in that band of up_thresholds always switch off together.
     let drive = [6.25, 12.5, 18.75, 25.0, 75.0, 81.25, 87.5, 93.75, 100.0];
-    let drive = drive.iter().fold(Drive::at(0.0, 100.0), |drive, top| {
-        drive.ramp(*top, 50.0).ramp(0.0, 50.0)
-    });
-    let rows: Vec<_> = drive
-        .time()
-        .iter()
-        .zip(&drive.samples)
-        .map(|(t, u)| [*t, *u, 0.5 * u])
-        .collect();
+    let drive = drive.iter().fold(Drive::at(0.0, 100.0), |drive, top| drive.ramp(*top, 50.0).ramp(0.0, 50.0));
+    let rows: Vec<_> = drive.time().iter().zip(&drive.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
     let record = read(csv(&rows).as_bytes()).unwrap();
     let result = identify(&record, &Options::new(16, RANGE)).unwrap();
     let warning = result.warnings.iter().find(|d| d.code == "W0609").unwrap();
     assert!(
-        warning
-            .message
-            .contains("up_threshold 25.000 to 75.000 V, down_threshold 0.000 to 68.750 V"),
+        warning.message.contains("up_threshold 25.000 to 75.000 V, down_threshold 0.000 to 68.750 V"),
         "{}",
         warning.message
     );
-    assert!(
-        (0.3..0.7).contains(&result.report.excited_share),
-        "{}",
-        result.report.excited_share
-    );
+    assert!((0.3..0.7).contains(&result.report.excited_share), "{}", result.report.excited_share);
 }
 
 #[test]
 fn impossible_options() {
     let record = read(csv(&good()).as_bytes()).unwrap();
     for grid in [0, 1, 65, 10_000] {
-        expect(
-            &identify(&record, &Options::new(grid, RANGE)).unwrap_err(),
-            "E0601",
-            "grid of",
-        );
+        expect(&identify(&record, &Options::new(grid, RANGE)).unwrap_err(), "E0601", "grid of");
     }
-    for drive in [
-        [100.0, 0.0],
-        [0.0, 0.0],
-        [f64::NAN, 1.0],
-        [0.0, f64::INFINITY],
-    ] {
-        expect(
-            &identify(&record, &Options::new(8, drive)).unwrap_err(),
-            "E0602",
-            "drive range",
-        );
+    for drive in [[100.0, 0.0], [0.0, 0.0], [f64::NAN, 1.0], [0.0, f64::INFINITY]] {
+        expect(&identify(&record, &Options::new(8, drive)).unwrap_err(), "E0602", "drive range");
     }
 }
 
@@ -425,7 +252,6 @@ fn damaged_files_never_panic() {
                 }
             }
         }
-        let _ =
-            read(&bytes).and_then(|record| identify(&record, &Options::new(8, RANGE)).map(|_| ()));
+        let _ = read(&bytes).and_then(|record| identify(&record, &Options::new(8, RANGE)).map(|_| ()));
     }
 }

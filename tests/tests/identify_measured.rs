@@ -2,26 +2,18 @@
 //!
 //! Each test prints that it is skipped where the data is absent.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "helpers of tests may fail the test"
-)]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use specgen::everett::EverettTable;
-use specgen::identify::{
-    Branches, DeadTime, Identified, Options, Record, Validation, identify, read_record, validate,
-};
+use specgen::identify::{Branches, DeadTime, Identified, Options, Record, Validation, identify, read_record, validate};
 
 const DRIVE: [f64; 2] = [-90.0, 90.0];
 
 fn data(name: &str) -> Option<Record> {
-    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../shared/data/piezo-forc")
-        .join(name);
+    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/piezo-forc").join(name);
     if path.exists() {
         return Some(read_record(&path, name).unwrap_or_else(|d| panic!("{d:#?}")));
     }
@@ -51,11 +43,7 @@ fn found(record: &Record, options: &Options) -> Identified {
 
 fn predicted(table: &EverettTable, record: &Record, dead_time: f64) -> Validation {
     let validation = validate(table, record, dead_time).unwrap();
-    let each: Vec<String> = validation
-        .starts
-        .iter()
-        .map(|s| format!("{:?} {:.3} %", s.start, s.rms_percent))
-        .collect();
+    let each: Vec<String> = validation.starts.iter().map(|s| format!("{:?} {:.3} %", s.start, s.rms_percent)).collect();
     println!(
         "  predicts {} to {:.3} % rms; by assumed start: {}",
         record.shown_as,
@@ -67,8 +55,7 @@ fn predicted(table: &EverettTable, record: &Record, dead_time: f64) -> Validatio
 
 #[test]
 fn measured_record_is_fitted_and_predicts_another_one() {
-    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv"))
-    else {
+    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv")) else {
         return;
     };
     let result = found(&forc, &Options::new(32, DRIVE));
@@ -79,57 +66,29 @@ fn measured_record_is_fitted_and_predicts_another_one() {
     // The drive rests at -90 V for 1.5 s while the displacement rings and creeps.
     assert_eq!(report.samples_skipped, 15_000);
     assert!(report.kkt_violation < 1e-10);
-    assert!(
-        report.fit_rms_percent <= 0.25,
-        "fit {} %",
-        report.fit_rms_percent
-    );
+    assert!(report.fit_rms_percent <= 0.25, "fit {} %", report.fit_rms_percent);
     let validation = predicted(&result.table, &triangle, report.dead_time);
     // The record ends with a jump from -81 V to -5 V in one sample.
     assert_eq!(validation.samples_after_jumps, 1);
-    assert!(
-        validation.best.rms_percent <= 0.85,
-        "prediction {} %",
-        validation.best.rms_percent
-    );
-    assert!(
-        validation.starts.iter().all(|s| s.rms_percent <= 1.35),
-        "whatever the start: {:?}",
-        validation.starts
-    );
+    assert!(validation.best.rms_percent <= 0.85, "prediction {} %", validation.best.rms_percent);
+    assert!(validation.starts.iter().all(|s| s.rms_percent <= 1.35), "whatever the start: {:?}", validation.starts);
 }
 
 /// The limits hold without the dead time too, which a static table cannot know.
 #[test]
 fn the_table_alone_stays_within_the_limits() {
-    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv"))
-    else {
+    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv")) else {
         return;
     };
-    let result = found(
-        &forc,
-        &Options {
-            dead_time: DeadTime::Fixed(0.0),
-            ..Options::new(32, DRIVE)
-        },
-    );
-    assert!(
-        result.report.fit_rms_percent <= 0.5,
-        "fit {} %",
-        result.report.fit_rms_percent
-    );
+    let result = found(&forc, &Options { dead_time: DeadTime::Fixed(0.0), ..Options::new(32, DRIVE) });
+    assert!(result.report.fit_rms_percent <= 0.5, "fit {} %", result.report.fit_rms_percent);
     let validation = predicted(&result.table, &triangle, 0.0);
-    assert!(
-        validation.best.rms_percent <= 1.2,
-        "prediction {} %",
-        validation.best.rms_percent
-    );
+    assert!(validation.best.rms_percent <= 1.2, "prediction {} %", validation.best.rms_percent);
 }
 
 #[test]
 fn a_table_without_hysteresis_fails_the_limits() {
-    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv"))
-    else {
+    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv")) else {
         return;
     };
     let result = found(&forc, &Options::new(32, DRIVE));
@@ -140,12 +99,7 @@ fn a_table_without_hysteresis_fails_the_limits() {
             straight.nodes[EverettTable::index(up, down)] = gain * (up - down) as f64;
         }
     }
-    assert!(
-        predicted(&straight, &triangle, result.report.dead_time)
-            .best
-            .rms_percent
-            > 2.0
-    );
+    assert!(predicted(&straight, &triangle, result.report.dead_time).best.rms_percent > 2.0);
 }
 
 #[test]
@@ -155,26 +109,14 @@ fn all_three_rates_and_all_grids_identify() {
     };
     for name in ["forc-20hz.csv", "forc-40hz.csv", "forc-100hz.csv"] {
         let Some(forc) = data(name) else { return };
-        let grids: &[usize] = if name == "forc-20hz.csv" {
-            &[8, 16, 25, 32, 64]
-        } else {
-            &[8, 16, 25, 32]
-        };
+        let grids: &[usize] = if name == "forc-20hz.csv" { &[8, 16, 25, 32, 64] } else { &[8, 16, 25, 32] };
         for &grid in grids {
             let started = Instant::now();
             let result = found(&forc, &Options::new(grid, DRIVE));
             println!("  {:.2} s", started.elapsed().as_secs_f64());
-            assert!(
-                result.report.fit_rms_percent <= 0.5,
-                "fit {} %",
-                result.report.fit_rms_percent
-            );
+            assert!(result.report.fit_rms_percent <= 0.5, "fit {} %", result.report.fit_rms_percent);
             let validation = predicted(&result.table, &triangle, result.report.dead_time);
-            assert!(
-                validation.best.rms_percent <= 1.35,
-                "prediction {} %",
-                validation.best.rms_percent
-            );
+            assert!(validation.best.rms_percent <= 1.35, "prediction {} %", validation.best.rms_percent);
         }
     }
 }

@@ -1,10 +1,6 @@
 //! Identification of actuators whose truth is known: exact Preisach planes, and a play-and-creep plant outside the model class.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "helpers of tests may fail the test"
-)]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
 mod identify_support;
 
@@ -12,18 +8,15 @@ use identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::everett::EverettTable;
 use specgen::identify::regressor::{Plane, evaluate};
 use specgen::identify::{
-    Branches, DeadTime, Identified, Options, Record, Staircase, Start, identify, read_table_csv,
-    validate, write_table_csv,
+    Branches, DeadTime, Identified, Options, Record, Staircase, Start, identify, read_table_csv, validate,
+    write_table_csv,
 };
 
 const NM: f64 = 1e-9;
 
 /// Displacement of a table along a drive (m), from a memory.
 fn response(table: &EverettTable, mut memory: Staircase, drive: &[f64]) -> Vec<f64> {
-    let plane = Plane {
-        grid: table.grid,
-        range: [table.drive_min, table.drive_max],
-    };
+    let plane = Plane { grid: table.grid, range: [table.drive_min, table.drive_max] };
     let mut row = Vec::new();
     drive
         .iter()
@@ -36,31 +29,19 @@ fn response(table: &EverettTable, mut memory: Staircase, drive: &[f64]) -> Vec<f
 }
 
 fn found(drive: &Drive, displacement: Vec<f64>, options: &Options) -> Identified {
-    let record = Record::from_columns(
-        "made.csv",
-        drive.time(),
-        drive.samples.clone(),
-        displacement,
-    )
-    .unwrap();
+    let record = Record::from_columns("made.csv", drive.time(), drive.samples.clone(), displacement).unwrap();
     identify(&record, options).unwrap_or_else(|d| panic!("{d:#?}"))
 }
 
 fn worst_node(a: &EverettTable, b: &EverettTable) -> f64 {
-    a.nodes
-        .iter()
-        .zip(&b.nodes)
-        .fold(0.0, |worst, (x, y)| f64::max(worst, (x - y).abs()))
+    a.nodes.iter().zip(&b.nodes).fold(0.0, |worst, (x, y)| f64::max(worst, (x - y).abs()))
 }
 
 fn assert_monotone(table: &EverettTable) {
     for up in 1..=table.grid {
         for down in 0..up {
             // The table holds sums of weights: their difference may miss zero by a rounding of the sum.
-            assert!(
-                table.weight(up, down) >= -1e-15 * table.node(table.grid, 0),
-                "weight of cell {up}, {down}"
-            );
+            assert!(table.weight(up, down) >= -1e-15 * table.node(table.grid, 0), "weight of cell {up}, {down}");
         }
     }
 }
@@ -70,16 +51,9 @@ fn a_clean_record_gives_the_exact_table() {
     let range = [0.0, 100.0];
     let truth = random_table(16, range, 40e-6, 0.3, 11);
     let drive = Drive::at(0.0, 200.0).reversal_curves(16, range, 20.0);
-    let y = response(
-        &truth,
-        Staircase::negative_saturation(range),
-        &drive.samples,
-    );
+    let y = response(&truth, Staircase::negative_saturation(range), &drive.samples);
     let result = found(&drive, y, &Options::new(16, range));
-    println!(
-        "worst node {:.4} nm",
-        worst_node(&truth, &result.table) / NM
-    );
+    println!("worst node {:.4} nm", worst_node(&truth, &result.table) / NM);
     assert_eq!(result.report.branches, Branches::Descending);
     assert_eq!(result.report.excited_share, 1.0);
     assert!(worst_node(&truth, &result.table) < 0.5 * NM);
@@ -112,23 +86,12 @@ fn noise_offset_drift_and_an_irregular_start_are_tolerated() {
             .enumerate()
             .map(|(k, f)| {
                 let since = k as f64 - jump as f64;
-                let ringing = if since >= 0.0 {
-                    5e-6 * (since * 0.16).cos() * (-since / 60.0).exp()
-                } else {
-                    0.0
-                };
+                let ringing = if since >= 0.0 { 5e-6 * (since * 0.16).cos() * (-since / 60.0).exp() } else { 0.0 };
                 f + ringing + 3e-6 + 20.0 * NM * time[k] + noise * normal(&mut random)
             })
             .collect();
         let within = found(&drive, y.clone(), &Options::new(16, range));
-        let result = found(
-            &drive,
-            y,
-            &Options {
-                drift: true,
-                ..Options::new(16, range)
-            },
-        );
+        let result = found(&drive, y, &Options { drift: true, ..Options::new(16, range) });
         let worst = worst_node(&truth, &result.table);
         // Left in the branches, the drift of the longest one (1.8 s) is all that bends the table.
         assert!(worst_node(&truth, &within.table) < worst + 20.0 * NM * 1.8);
@@ -140,17 +103,10 @@ fn noise_offset_drift_and_an_irregular_start_are_tolerated() {
             result.report.drift / NM,
             result.report.samples_skipped,
         );
-        assert!(
-            worst < 2.0 * noise + 4.0 * NM,
-            "worst node {} nm",
-            worst / NM
-        );
+        assert!(worst < 2.0 * noise + 4.0 * NM, "worst node {} nm", worst / NM);
         assert!((result.report.noise_floor / noise - 1.0).abs() < 0.1);
         assert!((result.report.drift - 20.0 * NM).abs() < 2.0 * NM);
-        assert!(
-            result.report.samples_skipped > jump + 400,
-            "the ringing after the jump must not be used"
-        );
+        assert!(result.report.samples_skipped > jump + 400, "the ringing after the jump must not be used");
         assert_eq!(result.report.reversal_curves, 16);
         assert_monotone(&result.table);
     }
@@ -162,25 +118,13 @@ fn noise_on_the_drive_column_is_tolerated() {
     let range = [0.0, 100.0];
     let truth = random_table(16, range, 40e-6, 0.3, 25);
     let drive = Drive::at(0.0, 1000.0).reversal_curves(16, range, 50.0);
-    let y = response(
-        &truth,
-        Staircase::negative_saturation(range),
-        &drive.samples,
-    );
+    let y = response(&truth, Staircase::negative_saturation(range), &drive.samples);
     let mut random = generator(25);
-    let measured: Vec<f64> = drive
-        .samples
-        .iter()
-        .map(|u| u + 0.01 * normal(&mut random))
-        .collect();
+    let measured: Vec<f64> = drive.samples.iter().map(|u| u + 0.01 * normal(&mut random)).collect();
     let record = Record::from_columns("made.csv", drive.time(), measured, y).unwrap();
     let result = identify(&record, &Options::new(16, range)).unwrap();
     let worst = worst_node(&truth, &result.table);
-    println!(
-        "10 mV on the drive: worst node {:.2} nm, {} curves",
-        worst / NM,
-        result.report.reversal_curves
-    );
+    println!("10 mV on the drive: worst node {:.2} nm, {} curves", worst / NM, result.report.reversal_curves);
     assert_eq!(result.report.reversal_curves, 16);
     assert_eq!(result.report.branches, Branches::Descending);
     // 10 mV are about 4 nm; the highest of noisy samples overstates each reversal by some 30 mV.
@@ -197,11 +141,7 @@ fn a_record_of_random_reversals_identifies_the_table() {
     for _ in 0..200 {
         drive = drive.ramp(100.0 * uniform(&mut random), 100.0);
     }
-    let mut y = response(
-        &truth,
-        Staircase::negative_saturation(range),
-        &drive.samples,
-    );
+    let mut y = response(&truth, Staircase::negative_saturation(range), &drive.samples);
     y.iter_mut().for_each(|y| *y += NM * normal(&mut random));
     let result = found(&drive, y, &Options::new(10, range));
     println!(
@@ -238,14 +178,7 @@ fn a_dead_time_is_estimated_only_where_rates_differ() {
             .iter()
             .map(|f| f + NM * normal(&mut random))
             .collect();
-        found(
-            &drive,
-            y,
-            &Options {
-                dead_time,
-                ..Options::new(16, range)
-            },
-        )
+        found(&drive, y, &Options { dead_time, ..Options::new(16, range) })
     };
     let varied = of_rates([50.0, 400.0], DeadTime::Estimate);
     let ignored = of_rates([50.0, 400.0], DeadTime::Fixed(0.0));
@@ -255,21 +188,9 @@ fn a_dead_time_is_estimated_only_where_rates_differ() {
         varied.report.dead_time_basis,
         worst_node(&truth, &varied.table) / NM
     );
-    assert!(
-        (varied.report.dead_time - lag).abs() < 0.1e-3,
-        "{}",
-        varied.report.dead_time
-    );
-    let (with, without) = (
-        worst_node(&truth, &varied.table),
-        worst_node(&truth, &ignored.table),
-    );
-    assert!(
-        5.0 * with < without,
-        "worst node {} nm with, {} nm without the dead time",
-        with / NM,
-        without / NM
-    );
+    assert!((varied.report.dead_time - lag).abs() < 0.1e-3, "{}", varied.report.dead_time);
+    let (with, without) = (worst_node(&truth, &varied.table), worst_node(&truth, &ignored.table));
+    assert!(5.0 * with < without, "worst node {} nm with, {} nm without the dead time", with / NM, without / NM);
     let single = of_rates([400.0, 400.0], DeadTime::Estimate);
     println!("single: {}", single.report.dead_time_basis);
     assert_eq!(single.report.dead_time, 0.0);
@@ -287,10 +208,7 @@ impl PlayCreep {
     const CREEP_GAINS: [f64; 3] = [0.012, 0.008, 0.015];
 
     fn relaxed() -> Self {
-        Self {
-            plays: [0.0; 12],
-            creep: [0.0; 3],
-        }
+        Self { plays: [0.0; 12], creep: [0.0; 3] }
     }
 
     fn step(&mut self, u: f64, dt: f64) -> f64 {
@@ -300,12 +218,7 @@ impl PlayCreep {
             *play = play.clamp(u - radius, u + radius);
             sum += 0.09 * (-0.18 * k as f64).exp() * *play;
         }
-        for ((z, rate), gain) in self
-            .creep
-            .iter_mut()
-            .zip(Self::RATES)
-            .zip(Self::CREEP_GAINS)
-        {
+        for ((z, rate), gain) in self.creep.iter_mut().zip(Self::RATES).zip(Self::CREEP_GAINS) {
             *z += (1.0 - (-rate * dt).exp()) * (u - *z);
             sum += gain * *z;
         }
@@ -319,21 +232,13 @@ impl PlayCreep {
 
 /// The classical table: E(u_i, u_j) = f(u_i) − f_{u_i}(u_j), read at the nodes of the i-th fall.
 fn read_at_nodes(grid: usize, range: [f64; 2], drive: &[f64], y: &[f64]) -> EverettTable {
-    let mut table = EverettTable {
-        grid,
-        drive_min: range[0],
-        drive_max: range[1],
-        nodes: vec![0.0; grid * (grid + 1) / 2],
-    };
+    let mut table =
+        EverettTable { grid, drive_min: range[0], drive_max: range[1], nodes: vec![0.0; grid * (grid + 1) / 2] };
     let mut at = 0;
     for up in 1..=grid {
-        let top = (at..drive.len())
-            .find(|&k| drive[k] >= table.threshold(up) - 1e-9)
-            .unwrap();
+        let top = (at..drive.len()).find(|&k| drive[k] >= table.threshold(up) - 1e-9).unwrap();
         for down in 0..up {
-            at = (top..drive.len())
-                .find(|&k| drive[k] <= table.threshold(down) + 1e-9)
-                .unwrap();
+            at = (top..drive.len()).find(|&k| drive[k] <= table.threshold(down) + 1e-9).unwrap();
             table.nodes[EverettTable::index(up, down)] = y[top] - y[at];
             if down == 0 {
                 continue;
@@ -351,8 +256,7 @@ fn on_a_plant_with_creep_the_fit_agrees_with_the_table_read_at_the_nodes() {
     let mut random = generator(51);
     let mut y = PlayCreep::relaxed().run(&drive.samples, 1.0 / rate);
     let returned = y[y.len() - 1];
-    y.iter_mut()
-        .for_each(|y| *y += 2.2 * NM * normal(&mut random));
+    y.iter_mut().for_each(|y| *y += 2.2 * NM * normal(&mut random));
     let result = found(&drive, y.clone(), &Options::new(grid, range));
     let read = read_at_nodes(grid, range, &drive.samples, &y);
     let worst = worst_node(&read, &result.table);
@@ -371,9 +275,8 @@ fn on_a_plant_with_creep_the_fit_agrees_with_the_table_read_at_the_nodes() {
     let first = (11.0 * rate) as usize;
     let error = |table: &EverettTable| {
         let model = response(table, Staircase::negative_saturation(range), &path.samples);
-        let sum: f64 = (first..plant.len())
-            .map(|k| ((plant[k] - plant[first]) - (model[k] - model[first])).powi(2))
-            .sum();
+        let sum: f64 =
+            (first..plant.len()).map(|k| ((plant[k] - plant[first]) - (model[k] - model[first])).powi(2)).sum();
         (sum / (plant.len() - first) as f64).sqrt()
     };
     let (by_fit, by_reading) = (error(&result.table), error(&read));
@@ -385,19 +288,9 @@ fn on_a_plant_with_creep_the_fit_agrees_with_the_table_read_at_the_nodes() {
         by_reading / NM,
         result.report.dead_time_basis,
     );
-    assert!(
-        returned > 100.0 * NM,
-        "the plant must creep, or the test says nothing"
-    );
-    assert!(
-        worst < 0.001 * read.node(grid, 0),
-        "worst node {} nm",
-        worst / NM
-    );
-    assert!(
-        (by_fit / by_reading - 1.0).abs() < 0.03,
-        "{by_fit} against {by_reading}"
-    );
+    assert!(returned > 100.0 * NM, "the plant must creep, or the test says nothing");
+    assert!(worst < 0.001 * read.node(grid, 0), "worst node {} nm", worst / NM);
+    assert!((by_fit / by_reading - 1.0).abs() < 0.03, "{by_fit} against {by_reading}");
     assert_monotone(&result.table);
 }
 
@@ -414,11 +307,8 @@ fn validation_finds_the_start_and_removes_offset_and_drift() {
         .ramp(0.0, 200.0);
     let mut history = Staircase::negative_saturation(range);
     history.push(90.0);
-    let y: Vec<f64> = response(&truth, history, &drive.samples)
-        .iter()
-        .zip(drive.time())
-        .map(|(f, t)| f + 7e-6 - 1e-7 * t)
-        .collect();
+    let y: Vec<f64> =
+        response(&truth, history, &drive.samples).iter().zip(drive.time()).map(|(f, t)| f + 7e-6 - 1e-7 * t).collect();
     let record = Record::from_columns("other.csv", drive.time(), drive.samples.clone(), y).unwrap();
     let good = validate(&truth, &record, 0.0).unwrap();
     println!("{:?}", good.starts);
@@ -426,10 +316,7 @@ fn validation_finds_the_start_and_removes_offset_and_drift() {
     assert!(good.best.rms < 0.01 * NM, "{}", good.best.rms);
     let mut bent = truth.clone();
     bent.nodes.iter_mut().for_each(|e| *e *= 1.02);
-    assert!(
-        validate(&bent, &record, 0.0).unwrap().best.rms_percent > 0.2,
-        "a wrong table must show"
-    );
+    assert!(validate(&bent, &record, 0.0).unwrap().best.rms_percent > 0.2, "a wrong table must show");
 }
 
 #[test]
@@ -438,29 +325,13 @@ fn two_runs_give_the_same_bits() {
     let truth = random_table(12, range, 40e-6, 0.3, 71);
     let drive = Drive::at(0.0, 200.0).reversal_curves(12, range, 20.0);
     let mut random = generator(71);
-    let y: Vec<f64> = response(
-        &truth,
-        Staircase::negative_saturation(range),
-        &drive.samples,
-    )
-    .iter()
-    .map(|f| f + 5.0 * NM * normal(&mut random))
-    .collect();
-    let options = Options {
-        dead_time: DeadTime::Fixed(0.0),
-        ..Options::new(12, range)
-    };
-    let bits = |r: Identified| {
-        r.table
-            .nodes
-            .iter()
-            .map(|e| e.to_bits())
-            .collect::<Vec<_>>()
-    };
-    assert_eq!(
-        bits(found(&drive, y.clone(), &options)),
-        bits(found(&drive, y, &options))
-    );
+    let y: Vec<f64> = response(&truth, Staircase::negative_saturation(range), &drive.samples)
+        .iter()
+        .map(|f| f + 5.0 * NM * normal(&mut random))
+        .collect();
+    let options = Options { dead_time: DeadTime::Fixed(0.0), ..Options::new(12, range) };
+    let bits = |r: Identified| r.table.nodes.iter().map(|e| e.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(found(&drive, y.clone(), &options)), bits(found(&drive, y, &options)));
 }
 
 #[test]
@@ -469,10 +340,7 @@ fn a_table_survives_its_csv_file_and_a_broken_file_is_refused() {
     let text = write_table_csv(&table);
     assert!(text.starts_with("up_V,down_V,everett_um\n"));
     let back = read_table_csv(&text, "everett.csv").unwrap();
-    assert_eq!(
-        (back.grid, back.drive_min, back.drive_max),
-        (7, -90.0, 90.0)
-    );
+    assert_eq!((back.grid, back.drive_min, back.drive_max), (7, -90.0, 90.0));
     assert!(worst_node(&table, &back) < 1e-20);
     let mut lines: Vec<&str> = text.lines().collect();
     lines.swap(3, 9);
@@ -484,9 +352,6 @@ fn a_table_survives_its_csv_file_and_a_broken_file_is_refused() {
         String::new(),
     ] {
         let all = read_table_csv(&broken, "everett.csv").unwrap_err();
-        assert!(
-            all.iter().all(|d| d.code == "E0613" && !d.help.is_empty()),
-            "{all:?}"
-        );
+        assert!(all.iter().all(|d| d.code == "E0613" && !d.help.is_empty()), "{all:?}");
     }
 }

@@ -1,10 +1,6 @@
 //! Properties that the identification's memory, regressor and solver must have, each against an independent basis.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "helpers of tests may fail the test"
-)]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
 mod identify_support;
 
@@ -35,10 +31,7 @@ fn rows_equal_brute_force_relays_on_grid_values() {
         relays.push(k);
         memory.push(table.threshold(k));
         let (wanted, found) = (relays.output(&table), output(&plane, &memory, &table.nodes));
-        assert!(
-            (wanted - found).abs() <= 1e-12,
-            "at grid value {k}: relays {wanted}, row {found}"
-        );
+        assert!((wanted - found).abs() <= 1e-12, "at grid value {k}: relays {wanted}, row {found}");
     }
 }
 
@@ -47,10 +40,7 @@ fn wiping_out_makes_the_inner_history_irrelevant() {
     let mut random = generator(2);
     for _ in 0..500 {
         let mut with = Staircase::negative_saturation(RANGE);
-        let (high, low) = (
-            20.0 + 60.0 * uniform(&mut random),
-            -80.0 + 60.0 * uniform(&mut random),
-        );
+        let (high, low) = (20.0 + 60.0 * uniform(&mut random), -80.0 + 60.0 * uniform(&mut random));
         with.push(high);
         with.push(low);
         let without = with.clone();
@@ -68,10 +58,7 @@ fn wiping_out_makes_the_inner_history_irrelevant() {
 
 #[test]
 fn congruency_loops_between_the_same_drives_have_the_same_height() {
-    let plane = Plane {
-        grid: 16,
-        range: RANGE,
-    };
+    let plane = Plane { grid: 16, range: RANGE };
     let table = random_table(16, RANGE, 40.0, 1.0, 3);
     let mut random = generator(3);
     let (low, high) = (-13.7, 31.4);
@@ -88,20 +75,13 @@ fn congruency_loops_between_the_same_drives_have_the_same_height() {
         heights.push(output(&plane, &memory, &table.nodes) - bottom);
     }
     for height in &heights {
-        assert!(
-            (height - heights[0]).abs() <= 1e-12,
-            "{height} against {}",
-            heights[0]
-        );
+        assert!((height - heights[0]).abs() <= 1e-12, "{height} against {}", heights[0]);
     }
 }
 
 #[test]
 fn output_is_continuous_when_the_drive_crosses_grid_lines() {
-    let plane = Plane {
-        grid: 9,
-        range: RANGE,
-    };
+    let plane = Plane { grid: 9, range: RANGE };
     let table = random_table(9, RANGE, 40.0, 1.0, 5);
     let mut memory = Staircase::negative_saturation(RANGE);
     memory.push(71.0);
@@ -110,10 +90,7 @@ fn output_is_continuous_when_the_drive_crosses_grid_lines() {
     for k in 1..=steps {
         memory.push(71.0 - 150.0 * f64::from(k) / f64::from(steps));
         let now = output(&plane, &memory, &table.nodes);
-        assert!(
-            now <= before && before - now < 0.05,
-            "step {k}: {before} to {now}"
-        );
+        assert!(now <= before && before - now < 0.05, "step {k}: {before} to {now}");
         before = now;
     }
 }
@@ -124,9 +101,7 @@ fn problem(n: usize, seed: u64) -> (DMatrix<f64>, Vec<f64>) {
     let a = DMatrix::from_fn(2 * n, n, |_, _| uniform(&mut random) - 0.3);
     let y: Vec<f64> = (0..2 * n).map(|_| uniform(&mut random) - 0.5).collect();
     let gram = a.transpose() * &a;
-    let rhs = (0..n)
-        .map(|c| (0..2 * n).map(|r| a[(r, c)] * y[r]).sum())
-        .collect();
+    let rhs = (0..n).map(|c| (0..2 * n).map(|r| a[(r, c)] * y[r]).sum()).collect();
     (gram, rhs)
 }
 
@@ -150,9 +125,7 @@ fn nnls_finds_the_best_of_all_active_sets() {
         let mut best = 0.0;
         for set in 1u32..1 << n {
             let chosen: Vec<usize> = (0..n).filter(|k| set >> k & 1 == 1).collect();
-            let part = DMatrix::from_fn(chosen.len(), chosen.len(), |r, c| {
-                gram[(chosen[r], chosen[c])]
-            });
+            let part = DMatrix::from_fn(chosen.len(), chosen.len(), |r, c| gram[(chosen[r], chosen[c])]);
             let b = nalgebra::DVector::from_iterator(chosen.len(), chosen.iter().map(|&k| rhs[k]));
             let x = part.lu().solve(&b).unwrap();
             if x.iter().all(|w| *w >= 0.0) {
@@ -162,10 +135,7 @@ fn nnls_finds_the_best_of_all_active_sets() {
             }
         }
         let found = cost(&gram, &rhs, &solution.weights);
-        assert!(
-            (found - best).abs() <= 1e-12 * best.abs().max(1e-3),
-            "seed {seed}: {found} against {best}"
-        );
+        assert!((found - best).abs() <= 1e-12 * best.abs().max(1e-3), "seed {seed}: {found} against {best}");
     }
 }
 
@@ -175,10 +145,7 @@ fn nnls_satisfies_karush_kuhn_tucker_and_the_check_can_fail() {
         let (gram, rhs) = problem(120, 100 + seed);
         let mut solution = nnls::solve(&gram, &rhs).unwrap();
         let zeros = solution.weights.iter().filter(|w| **w == 0.0).count();
-        assert!(
-            zeros > 0 && zeros < 120,
-            "the problem must have active and passive weights, has {zeros} zeros"
-        );
+        assert!(zeros > 0 && zeros < 120, "the problem must have active and passive weights, has {zeros} zeros");
         assert!(nnls::kkt_violation(&gram, &rhs, &solution.weights) < 1e-10);
         let k = solution.weights.iter().position(|w| *w > 0.0).unwrap();
         solution.weights[k] *= 1.01;
@@ -189,12 +156,6 @@ fn nnls_satisfies_karush_kuhn_tucker_and_the_check_can_fail() {
 #[test]
 fn nnls_refuses_a_singular_problem() {
     let gram = DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 1.0, 1.0]);
-    assert_eq!(
-        nnls::solve(&gram, &[1.0, 1.0]),
-        Err(nnls::Failure::Singular)
-    );
-    assert_eq!(
-        nnls::solve(&DMatrix::zeros(2, 2), &[1.0, 1.0]),
-        Err(nnls::Failure::Singular)
-    );
+    assert_eq!(nnls::solve(&gram, &[1.0, 1.0]), Err(nnls::Failure::Singular));
+    assert_eq!(nnls::solve(&DMatrix::zeros(2, 2), &[1.0, 1.0]), Err(nnls::Failure::Singular));
 }

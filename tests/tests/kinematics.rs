@@ -108,9 +108,7 @@ fn textbook(pose: &[f64; 6], base: &[[f64; 3]; 6], platform: &[[f64; 3]; 6], hei
             square.sqrt()
         };
         let p = platform[leg];
-        let turned = std::array::from_fn(|k| {
-            (0..3).fold(Pair::of(0.0), |sum, j| sum.add(r[k][j].mul(Pair::of(p[j]))))
-        });
+        let turned = std::array::from_fn(|k| (0..3).fold(Pair::of(0.0), |sum, j| sum.add(r[k][j].mul(Pair::of(p[j])))));
         let difference = length(turned, [pose[0], pose[1], pose[2]]).add(length(p.map(Pair::of), [0.0; 3]).neg());
         difference.0 + difference.1
     })
@@ -139,7 +137,11 @@ fn f64_is_exact_to_a_femtometre_and_f32_to_50_picometres() {
     let (rounded, single) = emitted("kinematics-f32", &[WIDE, STROKE, F32], &poses);
     let error = worst(&single, &exact(&rounded));
     let with_rounding = worst(&single, &double);
-    println!("f32 against f64: {:.4} nm on the same pose, {:.4} nm with the pose rounded", error * 1e9, with_rounding * 1e9);
+    println!(
+        "f32 against f64: {:.4} nm on the same pose, {:.4} nm with the pose rounded",
+        error * 1e9,
+        with_rounding * 1e9
+    );
     assert!(error <= 0.05e-9 && with_rounding <= 0.05e-9, "{error:e} m, {with_rounding:e} m");
 
     // What the difference form is for: the plain formula in f32.
@@ -162,8 +164,9 @@ fn plain_f32(poses: &[[f64; 6]], base: &[[f64; 3]; 6], platform: &[[f64; 3]; 6],
         ];
         (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]).sqrt()
     };
-    let displacements =
-        |pose: &[f64; 6]| std::array::from_fn(|leg| f64::from(length(pose.map(|v| v as f32), leg) - length([0.0; 6], leg)));
+    let displacements = |pose: &[f64; 6]| {
+        std::array::from_fn(|leg| f64::from(length(pose.map(|v| v as f32), leg) - length([0.0; 6], leg)))
+    };
     poses.iter().map(displacements).collect()
 }
 

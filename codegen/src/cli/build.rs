@@ -132,7 +132,14 @@ impl Summary {
         let mut out = String::new();
         let target = &compiled.model.target;
         // Writing to a String cannot fail.
-        let _ = writeln!(out, "{} → {} (f{}, digest {})", self.name, self.output, compiled.ir.scalar.bits(), &self.digest[..16]);
+        let _ = writeln!(
+            out,
+            "{} → {} (f{}, digest {})",
+            self.name,
+            self.output,
+            compiled.ir.scalar.bits(),
+            &self.digest[..16]
+        );
         out.push_str(&describe(compiled));
         let _ = writeln!(
             out,
@@ -151,22 +158,39 @@ impl Summary {
             let _ = writeln!(
                 out,
                 "    flash         {}{} bytes: {} code, {} constants; a tick reaches {} bytes of code",
-                group(m.flash), of(target.flash), group(m.code), group(m.constants), group(m.tick_code)
+                group(m.flash),
+                of(target.flash),
+                group(m.code),
+                group(m.constants),
+                group(m.tick_code)
             );
-            let _ = writeln!(out, "    RAM           {}{} bytes, of which State {}", group(m.ram), of(target.ram), group(m.state));
-            let bound = m.stack_bound.map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes", group(bytes), of(target.stack)));
+            let _ = writeln!(
+                out,
+                "    RAM           {}{} bytes, of which State {}",
+                group(m.ram),
+                of(target.ram),
+                group(m.state)
+            );
+            let bound = m
+                .stack_bound
+                .map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes", group(bytes), of(target.stack)));
             let _ = writeln!(out, "    stack a tick  {bound} at most (static), {} seen", group(m.stack_painted));
             for stage in &m.stages {
                 let budget = if stage.name == "step" { of(target.instructions) } else { String::new() };
                 let _ = writeln!(
                     out,
                     "    {:<13} {:.0}{budget} instructions mean, {} to {} ({} calls)",
-                    stage.name, stage.mean, group(stage.min), group(stage.max), group(stage.calls)
+                    stage.name,
+                    stage.mean,
+                    group(stage.min),
+                    group(stage.max),
+                    group(stage.calls)
                 );
             }
             match &m.first_difference {
                 None => {
-                    let _ = writeln!(out, "    host and {} agree in every bit over {} ticks", m.machine, group(m.ticks));
+                    let _ =
+                        writeln!(out, "    host and {} agree in every bit over {} ticks", m.machine, group(m.ticks));
                 }
                 Some(difference) => {
                     let _ = writeln!(out, "    host and {} DIFFER: {difference}", m.machine);

@@ -82,19 +82,18 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let legs = std::array::from_fn(|_| parameters.clone());
     let scenario = LegScenario::new(&legs, &noise, arguments.plant.seed, arguments.samples);
     ui.progress("Table 2: three laws at three frequencies");
-    let tracking = scenario
-        .tracking(&mut controller, &TRACKING_FREQUENCIES)
-        .map_err(|error| environment(&error))?;
+    let tracking = scenario.tracking(&mut controller, &TRACKING_FREQUENCIES).map_err(|error| environment(&error))?;
     ui.progress("Table 1: inverse model alone at six frequencies");
-    let linearity = scenario
-        .linearity(&mut controller, &LINEARITY_FREQUENCIES)
-        .map_err(|error| environment(&error))?;
+    let linearity = scenario.linearity(&mut controller, &LINEARITY_FREQUENCIES).map_err(|error| environment(&error))?;
 
     if let Some(output) = &arguments.output {
         let mut files = vec![
             ("tracking.csv".to_owned(), tracking.to_csv().into_bytes()),
             ("linearity.csv".to_owned(), linearity.to_csv().into_bytes()),
-            ("tables.json".to_owned(), format!("{:#}\n", json!({ "tracking": tracking, "linearity": linearity })).into_bytes()),
+            (
+                "tables.json".to_owned(),
+                format!("{:#}\n", json!({ "tracking": tracking, "linearity": linearity })).into_bytes(),
+            ),
         ];
         for (mode, word) in MODES {
             select(&mut controller, word).map_err(|error| environment(&error))?;

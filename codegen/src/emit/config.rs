@@ -22,10 +22,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let run_interval = literal::count(d.run_interval as usize);
     let max_step = literal::integer(d.max_step);
     let leg_gain = literal::real(ir.scalar, ir.scalar.round(d.leg_gain));
-    let step_doc = format!(
-        " The largest step is `actuator.slew_rate` over a `timing.period` of {} s.",
-        d.period
-    );
+    let step_doc = format!(" The largest step is `actuator.slew_rate` over a `timing.period` of {} s.", d.period);
     quote! {
         #![doc = " What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build."]
 

@@ -60,11 +60,13 @@ fn space_items(text: &str) -> String {
     let mut previous = "";
     for line in text.lines() {
         let indent = line.len() - line.trim_start().len();
-        let starts = ["///", "#[", "pub ", "fn ", "impl", "const ", "static "].iter().any(|s| line.trim_start().starts_with(s));
+        let starts =
+            ["///", "#[", "pub ", "fn ", "impl", "const ", "static "].iter().any(|s| line.trim_start().starts_with(s));
         let ended = previous.len() - previous.trim_start().len() == indent
             && (previous.ends_with('}') || previous.ends_with(';') || previous.ends_with("];"))
             && !previous.trim_start().starts_with("//");
-        let same_kind = ["pub use ", "use ", "pub mod ", "mod "].iter().any(|s| previous.starts_with(s) && line.starts_with(s));
+        let same_kind =
+            ["pub use ", "use ", "pub mod ", "mod "].iter().any(|s| previous.starts_with(s) && line.starts_with(s));
         let inner = indent == 0 || (indent == 4 && (previous.ends_with('}')));
         if starts && ended && inner && !same_kind && !previous.trim_start().starts_with("#!") {
             out.push('\n');

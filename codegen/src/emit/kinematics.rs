@@ -20,10 +20,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
         None => quote! { 0.0 },
     };
     let newton_steps = literal::count(k.newton_steps as usize);
-    let steps_doc = format!(
-        " Newton steps for Δl: bring |Δl| ≤ {:.3e} m to the last bit of the scalar.",
-        k.largest_displacement
-    );
+    let steps_doc =
+        format!(" Newton steps for Δl: bring |Δl| ≤ {:.3e} m to the last bit of the scalar.", k.largest_displacement);
     quote! {
         #![doc = " Leg kinematics in difference form: leg displacements from rest, without the cancellation of |r| − l₀."]
 

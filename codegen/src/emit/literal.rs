@@ -17,7 +17,11 @@ pub fn real(scalar: Scalar, value: f64) -> TokenStream {
         // Lowering keeps every constant finite; `{:?}` of a finite number is a literal.
         Err(_) => unreachable!("{text} is no literal"),
     };
-    if value.is_sign_negative() { quote! { -#literal } } else { quote! { #literal } }
+    if value.is_sign_negative() {
+        quote! { -#literal }
+    } else {
+        quote! { #literal }
+    }
 }
 
 /// Numbers separated by commas.
@@ -40,7 +44,11 @@ pub fn count(value: usize) -> Literal {
 /// A signed integer without suffix.
 pub fn integer(value: i32) -> TokenStream {
     let magnitude = Literal::u32_unsuffixed(value.unsigned_abs());
-    if value < 0 { quote! { -#magnitude } } else { quote! { #magnitude } }
+    if value < 0 {
+        quote! { -#magnitude }
+    } else {
+        quote! { #magnitude }
+    }
 }
 
 #[cfg(test)]

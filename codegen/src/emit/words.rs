@@ -14,7 +14,14 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let mut outputs = per_leg(&["voltage", "requested", "demand", "level", "drift", "dac_code"]);
     outputs.push("status".to_owned());
     let config = [
-        "mode", "setpoint_kind", "level_weight", "drift_weight", "run_interval", "max_step_codes", "code_min", "code_max",
+        "mode",
+        "setpoint_kind",
+        "level_weight",
+        "drift_weight",
+        "run_interval",
+        "max_step_codes",
+        "code_min",
+        "code_max",
     ];
     let description = format!(
         "name={}\ndigest={}\nversion={}\nscalar_bits={}\nleg_gain={:?}\nperiod={:?}\ngrid={}\ndrive_range={:?},{:?}\nconfig_names={}\ninput_names={}\noutput_names={}\n",

@@ -44,11 +44,7 @@ pub fn branches(drive: &[f64], first: usize, retreat: f64) -> Vec<Branch> {
                 } else if advance == 0.0 {
                     peak_last = k;
                 } else if -advance >= retreat {
-                    found.push(Branch {
-                        first: start,
-                        end: peak_first + 1,
-                        rising: up,
-                    });
+                    found.push(Branch { first: start, end: peak_first + 1, rising: up });
                     start = peak_last;
                     (peak_first, peak_last) = (k, k);
                     rising = Some(!up);
@@ -57,11 +53,7 @@ pub fn branches(drive: &[f64], first: usize, retreat: f64) -> Vec<Branch> {
         }
     }
     if let Some(rising) = rising {
-        found.push(Branch {
-            first: start,
-            end: peak_first + 1,
-            rising,
-        });
+        found.push(Branch { first: start, end: peak_first + 1, rising });
     }
     found.retain(|b| b.end > b.first + 1);
     found
@@ -90,10 +82,7 @@ pub fn first_usable(record: &Record, tolerance: f64) -> Option<usize> {
             at += 1;
             continue;
         }
-        let stay = drive[at..]
-            .iter()
-            .take_while(|&&u| u <= low + tolerance)
-            .count();
+        let stay = drive[at..].iter().take_while(|&&u| u <= low + tolerance).count();
         let end = at + stay;
         if end >= drive.len() {
             break;
@@ -121,28 +110,14 @@ mod tests {
 
     #[test]
     fn branches_end_at_reversals_and_leave_out_holds() {
-        let drive = [
-            0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 2.9, 3.0, 2.0, 1.0, 0.0, 1.0, 2.0,
-        ];
+        let drive = [0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 2.9, 3.0, 2.0, 1.0, 0.0, 1.0, 2.0];
         let found = branches(&drive, 0, 0.5);
         assert_eq!(
             found,
             [
-                Branch {
-                    first: 1,
-                    end: 5,
-                    rising: true
-                },
-                Branch {
-                    first: 7,
-                    end: 11,
-                    rising: false
-                },
-                Branch {
-                    first: 10,
-                    end: 13,
-                    rising: true
-                },
+                Branch { first: 1, end: 5, rising: true },
+                Branch { first: 7, end: 11, rising: false },
+                Branch { first: 10, end: 13, rising: true },
             ]
         );
     }

@@ -16,11 +16,7 @@ pub(crate) const NAMES: [&str; 3] = ["time_s", "drive_V", "displacement_um"];
 const NEAR: usize = 4;
 
 /// Positions of the three columns in a header, or `None` after every problem was reported.
-pub(crate) fn locate(
-    header: &csv::StringRecord,
-    line: usize,
-    findings: &mut Findings,
-) -> Option<[usize; 3]> {
+pub(crate) fn locate(header: &csv::StringRecord, line: usize, findings: &mut Findings) -> Option<[usize; 3]> {
     let wanted = NAMES.map(|name| find(header, name, line, findings));
     match wanted {
         [Some(time), Some(drive), Some(displacement)] => Some([time, drive, displacement]),
@@ -28,39 +24,20 @@ pub(crate) fn locate(
     }
 }
 
-fn find(
-    header: &csv::StringRecord,
-    name: &str,
-    line: usize,
-    findings: &mut Findings,
-) -> Option<usize> {
-    let matching: Vec<usize> = (0..header.len())
-        .filter(|&i| header[i].trim().eq_ignore_ascii_case(name))
-        .collect();
+fn find(header: &csv::StringRecord, name: &str, line: usize, findings: &mut Findings) -> Option<usize> {
+    let matching: Vec<usize> = (0..header.len()).filter(|&i| header[i].trim().eq_ignore_ascii_case(name)).collect();
     match matching[..] {
         [only] => return Some(only),
         [] => {}
         [first, second, ..] => {
-            let message = format!(
-                "column `{name}` appears twice, as columns {} and {}",
-                first + 1,
-                second + 1
-            );
+            let message = format!("column `{name}` appears twice, as columns {} and {}", first + 1, second + 1);
             findings.error("E0505", Some(line), message, "keep one of them");
             return None;
         }
     }
     let present: Vec<String> = header.iter().map(|h| format!("`{}`", h.trim())).collect();
-    let message = format!(
-        "column `{name}` is missing; the header has {}",
-        present.join(", ")
-    );
-    findings.error(
-        "E0504",
-        Some(line),
-        message,
-        &missing_column_help(header, name),
-    );
+    let message = format!("column `{name}` is missing; the header has {}", present.join(", "));
+    findings.error("E0504", Some(line), message, &missing_column_help(header, name));
     None
 }
 
@@ -77,12 +54,7 @@ fn missing_column_help(header: &csv::StringRecord, name: &str) -> String {
         .iter()
         .map(str::trim)
         .filter(|h| !NAMES.iter().any(|other| h.eq_ignore_ascii_case(other)))
-        .map(|h| {
-            (
-                strsim::damerau_levenshtein(&h.to_ascii_lowercase(), &lower),
-                h,
-            )
-        })
+        .map(|h| (strsim::damerau_levenshtein(&h.to_ascii_lowercase(), &lower), h))
         .filter(|(distance, h)| *distance < NEAR || h.to_ascii_lowercase().starts_with(quantity))
         .min();
     match near {
@@ -113,37 +85,25 @@ mod tests {
         let found = locate(&csv::StringRecord::from(header.to_vec()), 1, &mut findings);
         let all = findings.into_diagnostics();
         assert_eq!(found.is_none(), !all.is_empty());
-        all.into_iter()
-            .map(|d| format!("{} / {}", d.message, d.help))
-            .collect()
+        all.into_iter().map(|d| format!("{} / {}", d.message, d.help)).collect()
     }
 
     #[test]
     fn order_case_and_extra_columns_do_not_matter() {
         let header = csv::StringRecord::from(vec!["note", "Displacement_UM", " TIME_S", "drive_v"]);
-        assert_eq!(
-            locate(&header, 1, &mut Findings::new("r.csv")),
-            Some([2, 3, 1])
-        );
+        assert_eq!(locate(&header, 1, &mut Findings::new("r.csv")), Some([2, 3, 1]));
     }
 
     #[test]
     fn near_misses_units_and_wrong_separators_get_their_own_advice() {
-        assert!(
-            help(&["tme_s", "drive_V", "displacement_um"])[0]
-                .contains("rename `tme_s` to `time_s`")
-        );
+        assert!(help(&["tme_s", "drive_V", "displacement_um"])[0].contains("rename `tme_s` to `time_s`"));
         assert!(
             help(&["time_s", "drive_V", "displacement_nm"])[0]
                 .contains("`displacement_nm` seems to be in another unit")
         );
-        assert!(
-            help(&["time_s;drive_V;displacement_um"])[0].contains("separate the columns by commas")
-        );
+        assert!(help(&["time_s;drive_V;displacement_um"])[0].contains("separate the columns by commas"));
         assert!(help(&["0.0", "1.0", "2.0"])[0].contains("first line must be the header"));
-        assert!(
-            help(&["time_s", "time_s", "drive_V", "displacement_um"])[0].contains("appears twice")
-        );
+        assert!(help(&["time_s", "time_s", "drive_V", "displacement_um"])[0].contains("appears twice"));
         assert!(help(&["time_s", "drive_V"])[0].contains("column `displacement_um` is missing"));
     }
 }

@@ -26,31 +26,13 @@ pub(crate) fn plane(options: &Options, findings: &mut Findings) -> Option<Plane>
     let [low, high] = options.drive;
     if !(2..=MAX_GRID).contains(&options.grid) {
         let message = format!("a grid of {} cannot be identified", options.grid);
-        findings.error(
-            "E0601",
-            None,
-            message,
-            "choose a grid from 2 to 64; 32 is usual",
-        );
+        findings.error("E0601", None, message, "choose a grid from 2 to 64; 32 is usual");
     }
     if !(low.is_finite() && high.is_finite() && low < high) {
-        let message =
-            format!("the declared drive range {low} V to {high} V is empty or not finite");
-        findings.error(
-            "E0602",
-            None,
-            message,
-            "declare the lowest voltage first, then the highest",
-        );
+        let message = format!("the declared drive range {low} V to {high} V is empty or not finite");
+        findings.error("E0602", None, message, "declare the lowest voltage first, then the highest");
     }
-    if findings.any_error() {
-        None
-    } else {
-        Some(Plane {
-            grid: options.grid,
-            range: [low, high],
-        })
-    }
+    if findings.any_error() { None } else { Some(Plane { grid: options.grid, range: [low, high] }) }
 }
 
 /// Compares the drive of the record with the declared range.
@@ -58,9 +40,7 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     let [low, high] = plane.range;
     let span = high - low;
     let (bottom, top) = extent(&record.drive);
-    let found = format!(
-        "the drive goes from {bottom} V to {top} V, but the spec declares {low} V to {high} V"
-    );
+    let found = format!("the drive goes from {bottom} V to {top} V, but the spec declares {low} V to {high} V");
     let ratio = (top - bottom) / span;
     let um = record.displacement_range() * 1e6;
     if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
@@ -74,14 +54,8 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
         return;
     }
     if (ratio - 1.0).abs() > 0.2 && (um / span - 1.0).abs() < 0.02 {
-        let message =
-            format!("{found}, and the displacement covers {um:.3}, the span of the drive");
-        findings.error(
-            "E0604",
-            None,
-            message,
-            "the columns `drive_V` and `displacement_um` seem to be swapped",
-        );
+        let message = format!("{found}, and the displacement covers {um:.3}, the span of the drive");
+        findings.error("E0604", None, message, "the columns `drive_V` and `displacement_um` seem to be swapped");
         return;
     }
     if bottom < low - BEYOND * span || top > high + BEYOND * span {
@@ -90,24 +64,12 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     }
     let interval = plane.interval();
     if bottom > low + interval {
-        let message =
-            format!("{found}: no cell with a down_threshold below {bottom} V was ever excited");
-        findings.error(
-            "E0606",
-            None,
-            message,
-            "let the drive fall to the lower end of its range between the curves",
-        );
+        let message = format!("{found}: no cell with a down_threshold below {bottom} V was ever excited");
+        findings.error("E0606", None, message, "let the drive fall to the lower end of its range between the curves");
     }
     if top < high - interval {
-        let message =
-            format!("{found}: no cell with an up_threshold above {top} V was ever excited");
-        findings.error(
-            "E0606",
-            None,
-            message,
-            "let the last curves rise to the upper end of the drive range",
-        );
+        let message = format!("{found}: no cell with an up_threshold above {top} V was ever excited");
+        findings.error("E0606", None, message, "let the last curves rise to the upper end of the drive range");
     }
 }
 
@@ -123,10 +85,8 @@ pub(crate) fn check_curves(branches: &[Branch], plane: &Plane, findings: &mut Fi
         );
         findings.error("E0607", None, message, help);
     } else if curves < plane.grid / 2 {
-        let message = format!(
-            "has {curves} reversal curves for a grid of {}: weights between them are interpolated",
-            plane.grid
-        );
+        let message =
+            format!("has {curves} reversal curves for a grid of {}: weights between them are interpolated", plane.grid);
         findings.warning("W0608", None, message, help);
     }
     curves
@@ -144,12 +104,7 @@ pub(crate) fn excited(plane: &Plane, gram: &DMatrix<f64>) -> Vec<bool> {
         let terms: Vec<(usize, f64)> = cells
             .iter()
             .filter(|(up, down)| *up <= plane.grid && down < up)
-            .map(|&(up, down)| {
-                (
-                    EverettTable::index(up, down),
-                    if (up + down) % 2 == 0 { 1.0 } else { -1.0 },
-                )
-            })
+            .map(|&(up, down)| (EverettTable::index(up, down), if (up + down) % 2 == 0 { 1.0 } else { -1.0 }))
             .collect();
         if terms.len() < cells.len() {
             return;
@@ -169,12 +124,7 @@ pub(crate) fn excited(plane: &Plane, gram: &DMatrix<f64>) -> Vec<bool> {
             require(&[(up, down)]);
             require(&[(up, down), (up + 1, down)]);
             require(&[(up, down), (up, down + 1)]);
-            require(&[
-                (up, down),
-                (up + 1, down),
-                (up, down + 1),
-                (up + 1, down + 1),
-            ]);
+            require(&[(up, down), (up + 1, down), (up, down + 1), (up + 1, down + 1)]);
         }
     }
     excited
@@ -186,21 +136,12 @@ pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Find
     if missing == 0 {
         return;
     }
-    let (mut up, mut down) = (
-        [f64::INFINITY, f64::NEG_INFINITY],
-        [f64::INFINITY, f64::NEG_INFINITY],
-    );
+    let (mut up, mut down) = ([f64::INFINITY, f64::NEG_INFINITY], [f64::INFINITY, f64::NEG_INFINITY]);
     let threshold = |k: usize| plane.range[0] + k as f64 * plane.interval();
     for i in 1..=plane.grid {
         for j in (0..i).filter(|&j| !excited[EverettTable::index(i, j)]) {
-            up = [
-                smaller(up[0], threshold(i - 1)),
-                -smaller(-up[1], -threshold(i)),
-            ];
-            down = [
-                smaller(down[0], threshold(j)),
-                -smaller(-down[1], -threshold(j + 1)),
-            ];
+            up = [smaller(up[0], threshold(i - 1)), -smaller(-up[1], -threshold(i))];
+            down = [smaller(down[0], threshold(j)), -smaller(-down[1], -threshold(j + 1))];
         }
     }
     let message = format!(
@@ -211,12 +152,7 @@ pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Find
         down[0],
         down[1],
     );
-    findings.warning(
-        "W0609",
-        None,
-        message,
-        "add reversal curves that turn back in that part of the range",
-    );
+    findings.warning("W0609", None, message, "add reversal curves that turn back in that part of the range");
 }
 
 fn smaller(a: f64, b: f64) -> f64 {

@@ -23,12 +23,7 @@ const WORTHWHILE: f64 = 0.1;
 
 /// Estimates the dead time in s, at most 16 sampling intervals; the text says how it was decided.
 #[must_use]
-pub fn estimate(
-    plane: &Plane,
-    record: &Record,
-    first: usize,
-    branches: &[Branch],
-) -> (f64, String) {
+pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch]) -> (f64, String) {
     let (slow, fast) = rates(record, branches);
     if fast < RATE_RATIO * slow {
         let why = format!(
@@ -38,9 +33,7 @@ pub fn estimate(
     }
     let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
     let step = sanity::median(&mut intervals) / PER_INTERVAL as f64;
-    let tried: Vec<f64> = (0..=LONGEST * PER_INTERVAL)
-        .map(|k| k as f64 * step)
-        .collect();
+    let tried: Vec<f64> = (0..=LONGEST * PER_INTERVAL).map(|k| k as f64 * step).collect();
     let scale = 1.0 / record.displacement_range();
     let mut shifts: Vec<Shift> = tried.iter().map(|&tau| Shift { tau, next: 0 }).collect();
     let fill = |k: usize, values: &mut [f64]| {
@@ -48,21 +41,10 @@ pub fn estimate(
             *value = scale * shift.displacement(record, k);
         }
     };
-    let mut normal = accumulate(
-        plane,
-        record,
-        first,
-        branches,
-        Weighting::Even,
-        tried.len(),
-        fill,
-    );
+    let mut normal = accumulate(plane, record, first, branches, Weighting::Even, tried.len(), fill);
     prior::add(plane.grid, &mut normal.gram);
     let Some(factor) = Cholesky::new(normal.gram) else {
-        return (
-            0.0,
-            "not identifiable: the record does not determine the table".to_owned(),
-        );
+        return (0.0, "not identifiable: the record does not determine the table".to_owned());
     };
     let residual: Vec<f64> = normal
         .rhs
@@ -73,39 +55,18 @@ pub fn estimate(
             energy - factor.solve(&rhs).dot(&rhs)
         })
         .collect();
-    let best = (0..tried.len()).fold(0, |best, k| {
-        if residual[k] < residual[best] {
-            k
-        } else {
-            best
-        }
-    });
+    let best = (0..tried.len()).fold(0, |best, k| if residual[k] < residual[best] { k } else { best });
     let gain = 1.0 - (residual[best] / residual[0]).sqrt();
     if best + 1 == tried.len() {
-        return (
-            0.0,
-            format!("not credible: the fit still improves at {} s", tried[best]),
-        );
+        return (0.0, format!("not credible: the fit still improves at {} s", tried[best]));
     }
     if best == 0 || gain.is_nan() || gain < WORTHWHILE {
-        return (
-            0.0,
-            format!(
-                "none: the best one lowers the residual by less than {:.0} %",
-                WORTHWHILE * 100.0
-            ),
-        );
+        return (0.0, format!("none: the best one lowers the residual by less than {:.0} %", WORTHWHILE * 100.0));
     }
     // Vertex of the parabola through the best one and its neighbours.
     let (a, b, c) = (residual[best - 1], residual[best], residual[best + 1]);
     let tau = tried[best] + 0.5 * step * (a - c) / (a - 2.0 * b + c);
-    (
-        tau,
-        format!(
-            "estimated: lowers the residual of the branches by {:.0} %",
-            gain * 100.0
-        ),
-    )
+    (tau, format!("estimated: lowers the residual of the branches by {:.0} %", gain * 100.0))
 }
 
 /// 10 % and 90 % quantile of the mean rates of the branches, V/s.
@@ -114,18 +75,11 @@ fn rates(record: &Record, branches: &[Branch]) -> (f64, f64) {
         .iter()
         .map(|b| {
             let last = b.end - 1;
-            ((record.drive[last] - record.drive[b.first])
-                / (record.time[last] - record.time[b.first]))
-                .abs()
+            ((record.drive[last] - record.drive[b.first]) / (record.time[last] - record.time[b.first])).abs()
         })
         .collect();
     rates.sort_unstable_by(f64::total_cmp);
-    let at = |share: f64| {
-        rates
-            .get((share * rates.len() as f64) as usize)
-            .copied()
-            .unwrap_or(0.0)
-    };
+    let at = |share: f64| rates.get((share * rates.len() as f64) as usize).copied().unwrap_or(0.0);
     (at(0.1), at(0.9))
 }
 
@@ -133,9 +87,7 @@ fn rates(record: &Record, branches: &[Branch]) -> (f64, f64) {
 #[must_use]
 pub fn delayed(record: &Record, tau: f64) -> Vec<f64> {
     let mut shift = Shift { tau, next: 0 };
-    (0..record.time.len())
-        .map(|k| shift.displacement(record, k))
-        .collect()
+    (0..record.time.len()).map(|k| shift.displacement(record, k)).collect()
 }
 
 /// Reads a displacement `tau` later than asked for, for samples in ascending order.

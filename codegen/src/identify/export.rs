@@ -16,12 +16,7 @@ pub fn write_table_csv(table: &EverettTable) -> String {
         for down in 0..up {
             let um = table.node(up, down) * 1e6;
             // Writing to a String cannot fail.
-            let _ = writeln!(
-                text,
-                "{:?},{:?},{um:?}",
-                table.threshold(up),
-                table.threshold(down)
-            );
+            let _ = writeln!(text, "{:?},{:?},{um:?}", table.threshold(up), table.threshold(down));
         }
     }
     text
@@ -34,34 +29,18 @@ pub fn write_table_csv(table: &EverettTable) -> String {
 pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
     let help = "write the file with `specgen identify`";
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .map(|(k, line)| (k + 1, line.trim()));
+    let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim()));
     if lines.next().is_none_or(|(_, header)| header != HEADER) {
-        findings.error(
-            "E0613",
-            Some(1),
-            format!("the header must be `{HEADER}`"),
-            help,
-        );
+        findings.error("E0613", Some(1), format!("the header must be `{HEADER}`"), help);
         return Err(findings.into_diagnostics());
     }
     let mut values = Vec::new();
     for (line, text) in lines.filter(|(_, text)| !text.is_empty()) {
-        let fields: Vec<f64> = text
-            .split(',')
-            .filter_map(|f| f.trim().parse().ok())
-            .filter(|x: &f64| x.is_finite())
-            .collect();
+        let fields: Vec<f64> =
+            text.split(',').filter_map(|f| f.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();
         match fields[..] {
             [up, down, um] => values.push([up, down, um]),
-            _ => findings.error(
-                "E0613",
-                Some(line),
-                "is not three finite numbers".to_owned(),
-                help,
-            ),
+            _ => findings.error("E0613", Some(line), "is not three finite numbers".to_owned(), help),
         }
     }
     let grid = (1..=256).find(|n| n * (n + 1) / 2 == values.len());
@@ -73,10 +52,7 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
             nodes: values.iter().map(|v| v[2] * 1e-6).collect(),
         },
         _ => {
-            let message = format!(
-                "{} nodes do not make a triangle of rising thresholds",
-                values.len()
-            );
+            let message = format!("{} nodes do not make a triangle of rising thresholds", values.len());
             findings.error("E0613", None, message, help);
             return Err(findings.into_diagnostics());
         }
@@ -86,9 +62,7 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
         for down in 0..up {
             let at = EverettTable::index(up, down);
             let wanted = [table.threshold(up), table.threshold(down)];
-            if (values[at][0] - wanted[0]).abs() > tolerance
-                || (values[at][1] - wanted[1]).abs() > tolerance
-            {
+            if (values[at][0] - wanted[0]).abs() > tolerance || (values[at][1] - wanted[1]).abs() > tolerance {
                 let message = format!(
                     "thresholds {} V, {} V; expected {} V, {} V",
                     values[at][0], values[at][1], wanted[0], wanted[1]
@@ -97,9 +71,5 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
             }
         }
     }
-    if findings.any_error() {
-        Err(findings.into_diagnostics())
-    } else {
-        Ok(table)
-    }
+    if findings.any_error() { Err(findings.into_diagnostics()) } else { Ok(table) }
 }

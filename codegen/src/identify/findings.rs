@@ -18,58 +18,25 @@ pub(crate) struct Findings {
 impl Findings {
     /// An empty collection for the file that the user knows as `path`.
     pub(crate) fn new(path: &str) -> Self {
-        Self {
-            path: path.to_owned(),
-            found: Vec::new(),
-            count: BTreeMap::new(),
-        }
+        Self { path: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
     }
 
     /// Adds an error about `line`, or about the whole file.
-    pub(crate) fn error(
-        &mut self,
-        code: &'static str,
-        line: Option<usize>,
-        message: String,
-        help: &str,
-    ) {
+    pub(crate) fn error(&mut self, code: &'static str, line: Option<usize>, message: String, help: &str) {
         self.add(Severity::Error, code, line, message, help);
     }
 
     /// Adds a warning about `line`, or about the whole file.
-    pub(crate) fn warning(
-        &mut self,
-        code: &'static str,
-        line: Option<usize>,
-        message: String,
-        help: &str,
-    ) {
+    pub(crate) fn warning(&mut self, code: &'static str, line: Option<usize>, message: String, help: &str) {
         self.add(Severity::Warning, code, line, message, help);
     }
 
-    fn add(
-        &mut self,
-        severity: Severity,
-        code: &'static str,
-        line: Option<usize>,
-        message: String,
-        help: &str,
-    ) {
+    fn add(&mut self, severity: Severity, code: &'static str, line: Option<usize>, message: String, help: &str) {
         let count = self.count.entry(code).or_insert(0);
         *count += 1;
         if *count <= SHOWN_PER_CODE {
-            let place = Place::File {
-                path: self.path.clone(),
-                line,
-            };
-            self.found.push(Diagnostic {
-                severity,
-                code,
-                key: String::new(),
-                place,
-                message,
-                help: help.to_owned(),
-            });
+            let place = Place::File { path: self.path.clone(), line };
+            self.found.push(Diagnostic { severity, code, key: String::new(), place, message, help: help.to_owned() });
         }
     }
 
@@ -80,24 +47,14 @@ impl Findings {
 
     /// All findings in the order found, followed by one line for each kind that was cut short.
     pub(crate) fn into_diagnostics(self) -> Vec<Diagnostic> {
-        let Self {
-            path,
-            mut found,
-            count,
-        } = self;
+        let Self { path, mut found, count } = self;
         for (code, n) in count.into_iter().filter(|(_, n)| *n > SHOWN_PER_CODE) {
-            let severity = found
-                .iter()
-                .find(|d| d.code == code)
-                .map_or(Severity::Error, |d| d.severity);
+            let severity = found.iter().find(|d| d.code == code).map_or(Severity::Error, |d| d.severity);
             found.push(Diagnostic {
                 severity,
                 code,
                 key: String::new(),
-                place: Place::File {
-                    path: path.clone(),
-                    line: None,
-                },
+                place: Place::File { path: path.clone(), line: None },
                 message: format!("and {} more lines like this ({code})", n - SHOWN_PER_CODE),
                 help: String::new(),
             });
@@ -118,10 +75,6 @@ mod tests {
         }
         let all = findings.into_diagnostics();
         assert_eq!(all.len(), SHOWN_PER_CODE + 1);
-        assert!(
-            all[SHOWN_PER_CODE].message.contains("and 37 more lines"),
-            "{}",
-            all[SHOWN_PER_CODE].message
-        );
+        assert!(all[SHOWN_PER_CODE].message.contains("and 37 more lines"), "{}", all[SHOWN_PER_CODE].message);
     }
 }

@@ -40,12 +40,7 @@ pub fn solve(gram: &DMatrix<f64>, rhs: &[f64]) -> Result<Solution, Failure> {
 }
 
 /// `fewest` is the number of wrong signs that counts as the best so far: 0 leaves only the backup rule once `patience` is used up.
-fn solve_with(
-    gram: &DMatrix<f64>,
-    rhs: &[f64],
-    mut fewest: usize,
-    patience: usize,
-) -> Result<Solution, Failure> {
+fn solve_with(gram: &DMatrix<f64>, rhs: &[f64], mut fewest: usize, patience: usize) -> Result<Solution, Failure> {
     let n = rhs.len();
     let mut scale = Vec::with_capacity(n);
     for k in 0..n {
@@ -56,9 +51,7 @@ fn solve_with(
         scale.push(1.0 / diagonal.sqrt());
     }
     let target: Vec<f64> = rhs.iter().zip(&scale).map(|(b, s)| b * s).collect();
-    let largest = target
-        .iter()
-        .fold(0.0, |m: f64, b| if b.abs() > m { b.abs() } else { m });
+    let largest = target.iter().fold(0.0, |m: f64, b| if b.abs() > m { b.abs() } else { m });
     let limit = 5 * n + 50;
 
     let mut free = vec![true; n];
@@ -67,15 +60,8 @@ fn solve_with(
         let weights = restricted(gram, &scale, &target, &free)?;
         let wrong = wrong_signs(gram, &scale, &target, &free, &weights, largest);
         let Some(&last) = wrong.last() else {
-            let weights = weights
-                .iter()
-                .zip(&scale)
-                .map(|(w, s)| if *w > 0.0 { w * s } else { 0.0 })
-                .collect();
-            return Ok(Solution {
-                weights,
-                iterations: iteration,
-            });
+            let weights = weights.iter().zip(&scale).map(|(w, s)| if *w > 0.0 { w * s } else { 0.0 }).collect();
+            return Ok(Solution { weights, iterations: iteration });
         };
         let progress = wrong.len() < fewest;
         if progress {
@@ -95,27 +81,15 @@ fn solve_with(
 }
 
 /// Minimiser of the scaled problem with the weights outside `free` held at zero.
-fn restricted(
-    gram: &DMatrix<f64>,
-    scale: &[f64],
-    target: &[f64],
-    free: &[bool],
-) -> Result<Vec<f64>, Failure> {
+fn restricted(gram: &DMatrix<f64>, scale: &[f64], target: &[f64], free: &[bool]) -> Result<Vec<f64>, Failure> {
     let chosen: Vec<usize> = (0..free.len()).filter(|&k| free[k]).collect();
     let mut weights = vec![0.0; free.len()];
     let matrix = DMatrix::from_fn(chosen.len(), chosen.len(), |r, c| {
         let (row, column) = (chosen[r], chosen[c]);
-        if row >= column {
-            scale[row] * gram[(row, column)] * scale[column]
-        } else {
-            0.0
-        }
+        if row >= column { scale[row] * gram[(row, column)] * scale[column] } else { 0.0 }
     });
     let factor = Cholesky::new(matrix).ok_or(Failure::Singular)?;
-    let solution = factor.solve(&DVector::from_iterator(
-        chosen.len(),
-        chosen.iter().map(|&k| target[k]),
-    ));
+    let solution = factor.solve(&DVector::from_iterator(chosen.len(), chosen.iter().map(|&k| target[k])));
     for (&k, w) in chosen.iter().zip(solution.iter()) {
         weights[k] = *w;
     }
@@ -133,13 +107,7 @@ fn wrong_signs(
 ) -> Vec<usize> {
     let gradient = gradient(gram, scale, target, weights);
     (0..free.len())
-        .filter(|&k| {
-            if free[k] {
-                weights[k] < -TOLERANCE * largest
-            } else {
-                gradient[k] < -TOLERANCE * largest
-            }
-        })
+        .filter(|&k| if free[k] { weights[k] < -TOLERANCE * largest } else { gradient[k] < -TOLERANCE * largest })
         .collect()
 }
 
@@ -149,11 +117,7 @@ fn gradient(gram: &DMatrix<f64>, scale: &[f64], target: &[f64], weights: &[f64])
     for column in (0..n).filter(|&c| weights[c] != 0.0) {
         let w = weights[column] * scale[column];
         for (row, g) in gradient.iter_mut().enumerate() {
-            let entry = if row >= column {
-                gram[(row, column)]
-            } else {
-                gram[(column, row)]
-            };
+            let entry = if row >= column { gram[(row, column)] } else { gram[(column, row)] };
             *g += scale[row] * entry * w;
         }
     }
@@ -167,24 +131,18 @@ pub fn kkt_violation(gram: &DMatrix<f64>, rhs: &[f64], weights: &[f64]) -> f64 {
     let scale: Vec<f64> = (0..rhs.len()).map(|k| 1.0 / gram[(k, k)].sqrt()).collect();
     let target: Vec<f64> = rhs.iter().zip(&scale).map(|(b, s)| b * s).collect();
     let scaled: Vec<f64> = weights.iter().zip(&scale).map(|(w, s)| w / s).collect();
-    let largest = target.iter().fold(
-        f64::MIN_POSITIVE,
-        |m: f64, b| if b.abs() > m { b.abs() } else { m },
-    );
+    let largest = target.iter().fold(f64::MIN_POSITIVE, |m: f64, b| if b.abs() > m { b.abs() } else { m });
     let gradient = gradient(gram, &scale, &target, &scaled);
-    let worst = scaled
-        .iter()
-        .zip(gradient)
-        .fold(0.0, |worst: f64, (&w, g)| {
-            let violation = if w < 0.0 {
-                -w
-            } else if w > 0.0 {
-                g.abs()
-            } else {
-                -g
-            };
-            if violation > worst { violation } else { worst }
-        });
+    let worst = scaled.iter().zip(gradient).fold(0.0, |worst: f64, (&w, g)| {
+        let violation = if w < 0.0 {
+            -w
+        } else if w > 0.0 {
+            g.abs()
+        } else {
+            -g
+        };
+        if violation > worst { violation } else { worst }
+    });
     worst / largest
 }
 
@@ -204,12 +162,7 @@ mod tests {
         let rhs: Vec<f64> = (0..n).map(|_| uniform() - 0.5).collect();
         let full = solve(&gram, &rhs).unwrap();
         let backup = solve_with(&gram, &rhs, 0, 0).unwrap();
-        assert!(
-            backup.iterations > full.iterations,
-            "{} against {}",
-            backup.iterations,
-            full.iterations
-        );
+        assert!(backup.iterations > full.iterations, "{} against {}", backup.iterations, full.iterations);
         for (x, y) in full.weights.iter().zip(&backup.weights) {
             assert!((x - y).abs() < 1e-9 * (1.0 + x.abs()), "{x} against {y}");
         }

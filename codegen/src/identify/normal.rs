@@ -26,13 +26,7 @@ pub struct Normal {
 
 /// Calls `visit(sample, row)` for every sample from `first` on, with negative saturation before it.
 pub fn each_row(plane: &Plane, drive: &[f64], first: usize, visit: impl FnMut(usize, &[Term])) {
-    each_row_from(
-        Staircase::negative_saturation(plane.range),
-        plane,
-        drive,
-        first,
-        visit,
-    );
+    each_row_from(Staircase::negative_saturation(plane.range), plane, drive, first, visit);
 }
 
 /// Like [`each_row`], with another memory before sample `first`.
@@ -116,13 +110,7 @@ pub fn accumulate(
         }
     });
     sums.close_branch();
-    let Sums {
-        mut gram,
-        mut rhs,
-        energy,
-        samples,
-        ..
-    } = sums;
+    let Sums { mut gram, mut rhs, energy, samples, .. } = sums;
     mirror(&mut gram);
     for column in 0..nodes {
         nodes_to_weights(plane.grid, gram.column_mut(column).as_mut_slice());
@@ -134,12 +122,7 @@ pub fn accumulate(
     for b in &mut rhs {
         nodes_to_weights(plane.grid, b);
     }
-    Normal {
-        gram,
-        rhs,
-        energy,
-        samples,
-    }
+    Normal { gram, rhs, energy, samples }
 }
 
 /// Running sums over Everett nodes.

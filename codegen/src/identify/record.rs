@@ -46,19 +46,11 @@ impl Record {
         let mut findings = Findings::new(shown_as);
         let n = time.len();
         if drive.len() != n || displacement.len() != n {
-            let message = format!(
-                "columns of {n}, {} and {} samples",
-                drive.len(),
-                displacement.len()
-            );
+            let message = format!("columns of {n}, {} and {} samples", drive.len(), displacement.len());
             findings.error("E0507", None, message, "give columns of equal length");
             return Err(findings.into_diagnostics());
         }
-        for (column, name) in [
-            (&time, NAMES[TIME]),
-            (&drive, NAMES[DRIVE]),
-            (&displacement, NAMES[DISPLACEMENT]),
-        ] {
+        for (column, name) in [(&time, NAMES[TIME]), (&drive, NAMES[DRIVE]), (&displacement, NAMES[DISPLACEMENT])] {
             for (k, x) in column.iter().enumerate().filter(|(_, x)| !x.is_finite()) {
                 report_not_finite(&mut findings, k + 2, name, &x.to_string());
             }
@@ -107,23 +99,13 @@ fn finish(
     }
     let [time, drive, displacement] = columns;
     let warnings = findings.into_diagnostics();
-    Ok(Record {
-        shown_as: shown_as.to_owned(),
-        time,
-        drive,
-        displacement,
-        warnings,
-    })
+    Ok(Record { shown_as: shown_as.to_owned(), time, drive, displacement, warnings })
 }
 
 /// The text of the file without a byte order mark, or `None` after the reason was reported.
 fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
-    let unreadable = |e: std::io::Error| {
-        (
-            format!("cannot be read: {e}"),
-            "name an existing CSV file, relative to the spec",
-        )
-    };
+    let unreadable =
+        |e: std::io::Error| (format!("cannot be read: {e}"), "name an existing CSV file, relative to the spec");
     let bytes = match read_limited(path) {
         Ok(bytes) => bytes,
         Err(e) => {
@@ -134,12 +116,7 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
     };
     if bytes.len() as u64 > MAX_FILE_BYTES {
         let message = format!("is larger than {} MiB", MAX_FILE_BYTES >> 20);
-        findings.error(
-            "E0502",
-            None,
-            message,
-            "record at a lower rate, or keep every n-th sample",
-        );
+        findings.error("E0502", None, message, "record at a lower rate, or keep every n-th sample");
         return None;
     }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
@@ -147,16 +124,8 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
     let bad = std::str::from_utf8(bytes).err().map(|e| e.valid_up_to());
     if let Some(at) = end_of_text.or(bad) {
         let line = 1 + bytes[..at].iter().filter(|&&b| b == b'\n').count();
-        let message = format!(
-            "is not a text file in UTF-8: byte {at} is 0x{:02x}",
-            bytes[at]
-        );
-        findings.error(
-            "E0503",
-            Some(line),
-            message,
-            "export the record as CSV text in UTF-8",
-        );
+        let message = format!("is not a text file in UTF-8: byte {at} is 0x{:02x}", bytes[at]);
+        findings.error("E0503", Some(line), message, "export the record as CSV text in UTF-8");
         return None;
     }
     Some(String::from_utf8_lossy(bytes).into_owned())
@@ -180,20 +149,12 @@ fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 
         findings.error("E0504", None, "is empty".to_owned(), &help);
         return None;
     }
-    let mut reader = csv::ReaderBuilder::new()
-        .flexible(true)
-        .comment(Some(b'#'))
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
+    let mut reader =
+        csv::ReaderBuilder::new().flexible(true).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
     let header = match reader.headers() {
         Ok(header) => header.clone(),
         Err(e) => {
-            findings.error(
-                "E0504",
-                Some(1),
-                format!("the header cannot be read: {e}"),
-                "write plain CSV",
-            );
+            findings.error("E0504", Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
             return None;
         }
     };
@@ -212,12 +173,7 @@ fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 
             }
             Err(e) => {
                 let line = e.position().map(|p| p.line() as usize);
-                findings.error(
-                    "E0506",
-                    line,
-                    format!("cannot be read as CSV: {e}"),
-                    "write plain CSV",
-                );
+                findings.error("E0506", line, format!("cannot be read as CSV: {e}"), "write plain CSV");
             }
         }
     }
@@ -244,12 +200,7 @@ fn number(field: Option<&str>, line: usize, name: &str, findings: &mut Findings)
         Err(_) => {
             let shown: String = field.chars().take(40).collect();
             let message = format!("`{name}` is `{shown}`, which is not a number");
-            findings.error(
-                "E0506",
-                Some(line),
-                message,
-                "write a plain number with a decimal point, such as -12.5e-3",
-            );
+            findings.error("E0506", Some(line), message, "write a plain number with a decimal point, such as -12.5e-3");
             f64::NAN
         }
     }

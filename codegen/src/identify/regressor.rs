@@ -63,10 +63,7 @@ impl Plane {
         let position = (drive - self.range[0]) / self.interval();
         // A float-to-integer cast saturates, so that no drive leads outside the grid.
         let index = (position as usize).min(self.grid - 1);
-        (
-            index,
-            super::staircase::saturate(position - index as f64, [0.0, 1.0]),
-        )
+        (index, super::staircase::saturate(position - index as f64, [0.0, 1.0]))
     }
 }
 
@@ -79,7 +76,5 @@ fn push(row: &mut Vec<Term>, up: usize, down: usize, coefficient: f64) {
 /// Σ coefficient·node of a row: the model's displacement above negative saturation, in the unit of `nodes`.
 #[must_use]
 pub fn evaluate(row: &[Term], nodes: &[f64]) -> f64 {
-    row.iter().fold(0.0, |sum, &(node, coefficient)| {
-        sum + coefficient * nodes[node]
-    })
+    row.iter().fold(0.0, |sum, &(node, coefficient)| sum + coefficient * nodes[node])
 }

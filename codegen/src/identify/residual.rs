@@ -21,31 +21,16 @@ pub(crate) struct Residual {
 
 impl Residual {
     /// Runs `table` over the used samples of `displacement` (m, dead time and drift already removed).
-    pub(crate) fn of(
-        plane: &Plane,
-        record: &Record,
-        used: &Used,
-        displacement: &[f64],
-        table: &EverettTable,
-    ) -> Self {
+    pub(crate) fn of(plane: &Plane, record: &Record, used: &Used, displacement: &[f64], table: &EverettTable) -> Self {
         let mut plain = Vec::with_capacity(displacement.len() - used.first);
         normal::each_row(plane, &record.drive, used.first, |k, row| {
             plain.push(displacement[k] - regressor::evaluate(row, &table.nodes));
         });
         let time = &record.time[used.first..];
         let line = trend::Line::fit(time, &plain);
-        let detrended = plain
-            .iter()
-            .zip(time)
-            .map(|(r, t)| r - line.at(*t))
-            .collect();
+        let detrended = plain.iter().zip(time).map(|(r, t)| r - line.at(*t)).collect();
         let (low, high) = sanity::extent(&displacement[used.first..]);
-        Self {
-            plain,
-            detrended,
-            line,
-            range: high - low,
-        }
+        Self { plain, detrended, line, range: high - low }
     }
 
     /// Root mean square over `branches` with the mean of each branch removed, m.
@@ -57,10 +42,6 @@ impl Residual {
             sum = part.iter().fold(sum, |s, r| s + (r - mean) * (r - mean));
             count += part.len() as f64;
         }
-        if count > 0.0 {
-            (sum / count).sqrt()
-        } else {
-            0.0
-        }
+        if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
     }
 }

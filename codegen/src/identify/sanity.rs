@@ -16,25 +16,14 @@ const PLAUSIBLE_RANGE: [f64; 2] = [50e-9, 2e-3];
 pub(crate) fn check(lines: &[usize], columns: &[Vec<f64>; 3], findings: &mut Findings) {
     let [time, drive, displacement] = columns;
     if time.len() < MIN_SAMPLES {
-        let message = format!(
-            "has {} samples; at least {MIN_SAMPLES} are needed",
-            time.len()
-        );
-        findings.error(
-            "E0509",
-            None,
-            message,
-            "record more samples per reversal curve",
-        );
+        let message = format!("has {} samples; at least {MIN_SAMPLES} are needed", time.len());
+        findings.error("E0509", None, message, "record more samples per reversal curve");
         return;
     }
     check_time(lines, time, findings);
-    let moving = [
-        (drive, "drive_V", DRIVE),
-        (displacement, "displacement_um", DISPLACEMENT),
-    ]
-    .into_iter()
-    .all(|(column, name, which)| check_not_constant(column, name, which, findings));
+    let moving = [(drive, "drive_V", DRIVE), (displacement, "displacement_um", DISPLACEMENT)]
+        .into_iter()
+        .all(|(column, name, which)| check_not_constant(column, name, which, findings));
     if moving {
         check_stuck(lines, drive, displacement, findings);
         check_sign(drive, displacement, findings);
@@ -47,11 +36,7 @@ fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings) {
     let mut increasing = true;
     for (k, dt) in intervals.iter().enumerate().filter(|(_, dt)| **dt <= 0.0) {
         increasing = false;
-        let message = format!(
-            "time goes from {} s to {} s ({dt:e} s); it must increase",
-            time[k],
-            time[k + 1]
-        );
+        let message = format!("time goes from {} s to {} s ({dt:e} s); it must increase", time[k], time[k + 1]);
         let help = if *dt == 0.0 {
             "delete the repeated sample, or write the time with more digits"
         } else {
@@ -63,11 +48,7 @@ fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings) {
         return;
     }
     let gap = GAP * median(&mut intervals);
-    for (k, w) in time
-        .windows(2)
-        .enumerate()
-        .filter(|(_, w)| w[1] - w[0] > gap)
-    {
+    for (k, w) in time.windows(2).enumerate().filter(|(_, w)| w[1] - w[0] > gap) {
         let message = format!(
             "nothing was recorded between {} s and {} s ({:.0} sampling intervals)",
             w[0],
@@ -88,18 +69,9 @@ fn check_not_constant(column: &[f64], name: &str, which: usize, findings: &mut F
     if low < high {
         return true;
     }
-    let shown = if which == DISPLACEMENT {
-        low * 1e6
-    } else {
-        low
-    };
+    let shown = if which == DISPLACEMENT { low * 1e6 } else { low };
     let message = format!("`{name}` is {shown} in every sample");
-    findings.error(
-        "E0512",
-        None,
-        message,
-        "record while the drive runs through its range; is the channel connected?",
-    );
+    findings.error("E0512", None, message, "record while the drive runs through its range; is the channel connected?");
     false
 }
 
@@ -109,18 +81,11 @@ fn check_stuck(lines: &[usize], drive: &[f64], displacement: &[f64], findings: &
     let mut first = 0;
     while first < drive.len() {
         let value = displacement[first];
-        let run = displacement[first..]
-            .iter()
-            .take_while(|y| **y == value)
-            .count();
+        let run = displacement[first..].iter().take_while(|y| **y == value).count();
         let (run_low, run_high) = extent(&drive[first..first + run]);
         if run_high - run_low > STUCK_TRAVEL * (high - low) {
             let um = value * 1e6;
-            let what = if value == bottom || value == top {
-                "is limited at"
-            } else {
-                "is stuck at"
-            };
+            let what = if value == bottom || value == top { "is limited at" } else { "is stuck at" };
             let message = format!(
                 "the displacement {what} {um} um for {run} samples while the drive goes through {run_low} V to {run_high} V"
             );
@@ -148,24 +113,13 @@ fn check_sign(drive: &[f64], displacement: &[f64], findings: &mut Findings) {
     }
     let correlation = uy / (uu * yy).sqrt();
     if correlation < -0.5 {
-        let message =
-            format!("the displacement falls when the drive rises (correlation {correlation:.2})");
-        findings.error(
-            "E0514",
-            None,
-            message,
-            "change the sign of one of the two columns",
-        );
+        let message = format!("the displacement falls when the drive rises (correlation {correlation:.2})");
+        findings.error("E0514", None, message, "change the sign of one of the two columns");
     } else if correlation < 0.5 {
         let message = format!(
             "the displacement hardly follows the drive (correlation {correlation:.2}; a piezo actuator shows more than 0.9)"
         );
-        findings.error(
-            "E0514",
-            None,
-            message,
-            "check that `drive_V` and `displacement_um` hold what their names say",
-        );
+        findings.error("E0514", None, message, "check that `drive_V` and `displacement_um` hold what their names say");
     }
 }
 
@@ -174,9 +128,7 @@ fn check_displacement_unit(displacement: &[f64], findings: &mut Findings) {
     let range = high - low;
     let um = range * 1e6;
     if range > PLAUSIBLE_RANGE[1] {
-        let message = format!(
-            "the displacement covers {um:.0} um, too much for a piezo actuator: is it in nm?"
-        );
+        let message = format!("the displacement covers {um:.0} um, too much for a piezo actuator: is it in nm?");
         findings.warning("W0515", None, message, "convert the column to micrometres");
     } else if range < PLAUSIBLE_RANGE[0] {
         let message = format!("the displacement covers only {um:.2e} um: is it in mm or m?");
@@ -186,14 +138,9 @@ fn check_displacement_unit(displacement: &[f64], findings: &mut Findings) {
 
 /// Smallest and largest value of finite numbers; (+inf, -inf) if there are none.
 pub(crate) fn extent(values: &[f64]) -> (f64, f64) {
-    values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| {
-            (
-                if x < low { x } else { low },
-                if x > high { x } else { high },
-            )
-        })
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| {
+        (if x < low { x } else { low }, if x > high { x } else { high })
+    })
 }
 
 /// Middle value (upper middle of an even count); 0 for an empty slice. Reorders the slice.

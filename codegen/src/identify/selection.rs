@@ -35,12 +35,7 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
     let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
     let Some(first) = branches::first_usable(record, tolerance) else {
         let message = "the drive never rises from its minimum".to_owned();
-        findings.error(
-            "E0607",
-            None,
-            message,
-            "start at the lowest drive, then rise to each reversal and fall back",
-        );
+        findings.error("E0607", None, message, "start at the lowest drive, then rise to each reversal and fall back");
         return None;
     };
     let branches = branches::branches(&record.drive, first, REVERSAL * plane.interval());
@@ -50,40 +45,19 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
     }
     let rises = branches.iter().filter(|b| b.rising);
     let minimum = at_minimum(record, plane);
-    let from_saturation = rises
-        .clone()
-        .filter(|b| record.drive[b.first] <= minimum)
-        .count();
+    let from_saturation = rises.clone().filter(|b| record.drive[b.first] <= minimum).count();
     let first_order = from_saturation as f64 >= FIRST_ORDER * rises.count() as f64;
-    Some(Used {
-        first,
-        branches,
-        curves,
-        first_order,
-    })
+    Some(Used { first, branches, curves, first_order })
 }
 
 /// Normal equations over the falls of first-order reversal curves, if they excite the plane as well as all branches do,
 /// else over all branches: in other records it takes the rises to tell apart cells that only switch off together.
 /// The third value says of each cell whether the chosen branches excite it.
-pub(crate) fn select(
-    plane: &Plane,
-    record: &Record,
-    used: &Used,
-    target: &[f64],
-) -> (Normal, Branches, Vec<bool>) {
+pub(crate) fn select(plane: &Plane, record: &Record, used: &Used, target: &[f64]) -> (Normal, Branches, Vec<bool>) {
     let over = |branches: &[Branch], weighting| {
-        normal::accumulate(
-            plane,
-            record,
-            used.first,
-            branches,
-            weighting,
-            1,
-            |k, values| {
-                values[0] = target[k];
-            },
-        )
+        normal::accumulate(plane, record, used.first, branches, weighting, 1, |k, values| {
+            values[0] = target[k];
+        })
     };
     let all = over(&used.branches, Weighting::Even);
     let excited_by_all = coverage::excited(plane, &all.gram);
@@ -109,11 +83,7 @@ pub(crate) fn share(excited: &[bool]) -> f64 {
 }
 
 /// Drift in m/s over the returns to negative saturation, and their number.
-pub(crate) fn drift_of_returns(
-    record: &Record,
-    branches: &[Branch],
-    plane: &Plane,
-) -> (f64, usize) {
+pub(crate) fn drift_of_returns(record: &Record, branches: &[Branch], plane: &Plane) -> (f64, usize) {
     let minimum = at_minimum(record, plane);
     let returns: Vec<(f64, f64)> = branches
         .iter()

@@ -16,10 +16,7 @@ impl Staircase {
     /// Negative saturation: every relay is off. `range` in V, lower end first.
     #[must_use]
     pub fn negative_saturation(range: [f64; 2]) -> Self {
-        Self {
-            range,
-            extrema: vec![range[0]],
-        }
+        Self { range, extrema: vec![range[0]] }
     }
 
     /// Moves the drive monotonically to `drive` (V, saturated to the range).
@@ -59,11 +56,7 @@ impl Staircase {
 
 /// Whether `u` passes the extremum before the top one, which is a minimum if the top is a maximum.
 fn beyond(u: f64, before: f64, top_is_maximum: bool) -> bool {
-    if top_is_maximum {
-        u <= before
-    } else {
-        u >= before
-    }
+    if top_is_maximum { u <= before } else { u >= before }
 }
 
 /// `x` limited to `range`.
@@ -91,10 +84,7 @@ mod tests {
 
     #[test]
     fn wiping_out_a_larger_extremum_forgets_the_smaller_ones() {
-        assert_eq!(
-            after(&[8.0, 2.0, 6.0, 3.0, 5.0]),
-            [0.0, 8.0, 2.0, 6.0, 3.0, 5.0]
-        );
+        assert_eq!(after(&[8.0, 2.0, 6.0, 3.0, 5.0]), [0.0, 8.0, 2.0, 6.0, 3.0, 5.0]);
         assert_eq!(after(&[8.0, 2.0, 6.0, 3.0, 6.5]), [0.0, 8.0, 2.0, 6.5]);
         assert_eq!(after(&[8.0, 2.0, 6.0, 3.0, 1.0]), [0.0, 8.0, 1.0]);
         assert_eq!(after(&[8.0, 2.0, 6.0, 9.0]), [0.0, 9.0]);

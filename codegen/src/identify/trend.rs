@@ -16,11 +16,7 @@ impl Line {
     #[must_use]
     pub fn fit(time: &[f64], y: &[f64]) -> Self {
         if time.is_empty() {
-            return Self {
-                level: 0.0,
-                slope: 0.0,
-                middle: 0.0,
-            };
+            return Self { level: 0.0, slope: 0.0, middle: 0.0 };
         }
         let count = time.len() as f64;
         let middle = time.iter().fold(0.0, |sum, t| sum + t) / count;
@@ -30,11 +26,7 @@ impl Line {
             tt += (t - middle) * (t - middle);
             ty += (t - middle) * (v - level);
         }
-        Self {
-            level,
-            slope: if tt > 0.0 { ty / tt } else { 0.0 },
-            middle,
-        }
+        Self { level, slope: if tt > 0.0 { ty / tt } else { 0.0 }, middle }
     }
 
     /// Value at time `t` (s).
@@ -50,19 +42,16 @@ pub fn rms_and_max(errors: &[f64]) -> (f64, f64) {
     if errors.is_empty() {
         return (0.0, 0.0);
     }
-    let (sum, max) = errors.iter().fold((0.0, 0.0), |(sum, max): (f64, f64), e| {
-        (sum + e * e, if e.abs() > max { e.abs() } else { max })
-    });
+    let (sum, max) = errors
+        .iter()
+        .fold((0.0, 0.0), |(sum, max): (f64, f64), e| (sum + e * e, if e.abs() > max { e.abs() } else { max }));
     ((sum / errors.len() as f64).sqrt(), max)
 }
 
 /// Standard deviation of white noise on `y`, from the median of its second differences: smooth motion hardly counts.
 #[must_use]
 pub fn noise_floor(y: &[f64]) -> f64 {
-    let mut second: Vec<f64> = y
-        .windows(3)
-        .map(|w| (w[0] - 2.0 * w[1] + w[2]).abs())
-        .collect();
+    let mut second: Vec<f64> = y.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
     // The median of |N(0, s)| is 0.6745 s; second differences of white noise have the variance 6 σ².
     super::sanity::median(&mut second) / (0.674_489_75 * 6f64.sqrt())
 }
@@ -75,12 +64,7 @@ pub fn median_slope(points: &[(f64, f64)]) -> f64 {
     let points: Vec<_> = points.iter().step_by(every).collect();
     let mut slopes = Vec::new();
     for (k, (t0, y0)) in points.iter().enumerate() {
-        slopes.extend(
-            points[k + 1..]
-                .iter()
-                .filter(|(t1, _)| t1 > t0)
-                .map(|(t1, y1)| (y1 - y0) / (t1 - t0)),
-        );
+        slopes.extend(points[k + 1..].iter().filter(|(t1, _)| t1 > t0).map(|(t1, y1)| (y1 - y0) / (t1 - t0)));
     }
     super::sanity::median(&mut slopes)
 }

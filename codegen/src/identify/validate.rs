@@ -76,16 +76,9 @@ const SWINGS: u32 = 100;
 ///
 /// # Errors
 /// If the drive of the record never moves, or leaves the range of the table by more than 2 %.
-pub fn validate(
-    table: &EverettTable,
-    record: &Record,
-    dead_time: f64,
-) -> Result<Validation, Vec<Diagnostic>> {
+pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result<Validation, Vec<Diagnostic>> {
     let mut findings = Findings::new(&record.shown_as);
-    let plane = Plane {
-        grid: table.grid,
-        range: [table.drive_min, table.drive_max],
-    };
+    let plane = Plane { grid: table.grid, range: [table.drive_min, table.drive_max] };
     let (low, high) = sanity::extent(&record.drive);
     let allowed = 0.02 * (plane.range[1] - plane.range[0]);
     if low < plane.range[0] - allowed || high > plane.range[1] + allowed {
@@ -93,16 +86,9 @@ pub fn validate(
             "the drive goes from {low} V to {high} V, outside the table's {} V to {} V",
             plane.range[0], plane.range[1]
         );
-        findings.error(
-            "E0605",
-            None,
-            message,
-            "validate with a record inside the range of the table",
-        );
+        findings.error("E0605", None, message, "validate with a record inside the range of the table");
     }
-    let first = branches(&record.drive, 0, 0.5 * plane.interval())
-        .first()
-        .map(|b| b.first);
+    let first = branches(&record.drive, 0, 0.5 * plane.interval()).first().map(|b| b.first);
     let Some(first) = first.filter(|_| !findings.any_error()) else {
         if !findings.any_error() {
             findings.error(
@@ -115,18 +101,9 @@ pub fn validate(
         return Err(findings.into_diagnostics());
     };
     let displacement = dead_time::delayed(record, dead_time);
-    let compared = compared(
-        &record.drive,
-        first,
-        JUMP * (plane.range[1] - plane.range[0]),
-    );
+    let compared = compared(&record.drive, first, JUMP * (plane.range[1] - plane.range[0]));
     let time: Vec<f64> = compared.iter().map(|&k| record.time[k]).collect();
-    let (bottom, top) = sanity::extent(
-        &compared
-            .iter()
-            .map(|&k| displacement[k])
-            .collect::<Vec<_>>(),
-    );
+    let (bottom, top) = sanity::extent(&compared.iter().map(|&k| displacement[k]).collect::<Vec<_>>());
     let range = top - bottom;
     let run = |start: Start| {
         let mut all = Vec::with_capacity(displacement.len() - first);
@@ -141,24 +118,10 @@ pub fn validate(
         }
         let (rms, max) = rms_and_max(&errors);
         let percent = 100.0 / range;
-        StartResult {
-            start,
-            rms,
-            max,
-            rms_percent: rms * percent,
-            max_percent: max * percent,
-        }
+        StartResult { start, rms, max, rms_percent: rms * percent, max_percent: max * percent }
     };
-    let starts = [
-        Start::NegativeSaturation,
-        Start::PositiveSaturation,
-        Start::Demagnetised,
-    ]
-    .map(run);
-    let best = starts.iter().fold(
-        starts[0],
-        |best, s| if s.rms < best.rms { *s } else { best },
-    );
+    let starts = [Start::NegativeSaturation, Start::PositiveSaturation, Start::Demagnetised].map(run);
+    let best = starts.iter().fold(starts[0], |best, s| if s.rms < best.rms { *s } else { best });
     Ok(Validation {
         record: record.shown_as.clone(),
         samples_skipped: first,

@@ -13,9 +13,7 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<(Actuation, i32), V
     let cell = (volts_max - volts_min) / model.hysteresis.grid as f64;
     // The limits hold for the voltage as the controller computes it, in its own arithmetic.
     let voltage = |code: i32| {
-        scalar.round(
-            scalar.round(volts_at_zero) + scalar.round(f64::from(code) * scalar.round(volts_per_code)),
-        )
+        scalar.round(scalar.round(volts_at_zero) + scalar.round(f64::from(code) * scalar.round(volts_per_code)))
     };
     let mut code_min = (((volts_min - volts_at_zero) / volts_per_code).round() as i32).clamp(0, full_scale);
     while code_min < full_scale && voltage(code_min) < volts_min {

@@ -61,7 +61,11 @@ mod tests {
                 for factor in [0.9, 0.98, 1.02, 1.2] {
                     let ratio = pcc_limit(level, drift) * factor;
                     assert_eq!(settles(level, Some(drift), ratio), factor < 1.0, "PCC {level} {drift} × {factor}");
-                    assert_eq!(pcc_satisfies_jury(level, drift, ratio), factor < 1.0, "Jury {level} {drift} × {factor}");
+                    assert_eq!(
+                        pcc_satisfies_jury(level, drift, ratio),
+                        factor < 1.0,
+                        "Jury {level} {drift} × {factor}"
+                    );
                 }
             }
         }

@@ -47,10 +47,22 @@ impl LegDynamics {
         let damping = 2.0 * self.damping_ratio * self.resonance;
         // [A B; 0 0], velocity in units of ω y to balance the rows.
         let continuous = SMatrix::<f64, 4, 4>::new(
-            -1.0 / lag, 0.0, 0.0, 1.0 / lag,
-            0.0, 0.0, self.resonance, 0.0,
-            stiffness / self.resonance, -stiffness / self.resonance, -damping, 0.0,
-            0.0, 0.0, 0.0, 0.0,
+            -1.0 / lag,
+            0.0,
+            0.0,
+            1.0 / lag,
+            0.0,
+            0.0,
+            self.resonance,
+            0.0,
+            stiffness / self.resonance,
+            -stiffness / self.resonance,
+            -damping,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
         );
         let discrete = (continuous * self.run).exp();
         (discrete.fixed_view::<3, 3>(0, 0).into(), discrete.fixed_view::<3, 1>(0, 3).into())
@@ -161,7 +173,8 @@ mod tests {
 
     #[test]
     fn the_paper_s_weight_holds_up_to_about_11_kilohertz() {
-        let radius = |rate: f64| spectral_radius(&LegDynamics { run: 1.0 / rate, ..REFERENCE }, 0.252, Some(0.011), 1.0);
+        let radius =
+            |rate: f64| spectral_radius(&LegDynamics { run: 1.0 / rate, ..REFERENCE }, 0.252, Some(0.011), 1.0);
         assert!(radius(11_000.0) < 1.0 && radius(11_600.0) > 1.0, "{} {}", radius(11_000.0), radius(11_600.0));
     }
 

@@ -43,10 +43,7 @@ impl<T: Real> Estimate<T> {
     /// No correction.
     #[must_use]
     pub const fn new() -> Self {
-        Self {
-            level: T::ZERO,
-            drift: T::ZERO,
-        }
+        Self { level: T::ZERO, drift: T::ZERO }
     }
 
     /// Displacement to take off the demand before the inverse, δ̂ + φ̂, m.
@@ -68,8 +65,7 @@ impl<T: Real> Estimate<T> {
             }
             Law::Pcc => {
                 self.level = level_weight * model_error + (T::ONE - level_weight) * old_level;
-                self.drift =
-                    drift_weight * (model_error - old_level) + (T::ONE - drift_weight) * self.drift;
+                self.drift = drift_weight * (model_error - old_level) + (T::ONE - drift_weight) * self.drift;
             }
         }
     }

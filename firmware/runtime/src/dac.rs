@@ -37,11 +37,8 @@ impl<T: Real> Dac<T> {
     #[must_use]
     pub fn code(&self, drive: T, previous: i32, limits: CodeLimits) -> (i32, bool) {
         let wanted = ((drive - self.cells_at_zero) * self.codes_per_cell + T::HALF).truncate();
-        let stepped = within(
-            wanted,
-            previous.saturating_sub(limits.max_step),
-            previous.saturating_add(limits.max_step),
-        );
+        let stepped =
+            within(wanted, previous.saturating_sub(limits.max_step), previous.saturating_add(limits.max_step));
         let code = within(stepped, limits.min, limits.max);
         (code, code != wanted)
     }

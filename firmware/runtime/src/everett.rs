@@ -59,78 +59,89 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
 
     /// The drive above `down` at which a rise from `down` has added `gain` (m): solves E(x, `down`) = `gain`.
     ///
-    /// `gain` beyond what full drive gives yields N. Where the table is flat, the smallest solution.
+    /// `least` is a drive that the solution is known not to lie below, `down` at the least: the search begins in its cell,
+    /// where a tracking leg finds it. `gain` beyond what full drive gives yields N. Where the table is flat, the smallest
+    /// solution not below the cell of `least`.
     #[inline]
     #[must_use]
-    pub fn rise(&self, down: T, gain: T) -> T {
+    pub fn rise(&self, down: T, least: T, gain: T) -> T {
         let d = Self::place(down);
-        let mut low = d.cell + 1;
-        let mut at_low = self.along_row(low, d);
-        if gain <= at_low {
-            return Self::step_from(down, gain, self.node(low, d.cell), T::ONE);
-        }
-        let mut high = N;
+        let first = Self::place(least).cell;
+        // E at the lower node of the cell, zero where the cell is the diagonal one and holds `down` itself.
+        let mut low = first;
+        let mut at_low = if first > d.cell { self.along_row(first, d) } else { T::ZERO };
+        let mut high = first + 1;
         let mut at_high = self.along_row(high, d);
-        if gain >= at_high {
-            return self.full_scale();
-        }
-        // E(low, down) < gain < E(high, down) holds from here on.
-        for _ in 0..Self::SEARCH_STEPS {
-            if high - low <= 1 {
-                break;
+        if gain > at_high {
+            (low, at_low) = (high, at_high);
+            high = N;
+            at_high = self.along_row(high, d);
+            if gain >= at_high {
+                return self.full_scale();
             }
-            let middle = (low + high) / 2;
-            let at_middle = self.along_row(middle, d);
-            if at_middle < gain {
-                (low, at_low) = (middle, at_middle);
-            } else {
-                (high, at_high) = (middle, at_middle);
+            // E(low, down) < gain < E(high, down) holds from here on.
+            for _ in 0..Self::SEARCH_STEPS {
+                if high - low <= 1 {
+                    break;
+                }
+                let middle = (low + high) / 2;
+                let at_middle = self.along_row(middle, d);
+                if at_middle < gain {
+                    (low, at_low) = (middle, at_middle);
+                } else {
+                    (high, at_high) = (middle, at_middle);
+                }
             }
+        } else if low <= d.cell {
+            return Self::step_from(down, gain, self.node(high, d.cell), T::ONE);
         }
-        T::from_i32(low as i32) + (gain - at_low) / (at_high - at_low)
+        Self::step_from(T::from_i32(low as i32), gain - at_low, at_high - at_low, T::ONE)
     }
 
     /// The drive below `up` at which a fall from `up` has taken away `loss` (m): solves E(`up`, x) = `loss`.
     ///
-    /// `loss` beyond what zero drive takes yields 0. Where the table is flat, the largest solution.
+    /// `most` is a drive that the solution is known not to lie above, `up` at the most: the search begins in its cell.
+    /// `loss` beyond what zero drive takes yields 0. Where the table is flat, the largest solution not above the cell of
+    /// `most`.
     #[inline]
     #[must_use]
-    pub fn fall(&self, up: T, loss: T) -> T {
+    pub fn fall(&self, up: T, most: T, loss: T) -> T {
         let u = Self::place(up);
-        let mut high = u.cell;
-        let mut at_high = self.along_column(u, high);
-        if loss <= at_high {
-            return Self::step_from(up, loss, self.node(high + 1, high), -T::ONE);
-        }
-        let mut low = 0;
+        let first = Self::place(most).cell;
+        let mut high = first + 1;
+        let mut at_high = if first < u.cell { self.along_column(u, high) } else { T::ZERO };
+        let mut low = first;
         let mut at_low = self.along_column(u, low);
-        if loss >= at_low {
-            return T::ZERO;
-        }
-        // E(up, high) < loss < E(up, low) holds from here on.
-        for _ in 0..Self::SEARCH_STEPS {
-            if high - low <= 1 {
-                break;
+        if loss > at_low {
+            (high, at_high) = (low, at_low);
+            low = 0;
+            at_low = self.along_column(u, low);
+            if loss >= at_low {
+                return T::ZERO;
             }
-            let middle = (low + high) / 2;
-            let at_middle = self.along_column(u, middle);
-            if at_middle < loss {
-                (high, at_high) = (middle, at_middle);
-            } else {
-                (low, at_low) = (middle, at_middle);
+            // E(up, high) < loss < E(up, low) holds from here on.
+            for _ in 0..Self::SEARCH_STEPS {
+                if high - low <= 1 {
+                    break;
+                }
+                let middle = (low + high) / 2;
+                let at_middle = self.along_column(u, middle);
+                if at_middle < loss {
+                    (high, at_high) = (middle, at_middle);
+                } else {
+                    (low, at_low) = (middle, at_middle);
+                }
             }
+        } else if high > u.cell {
+            return Self::step_from(up, loss, self.node(high, u.cell), -T::ONE);
         }
-        T::from_i32(high as i32) - (loss - at_high) / (at_low - at_high)
+        Self::step_from(T::from_i32(high as i32), loss - at_high, at_low - at_high, -T::ONE)
     }
 
-    /// Within the diagonal triangle E is linear: `change` / `slope` cells from `start`. A flat triangle stays.
+    /// Within a cell E is linear along a branch: `change` / `slope` cells from `start`. Where it is flat, `start`.
     #[inline]
     fn step_from(start: T, change: T, slope: T, direction: T) -> T {
-        if slope > T::ZERO {
-            start + direction * (change / slope)
-        } else {
-            start
-        }
+        if slope > T::ZERO { start + direction * (change / slope) } else { start }
     }
 
     /// E at `up` node `row` and any `down`.
@@ -153,10 +164,7 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
         let last = N as i32 - 1;
         let whole = if whole > last { last } else { whole };
         let whole = if whole < 0 { 0 } else { whole };
-        Place {
-            cell: whole as usize,
-            part: drive - T::from_i32(whole),
-        }
+        Place { cell: whole as usize, part: drive - T::from_i32(whole) }
     }
 
     #[inline]

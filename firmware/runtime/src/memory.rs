@@ -38,10 +38,7 @@ impl<T: Real, const CAP: usize> Default for ReversalMemory<T, CAP> {
 }
 
 impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
-    const FITS: () = assert!(
-        CAP >= 4,
-        "a reversal memory needs room for a loop within a loop"
-    );
+    const FITS: () = assert!(CAP >= 4, "a reversal memory needs room for a loop within a loop");
 
     /// Negative saturation: drive 0, displacement 0.
     #[must_use]
@@ -87,11 +84,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     ///
     /// `drive` must be finite.
     #[inline]
-    pub fn apply<const N: usize, const NODES: usize>(
-        &mut self,
-        table: &Everett<T, N, NODES>,
-        drive: T,
-    ) -> T {
+    pub fn apply<const N: usize, const NODES: usize>(&mut self, table: &Everett<T, N, NODES>, drive: T) -> T {
         let drive = saturate(drive, T::ZERO, table.full_scale());
         if drive == self.drive {
             return self.displacement;
@@ -128,11 +121,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// `displacement` must be finite.
     #[inline]
     #[must_use]
-    pub fn solve<const N: usize, const NODES: usize>(
-        &self,
-        table: &Everett<T, N, NODES>,
-        displacement: T,
-    ) -> T {
+    pub fn solve<const N: usize, const NODES: usize>(&self, table: &Everett<T, N, NODES>, displacement: T) -> T {
         let wanted = saturate(displacement, T::ZERO, table.full_displacement());
         if wanted == self.displacement {
             return self.drive;
@@ -149,11 +138,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         // Walk outwards: each pair whose inner loop the wanted displacement leaves is (would be) wiped out.
         while next >= 2 {
             let bound = self.displacement_at(next - 1);
-            let leaves = if rising {
-                wanted >= bound
-            } else {
-                wanted <= bound
-            };
+            let leaves = if rising { wanted >= bound } else { wanted <= bound };
             if !leaves {
                 break;
             }
@@ -162,9 +147,9 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
             at_start = self.displacement_at(next);
         }
         if rising {
-            table.rise(start, wanted - at_start)
+            table.rise(start, self.drive, wanted - at_start)
         } else {
-            table.fall(start, at_start - wanted)
+            table.fall(start, self.drive, at_start - wanted)
         }
     }
 
@@ -174,8 +159,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         digest.word(u64::from(self.dropped));
         digest.real(self.drive);
         digest.real(self.displacement);
-        for (extremum, displacement) in self.extrema.iter().zip(&self.displacements).take(self.len)
-        {
+        for (extremum, displacement) in self.extrema.iter().zip(&self.displacements).take(self.len) {
             digest.real(*extremum);
             digest.real(*displacement);
         }
@@ -229,11 +213,8 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
             } else {
                 (self.drive, self.displacement)
             };
-            let direct = if outer < inner {
-                at_outer + table.value(inner, outer)
-            } else {
-                at_outer - table.value(outer, inner)
-            };
+            let direct =
+                if outer < inner { at_outer + table.value(inner, outer) } else { at_outer - table.value(outer, inner) };
             let change = direct - at_inner;
             if at == 0 || change.abs() < least {
                 (least, shift, at) = (change.abs(), change, i);

@@ -6,13 +6,7 @@ const LEVEL: f64 = 0.252;
 const DRIFT: f64 = 0.011;
 
 /// Error T − Y after `runs` runs with disturbance `d(n)` and demand `t(n)`.
-fn error_after(
-    law: Law,
-    gain_ratio: f64,
-    runs: u32,
-    t: impl Fn(f64) -> f64,
-    d: impl Fn(f64) -> f64,
-) -> f64 {
+fn error_after(law: Law, gain_ratio: f64, runs: u32, t: impl Fn(f64) -> f64, d: impl Fn(f64) -> f64) -> f64 {
     let mut estimate = Estimate::<f64>::new();
     let mut error = 0.0;
     for n in 0..runs {
@@ -41,10 +35,7 @@ fn a_ramp_disturbance_leaves_slope_over_lambda_omega_under_ewma_and_nothing_unde
     for gain_ratio in [0.8, 1.0, 1.25] {
         let ewma = error_after(Law::Ewma, gain_ratio, 6000, |_| 20e-6, |n| slope * n);
         let expected = -slope / (gain_ratio * LEVEL);
-        assert!(
-            (ewma - expected).abs() < 1e-3 * expected.abs(),
-            "{ewma:e} {expected:e}"
-        );
+        assert!((ewma - expected).abs() < 1e-3 * expected.abs(), "{ewma:e} {expected:e}");
         let pcc = error_after(Law::Pcc, gain_ratio, 6000, |_| 20e-6, |n| slope * n);
         assert!(pcc.abs() < 1e-13, "{pcc:e}");
     }
@@ -52,10 +43,7 @@ fn a_ramp_disturbance_leaves_slope_over_lambda_omega_under_ewma_and_nothing_unde
 
 #[test]
 fn the_drift_estimate_uses_the_old_level() {
-    let mut estimate = Estimate {
-        level: 3e-6_f64,
-        drift: 0.5e-6,
-    };
+    let mut estimate = Estimate { level: 3e-6_f64, drift: 0.5e-6 };
     estimate.update(Law::Pcc, 0.25, 0.5, 5e-6);
     assert_eq!(estimate.level, 0.25 * 5e-6 + 0.75 * 3e-6);
     assert_eq!(estimate.drift, 0.5 * (5e-6 - 3e-6) + 0.5 * 0.5e-6);
@@ -78,10 +66,7 @@ fn the_filter_form_equals_the_integrator_form_while_nothing_saturates() {
         // PCC's δ̂ in the filter form holds no φ̂: m − δ̂ = e + φ̂, so (AII.9) adds ω1 (e + φ̂_old).
         level += LEVEL * (e + old_drift);
         // (AII.10) written for the filter: ω2 (m − δ̂_old) + (1 − ω2) φ̂ = φ̂ + ω2 e.
-        assert!(
-            (filter.level - level).abs() < 1e-17 && (filter.drift - drift).abs() < 1e-17,
-            "run {n}"
-        );
+        assert!((filter.level - level).abs() < 1e-17 && (filter.drift - drift).abs() < 1e-17, "run {n}");
     }
 }
 
@@ -100,10 +85,7 @@ fn saturation_does_not_wind_the_estimates_up() {
 
 #[test]
 fn invhys_keeps_no_estimate() {
-    let mut estimate = Estimate {
-        level: 1e-6_f64,
-        drift: 1e-6,
-    };
+    let mut estimate = Estimate { level: 1e-6_f64, drift: 1e-6 };
     estimate.update(Law::Invhys, LEVEL, DRIFT, 5e-6);
     assert_eq!(estimate.correction(), 0.0);
 }

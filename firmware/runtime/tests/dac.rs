@@ -9,31 +9,15 @@ const DAC: Dac<f64> = Dac {
     cells_per_code: 150.0 / 65535.0 * 0.32,
     codes_per_cell: 65535.0 / 150.0 / 0.32,
 };
-const LIMITS: CodeLimits = CodeLimits {
-    min: 100,
-    max: 43_690,
-    max_step: 500,
-};
+const LIMITS: CodeLimits = CodeLimits { min: 100, max: 43_690, max_step: 500 };
 
 #[test]
 fn every_bit_pattern_gives_a_permitted_code() {
     let mut state = 1_u64;
     let mut previous = 200;
-    let edge = [
-        f64::NAN,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        -0.0,
-        5e-324,
-        f64::MAX,
-        f64::MIN,
-        32.0,
-        1e10,
-    ];
+    let edge = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -0.0, 5e-324, f64::MAX, f64::MIN, 32.0, 1e10];
     let random = std::iter::repeat_with(|| {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         f64::from_bits(state)
     });
     for drive in edge.into_iter().chain(random.take(200_000)) {

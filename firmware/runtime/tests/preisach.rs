@@ -136,8 +136,7 @@ fn f32_stays_within_50_pm_of_f64() {
         let drive32 = memory32.solve(&table32, q as f32);
         let got = memory.apply(&table, f64::from(drive32));
         worst_inverse = worst_inverse.max((got - f64::from(q as f32)).abs());
-        worst_forward =
-            worst_forward.max((f64::from(memory32.apply(&table32, drive32)) - got).abs());
+        worst_forward = worst_forward.max((f64::from(memory32.apply(&table32, drive32)) - got).abs());
         assert!(tick < 10 || memory.depth() == memory32.depth());
     }
     assert!(worst_forward <= 0.05e-9, "forward {worst_forward:e}");
@@ -156,21 +155,12 @@ fn saturation_at_either_end_resets_the_staircase() {
     memory.apply(&table, 1e300);
     assert_eq!(memory.drive(), 32.0);
     assert_eq!(memory.depth(), 1);
-    assert_eq!(
-        memory.displacement().to_bits(),
-        table.full_displacement().to_bits()
-    );
+    assert_eq!(memory.displacement().to_bits(), table.full_displacement().to_bits());
 }
 
 #[test]
 fn flat_tables_are_inverted_without_division_by_zero() {
-    let zero = table(
-        &vec![vec![0.0; N]; N + 1]
-            .iter()
-            .enumerate()
-            .map(|(up, r)| r[..up.min(N)].to_vec())
-            .collect(),
-    );
+    let zero = table(&vec![vec![0.0; N]; N + 1].iter().enumerate().map(|(up, r)| r[..up.min(N)].to_vec()).collect());
     let mut memory = Memory::new();
     for q in [1e-6, 0.0, -1e-6, 5.0] {
         let drive = memory.solve(&zero, q);
@@ -193,19 +183,12 @@ fn flat_tables_are_inverted_without_division_by_zero() {
 fn decaying(loops: usize) -> impl Iterator<Item = f64> {
     (0..2 * loops).map(move |k| {
         let amplitude = 15.9 * (1.0 - k as f64 / (2 * loops) as f64);
-        if k % 2 == 0 {
-            16.0 + amplitude
-        } else {
-            16.0 - amplitude
-        }
+        if k % 2 == 0 { 16.0 + amplitude } else { 16.0 - amplitude }
     })
 }
 
 /// Largest difference from a memory without bound, while the oscillation decays and on the way out of every loop.
-fn worst_error(
-    drives: impl Iterator<Item = f64>,
-    mut bounded: impl FnMut(&Table, f64) -> f64,
-) -> f64 {
+fn worst_error(drives: impl Iterator<Item = f64>, mut bounded: impl FnMut(&Table, f64) -> f64) -> f64 {
     let table = table(&random_weights(9, N));
     let mut exact = ReversalMemory::<f64, 8192>::new();
     let way_out = (0..400).map(|k| 16.0 + 16.0 * f64::from(k) / 400.0);
@@ -251,16 +234,8 @@ fn overflow_costs_less_than_dropping_the_innermost_loop() {
         worst_with_capacity::<32>(2000),
         worst_with_capacity::<64>(2000),
     ];
-    assert!(
-        least.windows(2).all(|w| w[1] < 0.6 * w[0]),
-        "about 1/capacity: {least:?}"
-    );
-    assert!(
-        least[3] < 0.05 * innermost(64),
-        "{:e} against {:e}",
-        least[3],
-        innermost(64)
-    );
+    assert!(least.windows(2).all(|w| w[1] < 0.6 * w[0]), "about 1/capacity: {least:?}");
+    assert!(least[3] < 0.05 * innermost(64), "{:e} against {:e}", least[3], innermost(64));
     assert!(least[3] < 0.3e-6);
 }
 
@@ -280,9 +255,7 @@ fn one_ulp_in_one_node_changes_the_digest() {
     let mut nodes = *good.nodes;
     let k = 20 * 21 / 2 + 7; // E(20, 7)
     nodes[k] = f64::from_bits(nodes[k].to_bits() + 1);
-    let bad = Table {
-        nodes: Box::leak(Box::new(nodes)),
-    };
+    let bad = Table { nodes: Box::leak(Box::new(nodes)) };
     let (mut a, mut b) = (Memory::new(), Memory::new());
     for drive in [25.0, 7.0, 20.0] {
         a.apply(&good, drive);

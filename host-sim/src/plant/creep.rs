@@ -45,12 +45,7 @@ impl CreepBank {
     pub fn advance(&mut self, v: f64) -> f64 {
         let share = 1.0 / self.thresholds.len() as f64;
         let mut sum = 0.0;
-        for ((row, gain), weight) in self
-            .states
-            .chunks_mut(self.thresholds.len())
-            .zip(&self.gains)
-            .zip(&self.weights)
-        {
+        for ((row, gain), weight) in self.states.chunks_mut(self.thresholds.len()).zip(&self.gains).zip(&self.weights) {
             for (state, threshold) in row.iter_mut().zip(&self.thresholds) {
                 *state += gain * dead(v - *state, *threshold);
                 sum += weight * share * *state;
@@ -84,10 +79,7 @@ mod tests {
             last = bank.advance(16.0);
         }
         // Exact: 10 (1 − e^(−2 · 0.5)).
-        assert!(
-            (last - 10.0 * (1.0 - libm::exp(-1.0))).abs() < 1e-12,
-            "{last}"
-        );
+        assert!((last - 10.0 * (1.0 - libm::exp(-1.0))).abs() < 1e-12, "{last}");
         assert_eq!(bank.advance(last + 5.0), last);
     }
 

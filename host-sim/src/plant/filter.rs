@@ -12,11 +12,7 @@ impl Lag {
     /// `time_constant` τ in s; 0 passes the input through.
     #[must_use]
     pub fn new(time_constant: f64) -> Self {
-        Self {
-            time_constant,
-            decay: 0.0,
-            output: 0.0,
-        }
+        Self { time_constant, decay: 0.0, output: 0.0 }
     }
 
     /// Output back to 0.
@@ -26,11 +22,7 @@ impl Lag {
 
     /// Fixes the length of the steps that follow, s.
     pub fn set_step(&mut self, step: f64) {
-        self.decay = if self.time_constant > 0.0 {
-            libm::exp(-step / self.time_constant)
-        } else {
-            0.0
-        };
+        self.decay = if self.time_constant > 0.0 { libm::exp(-step / self.time_constant) } else { 0.0 };
     }
 
     /// Output now.
@@ -82,14 +74,8 @@ impl Resonance {
         let envelope = libm::exp(-sigma * step);
         let (sin, cos) = libm::sincos(damped * step);
         self.transition = [
-            [
-                envelope * (cos + sigma / damped * sin),
-                envelope * sin / damped,
-            ],
-            [
-                -envelope * self.natural * self.natural / damped * sin,
-                envelope * (cos - sigma / damped * sin),
-            ],
+            [envelope * (cos + sigma / damped * sin), envelope * sin / damped],
+            [-envelope * self.natural * self.natural / damped * sin, envelope * (cos - sigma / damped * sin)],
         ];
     }
 
@@ -140,11 +126,7 @@ mod tests {
             for _ in 0..steps {
                 resonance.advance(1.0);
             }
-            assert!(
-                (resonance.position() - expected).abs() < 1e-10,
-                "{steps}: {}",
-                resonance.position()
-            );
+            assert!((resonance.position() - expected).abs() < 1e-10, "{steps}: {}", resonance.position());
         }
     }
 

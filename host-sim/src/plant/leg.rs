@@ -49,11 +49,7 @@ impl LegPlant {
             amplifier: Lag::new(p.tau_amp_s),
             rate: Lag::new(p.tau_rate_s),
             plays: PlayBank::new(&p.play_thresholds_v, &p.play_weights, p.kappa, p.v0_v_per_s),
-            creep: CreepBank::new(
-                &p.creep_rates_per_s,
-                &p.creep_weights,
-                &p.creep_thresholds_v,
-            ),
+            creep: CreepBank::new(&p.creep_rates_per_s, &p.creep_weights, &p.creep_thresholds_v),
             structure: Resonance::new(p.fn_hz, p.zeta),
             asymmetry: p.s2,
             drive_max: p.u_max,

@@ -76,12 +76,7 @@ pub struct NoiseParameters {
 
 impl NoiseParameters {
     /// No noise, no quantisation.
-    pub const NONE: Self = Self {
-        sensor_nm_rms: 0.0,
-        adc_lsb_nm: 0.0,
-        dac_lsb_mv: 0.0,
-        amplifier_mv_rms: 0.0,
-    };
+    pub const NONE: Self = Self { sensor_nm_rms: 0.0, adc_lsb_nm: 0.0, dac_lsb_mv: 0.0, amplifier_mv_rms: 0.0 };
 }
 
 fn default_step() -> f64 {
@@ -131,9 +126,7 @@ impl LegParameters {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|error| ParameterError {
             file: file.clone(),
-            findings: vec![format!(
-                "cannot be read as text: {error}; name a JSON file of a leg plant"
-            )],
+            findings: vec![format!("cannot be read as text: {error}; name a JSON file of a leg plant")],
         })?;
         Self::from_json(&text, &file)
     }
@@ -148,23 +141,13 @@ impl LegParameters {
             findings: vec![format!("{error}; compare with plants/reference-leg.json")],
         })?;
         let findings = parameters.findings();
-        if findings.is_empty() {
-            Ok(parameters)
-        } else {
-            Err(ParameterError {
-                file: file.to_owned(),
-                findings,
-            })
-        }
+        if findings.is_empty() { Ok(parameters) } else { Err(ParameterError { file: file.to_owned(), findings }) }
     }
 
     fn findings(&self) -> Vec<String> {
         let mut out = Vec::new();
         if self.units != "V, um, s" {
-            out.push(format!(
-                "`units` is {:?}; expected \"V, um, s\": convert the values",
-                self.units
-            ));
+            out.push(format!("`units` is {:?}; expected \"V, um, s\": convert the values", self.units));
         }
         let mut expect = |field: &str, value: f64, low: Bound, high: Bound| {
             if let Some(finding) = out_of_range(field, value, low, high) {
@@ -173,12 +156,7 @@ impl LegParameters {
         };
         use Bound::{Above, AtLeast, AtMost, Below};
         expect("u_max", self.u_max, Above(0.0), AtMost(1000.0));
-        expect(
-            "gain_um_per_V",
-            self.gain_um_per_v,
-            Above(0.0),
-            AtMost(1000.0),
-        );
+        expect("gain_um_per_V", self.gain_um_per_v, Above(0.0), AtMost(1000.0));
         expect("s2", self.s2, Above(-1.0), Below(1.0));
         expect("kappa", self.kappa, AtLeast(0.0), AtMost(10.0));
         expect("v0_V_per_s", self.v0_v_per_s, Above(0.0), AtMost(1e9));
@@ -187,58 +165,18 @@ impl LegParameters {
         expect("fn_hz", self.fn_hz, Above(0.0), AtMost(1e6));
         expect("zeta", self.zeta, AtLeast(0.0), Below(1.0));
         expect("settle_s", self.settle_s, AtLeast(0.0), AtMost(600.0));
-        expect(
-            "forc_rate_V_per_s",
-            self.forc_rate_v_per_s,
-            AtLeast(1.0),
-            AtMost(1e6),
-        );
+        expect("forc_rate_V_per_s", self.forc_rate_v_per_s, AtLeast(1.0), AtMost(1e6));
         expect("step_s", self.step_s, AtLeast(1e-6), AtMost(1e-3));
-        expect(
-            "noise.sensor_nm_rms",
-            self.noise.sensor_nm_rms,
-            AtLeast(0.0),
-            AtMost(1e6),
-        );
-        expect(
-            "noise.adc_lsb_nm",
-            self.noise.adc_lsb_nm,
-            AtLeast(0.0),
-            AtMost(1e6),
-        );
-        expect(
-            "noise.dac_lsb_mV",
-            self.noise.dac_lsb_mv,
-            AtLeast(0.0),
-            AtMost(1e6),
-        );
-        expect(
-            "noise.amplifier_mV_rms",
-            self.noise.amplifier_mv_rms,
-            AtLeast(0.0),
-            AtMost(1e6),
-        );
+        expect("noise.sensor_nm_rms", self.noise.sensor_nm_rms, AtLeast(0.0), AtMost(1e6));
+        expect("noise.adc_lsb_nm", self.noise.adc_lsb_nm, AtLeast(0.0), AtMost(1e6));
+        expect("noise.dac_lsb_mV", self.noise.dac_lsb_mv, AtLeast(0.0), AtMost(1e6));
+        expect("noise.amplifier_mV_rms", self.noise.amplifier_mv_rms, AtLeast(0.0), AtMost(1e6));
         let lists: [(&str, &[f64], Bound, f64); 5] = [
-            (
-                "play_thresholds_V",
-                &self.play_thresholds_v,
-                AtLeast(0.0),
-                1e4,
-            ),
+            ("play_thresholds_V", &self.play_thresholds_v, AtLeast(0.0), 1e4),
             ("play_weights", &self.play_weights, AtLeast(0.0), 1e3),
-            (
-                "creep_rates_per_s",
-                &self.creep_rates_per_s,
-                Above(0.0),
-                1e6,
-            ),
+            ("creep_rates_per_s", &self.creep_rates_per_s, Above(0.0), 1e6),
             ("creep_weights", &self.creep_weights, AtLeast(0.0), 1e3),
-            (
-                "creep_thresholds_V",
-                &self.creep_thresholds_v,
-                AtLeast(0.0),
-                1e4,
-            ),
+            ("creep_thresholds_V", &self.creep_thresholds_v, AtLeast(0.0), 1e4),
         ];
         for (field, values, low, high) in lists {
             for (index, value) in values.iter().enumerate() {
@@ -252,24 +190,12 @@ impl LegParameters {
             }
         }
         let pairs = [
-            (
-                "play_weights",
-                self.play_weights.len(),
-                "play_thresholds_V",
-                self.play_thresholds_v.len(),
-            ),
-            (
-                "creep_weights",
-                self.creep_weights.len(),
-                "creep_rates_per_s",
-                self.creep_rates_per_s.len(),
-            ),
+            ("play_weights", self.play_weights.len(), "play_thresholds_V", self.play_thresholds_v.len()),
+            ("creep_weights", self.creep_weights.len(), "creep_rates_per_s", self.creep_rates_per_s.len()),
         ];
         for (field, count, other, expected) in pairs {
             if count != expected {
-                out.push(format!(
-                    "`{field}` has {count} values but `{other}` has {expected}; give one for each"
-                ));
+                out.push(format!("`{field}` has {count} values but `{other}` has {expected}; give one for each"));
             }
         }
         out
@@ -319,9 +245,7 @@ mod tests {
     fn refused(from: &str, to: &str) -> String {
         let text = REFERENCE_LEG.replacen(from, to, 1);
         assert_ne!(text, REFERENCE_LEG, "{from} is not in the file");
-        LegParameters::from_json(&text, "leg.json")
-            .unwrap_err()
-            .to_string()
+        LegParameters::from_json(&text, "leg.json").unwrap_err().to_string()
     }
 
     #[test]
@@ -333,8 +257,7 @@ mod tests {
 
     #[test]
     fn the_shipped_file_has_the_values_of_the_feasibility_study() {
-        let path =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/reference/leg-plant.json");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/reference/leg-plant.json");
         if !path.exists() {
             eprintln!("skipped: ../shared is not beside the repository");
             return;
@@ -351,53 +274,26 @@ mod tests {
             "leg.json: not a usable leg plant\n  `u_max` is -5; expected a number > 0 and <= 1000"
         );
         assert!(refused("45.0\n", "-45.0\n").contains("`play_thresholds_V[23]` is -45"));
-        assert!(
-            refused("[0.05, ", "[")
-                .contains("`creep_weights` has 5 values but `creep_rates_per_s` has 4")
-        );
+        assert!(refused("[0.05, ", "[").contains("`creep_weights` has 5 values but `creep_rates_per_s` has 4"));
         assert!(refused("[0.0, 6.0]", "[]").contains("`creep_thresholds_V` has 0 values"));
-        assert!(
-            refused("\"V, um, s\"", "\"V, nm, s\"")
-                .contains("`units` is \"V, nm, s\"; expected \"V, um, s\"")
-        );
-        assert!(
-            refused("\"zeta\": 0.1", "\"zeta\": 1.5")
-                .contains("`zeta` is 1.5; expected a number >= 0 and < 1")
-        );
+        assert!(refused("\"V, um, s\"", "\"V, nm, s\"").contains("`units` is \"V, nm, s\"; expected \"V, um, s\""));
+        assert!(refused("\"zeta\": 0.1", "\"zeta\": 1.5").contains("`zeta` is 1.5; expected a number >= 0 and < 1"));
     }
 
     #[test]
     fn all_findings_come_in_one_run() {
-        let text = REFERENCE_LEG
-            .replace("\"u_max\": 100.0", "\"u_max\": 0")
-            .replace("\"s2\": 0.05", "\"s2\": 3");
-        assert_eq!(
-            LegParameters::from_json(&text, "leg.json")
-                .unwrap_err()
-                .findings
-                .len(),
-            2
-        );
+        let text = REFERENCE_LEG.replace("\"u_max\": 100.0", "\"u_max\": 0").replace("\"s2\": 0.05", "\"s2\": 3");
+        assert_eq!(LegParameters::from_json(&text, "leg.json").unwrap_err().findings.len(), 2);
     }
 
     #[test]
     fn missing_unknown_and_mistyped_fields_are_named_with_their_line() {
-        assert!(
-            refused("  \"kappa\": 1.2445442636136678e-06,\n", "").contains("missing field `kappa`")
-        );
+        assert!(refused("  \"kappa\": 1.2445442636136678e-06,\n", "").contains("missing field `kappa`"));
         let unknown = refused("\"kappa\"", "\"capa\"");
-        assert!(
-            unknown.contains("unknown field `capa`") && unknown.contains("line 7"),
-            "{unknown}"
-        );
+        assert!(unknown.contains("unknown field `capa`") && unknown.contains("line 7"), "{unknown}");
         assert!(refused("\"zeta\": 0.1", "\"zeta\": \"0.1\"").contains("invalid type: string"));
         assert!(refused("\"zeta\": 0.1", "\"zeta\": NaN").contains("line 12"));
-        let absent = LegParameters::load(Path::new("no/such.json"))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            absent.starts_with("no/such.json: not a usable leg plant\n  cannot be read"),
-            "{absent}"
-        );
+        let absent = LegParameters::load(Path::new("no/such.json")).unwrap_err().to_string();
+        assert!(absent.starts_with("no/such.json: not a usable leg plant\n  cannot be read"), "{absent}");
     }
 }

@@ -16,12 +16,7 @@ pub struct PlayBank {
 impl PlayBank {
     /// `thresholds` r_i in V (≥ 0), `weights` w_i (as many), `rate_sensitivity` κ, `rate_scale` v0 in V/s.
     #[must_use]
-    pub fn new(
-        thresholds: &[f64],
-        weights: &[f64],
-        rate_sensitivity: f64,
-        rate_scale: f64,
-    ) -> Self {
+    pub fn new(thresholds: &[f64], weights: &[f64], rate_sensitivity: f64, rate_scale: f64) -> Self {
         Self {
             thresholds: thresholds.to_vec(),
             weights: weights.to_vec(),
@@ -40,12 +35,7 @@ impl PlayBank {
     pub fn advance(&mut self, v: f64, rate: f64) -> f64 {
         let widening = 1.0 + self.rate_sensitivity * libm::log(1.0 + rate.abs() / self.rate_scale);
         let mut sum = 0.0;
-        for ((state, threshold), weight) in self
-            .states
-            .iter_mut()
-            .zip(&self.thresholds)
-            .zip(&self.weights)
-        {
+        for ((state, threshold), weight) in self.states.iter_mut().zip(&self.thresholds).zip(&self.weights) {
             let r = threshold * widening;
             if *state < v - r {
                 *state = v - r;

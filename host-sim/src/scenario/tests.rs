@@ -18,11 +18,7 @@ fn oracle(parameters: &LegParameters, intervals: u32, lsb: f64, noise: &NoisePar
         ..ReversalExperiment::reference(intervals)
     };
     let record = experiment.run(&mut leg, &mut Gauge::new(noise, 1, 0));
-    Oracle::new(
-        Table::from_record(&record, intervals as usize, 100.0),
-        100.0,
-        lsb,
-    )
+    Oracle::new(Table::from_record(&record, intervals as usize, 100.0), 100.0, lsb)
 }
 
 /// Six equal legs; the noise differs from leg to leg.
@@ -35,11 +31,8 @@ fn figures(table: &TrackingTable) -> Vec<f64> {
 }
 
 fn report(title: &str, found: &[f64], expected: &[f64]) {
-    let ratios: Vec<String> = found
-        .iter()
-        .zip(expected)
-        .map(|(f, e)| format!("{f:.2} ({:+.1} %)", 100.0 * (f / e - 1.0)))
-        .collect();
+    let ratios: Vec<String> =
+        found.iter().zip(expected).map(|(f, e)| format!("{f:.2} ({:+.1} %)", 100.0 * (f / e - 1.0))).collect();
     println!("{title}: {}", ratios.join(", "));
 }
 
@@ -48,16 +41,11 @@ fn noise_free_n16_figures_are_within_5_percent_of_the_study() {
     let study = [142.3, 230.0, 495.5, 9.00, 12.91, 21.81, 8.57, 10.96, 18.14];
     let parameters = LegParameters::reference();
     let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);
-    let table = scenario(&parameters, &NoiseParameters::NONE)
-        .tracking(&mut controller, &TRACKING_FREQUENCIES)
-        .unwrap();
+    let table = scenario(&parameters, &NoiseParameters::NONE).tracking(&mut controller, &TRACKING_FREQUENCIES).unwrap();
     let found = figures(&table);
     report("N = 16, no noise", &found, &study);
     for (found, study) in found.iter().zip(study) {
-        assert!(
-            (found / study - 1.0).abs() < 0.05,
-            "{found} nm, study {study} nm"
-        );
+        assert!((found / study - 1.0).abs() < 0.05, "{found} nm, study {study} nm");
     }
 }
 
@@ -66,26 +54,18 @@ fn n32_figures_with_noise_meet_the_bounds_and_rank() {
     let study = [127.1, 232.2, 498.3, 6.0, 11.8, 20.4, 5.5, 9.4, 16.4];
     let parameters = LegParameters::reference();
     let mut controller = oracle(&parameters, 32, DAC_LSB, &parameters.noise);
-    let table = scenario(&parameters, &parameters.noise)
-        .tracking(&mut controller, &TRACKING_FREQUENCIES)
-        .unwrap();
+    let table = scenario(&parameters, &parameters.noise).tracking(&mut controller, &TRACKING_FREQUENCIES).unwrap();
     let found = figures(&table);
     report("N = 32, noise", &found, &study);
     for (found, paper) in found[..3].iter().zip([127.0, 232.0, 504.5]) {
-        assert!(
-            (found / paper - 1.0).abs() < 0.10,
-            "Invhys {found} nm, paper {paper} nm"
-        );
+        assert!((found / paper - 1.0).abs() < 0.10, "Invhys {found} nm, paper {paper} nm");
     }
     for (found, bound) in found[3..].iter().zip([9.0, 18.0, 30.0, 8.0, 14.0, 25.0]) {
         assert!(*found <= bound, "{found} nm, bound {bound} nm");
     }
     for (index, frequency) in TRACKING_FREQUENCIES.iter().enumerate() {
         let [invhys, ewma, pcc] = [found[index], found[3 + index], found[6 + index]];
-        assert!(
-            invhys > ewma && ewma > pcc,
-            "{frequency} Hz: {invhys} {ewma} {pcc}"
-        );
+        assert!(invhys > ewma && ewma > pcc, "{frequency} Hz: {invhys} {ewma} {pcc}");
     }
 }
 
@@ -95,14 +75,10 @@ fn slopes_fall_with_frequency_as_table_1_says() {
     let study = [1.0, 0.9804, 0.9734, 0.9719, 0.9672, 0.9640];
     let parameters = LegParameters::reference();
     let mut controller = oracle(&parameters, 32, DAC_LSB, &parameters.noise);
-    let table = scenario(&parameters, &NoiseParameters::NONE)
-        .linearity(&mut controller, &LINEARITY_FREQUENCIES)
-        .unwrap();
+    let table =
+        scenario(&parameters, &NoiseParameters::NONE).linearity(&mut controller, &LINEARITY_FREQUENCIES).unwrap();
     let found: Vec<f64> = table.rows.iter().map(|row| row.relative_slope).collect();
-    println!(
-        "slope ratios: {found:.5?}; study {study:?}; paper {paper:?}\n{}",
-        table.to_text()
-    );
+    println!("slope ratios: {found:.5?}; study {study:?}; paper {paper:?}\n{}", table.to_text());
     assert_eq!(found.len(), 6);
     for ((found, study), paper) in found.iter().zip(study).zip(paper) {
         assert!((found / paper - 1.0).abs() < 0.01, "{found}, paper {paper}");
@@ -114,17 +90,10 @@ fn slopes_fall_with_frequency_as_table_1_says() {
 fn halving_the_step_changes_the_figures_by_less_than_the_stated_bound() {
     // Stated in plant/leg.rs. The coarser plant's table is used for both: what is bounded is the plant.
     let parameters = LegParameters::reference();
-    let halved = LegParameters {
-        step_s: 0.5 * parameters.step_s,
-        ..parameters.clone()
-    };
+    let halved = LegParameters { step_s: 0.5 * parameters.step_s, ..parameters.clone() };
     let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);
     let mut run = |parameters: &LegParameters| {
-        figures(
-            &scenario(parameters, &NoiseParameters::NONE)
-                .tracking(&mut controller, &TRACKING_FREQUENCIES)
-                .unwrap(),
-        )
+        figures(&scenario(parameters, &NoiseParameters::NONE).tracking(&mut controller, &TRACKING_FREQUENCIES).unwrap())
     };
     let (coarse, fine) = (run(&parameters), run(&halved));
     report("step halved", &fine, &coarse);
@@ -144,12 +113,7 @@ fn legs_may_differ() {
         ..parameters.clone()
     });
     let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);
-    let table = LegScenario::new(&legs, &NoiseParameters::NONE, 1, 100)
-        .tracking(&mut controller, &[10.0])
-        .unwrap();
+    let table = LegScenario::new(&legs, &NoiseParameters::NONE, 1, 100).tracking(&mut controller, &[10.0]).unwrap();
     let invhys = table.rows[0].leg_rmse_nm;
-    assert!(
-        invhys.windows(2).all(|pair| pair[0] != pair[1]),
-        "{invhys:?}"
-    );
+    assert!(invhys.windows(2).all(|pair| pair[0] != pair[1]), "{invhys:?}");
 }

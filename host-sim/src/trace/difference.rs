@@ -46,14 +46,7 @@ impl fmt::Display for Difference {
         match self {
             Self::Header { field, a, b } => write!(f, "header {field}: {a} vs {b}"),
             Self::Length { a, b } => write!(f, "length: {a} vs {b} ticks"),
-            Self::Word {
-                tick,
-                signal,
-                a,
-                b,
-                digits,
-                ulps,
-            } => {
+            Self::Word { tick, signal, a, b, digits, ulps } => {
                 write!(f, "tick {tick} {signal}: {a:0digits$x} vs {b:0digits$x}")?;
                 match ulps {
                     Some(1) => write!(f, " (1 ulp)"),
@@ -68,12 +61,10 @@ impl fmt::Display for Difference {
 /// The first difference between two traces, or `None` if every word is the same.
 #[must_use]
 pub fn first_difference(a: &Trace, b: &Trace) -> Option<Difference> {
-    header_difference(a, b)
-        .or_else(|| word_difference(a, b))
-        .or_else(|| {
-            let (a, b) = (a.len(), b.len());
-            (a != b).then_some(Difference::Length { a, b })
-        })
+    header_difference(a, b).or_else(|| word_difference(a, b)).or_else(|| {
+        let (a, b) = (a.len(), b.len());
+        (a != b).then_some(Difference::Length { a, b })
+    })
 }
 
 fn header_difference(a: &Trace, b: &Trace) -> Option<Difference> {
@@ -84,21 +75,9 @@ fn header_difference(a: &Trace, b: &Trace) -> Option<Difference> {
         ("digest", a.digest.clone(), b.digest.clone()),
         ("version", a.version.clone(), b.version.clone()),
         ("scalar_bits", bits(a.scalar), bits(b.scalar)),
-        (
-            "config_names",
-            a.config_names.join(","),
-            b.config_names.join(","),
-        ),
-        (
-            "input_names",
-            a.input_names.join(","),
-            b.input_names.join(","),
-        ),
-        (
-            "output_names",
-            a.output_names.join(","),
-            b.output_names.join(","),
-        ),
+        ("config_names", a.config_names.join(","), b.config_names.join(",")),
+        ("input_names", a.input_names.join(","), b.input_names.join(",")),
+        ("output_names", a.output_names.join(","), b.output_names.join(",")),
     ];
     let (field, a, b) = fields.into_iter().find(|(_, a, b)| a != b)?;
     Some(Difference::Header { field, a, b })
@@ -130,22 +109,14 @@ mod tests {
     fn trace(scalar: Scalar, ticks: usize, change: impl Fn(&mut Vec<u64>)) -> Trace {
         let description = six_legs(scalar);
         let width = 50;
-        let mut words: Vec<u64> = (0..ticks * width)
-            .map(|k| scalar.encode(1.0 + k as f64))
-            .collect();
+        let mut words: Vec<u64> = (0..ticks * width).map(|k| scalar.encode(1.0 + k as f64)).collect();
         change(&mut words);
         Trace::from_words(description, words).unwrap()
     }
 
     #[test]
     fn equal_traces_have_no_difference() {
-        assert_eq!(
-            first_difference(
-                &trace(Scalar::F64, 9, |_| ()),
-                &trace(Scalar::F64, 9, |_| ())
-            ),
-            None
-        );
+        assert_eq!(first_difference(&trace(Scalar::F64, 9, |_| ()), &trace(Scalar::F64, 9, |_| ())), None);
     }
 
     #[test]
@@ -157,10 +128,7 @@ mod tests {
             words[500 * 50] = 0;
         });
         let found = first_difference(&a, &b).unwrap().to_string();
-        assert_eq!(
-            found,
-            "tick 417 voltage[2]: 40d4604000000000 vs 40d4604000000001 (1 ulp)"
-        );
+        assert_eq!(found, "tick 417 voltage[2]: 40d4604000000000 vs 40d4604000000001 (1 ulp)");
     }
 
     #[test]
@@ -172,33 +140,19 @@ mod tests {
             "tick 1 displacement[0]: 42640000 vs 4263ffff (1 ulp)"
         );
         let c = trace(Scalar::F32, 2, |words| words[49] ^= 1);
-        assert!(
-            first_difference(&a, &c)
-                .unwrap()
-                .to_string()
-                .starts_with("tick 0 state_digest: 0000000042480000")
-        );
+        assert!(first_difference(&a, &c).unwrap().to_string().starts_with("tick 0 state_digest: 0000000042480000"));
         let nan = |payload: u64| trace(Scalar::F32, 2, |words| words[0] = 0x7fc0_0000 | payload);
-        assert_eq!(
-            first_difference(&nan(0), &nan(1)).unwrap().to_string(),
-            "tick 0 setpoint[0]: 7fc00000 vs 7fc00001"
-        );
+        assert_eq!(first_difference(&nan(0), &nan(1)).unwrap().to_string(), "tick 0 setpoint[0]: 7fc00000 vs 7fc00001");
     }
 
     #[test]
     fn another_length_or_controller_is_a_difference() {
         let a = trace(Scalar::F64, 3, |_| ());
         let longer = trace(Scalar::F64, 4, |_| ());
-        assert_eq!(
-            first_difference(&a, &longer).unwrap().to_string(),
-            "length: 3 vs 4 ticks"
-        );
+        assert_eq!(first_difference(&a, &longer).unwrap().to_string(), "length: 3 vs 4 ticks");
         let mut description = six_legs(Scalar::F64);
         description.digest = "01".to_owned();
         let other = Trace::from_words(description, a.words().to_vec()).unwrap();
-        assert_eq!(
-            first_difference(&a, &other).unwrap().to_string(),
-            "header digest: 00 vs 01"
-        );
+        assert_eq!(first_difference(&a, &other).unwrap().to_string(), "header digest: 00 vs 01");
     }
 }

@@ -36,33 +36,17 @@ pub fn table(grid: usize, range: [f64; 2], weight: impl Fn(usize, usize) -> f64)
             nodes[EverettTable::index(up, down)] = sum;
         }
     }
-    EverettTable {
-        grid,
-        drive_min: range[0],
-        drive_max: range[1],
-        nodes,
-    }
+    EverettTable { grid, drive_min: range[0], drive_max: range[1], nodes }
 }
 
 /// Table of positive weights (m) that resembles a piezo actuator: heavy diagonal, `roughness` 0 to 1 of random scatter.
-pub fn random_table(
-    grid: usize,
-    range: [f64; 2],
-    stroke: f64,
-    roughness: f64,
-    seed: u64,
-) -> EverettTable {
+pub fn random_table(grid: usize, range: [f64; 2], stroke: f64, roughness: f64, seed: u64) -> EverettTable {
     let mut random = generator(seed);
-    let scatter: Vec<f64> = (0..grid * (grid + 1) / 2)
-        .map(|_| 1.0 + roughness * (2.0 * uniform(&mut random) - 1.0))
-        .collect();
+    let scatter: Vec<f64> =
+        (0..grid * (grid + 1) / 2).map(|_| 1.0 + roughness * (2.0 * uniform(&mut random) - 1.0)).collect();
     let shape = |a: usize, b: usize| {
         let width = (a - 1 - b) as f64 / grid as f64;
-        let base = if a == b + 1 {
-            0.6
-        } else {
-            1.2 / grid as f64 * (-4.0 * width).exp()
-        };
+        let base = if a == b + 1 { 0.6 } else { 1.2 / grid as f64 * (-4.0 * width).exp() };
         base * scatter[EverettTable::index(a, b)]
     };
     let raw = table(grid, range, shape);
@@ -80,26 +64,21 @@ pub struct Drive {
 
 impl Drive {
     pub fn at(start: f64, rate: f64) -> Self {
-        Self {
-            rate,
-            samples: vec![start],
-        }
+        Self { rate, samples: vec![start] }
     }
 
     /// Ramp to `target` at `slope` (V/s).
     pub fn ramp(mut self, target: f64, slope: f64) -> Self {
         let from = *self.samples.last().unwrap();
         let steps = (((target - from).abs() / slope * self.rate).round() as usize).max(1);
-        self.samples
-            .extend((1..=steps).map(|k| from + (target - from) * k as f64 / steps as f64));
+        self.samples.extend((1..=steps).map(|k| from + (target - from) * k as f64 / steps as f64));
         self
     }
 
     /// Constant for `seconds`.
     pub fn hold(mut self, seconds: f64) -> Self {
         let last = *self.samples.last().unwrap();
-        self.samples
-            .extend(std::iter::repeat_n(last, (seconds * self.rate) as usize));
+        self.samples.extend(std::iter::repeat_n(last, (seconds * self.rate) as usize));
         self
     }
 
@@ -112,20 +91,13 @@ impl Drive {
     /// First-order reversal curves: up to k/n of the range and back, k = 1..=n.
     pub fn reversal_curves(mut self, n: usize, range: [f64; 2], slope: f64) -> Self {
         for k in 1..=n {
-            self = self
-                .ramp(
-                    range[0] + (range[1] - range[0]) * k as f64 / n as f64,
-                    slope,
-                )
-                .ramp(range[0], slope);
+            self = self.ramp(range[0] + (range[1] - range[0]) * k as f64 / n as f64, slope).ramp(range[0], slope);
         }
         self
     }
 
     pub fn time(&self) -> Vec<f64> {
-        (0..self.samples.len())
-            .map(|k| k as f64 / self.rate)
-            .collect()
+        (0..self.samples.len()).map(|k| k as f64 / self.rate).collect()
     }
 }
 
@@ -140,10 +112,7 @@ pub struct Relays {
 impl Relays {
     /// All off.
     pub fn off(grid: usize) -> Self {
-        Self {
-            grid,
-            on: vec![false; grid * (grid + 1) / 2],
-        }
+        Self { grid, on: vec![false; grid * (grid + 1) / 2] }
     }
 
     /// Moves the drive to grid value k.

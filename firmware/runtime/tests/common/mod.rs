@@ -8,10 +8,7 @@ pub struct Random(pub u64);
 
 impl Random {
     pub fn next(&mut self) -> u64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.0 >> 33
     }
     /// Uniform in 0..1.
@@ -34,9 +31,7 @@ pub type Weights = Vec<Vec<f64>>;
 /// Non-negative weights of a 60 µm actuator, a fifth of the square cells empty.
 pub fn random_weights(seed: u64, n: usize) -> Weights {
     let mut random = Random(seed);
-    let mut weights: Weights = (0..=n)
-        .map(|up| (0..up).map(|_| random.unit()).collect())
-        .collect();
+    let mut weights: Weights = (0..=n).map(|up| (0..up).map(|_| random.unit()).collect()).collect();
     for (up, row) in weights.iter_mut().enumerate() {
         for (down, w) in row.iter_mut().enumerate() {
             if down + 1 == up {
@@ -47,10 +42,7 @@ pub fn random_weights(seed: u64, n: usize) -> Weights {
         }
     }
     let total: f64 = weights.iter().flatten().sum();
-    weights
-        .iter_mut()
-        .flatten()
-        .for_each(|w| *w *= 60e-6 / total);
+    weights.iter_mut().flatten().for_each(|w| *w *= 60e-6 / total);
     weights
 }
 
@@ -72,15 +64,11 @@ pub fn everett_nodes(weights: &Weights) -> Vec<f64> {
 
 pub fn table(weights: &Weights) -> Table {
     let nodes: Box<[f64; NODES]> = everett_nodes(weights).try_into().expect("N × N weights");
-    Everett {
-        nodes: Box::leak(nodes),
-    }
+    Everett { nodes: Box::leak(nodes) }
 }
 
 pub fn table32(table: &Table) -> Table32 {
-    Everett {
-        nodes: Box::leak(Box::new(table.nodes.map(|e| e as f32))),
-    }
+    Everett { nodes: Box::leak(Box::new(table.nodes.map(|e| e as f32))) }
 }
 
 /// Brute force: every relay of a refined plane on its own.
@@ -107,11 +95,7 @@ impl Relays {
                 } else {
                     for a in 1..=refine {
                         for b in 0..refine {
-                            relays.push((
-                                (up - 1) * refine + a,
-                                down * refine + b,
-                                w / (refine * refine) as f64,
-                            ));
+                            relays.push(((up - 1) * refine + a, down * refine + b, w / (refine * refine) as f64));
                         }
                     }
                 }
@@ -160,12 +144,7 @@ pub struct PlainStaircase {
 
 impl PlainStaircase {
     pub fn new(capacity: usize, rule: Rule) -> Self {
-        Self {
-            extrema: vec![0.0],
-            drive: 0.0,
-            capacity,
-            rule,
-        }
+        Self { extrema: vec![0.0], drive: 0.0, capacity, rule }
     }
 
     pub fn apply(&mut self, table: &Table, drive: f64) -> f64 {
@@ -188,35 +167,23 @@ impl PlainStaircase {
             self.drive = drive;
         }
         let path: Vec<f64> = self.extrema.iter().copied().chain([self.drive]).collect();
-        path.windows(2)
-            .map(|w| {
-                if w[1] >= w[0] {
-                    table.value(w[1], w[0])
-                } else {
-                    -table.value(w[0], w[1])
-                }
-            })
-            .sum()
+        path.windows(2).map(|w| if w[1] >= w[0] { table.value(w[1], w[0]) } else { -table.value(w[0], w[1]) }).sum()
     }
 
     fn drop_pair(&mut self, table: &Table) {
         let path: Vec<f64> = self.extrema.iter().copied().chain([self.drive]).collect();
         let rectangle = |i: usize| {
             let e = |a: f64, b: f64| {
-                if a >= b {
-                    table.value(a, b)
-                } else {
-                    table.value(b, a)
-                }
+                if a >= b { table.value(a, b) } else { table.value(b, a) }
             };
             let [p, q, r, s] = [path[i - 1], path[i], path[i + 1], path[i + 2]];
             (e(p, q) - e(r, q) - e(p, s) + e(r, s)).abs()
         };
         let i = match self.rule {
             Rule::Innermost => path.len() - 3,
-            Rule::LeastRectangle => (1..path.len() - 2)
-                .min_by(|&a, &b| rectangle(a).total_cmp(&rectangle(b)))
-                .expect("at least one pair"),
+            Rule::LeastRectangle => {
+                (1..path.len() - 2).min_by(|&a, &b| rectangle(a).total_cmp(&rectangle(b))).expect("at least one pair")
+            }
         };
         self.extrema.drain(i..i + 2);
     }

@@ -75,7 +75,7 @@ impl Config {
         self.setpoint
     }
 
-    /// ω (EWMA) or ω1 (PCC) per run, within (0, 1]; from `adaptation.level_weight`.
+    /// ω (EWMA) or ω1 (PCC) per run, within [0, 1]; from `adaptation.level_weight`.
     #[inline]
     #[must_use]
     pub const fn level_weight(&self) -> Real {
@@ -118,14 +118,14 @@ impl Config {
     /// The same with other weights per run.
     ///
     /// # Errors
-    /// A level weight outside (0, 1] or a drift weight outside [0, 1]. That they are stable on the platform is for the
+    /// A weight outside [0, 1]. That they are stable on the platform is for the
     /// compiler to check, not for this function.
     pub fn with_weights(
         self,
         level_weight: Real,
         drift_weight: Real,
     ) -> Result<Self, ConfigError> {
-        if !(level_weight > 0.0 && level_weight <= 1.0) {
+        if !(level_weight >= 0.0 && level_weight <= 1.0) {
             return Err(ConfigError { word: 2 });
         }
         if !(drift_weight >= 0.0 && drift_weight <= 1.0) {

@@ -1,0 +1,91 @@
+//! What a tick costs on the emulated microcontrollers, against the figures the project promises.
+//! `cargo test --release -p specgen-tests --test budgets -- --nocapture` prints them.
+
+use host_sim::controller::TickController;
+use specgen::model::Mcu;
+use specgen::target::{image, stack};
+use specgen::verify::{self, Measurement};
+use specgen_tests::{Emitted, host_trace};
+
+const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+const TICKS: u32 = 20_000;
+/// Instructions of the inverse Preisach model of one leg on the M7: mean, worst.
+const INVERSE: (f64, u64) = (250.0, 450);
+
+struct Budget {
+    name: &'static str,
+    edits: &'static [(&'static str, &'static str)],
+    mcu: Mcu,
+    /// Mean instructions of a whole tick.
+    tick: f64,
+}
+
+const BUDGETS: [Budget; 3] = [
+    Budget { name: "M7 f64", edits: &[], mcu: Mcu::Mps2An500, tick: 3000.0 },
+    Budget { name: "M7 f32", edits: &[F32], mcu: Mcu::Mps2An500, tick: 2500.0 },
+    Budget { name: "M4F f32", edits: &[F32], mcu: Mcu::Mps2An386, tick: 3000.0 },
+];
+
+/// Pose set-points to six voltages under PCC, tracking with gauge noise, each tick measured.
+#[test]
+fn a_tick_of_six_legs_stays_within_its_instructions_and_its_stack() {
+    for budget in &BUDGETS {
+        let folder = format!("budget-{}", budget.name.replace(' ', "-"));
+        let emitted = Emitted::new(&folder, "reference.toml", budget.edits);
+        let Some(image) = emitted.image(budget.mcu) else { continue };
+        let host = verify::exercise(&emitted.library(), &emitted.compiled.model, &emitted.compiled.ir, TICKS).unwrap();
+        let config = emitted.controller().default_config();
+        let (m, difference) = verify::measure(&image, &config, &host).unwrap();
+        assert!(difference.is_none(), "{}: {}", budget.name, difference.unwrap());
+        print(budget.name, &m);
+
+        let tick = m.stage("step").unwrap();
+        assert_eq!(tick.calls, u64::from(TICKS));
+        assert!(tick.mean <= budget.tick, "{}: {} instructions", budget.name, tick.mean);
+        let inverse = m.stage("inverse").unwrap();
+        assert!(
+            inverse.mean <= INVERSE.0 && inverse.max <= INVERSE.1,
+            "{}: {} mean, {} worst",
+            budget.name,
+            inverse.mean,
+            inverse.max
+        );
+
+        assert!(m.forbidden_symbols.is_empty(), "{}: {:?}", budget.name, m.forbidden_symbols);
+        let bound = stack::bound(&image.elf, stack::STEP_SYMBOL).unwrap();
+        assert!(bound.is_complete(), "{}: {bound:?}", budget.name);
+        assert!(bound.bytes >= m.stack_painted && m.stack_painted > 0, "{} < {}", bound.bytes, m.stack_painted);
+        assert!(bound.bytes <= 2048);
+        assert!(image::footprint(&image.elf).unwrap().flash <= 96 * 1024);
+    }
+}
+
+/// The hostile record of the bit comparison, whose nested loops overfill the memory: no promise, but stated and bounded.
+#[test]
+fn the_worst_tick_of_the_hostile_record_is_bounded() {
+    let emitted = Emitted::new("budget-hostile", "reference.toml", &[]);
+    let Some(image) = emitted.image(Mcu::Mps2An500) else { return };
+    let mut controller = emitted.controller();
+    let description = controller.description().clone();
+    for (what, mode) in [("pcc", 2.0), ("invhys", 0.0)] {
+        let inputs = emitted.stimulus(&description, false, 20_000, 3);
+        let (host, config) = host_trace(&mut controller, &[("mode", mode), ("setpoint_kind", 1.0)], &inputs);
+        let (m, difference) = verify::measure(&image, &config, &host).unwrap();
+        assert!(difference.is_none());
+        print(&format!("M7 f64, hostile, {what}"), &m);
+        let leg = m.stage("actuate").unwrap();
+        // A full memory drops one pair: a look-up for each of 62 pairs, and two moves of 62 entries.
+        assert!(leg.max <= 6000, "{} instructions", leg.max);
+        assert!(m.stage("step").unwrap().max <= 6 * 6000 + 1000);
+    }
+}
+
+fn print(name: &str, m: &Measurement) {
+    println!(
+        "{name}: flash {} ({} code, {} constants), RAM {}, tick code {}, stack {:?} bound {} painted",
+        m.flash, m.code, m.constants, m.ram, m.tick_code, m.stack_bound, m.stack_painted
+    );
+    for stage in &m.stages {
+        println!("  {:<12} {:>8.1} mean {:>6} min {:>6} max", stage.name, stage.mean, stage.min, stage.max);
+    }
+}
