@@ -33,6 +33,7 @@ const FIXED: &[(&str, &str)] = &[
     ("host/build.rs", include_str!("../../firmware/host/build.rs")),
     ("host/src/lib.rs", include_str!("../../firmware/host/src/lib.rs")),
     ("qemu/Cargo.lock", include_str!("../../firmware/qemu/Cargo.lock")),
+    ("qemu/README.md", include_str!("../../firmware/qemu/README.md")),
     ("qemu/Cargo.toml", include_str!("../../firmware/qemu/Cargo.toml")),
     ("qemu/build.rs", include_str!("../../firmware/qemu/build.rs")),
     ("qemu/memory.x", include_str!("../../firmware/qemu/memory.x")),
@@ -278,4 +279,26 @@ pub fn sha256(bytes: &[u8]) -> String {
 
 fn io_error(verb: &str, path: &Path, source: io::Error) -> WriteError {
     WriteError::Io { action: format!("{verb} `{}`", path.display()), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nothing that a target needs is forgotten: what lies in its folder is copied, but for tests.
+    #[test]
+    fn every_hand_written_file_of_runtime_and_targets_is_copied() {
+        let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware");
+        let mut present: Vec<String> = list(&firmware)
+            .unwrap()
+            .into_iter()
+            .filter(|path| !path.starts_with("controller/") && !path.starts_with("runtime/tests/"))
+            .collect();
+        // `list` passes lock files over; the one of the image is ours.
+        present.push("qemu/Cargo.lock".to_owned());
+        present.sort();
+        let mut copied: Vec<String> = FIXED.iter().map(|(path, _)| (*path).to_owned()).collect();
+        copied.sort();
+        assert_eq!(present, copied);
+    }
 }

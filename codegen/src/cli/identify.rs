@@ -88,12 +88,13 @@ fn refused(findings: Vec<Diagnostic>) -> Failure {
 /// A report in one line.
 pub fn summary(report: &Report) -> String {
     format!(
-        "{} reversal curves, fit {:.2} nm rms ({:.3} % of {:.2} µm), noise {:.2} nm, drift {:.3} nm/s, dead time {:.3} ms, \
+        "{} reversal curves, fit {:.2} nm rms ({:.3} % of {:.2} µm; {:.2} nm within branches), noise {:.2} nm, drift {:.3} nm/s, dead time {:.3} ms, \
          {} of {} weights zero, {:.1} % of the plane excited",
         report.reversal_curves,
         report.fit_rms * 1e9,
         report.fit_rms_percent,
         report.displacement_range * 1e6,
+        report.branch_rms * 1e9,
         report.noise_floor * 1e9,
         report.drift * 1e9,
         report.dead_time * 1e3,

@@ -1,5 +1,6 @@
 //! The rows of the key table.
 
+use crate::identify::MAX_GRID;
 use super::{Dimension, Item, Key, Presence, Range, SCHEMA_VERSION, Section, Shape};
 use Presence::{Default, InsteadOf, Optional, Required};
 
@@ -158,7 +159,7 @@ pub const SECTIONS: &[Section] = &[
         optional: false,
         doc: "The inverse Preisach model and the measurements that identify it.",
         keys: &[
-            row("grid", integer(2, 256), Default("32"), "N", "32", "Intervals per axis of the Preisach plane; the table grows and the error falls with its square."),
+            row("grid", integer(2, MAX_GRID as i64), Default("32"), "N", "32", "Intervals per axis of the Preisach plane; the table grows and the error falls with its square."),
             row("memory", integer(8, 256), Default("64"), "", "64", "Reversals that the controller can remember."),
             row("records", Shape::Records, Required, "", "[\"records/reference-forc.csv\"]", "Reversal-curve files, relative to the spec: one for all legs, or six."),
         ],
