@@ -42,7 +42,7 @@ fn install_compiler(say: &mut dyn FnMut(&str)) {
         }
     }
     apt_install(&DEBIAN_COMPILER, say);
-    if toolchain::find().is_err() {
+    if matches!(toolchain::find(), Err(TargetError::MissingTool { tool, .. }) if tool == toolchain::LINKER) {
         apt_install(&[DEBIAN_LINKER], say);
     }
 }

@@ -14,6 +14,9 @@ use super::process::{clean_command, find_in_path, first_line};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// What [`TargetError::MissingTool`] calls a linker, where a compiler alone is not enough.
+pub(super) const LINKER: &str = "a linker for ARM images";
+
 /// Where `core` for the target comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CoreLibrary {
@@ -88,7 +91,7 @@ fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, 
     }
     Err(match without_linker {
         Some(rustc) => TargetError::MissingTool {
-            tool: "a linker for ARM images".into(),
+            tool: LINKER.into(),
             looked: format!("rust-lld beside {} and on PATH, ld.lld on PATH", rustc.display()),
             command: "apt-get install lld".into(),
         },
