@@ -198,7 +198,7 @@ fn check_free(dir: &Path) -> Result<Vec<String>, WriteError> {
         found.is_some() && found.as_ref() == recorded.get(path)
     };
     let foreign: Vec<String> =
-        present.into_iter().filter(|path| !(path == MANIFEST && !recorded.is_empty()) && !is_ours(path)).collect();
+        present.into_iter().filter(|path| (path != MANIFEST || recorded.is_empty()) && !is_ours(path)).collect();
     if foreign.is_empty() {
         return Ok(recorded.into_keys().collect());
     }

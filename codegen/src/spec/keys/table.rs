@@ -1,7 +1,7 @@
 //! The rows of the key table.
 
-use crate::identify::MAX_GRID;
 use super::{Dimension, Item, Key, Presence, Range, SCHEMA_VERSION, Section, Shape};
+use crate::identify::MAX_GRID;
 use Presence::{Default, InsteadOf, Optional, Required};
 
 const fn row(
