@@ -156,7 +156,9 @@ codes! {
     VALIDATION_IDLE = "E0612", "validation record hardly moves",
         "Validate with a record that moves the drive through the table's range.";
     TABLE_FILE = "E0613", "not a table file",
-        "A table file is as `identify` writes it: three columns, the nodes of a triangle of rising thresholds.";
+        "A table file is as `identify` writes it: three columns, the nodes of a triangle of rising thresholds, no negative weight.";
+    TABLE_MISMATCH = "E0614", "a table of another grid or voltage range",
+        "A table named in hysteresis.records must have the cells of hysteresis.grid over the range of actuator.voltage: identify the record again with both.";
     STROKE_MISMATCH = "W0301", "stroke, gain and voltage do not fit",
         "stacks x stack_gain x voltage range is far from the stroke: one of the four is probably wrong, or the stroke is never used.";
     RESONANCE_ALIASED = "W0302", "resonance above half the tick rate",
