@@ -16,7 +16,7 @@ const REFERENCE_CURVES: u32 = 32;
 const LEG_CURVES: u32 = 8;
 /// Gains of the six legs against the reference leg's.
 const LEG_GAINS: [f64; 6] = [0.95, 1.03, 0.98, 1.05, 1.0, 0.97];
-/// Emitted files whose text does not depend on the spec, but for the header.
+/// Emitted files that differ between specs only in their header and in what the controller says of itself.
 const SAME_FOR_EVERY_SPEC: [&str; 3] = ["src/state.rs", "src/step.rs", "src/words.rs"];
 /// Specs whose emitted crate is kept as a golden: small ones, one per scalar.
 const GOLDENS: [&str; 2] = ["small-grid", "six-records"];
