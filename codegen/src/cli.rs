@@ -4,6 +4,7 @@
 
 mod build;
 mod check;
+mod file;
 mod identify;
 mod sim;
 mod ui;
@@ -11,7 +12,8 @@ mod ui;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use ui::{Failure, Ui};
 
@@ -21,6 +23,7 @@ use ui::{Failure, Ui};
     version,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
+    override_usage = "specgen [OPTIONS] <SPEC>\n       specgen <COMMAND>",
     after_help = "Examples:\n  specgen platform.toml -o controller    compile, write a workspace, build and measure it\n  \
                   specgen check platform.toml            every finding, nothing written\n  \
                   specgen sim platform.toml              the paper's leg experiment with the emitted controller\n  \
@@ -64,7 +67,10 @@ enum Command {
 /// Runs the command that the process was started with.
 #[must_use]
 pub fn run() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse_arguments(error),
+    };
     let mut ui = Ui::new(cli.common.json);
     let done = match &cli.command {
         None => build::run(&cli.build, &mut ui),
@@ -80,9 +86,28 @@ pub fn run() -> ExitCode {
     }
 }
 
+/// Help and version, or why the arguments make no sense.
+fn refuse_arguments(error: clap::Error) -> ExitCode {
+    let error = match error.kind() {
+        // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
+        ErrorKind::ArgumentConflict => Cli::command().error(
+            ErrorKind::ArgumentConflict,
+            "one spec file is expected, or a command (check, sim, identify, forc, dump-ir) with its own arguments",
+        ),
+        _ => error,
+    };
+    // Nothing was parsed, so the arguments are asked themselves.
+    if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
+        let text = error.render().to_string();
+        let message = text.trim().trim_start_matches("error: ").to_owned();
+        return ExitCode::from(Ui::new(true).failed(&Failure::Usage(message)));
+    }
+    error.exit()
+}
+
 fn dump_ir(spec: &std::path::Path, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = crate::compile::compile(spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
-    ui.out(&crate::workspace::ir_text(&compiled.ir));
+    ui.result(&crate::workspace::ir_text(&compiled.ir), serde_json::json!(compiled.ir));
     Ok(())
 }

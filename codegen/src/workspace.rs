@@ -1,23 +1,16 @@
-//! The output folder: a self-contained workspace, written whole or not at all.
-//!
-//! Beside the emitted crate it holds the runtime and the targets, copied verbatim from the sources that specgen itself
-//! was built with. A manifest (`.specgen`) lists every file with its SHA-256, so that a later run can tell its own output
-//! from somebody's work.
+//! The files of a self-contained workspace. Beside the emitted crate it holds the runtime and the targets, copied verbatim
+//! from the sources that specgen itself was built with. [`write`] puts them into a folder, whole or not at all.
+
+mod output;
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
 use crate::emit::EmittedCrate;
 use crate::ir::Ir;
 
-/// Name of the manifest in the output folder.
-const MANIFEST: &str = ".specgen";
-/// Build output and lock files that cargo makes in a workspace; never ours, never in the way.
-const CARGO_MAKES: [&str; 2] = ["target", "Cargo.lock"];
+pub use output::{WriteError, write};
 
 /// Hand-written files that every workspace gets, as path and text.
 const FIXED: &[(&str, &str)] = &[
@@ -45,42 +38,6 @@ const FIXED: &[(&str, &str)] = &[
     ("qemu/src/stages.rs", include_str!("../../firmware/qemu/src/stages.rs")),
     ("qemu/src/stats.rs", include_str!("../../firmware/qemu/src/stats.rs")),
 ];
-
-/// Why an output folder could not be written. Nothing was changed.
-#[derive(Debug)]
-pub enum WriteError {
-    /// The folder holds files that specgen did not write, or that were changed since.
-    Occupied {
-        /// The folder.
-        dir: PathBuf,
-        /// Up to a few of the files, relative to it.
-        files: Vec<String>,
-    },
-    /// The file system said no.
-    Io {
-        /// What was attempted.
-        action: String,
-        /// Its answer.
-        source: io::Error,
-    },
-}
-
-impl std::fmt::Display for WriteError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Occupied { dir, files } => write!(
-                f,
-                "output folder `{}` holds files that specgen did not write or that were changed since: {}; \
-                 nothing was written. Name another folder with -o, or move them away",
-                dir.display(),
-                files.join(", ")
-            ),
-            Self::Io { action, source } => write!(f, "could not {action}: {source}; nothing was changed"),
-        }
-    }
-}
-
-impl std::error::Error for WriteError {}
 
 /// All files of a workspace: path relative to its root, text. The same spec gives the same bytes.
 #[must_use]
@@ -154,143 +111,29 @@ MIT OR Apache-2.0, like specgen.
     )
 }
 
-/// Writes the workspace into `dir`, which must not exist, be empty, or hold nothing but an unchanged earlier output
-/// (its `target` folders stay).
-///
-/// Everything is first written beside it and then moved into place, so that a failure leaves `dir` as it was.
-///
-/// # Errors
-/// See [`WriteError`].
-pub fn write(dir: &Path, files: &BTreeMap<String, String>) -> Result<(), WriteError> {
-    let known = check_free(dir)?;
-    let parent = match dir.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    fs::create_dir_all(parent).map_err(|e| io_error("create", parent, e))?;
-    let staging = tempfile::Builder::new()
-        .prefix(".specgen-")
-        .tempdir_in(parent)
-        .map_err(|e| io_error("create a folder in", parent, e))?;
-    for (path, text) in files {
-        put(&staging.path().join(path), text)?;
-    }
-    put(&staging.path().join(MANIFEST), &manifest(files))?;
-    move_into_place(dir, staging.path(), files, &known)
-}
-
-/// The files that an earlier run wrote into `dir`.
-fn check_free(dir: &Path) -> Result<Vec<String>, WriteError> {
-    let present = match list(dir) {
-        Ok(present) => present,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        Err(error) => return Err(io_error("read", dir, error)),
-    };
-    // Without a manifest nothing here is ours.
-    let recorded: BTreeMap<String, String> = fs::read_to_string(dir.join(MANIFEST))
-        .unwrap_or_default()
-        .lines()
-        .filter_map(|line| line.split_once("  "))
-        .map(|(digest, path)| (path.to_owned(), digest.to_owned()))
-        .collect();
-    let is_ours = |path: &String| {
-        let found = fs::read(dir.join(path)).ok().map(|bytes| sha256(&bytes));
-        found.is_some() && found.as_ref() == recorded.get(path)
-    };
-    let foreign: Vec<String> =
-        present.into_iter().filter(|path| (path != MANIFEST || recorded.is_empty()) && !is_ours(path)).collect();
-    if foreign.is_empty() {
-        return Ok(recorded.into_keys().collect());
-    }
-    let more = foreign.len().saturating_sub(5);
-    let mut files: Vec<String> = foreign.into_iter().take(5).collect();
-    if more > 0 {
-        files.push(format!("and {more} more"));
-    }
-    Err(WriteError::Occupied { dir: dir.to_owned(), files })
-}
-
-/// Files below `dir`, relative, sorted, without what cargo makes.
-fn list(dir: &Path) -> io::Result<Vec<String>> {
-    fn walk(root: &Path, below: &str, out: &mut Vec<String>) -> io::Result<()> {
-        let mut entries: Vec<_> = fs::read_dir(root.join(below))?.collect::<io::Result<_>>()?;
-        entries.sort_by_key(fs::DirEntry::file_name);
-        for entry in entries {
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if CARGO_MAKES.contains(&name.as_str()) {
-                continue;
-            }
-            let path = if below.is_empty() { name } else { format!("{below}/{name}") };
-            if entry.file_type()?.is_dir() {
-                walk(root, &path, out)?;
-            } else {
-                out.push(path);
-            }
-        }
-        Ok(())
-    }
-    let mut out = Vec::new();
-    walk(dir, "", &mut out)?;
-    Ok(out)
-}
-
-/// Moves the staged tree to `dir`. A new folder is one rename; into an existing one the files are moved one by one, and
-/// those of the earlier output that are no longer made are removed.
-fn move_into_place(
-    dir: &Path,
-    staging: &Path,
-    files: &BTreeMap<String, String>,
-    known: &[String],
-) -> Result<(), WriteError> {
-    if !dir.exists() {
-        // The staging folder is private; the output folder gets the usual permissions.
-        fs::create_dir(dir).map_err(|e| io_error("create", dir, e))?;
-    }
-    for path in files.keys().map(String::as_str).chain([MANIFEST]) {
-        let to = dir.join(path);
-        if let Some(folder) = to.parent() {
-            fs::create_dir_all(folder).map_err(|e| io_error("create", folder, e))?;
-        }
-        fs::rename(staging.join(path), &to).map_err(|e| io_error("write", &to, e))?;
-    }
-    for stale in known.iter().filter(|path| !files.contains_key(*path)) {
-        let path = dir.join(stale);
-        fs::remove_file(&path).map_err(|e| io_error("remove", &path, e))?;
-    }
-    Ok(())
-}
-
-fn put(path: &Path, text: &str) -> Result<(), WriteError> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(|e| io_error("create", folder, e))?;
-    }
-    fs::write(path, text).map_err(|e| io_error("write", path, e))
-}
-
-fn manifest(files: &BTreeMap<String, String>) -> String {
-    files.iter().map(|(path, text)| format!("{}  {path}\n", sha256(text.as_bytes()))).collect()
-}
-
 /// SHA-256 in hex.
 #[must_use]
 pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-fn io_error(verb: &str, path: &Path, source: io::Error) -> WriteError {
-    WriteError::Io { action: format!("{verb} `{}`", path.display()), source }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
+
+    fn list(root: &Path, below: &str) -> Vec<String> {
+        let inside =
+            |(path, kind): (String, std::fs::FileType)| if kind.is_dir() { list(root, &path) } else { vec![path] };
+        output::entries(root, below).unwrap().into_iter().flat_map(inside).collect()
+    }
 
     /// Nothing that a target needs is forgotten: what lies in its folder is copied, but for tests.
     #[test]
     fn every_hand_written_file_of_runtime_and_targets_is_copied() {
         let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware");
-        let mut present: Vec<String> = list(&firmware)
-            .unwrap()
+        let mut present: Vec<String> = list(&firmware, "")
             .into_iter()
             .filter(|path| !path.starts_with("controller/") && !path.starts_with("runtime/tests/"))
             .collect();

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use super::ui::{Failure, Ui, write_file};
+use super::file::write_file;
+use super::ui::{Failure, Ui};
 use crate::compile::Refused;
 use crate::diagnostic::Diagnostic;
 use crate::identify::{self, Options, Report, Validation};
@@ -16,11 +17,11 @@ use crate::identify::{self, Options, Report, Validation};
 pub struct Arguments {
     /// Reversal-curve record: CSV with columns time_s, drive_V, displacement_um.
     record: PathBuf,
-    /// Voltage range of the table, V.
+    /// Voltage range of the table, V, such as 0:100 or -90:90.
     #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
     drive: [f64; 2],
     /// Cells per axis of the Preisach grid.
-    #[arg(long, default_value_t = 32)]
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = grid, allow_negative_numbers = true)]
     grid: usize,
     /// Another record of the same leg, not used for the fit, to judge the table by.
     #[arg(long, value_name = "RECORD")]
@@ -40,6 +41,11 @@ fn range(text: &str) -> Result<[f64; 2], String> {
     } else {
         Err(format!("the lower voltage must be below the upper one, found `{text}`"))
     }
+}
+
+/// Any whole number: which sizes can be identified is for identification to say.
+fn grid(text: &str) -> Result<usize, String> {
+    text.parse().map_err(|_| format!("expected a whole number such as 32, found `{text}`"))
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {

@@ -14,6 +14,7 @@ use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, TRACKING_FRE
 use host_sim::table::{LinearityTable, TrackingTable};
 use serde_json::json;
 
+use super::file::write_file;
 use super::ui::{Failure, Ui};
 use crate::compile;
 use crate::target;
@@ -158,7 +159,7 @@ pub fn run_forc(arguments: &ForcArguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut gauge = Gauge::new(&noise, arguments.plant.seed, 0);
     let record = ReversalExperiment::reference(arguments.grid).run(&mut leg, &mut gauge);
     let rows = record.rows.len();
-    super::ui::write_file(&arguments.output, record.to_csv().as_bytes())?;
+    write_file(&arguments.output, record.to_csv().as_bytes())?;
     let text = format!("wrote {rows} rows to {}\n", arguments.output.display());
     ui.result(&text, json!({ "rows": rows, "file": arguments.output.display().to_string() }));
     Ok(())
@@ -169,7 +170,7 @@ fn write_folder(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failur
     fs::create_dir_all(folder)
         .map_err(|error| Failure::Environment(format!("could not create `{}`: {error}", folder.display())))?;
     for (name, bytes) in files {
-        super::ui::write_file(&folder.join(name), bytes)?;
+        write_file(&folder.join(name), bytes)?;
     }
     Ok(())
 }

@@ -1,12 +1,12 @@
 //! What the user sees: results on standard output, findings and progress on standard error.
 
 use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
 use crate::compile::Refused;
-use crate::diagnostic::{self, Diagnostic, Severity};
+use crate::diagnostic::{self, Diagnostic, Place, Severity};
 use crate::spec::SpecSource;
 use crate::target::TargetError;
 use crate::workspace::WriteError;
@@ -102,14 +102,13 @@ impl Ui {
         let (code, message) = match failure {
             Failure::Refused(refused) => {
                 self.findings(refused.source.as_ref(), &refused.findings);
-                let errors = refused.findings.iter().filter(|f| f.severity == Severity::Error).count();
-                let what = refused.source.as_ref().map_or("the input", |s| s.display_name.as_str());
-                let s = if errors == 1 { "" } else { "s" };
-                (1, format!("{what} is refused: {errors} error{s}; nothing was written"))
+                (1, format!("{} is refused; nothing was written", refused_file(refused)))
             }
             Failure::Gate(text) => (1, text.clone()),
             Failure::Usage(text) => (2, text.clone()),
-            Failure::Write(error @ WriteError::Occupied { .. }) => (1, error.to_string()),
+            Failure::Write(error @ (WriteError::Occupied { .. } | WriteError::NotAFolder { .. })) => {
+                (1, error.to_string())
+            }
             Failure::Write(error) => (3, error.to_string()),
             Failure::Target(error) => (3, error.to_string()),
             Failure::Environment(text) => (3, text.clone()),
@@ -134,15 +133,14 @@ impl Ui {
     }
 }
 
-/// Writes beside the target and renames, so that a failure leaves no half file.
-pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let failed = |error: std::io::Error| Failure::Environment(format!("could not write `{}`: {error}", path.display()));
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
+/// The file that is to blame, as its user named it. A spec that names a bad record is refused itself.
+fn refused_file(refused: &Refused) -> &str {
+    if let Some(source) = &refused.source {
+        return &source.display_name;
+    }
+    let first = refused.findings.iter().find(|finding| finding.severity == Severity::Error);
+    match first.map(|finding| &finding.place) {
+        Some(Place::File { path, .. }) => path,
+        _ => "the input",
+    }
 }

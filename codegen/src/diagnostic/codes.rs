@@ -101,6 +101,8 @@ codes! {
         "There are fewer than two converter codes to a cell of the Preisach grid.";
     SLEW_TOO_SLOW = "E0411", "slew rate too slow for the converter",
         "The slew limit, in converter codes per tick, rounds down to none.";
+    WORKSPACE_TOO_LARGE = "E0412", "workspace too large for the legs",
+        "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",
