@@ -76,25 +76,27 @@ impl Adapting {
 pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
     let adaptation = &model.adaptation;
     let dynamics = LegDynamics::of(model);
-    let mut margins = Margins { static_gain_limit: None, spectral_radius: 0.0, largest_level_weight: None };
-    for law in Adapting::of(adaptation) {
-        let of_law = check_law(model, &dynamics, law)?;
-        // The tighter of two laws counts.
-        let least = |a: Option<f64>, b: f64| Some(a.map_or(b, |a| if a < b { a } else { b }));
-        margins.static_gain_limit = least(margins.static_gain_limit, of_law.0);
-        margins.largest_level_weight = least(margins.largest_level_weight, of_law.2);
-        if of_law.1 > margins.spectral_radius {
-            margins.spectral_radius = of_law.1;
-        }
+    let laws = Adapting::of(adaptation);
+    // What every law allows; none of them, and there is nothing to allow.
+    let largest = laws.iter().map(|law| largest_level_weight(&dynamics, adaptation, *law)).reduce(f64::min);
+    let mut margins = Margins { static_gain_limit: None, spectral_radius: 0.0, largest_level_weight: largest };
+    for law in laws {
+        let (static_limit, radius) = check_law(model, &dynamics, law, largest.unwrap_or_default())?;
+        margins.static_gain_limit = Some(margins.static_gain_limit.map_or(static_limit, |a| a.min(static_limit)));
+        margins.spectral_radius = margins.spectral_radius.max(radius);
     }
     Ok(margins)
 }
 
-/// Static limit of λ, spectral radius, largest level weight of one law; or why it is refused.
-fn check_law(model: &Model, dynamics: &LegDynamics, law: Adapting) -> Result<(f64, f64, f64), Vec<Diagnostic>> {
+/// Static limit of λ and spectral radius of one law; or why it is refused, `largest` being the level weight that would do.
+fn check_law(
+    model: &Model,
+    dynamics: &LegDynamics,
+    law: Adapting,
+    largest: f64,
+) -> Result<(f64, f64), Vec<Diagnostic>> {
     let adaptation = &model.adaptation;
     let static_limit = law.static_limit(adaptation, 1.0);
-    let largest = largest_level_weight(dynamics, adaptation, law);
     let highest_ratio = adaptation.gain_ratio[1];
     if highest_ratio >= static_limit {
         let source = match law {
@@ -106,7 +108,7 @@ fn check_law(model: &Model, dynamics: &LegDynamics, law: Adapting) -> Result<(f6
              but gain_ratio goes up to {highest_ratio} (Jury, {source})",
             law.name()
         );
-        return Err(vec![refusal(model, law, codes::UNSTABLE_STATIC, message, largest)]);
+        return Err(vec![refusal(model, codes::UNSTABLE_STATIC, message, largest)]);
     }
     let radius = worst_radius(dynamics, adaptation, law, 1.0);
     if radius > LARGEST_RADIUS {
@@ -120,9 +122,9 @@ fn check_law(model: &Model, dynamics: &LegDynamics, law: Adapting) -> Result<(f6
             dynamics.damping_ratio,
             adaptation.gain_ratio
         );
-        return Err(vec![refusal(model, law, codes::UNSTABLE_SAMPLED, message, largest)]);
+        return Err(vec![refusal(model, codes::UNSTABLE_SAMPLED, message, largest)]);
     }
-    Ok((static_limit, radius, largest))
+    Ok((static_limit, radius))
 }
 
 /// Largest spectral radius over the λ interval with both weights scaled by `scale`.
@@ -169,7 +171,7 @@ fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Ad
 }
 
 /// `largest` is rounded down to what the message shows, so that the number shown is itself accepted.
-fn refusal(model: &Model, law: Adapting, code: &'static str, message: String, largest: f64) -> Diagnostic {
+fn refusal(model: &Model, code: &'static str, message: String, largest: f64) -> Diagnostic {
     let bandwidth = model.spans.contains_key("adaptation.level_bandwidth");
     let key = if bandwidth { "adaptation.level_bandwidth" } else { "adaptation.level_weight" };
     let run = model.timing.period * f64::from(model.adaptation.run_interval);
@@ -185,7 +187,7 @@ fn refusal(model: &Model, law: Adapting, code: &'static str, message: String, la
         let proportion = model.adaptation.drift_weight / model.adaptation.level_weight;
         let level = if bandwidth { shown(largest / run) } else { shown(largest) };
         let (name, unit) = if bandwidth { ("level_bandwidth", " rad/s") } else { ("level_weight", "") };
-        let drift = if law == Adapting::Pcc {
+        let drift = if model.adaptation.drift_weight > 0.0 {
             format!(" (with the drift weight in the same proportion: {:.4e}{unit})", shown(level * proportion))
         } else {
             String::new()
