@@ -12,7 +12,7 @@ mod ui;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use ui::{Failure, Ui};
@@ -90,7 +90,7 @@ pub fn run() -> ExitCode {
 fn refuse_arguments(error: clap::Error) -> ExitCode {
     let error = match error.kind() {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
-        ErrorKind::ArgumentConflict => Cli::command().error(
+        ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
             "one spec file is expected, or a command (check, sim, identify, forc, dump-ir) with its own arguments",
         ),

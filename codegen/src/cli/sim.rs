@@ -37,7 +37,7 @@ pub struct Arguments {
     #[command(flatten)]
     plant: PlantArguments,
     /// Control ticks per period of the trajectory.
-    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, default_value_t = 500, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: u32,
 }
 
@@ -51,7 +51,7 @@ pub struct PlantArguments {
     #[arg(long)]
     no_noise: bool,
     /// Seed of the noise.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
 }
 
@@ -147,7 +147,7 @@ pub struct ForcArguments {
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Reversal curves, and cells per axis of the grid that they identify.
-    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(2..=256))]
+    #[arg(long, default_value_t = 32, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=256))]
     grid: u32,
     #[command(flatten)]
     plant: PlantArguments,

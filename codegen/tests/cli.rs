@@ -1,0 +1,308 @@
+//! The command as a user meets it: exit codes, `--json`, help, and what it says about arguments and files that are wrong.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+mod support;
+
+use std::ffi::OsString;
+use std::fs;
+use std::os::unix::ffi::OsStringExt;
+use std::os::unix::fs::{PermissionsExt, symlink};
+
+use support::{Document, Folder, Run};
+
+const COMMANDS: [&str; 5] = ["check", "sim", "identify", "forc", "dump-ir"];
+
+#[test]
+fn arguments_that_make_no_sense_are_usage_errors() {
+    let folder = Folder::new();
+    let before = folder.listing();
+    let record = "records/leg1.csv";
+    let cases: &[(&[&str], &str)] = &[
+        (&[], "<SPEC>"),
+        (&["--bogus"], "--bogus"),
+        (&["reference.toml", "--bogus"], "--bogus"),
+        (&["reference.toml", "-o"], "--output"),
+        (&["reference.toml", "-o", ""], "--output"),
+        (&["reference.toml", "minimal.toml"], "one spec file is expected"),
+        (&["reference.toml", "--no-build", "--setup"], "--setup"),
+        (&["chek", "reference.toml"], "check, sim, identify, forc, dump-ir"),
+        (&["check"], "<SPEC>"),
+        (&["dump-ir"], "<SPEC>"),
+        (&["sim"], "<SPEC>"),
+        (&["sim", "reference.toml", "--samples", "0"], "--samples"),
+        (&["sim", "reference.toml", "--seed", "-1"], "--seed"),
+        (&["forc"], "--output"),
+        (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),
+        (&["identify", record], "--drive"),
+        (&["identify", record, "--drive", "10"], "two voltages such as 0:100, found `10`"),
+        (&["identify", record, "--drive", "10:5"], "below the upper one"),
+        (&["identify", record, "--drive", "0:nan"], "0:nan"),
+        (&["identify", record, "--drive", "a:b"], "two voltages"),
+        (&["identify", record, "--drive", "0:100", "--grid", "x"], "whole number such as 32, found `x`"),
+        (&["identify", record, "--drive", "0:100", "--grid", "-3"], "whole number such as 32, found `-3`"),
+    ];
+    for (arguments, word) in cases {
+        folder.run(arguments).says(2, &["error: ", word]);
+        let document = folder.json(arguments);
+        assert_eq!(document.code, 2, "{arguments:?}");
+        assert!(document.error().contains(word), "{arguments:?}: {}", document.error());
+        assert!(document.findings().is_empty());
+    }
+    assert_eq!(folder.listing(), before);
+}
+
+#[test]
+fn every_command_explains_itself() {
+    let folder = Folder::new();
+    let main = folder.run(&["--help"]);
+    assert_eq!((main.code, main.stderr.as_str()), (0, ""));
+    for word in COMMANDS.iter().chain(&["Exit codes: 0", "--no-build", "--json", "specgen platform.toml -o"]) {
+        assert!(main.stdout.contains(word), "{word}:\n{}", main.stdout);
+    }
+    for command in COMMANDS {
+        let help = folder.run(&[command, "--help"]);
+        assert_eq!((help.code, help.stderr.as_str()), (0, ""));
+        let text = &help.stdout;
+        assert!(text.contains(&format!("Usage: specgen {command}")) && text.contains("--json"), "{text}");
+        // Every option and argument has a sentence.
+        for line in text.lines().filter(|line| line.starts_with("  ")) {
+            let explained = line.trim().split_once("  ").is_some_and(|(_, text)| text.trim().len() > 4);
+            assert!(explained, "{command}: `{line}`");
+        }
+    }
+    let version = folder.run(&["--version"]);
+    assert_eq!(version.stdout, format!("specgen {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
+    let folder = Folder::new();
+    let document = folder.json(&["reference.toml", "-o", "out", "--no-build"]);
+    let made = &document.value["result"];
+    assert_eq!((document.code, &made["name"], &made["output"]), (0, &"reference".into(), &"out".into()));
+    assert_eq!(made["files"], support::contents(&folder.path("out")).len() - 1, "all but the manifest");
+    let digest = made["digest"].as_str().unwrap();
+    assert!(folder.read("out/README.md").contains(digest));
+    let text = folder.run(&["reference.toml", "-o", "out", "--no-build"]);
+    assert!(text.stdout.starts_with(&format!("reference → out (f64, digest {}", &digest[..16])), "{}", text.stdout);
+
+    let check = folder.json(&["check", "reference.toml"]);
+    assert_eq!((check.code, &check.value["result"]["digest"]), (0, &digest.into()));
+    assert_eq!(check.value["result"]["records"][0]["grid"], 32);
+    let text = folder.run(&["check", "reference.toml"]);
+    assert!(
+        text.code == 0 && text.stdout.starts_with("reference.toml is good\n") && text.stderr.is_empty(),
+        "{text:#?}"
+    );
+
+    let ir = folder.json(&["dump-ir", "reference.toml"]);
+    let plain: serde_json::Value = serde_json::from_str(&folder.run(&["dump-ir", "reference.toml"]).stdout).unwrap();
+    assert_eq!((ir.code, &ir.value["result"]), (0, &plain));
+    assert_eq!(plain, serde_json::from_str::<serde_json::Value>(&folder.read("out/ir.json")).unwrap());
+    assert_eq!(plain["digest"], digest);
+}
+
+#[test]
+fn the_output_folder_is_named_after_the_platform_if_not_given() {
+    let folder = Folder::new();
+    assert_eq!(folder.run(&["reference.toml", "--no-build"]).code, 0);
+    assert!(folder.path("reference-controller/controller/src/step.rs").is_file());
+}
+
+/// Builds the emitted controller, as `sim` does for a user.
+#[test]
+fn sim_gives_one_document_and_its_files_hold_the_same_table() {
+    let folder = Folder::new();
+    let document = folder.json(&["sim", "reference.toml", "--samples", "40", "--no-noise", "-o", "out/sim"]);
+    assert_eq!(document.code, 0, "{:#}", document.value);
+    let result = &document.value["result"];
+    let tables: serde_json::Value = serde_json::from_str(&folder.read("out/sim/tables.json")).unwrap();
+    assert_eq!((&tables["tracking"], &tables["linearity"]), (&result["tracking"], &result["linearity"]));
+    for mode in ["invhys", "ewma", "pcc"] {
+        let trace = folder.read(&format!("out/sim/trace-{mode}-1hz.csv"));
+        assert!(trace.lines().count() > 40, "{mode}");
+    }
+    folder.json(&["sim", "nothing.toml"]).finding("E0101");
+    let refused = folder.json(&["sim", "reference.toml", "--plant", "reference.toml"]);
+    assert!(refused.code == 1 && refused.error().contains("reference.toml"), "{}", refused.error());
+}
+
+#[test]
+fn a_simulated_record_can_be_identified() {
+    let folder = Folder::new();
+    let forc = folder.json(&["forc", "-o", "record.csv", "--grid", "8"]);
+    let rows = folder.read("record.csv").lines().filter(|line| !line.starts_with('#')).count() - 1;
+    assert_eq!((forc.code, &forc.value["result"]["rows"]), (0, &rows.into()));
+    let arguments = ["identify", "record.csv", "--drive", "0:100", "--grid", "8", "-o", "table.csv"];
+    let document = folder.json(&[&arguments[..], &["--validate", "records/leg1.csv"]].concat());
+    let report = &document.value["result"]["report"];
+    assert_eq!((document.code, &report["reversal_curves"], &report["grid"]), (0, &8.into(), &8.into()));
+    assert_eq!(document.value["result"]["validation"]["record"], "records/leg1.csv");
+    assert!(folder.read("table.csv").starts_with("up_V,down_V,everett_um\n"));
+    let text = folder.run(&arguments);
+    assert!(text.code == 0 && text.stdout.contains("8 reversal curves") && text.stdout.contains("wrote table.csv"));
+    // Another seed is another noise; the same seed the same bytes.
+    folder.run(&["forc", "-o", "again.csv", "--grid", "8"]);
+    folder.run(&["forc", "-o", "other.csv", "--grid", "8", "--seed", "2"]);
+    assert_eq!(folder.read("record.csv"), folder.read("again.csv"));
+    assert_ne!(folder.read("record.csv"), folder.read("other.csv"));
+}
+
+#[test]
+fn a_spec_that_is_no_spec_is_refused_with_its_name_and_a_mend() {
+    let folder = Folder::new();
+    folder.write("empty.toml", "");
+    folder.write("huge.toml", vec![b'#'; 2 << 20]);
+    folder.write("latin.toml", b"schema = 1\nname = \"caf\xe9\"\n");
+    folder.write("binary.toml", (0..=255).cycle().take(5000).map(|b: u16| b as u8).collect::<Vec<_>>());
+    folder.write("syntax.toml", "schema = 1\nname = [\n");
+    fs::create_dir(folder.path("folder.toml")).unwrap();
+    let before = folder.listing();
+    for (spec, code, line, mend) in [
+        ("nothing.toml", "E0101", None, "path"),
+        ("folder.toml", "E0101", None, "name the .toml file in it"),
+        ("empty.toml", "E0105", Some(1), "specs/minimal.toml"),
+        ("huge.toml", "E0102", None, "measurements belong in CSV files"),
+        ("latin.toml", "E0103", Some(2), "save the file as UTF-8"),
+        ("binary.toml", "E0103", Some(2), "save the file as UTF-8"),
+        ("syntax.toml", "E0104", Some(2), "]"),
+    ] {
+        for arguments in [&[spec, "-o", "out", "--no-build"][..], &["check", spec], &["dump-ir", spec]] {
+            let document = folder.json(arguments);
+            assert_eq!(document.code, 1, "{arguments:?}");
+            assert_eq!(document.error(), format!("{spec} is refused; nothing was written"));
+            let finding = document.finding(code);
+            assert_eq!(finding["file"], spec);
+            assert!(finding["help"].as_str().unwrap().contains(mend), "{finding:#}");
+            if let Some(line) = line {
+                assert_eq!(finding["line"], line, "{spec}");
+            }
+            folder.run(arguments).says(1, &[&format!("error[{code}]"), spec, "help: ", "nothing was written"]);
+        }
+    }
+    assert_eq!(folder.listing(), before);
+}
+
+#[test]
+fn a_grid_that_cannot_be_is_refused_at_its_line() {
+    let folder = Folder::new();
+    for grid in ["0", "1", "10000"] {
+        folder.spec("grid.toml", &[("grid    = 32", &format!("grid    = {grid}"))]);
+        let line = 1 + folder.read("grid.toml").lines().position(|line| line.starts_with("grid")).unwrap();
+        let document = folder.json(&["grid.toml", "-o", "out", "--no-build"]);
+        let finding = document.finding("E0301");
+        assert_eq!((document.code, &finding["line"], &finding["column"]), (1, &line.into(), &11.into()));
+        assert_eq!(finding["key"], "hysteresis.grid");
+        for word in [grid, "2 to 64"] {
+            assert!(finding["message"].as_str().unwrap().contains(word), "{finding:#}");
+        }
+        let document = folder.json(&["identify", "records/leg1.csv", "--drive", "0:100", "--grid", grid]);
+        assert_eq!(document.code, 1);
+        assert!(document.finding("E0601")["message"].as_str().unwrap().contains(grid));
+    }
+    assert!(!folder.path("out").exists());
+}
+
+/// All findings of a spec in one run, each at its own line.
+#[test]
+fn several_mistakes_are_reported_together() {
+    let folder = Folder::new();
+    let edits = [
+        ("mass           = \"1.195 kg\"", "mass           = \"1.195 V\""),
+        ("bits  = 16\nrange = [\"0", "bitz  = 16\nrange = [\"0"),
+        ("stacks          = 5", "stacks          = \"five\""),
+    ];
+    folder.spec("bad.toml", &edits);
+    let document = folder.json(&["check", "bad.toml"]);
+    for code in ["E0211", "E0202", "E0206"] {
+        let finding = document.finding(code);
+        assert!(finding["line"].as_u64().is_some() && finding["column"].as_u64().is_some(), "{finding:#}");
+    }
+    assert!(document.finding("E0202")["help"].as_str().unwrap().contains("bits"));
+    folder.run(&["check", "bad.toml"]).says(1, &["bad.toml is refused; nothing was written", "--> bad.toml:"]);
+}
+
+/// A name that is no UTF-8 is as good as any: what the file says counts, and the name reaches no output.
+#[test]
+fn a_file_name_that_is_not_utf_8_is_read_or_refused_but_never_fatal() {
+    let folder = Folder::new();
+    let name = OsString::from_vec(b"caf\xe9.toml".to_vec());
+    let run = |arguments: &[&str]| Run::of(folder.command().args(arguments).arg(&name));
+    run(&["check"]).says(1, &["E0101", "there is no such file", "caf\u{fffd}.toml"]);
+    Document::of(&run(&["check", "--json"])).finding("E0101");
+    if fs::copy(folder.path("reference.toml"), folder.path(&name)).is_err() {
+        return support::skipped("the file system takes UTF-8 names only");
+    }
+    assert_eq!(run(&["check"]).code, 0);
+    assert_eq!(run(&["-o", "out", "--no-build"]).code, 0);
+    folder.run(&["reference.toml", "-o", "plain", "--no-build"]);
+    assert_eq!(support::contents(&folder.path("out")), support::contents(&folder.path("plain")));
+    let output = OsString::from_vec(b"out-\xff".to_vec());
+    let made = Run::of(folder.command().args(["reference.toml", "--no-build", "-o"]).arg(&output));
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    assert!(folder.path(&output).join("Cargo.toml").is_file());
+    // As a record: no such name can stand in a spec, but on the command line.
+    fs::copy(folder.path("records/leg1.csv"), folder.path(&name)).unwrap();
+    let mut identify = folder.command();
+    identify.arg("identify").arg(&name).args(["--drive", "0:100", "--grid", "8", "--json"]);
+    assert_eq!(Document::of(&Run::of(&mut identify)).code, 0);
+}
+
+#[test]
+fn a_written_file_has_usual_permissions_and_a_link_or_device_stays_one() {
+    let folder = Folder::new();
+    folder.write("plain", "");
+    let usual = fs::metadata(folder.path("plain")).unwrap().permissions().mode();
+    let identify =
+        |output: &str| folder.run(&["identify", "records/leg1.csv", "--drive", "0:100", "--grid", "8", "-o", output]);
+    assert_eq!(identify("table.csv").code, 0);
+    assert_eq!(fs::metadata(folder.path("table.csv")).unwrap().permissions().mode(), usual);
+
+    symlink("table.csv", folder.path("link.csv")).unwrap();
+    folder.write("table.csv", "old");
+    assert_eq!(identify("link.csv").code, 0);
+    assert!(folder.path("link.csv").is_symlink() && folder.read("table.csv").starts_with("up_V"));
+
+    // A pipe, not /dev/null: if this failed, root would lose the device.
+    let made = std::process::Command::new("mkfifo").arg(folder.path("pipe")).status();
+    if !made.is_ok_and(|status| status.success()) {
+        return support::skipped("no mkfifo");
+    }
+    let pipe = folder.path("pipe");
+    let reader = std::thread::spawn(move || fs::read_to_string(pipe).unwrap());
+    assert_eq!(identify("pipe").code, 0);
+    assert!(reader.join().unwrap().starts_with("up_V"));
+    assert!(!fs::symlink_metadata(folder.path("pipe")).unwrap().is_file());
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_named() {
+    let folder = Folder::new();
+    let before = folder.listing();
+    for (output, word) in [("none/table.csv", "there is no folder"), ("records", "it is a folder")] {
+        let table = ["identify", "records/leg1.csv", "--drive", "0:100", "--grid", "8", "-o", output];
+        for arguments in [&table[..], &["forc", "--grid", "4", "-o", output]] {
+            folder.run(arguments).says(3, &[&format!("could not write `{output}`"), word, "nothing was changed"]);
+            assert_eq!(folder.json(arguments).code, 3);
+        }
+    }
+    assert_eq!(folder.listing(), before);
+}
+
+/// `specgen … | head` closes the pipe early.
+#[test]
+fn a_closed_pipe_is_no_panic() {
+    let folder = Folder::new();
+    let mut child = folder
+        .command()
+        .args(["dump-ir", "reference.toml"])
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success() && said.is_empty(), "{output:?}");
+}

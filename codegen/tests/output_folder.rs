@@ -1,0 +1,222 @@
+//! The output folder is written whole or not at all, and nobody's work is overwritten.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+mod support;
+
+use std::fs;
+use std::os::unix::fs::symlink;
+
+use support::unprivileged::{Unprivileged, set_mode};
+use support::{Folder, contents, digest, listing};
+
+/// Writes the reference workspace to `out`.
+fn write(folder: &Folder) {
+    let run = folder.run(&["reference.toml", "-o", "out", "--no-build"]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+}
+
+/// A run into `out` is refused with `code` and `words`, and nothing changes anywhere in the folder.
+fn refused(folder: &Folder, output: &str, code: i32, words: &[&str]) {
+    let before = folder.listing();
+    folder.run(&["reference.toml", "-o", output, "--no-build"]).says(code, words);
+    assert_eq!(folder.listing(), before);
+}
+
+#[test]
+fn the_manifest_lists_every_file_with_its_digest() {
+    let folder = Folder::new();
+    write(&folder);
+    let mut files = contents(&folder.path("out"));
+    let manifest = String::from_utf8(files.remove(".specgen").unwrap()).unwrap();
+    let listed: Vec<(String, String)> = manifest
+        .lines()
+        .map(|line| line.split_once("  ").unwrap())
+        .map(|(digest, path)| (path.to_owned(), digest.to_owned()))
+        .collect();
+    let present: Vec<(String, String)> = files.iter().map(|(path, bytes)| (path.clone(), digest(bytes))).collect();
+    assert_eq!(listed, present);
+    for path in
+        ["Cargo.toml", "ir.json", "controller/src/step.rs", "runtime/src/lib.rs", "host/build.rs", "qemu/memory.x"]
+    {
+        assert!(files.contains_key(path), "{path}");
+    }
+    for (path, bytes) in &files {
+        assert!(bytes.ends_with(b"\n") && !bytes.contains(&b'\r'), "{path}");
+    }
+}
+
+#[test]
+fn a_second_run_changes_nothing_and_leaves_what_cargo_made() {
+    let folder = Folder::new();
+    write(&folder);
+    for made in ["target", "qemu/target", "controller/target/release"] {
+        fs::create_dir_all(folder.path("out").join(made)).unwrap();
+        folder.write(&format!("out/{made}/object.o"), "built");
+    }
+    folder.write("out/Cargo.lock", "locked");
+    let before = folder.listing();
+    write(&folder);
+    assert_eq!(folder.listing(), before);
+}
+
+#[test]
+fn another_spec_replaces_an_earlier_output_as_if_it_were_new() {
+    let folder = Folder::new();
+    folder.spec("other.toml", &[("= \"pcc\"", "= \"ewma\""), ("name = \"reference\"", "name = \"other\"")]);
+    assert_eq!(folder.run(&["other.toml", "-o", "new", "--no-build"]).code, 0);
+    write(&folder);
+    assert_ne!(contents(&folder.path("out")), contents(&folder.path("new")));
+    assert_eq!(folder.run(&["other.toml", "-o", "out", "--no-build"]).code, 0);
+    assert_eq!(contents(&folder.path("out")), contents(&folder.path("new")));
+}
+
+#[test]
+fn a_file_that_is_no_longer_made_goes_and_a_deleted_one_comes_back() {
+    let folder = Folder::new();
+    write(&folder);
+    let fresh = listing(&folder.path("out"));
+    fs::create_dir_all(folder.path("out/controller/old/deep")).unwrap();
+    folder.write("out/controller/old/deep/stale.rs", "// of an older version");
+    // An older version of the manifest; a path that leads out of the folder is not ours.
+    folder.write("victim", "precious");
+    let mut manifest = folder.read("out/.specgen");
+    manifest += &format!("{}  controller/old/deep/stale.rs\n", digest(b"// of an older version"));
+    manifest += &format!("{}  ../victim\n", digest(b"precious"));
+    folder.write("out/.specgen", manifest);
+    fs::remove_file(folder.path("out/README.md")).unwrap();
+    write(&folder);
+    assert_eq!(listing(&folder.path("out")), fresh);
+    assert_eq!(folder.read("victim"), "precious");
+}
+
+#[test]
+fn an_empty_folder_and_one_whose_parents_are_missing_are_taken() {
+    let folder = Folder::new();
+    fs::create_dir(folder.path("out")).unwrap();
+    write(&folder);
+    assert_eq!(folder.run(&["reference.toml", "-o", "a/b/c", "--no-build"]).code, 0);
+    assert_eq!(contents(&folder.path("a/b/c")), contents(&folder.path("out")));
+    fs::create_dir(folder.path("here")).unwrap();
+    let mut inside = folder.command();
+    let inside = inside.current_dir(folder.path("here")).args(["../reference.toml", "-o", ".", "--no-build"]);
+    assert_eq!(support::Run::of(inside).code, 0);
+    assert_eq!(contents(&folder.path("here")), contents(&folder.path("out")));
+}
+
+#[test]
+fn somebody_elses_file_is_not_overwritten() {
+    let folder = Folder::new();
+    write(&folder);
+    folder.write("out/notes.txt", "mine");
+    refused(&folder, "out", 1, &["`out` holds files", "notes.txt", "nothing was written", "-o"]);
+    fs::remove_file(folder.path("out/notes.txt")).unwrap();
+
+    folder.write("out/controller/src/step.rs", folder.read("out/controller/src/step.rs") + "// tuned by hand\n");
+    refused(&folder, "out", 1, &["changed since: controller/src/step.rs;"]);
+
+    // A folder without a manifest, with a name like one of ours.
+    fs::create_dir_all(folder.path("theirs/controller/src")).unwrap();
+    folder.write("theirs/controller/src/step.rs", "mine");
+    folder.write("theirs/Cargo.toml", "mine");
+    refused(&folder, "theirs", 1, &["Cargo.toml, controller/"]);
+
+    for k in 0..8 {
+        folder.write(&format!("theirs/file{k}"), "mine");
+    }
+    refused(&folder, "theirs", 1, &["and 5 more"]);
+}
+
+#[test]
+fn a_link_in_the_output_is_somebody_elses() {
+    let folder = Folder::new();
+    write(&folder);
+    fs::rename(folder.path("out/README.md"), folder.path("moved.md")).unwrap();
+    symlink("../moved.md", folder.path("out/README.md")).unwrap();
+    refused(&folder, "out", 1, &["README.md"]);
+}
+
+#[test]
+fn what_is_no_folder_is_not_overwritten() {
+    let folder = Folder::new();
+    folder.write("file", "mine");
+    refused(&folder, "file", 1, &["`file` exists and is not a folder", "nothing was written", "-o"]);
+    refused(&folder, "file/below", 3, &["`file/below`", "nothing was changed"]);
+    symlink("nowhere", folder.path("link")).unwrap();
+    refused(&folder, "link", 1, &["`link` exists and is not a folder"]);
+}
+
+/// An empty folder where a file is due is replaced; it holds nothing.
+#[test]
+fn an_empty_folder_in_the_way_of_a_file_does_no_harm() {
+    let folder = Folder::new();
+    write(&folder);
+    let fresh = folder.listing();
+    fs::remove_file(folder.path("out/ir.json")).unwrap();
+    fs::create_dir(folder.path("out/ir.json")).unwrap();
+    write(&folder);
+    assert_eq!(folder.listing(), fresh);
+}
+
+#[test]
+fn a_refused_run_leaves_no_folder_behind() {
+    let folder = Folder::new();
+    folder.spec("bad-key.toml", &[("grid    = 32", "grit    = 32")]);
+    folder.spec("bad-unit.toml", &[("height          = \"180 mm\"", "height          = \"180 V\"")]);
+    folder.spec("no-record.toml", &[("records/reference-forc.csv", "records/none.csv")]);
+    folder.spec("bad-record.toml", &[("records/reference-forc.csv", "records/bad.csv")]);
+    folder.write("records/bad.csv", "time_s,drive_V\n0,1\n");
+    folder.spec("unstable.toml", &[("level_weight = 0.252", "level_weight = 1.0")]);
+    // Accepted by every check of the spec, refused where its constants are computed.
+    folder.spec(
+        "coarse.toml",
+        &[("bits  = 16\nrange = [\"0 V\", \"150 V\"]", "bits  = 8\nrange = [\"0 V\", \"500 V\"]")],
+    );
+    let before = folder.listing();
+    for (spec, code) in [
+        ("bad-key.toml", "E0202"),
+        ("bad-unit.toml", "E0211"),
+        ("no-record.toml", "E0306"),
+        ("bad-record.toml", "E0504"),
+        ("unstable.toml", "E0402"),
+        ("coarse.toml", "E0410"),
+    ] {
+        let document = folder.json(&[spec, "-o", "a/out", "--no-build"]);
+        assert_eq!(document.code, 1, "{spec}");
+        document.finding(code);
+        assert_eq!(folder.listing(), before, "{spec}");
+    }
+}
+
+#[test]
+fn without_permission_nothing_changes() {
+    let folder = Folder::new();
+    let Some(user) = Unprivileged::owning(&folder) else { return };
+    let arguments = |output| ["reference.toml", "-o", output, "--no-build"];
+    fs::create_dir(folder.path("readonly")).unwrap();
+    set_mode(&folder.path("readonly"), 0o555);
+    let before = folder.listing();
+    for output in ["readonly", "readonly/out", "readonly/a/b/out"] {
+        let words = ["Permission denied", "nothing was changed", "readonly", "name another folder with -o"];
+        user.run(&folder, &arguments(output)).says(3, &words);
+        assert_eq!(folder.listing(), before, "{output}");
+    }
+
+    // The failure comes in the middle: some files are moved by then, and must come back.
+    assert_eq!(user.run(&folder, &arguments("out")).code, 0);
+    folder.write("out/controller/old.rs", "// older");
+    folder
+        .write("out/.specgen", folder.read("out/.specgen") + &format!("{}  controller/old.rs\n", digest(b"// older")));
+    set_mode(&folder.path("out/runtime/src"), 0o555);
+    let before = folder.listing();
+    user.run(&folder, &arguments("out")).says(3, &["runtime/src", "Permission denied", "nothing was changed"]);
+    assert_eq!(folder.listing(), before);
+    set_mode(&folder.path("out/runtime/src"), 0o755);
+    assert_eq!(user.run(&folder, &arguments("out")).code, 0);
+    assert!(!folder.path("out/controller/old.rs").exists());
+
+    // A folder that cannot be read cannot be judged.
+    set_mode(&folder.path("out"), 0o333);
+    user.run(&folder, &arguments("out")).says(3, &["could not read `out`"]);
+    set_mode(&folder.path("out"), 0o755);
+}
