@@ -93,7 +93,7 @@ fn the_worst_tick_is_bounded_even_when_every_memory_overflows() {
 fn nested_loops(description: &Description) -> InputRecording {
     let row = |k: u32| {
         let amplitude = 2e-6 * (1.0 - f64::from(k) / 200.0);
-        let setpoint = 20e-6 + if k % 2 == 0 { amplitude } else { -amplitude };
+        let setpoint = 20e-6 + if k.is_multiple_of(2) { amplitude } else { -amplitude };
         let mut words = vec![description.scalar.encode(setpoint); 6];
         words.extend([description.scalar.encode(20e-6); 6]);
         words
