@@ -146,10 +146,10 @@ fn no_clock_path_user_or_host_reaches_the_output() {
         repository().to_string_lossy().into_owned(),
         "user-of-this-run".to_owned(),
         "/home/".to_owned(),
-        "/root/".to_owned(),
         ".cargo/".to_owned(),
         "reference.toml".to_owned(),
     ];
+    traces.extend(std::env::var("HOME").ok().filter(|home| home.len() > 1));
     // A host may be called anything; a short name could be a word of the text.
     let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default().trim().to_owned();
     if host.len() >= 6 {
