@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::diagnostic::{Diagnostic, Severity};
+use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::emit;
 use crate::everett::EverettTable;
 use crate::identify;
@@ -21,8 +21,8 @@ pub struct Compiled {
     pub source: SpecSource,
     /// What it says.
     pub model: Model,
-    /// How each record was identified, in the order of `hysteresis.records`.
-    pub records: Vec<identify::Report>,
+    /// How each record was identified, in the order of `hysteresis.records`; none for one that is a table already.
+    pub records: Vec<Option<identify::Report>>,
     /// Stability of the adaptation.
     pub margins: Margins,
     /// Every constant of the controller.
@@ -74,31 +74,63 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
 /// What the records of a spec yield.
 struct IdentifiedRecords {
     tables: Vec<EverettTable>,
-    reports: Vec<identify::Report>,
+    reports: Vec<Option<identify::Report>>,
     findings: Vec<Diagnostic>,
     /// Name and content of each file, for the digest.
     bytes: Vec<(String, Vec<u8>)>,
 }
 
 fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedRecords, Vec<Diagnostic>> {
-    let options = identify::Options::new(model.hysteresis.grid, model.actuator.voltage);
     let mut result =
         IdentifiedRecords { tables: Vec::new(), reports: Vec::new(), findings: Vec::new(), bytes: Vec::new() };
     let mut errors = Vec::new();
     for name in &model.hysteresis.records {
         let path = source.dir.join(name);
-        let one = identify::read_record(&path, name).and_then(|record| identify::identify(&record, &options));
+        // What cannot be read is reported by `identify_record`, which opens it again.
+        let bytes = std::fs::read(&path).unwrap_or_default();
+        let one = if identify::is_table_csv(&bytes) {
+            read_table(model, name, &bytes).map(|table| (table, None, Vec::new()))
+        } else {
+            identify_record(model, name, &path).map(|found| (found.table, Some(found.report), found.warnings))
+        };
         match one {
-            Ok(identified) => {
-                result.tables.push(identified.table);
-                result.reports.push(identified.report);
-                result.findings.extend(identified.warnings);
+            Ok((table, report, warnings)) => {
+                result.tables.push(table);
+                result.reports.push(report);
+                result.findings.extend(warnings);
             }
             Err(found) => errors.extend(found),
         }
-        result.bytes.push((name.clone(), std::fs::read(&path).unwrap_or_default()));
+        result.bytes.push((name.clone(), bytes));
     }
     if errors.is_empty() { Ok(result) } else { Err(errors) }
+}
+
+fn identify_record(model: &Model, name: &str, path: &Path) -> Result<identify::Identified, Vec<Diagnostic>> {
+    let options = identify::Options::new(model.hysteresis.grid, model.actuator.voltage);
+    identify::identify(&identify::read_record(path, name)?, &options)
+}
+
+/// A table that `specgen identify` wrote: it must be of the grid and the voltage range that the spec declares.
+fn read_table(model: &Model, name: &str, bytes: &[u8]) -> Result<EverettTable, Vec<Diagnostic>> {
+    let table = identify::read_table_csv(&String::from_utf8_lossy(bytes), name)?;
+    let [min, max] = model.actuator.voltage;
+    let slack = 1e-9 * (max - min);
+    let fits = (table.drive_min - min).abs() <= slack && (table.drive_max - max).abs() <= slack;
+    if table.grid == model.hysteresis.grid && fits {
+        return Ok(table);
+    }
+    Err(vec![Diagnostic {
+        severity: Severity::Error,
+        code: codes::TABLE_MISMATCH,
+        key: "hysteresis.records".to_owned(),
+        place: Place::File { path: name.to_owned(), line: None },
+        message: format!(
+            "the table has {} cells over {} V to {} V; the spec declares {} cells (hysteresis.grid) over {min} V to {max} V (actuator.voltage)",
+            table.grid, table.drive_min, table.drive_max, model.hysteresis.grid
+        ),
+        help: format!("identify the record again with --grid {} --drive {min}:{max}", model.hysteresis.grid),
+    }])
 }
 
 /// Digest of what the controller depends on: the text of the spec (line ends as `\n`) and the records by name and content.

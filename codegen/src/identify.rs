@@ -36,7 +36,7 @@ use regressor::Plane;
 use residual::Residual;
 
 pub use coverage::MAX_GRID;
-pub use export::{read_table_csv, write_table_csv};
+pub use export::{is_table_csv, read_table_csv, write_table_csv};
 pub use record::{MAX_FILE_BYTES, Record, read_record};
 pub use report::{Branches, Report};
 pub use staircase::Staircase;

@@ -38,7 +38,7 @@ pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir,
         digest: digest.to_owned(),
         specgen_version: env!("CARGO_PKG_VERSION").to_owned(),
         scalar,
-        kinematics: kinematics::lower(model, scalar),
+        kinematics: kinematics::lower(model, scalar)?,
         hysteresis,
         actuation,
         bounds: Bounds {

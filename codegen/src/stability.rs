@@ -12,7 +12,7 @@ mod jury;
 mod sampled;
 
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
-use crate::model::{Adaptation, AdaptationMode, Model};
+use crate::model::{Adaptation, Model};
 
 pub use jury::{ewma_limit, pcc_limit, pcc_satisfies_jury};
 pub use sampled::{LegDynamics, spectral_radius};
@@ -34,68 +34,108 @@ pub struct Margins {
     pub largest_level_weight: Option<f64>,
 }
 
-/// Checks the weights of `model`.
+/// A law that a running controller can be switched to with the spec's weights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Adapting {
+    Ewma,
+    Pcc,
+}
+
+impl Adapting {
+    /// The laws whose weights are given: which of them is used is a setting, not a build, so each must be stable.
+    fn of(adaptation: &Adaptation) -> Vec<Self> {
+        let level = adaptation.level_weight > 0.0;
+        let drift = adaptation.drift_weight > 0.0;
+        [(Self::Ewma, level), (Self::Pcc, level && drift)]
+            .into_iter()
+            .filter(|(_, given)| *given)
+            .map(|(law, _)| law)
+            .collect()
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Ewma => "EWMA",
+            Self::Pcc => "PCC",
+        }
+    }
+
+    /// λ below which the law is stable on a leg without dynamics, with both weights scaled.
+    fn static_limit(self, adaptation: &Adaptation, scale: f64) -> f64 {
+        match self {
+            Self::Ewma => ewma_limit(scale * adaptation.level_weight),
+            Self::Pcc => pcc_limit(scale * adaptation.level_weight, scale * adaptation.drift_weight),
+        }
+    }
+}
+
+/// Checks the weights of `model`, under every law that they are given for.
 ///
 /// # Errors
 /// One finding at the weight's place in the spec, naming the largest weight that would do.
 pub fn check(model: &Model) -> Result<Margins, Vec<Diagnostic>> {
     let adaptation = &model.adaptation;
     let dynamics = LegDynamics::of(model);
-    let (static_gain_limit, largest) = match adaptation.mode {
-        AdaptationMode::Invhys => {
-            return Ok(Margins { static_gain_limit: None, spectral_radius: 0.0, largest_level_weight: None });
-        }
-        AdaptationMode::Ewma => (ewma_limit(adaptation.level_weight), largest_level_weight(&dynamics, adaptation)),
-        AdaptationMode::Pcc => {
-            (pcc_limit(adaptation.level_weight, adaptation.drift_weight), largest_level_weight(&dynamics, adaptation))
-        }
-    };
+    let laws = Adapting::of(adaptation);
+    // What every law allows; none of them, and there is nothing to allow.
+    let largest = laws.iter().map(|law| largest_level_weight(&dynamics, adaptation, *law)).reduce(f64::min);
+    let mut margins = Margins { static_gain_limit: None, spectral_radius: 0.0, largest_level_weight: largest };
+    for law in laws {
+        let (static_limit, radius) = check_law(model, &dynamics, law, largest.unwrap_or_default())?;
+        margins.static_gain_limit = Some(margins.static_gain_limit.map_or(static_limit, |a| a.min(static_limit)));
+        margins.spectral_radius = margins.spectral_radius.max(radius);
+    }
+    Ok(margins)
+}
+
+/// Static limit of λ and spectral radius of one law; or why it is refused, `largest` being the level weight that would do.
+fn check_law(
+    model: &Model,
+    dynamics: &LegDynamics,
+    law: Adapting,
+    largest: f64,
+) -> Result<(f64, f64), Vec<Diagnostic>> {
+    let adaptation = &model.adaptation;
+    let static_limit = law.static_limit(adaptation, 1.0);
     let highest_ratio = adaptation.gain_ratio[1];
-    let mut findings = Vec::new();
-    if highest_ratio >= static_gain_limit {
-        findings.push(refusal(
-            model,
-            codes::UNSTABLE_STATIC,
-            format!(
-                "the adaptation is unstable even on a leg without dynamics: with these weights λ = ρ/ρ̂ must stay below \
-                 {static_gain_limit:.4}, but gain_ratio goes up to {highest_ratio} (Jury, {})",
-                match adaptation.mode {
-                    AdaptationMode::Pcc => "AII.19",
-                    _ => "AII.18 corrected to 0 < λω < 2",
-                }
-            ),
-            largest,
-        ));
+    if highest_ratio >= static_limit {
+        let source = match law {
+            Adapting::Pcc => "AII.19",
+            Adapting::Ewma => "AII.18 corrected to 0 < λω < 2",
+        };
+        let message = format!(
+            "{} is unstable even on a leg without dynamics: with these weights λ = ρ/ρ̂ must stay below {static_limit:.4}, \
+             but gain_ratio goes up to {highest_ratio} (Jury, {source})",
+            law.name()
+        );
+        return Err(vec![refusal(model, codes::UNSTABLE_STATIC, message, largest)]);
     }
-    let spectral_radius = worst_radius(&dynamics, adaptation, 1.0);
-    if findings.is_empty() && spectral_radius > LARGEST_RADIUS {
-        findings.push(refusal(
-            model,
-            codes::UNSTABLE_SAMPLED,
-            format!(
-                "the adaptation is unstable on this leg: the sampled loop (run of {} s, amplifier lag {} s, resonance {} Hz, ζ {}) \
-                 has spectral radius {spectral_radius:.4} somewhere in gain_ratio {:?}; it must be below {LARGEST_RADIUS}",
-                dynamics.run, dynamics.lag, model.actuator.resonance, dynamics.damping_ratio, adaptation.gain_ratio
-            ),
-            largest,
-        ));
+    let radius = worst_radius(dynamics, adaptation, law, 1.0);
+    if radius > LARGEST_RADIUS {
+        let message = format!(
+            "{} is unstable on this leg: the sampled loop (run of {} s, amplifier lag {} s, resonance {} Hz, ζ {}) has \
+             spectral radius {radius:.4} somewhere in gain_ratio {:?}; it must be below 1",
+            law.name(),
+            dynamics.run,
+            dynamics.lag,
+            model.actuator.resonance,
+            dynamics.damping_ratio,
+            adaptation.gain_ratio
+        );
+        return Err(vec![refusal(model, codes::UNSTABLE_SAMPLED, message, largest)]);
     }
-    if findings.is_empty() {
-        Ok(Margins { static_gain_limit: Some(static_gain_limit), spectral_radius, largest_level_weight: Some(largest) })
-    } else {
-        Err(findings)
-    }
+    Ok((static_limit, radius))
 }
 
 /// Largest spectral radius over the λ interval with both weights scaled by `scale`.
-fn worst_radius(dynamics: &LegDynamics, adaptation: &Adaptation, scale: f64) -> f64 {
+fn worst_radius(dynamics: &LegDynamics, adaptation: &Adaptation, law: Adapting, scale: f64) -> f64 {
     let [low, high] = adaptation.gain_ratio;
     (0..RATIOS)
         .map(|k| low + (high - low) * f64::from(k) / f64::from(RATIOS - 1))
         .map(|ratio| {
-            let drift = match adaptation.mode {
-                AdaptationMode::Pcc => Some(scale * adaptation.drift_weight),
-                _ => None,
+            let drift = match law {
+                Adapting::Pcc => Some(scale * adaptation.drift_weight),
+                Adapting::Ewma => None,
             };
             spectral_radius(dynamics, scale * adaptation.level_weight, drift, ratio)
         })
@@ -104,14 +144,14 @@ fn worst_radius(dynamics: &LegDynamics, adaptation: &Adaptation, scale: f64) -> 
 
 /// Largest level weight, drift weight in proportion, below which every weight is stable. Found by scanning upwards and
 /// bisecting the first crossing: beyond a first unstable stretch a loop may be stable again, but nobody should rely on it.
-fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation) -> f64 {
-    let largest_scale = 1.0 / adaptation.level_weight.max(adaptation.drift_weight);
+fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Adapting) -> f64 {
+    let largest_scale = match law {
+        Adapting::Ewma => 1.0 / adaptation.level_weight,
+        Adapting::Pcc => 1.0 / adaptation.level_weight.max(adaptation.drift_weight),
+    };
     let stable = |scale: f64| {
-        let statically = match adaptation.mode {
-            AdaptationMode::Pcc => pcc_limit(scale * adaptation.level_weight, scale * adaptation.drift_weight),
-            _ => ewma_limit(scale * adaptation.level_weight),
-        };
-        adaptation.gain_ratio[1] < statically && worst_radius(dynamics, adaptation, scale) <= LARGEST_RADIUS
+        adaptation.gain_ratio[1] < law.static_limit(adaptation, scale)
+            && worst_radius(dynamics, adaptation, law, scale) <= LARGEST_RADIUS
     };
     // Four decades up to the largest weight there is.
     let steps = 400;
@@ -134,7 +174,6 @@ fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation) -> f64 
 fn refusal(model: &Model, code: &'static str, message: String, largest: f64) -> Diagnostic {
     let bandwidth = model.spans.contains_key("adaptation.level_bandwidth");
     let key = if bandwidth { "adaptation.level_bandwidth" } else { "adaptation.level_weight" };
-    let pcc = model.adaptation.mode == AdaptationMode::Pcc;
     let run = model.timing.period * f64::from(model.adaptation.run_interval);
     let shown = |value: f64| {
         let digits = 10f64.powi(3 - value.abs().log10().floor() as i32);
@@ -148,7 +187,7 @@ fn refusal(model: &Model, code: &'static str, message: String, largest: f64) -> 
         let proportion = model.adaptation.drift_weight / model.adaptation.level_weight;
         let level = if bandwidth { shown(largest / run) } else { shown(largest) };
         let (name, unit) = if bandwidth { ("level_bandwidth", " rad/s") } else { ("level_weight", "") };
-        let drift = if pcc {
+        let drift = if model.adaptation.drift_weight > 0.0 {
             format!(" (with the drift weight in the same proportion: {:.4e}{unit})", shown(level * proportion))
         } else {
             String::new()

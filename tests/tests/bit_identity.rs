@@ -81,6 +81,24 @@ fn f32_on_the_host_the_m7_and_the_m4f_is_equal_in_every_bit() {
     compare("bits-f32", &[ALIGNED, F32], &[Mcu::Mps2An500, Mcu::Mps2An386]);
 }
 
+/// With room for eight extrema the memory overflows all the time, and what it drops is the same everywhere.
+#[test]
+fn an_overflowing_memory_is_equal_in_every_bit() {
+    let emitted = Emitted::new("bits-memory", "reference.toml", &[ALIGNED, ("memory  = 64", "memory  = 8")]);
+    let mut controller = emitted.controller();
+    let roomy = Emitted::new("bits-roomy", "reference.toml", &[ALIGNED]);
+    let inputs = emitted.stimulus(&controller.description().clone(), false, 20_000, 9);
+    let settings = [("mode", 0.0), ("setpoint_kind", 1.0)];
+    let (host, config) = host_trace(&mut controller, &settings, &inputs);
+    let (unbounded, _) = host_trace(&mut roomy.controller(), &settings, &inputs);
+    let differs = column(&host, "requested[0]").iter().zip(&column(&unbounded, "requested[0]")).any(|(a, b)| a != b);
+    assert!(differs, "the record never overfilled the memory");
+    let Some(image) = emitted.image(Mcu::Mps2An500) else { return };
+    let (target, _) = verify::replay(&image, &config, &host).unwrap_or_else(|error| panic!("{error}"));
+    let difference = first_difference(&host, &target);
+    assert!(difference.is_none(), "{}", difference.unwrap());
+}
+
 /// The comparison is falsifiable: one flipped ulp of one constant of the controller on one side is found, and named.
 #[test]
 fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {

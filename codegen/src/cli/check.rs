@@ -28,8 +28,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 pub fn describe(compiled: &Compiled) -> String {
     let mut text = String::new();
     for (name, report) in compiled.model.hysteresis.records.iter().zip(&compiled.records) {
+        let what = report.as_ref().map_or_else(|| "a table, taken as it is".to_owned(), super::identify::summary);
         // Writing to a String cannot fail.
-        let _ = writeln!(text, "  record {name}: {}", super::identify::summary(report));
+        let _ = writeln!(text, "  record {name}: {what}");
     }
     let margins = &compiled.margins;
     if let (Some(limit), Some(largest)) = (margins.static_gain_limit, margins.largest_level_weight) {

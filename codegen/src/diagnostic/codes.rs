@@ -101,6 +101,8 @@ codes! {
         "There are fewer than two converter codes to a cell of the Preisach grid.";
     SLEW_TOO_SLOW = "E0411", "slew rate too slow for the converter",
         "The slew limit, in converter codes per tick, rounds down to none.";
+    WORKSPACE_TOO_LARGE = "E0412", "workspace too large for the legs",
+        "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",
@@ -156,7 +158,9 @@ codes! {
     VALIDATION_IDLE = "E0612", "validation record hardly moves",
         "Validate with a record that moves the drive through the table's range.";
     TABLE_FILE = "E0613", "not a table file",
-        "A table file is as `identify` writes it: three columns, the nodes of a triangle of rising thresholds.";
+        "A table file is as `identify` writes it: three columns, the nodes of a triangle of rising thresholds, no negative weight.";
+    TABLE_MISMATCH = "E0614", "a table of another grid or voltage range",
+        "A table named in hysteresis.records must have the cells of hysteresis.grid over the range of actuator.voltage: identify the record again with both.";
     STROKE_MISMATCH = "W0301", "stroke, gain and voltage do not fit",
         "stacks x stack_gain x voltage range is far from the stroke: one of the four is probably wrong, or the stroke is never used.";
     RESONANCE_ALIASED = "W0302", "resonance above half the tick rate",

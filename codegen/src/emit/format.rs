@@ -59,24 +59,25 @@ fn space_items(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let mut previous = "";
     for line in text.lines() {
-        let indent = line.len() - line.trim_start().len();
-        let starts =
-            ["///", "#[", "pub ", "fn ", "impl", "const ", "static "].iter().any(|s| line.trim_start().starts_with(s));
-        let ended = previous.len() - previous.trim_start().len() == indent
-            && (previous.ends_with('}') || previous.ends_with(';') || previous.ends_with("];"))
-            && !previous.trim_start().starts_with("//");
-        let same_kind =
-            ["pub use ", "use ", "pub mod ", "mod "].iter().any(|s| previous.starts_with(s) && line.starts_with(s));
-        let inner = indent == 0 || (indent == 4 && (previous.ends_with('}')));
-        if starts && ended && inner && !same_kind && !previous.trim_start().starts_with("#!") {
-            out.push('\n');
-        } else if is_inner(previous) && !is_inner(line) {
+        if starts_new_item(previous, line) || (is_inner(previous) && !is_inner(line)) {
             out.push('\n');
         }
         push_line(&mut out, line);
         previous = line;
     }
     out
+}
+
+/// Whether `line` begins an item and `previous` ends another one at the same depth; imports and modules stay together.
+fn starts_new_item(previous: &str, line: &str) -> bool {
+    const BEGINNINGS: [&str; 7] = ["///", "#[", "pub ", "fn ", "impl", "const ", "static "];
+    const TOGETHER: [&str; 4] = ["pub use ", "use ", "pub mod ", "mod "];
+    let depth = |line: &str| line.len() - line.trim_start().len();
+    let begins = BEGINNINGS.iter().any(|word| line.trim_start().starts_with(word));
+    let is_comment = previous.trim_start().starts_with("//") || is_inner(previous);
+    let ends = previous.ends_with('}') || (previous.ends_with(';') && depth(line) == 0);
+    let together = TOGETHER.iter().any(|word| previous.starts_with(word) && line.starts_with(word));
+    begins && ends && !is_comment && !together && depth(previous) == depth(line) && depth(line) <= 4
 }
 
 /// Attributes and documentation of the file as a whole.

@@ -46,14 +46,14 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #[inline]
         #[must_use]
         pub fn leg_setpoint_is_accepted(displacements: &[Real; LEGS]) -> bool {
-            displacements.iter().all(|value| *value >= LEG_SETPOINT[0] && *value <= LEG_SETPOINT[1])
+            displacements.iter().all(|value| (LEG_SETPOINT[0]..=LEG_SETPOINT[1]).contains(value))
         }
 
         /// A gauge reading is finite and within [`GAUGE`].
         #[inline]
         #[must_use]
         pub fn gauge_is_accepted(displacement: Real) -> bool {
-            displacement >= GAUGE[0] && displacement <= GAUGE[1]
+            (GAUGE[0]..=GAUGE[1]).contains(&displacement)
         }
     }
 }

@@ -67,14 +67,13 @@ pub fn emit(_ir: &Ir) -> TokenStream {
                 dac_code: [0; LEGS],
                 status: if accepted { 0 } else { SETPOINT_FAULT },
             };
-            for index in 0..LEGS {
-                let leg = &mut state.legs[index];
+            for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
                 let gauge = input.displacement[index];
                 let gauge_good = limits::gauge_is_accepted(gauge);
                 if config.law() == Law::Invhys || (run_ends && gauge_good) {
                     adapt(config, leg, gauge);
                 }
-                let limited = actuate(config, leg, &TABLES[index], state.demand[index]);
+                let limited = actuate(config, leg, table, state.demand[index]);
                 output.voltage[index] = DAC.voltage(leg.code);
                 output.requested[index] = leg.memory.displacement();
                 output.level[index] = leg.estimate.level;

@@ -22,6 +22,12 @@ pub fn write_table_csv(table: &EverettTable) -> String {
     text
 }
 
+/// Whether a data file is a table as [`write_table_csv`] writes it, by its first line.
+#[must_use]
+pub fn is_table_csv(bytes: &[u8]) -> bool {
+    bytes.strip_prefix(HEADER.as_bytes()).is_some_and(|rest| rest.starts_with(b"\n") || rest.starts_with(b"\r\n"))
+}
+
 /// Reads what [`write_table_csv`] wrote; node values are the same within rounding of the unit. `shown_as` names the file in messages.
 ///
 /// # Errors
@@ -71,5 +77,25 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
             }
         }
     }
+    check_weights(&table, &mut findings);
     if findings.any_error() { Err(findings.into_diagnostics()) } else { Ok(table) }
+}
+
+/// A table with a negative weight is not monotone, so that its inverse is not unique. Rounding is let pass.
+fn check_weights(table: &EverettTable, findings: &mut Findings) {
+    let rounding = 1e-9 * table.node(table.grid, 0).abs();
+    for up in 1..=table.grid {
+        for down in 0..up {
+            let weight = table.weight(up, down);
+            if weight < -rounding {
+                let message = format!(
+                    "the weight of the cell below {} V and above {} V is negative ({:.3e} µm): the model would not be monotone",
+                    table.threshold(up),
+                    table.threshold(down),
+                    weight * 1e6
+                );
+                findings.error("E0613", Some(EverettTable::index(up, down) + 2), message, "identify the record again");
+            }
+        }
+    }
 }

@@ -56,7 +56,7 @@ impl Findings {
                 key: String::new(),
                 place: Place::File { path: path.clone(), line: None },
                 message: format!("and {} more lines like this ({code})", n - SHOWN_PER_CODE),
-                help: String::new(),
+                help: "mend the ones shown and run again".to_owned(),
             });
         }
         found

@@ -2,8 +2,12 @@
 
 use core::f64::consts::PI;
 
+use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::ir::{Kinematics, LEGS, Scalar};
 use crate::model::{Geometry, Model};
+
+/// Largest |Δl| / l₀ for which the Newton steps are known to converge as counted.
+const LARGEST_RATIO: f64 = 0.25;
 
 /// Joint angles λ_i of the base (1), rad.
 fn base_angles(alpha: f64) -> [f64; LEGS] {
@@ -47,7 +51,7 @@ fn norm(v: [f64; 3]) -> f64 {
     libm::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
 }
 
-pub(super) fn lower(model: &Model, scalar: Scalar) -> Kinematics {
+pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<Kinematics, Vec<Diagnostic>> {
     let (base, platform) = joint_positions(&model.geometry);
     let mut rest_leg = [[0.0; 3]; LEGS];
     for ((rest, b), p) in rest_leg.iter_mut().zip(&base).zip(&platform) {
@@ -59,8 +63,11 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Kinematics {
     let joint_radius = platform.iter().fold(0.0, |a: f64, p| if norm(*p) > a { norm(*p) } else { a });
     let largest_displacement = norm(model.workspace.translation) + norm(model.workspace.rotation) * joint_radius;
     let shortest = rest_length.iter().fold(f64::INFINITY, |a: f64, b| if *b < a { *b } else { a });
+    if largest_displacement > LARGEST_RATIO * shortest {
+        return Err(vec![too_large(model, largest_displacement, shortest)]);
+    }
     let round3 = |v: [f64; 3]| v.map(|x| scalar.round(x));
-    Kinematics {
+    Ok(Kinematics {
         rest_leg: rest_leg.map(round3),
         platform_joint: platform.map(round3),
         rest_length: rest_length.map(|l| scalar.round(l)),
@@ -68,6 +75,24 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Kinematics {
         versine: versine_series(largest_angle, scalar),
         newton_steps: newton_steps(largest_displacement / shortest, scalar),
         largest_displacement,
+    })
+}
+
+fn too_large(model: &Model, displacement: f64, length: f64) -> Diagnostic {
+    let key = "workspace.translation";
+    Diagnostic {
+        severity: Severity::Error,
+        code: codes::WORKSPACE_TOO_LARGE,
+        key: key.to_owned(),
+        place: model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec),
+        message: format!(
+            "the declared workspace may change a leg by {:.3} mm, more than a quarter of its length of {:.3} mm",
+            displacement * 1e3,
+            length * 1e3
+        ),
+        help:
+            "the difference-form kinematics is for small motions: reduce workspace.translation and workspace.rotation"
+                .to_owned(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The key table: every section and key of a spec, its kind, range, default and meaning.
 //!
 //! Reading, messages, the JSON Schema and `docs/spec-reference.md` all come from here; a key that is not here
-//! does not exist. The rows are in [`table`].
+//! does not exist. The rows are in `table`.
 
 mod table;
 

@@ -125,10 +125,10 @@ impl Config {
         level_weight: Real,
         drift_weight: Real,
     ) -> Result<Self, ConfigError> {
-        if !(level_weight >= 0.0 && level_weight <= 1.0) {
+        if !(0.0..=1.0).contains(&level_weight) {
             return Err(ConfigError { word: 2 });
         }
-        if !(drift_weight >= 0.0 && drift_weight <= 1.0) {
+        if !(0.0..=1.0).contains(&drift_weight) {
             return Err(ConfigError { word: 3 });
         }
         Ok(Self {

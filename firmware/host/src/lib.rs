@@ -154,9 +154,8 @@ pub unsafe extern "C" fn specgen_state_reset(state: *mut u8) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_step(config: *const u8, state: *mut u8, input: *const u64, output: *mut u64) {
     // SAFETY: the caller's duty.
-    let (config, state, input) = unsafe {
-        (&*config.cast::<Config>(), &mut *state.cast::<State>(), &*input.cast::<[u64; INPUT_WORDS]>())
-    };
+    let (config, state, input) =
+        unsafe { (&*config.cast::<Config>(), &mut *state.cast::<State>(), &*input.cast::<[u64; INPUT_WORDS]>()) };
     let words = controller::step(config, state, &TickInput::from_words(input)).to_words();
     // SAFETY: the caller's duty.
     unsafe { output.cast::<[u64; OUTPUT_WORDS]>().write(words) }

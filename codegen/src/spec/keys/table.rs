@@ -1,7 +1,7 @@
 //! The rows of the key table.
 
-use crate::identify::MAX_GRID;
 use super::{Dimension, Item, Key, Presence, Range, SCHEMA_VERSION, Section, Shape};
+use crate::identify::MAX_GRID;
 use Presence::{Default, InsteadOf, Optional, Required};
 
 const fn row(
@@ -161,7 +161,7 @@ pub const SECTIONS: &[Section] = &[
         keys: &[
             row("grid", integer(2, MAX_GRID as i64), Default("32"), "N", "32", "Intervals per axis of the Preisach plane; the table grows and the error falls with its square."),
             row("memory", integer(8, 256), Default("64"), "", "64", "Reversals that the controller can remember."),
-            row("records", Shape::Records, Required, "", "[\"records/reference-forc.csv\"]", "Reversal-curve files, relative to the spec: one for all legs, or six."),
+            row("records", Shape::Records, Required, "", "[\"records/reference-forc.csv\"]", "Reversal-curve files, relative to the spec: one for all legs, or six. A table that `specgen identify -o` wrote is taken as it is."),
         ],
     },
     Section {

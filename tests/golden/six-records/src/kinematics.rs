@@ -40,9 +40,7 @@ const NEWTON_STEPS: usize = 1;
 #[inline]
 #[must_use]
 pub fn pose_is_accepted(pose: &[Real; 6]) -> bool {
-    pose.iter()
-        .zip(&POSE_BOUND)
-        .all(|(value, bound)| *value >= -*bound && *value <= *bound)
+    pose.iter().zip(&POSE_BOUND).all(|(value, bound)| (-*bound..=*bound).contains(value))
 }
 
 /// Δl_i = |P₀ + t + R P_i − B_i| − l₀ of each leg, m, positive when it gets longer.
