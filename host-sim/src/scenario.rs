@@ -52,17 +52,19 @@ impl LegScenario {
         self.prepared.clone().run(controller, &PaperLeg { frequency }, interval)
     }
 
-    /// Table 2: every mode at every frequency. The controller keeps the last mode; other configuration words are the spec's.
+    /// Table 2: `modes` (see [`MODES`]) at every frequency. The controller keeps the last mode; other configuration words
+    /// are the spec's.
     ///
     /// # Errors
     /// As [`Rig::run`], and if the controller has no `mode` word.
     pub fn tracking(
         &self,
         controller: &mut dyn TickController,
+        modes: &[(&str, u32)],
         frequencies: &[f64],
     ) -> Result<TrackingTable, RunError> {
         let mut table = TrackingTable::default();
-        for (mode, word) in MODES {
+        for &(mode, word) in modes {
             select(controller, word)?;
             for &frequency in frequencies {
                 let run = self.run(controller, frequency)?;

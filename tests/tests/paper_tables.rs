@@ -4,7 +4,7 @@
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
-use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, TRACKING_FREQUENCIES};
+use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, TRACKING_FREQUENCIES};
 use host_sim::table::TrackingTable;
 use specgen_tests::Emitted;
 
@@ -41,7 +41,7 @@ fn table_2_on_the_reference_plant() {
     let mut controller = Emitted::new("paper", "reference.toml", &[]).controller();
     let noise = LegParameters::reference().noise;
     for seed in [SEED, 2, 3] {
-        let table = scenario(&noise, seed).tracking(&mut controller, &TRACKING_FREQUENCIES).expect("a run");
+        let table = scenario(&noise, seed).tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).expect("a run");
         let (invhys, ewma, pcc) = (row(&table, "invhys"), row(&table, "ewma"), row(&table, "pcc"));
         within("Invhys against the paper", invhys, [127.0, 232.0, 504.5], 0.10);
         at_most("EWMA against the paper", ewma, [103.086, 117.305, 191.409]);
@@ -61,8 +61,8 @@ fn table_2_in_f32_differs_by_less_than_the_noise() {
     let mut reference = Emitted::new("paper-f64", "reference.toml", &[]).controller();
     let noise = LegParameters::reference().noise;
     let scenario = scenario(&noise, SEED);
-    let single = scenario.tracking(&mut controller, &TRACKING_FREQUENCIES).expect("a run");
-    let double = scenario.tracking(&mut reference, &TRACKING_FREQUENCIES).expect("a run");
+    let single = scenario.tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).expect("a run");
+    let double = scenario.tracking(&mut reference, &MODES, &TRACKING_FREQUENCIES).expect("a run");
     for mode in ["invhys", "ewma", "pcc"] {
         let (a, b) = (row(&single, mode), row(&double, mode));
         for k in 0..3 {
@@ -79,7 +79,8 @@ fn the_study_without_noise_on_a_grid_of_16() {
     let edits = [("grid    = 32", "grid    = 16"), ("records/reference-forc.csv", "records/clean-16.csv")];
     let emitted = Emitted::with_records("clean-16", "reference.toml", &edits, &[("clean-16.csv", record)]);
     let mut controller = emitted.controller();
-    let table = scenario(&NoiseParameters::NONE, SEED).tracking(&mut controller, &TRACKING_FREQUENCIES).expect("a run");
+    let table =
+        scenario(&NoiseParameters::NONE, SEED).tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).expect("a run");
     within("Invhys", row(&table, "invhys"), [142.3, 230.0, 495.5], 0.05);
     within("EWMA", row(&table, "ewma"), [9.00, 12.91, 21.81], 0.05);
     within("PCC", row(&table, "pcc"), [8.57, 10.96, 18.14], 0.05);

@@ -17,6 +17,7 @@ use serde_json::json;
 use super::file::write_file;
 use super::ui::{Failure, Ui};
 use crate::compile;
+use crate::model::Adaptation;
 use crate::target;
 use crate::workspace;
 
@@ -82,8 +83,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs = std::array::from_fn(|_| parameters.clone());
     let scenario = LegScenario::new(&legs, &noise, arguments.plant.seed, arguments.samples);
-    ui.progress("Table 2: three laws at three frequencies");
-    let tracking = scenario.tracking(&mut controller, &TRACKING_FREQUENCIES).map_err(|error| environment(&error))?;
+    let modes = modes(&compiled.model.adaptation);
+    ui.progress("Table 2: every law that the spec gives weights for, at three frequencies");
+    let tracking =
+        scenario.tracking(&mut controller, &modes, &TRACKING_FREQUENCIES).map_err(|error| environment(&error))?;
     ui.progress("Table 1: inverse model alone at six frequencies");
     let linearity = scenario.linearity(&mut controller, &LINEARITY_FREQUENCIES).map_err(|error| environment(&error))?;
 
@@ -96,7 +99,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
                 format!("{:#}\n", json!({ "tracking": tracking, "linearity": linearity })).into_bytes(),
             ),
         ];
-        for (mode, word) in MODES {
+        for &(mode, word) in &modes {
             select(&mut controller, word).map_err(|error| environment(&error))?;
             for frequency in TRACKING_FREQUENCIES {
                 let run = scenario.run(&mut controller, frequency).map_err(|error| environment(&error))?;
@@ -111,6 +114,16 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let text = text(&compiled.ir.name, &tracking, &linearity);
     ui.result(&text, json!({ "digest": compiled.ir.digest, "tracking": tracking, "linearity": linearity }));
     Ok(())
+}
+
+/// The laws that the spec gives weights for: with a weight of zero a law adapts nothing, and its row would say nothing.
+fn modes(adaptation: &Adaptation) -> Vec<(&'static str, u32)> {
+    let given = |mode: &str| match mode {
+        "ewma" => adaptation.level_weight > 0.0,
+        "pcc" => adaptation.level_weight > 0.0 && adaptation.drift_weight > 0.0,
+        _ => true,
+    };
+    MODES.into_iter().filter(|(mode, _)| given(mode)).collect()
 }
 
 fn text(name: &str, tracking: &TrackingTable, linearity: &LinearityTable) -> String {

@@ -41,7 +41,8 @@ fn noise_free_n16_figures_are_within_5_percent_of_the_study() {
     let study = [142.3, 230.0, 495.5, 9.00, 12.91, 21.81, 8.57, 10.96, 18.14];
     let parameters = LegParameters::reference();
     let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);
-    let table = scenario(&parameters, &NoiseParameters::NONE).tracking(&mut controller, &TRACKING_FREQUENCIES).unwrap();
+    let table =
+        scenario(&parameters, &NoiseParameters::NONE).tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).unwrap();
     let found = figures(&table);
     report("N = 16, no noise", &found, &study);
     for (found, study) in found.iter().zip(study) {
@@ -54,7 +55,8 @@ fn n32_figures_with_noise_meet_the_bounds_and_rank() {
     let study = [127.1, 232.2, 498.3, 6.0, 11.8, 20.4, 5.5, 9.4, 16.4];
     let parameters = LegParameters::reference();
     let mut controller = oracle(&parameters, 32, DAC_LSB, &parameters.noise);
-    let table = scenario(&parameters, &parameters.noise).tracking(&mut controller, &TRACKING_FREQUENCIES).unwrap();
+    let table =
+        scenario(&parameters, &parameters.noise).tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES).unwrap();
     let found = figures(&table);
     report("N = 32, noise", &found, &study);
     for (found, paper) in found[..3].iter().zip([127.0, 232.0, 504.5]) {
@@ -93,7 +95,11 @@ fn halving_the_step_changes_the_figures_by_less_than_the_stated_bound() {
     let halved = LegParameters { step_s: 0.5 * parameters.step_s, ..parameters.clone() };
     let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);
     let mut run = |parameters: &LegParameters| {
-        figures(&scenario(parameters, &NoiseParameters::NONE).tracking(&mut controller, &TRACKING_FREQUENCIES).unwrap())
+        figures(
+            &scenario(parameters, &NoiseParameters::NONE)
+                .tracking(&mut controller, &MODES, &TRACKING_FREQUENCIES)
+                .unwrap(),
+        )
     };
     let (coarse, fine) = (run(&parameters), run(&halved));
     report("step halved", &fine, &coarse);
@@ -113,7 +119,8 @@ fn legs_may_differ() {
         ..parameters.clone()
     });
     let mut controller = oracle(&parameters, 16, 0.0, &NoiseParameters::NONE);
-    let table = LegScenario::new(&legs, &NoiseParameters::NONE, 1, 100).tracking(&mut controller, &[10.0]).unwrap();
+    let table =
+        LegScenario::new(&legs, &NoiseParameters::NONE, 1, 100).tracking(&mut controller, &MODES, &[10.0]).unwrap();
     let invhys = table.rows[0].leg_rmse_nm;
     assert!(invhys.windows(2).all(|pair| pair[0] != pair[1]), "{invhys:?}");
 }
