@@ -6,9 +6,10 @@ mod support;
 
 use std::fs;
 use std::os::unix::fs::symlink;
+use std::process::Command;
 
 use support::unprivileged::{Unprivileged, set_mode};
-use support::{Folder, contents, digest, listing};
+use support::{Folder, Run, contents, digest, listing};
 
 /// Writes the reference workspace to `out`.
 fn write(folder: &Folder) {
@@ -100,7 +101,7 @@ fn an_empty_folder_and_one_whose_parents_are_missing_are_taken() {
     fs::create_dir(folder.path("here")).unwrap();
     let mut inside = folder.command();
     let inside = inside.current_dir(folder.path("here")).args(["../reference.toml", "-o", ".", "--no-build"]);
-    assert_eq!(support::Run::of(inside).code, 0);
+    assert_eq!(Run::of(inside).code, 0);
     assert_eq!(contents(&folder.path("here")), contents(&folder.path("out")));
 }
 
@@ -201,6 +202,14 @@ fn without_permission_nothing_changes() {
         user.run(&folder, &arguments(output)).says(3, &words);
         assert_eq!(folder.listing(), before, "{output}");
     }
+
+    // The first of the missing parents can be made, the second not: its user masks all permissions.
+    let plain = user.command(&folder);
+    let mut masked = Command::new("sh");
+    masked.args(["-c", "umask 0777; exec \"$@\"", "sh"]).arg(plain.get_program()).args(plain.get_args());
+    masked.current_dir(folder.path("")).args(arguments("a/b/out"));
+    Run::of(&mut masked).says(3, &["could not create `a/b`", "nothing was changed"]);
+    assert_eq!(folder.listing(), before);
 
     // The failure comes in the middle: some files are moved by then, and must come back.
     assert_eq!(user.run(&folder, &arguments("out")).code, 0);

@@ -31,12 +31,17 @@ pub struct Arguments {
     output: Option<PathBuf>,
 }
 
+/// Voltages that make sense; `actuator.voltage` of a spec has the same range.
+const VOLTS: std::ops::RangeInclusive<f64> = -1e4..=1e4;
+
 fn range(text: &str) -> Result<[f64; 2], String> {
     let expected = || format!("expected two voltages such as 0:100, found `{text}`");
     let (low, high) = text.split_once(':').ok_or_else(expected)?;
     let number = |part: &str| part.trim().trim_end_matches('V').trim().parse::<f64>().map_err(|_| expected());
     let (low, high) = (number(low)?, number(high)?);
-    if low.is_finite() && high.is_finite() && low < high {
+    if ![low, high].iter().all(|volts| VOLTS.contains(volts)) {
+        Err(format!("expected voltages from {} to {} V, found `{text}`", VOLTS.start(), VOLTS.end()))
+    } else if low < high {
         Ok([low, high])
     } else {
         Err(format!("the lower voltage must be below the upper one, found `{text}`"))
