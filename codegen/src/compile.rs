@@ -14,6 +14,10 @@ use crate::spec::{self, SpecSource};
 use crate::stability::{self, Margins};
 use crate::workspace;
 
+/// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
+/// factor, a wrong unit is 1000.
+const LARGEST_SCALE: f64 = 5.0;
+
 /// A spec that compiled.
 #[derive(Debug)]
 pub struct Compiled {
@@ -95,6 +99,7 @@ fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedReco
         };
         match one {
             Ok((table, report, warnings)) => {
+                errors.extend(wrong_scale(model, name, &table));
                 result.tables.push(table);
                 result.reports.push(report);
                 result.findings.extend(warnings);
@@ -103,12 +108,41 @@ fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedReco
         }
         result.bytes.push((name.clone(), bytes));
     }
-    if errors.is_empty() { Ok(result) } else { Err(errors) }
+    if errors.is_empty() {
+        Ok(result)
+    } else {
+        errors.extend(result.findings);
+        Err(errors)
+    }
 }
 
 fn identify_record(model: &Model, name: &str, path: &Path) -> Result<identify::Identified, Vec<Diagnostic>> {
     let options = identify::Options::new(model.hysteresis.grid, model.actuator.voltage);
     identify::identify(&identify::read_record(path, name)?, &options)
+}
+
+/// A displacement that stack gain and voltage do not explain is one in another unit, and the controller would be off by it.
+fn wrong_scale(model: &Model, name: &str, table: &EverettTable) -> Option<Diagnostic> {
+    let [min, max] = model.actuator.voltage;
+    let expected = model.actuator.leg_gain() * (max - min);
+    let found = table.node(table.grid, 0);
+    if (expected / LARGEST_SCALE..=expected * LARGEST_SCALE).contains(&found) {
+        return None;
+    }
+    Some(Diagnostic {
+        severity: Severity::Error,
+        code: codes::RECORD_SCALE,
+        key: "hysteresis.records".to_owned(),
+        place: Place::File { path: name.to_owned(), line: None },
+        message: format!(
+            "the record moves by {:.4} µm over {min} V to {max} V; {} stacks of {} m/V give {:.4} µm",
+            found * 1e6,
+            model.actuator.stacks,
+            model.actuator.stack_gain,
+            expected * 1e6
+        ),
+        help: "check that the displacement is in µm, or mend actuator.stacks and actuator.stack_gain".to_owned(),
+    })
 }
 
 /// A table that `specgen identify` wrote: it must be of the grid and the voltage range that the spec declares.

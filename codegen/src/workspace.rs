@@ -1,5 +1,5 @@
 //! The files of a self-contained workspace. Beside the emitted crate it holds the runtime and the targets, copied verbatim
-//! from the sources that specgen itself was built with. [`write`] puts them into a folder, whole or not at all.
+//! from the sources that specgen itself was built with. [`write()`] puts them into a folder, whole or not at all.
 
 mod output;
 

@@ -280,17 +280,24 @@ fn a_record_that_does_not_cover_the_declared_range_is_refused() {
     }
 }
 
+/// Alone, `identify` can only point at an odd size; a spec knows what its actuator can do.
 #[test]
-fn a_displacement_in_another_unit_is_pointed_out() {
+fn a_displacement_in_another_unit_is_pointed_out_and_refused_by_a_spec() {
     let folder = prepared();
-    for (factor, word) in [(1e3, "is it in nm?"), (1e-6, "is it in mm or m?")] {
+    for (factor, word) in [(1e3, Some("is it in nm?")), (1e-3, None), (1e-6, Some("is it in mm or m?"))] {
         let mut rows = good(&folder);
         rows.iter_mut().for_each(|row| row[2] *= factor);
         folder.write(BAD, csv(&rows));
-        for document in met(&folder) {
-            let finding = document.finding("W0515");
-            assert!(finding["message"].as_str().unwrap().contains(word), "{finding:#}");
+        if let Some(word) = word {
+            for document in met(&folder) {
+                let finding = document.finding("W0515");
+                assert!(finding["message"].as_str().unwrap().contains(word), "{finding:#}");
+            }
         }
+        let before = folder.listing();
+        let document = folder.json(&["platform.toml", "-o", "out", "--no-build"]);
+        assert_eq!((document.code, &document.finding("E0615")["file"]), (1, &BAD.into()));
+        assert_eq!(folder.listing(), before);
     }
 }
 

@@ -177,7 +177,7 @@ fn wrong_units_and_swapped_columns() {
     expect(
         &errors(changed(|r| r.iter_mut().for_each(|r| r.swap(1, 2))).as_bytes()),
         "E0604",
-        "spec declares 0 V to 100 V",
+        "table is to cover 0 V to 100 V",
     );
     let record = read(changed(|r| r.iter_mut().for_each(|r| r[2] *= 1e3)).as_bytes()).unwrap();
     assert!(record.warnings.iter().any(|d| d.code == "W0515" && d.message.contains("in nm?")), "{:?}", record.warnings);

@@ -161,6 +161,8 @@ codes! {
         "A table file is as `identify` writes it: three columns, the nodes of a triangle of rising thresholds, no negative weight.";
     TABLE_MISMATCH = "E0614", "a table of another grid or voltage range",
         "A table named in hysteresis.records must have the cells of hysteresis.grid over the range of actuator.voltage: identify the record again with both.";
+    RECORD_SCALE = "E0615", "a record that the actuator cannot have made",
+        "Its displacement is more than five times, or less than a fifth, of stacks x stack_gain x voltage: most likely it is not in micrometres.";
     STROKE_MISMATCH = "W0301", "stroke, gain and voltage do not fit",
         "stacks x stack_gain x voltage range is far from the stroke: one of the four is probably wrong, or the stroke is never used.";
     RESONANCE_ALIASED = "W0302", "resonance above half the tick rate",

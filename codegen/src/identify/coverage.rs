@@ -1,4 +1,4 @@
-//! Does a record excite the plane that the spec declares? Checks that need the drive range and the grid.
+//! Does a record excite the plane that the table covers? Checks that need the drive range and the grid.
 
 use nalgebra::DMatrix;
 
@@ -40,7 +40,7 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     let [low, high] = plane.range;
     let span = high - low;
     let (bottom, top) = extent(&record.drive);
-    let found = format!("the drive goes from {bottom} V to {top} V, but the spec declares {low} V to {high} V");
+    let found = format!("the drive goes from {bottom} V to {top} V, but the table is to cover {low} V to {high} V");
     let ratio = (top - bottom) / span;
     let um = record.displacement_range() * 1e6;
     if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {

@@ -104,8 +104,7 @@ fn finish(
 
 /// The text of the file without a byte order mark, or `None` after the reason was reported.
 fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
-    let unreadable =
-        |e: std::io::Error| (format!("cannot be read: {e}"), "name an existing CSV file, relative to the spec");
+    let unreadable = |e: std::io::Error| (format!("cannot be read: {e}"), "name an existing CSV file");
     let bytes = match read_limited(path) {
         Ok(bytes) => bytes,
         Err(e) => {
