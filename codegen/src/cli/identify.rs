@@ -23,7 +23,7 @@ pub struct Arguments {
     /// Cells per axis of the Preisach grid.
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = grid, allow_negative_numbers = true)]
     grid: usize,
-    /// Another record of the same leg, not used for the fit, to judge the table by.
+    /// A second record of the leg, not used for the fit, to judge the table by.
     #[arg(long, value_name = "RECORD")]
     validate: Option<PathBuf>,
     /// Write the table (CSV: up_V, down_V, everett_um) here.
