@@ -66,8 +66,9 @@ fn every_command_explains_itself() {
         assert_eq!((help.code, help.stderr.as_str()), (0, ""));
         let text = &help.stdout;
         assert!(text.contains(&format!("Usage: specgen {command}")) && text.contains("--json"), "{text}");
-        // Every option and argument has a sentence.
-        for line in text.lines().filter(|line| line.starts_with("  ")) {
+        // Every option and argument has a sentence; deeper lines are the rest of one.
+        let depth = |line: &str| line.len() - line.trim_start().len();
+        for line in text.lines().filter(|line| (2..=6).contains(&depth(line))) {
             let explained = line.trim().split_once("  ").is_some_and(|(_, text)| text.trim().len() > 4);
             assert!(explained, "{command}: `{line}`");
         }
