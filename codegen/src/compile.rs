@@ -63,7 +63,7 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
         return Err(Refused { source: Some(source), findings });
     };
     findings.extend(identified.findings);
-    let ir = match lower(&model, &identified.tables, &digest(&source, &identified.bytes)) {
+    let ir = match lower(&model, &identified.tables, &digest(&source, &identified.texts)) {
         Ok(ir) => ir,
         Err(found) => {
             findings.extend(found);
@@ -80,22 +80,26 @@ struct IdentifiedRecords {
     tables: Vec<EverettTable>,
     reports: Vec<Option<identify::Report>>,
     findings: Vec<Diagnostic>,
-    /// Name and content of each file, for the digest.
-    bytes: Vec<(String, Vec<u8>)>,
+    /// Name and text of each file, for the digest.
+    texts: Vec<(String, String)>,
 }
 
 fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedRecords, Vec<Diagnostic>> {
     let mut result =
-        IdentifiedRecords { tables: Vec::new(), reports: Vec::new(), findings: Vec::new(), bytes: Vec::new() };
+        IdentifiedRecords { tables: Vec::new(), reports: Vec::new(), findings: Vec::new(), texts: Vec::new() };
     let mut errors = Vec::new();
     for name in &model.hysteresis.records {
-        let path = source.dir.join(name);
-        // What cannot be read is reported by `identify_record`, which opens it again.
-        let bytes = std::fs::read(&path).unwrap_or_default();
-        let one = if identify::is_table_csv(&bytes) {
-            read_table(model, name, &bytes).map(|table| (table, None, Vec::new()))
+        let text = match identify::read_file(&source.dir.join(name), name) {
+            Ok(text) => text,
+            Err(found) => {
+                errors.extend(found);
+                continue;
+            }
+        };
+        let one = if identify::is_table_csv(&text) {
+            read_table(model, name, &text).map(|table| (table, None, Vec::new()))
         } else {
-            identify_record(model, name, &path).map(|found| (found.table, Some(found.report), found.warnings))
+            identify_record(model, name, &text).map(|found| (found.table, Some(found.report), found.warnings))
         };
         match one {
             Ok((table, report, warnings)) => {
@@ -106,7 +110,7 @@ fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedReco
             }
             Err(found) => errors.extend(found),
         }
-        result.bytes.push((name.clone(), bytes));
+        result.texts.push((name.clone(), text));
     }
     if errors.is_empty() {
         Ok(result)
@@ -116,9 +120,9 @@ fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedReco
     }
 }
 
-fn identify_record(model: &Model, name: &str, path: &Path) -> Result<identify::Identified, Vec<Diagnostic>> {
+fn identify_record(model: &Model, name: &str, text: &str) -> Result<identify::Identified, Vec<Diagnostic>> {
     let options = identify::Options::new(model.hysteresis.grid, model.actuator.voltage);
-    identify::identify(&identify::read_record(path, name)?, &options)
+    identify::identify(&identify::parse_record(text, name)?, &options)
 }
 
 /// A displacement that stack gain and voltage do not explain is one in another unit, and the controller would be off by it.
@@ -146,8 +150,8 @@ fn wrong_scale(model: &Model, name: &str, table: &EverettTable) -> Option<Diagno
 }
 
 /// A table that `specgen identify` wrote: it must be of the grid and the voltage range that the spec declares.
-fn read_table(model: &Model, name: &str, bytes: &[u8]) -> Result<EverettTable, Vec<Diagnostic>> {
-    let table = identify::read_table_csv(&String::from_utf8_lossy(bytes), name)?;
+fn read_table(model: &Model, name: &str, text: &str) -> Result<EverettTable, Vec<Diagnostic>> {
+    let table = identify::read_table_csv(text, name)?;
     let [min, max] = model.actuator.voltage;
     let slack = 1e-9 * (max - min);
     let fits = (table.drive_min - min).abs() <= slack && (table.drive_max - max).abs() <= slack;
@@ -169,13 +173,13 @@ fn read_table(model: &Model, name: &str, bytes: &[u8]) -> Result<EverettTable, V
 
 /// Digest of what the controller depends on: the text of the spec (line ends as `\n`) and the records by name and content.
 /// Not the folder it lies in.
-fn digest(source: &SpecSource, records: &[(String, Vec<u8>)]) -> String {
+fn digest(source: &SpecSource, records: &[(String, String)]) -> String {
     let mut all = source.text.replace("\r\n", "\n").into_bytes();
-    for (name, bytes) in records {
+    for (name, text) in records {
         all.push(0);
         all.extend(name.as_bytes());
         all.push(0);
-        all.extend(workspace::sha256(bytes).as_bytes());
+        all.extend(workspace::sha256(text.as_bytes()).as_bytes());
     }
     workspace::sha256(&all)
 }

@@ -37,7 +37,7 @@ use residual::Residual;
 
 pub use coverage::MAX_GRID;
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
-pub use record::{MAX_FILE_BYTES, Record, read_record};
+pub use record::{MAX_FILE_BYTES, Record, parse_record, read_file, read_record};
 pub use report::{Branches, Report};
 pub use staircase::Staircase;
 pub use validate::{Start, StartResult, Validation, validate};

@@ -20,8 +20,8 @@ const LEG_SETPOINT_STROKES: f64 = 2.0;
 /// `tables` holds one Everett table for all legs or one for each; `digest` is the hex digest of spec and records.
 ///
 /// # Errors
-/// Findings about values that cannot be turned into a controller (a slew limit below one code per tick, voltage limits
-/// without a code between them), with their place in the spec.
+/// Findings about values that cannot be turned into a controller (a converter too coarse
+/// for the grid, a workspace too large for the legs), with their place in the spec.
 pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir, Vec<Diagnostic>> {
     let scalar = match model.controller.scalar {
         model::Scalar::F32 => Scalar::F32,

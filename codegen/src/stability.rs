@@ -14,7 +14,7 @@ mod sampled;
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::model::{Adaptation, Model};
 
-pub use jury::{ewma_limit, pcc_limit, pcc_satisfies_jury};
+pub use jury::{ewma_limit, pcc_limit};
 pub use sampled::{LegDynamics, spectral_radius};
 
 /// A radius above this is refused. The limit is 1; a small weight rightly has a radius just below it, so what is kept

@@ -2,12 +2,11 @@
 //! bit, with what a tick costs there.
 
 use std::f64::consts::TAU;
-use std::path::Path;
 use std::time::Duration;
 
 use host_sim::controller::{Controller, ControllerError, TickController};
 use host_sim::noise::Gaussian;
-use host_sim::trace::{Difference, Trace, first_difference};
+use host_sim::trace::{Trace, first_difference};
 use serde::Serialize;
 
 use crate::ir::{Ir, LEGS, Setpoint};
@@ -19,12 +18,12 @@ const SEED: u64 = 1;
 /// Longest time the emulator may take, s.
 const LIMIT: Duration = Duration::from_secs(600);
 
-/// A controller library under the exercise.
+/// A controller, reset and configured as it is, under the exercise.
 ///
 /// # Errors
-/// The library cannot be loaded, or lacks a word.
-pub fn exercise(library: &Path, model: &Model, ir: &Ir, ticks: u32) -> Result<Trace, ControllerError> {
-    let mut controller = Controller::load(library)?;
+/// It lacks a word.
+pub fn exercise(controller: &mut Controller, model: &Model, ir: &Ir, ticks: u32) -> Result<Trace, ControllerError> {
+    controller.reset();
     let description = controller.description().clone();
     let mut trace = Trace::new(description.clone());
     let mut noise: Vec<Gaussian> = (0..LEGS as u64).map(|leg| Gaussian::new(model.sensor.noise, SEED, leg)).collect();
@@ -138,11 +137,10 @@ impl Measurement {
 ///
 /// # Errors
 /// The emulator is missing or fails, or the image is not one of specgen's.
-pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<(Measurement, Option<Difference>), TargetError> {
+pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measurement, TargetError> {
     let footprint = image::footprint(&image.elf)?;
     let bound = stack::bound(&image.elf, stack::STEP_SYMBOL)?;
     let (replayed, stats) = replay(image, config, host)?;
-    let difference = first_difference(host, &replayed);
     let stages = stats.stages.iter().filter(|stage| stage.calls > 0).map(|stage| Stage {
         name: stage.name.clone(),
         calls: stage.calls,
@@ -150,7 +148,7 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<(Measureme
         mean: stage.mean(),
         max: stage.largest,
     });
-    let measurement = Measurement {
+    Ok(Measurement {
         machine: image.mcu.machine().to_owned(),
         compiler: image.compiler.clone(),
         flash: footprint.flash,
@@ -164,9 +162,8 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<(Measureme
         forbidden_symbols: footprint.panic_symbols.into_iter().chain(footprint.allocator_symbols).collect(),
         stages: stages.collect(),
         ticks: stats.ticks,
-        first_difference: difference.as_ref().map(ToString::to_string),
-    };
-    Ok((measurement, difference))
+        first_difference: first_difference(host, &replayed).map(|difference| difference.to_string()),
+    })
 }
 
 /// The record's inputs on the emulated machine: its trace, and what was measured.

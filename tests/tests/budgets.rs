@@ -35,10 +35,11 @@ fn a_tick_of_six_legs_stays_within_its_instructions_and_its_stack() {
         let folder = format!("budget-{}", budget.name.replace(' ', "-"));
         let emitted = Emitted::new(&folder, "reference.toml", budget.edits);
         let Some(image) = emitted.image(budget.mcu) else { continue };
-        let host = verify::exercise(&emitted.library(), &emitted.compiled.model, &emitted.compiled.ir, TICKS).unwrap();
-        let config = emitted.controller().default_config();
-        let (m, difference) = verify::measure(&image, &config, &host).unwrap();
-        assert!(difference.is_none(), "{}: {}", budget.name, difference.unwrap());
+        let mut controller = emitted.controller();
+        let host = verify::exercise(&mut controller, &emitted.compiled.model, &emitted.compiled.ir, TICKS).unwrap();
+        let config = controller.default_config();
+        let m = verify::measure(&image, &config, &host).unwrap();
+        assert_eq!(m.first_difference, None, "{}", budget.name);
         print(budget.name, &m);
 
         let tick = m.stage("step").unwrap();
@@ -76,8 +77,8 @@ fn the_worst_tick_is_bounded_even_when_every_memory_overflows() {
         [("hostile, pcc", 2.0, &hostile), ("hostile, invhys", 0.0, &hostile), ("overflow", 0.0, &nested)]
     {
         let (host, config) = host_trace(&mut controller, &[("mode", mode), ("setpoint_kind", 1.0)], inputs);
-        let (m, difference) = verify::measure(&image, &config, &host).unwrap();
-        assert!(difference.is_none(), "{what}: {}", difference.unwrap());
+        let m = verify::measure(&image, &config, &host).unwrap();
+        assert_eq!(m.first_difference, None, "{what}");
         print(&format!("M7 f64, {what}"), &m);
         let leg = m.stage("actuate").unwrap();
         // A full memory drops one pair: a look-up for each of 62 pairs, and two moves of 62 entries.

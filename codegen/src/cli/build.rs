@@ -98,15 +98,14 @@ fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> 
     let library = target::host::build_library(output, &target_dir)?;
     summary.host_library = Some(library.display().to_string());
     let sim = |error: host_sim::controller::ControllerError| Failure::Environment(error.to_string());
-    let host = verify::exercise(&library, &compiled.model, &compiled.ir, TICKS).map_err(sim)?;
-    let config = Controller::load(&library).map_err(sim)?.default_config();
+    let mut controller = Controller::load(&library).map_err(sim)?;
+    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS).map_err(sim)?;
 
     target::available()?;
     let mcu = compiled.model.target.mcu;
     ui.progress(&format!("building and measuring for {}", mcu.machine()));
     let image = target::build_image(output, mcu, &target_dir)?;
-    let (measurement, _) = verify::measure(&image, &config, &host)?;
-    summary.measurement = Some(measurement);
+    summary.measurement = Some(verify::measure(&image, &controller.default_config(), &host)?);
     Ok(())
 }
 

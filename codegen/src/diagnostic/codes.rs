@@ -99,8 +99,6 @@ codes! {
         "The sampled loop of amplifier lag, resonance and adaptation has a spectral radius of 1 or more. The help names the largest weight that would do; a longer run helps as well.";
     TOO_FEW_CODES = "E0410", "converter too coarse for the grid",
         "There are fewer than two converter codes to a cell of the Preisach grid.";
-    SLEW_TOO_SLOW = "E0411", "slew rate too slow for the converter",
-        "The slew limit, in converter codes per tick, rounds down to none.";
     WORKSPACE_TOO_LARGE = "E0412", "workspace too large for the legs",
         "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
     RECORD_IO = "E0501", "a record cannot be opened",

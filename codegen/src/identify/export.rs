@@ -24,8 +24,8 @@ pub fn write_table_csv(table: &EverettTable) -> String {
 
 /// Whether a data file is a table as [`write_table_csv`] writes it, by its first line.
 #[must_use]
-pub fn is_table_csv(bytes: &[u8]) -> bool {
-    bytes.strip_prefix(HEADER.as_bytes()).is_some_and(|rest| rest.starts_with(b"\n") || rest.starts_with(b"\r\n"))
+pub fn is_table_csv(text: &str) -> bool {
+    text.lines().next() == Some(HEADER)
 }
 
 /// Reads what [`write_table_csv`] wrote; node values are the same within rounding of the unit. `shown_as` names the file in messages.

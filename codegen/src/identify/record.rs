@@ -72,11 +72,25 @@ impl Record {
 /// # Errors
 /// All findings of the file, warnings included, if at least one refuses it.
 pub fn read_record(path: &Path, shown_as: &str) -> Result<Record, Vec<Diagnostic>> {
+    parse_record(&read_file(path, shown_as)?, shown_as)
+}
+
+/// The text of a data file, record or table, without a byte order mark.
+///
+/// # Errors
+/// A finding if it is no regular file, cannot be read, is larger than [`MAX_FILE_BYTES`] or not UTF-8.
+pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
-    let Some(text) = read_text(path, &mut findings) else {
-        return Err(findings.into_diagnostics());
-    };
-    let Some((lines, columns)) = parse(&text, &mut findings) else {
+    read_text(path, &mut findings).ok_or_else(|| findings.into_diagnostics())
+}
+
+/// A record from the text of its file.
+///
+/// # Errors
+/// As [`read_record`].
+pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    let Some((lines, columns)) = parse(text, &mut findings) else {
         return Err(findings.into_diagnostics());
     };
     let [time, drive, micrometres] = columns;

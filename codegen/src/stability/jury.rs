@@ -12,18 +12,17 @@ pub fn pcc_limit(level_weight: f64, drift_weight: f64) -> f64 {
     4.0 / (2.0 * (level_weight + drift_weight) - level_weight * drift_weight)
 }
 
-/// All three inequalities of (AII.19) as printed.
-#[must_use]
-pub fn pcc_satisfies_jury(level_weight: f64, drift_weight: f64, gain_ratio: f64) -> bool {
-    let (sum, product) = (level_weight + drift_weight, level_weight * drift_weight);
-    (gain_ratio * (product - sum) + 1.0).abs() < 1.0
-        && gain_ratio * product > 0.0
-        && 4.0 + gain_ratio * (product - 2.0 * sum) > 0.0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// All three inequalities of (AII.19) as printed.
+    fn pcc_satisfies_jury(level_weight: f64, drift_weight: f64, gain_ratio: f64) -> bool {
+        let (sum, product) = (level_weight + drift_weight, level_weight * drift_weight);
+        (gain_ratio * (product - sum) + 1.0).abs() < 1.0
+            && gain_ratio * product > 0.0
+            && 4.0 + gain_ratio * (product - 2.0 * sum) > 0.0
+    }
 
     /// Error of a static leg of gain λ under the law, run by run, starting from a step disturbance.
     fn settles(level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> bool {
