@@ -164,7 +164,7 @@ pub fn emit() -> TokenStream {
 
         /// What the readings teach: the integral of (7) and the run-to-run estimates.
         #[inline]
-        fn learn(config: &Config, state: &mut State) {
+        pub(crate) fn learn(config: &Config, state: &mut State) {
             let mode = config.mode();
             if mode.feeds_back() {
                 let error = difference(&state.target.pose, &state.pose);
@@ -222,7 +222,7 @@ pub fn emit() -> TokenStream {
 
         /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
         #[inline]
-        fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load {
+        pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load {
             let wrench = match config.interaction() {
                 Interaction::Neglected => [0.0; 6],
                 Interaction::Measured => state.wrench,
@@ -237,7 +237,7 @@ pub fn emit() -> TokenStream {
 
         /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.
         #[inline]
-        fn feedback(config: &Config, state: &State) -> [Real; LEGS] {
+        pub(crate) fn feedback(config: &Config, state: &State) -> [Real; LEGS] {
             if !config.mode().feeds_back() {
                 return [0.0; LEGS];
             }
