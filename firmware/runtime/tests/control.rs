@@ -123,10 +123,10 @@ fn without_a_filter_innovations_and_model_errors_give_the_same_estimates() {
 #[test]
 fn the_integral_grows_by_gain_times_error_and_is_held_only_outward() {
     let mut integral = Integral::<f64>::new();
-    let growth = Integral::growth(&[2.0; 6], 1e-4, &[1.0, -1.0, 0.0, 3.0, 0.5, -2.0]);
+    let growth = Integral::growth(&[2.0; 6], 1e-4, &[1.0, -1.0, 0.0, 4.0, 0.5, -2.0]);
     integral.grow(&growth);
     integral.grow(&growth);
-    assert_eq!(integral.force, [4e-4, -4e-4, 0.0, 1.2e-3, 2e-4, -8e-4]);
+    assert_eq!(integral.force, [4e-4, -4e-4, 0.0, 1.6e-3, 2e-4, -8e-4]);
 
     let mut excess = [0.0; 6];
     assert!(!winds_up(&excess, &[1.0; 6]));
