@@ -4,8 +4,9 @@
 
 mod actuation;
 mod kinematics;
+mod linear;
 
-pub use kinematics::joint_positions;
+pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
 
 use crate::diagnostic::Diagnostic;
 use crate::everett::EverettTable;
@@ -63,6 +64,7 @@ pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir,
             period: model.timing.period,
             leg_gain: model.actuator.leg_gain(),
         },
+        task_space: None,
     })
 }
 

@@ -12,6 +12,10 @@
 //! | [`memory`] | reversal memory: forward Preisach model, its inverse, bounded storage | section 3, operator Γ and Γ⁻¹ |
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
 //! | [`dac`] | converter codes with voltage and slew limits | section 4, amplifiers |
+//! | [`attitude`] | R = Rz Ry Rx by sine and versine; rates of its angles and angular velocity | (AI.1) |
+//! | [`kinematics`] | pose to leg displacements in difference form, and back | (1), (2), (AI.2)–(AI.4) |
+//! | [`sensing`] | pose from six gauges that see the platform | section 4 |
+//! | [`velocity`] | rate of the measured pose, filtered | (7), k_v |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
@@ -19,15 +23,23 @@
 //! (their results on ±0 and NaN, or their assertions, depend on the compiler), sums in written order.
 
 pub mod adaptation;
+pub mod attitude;
 pub mod dac;
 pub mod digest;
 pub mod everett;
+pub mod kinematics;
 pub mod memory;
 pub mod real;
+pub mod sensing;
+pub mod velocity;
 
 pub use adaptation::{Estimate, Law};
+pub use attitude::{Attitude, Series};
 pub use dac::{CodeLimits, Dac};
 pub use digest::Digest;
 pub use everett::Everett;
+pub use kinematics::Legs;
 pub use memory::ReversalMemory;
 pub use real::Real;
+pub use sensing::{Calibration, Gauges};
+pub use velocity::{Rate, RateFilter};
