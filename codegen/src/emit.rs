@@ -10,6 +10,7 @@ mod kinematics;
 mod limits;
 mod literal;
 mod manifest;
+mod sensing;
 mod state;
 mod step;
 mod words;
@@ -34,9 +35,13 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
         ("src/step.rs", step::emit(ir)),
         ("src/words.rs", words::emit(ir)),
     ];
+    let of_platform = ir.task_space.iter().map(|task| ("src/sensing.rs", sensing::emit(ir.scalar, &task.sensing)));
     let header = format::header(ir);
-    let mut files: EmittedCrate =
-        sources.into_iter().map(|(path, tokens)| (path.to_owned(), format::source(&header, tokens))).collect();
+    let mut files: EmittedCrate = sources
+        .into_iter()
+        .chain(of_platform)
+        .map(|(path, tokens)| (path.to_owned(), format::source(&header, tokens)))
+        .collect();
     files.insert("Cargo.toml".to_owned(), manifest::emit(ir));
     files
 }

@@ -10,6 +10,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let title = format!(" Controller of platform `{}`.", ir.name);
     let scalar = format_ident!("f{}", ir.scalar.bits().to_string());
     let bits = literal::count(ir.scalar.bits() as usize);
+    let of_platform = ir.task_space.as_ref().map(|_| quote! { pub mod sensing; });
     let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
     quote! {
         #![doc = #title]
@@ -37,6 +38,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod hysteresis;
         pub mod kinematics;
         pub mod limits;
+        #of_platform
         mod state;
         mod step;
         mod words;
