@@ -16,6 +16,7 @@ mod limits;
 mod literal;
 mod manifest;
 mod platform;
+mod sensing;
 mod stage_type;
 
 use std::collections::BTreeMap;
@@ -61,6 +62,7 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
     vec![
         ("src/config.rs", platform::config::emit(ir, &task.defaults)),
         ("src/lib.rs", platform::crate_root::emit(ir)),
+        ("src/sensing.rs", sensing::emit(ir.scalar, &task.sensing)),
         ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),
         ("src/step.rs", platform::step::emit()),
