@@ -107,7 +107,7 @@ impl Matrix {
             for x in self.row(i) {
                 sum += x.abs();
             }
-            if !(sum <= largest) {
+            if sum > largest || sum.is_nan() {
                 largest = sum;
             }
         }

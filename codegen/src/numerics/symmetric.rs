@@ -1,5 +1,7 @@
 //! Symmetric eigenproblems by Jacobi rotations, and the modes of M q̈ + K q = 0.
 
+#![allow(clippy::needless_range_loop, reason = "an index names a row of one matrix and a column of another")]
+
 use super::matrix::{Matrix6, multiply6, transpose6};
 
 /// Sweeps at most; a 6 × 6 matrix needs fewer than ten.
