@@ -27,6 +27,7 @@ const FIXED: &[(&str, &str)] = &[
     ("runtime/src/notch.rs", include_str!("../../firmware/runtime/src/notch.rs")),
     ("runtime/src/transfer.rs", include_str!("../../firmware/runtime/src/transfer.rs")),
     ("runtime/src/real.rs", include_str!("../../firmware/runtime/src/real.rs")),
+    ("runtime/src/trig.rs", include_str!("../../firmware/runtime/src/trig.rs")),
     ("host/Cargo.toml", include_str!("../../firmware/host/Cargo.toml")),
     ("host/build.rs", include_str!("../../firmware/host/build.rs")),
     ("host/src/lib.rs", include_str!("../../firmware/host/src/lib.rs")),

@@ -17,6 +17,7 @@
 //! | [`transfer`] | bumpless change of mode | |
 //! | [`linear`] | six-vectors and constant maps | |
 //! | [`dac`] | converter codes with voltage and slew limits | section 4, amplifiers |
+//! | [`trig`] | sine and cosine by the same operations everywhere | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
@@ -34,6 +35,7 @@ pub mod mode;
 pub mod notch;
 pub mod real;
 pub mod transfer;
+pub mod trig;
 
 pub use adaptation::{Estimate, Law};
 pub use dac::{CodeLimits, Dac};
