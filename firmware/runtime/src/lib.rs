@@ -15,6 +15,7 @@
 //! | [`feedback`] | position feedback with anti-windup | (7) |
 //! | [`notch`] | modal notch of the feedback | |
 //! | [`transfer`] | bumpless change of mode | |
+//! | [`setpoint`] | bias, moves, trajectories, streams; user frames | section 4, trajectories |
 //! | [`linear`] | six-vectors and constant maps | |
 //! | [`dac`] | converter codes with voltage and slew limits | section 4, amplifiers |
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
@@ -34,6 +35,7 @@ pub mod memory;
 pub mod mode;
 pub mod notch;
 pub mod real;
+pub mod setpoint;
 pub mod transfer;
 pub mod trig;
 
