@@ -17,6 +17,7 @@ const FIXED: &[(&str, &str)] = &[
     ("runtime/Cargo.toml", include_str!("../../firmware/runtime/Cargo.toml")),
     ("runtime/src/lib.rs", include_str!("../../firmware/runtime/src/lib.rs")),
     ("runtime/src/adaptation.rs", include_str!("../../firmware/runtime/src/adaptation.rs")),
+    ("runtime/src/attitude.rs", include_str!("../../firmware/runtime/src/attitude.rs")),
     ("runtime/src/dac.rs", include_str!("../../firmware/runtime/src/dac.rs")),
     ("runtime/src/digest.rs", include_str!("../../firmware/runtime/src/digest.rs")),
     ("runtime/src/everett.rs", include_str!("../../firmware/runtime/src/everett.rs")),

@@ -11,6 +11,7 @@
 //! | [`everett`] | Everett function on a grid: look-up and inverse along one branch | section 3 |
 //! | [`memory`] | reversal memory: forward Preisach model, its inverse, bounded storage | section 3, operator Γ and Γ⁻¹ |
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
+//! | [`attitude`] | rotation by three angles, Euler rates | (AI.1) |
 //! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
 //! | [`feedback`] | position feedback with anti-windup | (7) |
 //! | [`notch`] | modal notch of the feedback | |
@@ -26,6 +27,7 @@
 //! (their results on ±0 and NaN, or their assertions, depend on the compiler), sums in written order.
 
 pub mod adaptation;
+pub mod attitude;
 pub mod dac;
 pub mod digest;
 pub mod everett;

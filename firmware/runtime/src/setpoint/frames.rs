@@ -12,6 +12,7 @@
 //! angular velocities: T(θ) and its derivative are exact.
 
 use super::Target;
+use crate::attitude::Attitude;
 use crate::real::Real;
 use crate::trig::sine_cosine;
 
@@ -90,12 +91,12 @@ impl<T: Real> Frames<T> for Work<T> {
         let z = angle_of(r[1][0], T::ONE + r[0][0]);
         let (sz, cz) = sine_cosine(z);
         let y = angle_of(-r[2][0], cz * (T::ONE + r[0][0]) + sz * r[1][0]);
-        let (sy, cy) = sine_cosine(y);
         let x = angle_of(r[2][1], T::ONE + r[2][2]);
-        let columns = Columns::of(sy, cy, sz, cz);
-        let rates = columns.solve(sy, cy, sz, cz, &velocity);
-        let turning = columns.turning(&rates);
-        let accelerations = columns.solve(sy, cy, sz, cz, &minus(&angular_acceleration, &turning));
+        let attitude = attitude([x, y, z]);
+        let inverse = attitude.rate_matrix_inverse();
+        let rates = apply(&inverse, &velocity);
+        let turning = apply(&attitude.rate_matrix_derivative(rates), &rates);
+        let accelerations = apply(&inverse, &minus(&angular_acceleration, &turning));
         for (axis, angle) in [x, y, z].into_iter().enumerate() {
             target.pose[3 + axis] = angle;
             target.rate[3 + axis] = rates[axis];
@@ -123,65 +124,28 @@ impl<T: Real> Turn<T> {
         if !(ax.abs() <= largest && ay.abs() <= largest && az.abs() <= largest) {
             return None;
         }
-        let [(sx, cx, vx), (sy, cy, vy), (sz, cz, vz)] = [circle(ax), circle(ay), circle(az)];
-        let less_identity = [
-            [vy * vz - vy - vz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
-            [cy * sz, sx * sy * sz + (vx * vz - vx - vz), cx * sy * sz - sx * cz],
-            [-sy, sx * cy, vx * vy - vx - vy],
-        ];
-        let columns = Columns::of(sy, cy, sz, cz);
+        let attitude = attitude([ax, ay, az]);
         let rates = [user.rate[3], user.rate[4], user.rate[5]];
-        let velocity = columns.combine(&rates);
-        let [ax, ay, az] = columns.combine(&[user.acceleration[3], user.acceleration[4], user.acceleration[5]]);
-        let [tx, ty, tz] = columns.turning(&rates);
-        Some(Self { less_identity, velocity, acceleration: [ax + tx, ay + ty, az + tz] })
+        let accelerations = [user.acceleration[3], user.acceleration[4], user.acceleration[5]];
+        let matrix = attitude.rate_matrix();
+        let [x, y, z] = apply(&matrix, &accelerations);
+        let [tx, ty, tz] = apply(&attitude.rate_matrix_derivative(rates), &rates);
+        Some(Self {
+            less_identity: attitude.rotation_less_identity(),
+            velocity: apply(&matrix, &rates),
+            acceleration: [x + tx, y + ty, z + tz],
+        })
     }
 }
 
-/// Columns of T(θ), ω = T θ̇: the axes about which θx and θy turn; θz turns about z.
-struct Columns<T> {
-    /// Rz Ry x̂.
-    x: [T; 3],
-    /// Rz ŷ.
-    y: [T; 3],
-}
-
-impl<T: Real> Columns<T> {
-    #[inline]
-    fn of(sy: T, cy: T, sz: T, cz: T) -> Self {
-        Self { x: [cy * cz, cy * sz, -sy], y: [-sz, cz, T::ZERO] }
-    }
-
-    /// T · rates.
-    #[inline]
-    fn combine(&self, rates: &[T; 3]) -> [T; 3] {
-        let [a, b, c] = *rates;
-        [self.x[0] * a + self.y[0] * b, self.x[1] * a + self.y[1] * b, self.x[2] * a + c]
-    }
-
-    /// Ṫ · rates.
-    #[inline]
-    fn turning(&self, rates: &[T; 3]) -> [T; 3] {
-        let [a, b, c] = *rates;
-        let of_y = [-(self.y[1] * c) * b, self.y[0] * c * b];
-        let [x, y, z] = cross(&[self.y[0] * b, self.y[1] * b, c], &self.x);
-        [x * a + of_y[0], y * a + of_y[1], z * a]
-    }
-
-    /// T⁻¹ · velocity; cos θy is not zero.
-    #[inline]
-    fn solve(&self, sy: T, cy: T, sz: T, cz: T, velocity: &[T; 3]) -> [T; 3] {
-        let [x, y, z] = *velocity;
-        let a = (cz * x + sz * y) / cy;
-        [a, cz * y - sz * x, z + sy * a]
-    }
-}
-
-/// sin, cos and 1 − cos of |angle| ≤ π/4.
+/// Of |angles| ≤ π/4; 1 − cos without cancellation.
 #[inline]
-fn circle<T: Real>(angle: T) -> (T, T, T) {
-    let (s, c) = sine_cosine(angle);
-    (s, c, s * s / (T::ONE + c))
+fn attitude<T: Real>(angles: [T; 3]) -> Attitude<T> {
+    let [(sx, vx), (sy, vy), (sz, vz)] = angles.map(|angle| {
+        let (sine, cosine) = sine_cosine(angle);
+        (sine, sine * sine / (T::ONE + cosine))
+    });
+    Attitude { sine: [sx, sy, sz], versine: [vx, vy, vz] }
 }
 
 /// The angle whose sine and cosine stand as `s` to `c` > 0, |angle| ≤ π/4: Newton on s cos θ − c sin θ, whose error is
