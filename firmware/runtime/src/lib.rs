@@ -11,16 +11,19 @@
 //! | [`everett`] | Everett function on a grid: look-up and inverse along one branch | section 3 |
 //! | [`memory`] | reversal memory: forward Preisach model, its inverse, bounded storage | section 3, operator Γ and Γ⁻¹ |
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
+//! | [`attitude`] | rotation by three angles, Euler rates | (AI.1) |
 //! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
 //! | [`feedback`] | position feedback with anti-windup | (7) |
 //! | [`notch`] | modal notch of the feedback | |
 //! | [`transfer`] | bumpless change of mode | |
+//! | [`setpoint`] | bias, moves, trajectories, streams; user frames | section 4, trajectories |
 //! | [`linear`] | six-vectors and constant maps | |
 //! | [`dac`] | converter codes with voltage and slew limits | section 4, amplifiers |
 //! | [`attitude`] | R = Rz Ry Rx by sine and versine; rates of its angles and angular velocity | (AI.1) |
 //! | [`kinematics`] | pose to leg displacements in difference form, and back | (1), (2), (AI.2)–(AI.4) |
 //! | [`sensing`] | pose from six gauges that see the platform | section 4 |
 //! | [`velocity`] | rate of the measured pose, filtered | (7), k_v |
+//! | [`trig`] | sine and cosine by the same operations everywhere | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
@@ -40,7 +43,9 @@ pub mod mode;
 pub mod notch;
 pub mod real;
 pub mod sensing;
+pub mod setpoint;
 pub mod transfer;
+pub mod trig;
 pub mod velocity;
 
 pub use adaptation::{Estimate, Law};
