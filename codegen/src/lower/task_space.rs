@@ -1,8 +1,9 @@
 //! Constants of the control law in task space: maps at rest, modal notch, settings at start-up.
 
 use crate::ir::{ControlLaw, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Scalar, Section};
-use crate::matrix::{self, Matrix6};
+use super::linear;
 use crate::model::{self, Model};
+use crate::numerics::{Matrix6, multiply6, transpose6};
 use crate::stability::platform::{self as design, Design, RestDynamics};
 
 /// Offset of a change of mode that is over, m: far below what a gauge sees.
@@ -21,13 +22,13 @@ pub(super) fn law(
     let round_all = |matrix: Matrix6| matrix.map(|row| row.map(round));
     let compliance = 1.0 / model.actuator.axial_stiffness;
     // Lowering of the dynamics has refused a singular geometry.
-    let legs_to_pose = matrix::inverse(&rest.jacobian).unwrap_or(matrix::ZERO);
-    let wrench_to_legs = matrix::scaled(&matrix::transpose(&legs_to_pose), compliance);
+    let legs_to_pose = linear::inverse(&rest.jacobian).unwrap_or([[0.0; 6]; 6]);
+    let wrench_to_legs = transpose6(&legs_to_pose).map(|row| row.map(|value| value * compliance));
     let notch = design.notch.as_ref().map(|notch| Notch {
         pose_to_modes: round_all(notch.to_modal),
         modes_to_pose: round_all(notch.from_modal),
-        legs_to_modes: round_all(matrix::product(&notch.to_modal, &legs_to_pose)),
-        modes_to_legs: round_all(matrix::product(&rest.jacobian, &notch.from_modal)),
+        legs_to_modes: round_all(multiply6(&notch.to_modal, &legs_to_pose)),
+        modes_to_legs: round_all(multiply6(&rest.jacobian, &notch.from_modal)),
         sections: notch.sections.map(|section| Section { b: section.b.map(round), a: section.a.map(round) }),
     });
     let volts_per_cell = (model.actuator.voltage[1] - model.actuator.voltage[0]) / model.hysteresis.grid as f64;

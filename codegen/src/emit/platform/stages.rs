@@ -20,7 +20,7 @@ pub fn emit() -> TokenStream {
         use crate::setpoint::PLAN;
         use crate::step::{actuate, feedback, known_load, learn};
         use crate::task_space::notch_error;
-        use crate::{Config, LEGS, Real, State, TickInput, sensing};
+        use crate::{Config, LEGS, Real, State, TickInput};
 
         #stage
 
@@ -40,7 +40,7 @@ pub fn emit() -> TokenStream {
 
         /// Brings a copy of the state to where the stages find it, with each leg's request in place of its load; not measured.
         pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
-            sensing::sense(state, &input.gauge);
+            crate::step::sense(state, &input.gauge);
             let (target, _) = state.generator.next(&PLAN, &input.command);
             let load = known_load(config, state, &target);
             let feedback = feedback(config, state);
@@ -52,7 +52,7 @@ pub fn emit() -> TokenStream {
 
         /// Gauges to pose.
         extern "C" fn sense(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
-            sensing::sense(state, &input.gauge);
+            crate::step::sense(state, &input.gauge);
         }
 
         /// Measured pose to six leg displacements.
