@@ -1,6 +1,6 @@
 //! The rows of the key table.
 
-use super::{Dimension, Item, Key, Kind, Presence, Range, SCHEMA_VERSION, Section, Shape};
+use super::{Dimension, Item, Key, Kind, MAX_TABLES, Presence, Range, SCHEMA_VERSION, Section, Shape};
 use crate::identify::MAX_GRID;
 use Presence::{Default, Form, InsteadOf, Optional, Required, Rule};
 
@@ -320,7 +320,7 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "gauge",
-        kind: Kind::Repeated,
+        kind: Kind::Repeated(6, 6),
         doc: "One of the six gauges that see the platform, in the order of the gauge words; with [control], and with it alone. A gauge fixed in {B} measures along a line to a plane on the platform, from rest.",
         keys: &[
             row("point", Shape::List(&[CENTER; 3]), Required, "", "[\"80 mm\", \"0 mm\", \"180 mm\"]", "A point of the measuring line in {B}."),
@@ -332,7 +332,7 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "trajectory",
-        kind: Kind::Repeated,
+        kind: Kind::Repeated(0, MAX_TABLES),
         doc: "A trajectory that the controller can play, numbered from 0 in the order of the file; with [control] alone.",
         keys: &[
             row("name", Shape::One(Item::Name), Required, "", "\"circle\"", "Its name, once in the file."),
