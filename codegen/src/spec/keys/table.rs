@@ -270,7 +270,7 @@ pub const SECTIONS: &[Section] = &[
             row("modal_damping", Shape::One(Item::Number(Range::open(0.0, 1.0))), Required, "zeta", "0.02", "Damping ratio of the lowest mode of the platform on its legs. Give what is measured, or less: less is the cautious side."),
             row("notch", Shape::One(Item::Flag), Default("true"), "", "true", "Whether a modal notch stands in the feedback; without one the bandwidth falls to about a twelfth."),
             row("notch_damping", Shape::One(Item::Number(Range::above(0.0, 1.0))), Rule("1, with a notch"), "zeta_d", "1.0", "Damping ratio that the notch leaves of each mode, above `modal_damping`."),
-            row("velocity_cutoff", BANDWIDTH, Rule("0.6 pi rad / period"), "", "\"1.9e4 rad/s\"", "First-order low-pass of the pose derivative, below half the tick rate (pi rad / period)."),
+            row("velocity_cutoff", BANDWIDTH, Rule("0.6 pi rad / period"), "", "\"9e3 rad/s\"", "First-order low-pass of the pose derivative, below half the tick rate (pi rad / period)."),
             row("interaction", Shape::One(Item::Choice(&["none", "modelled", "measured"])), Default("\"none\""), "", "\"none\"", "Where the interaction force of the feed-forward comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words."),
             row("transfer_time", one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("\"50 ms\""), "", "\"50 ms\"", "Time constant with which the offset fades that makes a change of mode bumpless."),
         ],
