@@ -63,6 +63,7 @@ pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir,
             period: model.timing.period,
             leg_gain: model.actuator.leg_gain(),
         },
+        task_space: None,
     })
 }
 

@@ -10,6 +10,7 @@ mod build;
 mod check;
 mod fields;
 mod findings;
+mod joints;
 pub mod keys;
 mod messages;
 mod names;
@@ -56,7 +57,7 @@ pub fn load(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
             "",
             0..0,
             "the spec is empty".to_owned(),
-            "start from a copy of specs/minimal.toml, or of specs/reference.toml for every key".to_owned(),
+            "start from a copy of specs/minimal.toml, or of specs/legs.toml for every key".to_owned(),
         );
         return (None, findings.finish());
     }

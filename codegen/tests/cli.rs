@@ -21,17 +21,17 @@ fn arguments_that_make_no_sense_are_usage_errors() {
     let cases: &[(&[&str], &str)] = &[
         (&[], "<SPEC>"),
         (&["--bogus"], "--bogus"),
-        (&["reference.toml", "--bogus"], "--bogus"),
-        (&["reference.toml", "-o"], "--output"),
-        (&["reference.toml", "-o", ""], "--output"),
-        (&["reference.toml", "minimal.toml"], "one spec file is expected"),
-        (&["reference.toml", "--no-build", "--setup"], "--setup"),
-        (&["chek", "reference.toml"], "check, sim, identify, forc, dump-ir"),
+        (&["legs.toml", "--bogus"], "--bogus"),
+        (&["legs.toml", "-o"], "--output"),
+        (&["legs.toml", "-o", ""], "--output"),
+        (&["legs.toml", "minimal.toml"], "one spec file is expected"),
+        (&["legs.toml", "--no-build", "--setup"], "--setup"),
+        (&["chek", "legs.toml"], "check, sim, identify, forc, dump-ir"),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
         (&["sim"], "<SPEC>"),
-        (&["sim", "reference.toml", "--samples", "0"], "--samples"),
-        (&["sim", "reference.toml", "--seed", "-1"], "--seed"),
+        (&["sim", "legs.toml", "--samples", "0"], "--samples"),
+        (&["sim", "legs.toml", "--seed", "-1"], "--seed"),
         (&["forc"], "--output"),
         (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),
         (&["identify", record], "--drive"),
@@ -80,26 +80,26 @@ fn every_command_explains_itself() {
 #[test]
 fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
     let folder = Folder::new();
-    let document = folder.json(&["reference.toml", "-o", "out", "--no-build"]);
+    let document = folder.json(&["legs.toml", "-o", "out", "--no-build"]);
     let made = &document.value["result"];
-    assert_eq!((document.code, &made["name"], &made["output"]), (0, &"reference".into(), &"out".into()));
+    assert_eq!((document.code, &made["name"], &made["output"]), (0, &"legs".into(), &"out".into()));
     assert_eq!(made["files"], support::contents(&folder.path("out")).len() - 1, "all but the manifest");
     let digest = made["digest"].as_str().unwrap();
     assert!(folder.read("out/README.md").contains(digest));
-    let text = folder.run(&["reference.toml", "-o", "out", "--no-build"]);
-    assert!(text.stdout.starts_with(&format!("reference → out (f64, digest {}", &digest[..16])), "{}", text.stdout);
+    let text = folder.run(&["legs.toml", "-o", "out", "--no-build"]);
+    assert!(text.stdout.starts_with(&format!("legs → out (f64, digest {}", &digest[..16])), "{}", text.stdout);
 
-    let check = folder.json(&["check", "reference.toml"]);
+    let check = folder.json(&["check", "legs.toml"]);
     assert_eq!((check.code, &check.value["result"]["digest"]), (0, &digest.into()));
     assert_eq!(check.value["result"]["records"][0]["grid"], 32);
-    let text = folder.run(&["check", "reference.toml"]);
+    let text = folder.run(&["check", "legs.toml"]);
     assert!(
-        text.code == 0 && text.stdout.starts_with("reference.toml is good\n") && text.stderr.is_empty(),
+        text.code == 0 && text.stdout.starts_with("legs.toml is good\n") && text.stderr.is_empty(),
         "{text:#?}"
     );
 
-    let ir = folder.json(&["dump-ir", "reference.toml"]);
-    let plain: serde_json::Value = serde_json::from_str(&folder.run(&["dump-ir", "reference.toml"]).stdout).unwrap();
+    let ir = folder.json(&["dump-ir", "legs.toml"]);
+    let plain: serde_json::Value = serde_json::from_str(&folder.run(&["dump-ir", "legs.toml"]).stdout).unwrap();
     assert_eq!((ir.code, &ir.value["result"]), (0, &plain));
     assert_eq!(plain, serde_json::from_str::<serde_json::Value>(&folder.read("out/ir.json")).unwrap());
     assert_eq!(plain["digest"], digest);
@@ -108,15 +108,15 @@ fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
 #[test]
 fn the_output_folder_is_named_after_the_platform_if_not_given() {
     let folder = Folder::new();
-    assert_eq!(folder.run(&["reference.toml", "--no-build"]).code, 0);
-    assert!(folder.path("reference-controller/controller/src/step.rs").is_file());
+    assert_eq!(folder.run(&["legs.toml", "--no-build"]).code, 0);
+    assert!(folder.path("legs-controller/controller/src/step.rs").is_file());
 }
 
 /// Builds the emitted controller, as `sim` does for a user.
 #[test]
 fn sim_gives_one_document_and_its_files_hold_the_same_table() {
     let folder = Folder::new();
-    let document = folder.json(&["sim", "reference.toml", "--samples", "40", "--no-noise", "-o", "out/sim"]);
+    let document = folder.json(&["sim", "legs.toml", "--samples", "40", "--no-noise", "-o", "out/sim"]);
     assert_eq!(document.code, 0, "{:#}", document.value);
     let result = &document.value["result"];
     let tables: serde_json::Value = serde_json::from_str(&folder.read("out/sim/tables.json")).unwrap();
@@ -126,8 +126,8 @@ fn sim_gives_one_document_and_its_files_hold_the_same_table() {
         assert!(trace.lines().count() > 40, "{mode}");
     }
     folder.json(&["sim", "nothing.toml"]).finding("E0101");
-    let refused = folder.json(&["sim", "reference.toml", "--plant", "reference.toml"]);
-    assert!(refused.code == 1 && refused.error().contains("reference.toml"), "{}", refused.error());
+    let refused = folder.json(&["sim", "legs.toml", "--plant", "legs.toml"]);
+    assert!(refused.code == 1 && refused.error().contains("legs.toml"), "{}", refused.error());
 }
 
 #[test]
@@ -233,15 +233,15 @@ fn a_file_name_that_is_not_utf_8_is_read_or_refused_but_never_fatal() {
     let run = |arguments: &[&str]| Run::of(folder.command().args(arguments).arg(&name));
     run(&["check"]).says(1, &["E0101", "there is no such file", "caf\u{fffd}.toml"]);
     Document::of(&run(&["check", "--json"])).finding("E0101");
-    if fs::copy(folder.path("reference.toml"), folder.path(&name)).is_err() {
+    if fs::copy(folder.path("legs.toml"), folder.path(&name)).is_err() {
         return support::skipped("the file system takes UTF-8 names only");
     }
     assert_eq!(run(&["check"]).code, 0);
     assert_eq!(run(&["-o", "out", "--no-build"]).code, 0);
-    folder.run(&["reference.toml", "-o", "plain", "--no-build"]);
+    folder.run(&["legs.toml", "-o", "plain", "--no-build"]);
     assert_eq!(support::contents(&folder.path("out")), support::contents(&folder.path("plain")));
     let output = OsString::from_vec(b"out-\xff".to_vec());
-    let made = Run::of(folder.command().args(["reference.toml", "--no-build", "-o"]).arg(&output));
+    let made = Run::of(folder.command().args(["legs.toml", "--no-build", "-o"]).arg(&output));
     assert_eq!(made.code, 0, "{}", made.stderr);
     assert!(folder.path(&output).join("Cargo.toml").is_file());
     // As a record: no such name can stand in a spec, but on the command line.
@@ -298,7 +298,7 @@ fn a_closed_pipe_is_no_panic() {
     let folder = Folder::new();
     let mut child = folder
         .command()
-        .args(["dump-ir", "reference.toml"])
+        .args(["dump-ir", "legs.toml"])
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::piped())
         .spawn()

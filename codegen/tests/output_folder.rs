@@ -13,14 +13,14 @@ use support::{Folder, Run, contents, digest, listing};
 
 /// Writes the reference workspace to `out`.
 fn write(folder: &Folder) {
-    let run = folder.run(&["reference.toml", "-o", "out", "--no-build"]);
+    let run = folder.run(&["legs.toml", "-o", "out", "--no-build"]);
     assert_eq!(run.code, 0, "{}", run.stderr);
 }
 
 /// A run into `out` is refused with `code` and `words`, and nothing changes anywhere in the folder.
 fn refused(folder: &Folder, output: &str, code: i32, words: &[&str]) {
     let before = folder.listing();
-    folder.run(&["reference.toml", "-o", output, "--no-build"]).says(code, words);
+    folder.run(&["legs.toml", "-o", output, "--no-build"]).says(code, words);
     assert_eq!(folder.listing(), before);
 }
 
@@ -64,7 +64,7 @@ fn a_second_run_changes_nothing_and_leaves_what_cargo_made() {
 #[test]
 fn another_spec_replaces_an_earlier_output_as_if_it_were_new() {
     let folder = Folder::new();
-    folder.spec("other.toml", &[("= \"pcc\"", "= \"ewma\""), ("name = \"reference\"", "name = \"other\"")]);
+    folder.spec("other.toml", &[("= \"pcc\"", "= \"ewma\""), ("name = \"legs\"", "name = \"other\"")]);
     assert_eq!(folder.run(&["other.toml", "-o", "new", "--no-build"]).code, 0);
     write(&folder);
     assert_ne!(contents(&folder.path("out")), contents(&folder.path("new")));
@@ -96,11 +96,11 @@ fn an_empty_folder_and_one_whose_parents_are_missing_are_taken() {
     let folder = Folder::new();
     fs::create_dir(folder.path("out")).unwrap();
     write(&folder);
-    assert_eq!(folder.run(&["reference.toml", "-o", "a/b/c", "--no-build"]).code, 0);
+    assert_eq!(folder.run(&["legs.toml", "-o", "a/b/c", "--no-build"]).code, 0);
     assert_eq!(contents(&folder.path("a/b/c")), contents(&folder.path("out")));
     fs::create_dir(folder.path("here")).unwrap();
     let mut inside = folder.command();
-    let inside = inside.current_dir(folder.path("here")).args(["../reference.toml", "-o", ".", "--no-build"]);
+    let inside = inside.current_dir(folder.path("here")).args(["../legs.toml", "-o", ".", "--no-build"]);
     assert_eq!(Run::of(inside).code, 0);
     assert_eq!(contents(&folder.path("here")), contents(&folder.path("out")));
 }
@@ -193,7 +193,7 @@ fn a_refused_run_leaves_no_folder_behind() {
 fn without_permission_nothing_changes() {
     let folder = Folder::new();
     let Some(user) = Unprivileged::owning(&folder) else { return };
-    let arguments = |output| ["reference.toml", "-o", output, "--no-build"];
+    let arguments = |output| ["legs.toml", "-o", output, "--no-build"];
     fs::create_dir(folder.path("readonly")).unwrap();
     set_mode(&folder.path("readonly"), 0o555);
     let before = folder.listing();

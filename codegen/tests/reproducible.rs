@@ -17,7 +17,7 @@ type Files = BTreeMap<String, Vec<u8>>;
 
 /// The reference workspace, made in the plainest way.
 fn baseline(folder: &Folder) -> Files {
-    made(folder.command().args(["reference.toml", "-o", "out", "--no-build"]), &folder.path("out"))
+    made(folder.command().args(["legs.toml", "-o", "out", "--no-build"]), &folder.path("out"))
 }
 
 fn made(command: &mut Command, output: &Path) -> Files {
@@ -41,7 +41,7 @@ fn same(left: &Files, right: &Files) {
 fn two_runs_give_the_same_bytes_and_one_changed_constant_does_not() {
     let folder = Folder::new();
     let first = baseline(&folder);
-    same(&first, &made(folder.command().args(["reference.toml", "-o", "again", "--no-build"]), &folder.path("again")));
+    same(&first, &made(folder.command().args(["legs.toml", "-o", "again", "--no-build"]), &folder.path("again")));
     folder.spec("other.toml", &[("level_weight = 0.252", "level_weight = 0.2520000000000001")]);
     let other = made(folder.command().args(["other.toml", "-o", "other", "--no-build"]), &folder.path("other"));
     assert_ne!(first["controller/src/config.rs"], other["controller/src/config.rs"]);
@@ -50,7 +50,7 @@ fn two_runs_give_the_same_bytes_and_one_changed_constant_does_not() {
     let record = folder.read("records/reference-forc.csv");
     let (head, last) = record.trim_end().rsplit_once('\n').unwrap();
     folder.write("records/reference-forc.csv", format!("{head}\n{last}1\n"));
-    let other = made(folder.command().args(["reference.toml", "-o", "third", "--no-build"]), &folder.path("third"));
+    let other = made(folder.command().args(["legs.toml", "-o", "third", "--no-build"]), &folder.path("third"));
     assert_ne!(first["ir.json"], other["ir.json"]);
 }
 
@@ -62,13 +62,13 @@ fn the_folder_and_the_name_of_the_spec_do_not_matter() {
 
     // From somewhere else, by absolute paths.
     let mut command = Command::new(support::BINARY);
-    command.current_dir("/").arg(folder.path("reference.toml")).arg("-o").arg(folder.path("far")).arg("--no-build");
+    command.current_dir("/").arg(folder.path("legs.toml")).arg("-o").arg(folder.path("far")).arg("--no-build");
     same(&first, &made(&mut command, &folder.path("far")));
 
     fs::create_dir_all(folder.path("deep er/ünïcode")).unwrap();
     fs::create_dir(folder.path("deep er/ünïcode/records")).unwrap();
     for (from, to) in
-        [("reference.toml", "my platform.toml"), ("records/reference-forc.csv", "records/reference-forc.csv")]
+        [("legs.toml", "my platform.toml"), ("records/reference-forc.csv", "records/reference-forc.csv")]
     {
         fs::copy(folder.path(from), folder.path("deep er/ünïcode").join(to)).unwrap();
     }
@@ -95,10 +95,10 @@ fn the_environment_does_not_matter() {
         ("RAYON_NUM_THREADS", "3"),
     ];
     let mut command = folder.command();
-    command.envs(odd).args(["reference.toml", "-o", "odd", "--no-build"]);
+    command.envs(odd).args(["legs.toml", "-o", "odd", "--no-build"]);
     same(&first, &made(&mut command, &folder.path("odd")));
     let mut command = folder.command();
-    command.env_clear().args(["reference.toml", "-o", "bare", "--no-build"]);
+    command.env_clear().args(["legs.toml", "-o", "bare", "--no-build"]);
     same(&first, &made(&mut command, &folder.path("bare")));
 }
 
@@ -106,10 +106,10 @@ fn the_environment_does_not_matter() {
 fn line_ends_of_the_spec_do_not_matter() {
     let folder = Folder::new();
     let first = baseline(&folder);
-    let text = folder.read("reference.toml");
+    let text = folder.read("legs.toml");
     assert!(!text.contains('\r'));
-    folder.write("reference.toml", text.replace('\n', "\r\n"));
-    same(&first, &made(folder.command().args(["reference.toml", "-o", "crlf", "--no-build"]), &folder.path("crlf")));
+    folder.write("legs.toml", text.replace('\n', "\r\n"));
+    same(&first, &made(folder.command().args(["legs.toml", "-o", "crlf", "--no-build"]), &folder.path("crlf")));
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn another_user_makes_the_same_bytes() {
     let first = baseline(&folder);
     let Some(user) = Unprivileged::owning(&folder) else { return };
     let mut command = user.command(&folder);
-    command.args(["reference.toml", "-o", "theirs", "--no-build"]);
+    command.args(["legs.toml", "-o", "theirs", "--no-build"]);
     same(&first, &made(&mut command, &folder.path("theirs")));
 }
 
@@ -140,14 +140,14 @@ fn no_clock_path_user_or_host_reaches_the_output() {
     let folder = Folder::new();
     let mut command = folder.command();
     command.env("USER", "user-of-this-run").env("LOGNAME", "user-of-this-run");
-    let files = made(command.args(["reference.toml", "-o", "out", "--no-build"]), &folder.path("out"));
+    let files = made(command.args(["legs.toml", "-o", "out", "--no-build"]), &folder.path("out"));
     let mut traces = vec![
         folder.path("").to_string_lossy().trim_end_matches('/').to_owned(),
         repository().to_string_lossy().into_owned(),
         "user-of-this-run".to_owned(),
         "/home/".to_owned(),
         ".cargo/".to_owned(),
-        "reference.toml".to_owned(),
+        "legs.toml".to_owned(),
     ];
     traces.extend(std::env::var("HOME").ok().filter(|home| home.len() > 1));
     // A host may be called anything; a short name could be a word of the text.

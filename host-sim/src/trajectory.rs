@@ -1,5 +1,10 @@
 //! Set-points over time.
 
+mod jet;
+mod paper;
+
+pub use paper::{Jump, PaperPath, PaperPose, Reading};
+
 /// A motion of the six legs from time 0.
 pub trait LegTrajectory {
     /// Length in s.

@@ -21,7 +21,7 @@ const RUNS: [(&str, bool, f64); 3] =
     [("legs, pcc", false, 2.0), ("legs, invhys", false, 0.0), ("poses, ewma", true, 1.0)];
 
 fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
-    let emitted = Emitted::new(name, "reference.toml", edits);
+    let emitted = Emitted::new(name, "legs.toml", edits);
     let mut controller = emitted.controller();
     let description = controller.description().clone();
     for (what, pose, mode) in RUNS {
@@ -85,9 +85,9 @@ fn f32_on_the_host_the_m7_and_the_m4f_is_equal_in_every_bit() {
 /// With room for eight extrema the memory overflows all the time, and what it drops is the same everywhere.
 #[test]
 fn an_overflowing_memory_is_equal_in_every_bit() {
-    let emitted = Emitted::new("bits-memory", "reference.toml", &[ALIGNED, ("memory  = 64", "memory  = 8")]);
+    let emitted = Emitted::new("bits-memory", "legs.toml", &[ALIGNED, ("memory  = 64", "memory  = 8")]);
     let mut controller = emitted.controller();
-    let roomy = Emitted::new("bits-roomy", "reference.toml", &[ALIGNED]);
+    let roomy = Emitted::new("bits-roomy", "legs.toml", &[ALIGNED]);
     let inputs = emitted.stimulus(&controller.description().clone(), false, 20_000, 9);
     let settings = [("mode", 0.0), ("setpoint_kind", 1.0)];
     let (host, config) = host_trace(&mut controller, &settings, &inputs);
@@ -103,7 +103,7 @@ fn an_overflowing_memory_is_equal_in_every_bit() {
 /// The comparison is falsifiable: one flipped ulp of one constant of the controller on one side is found, and named.
 #[test]
 fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
-    let good = Emitted::new("ulp-good", "reference.toml", &[ALIGNED]);
+    let good = Emitted::new("ulp-good", "legs.toml", &[ALIGNED]);
     let Some(image) = good.image(Mcu::Mps2An500) else { return };
     let ir = &good.compiled.ir;
     let table_value = ir.hysteresis.tables[0][20 * 21 / 2 + 3];
@@ -113,7 +113,7 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
         ("controller/src/limits.rs", ir.actuation.volts_per_code, false, "voltage"),
     ];
     for (file, value, pose, signal) in cases {
-        let bad = Emitted::new("ulp-bad", "reference.toml", &[ALIGNED]);
+        let bad = Emitted::new("ulp-bad", "legs.toml", &[ALIGNED]);
         let path = bad.dir.join(file);
         let text = fs::read_to_string(&path).unwrap();
         let (old, new) = (format!("{value:?}"), format!("{:?}", f64::from_bits(value.to_bits() + 1)));

@@ -33,7 +33,7 @@ const BUDGETS: [Budget; 3] = [
 fn a_tick_of_six_legs_stays_within_its_instructions_and_its_stack() {
     for budget in &BUDGETS {
         let folder = format!("budget-{}", budget.name.replace(' ', "-"));
-        let emitted = Emitted::new(&folder, "reference.toml", budget.edits);
+        let emitted = Emitted::new(&folder, "legs.toml", budget.edits);
         let Some(image) = emitted.image(budget.mcu) else { continue };
         let mut controller = emitted.controller();
         let host = verify::exercise(&mut controller, &emitted.compiled.model, &emitted.compiled.ir, TICKS).unwrap();
@@ -67,7 +67,7 @@ fn a_tick_of_six_legs_stays_within_its_instructions_and_its_stack() {
 /// no promise, but stated and bounded.
 #[test]
 fn the_worst_tick_is_bounded_even_when_every_memory_overflows() {
-    let emitted = Emitted::new("budget-hostile", "reference.toml", &[]);
+    let emitted = Emitted::new("budget-hostile", "legs.toml", &[]);
     let Some(image) = emitted.image(Mcu::Mps2An500) else { return };
     let mut controller = emitted.controller();
     let description = controller.description().clone();

@@ -21,7 +21,7 @@ fn poses() -> Vec<[f64; 6]> {
 
 /// Leg displacements that the controller derives from poses; its arithmetic rounds the pose first.
 fn emitted(name: &str, edits: &[(&str, &str)], poses: &[[f64; 6]]) -> (Vec<[f64; 6]>, Vec<[f64; 6]>) {
-    let mut controller = Emitted::new(name, "reference.toml", edits).controller();
+    let mut controller = Emitted::new(name, "legs.toml", edits).controller();
     let description = controller.description().clone();
     let demand = description.output("demand[0]").expect("an output word");
     let mut output = vec![0; description.output_names.len()];
@@ -121,7 +121,7 @@ fn worst(a: &[[f64; 6]], b: &[[f64; 6]]) -> f64 {
 #[test]
 fn f64_is_exact_to_a_femtometre_and_f32_to_50_picometres() {
     let poses = poses();
-    let reference = Emitted::new("kinematics-geometry", "reference.toml", &[WIDE, STROKE]);
+    let reference = Emitted::new("kinematics-geometry", "legs.toml", &[WIDE, STROKE]);
     let geometry = &reference.compiled.model.geometry;
     let (base, platform) = joint_positions(geometry);
     let exact = |poses: &[[f64; 6]]| -> Vec<[f64; 6]> {
@@ -173,7 +173,7 @@ fn plain_f32(poses: &[[f64; 6]], base: &[[f64; 3]; 6], platform: &[[f64; 3]; 6],
 #[test]
 fn an_upward_move_lengthens_every_leg_and_a_turn_about_x_lifts_the_side_with_positive_y() {
     let poses = [[0.0, 0.0, 10e-6, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.1e-3, 0.0, 0.0]];
-    let emitted_crate = Emitted::new("kinematics-signs", "reference.toml", &[]);
+    let emitted_crate = Emitted::new("kinematics-signs", "legs.toml", &[]);
     let (_, platform) = joint_positions(&emitted_crate.compiled.model.geometry);
     let (_, displacements) = emitted("kinematics-signs", &[], &poses);
     assert!(displacements[0].iter().all(|d| (8e-6..8.3e-6).contains(d)), "{:?}", displacements[0]);

@@ -9,7 +9,7 @@ use std::fs;
 fn verdict(edits: &[(&str, String)]) -> Result<(), (String, String)> {
     let folder = tempfile::tempdir().unwrap();
     let specs = repository().join("specs");
-    let mut text = fs::read_to_string(specs.join("reference.toml")).unwrap();
+    let mut text = fs::read_to_string(specs.join("legs.toml")).unwrap();
     for (old, new) in edits {
         assert!(text.contains(old), "no `{old}`");
         text = text.replace(old, new);

@@ -11,7 +11,13 @@
 //! | [`everett`] | Everett function on a grid: look-up and inverse along one branch | section 3 |
 //! | [`memory`] | reversal memory: forward Preisach model, its inverse, bounded storage | section 3, operator Γ and Γ⁻¹ |
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
+//! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
+//! | [`feedback`] | position feedback with anti-windup | (7) |
+//! | [`notch`] | modal notch of the feedback | |
+//! | [`transfer`] | bumpless change of mode | |
+//! | [`linear`] | six-vectors and constant maps | |
 //! | [`dac`] | converter codes with voltage and slew limits | section 4, amplifiers |
+//! | [`trig`] | sine and cosine by the same operations everywhere | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
@@ -22,12 +28,22 @@ pub mod adaptation;
 pub mod dac;
 pub mod digest;
 pub mod everett;
+pub mod feedback;
+pub mod linear;
 pub mod memory;
+pub mod mode;
+pub mod notch;
 pub mod real;
+pub mod transfer;
+pub mod trig;
 
 pub use adaptation::{Estimate, Law};
 pub use dac::{CodeLimits, Dac};
 pub use digest::Digest;
 pub use everett::Everett;
+pub use feedback::{Gains, Integral};
 pub use memory::ReversalMemory;
+pub use mode::{ControlMode, Interaction};
+pub use notch::{NotchState, Section};
 pub use real::Real;
+pub use transfer::Transfer;

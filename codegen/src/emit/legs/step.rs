@@ -1,4 +1,4 @@
-//! `src/step.rs`: one control tick. The order of the stages; constants come from the other files.
+//! `src/step.rs` of six legs: one control tick. The order of the stages; constants come from the other files.
 
 use proc_macro2::TokenStream;
 use quote::quote;
