@@ -3,6 +3,8 @@
 #![allow(dead_code)] // Each test file uses its part.
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
+pub mod simulation;
+
 use std::path::Path;
 
 use specgen::model::{ControlMode, Environment, Frames, Interaction, Model, Probe, SetpointRules, TaskSpace};
