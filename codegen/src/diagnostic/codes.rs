@@ -62,7 +62,7 @@ codes! {
     UNKNOWN_CHOICE = "E0213", "unknown choice",
         "The key takes one of a few words, listed in the help.";
     ALTERNATIVES = "E0214", "one of two keys",
-        "A weight may be given per run or as a bandwidth, not both; a mode that uses the weight needs one of them.";
+        "A weight may be given per run or as a bandwidth, not both; a mode that uses the weight needs one of them. Joints lie on circles or are given one by one, not both. With [control] both bandwidths are given or neither.";
     OUT_OF_RANGE = "E0301", "out of range",
         "The value lies outside what the key takes. `docs/spec-reference.md` lists the ranges.";
     WRONG_ORDER = "E0302", "limits in the wrong order",
@@ -71,8 +71,8 @@ codes! {
         "The controller would ask for voltages that the converter cannot make.";
     RECORD_COUNT = "E0304", "one or six records",
         "Either one record identifies all legs, or each leg has its own.";
-    RECORD_PATH = "E0305", "record path not relative",
-        "Records are named relative to the spec, with forward slashes, so that the folder can move to another machine.";
+    RECORD_PATH = "E0305", "file path not relative",
+        "Records and waveforms are named relative to the spec, with forward slashes, so that the folder can move to another machine.";
     RECORD_UNREADABLE = "E0306", "record cannot be read",
         "The file does not exist beside the spec, is a folder, or may not be read.";
     BANDWIDTH_TOO_HIGH = "E0307", "bandwidth too high",
@@ -93,6 +93,28 @@ codes! {
         "Within one period the voltage may change by less than one code, so that it could never move.";
     BUDGET_NOT_WHOLE = "E0315", "not a whole number of bytes",
         "Memory is counted in whole bytes.";
+    WITHOUT_CONTROL = "E0316", "belongs to the task-space controller",
+        "Gauges that see the platform, their calibration and trajectories are for a spec with [control]. Without it each leg has its own gauge, and these would silently do nothing.";
+    GAUGE_COUNT = "E0317", "not six gauges",
+        "Six gauges, each a [[gauge]] section, tell the six coordinates of a pose.";
+    BAD_DIRECTION = "E0318", "not a direction, or one along the target",
+        "A direction is a vector other than zero. A gauge whose line lies nearly in its target plane (within 6 degrees) sees no motion along the line, and a tilt as a large one.";
+    LEG_KEY_WITH_CONTROL = "E0319", "key of the leg feed-forward beside [control]",
+        "The task-space controller adapts in every tick, with bandwidths that hold at any period, and its set-point is a pose.";
+    NOTCH_DAMPING = "E0320", "notch below the mode's own damping",
+        "A notch replaces the damping of a mode by notch_damping; at or below modal_damping it would raise the resonance.";
+    CUTOFF_TOO_HIGH = "E0321", "velocity filter above half the tick rate",
+        "A low-pass above pi rad / period does not filter anything that the ticks can show.";
+    TRAJECTORY_KEY = "E0322", "key of another kind of trajectory",
+        "The paper's paths take frequency and as_printed; a waveform takes file, period and repeat.";
+    NAME_TAKEN = "E0323", "name given twice",
+        "Trajectories are told apart by their names.";
+    BIAS_OUTSIDE = "E0324", "bias outside the workspace",
+        "The workspace bounds the pose from rest with the bias in it: no set-point could be reached.";
+    CALIBRATION_PARTLY = "E0325", "calibration of some gauges only",
+        "The gauge words are volts for all six gauges or metres for all six.";
+    TOO_MANY_TRAJECTORIES = "E0326", "too many trajectories",
+        "The controller chooses among at most 32.";
     UNSTABLE_STATIC = "E0401", "adaptation unstable on any leg",
         "With these weights and the declared gain_ratio the loop grows even on a leg without dynamics (Appendix B). The help names the largest weight that would do.";
     UNSTABLE_SAMPLED = "E0402", "adaptation unstable on this leg",
@@ -195,6 +217,8 @@ codes! {
         "The radius of gyration is unusual for the size of the platform, though possible.";
     UNUSED_WEIGHT = "W0307", "weight that the mode does not use",
         "The key is checked and kept for a later change of mode, but has no effect at start-up.";
+    GAINS_UNUSED = "W0308", "gains without a task-space controller",
+        "The leg feed-forward has no feedback: [gains] and [position_gains] take effect with [control].";
     TRUNCATED = "W0001", "further findings left out",
         "Only the first findings are shown; mend them and run again.";
 }
