@@ -10,6 +10,7 @@ mod build;
 mod check;
 mod fields;
 mod findings;
+mod joints;
 pub mod keys;
 mod messages;
 mod names;

@@ -64,7 +64,7 @@ fn setpoint(model: &Model, ir: &Ir, time: f64) -> [f64; 6] {
             };
             // A rise of z lengthens every leg by its vertical share.
             let lift = reach * ir.kinematics.rest_length[0] / model.geometry.height;
-            let turn = reach / model.geometry.platform_radius;
+            let turn = reach / model.geometry.joint_radius();
             [
                 within(0, 0.1 * lift) * swing(0),
                 within(1, 0.1 * lift) * swing(1),

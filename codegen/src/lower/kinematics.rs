@@ -1,7 +1,5 @@
 //! Joints, rest legs, and how many terms and steps the kinematics needs over the declared workspace.
 
-use core::f64::consts::PI;
-
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::ir::{Kinematics, LEGS, Scalar};
 use crate::model::{Geometry, Model};
@@ -9,42 +7,10 @@ use crate::model::{Geometry, Model};
 /// Largest |Δl| / l₀ for which the Newton steps are known to converge as counted.
 const LARGEST_RATIO: f64 = 0.25;
 
-/// Joint angles λ_i of the base (1), rad.
-fn base_angles(alpha: f64) -> [f64; LEGS] {
-    [
-        PI / 3.0 - alpha / 2.0,
-        PI / 3.0 + alpha / 2.0,
-        PI - alpha / 2.0,
-        PI + alpha / 2.0,
-        5.0 * PI / 3.0 - alpha / 2.0,
-        5.0 * PI / 3.0 + alpha / 2.0,
-    ]
-}
-
-/// Joint angles Λ_i of the platform (2), rad.
-fn platform_angles(alpha: f64) -> [f64; LEGS] {
-    [
-        alpha / 2.0,
-        2.0 * PI / 3.0 - alpha / 2.0,
-        2.0 * PI / 3.0 + alpha / 2.0,
-        4.0 * PI / 3.0 - alpha / 2.0,
-        4.0 * PI / 3.0 + alpha / 2.0,
-        -alpha / 2.0,
-    ]
-}
-
-/// Joints on a circle in the plane z = 0 (AI.3), (AI.4), m.
-fn joints(radius: f64, angles: [f64; LEGS]) -> [[f64; 3]; LEGS] {
-    angles.map(|angle| [radius * libm::cos(angle), radius * libm::sin(angle), 0.0])
-}
-
 /// B_i in the base frame and P_i in the platform frame, m.
 #[must_use]
 pub fn joint_positions(geometry: &Geometry) -> ([[f64; 3]; LEGS], [[f64; 3]; LEGS]) {
-    (
-        joints(geometry.base_radius, base_angles(geometry.base_angle)),
-        joints(geometry.platform_radius, platform_angles(geometry.platform_angle)),
-    )
+    (geometry.base_joints, geometry.platform_joints)
 }
 
 fn norm(v: [f64; 3]) -> f64 {

@@ -1,9 +1,10 @@
 //! Checked values to the [`Model`].
 
 use super::fields::Fields;
+use super::joints;
 use crate::model::{
-    Actuator, Adaptation, AdaptationMode, Amplifier, ControllerOptions, Dac, Gains, Geometry, Hysteresis, LegBody, Mcu,
-    Model, RigidBody, Scalar, Sensor, SetpointKind, Target, Timing, Workspace,
+    Actuator, Adaptation, AdaptationMode, Amplifier, ControllerOptions, Dac, Geometry, Hysteresis, LegBody, Mcu, Model,
+    RigidBody, Scalar, Sensor, SetpointKind, Target, Timing, Workspace,
 };
 
 /// The model, or `None` if a value is missing: then there is a finding for it.
@@ -48,7 +49,6 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
             records: f.texts("hysteresis.records")?.to_vec(),
         },
         adaptation: adaptation(f)?,
-        gains: gains(f),
         timing: Timing { period: f.number("timing.period")? },
         workspace: Workspace { translation: f.list("workspace.translation")?, rotation: f.list("workspace.rotation")? },
         controller: ControllerOptions {
@@ -56,16 +56,18 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
             setpoint: if f.choice("controller.setpoint")? == "leg" { SetpointKind::Leg } else { SetpointKind::Pose },
         },
         target: target(f)?,
+        task_space: None,
         spans: f.spans(),
     })
 }
 
 pub(super) fn geometry(f: &Fields) -> Option<Geometry> {
     Some(Geometry {
-        base_radius: f.number("geometry.base_radius")?,
-        platform_radius: f.number("geometry.platform_radius")?,
-        base_angle: f.number("geometry.base_angle")?,
-        platform_angle: f.number("geometry.platform_angle")?,
+        base_joints: joints::base_joints(f.number("geometry.base_radius")?, f.number("geometry.base_angle")?),
+        platform_joints: joints::platform_joints(
+            f.number("geometry.platform_radius")?,
+            f.number("geometry.platform_angle")?,
+        ),
         height: f.number("geometry.height")?,
     })
 }
@@ -96,15 +98,6 @@ pub(super) fn weight(f: &Fields, which: &str) -> Option<f64> {
     }
     let run: u32 = f.whole("adaptation.run_interval")?;
     Some(f.number(&format!("adaptation.{which}_bandwidth"))? * f.number("timing.period")? * f64::from(run))
-}
-
-fn gains(f: &Fields) -> Option<Gains> {
-    Some(Gains {
-        proportional: f.list("gains.proportional")?,
-        integral: f.list("gains.integral")?,
-        derivative: f.list("gains.derivative")?,
-        environment: f.list("gains.environment")?,
-    })
 }
 
 fn target(f: &Fields) -> Option<Target> {

@@ -1,7 +1,5 @@
 //! Masses, inertias and geometry: could this platform exist, and does it hold?
 
-use std::f64::consts::FRAC_PI_3;
-
 use nalgebra::{Matrix3, Matrix6, RowVector6, Vector3};
 
 use crate::diagnostic::codes;
@@ -20,16 +18,10 @@ struct Legs {
 /// (1), (2) and the derivative of (AI.1) at the rest pose P = (0, 0, height), R = I:
 /// dl_i/dh = [s_i, P_i × s_i], with s_i from B_i to P_i.
 fn legs_at_rest(geometry: &Geometry) -> Legs {
-    let on_circle = |radius: f64, angle: f64| Vector3::new(radius * angle.cos(), radius * angle.sin(), 0.0);
     let mut legs = Legs { lengths: [0.0; 6], jacobian: Matrix6::zeros() };
-    for i in 0..6_usize {
-        // Base pairs sit about 60°, 180°, 300°, platform pairs about 0°, 120°, 240°.
-        let base_side = if i % 2 == 0 { -0.5 } else { 0.5 };
-        let base_pair = (2 * (i / 2) + 1) as f64 * FRAC_PI_3;
-        let platform_pair = (2 * i.div_ceil(2)) as f64 * FRAC_PI_3;
-        let base = on_circle(geometry.base_radius, base_pair + base_side * geometry.base_angle);
-        let joint = on_circle(geometry.platform_radius, platform_pair - base_side * geometry.platform_angle);
-        let leg = Vector3::new(0.0, 0.0, geometry.height) + joint - base;
+    for (i, (base, joint)) in geometry.base_joints.iter().zip(&geometry.platform_joints).enumerate() {
+        let joint = Vector3::from(*joint);
+        let leg = Vector3::new(0.0, 0.0, geometry.height) + joint - Vector3::from(*base);
         let direction = leg.normalize();
         let turn = joint.cross(&direction);
         legs.lengths[i] = leg.norm();
@@ -125,7 +117,7 @@ pub(super) fn platform_inertia(f: &Fields, findings: &mut Findings) -> Option<()
 pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<()> {
     let mass = f.number("platform.mass")?;
     let moments = f.list::<3>("platform.inertia")?;
-    let size = f.number("geometry.platform_radius")?;
+    let size = build::geometry(f)?.joint_radius();
     let radii = moments.map(|moment| (moment / mass).sqrt());
     let largest = radii.into_iter().fold(0.0, |a, b| if b > a { b } else { a });
     let ratio = largest / size;
@@ -157,7 +149,7 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
     let mut jacobian = legs_at_rest(&geometry).jacobian;
     // Rotations in lengths at the joint circle, so that the condition has no unit.
     for column in 3..6 {
-        jacobian.column_mut(column).unscale_mut(geometry.platform_radius);
+        jacobian.column_mut(column).unscale_mut(geometry.joint_radius());
     }
     let singular = jacobian.singular_values();
     let condition = singular.max() / singular.min();
@@ -214,16 +206,25 @@ pub(super) fn workspace_in_reach(f: &Fields, findings: &mut Findings) -> Option<
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::FRAC_PI_3;
+
     use super::*;
+    use crate::spec::joints;
+
+    const ANGLE: f64 = 0.0377;
 
     fn reference() -> Geometry {
-        Geometry { base_radius: 0.15, platform_radius: 0.1, base_angle: 0.0377, platform_angle: 0.0377, height: 0.18 }
+        Geometry {
+            base_joints: joints::base_joints(0.15, ANGLE),
+            platform_joints: joints::platform_joints(0.1, ANGLE),
+            height: 0.18,
+        }
     }
 
     fn leg_lengths(g: &Geometry, pose: [f64; 6]) -> [f64; 6] {
         // Angles of (1) and (2), written out.
         let third = 2.0 * FRAC_PI_3;
-        let (b, p) = (g.base_angle / 2.0, g.platform_angle / 2.0);
+        let (b, p) = (ANGLE / 2.0, ANGLE / 2.0);
         let base = [
             FRAC_PI_3 - b,
             FRAC_PI_3 + b,
@@ -235,8 +236,8 @@ mod tests {
         let platform = [p, third - p, third + p, 2.0 * third - p, 2.0 * third + p, -p];
         let turn = nalgebra::Rotation3::from_euler_angles(pose[3], pose[4], pose[5]);
         std::array::from_fn(|i| {
-            let joint = Vector3::new(platform[i].cos(), platform[i].sin(), 0.0) * g.platform_radius;
-            let anchor = Vector3::new(base[i].cos(), base[i].sin(), 0.0) * g.base_radius;
+            let joint = Vector3::new(platform[i].cos(), platform[i].sin(), 0.0) * 0.1;
+            let anchor = Vector3::new(base[i].cos(), base[i].sin(), 0.0) * 0.15;
             (Vector3::new(pose[0], pose[1], g.height + pose[2]) + turn * joint - anchor).norm()
         })
     }
