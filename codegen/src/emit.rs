@@ -4,6 +4,7 @@
 
 mod config;
 mod crate_root;
+mod dynamics;
 mod format;
 mod hysteresis;
 mod kinematics;
@@ -26,6 +27,7 @@ pub type EmittedCrate = BTreeMap<String, String>;
 pub fn emit(ir: &Ir) -> EmittedCrate {
     let sources = [
         ("src/config.rs", config::emit(ir)),
+        ("src/dynamics.rs", dynamics::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/lib.rs", crate_root::emit(ir)),

@@ -3,8 +3,10 @@
 //! Trigonometry goes through `libm`, so that the same spec gives the same bytes on every machine.
 
 mod actuation;
+mod dynamics;
 mod kinematics;
 
+pub use dynamics::{GRAVITY, platform};
 pub use kinematics::joint_positions;
 
 use crate::diagnostic::Diagnostic;
@@ -39,6 +41,7 @@ pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir,
         specgen_version: env!("CARGO_PKG_VERSION").to_owned(),
         scalar,
         kinematics: kinematics::lower(model, scalar)?,
+        dynamics: dynamics::lower(model, scalar)?,
         hysteresis,
         actuation,
         bounds: Bounds {

@@ -143,6 +143,8 @@ codes! {
         "There are fewer than two converter codes to a cell of the Preisach grid.";
     WORKSPACE_TOO_LARGE = "E0412", "workspace too large for the legs",
         "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
+    ILL_CONDITIONED = "E0413", "leg forces not determined in the workspace",
+        "The equations for the leg forces come close to singular at some pose of the declared workspace, and digits would be lost there. Change the geometry so that the legs point in more different directions, or reduce the workspace.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",

@@ -3,8 +3,8 @@
 
 //! What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build.
 
-use specgen_runtime::{CodeLimits, Law};
 use crate::{Real, limits};
+use specgen_runtime::{CodeLimits, Law};
 
 /// ρ̂ of a leg, m/V; from `actuator`. The virtual drive of (AII.1) is X = q̂/ρ̂; the tick itself needs only q̂.
 pub const LEG_GAIN: Real = 6.31e-7;
@@ -53,11 +53,7 @@ impl Config {
             level_weight: 0.252,
             drift_weight: 0.011,
             run_interval: 1,
-            code_limits: CodeLimits {
-                min: limits::CODES[0],
-                max: limits::CODES[1],
-                max_step: 3495,
-            },
+            code_limits: CodeLimits { min: limits::CODES[0], max: limits::CODES[1], max_step: 3495 },
         }
     }
 
@@ -120,32 +116,21 @@ impl Config {
     /// # Errors
     /// A weight outside [0, 1]. That they are stable on the platform is for the
     /// compiler to check, not for this function.
-    pub fn with_weights(
-        self,
-        level_weight: Real,
-        drift_weight: Real,
-    ) -> Result<Self, ConfigError> {
+    pub fn with_weights(self, level_weight: Real, drift_weight: Real) -> Result<Self, ConfigError> {
         if !(0.0..=1.0).contains(&level_weight) {
             return Err(ConfigError { word: 2 });
         }
         if !(0.0..=1.0).contains(&drift_weight) {
             return Err(ConfigError { word: 3 });
         }
-        Ok(Self {
-            level_weight,
-            drift_weight,
-            ..self
-        })
+        Ok(Self { level_weight, drift_weight, ..self })
     }
 
     /// The same with another run interval.
     ///
     /// # Errors
     /// An interval of zero ticks.
-    pub const fn with_run_interval(
-        self,
-        run_interval: u32,
-    ) -> Result<Self, ConfigError> {
+    pub const fn with_run_interval(self, run_interval: u32) -> Result<Self, ConfigError> {
         if run_interval == 0 {
             return Err(ConfigError { word: 4 });
         }
@@ -156,10 +141,7 @@ impl Config {
     ///
     /// # Errors
     /// A step below one code, or limits that leave the spec's voltage limits or are empty.
-    pub const fn with_code_limits(
-        self,
-        code_limits: CodeLimits,
-    ) -> Result<Self, ConfigError> {
+    pub const fn with_code_limits(self, code_limits: CodeLimits) -> Result<Self, ConfigError> {
         if code_limits.max_step < 1 {
             return Err(ConfigError { word: 5 });
         }

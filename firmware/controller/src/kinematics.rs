@@ -27,7 +27,11 @@ const PLATFORM_JOINT: [[Real; 3]; LEGS] = [
 
 /// Leg lengths at rest l₀ = |r₀|, m.
 const REST_LENGTH: [Real; LEGS] = [
-    0.22120451677221237, 0.22120451677221234, 0.22120451677221237, 0.22120451677221237, 0.22120451677221242,
+    0.22120451677221237,
+    0.22120451677221234,
+    0.22120451677221237,
+    0.22120451677221237,
+    0.22120451677221242,
     0.2212045167722124,
 ];
 
@@ -69,7 +73,8 @@ pub fn leg_displacements(pose: &[Real; 6]) -> [Real; LEGS] {
 /// |r₀ + d| − l₀ for a joint that moved by d: the root Δl of Δl² + 2 l₀ Δl = s with s = (2 r₀ + d)·d.
 #[inline]
 fn extension(rest: &[Real; 3], length: Real, moved: &[Real; 3]) -> Real {
-    let s = (2.0 * rest[0] + moved[0]) * moved[0] + (2.0 * rest[1] + moved[1]) * moved[1]
+    let s = (2.0 * rest[0] + moved[0]) * moved[0]
+        + (2.0 * rest[1] + moved[1]) * moved[1]
         + (2.0 * rest[2] + moved[2]) * moved[2];
     let mut root = s / (2.0 * length);
     for _ in 0..NEWTON_STEPS {

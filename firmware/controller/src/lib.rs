@@ -34,14 +34,9 @@ mod words;
 pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};
 pub use specgen_runtime::{CodeLimits, Law};
 pub use state::{LegState, State};
-pub use step::{
-    GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, TickInput, TickOutput, actuate, step,
-};
+pub use step::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, TickInput, TickOutput, actuate, step};
 
-pub use words::{
-    CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES,
-    OUTPUT_WORDS,
-};
+pub use words::{CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS};
 
 /// Floating-point type of this controller; from `controller.scalar`.
 pub type Real = f64;

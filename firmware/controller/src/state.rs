@@ -3,9 +3,9 @@
 
 //! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
 
-use specgen_runtime::{Digest, Estimate};
 use crate::hysteresis::Memory;
 use crate::{LEGS, Real, limits};
+use specgen_runtime::{Digest, Estimate};
 
 /// State of one leg.
 #[derive(Debug, Clone, Copy)]
@@ -39,16 +39,8 @@ impl State {
     /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there, no correction.
     #[must_use]
     pub const fn new() -> Self {
-        let leg = LegState {
-            memory: Memory::new(),
-            estimate: Estimate::new(),
-            code: limits::CODES[0],
-        };
-        Self {
-            legs: [leg; LEGS],
-            demand: [0.0; LEGS],
-            ticks_in_run: 0,
-        }
+        let leg = LegState { memory: Memory::new(), estimate: Estimate::new(), code: limits::CODES[0] };
+        Self { legs: [leg; LEGS], demand: [0.0; LEGS], ticks_in_run: 0 }
     }
 
     /// Fingerprint of everything that later ticks depend on, for comparing two machines bit for bit.

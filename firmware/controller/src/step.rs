@@ -6,10 +6,10 @@
 //! At time t_n the interval that voltage u_n was held over has just ended and Y_n is read; the set-point is that of the
 //! END of the interval that begins now, T_{n+1}, and the voltages that come out are held over it.
 
-use specgen_runtime::{Law, Real as _};
 use crate::hysteresis::{TABLES, Table};
 use crate::limits::{self, DAC};
 use crate::{Config, LEGS, LegState, Real, SetpointKind, State, kinematics};
+use specgen_runtime::{Law, Real as _};
 
 /// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
 pub const LEG_LIMITED: u32 = 0x3f;
@@ -108,19 +108,13 @@ fn count_run(config: &Config, state: &mut State) -> bool {
 #[inline]
 fn adapt(config: &Config, leg: &mut LegState, gauge: Real) {
     let model_error = gauge - leg.memory.displacement();
-    leg.estimate
-        .update(config.law(), config.level_weight(), config.drift_weight(), model_error);
+    leg.estimate.update(config.law(), config.level_weight(), config.drift_weight(), model_error);
 }
 
 /// u = Γ⁻¹(T − δ̂ − φ̂) as a permitted code; the memory then holds what that code really requests. Returns whether a
 /// limit of table, voltage or slew rate held the leg back.
 #[inline]
-pub fn actuate(
-    config: &Config,
-    leg: &mut LegState,
-    table: &Table,
-    demand: Real,
-) -> bool {
+pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, demand: Real) -> bool {
     let request = demand - leg.estimate.correction();
     let out_of_reach = !(request >= Real::ZERO && request <= table.full_displacement());
     let drive = leg.memory.solve(table, request);

@@ -4,8 +4,8 @@
 //! Inputs, outputs and settings as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target
 //! reads and writes these, so that two of them can be compared bit for bit.
 
-use specgen_runtime::{CodeLimits, Law, Real as _};
 use crate::{Config, ConfigError, LEGS, Real, SetpointKind, TickInput, TickOutput};
+use specgen_runtime::{CodeLimits, Law, Real as _};
 
 /// Words of a tick's input.
 pub const INPUT_WORDS: usize = 12;
@@ -74,16 +74,8 @@ pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] = [
 ];
 
 /// Names of the settings. `mode` is 0 invhys, 1 ewma, 2 pcc; `setpoint_kind` is 0 pose, 1 leg.
-pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = [
-    "mode",
-    "setpoint_kind",
-    "level_weight",
-    "drift_weight",
-    "run_interval",
-    "max_step_codes",
-    "code_min",
-    "code_max",
-];
+pub const CONFIG_NAMES: [&str; CONFIG_WORDS] =
+    ["mode", "setpoint_kind", "level_weight", "drift_weight", "run_interval", "max_step_codes", "code_min", "code_max"];
 
 /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
 pub const DESCRIPTION: &str = "name=legs\ndigest=ca3eb811f1219af881ee05531de6e36870ee8b45d2e8310043e5dfaf156127c7\nversion=0.1.0\nscalar_bits=64\nleg_gain=6.31e-7\nperiod=0.0002\ngrid=32\ndrive_range=0.0,100.0\nconfig_names=mode,setpoint_kind,level_weight,drift_weight,run_interval,max_step_codes,code_min,code_max\ninput_names=setpoint[0],setpoint[1],setpoint[2],setpoint[3],setpoint[4],setpoint[5],displacement[0],displacement[1],displacement[2],displacement[3],displacement[4],displacement[5]\noutput_names=voltage[0],voltage[1],voltage[2],voltage[3],voltage[4],voltage[5],requested[0],requested[1],requested[2],requested[3],requested[4],requested[5],demand[0],demand[1],demand[2],demand[3],demand[4],demand[5],level[0],level[1],level[2],level[3],level[4],level[5],drift[0],drift[1],drift[2],drift[3],drift[4],drift[5],dac_code[0],dac_code[1],dac_code[2],dac_code[3],dac_code[4],dac_code[5],status\n";
@@ -92,10 +84,7 @@ impl TickInput {
     /// From words in the order of [`INPUT_NAMES`].
     #[must_use]
     pub fn from_words(words: &[u64; INPUT_WORDS]) -> Self {
-        let mut input = Self {
-            setpoint: [0.0; LEGS],
-            displacement: [0.0; LEGS],
-        };
+        let mut input = Self { setpoint: [0.0; LEGS], displacement: [0.0; LEGS] };
         for index in 0..LEGS {
             input.setpoint[index] = Real::from_word(words[index]);
             input.displacement[index] = Real::from_word(words[LEGS + index]);
@@ -140,11 +129,7 @@ impl Config {
             _ => return Err(ConfigError { word: 1 }),
         };
         let run_interval = if words[4] > u32::MAX as u64 { 0 } else { words[4] as u32 };
-        let limits = CodeLimits {
-            max_step: code(words[5]),
-            min: code(words[6]),
-            max: code(words[7]),
-        };
+        let limits = CodeLimits { max_step: code(words[5]), min: code(words[6]), max: code(words[7]) };
         Self::new()
             .with_law(law)
             .with_setpoint(setpoint)

@@ -23,7 +23,11 @@ pub trait Real:
     const HALF: Self;
     /// 1.
     const ONE: Self;
+    /// Whether this is `f32`: kernels choose their coefficients by it.
+    const SINGLE: bool;
 
+    /// The number nearest to `value`; for constants.
+    fn from_f64(value: f64) -> Self;
     /// The integer part towards zero; saturates at the range of `i32`, and a NaN gives 0.
     fn truncate(self) -> i32;
     /// The number itself, exact up to 2²⁴.
@@ -42,7 +46,12 @@ impl Real for f64 {
     const ZERO: Self = 0.0;
     const HALF: Self = 0.5;
     const ONE: Self = 1.0;
+    const SINGLE: bool = false;
 
+    #[inline]
+    fn from_f64(value: f64) -> Self {
+        value
+    }
     #[inline]
     fn truncate(self) -> i32 {
         self as i32
@@ -73,7 +82,12 @@ impl Real for f32 {
     const ZERO: Self = 0.0;
     const HALF: Self = 0.5;
     const ONE: Self = 1.0;
+    const SINGLE: bool = true;
 
+    #[inline]
+    fn from_f64(value: f64) -> Self {
+        value as Self
+    }
     #[inline]
     fn truncate(self) -> i32 {
         self as i32
