@@ -7,6 +7,7 @@
 //! task space lies in [`legs`] and [`platform`].
 
 mod description;
+mod dynamics;
 mod format;
 mod hysteresis;
 mod identity;
@@ -32,6 +33,7 @@ pub type EmittedCrate = BTreeMap<String, String>;
 #[must_use]
 pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
+        ("src/dynamics.rs", dynamics::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),

@@ -3,10 +3,12 @@
 //! Trigonometry goes through `libm`, so that the same spec gives the same bytes on every machine.
 
 mod actuation;
+mod dynamics;
 mod kinematics;
 mod linear;
 mod sensing;
 
+pub use dynamics::{GRAVITY, platform};
 pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
 pub use sensing::{PoseNoise, pose_noise};
 
@@ -42,6 +44,7 @@ pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir,
         specgen_version: env!("CARGO_PKG_VERSION").to_owned(),
         scalar,
         kinematics: kinematics::lower(model, scalar)?,
+        dynamics: dynamics::lower(model, scalar)?,
         hysteresis,
         actuation,
         bounds: Bounds {
