@@ -8,7 +8,7 @@ use crate::emit;
 use crate::everett::EverettTable;
 use crate::identify;
 use crate::ir::Ir;
-use crate::lower::lower;
+use crate::lower::{PoseNoise, lower, pose_noise};
 use crate::model::Model;
 use crate::spec::{self, SpecSource};
 use crate::stability::{self, Margins};
@@ -29,6 +29,8 @@ pub struct Compiled {
     pub records: Vec<Option<identify::Report>>,
     /// Stability of the adaptation.
     pub margins: Margins,
+    /// Noise of the measured pose, with gauges that see the platform.
+    pub pose_noise: Option<PoseNoise>,
     /// Every constant of the controller.
     pub ir: Ir,
     /// Files of the workspace: path, text.
@@ -63,8 +65,9 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
         return Err(Refused { source: Some(source), findings });
     };
     findings.extend(identified.findings);
-    let ir = match lower(&model, &identified.tables, &digest(&source, &identified.texts)) {
-        Ok(ir) => ir,
+    let lowered = lower(&model, &identified.tables, &digest(&source, &identified.texts));
+    let (ir, pose_noise) = match lowered.and_then(|ir| Ok((ir, pose_noise(&model)?))) {
+        Ok(both) => both,
         Err(found) => {
             findings.extend(found);
             return Err(Refused { source: Some(source), findings });
@@ -72,7 +75,7 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
     };
     let files = workspace::files(&ir, &emit::emit(&ir));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
-    Ok(Compiled { source, model, records: identified.reports, margins, ir, files, findings })
+    Ok(Compiled { source, model, records: identified.reports, margins, pose_noise, ir, files, findings })
 }
 
 /// What the records of a spec yield.

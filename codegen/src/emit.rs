@@ -16,6 +16,8 @@ mod limits;
 mod literal;
 mod manifest;
 mod platform;
+mod sensing;
+mod stage_type;
 
 use std::collections::BTreeMap;
 
@@ -49,6 +51,7 @@ fn legs_sources(ir: &Ir) -> Vec<(&'static str, TokenStream)> {
     vec![
         ("src/config.rs", legs::config::emit(ir)),
         ("src/lib.rs", legs::crate_root::emit(ir)),
+        ("src/stages.rs", legs::stages::emit()),
         ("src/state.rs", legs::state::emit(ir)),
         ("src/step.rs", legs::step::emit(ir)),
         ("src/words.rs", legs::words::emit(ir)),
@@ -59,6 +62,8 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
     vec![
         ("src/config.rs", platform::config::emit(ir, &task.defaults)),
         ("src/lib.rs", platform::crate_root::emit(ir)),
+        ("src/sensing.rs", sensing::emit(ir.scalar, &task.sensing)),
+        ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),
         ("src/step.rs", platform::step::emit()),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),

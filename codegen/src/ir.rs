@@ -69,6 +69,7 @@ pub struct Ir {
     /// Config at start-up.
     pub defaults: Defaults,
     /// Control in task space; none for six legs with their own gauges.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub task_space: Option<TaskSpace>,
 }
 
@@ -89,6 +90,10 @@ pub struct Kinematics {
     pub newton_steps: u32,
     /// Largest |Δl| over the accepted poses, m (bound; sizes the Newton steps).
     pub largest_displacement: f64,
+    /// J⁻¹ of the legs at rest: pose coordinates (rows) per leg displacement (columns), m/m and rad/m.
+    pub inverse_jacobian: [[f64; 6]; LEGS],
+    /// Corrections of the forward kinematics over the accepted poses.
+    pub corrections: u32,
 }
 
 /// Preisach tables.
@@ -182,6 +187,8 @@ pub enum Setpoint {
 /// Control in task space.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TaskSpace {
+    /// Gauges to pose and its rate.
+    pub sensing: Sensing,
     /// Constants of the control law.
     pub law: ControlLaw,
     /// Config at start-up.
@@ -295,4 +302,37 @@ pub struct PlatformDefaults {
     pub environment_stiffness: [f64; 6],
     /// h_e.
     pub environment_rest: [f64; 6],
+}
+
+/// Gauges to pose and its rate. The constants are those of `specgen_runtime::sensing::Gauges`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sensing {
+    /// n of each gauge, unit, {B}.
+    pub direction: [[f64; 3]; 6],
+    /// m of each gauge: normal of its plane over n·normal, {P}.
+    pub normal: [[f64; 3]; 6],
+    /// m × n of each gauge.
+    pub skew: [[f64; 3]; 6],
+    /// c of each gauge: where its line pierces the plane at rest, {P}, m.
+    pub pierced: [[f64; 3]; 6],
+    /// J⁻¹ at rest: pose coordinates (rows) per reading (columns), m/m and rad/m.
+    pub inverse: [[f64; 6]; 6],
+    /// J⁻¹ of the second-degree terms: pose coordinates (rows) per product of two turns (columns).
+    pub curvature: [[f64; 6]; 6],
+    /// Passes after the first guess.
+    pub passes: u32,
+    /// What the passes leave over the accepted poses, in exact arithmetic: m, rad.
+    pub remainder: [f64; 2],
+    /// Coefficients of asin x / x in x² after the leading 1.
+    pub arc_sine: Vec<f64>,
+    /// Coefficients of atan x / x in x² after the leading 1.
+    pub arc_tangent: Vec<f64>,
+    /// Polynomial of each gauge from its raw word to m, lowest power first, all of one length; none: the words are m.
+    pub calibration: Option<[Vec<f64>; 6]>,
+    /// Raw words that are believed, per gauge, in the unit of the word.
+    pub raw_limits: [[f64; 2]; 6],
+    /// exp(−ω_c T) of the rate filter.
+    pub rate_keep: f64,
+    /// (1 − exp(−ω_c T))/T of the rate filter, 1/s.
+    pub rate_gain: f64,
 }

@@ -14,6 +14,7 @@ pub mod identify;
 pub mod ir;
 pub mod lower;
 pub mod model;
+pub mod numerics;
 pub mod spec;
 pub mod stability;
 pub mod target;

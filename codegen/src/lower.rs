@@ -4,12 +4,15 @@
 
 mod actuation;
 mod kinematics;
+mod linear;
+mod sensing;
 
-pub use kinematics::joint_positions;
+pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
+pub use sensing::{PoseNoise, pose_noise};
 
 use crate::diagnostic::Diagnostic;
 use crate::everett::EverettTable;
-use crate::ir::{Bounds, Defaults, Hysteresis, Ir, LEGS, Law, Scalar, Setpoint};
+use crate::ir::{Bounds, Defaults, Hysteresis, Ir, LEGS, Law, Scalar, Setpoint, TaskSpace};
 use crate::model::{self, Model};
 
 /// Beyond this many strokes a leg set-point is a mistake, not a demand to saturate on.
@@ -63,8 +66,13 @@ pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir,
             period: model.timing.period,
             leg_gain: model.actuator.leg_gain(),
         },
-        task_space: None,
+        task_space: model.task_space.as_ref().map(|task| task_space(model, task, scalar)).transpose()?,
     })
+}
+
+/// What a controller that sees the platform has of its own.
+fn task_space(model: &Model, task: &model::TaskSpace, scalar: Scalar) -> Result<TaskSpace, Vec<Diagnostic>> {
+    Ok(TaskSpace { sensing: sensing::lower(model, task, scalar)? })
 }
 
 /// Tables in the layout of the controller, each distinct one once.

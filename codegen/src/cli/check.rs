@@ -20,7 +20,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = compile::compile(&arguments.spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     let text = format!("{} is good\n{}", compiled.source.display_name, describe(&compiled));
-    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "records": compiled.records }));
+    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "pose_noise": compiled.pose_noise, "records": compiled.records }));
     Ok(())
 }
 
@@ -39,6 +39,20 @@ pub fn describe(compiled: &Compiled) -> String {
             "  adaptation: λ < {limit:.3} without leg dynamics; sampled leg has spectral radius {:.4}; \
              stable up to level weight {largest:.4} (here {})",
             margins.spectral_radius, compiled.model.adaptation.level_weight
+        );
+    }
+    if let (Some(noise), Some(task)) = (&compiled.pose_noise, &compiled.ir.task_space) {
+        let list = |values: &[f64]| values.iter().map(|v| format!("{:.1}", v * 1e9)).collect::<Vec<_>>().join("/");
+        let _ = writeln!(
+            text,
+            "  gauges: {:.2} nm rms each with quantisation; pose {} nm and {} nrad rms; legs {} nm rms; found in {} passes to {:.1e} m, {:.1e} rad",
+            noise.reading * 1e9,
+            list(&noise.pose[..3]),
+            list(&noise.pose[3..]),
+            list(&noise.leg),
+            task.sensing.passes,
+            task.sensing.remainder[0],
+            task.sensing.remainder[1]
         );
     }
     text

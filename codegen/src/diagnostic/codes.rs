@@ -62,7 +62,7 @@ codes! {
     UNKNOWN_CHOICE = "E0213", "unknown choice",
         "The key takes one of a few words, listed in the help.";
     ALTERNATIVES = "E0214", "one of two keys",
-        "A weight may be given per run or as a bandwidth, not both; a mode that uses the weight needs one of them.";
+        "A weight may be given per run or as a bandwidth, not both; a mode that uses the weight needs one of them. Joints lie on circles or are given one by one, not both. With [control] both bandwidths are given or neither.";
     OUT_OF_RANGE = "E0301", "out of range",
         "The value lies outside what the key takes. `docs/spec-reference.md` lists the ranges.";
     WRONG_ORDER = "E0302", "limits in the wrong order",
@@ -71,8 +71,8 @@ codes! {
         "The controller would ask for voltages that the converter cannot make.";
     RECORD_COUNT = "E0304", "one or six records",
         "Either one record identifies all legs, or each leg has its own.";
-    RECORD_PATH = "E0305", "record path not relative",
-        "Records are named relative to the spec, with forward slashes, so that the folder can move to another machine.";
+    RECORD_PATH = "E0305", "file path not relative",
+        "Records and waveforms are named relative to the spec, with forward slashes, so that the folder can move to another machine.";
     RECORD_UNREADABLE = "E0306", "record cannot be read",
         "The file does not exist beside the spec, is a folder, or may not be read.";
     BANDWIDTH_TOO_HIGH = "E0307", "bandwidth too high",
@@ -93,14 +93,68 @@ codes! {
         "Within one period the voltage may change by less than one code, so that it could never move.";
     BUDGET_NOT_WHOLE = "E0315", "not a whole number of bytes",
         "Memory is counted in whole bytes.";
+    WITHOUT_CONTROL = "E0316", "belongs to the task-space controller",
+        "Gauges that see the platform, their calibration and trajectories are for a spec with [control]. Without it each leg has its own gauge, and these would silently do nothing.";
+    GAUGE_COUNT = "E0317", "not six gauges",
+        "Six gauges, each a [[gauge]] section, tell the six coordinates of a pose.";
+    BAD_DIRECTION = "E0318", "not a direction, or one along the target",
+        "A direction is a vector other than zero. A gauge whose line lies nearly in its target plane (within 6 degrees) sees no motion along the line, and a tilt as a large one.";
+    LEG_KEY_WITH_CONTROL = "E0319", "key of the leg feed-forward beside [control]",
+        "The task-space controller adapts in every tick, with bandwidths that hold at any period, and its set-point is a pose.";
+    NOTCH_DAMPING = "E0320", "notch below the mode's own damping",
+        "A notch replaces the damping of a mode by notch_damping; at or below modal_damping it would raise the resonance.";
+    CUTOFF_TOO_HIGH = "E0321", "velocity filter above half the tick rate",
+        "A low-pass above pi rad / period does not filter anything that the ticks can show.";
+    TRAJECTORY_KEY = "E0322", "key of another kind of trajectory",
+        "The paper's paths take frequency and as_printed; a waveform takes file, period and repeat.";
+    NAME_TAKEN = "E0323", "name given twice",
+        "Trajectories are told apart by their names.";
+    BIAS_OUTSIDE = "E0324", "bias outside the workspace",
+        "The workspace bounds the pose from rest with the bias in it: no set-point could be reached.";
+    CALIBRATION_PARTLY = "E0325", "calibration of some gauges only",
+        "The gauge words are volts for all six gauges or metres for all six.";
+    TOO_MANY_TRAJECTORIES = "E0326", "too many trajectories",
+        "The controller chooses among at most 32.";
     UNSTABLE_STATIC = "E0401", "adaptation unstable on any leg",
         "With these weights and the declared gain_ratio the loop grows even on a leg without dynamics (Appendix B). The help names the largest weight that would do.";
     UNSTABLE_SAMPLED = "E0402", "adaptation unstable on this leg",
         "The sampled loop of amplifier lag, resonance and adaptation has a spectral radius of 1 or more. The help names the largest weight that would do; a longer run helps as well.";
+    NO_MODES = "E0430", "the platform has no six modes on its legs",
+        "Mass matrix and leg stiffness at rest must be positive definite: every motion has a mass and a stiffness. Check geometry, masses and actuator.axial_stiffness.";
+    UNSTABLE_PLATFORM = "E0431", "a control mode unstable on this platform",
+        "One tick of the closed loop (amplifier lag, modes of the platform on its legs, notch, gains, adaptation) has a spectral radius of 1 or more somewhere in gain_ratio, free or touching the declared work piece. Every mode that a running controller can be switched to is checked. The help names the largest factor or bandwidth that would do.";
+    NO_TUNING = "E0432", "no start values hold",
+        "The spec leaves gains or bandwidths to the compiler, and its rule found none that are stable. A higher tick rate, a notch (control.notch_damping), more damping or a narrower gain_ratio helps.";
+    THIN_MARGIN = "W0433", "stable, but not by much",
+        "A gain margin below 1.5 or a delay margin below half a tick: a platform a little softer, less damped or later than the spec says may be unstable.";
+    MODE_NOT_NOTCHED = "W0434", "a mode too fast for the notch",
+        "The mode lies above nine tenths of half the tick rate, where a sampled notch cannot sit on it. The stability check includes it.";
+    BIAS_UNREACHABLE = "E0440", "bias out of reach",
+        "At the pose control.setpoint.bias a leg would be shorter than at zero volts or longer than its stroke.";
+    AXIS_UNREACHABLE = "E0441", "workspace bound that no pose reaches",
+        "Moving along this axis alone from the middle of the strokes, the legs end before the bound does.";
+    TRAJECTORY_UNREACHABLE = "E0442", "trajectory out of reach",
+        "Somewhere on the declared trajectory a leg would be shorter than at zero volts or longer than its stroke. The help names the bias in z that would make it fit, if there is one.";
+    NEAR_SINGULAR = "E0443", "geometry nearly singular inside the workspace",
+        "Somewhere in the declared workspace the legs hardly hold the platform: the condition number of their Jacobian, angles taken at the joint radius, exceeds 10000.";
+    WORKSPACE_PARTLY_REACHABLE = "W0444", "corners of the workspace out of reach",
+        "Usual for a hexapod: the poses it reaches are no box. The figure says how large a box around the bias is reachable as a whole; beyond it the controller limits the legs.";
     TOO_FEW_CODES = "E0410", "converter too coarse for the grid",
         "There are fewer than two converter codes to a cell of the Preisach grid.";
     WORKSPACE_TOO_LARGE = "E0412", "workspace too large for the legs",
         "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
+    PROBE_ALONG_PLANE = "E0430", "gauge along its target plane",
+        "A gauge sees its target move along its line; if the line lies in the plane, or nearly so, it sees nothing of that.";
+    PROBE_MISSES = "E0431", "gauge that misses the platform",
+        "The line of the gauge meets its target plane far from the platform: most likely a frame is mistaken. The line is in {B}, the plane in {P}, whose origin is P_C.";
+    GAUGES_BLIND = "E0432", "gauges that leave a motion unseen",
+        "Six readings fix a pose only if no motion leaves all of them as they are, or nearly so. The message names the motion that is seen least.";
+    GAUGE_RANGE = "E0433", "workspace beyond the gauges' range",
+        "A pose that the controller would accept could not be measured.";
+    CALIBRATION_AMBIGUOUS = "E0434", "calibration that cannot be inverted",
+        "Over sensor.range a calibration rises or falls all the way, so that every raw value means one reading.";
+    GAUGES_DIVERGE = "E0435", "workspace too large for the gauges' equations",
+        "They are solved for small motions, by a number of passes that the compiler counts.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",
@@ -175,6 +229,8 @@ codes! {
         "The radius of gyration is unusual for the size of the platform, though possible.";
     UNUSED_WEIGHT = "W0307", "weight that the mode does not use",
         "The key is checked and kept for a later change of mode, but has no effect at start-up.";
+    GAINS_UNUSED = "W0308", "gains without a task-space controller",
+        "The leg feed-forward has no feedback: [gains] and [position_gains] take effect with [control].";
     TRUNCATED = "W0001", "further findings left out",
         "Only the first findings are shown; mend them and run again.";
 }

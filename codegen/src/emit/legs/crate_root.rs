@@ -35,6 +35,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod hysteresis;
         pub mod kinematics;
         pub mod limits;
+        pub mod stages;
         mod state;
         mod step;
         mod words;
