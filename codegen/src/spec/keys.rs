@@ -32,11 +32,11 @@ pub enum Kind {
     Plain,
     /// Once, or left out as a whole although keys in it are required.
     Optional,
-    /// Any number of times, with double brackets: `[[gauge]]`. Checks count them.
-    Repeated,
+    /// At least and at most so many times, with double brackets: `[[gauge]]`. Checks count them.
+    Repeated(usize, usize),
 }
 
-/// Most tables of a repeated section that are read.
+/// Most tables of a repeated section that are read; no section may have more.
 pub const MAX_TABLES: usize = 32;
 
 /// One key.
@@ -177,7 +177,7 @@ impl Section {
     pub fn header(&self) -> String {
         match self.kind {
             _ if self.name.is_empty() => String::new(),
-            Kind::Repeated => format!("[[{}]]", self.name),
+            Kind::Repeated(..) => format!("[[{}]]", self.name),
             Kind::Plain | Kind::Optional => format!("[{}]", self.name),
         }
     }

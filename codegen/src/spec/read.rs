@@ -50,7 +50,9 @@ impl Reader<'_> {
                     found.insert(key.name, text::clamp(self.source, name.span()));
                     self.value(path, key, value);
                 }
-                Some(Meaning::Section(inner)) if inner.kind == Kind::Repeated => self.tables(inner, name, value),
+                Some(Meaning::Section(inner)) if matches!(inner.kind, Kind::Repeated(..)) => {
+                    self.tables(inner, name, value)
+                }
                 Some(Meaning::Section(inner)) => self.section(inner, name, value),
                 None => {}
             }

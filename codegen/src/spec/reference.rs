@@ -27,8 +27,11 @@ pub fn reference_markdown() -> String {
     let mut text = HEAD.to_owned();
     for section in SECTIONS {
         let title = if section.name.is_empty() { "Before the first section".to_owned() } else { section.header() };
-        let optional =
-            if section.kind == Kind::Optional { " Optional; if it is there, it is there whole." } else { "" };
+        let optional = if section.kind == Kind::Optional {
+            " Optional; if it is there, it has every key without a default."
+        } else {
+            ""
+        };
         // Writing to a String cannot fail.
         let _ = write!(
             text,

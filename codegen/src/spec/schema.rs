@@ -5,7 +5,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::keys::{Item, Key, Kind, MAX_NAME, MAX_TABLES, Presence, SECTIONS, Section, Shape};
+use super::keys::{Item, Key, Kind, MAX_NAME, Presence, SECTIONS, Section, Shape};
 use super::messages::range_of;
 
 /// A sign, a number, and a unit that starts with a letter, a degree sign or a bracket.
@@ -43,7 +43,9 @@ fn table(name: &str) -> Map<String, Value> {
         let last = inner.name.rsplit('.').next().unwrap_or(inner.name);
         let object = Value::Object(table(inner.name));
         let one_or_many = match inner.kind {
-            Kind::Repeated => json!({"type": "array", "items": object, "maxItems": MAX_TABLES}),
+            Kind::Repeated(least, most) => {
+                json!({"type": "array", "items": object, "minItems": least, "maxItems": most})
+            }
             Kind::Plain | Kind::Optional => object,
         };
         properties.insert(last.into(), one_or_many);

@@ -1,6 +1,6 @@
 //! The rows of the key table.
 
-use super::{Dimension, Item, Key, Kind, Presence, Range, SCHEMA_VERSION, Section, Shape};
+use super::{Dimension, Item, Key, Kind, MAX_TABLES, Presence, Range, SCHEMA_VERSION, Section, Shape};
 use crate::identify::MAX_GRID;
 use Presence::{Default, Form, InsteadOf, Optional, Required, Rule};
 
@@ -270,7 +270,7 @@ pub const SECTIONS: &[Section] = &[
             row("modal_damping", Shape::One(Item::Number(Range::open(0.0, 1.0))), Required, "zeta", "0.02", "Damping ratio of the lowest mode of the platform on its legs. Give what is measured, or less: less is the cautious side."),
             row("notch", Shape::One(Item::Flag), Default("true"), "", "true", "Whether a modal notch stands in the feedback; without one the bandwidth falls to about a twelfth."),
             row("notch_damping", Shape::One(Item::Number(Range::above(0.0, 1.0))), Rule("1, with a notch"), "zeta_d", "1.0", "Damping ratio that the notch leaves of each mode, above `modal_damping`."),
-            row("velocity_cutoff", BANDWIDTH, Rule("0.6 pi rad / period"), "", "\"1.9e4 rad/s\"", "First-order low-pass of the pose derivative, below half the tick rate (pi rad / period)."),
+            row("velocity_cutoff", BANDWIDTH, Rule("0.6 pi rad / period"), "", "\"9e3 rad/s\"", "First-order low-pass of the pose derivative, below half the tick rate (pi rad / period)."),
             row("interaction", Shape::One(Item::Choice(&["none", "modelled", "measured"])), Default("\"none\""), "", "\"none\"", "Where the interaction force of the feed-forward comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words."),
             row("transfer_time", one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("\"50 ms\""), "", "\"50 ms\"", "Time constant with which the offset fades that makes a change of mode bumpless."),
         ],
@@ -320,7 +320,7 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "gauge",
-        kind: Kind::Repeated,
+        kind: Kind::Repeated(6, 6),
         doc: "One of the six gauges that see the platform, in the order of the gauge words; with [control], and with it alone. A gauge fixed in {B} measures along a line to a plane on the platform, from rest.",
         keys: &[
             row("point", Shape::List(&[CENTER; 3]), Required, "", "[\"80 mm\", \"0 mm\", \"180 mm\"]", "A point of the measuring line in {B}."),
@@ -332,7 +332,7 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "trajectory",
-        kind: Kind::Repeated,
+        kind: Kind::Repeated(0, MAX_TABLES),
         doc: "A trajectory that the controller can play, numbered from 0 in the order of the file; with [control] alone.",
         keys: &[
             row("name", Shape::One(Item::Name), Required, "", "\"circle\"", "Its name, once in the file."),
