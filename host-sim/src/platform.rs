@@ -28,6 +28,8 @@ pub use contact::{Contact, WorkPart, Wrench};
 pub use gauge::{GaugeSignal, Probe};
 pub use geometry::{Geometry, angles, rate_matrix, rotation};
 pub use inertia::Masses;
+#[cfg(any(test, feature = "oracle"))]
+pub(crate) use linear::exponential;
 pub use linear::{Matrix3, Matrix6, Six, Three};
 pub use machine::Machine;
 pub use parameters::{PlatformParameters, REFERENCE_PLATFORM};

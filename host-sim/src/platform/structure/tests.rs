@@ -146,7 +146,7 @@ fn a_one_sided_part_is_left_and_met_again() {
     let up = |z: f64| parameters.geometry.extensions(&[0.0, 0.0, z, 0.0, 0.0, 0.0]);
     let mut structure = Structure::new(parameters.clone(), 2e-5);
     structure.touch(WorkPart { one_sided: true, ..WorkPart::glass() });
-    let mut settle = |structure: &mut Structure, z: f64| {
+    let settle = |structure: &mut Structure, z: f64| {
         for _ in 0..5000 {
             structure.advance(&up(z));
         }
