@@ -20,6 +20,7 @@ mod sampled;
 mod search;
 
 use serde::Serialize;
+use specgen_runtime::Platform;
 
 use crate::diagnostic::Diagnostic;
 use crate::model::{Gains, Interaction, Model, TaskSpace};
@@ -44,6 +45,19 @@ pub struct RestDynamics {
     pub mass: Matrix6,
     /// J(0) = ∂l/∂h, one row a leg, 1 and m/rad.
     pub jacobian: Matrix6,
+}
+
+impl RestDynamics {
+    /// M and J of the controller's own model at rest.
+    #[must_use]
+    pub fn of(platform: &Platform<f64>) -> Self {
+        let mass = platform.mass_matrix(&[0.0; 6]);
+        Self {
+            // Symmetric but for rounding, which the modes must not see.
+            mass: core::array::from_fn(|i| core::array::from_fn(|j| 0.5 * (mass[i][j] + mass[j][i]))),
+            jacobian: platform.jacobian(&[0.0; 6]),
+        }
+    }
 }
 
 /// What the analysis decided: numbers for lowering, figures for the user.
