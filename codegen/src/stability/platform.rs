@@ -75,6 +75,8 @@ pub struct Design {
     pub combined: Tuning,
     /// Gains of P alone; its bandwidths are zero.
     pub position: Tuning,
+    /// Whether the check includes contact with the declared work piece.
+    pub touching: bool,
     /// Every control mode.
     pub margins: Vec<ModeMargins>,
     /// Warnings and notes about what is stable but thin.
@@ -128,6 +130,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         bandwidth_limit: limit,
         combined,
         position,
+        touching: closed_loop.environment != [0.0; 6],
         margins,
         findings,
     })
