@@ -17,6 +17,7 @@ mod literal;
 mod manifest;
 mod platform;
 mod sensing;
+mod setpoint;
 mod stage_type;
 
 use std::collections::BTreeMap;

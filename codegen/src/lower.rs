@@ -6,6 +6,7 @@ mod actuation;
 mod kinematics;
 mod linear;
 mod sensing;
+pub mod setpoint;
 
 pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
 pub use sensing::{PoseNoise, pose_noise};
