@@ -7,6 +7,7 @@
 //! task space lies in [`legs`] and [`platform`].
 
 mod description;
+mod dynamics;
 mod format;
 mod hysteresis;
 mod identity;
@@ -33,6 +34,7 @@ pub type EmittedCrate = BTreeMap<String, String>;
 #[must_use]
 pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
+        ("src/dynamics.rs", dynamics::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
@@ -64,6 +66,7 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
         ("src/config.rs", platform::config::emit(ir, &task.defaults)),
         ("src/lib.rs", platform::crate_root::emit(ir)),
         ("src/sensing.rs", sensing::emit(ir.scalar, &task.sensing)),
+        ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
         ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),
         ("src/step.rs", platform::step::emit()),

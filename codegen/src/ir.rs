@@ -4,6 +4,8 @@
 //! Numbers are already rounded to the controller's scalar, so that the text is the constant.
 
 use serde::Serialize;
+use specgen_runtime::Platform;
+use specgen_runtime::dynamics::{LANES, LegGroup};
 
 /// Number of legs.
 pub const LEGS: usize = 6;
@@ -60,6 +62,8 @@ pub struct Ir {
     pub scalar: Scalar,
     /// Pose to leg displacements.
     pub kinematics: Kinematics,
+    /// Motion to leg forces.
+    pub dynamics: Dynamics,
     /// Preisach tables.
     pub hysteresis: Hysteresis,
     /// Converter and limits.
@@ -94,6 +98,133 @@ pub struct Kinematics {
     pub inverse_jacobian: [[f64; 6]; LEGS],
     /// Corrections of the forward kinematics over the accepted poses.
     pub corrections: u32,
+}
+
+/// Inverse dynamics: the constants of [`specgen_runtime::Platform`], where each is explained.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Dynamics {
+    /// The legs in the order of elimination.
+    pub legs: [DynamicsLeg; LEGS],
+    /// Leg at each place of that order.
+    pub order: [usize; LEGS],
+    /// Equation that each place is solved from.
+    pub rows: [usize; LEGS],
+    /// Base joints in one plane.
+    pub flat_base: bool,
+    /// Platform joints in the plane z = 0.
+    pub flat_platform: bool,
+    /// Height of P_C at rest above that of `base`, m.
+    pub base_depth: f64,
+    /// Joint that moments are taken about, m.
+    pub pole: [f64; 3],
+    /// Platform and point masses at its joints, kg.
+    pub mass: f64,
+    /// About P_C, kg m.
+    pub first_moment: [f64; 3],
+    /// About the pole, kg m.
+    pub pole_moment: [f64; 3],
+    /// About P_C and the pole, kg m².
+    pub second_moment: [[f64; 3]; 3],
+    /// q, kg m.
+    pub extensible_moment: f64,
+    /// J, kg m².
+    pub leg_inertia: f64,
+    /// (q − σ) g, N m.
+    pub leg_weight_moment: f64,
+    /// g, m/s².
+    pub gravity: f64,
+    /// Smallest over largest pivot of the elimination, the worst of the declared workspace; moments in joint radii.
+    pub pivot_ratio: f64,
+}
+
+/// Geometry of one leg in [`Dynamics`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DynamicsLeg {
+    /// From the base joint, base axes, m.
+    pub base: [f64; 3],
+    /// P_i, m.
+    pub joint: [f64; 3],
+    /// P_i from the pole, m.
+    pub arm: [f64; 3],
+    /// r₀, m.
+    pub rest: [f64; 3],
+    /// l₀, m.
+    pub length: f64,
+    /// 1/l₀, 1/m.
+    pub inverse_length: f64,
+    /// 1/(2 l₀²), 1/m².
+    pub half_inverse_square: f64,
+}
+
+impl Dynamics {
+    /// As the runtime takes it.
+    #[must_use]
+    pub fn platform(&self) -> Platform<f64> {
+        let lanes = |group: usize, value: &dyn Fn(&DynamicsLeg) -> f64| {
+            std::array::from_fn(|lane| value(&self.legs[group * LANES + lane]))
+        };
+        let vectors = |group: usize, value: &dyn Fn(&DynamicsLeg) -> [f64; 3]| {
+            std::array::from_fn(|axis| lanes(group, &|leg| value(leg)[axis]))
+        };
+        Platform {
+            groups: std::array::from_fn(|group| LegGroup {
+                base: vectors(group, &|leg| leg.base),
+                joint: vectors(group, &|leg| leg.joint),
+                arm: vectors(group, &|leg| leg.arm),
+                rest: vectors(group, &|leg| leg.rest),
+                length: lanes(group, &|leg| leg.length),
+                inverse_length: lanes(group, &|leg| leg.inverse_length),
+                half_inverse_square: lanes(group, &|leg| leg.half_inverse_square),
+            }),
+            order: self.order,
+            rows: self.rows,
+            flat_base: self.flat_base,
+            flat_platform: self.flat_platform,
+            base_depth: self.base_depth,
+            pole: self.pole,
+            mass: self.mass,
+            first_moment: self.first_moment,
+            pole_moment: self.pole_moment,
+            second_moment: self.second_moment,
+            extensible_moment: self.extensible_moment,
+            leg_inertia: self.leg_inertia,
+            leg_weight_moment: self.leg_weight_moment,
+            gravity: self.gravity,
+        }
+    }
+
+    /// Every number rounded to the scalar, but for the pivot ratio, which is a finding and no constant.
+    #[must_use]
+    pub fn rounded(&self, scalar: Scalar) -> Self {
+        let number = |value: f64| scalar.round(value);
+        let vector = |value: [f64; 3]| value.map(number);
+        Self {
+            legs: self.legs.clone().map(|leg| DynamicsLeg {
+                base: vector(leg.base),
+                joint: vector(leg.joint),
+                arm: vector(leg.arm),
+                rest: vector(leg.rest),
+                length: number(leg.length),
+                inverse_length: number(leg.inverse_length),
+                half_inverse_square: number(leg.half_inverse_square),
+            }),
+            order: self.order,
+            rows: self.rows,
+            flat_base: self.flat_base,
+            flat_platform: self.flat_platform,
+            base_depth: number(self.base_depth),
+            pole: vector(self.pole),
+            mass: number(self.mass),
+            first_moment: vector(self.first_moment),
+            pole_moment: vector(self.pole_moment),
+            second_moment: self.second_moment.map(vector),
+            extensible_moment: number(self.extensible_moment),
+            leg_inertia: number(self.leg_inertia),
+            leg_weight_moment: number(self.leg_weight_moment),
+            gravity: number(self.gravity),
+            pivot_ratio: self.pivot_ratio,
+        }
+    }
 }
 
 /// Preisach tables.
@@ -506,15 +637,15 @@ impl Path {
             Self::Segments { start, segments, end, .. } => {
                 start.iter_mut().chain(end).for_each(round);
                 for segment in segments {
-                    [&mut segment.per_tick, &mut segment.per_second, &mut segment.angular].map(round);
+                    [&mut segment.per_tick, &mut segment.per_second, &mut segment.angular].into_iter().for_each(round);
                     for axis in &mut segment.axes {
-                        [&mut axis.place, &mut axis.slope].map(round);
+                        [&mut axis.place, &mut axis.slope].into_iter().for_each(round);
                         axis.sine.iter_mut().chain(&mut axis.cosine).for_each(round);
                     }
                 }
             }
             Self::Table { rows, per_tick, per_second, bend_rate, .. } => {
-                [per_tick, per_second, bend_rate].map(round);
+                [per_tick, per_second, bend_rate].into_iter().for_each(round);
                 for row in rows {
                     row.pose.iter_mut().chain(&mut row.bend).for_each(round);
                 }

@@ -20,6 +20,7 @@ const FIXED: &[(&str, &str)] = &[
     ("runtime/src/attitude.rs", include_str!("../../firmware/runtime/src/attitude.rs")),
     ("runtime/src/dac.rs", include_str!("../../firmware/runtime/src/dac.rs")),
     ("runtime/src/digest.rs", include_str!("../../firmware/runtime/src/digest.rs")),
+    ("runtime/src/dynamics.rs", include_str!("../../firmware/runtime/src/dynamics.rs")),
     ("runtime/src/everett.rs", include_str!("../../firmware/runtime/src/everett.rs")),
     ("runtime/src/kinematics.rs", include_str!("../../firmware/runtime/src/kinematics.rs")),
     ("runtime/src/memory.rs", include_str!("../../firmware/runtime/src/memory.rs")),

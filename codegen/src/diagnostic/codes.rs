@@ -143,6 +143,8 @@ codes! {
         "There are fewer than two converter codes to a cell of the Preisach grid.";
     WORKSPACE_TOO_LARGE = "E0412", "workspace too large for the legs",
         "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
+    ILL_CONDITIONED = "E0413", "leg forces not determined in the workspace",
+        "The equations for the leg forces come close to singular at some pose of the declared workspace, and digits would be lost there. Change the geometry so that the legs point in more different directions, or reduce the workspace.";
     PROBE_ALONG_PLANE = "E0430", "gauge along its target plane",
         "A gauge sees its target move along its line; if the line lies in the plane, or nearly so, it sees nothing of that.";
     PROBE_MISSES = "E0431", "gauge that misses the platform",

@@ -1,7 +1,7 @@
 //! Constants of the control law in task space: maps at rest, modal notch, settings at start-up.
 
-use crate::ir::{ControlLaw, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Scalar, Section};
 use super::linear;
+use crate::ir::{ControlLaw, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Scalar, Section};
 use crate::model::{self, Model};
 use crate::numerics::{Matrix6, multiply6, transpose6};
 use crate::stability::platform::{self as design, Design, RestDynamics};
@@ -59,12 +59,7 @@ fn largest_wrench(model: &Model) -> [f64; 6] {
 }
 
 /// Config at start-up.
-pub(super) fn defaults(
-    model: &Model,
-    task: &model::TaskSpace,
-    scalar: Scalar,
-    design: &Design,
-) -> PlatformDefaults {
+pub(super) fn defaults(model: &Model, task: &model::TaskSpace, scalar: Scalar, design: &Design) -> PlatformDefaults {
     let round = |value: f64| scalar.round(value);
     let gains = |tuning: &design::Tuning| Gains {
         proportional: tuning.proportional.map(round),

@@ -20,6 +20,7 @@ mod sampled;
 mod search;
 
 use serde::Serialize;
+use specgen_runtime::Platform;
 
 use crate::diagnostic::Diagnostic;
 use crate::model::{Gains, Interaction, Model, TaskSpace};
@@ -44,6 +45,15 @@ pub struct RestDynamics {
     pub mass: Matrix6,
     /// J(0) = ∂l/∂h, one row a leg, 1 and m/rad.
     pub jacobian: Matrix6,
+}
+
+impl RestDynamics {
+    /// Of the model that the controller holds.
+    #[must_use]
+    pub fn of(platform: &Platform<f64>) -> Self {
+        let rest = [0.0; 6];
+        Self { mass: platform.mass_matrix(&rest), jacobian: platform.jacobian(&rest) }
+    }
 }
 
 /// What the analysis decided: numbers for lowering, figures for the user.

@@ -11,7 +11,6 @@
 //! | [`everett`] | Everett function on a grid: look-up and inverse along one branch | section 3 |
 //! | [`memory`] | reversal memory: forward Preisach model, its inverse, bounded storage | section 3, operator Γ and Γ⁻¹ |
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
-//! | [`attitude`] | rotation by three angles, Euler rates | (AI.1) |
 //! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
 //! | [`feedback`] | position feedback with anti-windup | (7) |
 //! | [`notch`] | modal notch of the feedback | |
@@ -23,6 +22,7 @@
 //! | [`kinematics`] | pose to leg displacements in difference form, and back | (1), (2), (AI.2)–(AI.4) |
 //! | [`sensing`] | pose from six gauges that see the platform | section 4 |
 //! | [`velocity`] | rate of the measured pose, filtered | (7), k_v |
+//! | [`dynamics`] | motion of the platform to leg forces and displacements | (4), (AI.1)–(AI.17) |
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
@@ -34,6 +34,7 @@ pub mod adaptation;
 pub mod attitude;
 pub mod dac;
 pub mod digest;
+pub mod dynamics;
 pub mod everett;
 pub mod feedback;
 pub mod kinematics;
@@ -52,6 +53,7 @@ pub use adaptation::{Estimate, Law};
 pub use attitude::{Attitude, Series};
 pub use dac::{CodeLimits, Dac};
 pub use digest::Digest;
+pub use dynamics::{Load, Motion, Platform};
 pub use everett::Everett;
 pub use feedback::{Gains, Integral};
 pub use kinematics::Legs;

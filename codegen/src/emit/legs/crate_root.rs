@@ -32,6 +32,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![deny(missing_docs)]
 
         mod config;
+        pub mod dynamics;
         pub mod hysteresis;
         pub mod kinematics;
         pub mod limits;

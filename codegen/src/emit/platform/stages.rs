@@ -13,7 +13,9 @@ pub fn emit() -> TokenStream {
         use specgen_runtime::Real as _;
         use specgen_runtime::linear::difference;
 
-        use crate::dynamics::leg_forces;
+        use specgen_runtime::setpoint::Target;
+
+        use crate::dynamics::{Motion, leg_forces};
         use crate::hysteresis::TABLES;
         use crate::kinematics::leg_displacements;
         use crate::limits::DAC;
@@ -79,7 +81,8 @@ pub fn emit() -> TokenStream {
 
         /// h, ḣ, ḧ to six leg forces.
         extern "C" fn dynamics(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            state.load = leg_forces(&state.target.pose, &state.target.rate, &state.target.acceleration);
+            let Target { pose, rate, acceleration } = state.target;
+            state.load = leg_forces(&Motion { pose, rate, acceleration });
         }
 
         /// The same with the interaction force, and with the leg displacements.

@@ -27,7 +27,7 @@ pub fn emit() -> TokenStream {
         use specgen_runtime::setpoint::{Command, Target};
         use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _};
 
-        use crate::dynamics::Load;
+        use crate::dynamics::{Load, Motion};
         use crate::hysteresis::{TABLES, Table};
         use crate::limits::DAC;
         use crate::setpoint::PLAN;
@@ -235,7 +235,7 @@ pub fn emit() -> TokenStream {
 
         /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
         #[inline]
-        pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load {
+        pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load<Real> {
             let wrench = match config.interaction() {
                 Interaction::Neglected => [0.0; 6],
                 Interaction::Measured => state.wrench,
@@ -245,7 +245,7 @@ pub fn emit() -> TokenStream {
                     force_of(&environment.stiffness, &compressed)
                 }
             };
-            dynamics::load(&target.pose, &target.rate, &target.acceleration, &wrench)
+            dynamics::load(&Motion { pose: target.pose, rate: target.rate, acceleration: target.acceleration }, &wrench)
         }
 
         /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.

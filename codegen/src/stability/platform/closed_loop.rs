@@ -24,9 +24,9 @@ type Signal = Vec<f64>;
 pub struct Conditions {
     /// λ = ρ/ρ̂ of the actuators.
     pub gain_ratio: f64,
-    /// Axial stiffness of the legs against the nominal one, which the controller assumes.
+    /// Axial stiffness of the legs against the nominal one, which the controller assumes; damping ratios stay.
     pub stiffness: f64,
-    /// Damping against the nominal one.
+    /// Damping ratios against the nominal ones.
     pub damping: f64,
     /// Ticks between reading the gauges and the voltage, beyond none.
     pub delay: f64,

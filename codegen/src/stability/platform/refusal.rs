@@ -13,8 +13,10 @@ use crate::model::{Model, TaskSpace};
 const ADAPTED: [Law; 2] = [Law::Feedforward(Adapting::Ewma), Law::Feedforward(Adapting::Pcc)];
 const COMBINED: [Law; 3] =
     [Law::Combined(Adapting::Invhys), Law::Combined(Adapting::Ewma), Law::Combined(Adapting::Pcc)];
-/// Lowest factor offered.
+/// Lowest factor looked at.
 const LOWEST: f64 = 1e-4;
+/// What is offered is this part of the limit: at the limit itself nothing could be stable beside it.
+const SLACK: f64 = 0.95;
 /// Below these a margin is thin.
 const THIN_GAIN: f64 = 1.5;
 const THIN_DELAY: f64 = 0.5;
@@ -53,9 +55,10 @@ pub(super) fn check(
         bandwidths = largest.unwrap_or(LOWEST);
         findings.push(case.bandwidths(task, unstable, combined, largest));
     }
-    // Gains are judged beside bandwidths that are, or will be, accepted.
+    // Gains are judged beside bandwidths that are, or will be, accepted; the rule's are chosen beside accepted ones only.
     let beside = combined.scaled(1.0, bandwidths);
-    if let Some(unstable) = case.unstable(&COMBINED, &beside) {
+    let judged = task.gains.is_some() || findings.is_empty();
+    if let Some(unstable) = case.unstable(&COMBINED, &beside).filter(|_| judged) {
         let largest = case.largest(&COMBINED, |factor| beside.scaled(factor, 1.0));
         findings.push(case.gains("gains", task.gains.is_some(), unstable, &beside, largest));
     }
@@ -90,7 +93,7 @@ impl Case<'_> {
 
     fn largest(&self, laws: &[Law], tuning: impl Fn(f64) -> Tuning) -> Option<f64> {
         largest_stable(LOWEST, 1.0, 1.2, |factor| self.unstable(laws, &tuning(factor)).is_none())
-            .map(shown)
+            .map(|limit| shown(SLACK * limit))
             .filter(|factor| self.unstable(laws, &tuning(*factor)).is_none())
     }
 
@@ -121,7 +124,9 @@ impl Case<'_> {
             };
             worst_radius(&softer, BARE[0], &Tuning::NONE, self.conditions) <= LARGEST_RADIUS
         };
-        let largest = largest_stable(LOWEST, 1.0, 1.2, stable_with).map(shown).filter(|factor| stable_with(*factor));
+        let largest = largest_stable(LOWEST, 1.0, 1.2, stable_with)
+            .map(|limit| shown(SLACK * limit))
+            .filter(|factor| stable_with(*factor));
         let help = match largest {
             Some(factor) => format!(
                 "the measured force of the work piece, fed forward, closes a loop: it is stable up to {factor} times the \

@@ -1,10 +1,10 @@
 //! The platform between two ticks, sampled exactly: amplifier lag and six modes in modal coordinates.
 //!
 //! ```text
-//! τ ṗ = d − p ;   z̈ + κ diag(2 ζ ω) ż + (κ diag(ω²) + Vᵀ K_e V) z = κ diag(ω²) p
+//! τ ṗ = d − p ;   z̈ + √κ diag(2 ζ ω) ż + (κ diag(ω²) + Vᵀ K_e V) z = κ diag(ω²) p
 //! ```
-//! d is the leg motion asked for, z the pose, both in modal coordinates; κ scales the axial stiffness of the legs, and K_e
-//! is the stiffness of a work piece that the platform touches.
+//! d is the leg motion asked for, z the pose, both in modal coordinates; κ scales the axial stiffness of the legs while
+//! their damping ratios stay, and K_e is the stiffness of a work piece that the platform touches.
 
 use super::modes::ModalBasis;
 use crate::numerics::{Matrix, Matrix6, exponential};
@@ -37,7 +37,7 @@ impl Plant {
             continuous[(place, speed)] = frequency;
             continuous[(speed, drive)] = stiffness_factor * frequency;
             continuous[(speed, place)] = -stiffness_factor * frequency;
-            continuous[(speed, speed)] = -stiffness_factor * 2.0 * damping[i] * frequency;
+            continuous[(speed, speed)] = -libm::sqrt(stiffness_factor) * 2.0 * damping[i] * frequency;
             for j in 0..6 {
                 continuous[(speed, 6 + j)] -= contact[i][j] / frequency;
             }
