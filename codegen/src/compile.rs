@@ -7,13 +7,13 @@ use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::emit;
 use crate::everett::EverettTable;
 use crate::identify;
-use crate::ir::Ir;
-use crate::lower::{PoseNoise, lower, platform, pose_noise};
-use crate::model::Model;
+use crate::ir::{Ir, Setpoints};
+use crate::lower::{PoseNoise, lower, platform, pose_noise, scalar, setpoint};
+use crate::model::{Model, TrajectoryKind};
 use crate::spec::{self, SpecSource};
 use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
-use crate::workspace;
+use crate::{waveform, workspace};
 
 /// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
 /// factor, a wrong unit is 1000.
@@ -64,12 +64,16 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
     // Stability and records do not depend on each other: report both.
     let stability = check_stability(&model).map_err(|found| findings.extend(found));
     let identified = identify_records(&source, &model).map_err(|found| findings.extend(found));
-    let (Ok((margins, design)), Ok(identified)) = (stability, identified) else {
+    let setpoints = lower_setpoints(&source, &model).map_err(|found| findings.extend(found));
+    let (Ok((margins, design)), Ok(mut identified), Ok(setpoints)) = (stability, identified, setpoints) else {
         return Err(Refused { source: Some(source), findings });
     };
     findings.extend(identified.findings);
     findings.extend(design.iter().flat_map(|design| design.findings.clone()));
-    let lowered = lower(&model, design.as_ref(), &identified.tables, &digest(&source, &identified.texts));
+    findings.extend(setpoints.warnings);
+    identified.texts.extend(setpoints.texts);
+    let task = design.as_ref().zip(setpoints.setpoints);
+    let lowered = lower(&model, task, &identified.tables, &digest(&source, &identified.texts));
     let (ir, pose_noise) = match lowered.and_then(|ir| Ok((ir, pose_noise(&model)?))) {
         Ok(both) => both,
         Err(found) => {
@@ -90,6 +94,42 @@ fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<Design>), V
             let rest = RestDynamics::of(&platform(model)?);
             stability::platform::design(model, task, &rest).map(|design| (None, Some(design)))
         }
+    }
+}
+
+/// What set-points yield.
+#[derive(Default)]
+struct LoweredSetpoints {
+    setpoints: Option<Setpoints>,
+    warnings: Vec<Diagnostic>,
+    /// Name and text of each table of poses, for the digest.
+    texts: Vec<(String, String)>,
+}
+
+fn lower_setpoints(source: &SpecSource, model: &Model) -> Result<LoweredSetpoints, Vec<Diagnostic>> {
+    let Some(task) = &model.task_space else { return Ok(LoweredSetpoints::default()) };
+    let mut texts = Vec::new();
+    let mut errors = Vec::new();
+    let mut waveforms = Vec::new();
+    for trajectory in &task.trajectories {
+        let TrajectoryKind::Waveform { file, period, .. } = &trajectory.kind else {
+            waveforms.push(None);
+            continue;
+        };
+        let read = waveform::read_file(&source.dir.join(file), file);
+        let parsed = read.and_then(|text| {
+            let parsed = waveform::parse(&text, file, *period);
+            texts.push((file.clone(), text));
+            parsed
+        });
+        waveforms.push(parsed.map_err(|found| errors.extend(found)).ok());
+    }
+    match setpoint::lower(model, task, &waveforms, scalar(model)) {
+        Ok((setpoints, warnings)) if errors.is_empty() => {
+            Ok(LoweredSetpoints { setpoints: Some(setpoints), warnings, texts })
+        }
+        Ok((_, warnings)) => Err(errors.into_iter().chain(warnings).collect()),
+        Err(found) => Err(errors.into_iter().chain(found).collect()),
     }
 }
 
