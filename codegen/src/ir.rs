@@ -335,6 +335,8 @@ pub struct ControlLaw {
     pub period: f64,
     /// 1/k_a, m/N.
     pub compliance: f64,
+    /// J, m/m and m/rad.
+    pub jacobian: [[f64; 6]; LEGS],
     /// J⁻ᵀ/k_a, m/N and 1/N.
     pub wrench_to_legs: [[f64; 6]; LEGS],
     /// Leg forces at rest, N.
@@ -370,11 +372,11 @@ pub struct Notch {
     pub sections: [Section; 6],
 }
 
-/// A biquad with a₀ = 1.
+/// 1 − g (1 − z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Section {
-    /// b₀, b₁, b₂.
-    pub b: [f64; 3],
+    /// g.
+    pub depth: f64,
     /// a₁, a₂.
     pub a: [f64; 2],
 }
