@@ -123,8 +123,6 @@ codes! {
         "There are fewer than two converter codes to a cell of the Preisach grid.";
     WORKSPACE_TOO_LARGE = "E0412", "workspace too large for the legs",
         "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
-    PROBE_ALONG_PLANE = "E0430", "gauge along its target plane",
-        "A gauge sees its target move along its line; if the line lies in the plane, or nearly so, it sees nothing of that.";
     PROBE_MISSES = "E0431", "gauge that misses the platform",
         "The line of the gauge meets its target plane far from the platform: most likely a frame is mistaken. The line is in {B}, the plane in {P}, whose origin is P_C.";
     GAUGES_BLIND = "E0432", "gauges that leave a motion unseen",
