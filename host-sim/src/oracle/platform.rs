@@ -395,7 +395,7 @@ impl PlatformOracle {
 }
 
 /// The emitted controller's interface.
-fn description() -> Description {
+pub(crate) fn description() -> Description {
     let six = |stems: &[&str]| -> Vec<String> {
         stems.iter().flat_map(|stem| (0..LEGS).map(move |k| format!("{stem}[{k}]"))).collect()
     };

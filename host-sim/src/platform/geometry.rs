@@ -18,22 +18,40 @@ pub struct Geometry {
     pub height: f64,
 }
 
+/// sin and cos. Piezo platforms turn by less than a milliradian, where a short series is exact to the last bit or so.
+fn sincos(angle: f64) -> (f64, f64) {
+    if angle.abs() > 1e-2 {
+        return libm::sincos(angle);
+    }
+    let square = angle * angle;
+    let sin = angle - angle * square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0));
+    let cos = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square / 720.0));
+    (sin, cos)
+}
+
+/// R and T(θ) of the angles [θx, θy, θz], rad.
+fn attitude(angles: Three) -> (Matrix3, Matrix3) {
+    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(sincos);
+    (
+        [
+            [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+            [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+            [-sy, cy * sx, cy * cx],
+        ],
+        [[cz * cy, -sz, 0.0], [sz * cy, cz, 0.0], [-sy, 0.0, 1.0]],
+    )
+}
+
 /// R of the angles [θx, θy, θz], rad.
 #[must_use]
 pub fn rotation(angles: Three) -> Matrix3 {
-    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(libm::sincos);
-    [
-        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
-        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
-        [-sy, cy * sx, cy * cx],
-    ]
+    attitude(angles).0
 }
 
 /// T(θ) of ω = T(θ) θ̇, ω in {B}: the axes about which the three angles turn, as columns.
 #[must_use]
 pub fn rate_matrix(angles: Three) -> Matrix3 {
-    let [_, (sy, cy), (sz, cz)] = angles.map(libm::sincos);
-    [[cz * cy, -sz, 0.0], [sz * cy, cz, 0.0], [-sy, 0.0, 1.0]]
+    attitude(angles).1
 }
 
 /// ∂(P_C + R a)/∂h of a point fixed to the platform, with `arm` = R a in {B}, and T(θ).
@@ -121,8 +139,7 @@ impl Geometry {
     /// Δl and J together.
     #[must_use]
     pub fn extensions_and_jacobian(&self, pose: &Six) -> (Six, Matrix6) {
-        let turn = rotation(angles(pose));
-        let rates = rate_matrix(angles(pose));
+        let (turn, rates) = attitude(angles(pose));
         let mut extensions = [0.0; 6];
         let mut jacobian = [[0.0; 6]; 6];
         for leg in 0..6 {
@@ -154,6 +171,15 @@ mod tests {
 
     fn geometry() -> Geometry {
         Geometry::hexagonal([0.15, 0.1], [0.012 * PI; 2], 0.18)
+    }
+
+    #[test]
+    fn the_series_is_sine_and_cosine() {
+        for n in -1000..=1000 {
+            let angle = 1e-5 * f64::from(n);
+            let (sin, cos) = sincos(angle);
+            assert!((sin - libm::sin(angle)).abs() <= 2e-18 && (cos - libm::cos(angle)).abs() <= 2e-16, "{angle}");
+        }
     }
 
     #[test]

@@ -34,7 +34,7 @@ impl Actuator {
     }
 
     /// Free displacement from rest, m.
-    fn from_rest(&self) -> f64 {
+    fn free_displacement(&self) -> f64 {
         (self.displacement - self.rest) * 1e-6
     }
 }
@@ -134,7 +134,7 @@ impl Machine {
     /// d_i: what each leg would have moved without load since rest, m.
     #[must_use]
     pub fn free_displacements(&self) -> Six {
-        self.actuators.each_ref().map(Actuator::from_rest)
+        self.actuators.each_ref().map(Actuator::free_displacement)
     }
 
     /// Voltages of the stacks, V.
