@@ -7,12 +7,13 @@ use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::emit;
 use crate::everett::EverettTable;
 use crate::identify;
-use crate::ir::Ir;
-use crate::lower::lower;
-use crate::model::Model;
+use crate::ir::{Ir, Setpoints};
+use crate::lower::{PoseNoise, lower, platform, pose_noise, scalar, setpoint};
+use crate::model::{Model, TrajectoryKind};
 use crate::spec::{self, SpecSource};
+use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
-use crate::workspace;
+use crate::{waveform, workspace};
 
 /// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
 /// factor, a wrong unit is 1000.
@@ -27,8 +28,12 @@ pub struct Compiled {
     pub model: Model,
     /// How each record was identified, in the order of `hysteresis.records`; none for one that is a table already.
     pub records: Vec<Option<identify::Report>>,
-    /// Stability of the adaptation.
-    pub margins: Margins,
+    /// Stability of the adaptation of six legs with their own gauges.
+    pub margins: Option<Margins>,
+    /// Modes, tuning and margins of a controller in task space.
+    pub design: Option<Design>,
+    /// Noise of the measured pose, with gauges that see the platform.
+    pub pose_noise: Option<PoseNoise>,
     /// Every constant of the controller.
     pub ir: Ir,
     /// Files of the workspace: path, text.
@@ -57,14 +62,20 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
         return Err(Refused { source: Some(source), findings });
     };
     // Stability and records do not depend on each other: report both.
-    let margins = stability::check(&model).map_err(|found| findings.extend(found));
+    let stability = check_stability(&model).map_err(|found| findings.extend(found));
     let identified = identify_records(&source, &model).map_err(|found| findings.extend(found));
-    let (Ok(margins), Ok(identified)) = (margins, identified) else {
+    let setpoints = lower_setpoints(&source, &model).map_err(|found| findings.extend(found));
+    let (Ok((margins, design)), Ok(mut identified), Ok(setpoints)) = (stability, identified, setpoints) else {
         return Err(Refused { source: Some(source), findings });
     };
     findings.extend(identified.findings);
-    let ir = match lower(&model, &identified.tables, &digest(&source, &identified.texts)) {
-        Ok(ir) => ir,
+    findings.extend(design.iter().flat_map(|design| design.findings.clone()));
+    findings.extend(setpoints.warnings);
+    identified.texts.extend(setpoints.texts);
+    let task = design.as_ref().zip(setpoints.setpoints);
+    let lowered = lower(&model, task, &identified.tables, &digest(&source, &identified.texts));
+    let (ir, pose_noise) = match lowered.and_then(|ir| Ok((ir, pose_noise(&model)?))) {
+        Ok(both) => both,
         Err(found) => {
             findings.extend(found);
             return Err(Refused { source: Some(source), findings });
@@ -72,7 +83,54 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
     };
     let files = workspace::files(&ir, &emit::emit(&ir));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
-    Ok(Compiled { source, model, records: identified.reports, margins, ir, files, findings })
+    Ok(Compiled { source, model, records: identified.reports, margins, design, pose_noise, ir, files, findings })
+}
+
+/// Legs with their own gauges adapt each on its own; a controller in task space closes its loops over the platform's modes.
+fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<Design>), Vec<Diagnostic>> {
+    match &model.task_space {
+        None => stability::check(model).map(|margins| (Some(margins), None)),
+        Some(task) => {
+            let rest = RestDynamics::of(&platform(model)?);
+            stability::platform::design(model, task, &rest).map(|design| (None, Some(design)))
+        }
+    }
+}
+
+/// What set-points yield.
+#[derive(Default)]
+struct LoweredSetpoints {
+    setpoints: Option<Setpoints>,
+    warnings: Vec<Diagnostic>,
+    /// Name and text of each table of poses, for the digest.
+    texts: Vec<(String, String)>,
+}
+
+fn lower_setpoints(source: &SpecSource, model: &Model) -> Result<LoweredSetpoints, Vec<Diagnostic>> {
+    let Some(task) = &model.task_space else { return Ok(LoweredSetpoints::default()) };
+    let mut texts = Vec::new();
+    let mut errors = Vec::new();
+    let mut waveforms = Vec::new();
+    for trajectory in &task.trajectories {
+        let TrajectoryKind::Waveform { file, period, .. } = &trajectory.kind else {
+            waveforms.push(None);
+            continue;
+        };
+        let read = waveform::read_file(&source.dir.join(file), file);
+        let parsed = read.and_then(|text| {
+            let parsed = waveform::parse(&text, file, *period);
+            texts.push((file.clone(), text));
+            parsed
+        });
+        waveforms.push(parsed.map_err(|found| errors.extend(found)).ok());
+    }
+    match setpoint::lower(model, task, &waveforms, scalar(model)) {
+        Ok((setpoints, warnings)) if errors.is_empty() => {
+            Ok(LoweredSetpoints { setpoints: Some(setpoints), warnings, texts })
+        }
+        Ok((_, warnings)) => Err(errors.into_iter().chain(warnings).collect()),
+        Err(found) => Err(errors.into_iter().chain(found).collect()),
+    }
 }
 
 /// What the records of a spec yield.

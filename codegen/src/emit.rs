@@ -7,6 +7,7 @@
 //! task space lies in [`legs`] and [`platform`].
 
 mod description;
+mod dynamics;
 mod format;
 mod hysteresis;
 mod identity;
@@ -16,6 +17,9 @@ mod limits;
 mod literal;
 mod manifest;
 mod platform;
+mod sensing;
+mod setpoint;
+mod stage_type;
 
 use std::collections::BTreeMap;
 
@@ -30,6 +34,7 @@ pub type EmittedCrate = BTreeMap<String, String>;
 #[must_use]
 pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
+        ("src/dynamics.rs", dynamics::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
@@ -49,6 +54,7 @@ fn legs_sources(ir: &Ir) -> Vec<(&'static str, TokenStream)> {
     vec![
         ("src/config.rs", legs::config::emit(ir)),
         ("src/lib.rs", legs::crate_root::emit(ir)),
+        ("src/stages.rs", legs::stages::emit()),
         ("src/state.rs", legs::state::emit(ir)),
         ("src/step.rs", legs::step::emit(ir)),
         ("src/words.rs", legs::words::emit(ir)),
@@ -59,6 +65,9 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
     vec![
         ("src/config.rs", platform::config::emit(ir, &task.defaults)),
         ("src/lib.rs", platform::crate_root::emit(ir)),
+        ("src/sensing.rs", sensing::emit(ir.scalar, &task.sensing)),
+        ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
+        ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),
         ("src/step.rs", platform::step::emit()),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),

@@ -4,6 +4,8 @@
 //! Numbers are already rounded to the controller's scalar, so that the text is the constant.
 
 use serde::Serialize;
+use specgen_runtime::Platform;
+use specgen_runtime::dynamics::{LANES, LegGroup};
 
 /// Number of legs.
 pub const LEGS: usize = 6;
@@ -60,6 +62,8 @@ pub struct Ir {
     pub scalar: Scalar,
     /// Pose to leg displacements.
     pub kinematics: Kinematics,
+    /// Motion to leg forces.
+    pub dynamics: Dynamics,
     /// Preisach tables.
     pub hysteresis: Hysteresis,
     /// Converter and limits.
@@ -69,6 +73,7 @@ pub struct Ir {
     /// Config at start-up.
     pub defaults: Defaults,
     /// Control in task space; none for six legs with their own gauges.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub task_space: Option<TaskSpace>,
 }
 
@@ -89,6 +94,137 @@ pub struct Kinematics {
     pub newton_steps: u32,
     /// Largest |Δl| over the accepted poses, m (bound; sizes the Newton steps).
     pub largest_displacement: f64,
+    /// J⁻¹ of the legs at rest: pose coordinates (rows) per leg displacement (columns), m/m and rad/m.
+    pub inverse_jacobian: [[f64; 6]; LEGS],
+    /// Corrections of the forward kinematics over the accepted poses.
+    pub corrections: u32,
+}
+
+/// Inverse dynamics: the constants of [`specgen_runtime::Platform`], where each is explained.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Dynamics {
+    /// The legs in the order of elimination.
+    pub legs: [DynamicsLeg; LEGS],
+    /// Leg at each place of that order.
+    pub order: [usize; LEGS],
+    /// Equation that each place is solved from.
+    pub rows: [usize; LEGS],
+    /// Base joints in one plane.
+    pub flat_base: bool,
+    /// Platform joints in the plane z = 0.
+    pub flat_platform: bool,
+    /// Height of P_C at rest above that of `base`, m.
+    pub base_depth: f64,
+    /// Joint that moments are taken about, m.
+    pub pole: [f64; 3],
+    /// Platform and point masses at its joints, kg.
+    pub mass: f64,
+    /// About P_C, kg m.
+    pub first_moment: [f64; 3],
+    /// About the pole, kg m.
+    pub pole_moment: [f64; 3],
+    /// About P_C and the pole, kg m².
+    pub second_moment: [[f64; 3]; 3],
+    /// q, kg m.
+    pub extensible_moment: f64,
+    /// J, kg m².
+    pub leg_inertia: f64,
+    /// (q − σ) g, N m.
+    pub leg_weight_moment: f64,
+    /// g, m/s².
+    pub gravity: f64,
+    /// Smallest over largest pivot of the elimination, the worst of the declared workspace; moments in joint radii.
+    pub pivot_ratio: f64,
+}
+
+/// Geometry of one leg in [`Dynamics`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DynamicsLeg {
+    /// From the base joint, base axes, m.
+    pub base: [f64; 3],
+    /// P_i, m.
+    pub joint: [f64; 3],
+    /// P_i from the pole, m.
+    pub arm: [f64; 3],
+    /// r₀, m.
+    pub rest: [f64; 3],
+    /// l₀, m.
+    pub length: f64,
+    /// 1/l₀, 1/m.
+    pub inverse_length: f64,
+    /// 1/(2 l₀²), 1/m².
+    pub half_inverse_square: f64,
+}
+
+impl Dynamics {
+    /// As the runtime takes it.
+    #[must_use]
+    pub fn platform(&self) -> Platform<f64> {
+        let lanes = |group: usize, value: &dyn Fn(&DynamicsLeg) -> f64| {
+            std::array::from_fn(|lane| value(&self.legs[group * LANES + lane]))
+        };
+        let vectors = |group: usize, value: &dyn Fn(&DynamicsLeg) -> [f64; 3]| {
+            std::array::from_fn(|axis| lanes(group, &|leg| value(leg)[axis]))
+        };
+        Platform {
+            groups: std::array::from_fn(|group| LegGroup {
+                base: vectors(group, &|leg| leg.base),
+                joint: vectors(group, &|leg| leg.joint),
+                arm: vectors(group, &|leg| leg.arm),
+                rest: vectors(group, &|leg| leg.rest),
+                length: lanes(group, &|leg| leg.length),
+                inverse_length: lanes(group, &|leg| leg.inverse_length),
+                half_inverse_square: lanes(group, &|leg| leg.half_inverse_square),
+            }),
+            order: self.order,
+            rows: self.rows,
+            flat_base: self.flat_base,
+            flat_platform: self.flat_platform,
+            base_depth: self.base_depth,
+            pole: self.pole,
+            mass: self.mass,
+            first_moment: self.first_moment,
+            pole_moment: self.pole_moment,
+            second_moment: self.second_moment,
+            extensible_moment: self.extensible_moment,
+            leg_inertia: self.leg_inertia,
+            leg_weight_moment: self.leg_weight_moment,
+            gravity: self.gravity,
+        }
+    }
+
+    /// Every number rounded to the scalar, but for the pivot ratio, which is a finding and no constant.
+    #[must_use]
+    pub fn rounded(&self, scalar: Scalar) -> Self {
+        let number = |value: f64| scalar.round(value);
+        let vector = |value: [f64; 3]| value.map(number);
+        Self {
+            legs: self.legs.clone().map(|leg| DynamicsLeg {
+                base: vector(leg.base),
+                joint: vector(leg.joint),
+                arm: vector(leg.arm),
+                rest: vector(leg.rest),
+                length: number(leg.length),
+                inverse_length: number(leg.inverse_length),
+                half_inverse_square: number(leg.half_inverse_square),
+            }),
+            order: self.order,
+            rows: self.rows,
+            flat_base: self.flat_base,
+            flat_platform: self.flat_platform,
+            base_depth: number(self.base_depth),
+            pole: vector(self.pole),
+            mass: number(self.mass),
+            first_moment: vector(self.first_moment),
+            pole_moment: vector(self.pole_moment),
+            second_moment: self.second_moment.map(vector),
+            extensible_moment: number(self.extensible_moment),
+            leg_inertia: number(self.leg_inertia),
+            leg_weight_moment: number(self.leg_weight_moment),
+            gravity: number(self.gravity),
+            pivot_ratio: self.pivot_ratio,
+        }
+    }
 }
 
 /// Preisach tables.
@@ -182,6 +318,10 @@ pub enum Setpoint {
 /// Control in task space.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TaskSpace {
+    /// Gauges to pose and its rate.
+    pub sensing: Sensing,
+    /// Set-points: limits, user frames, trajectories.
+    pub setpoints: Setpoints,
     /// Constants of the control law.
     pub law: ControlLaw,
     /// Config at start-up.
@@ -295,4 +435,222 @@ pub struct PlatformDefaults {
     pub environment_stiffness: [f64; 6],
     /// h_e.
     pub environment_rest: [f64; 6],
+}
+
+/// Gauges to pose and its rate. The constants are those of `specgen_runtime::sensing::Gauges`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sensing {
+    /// n of each gauge, unit, {B}.
+    pub direction: [[f64; 3]; 6],
+    /// m of each gauge: normal of its plane over n·normal, {P}.
+    pub normal: [[f64; 3]; 6],
+    /// m × n of each gauge.
+    pub skew: [[f64; 3]; 6],
+    /// c of each gauge: where its line pierces the plane at rest, {P}, m.
+    pub pierced: [[f64; 3]; 6],
+    /// J⁻¹ at rest: pose coordinates (rows) per reading (columns), m/m and rad/m.
+    pub inverse: [[f64; 6]; 6],
+    /// J⁻¹ of the second-degree terms: pose coordinates (rows) per product of two turns (columns).
+    pub curvature: [[f64; 6]; 6],
+    /// Passes after the first guess.
+    pub passes: u32,
+    /// What the passes leave over the accepted poses, in exact arithmetic: m, rad.
+    pub remainder: [f64; 2],
+    /// Coefficients of asin x / x in x² after the leading 1.
+    pub arc_sine: Vec<f64>,
+    /// Coefficients of atan x / x in x² after the leading 1.
+    pub arc_tangent: Vec<f64>,
+    /// Polynomial of each gauge from its raw word to m, lowest power first, all of one length; none: the words are m.
+    pub calibration: Option<[Vec<f64>; 6]>,
+    /// Raw words that are believed, per gauge, in the unit of the word.
+    pub raw_limits: [[f64; 2]; 6],
+    /// exp(−ω_c T) of the rate filter.
+    pub rate_keep: f64,
+    /// (1 − exp(−ω_c T))/T of the rate filter, 1/s.
+    pub rate_gain: f64,
+}
+
+/// Constants of `specgen_runtime::setpoint::Plan`; the workspace is in [`Bounds`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Setpoints {
+    /// T_s, s.
+    pub period: f64,
+    /// 1/T_s, 1/s.
+    pub rate: f64,
+    /// 1/T_s², 1/s².
+    pub square_rate: f64,
+    /// Bias and offset of the work frame, m and rad.
+    pub bias: [f64; 6],
+    /// The user's coordinates of the bias, m and rad.
+    pub home: [f64; 6],
+    /// 1/(V T_s) of moves, 1/m and 1/rad.
+    pub speed_limit: [f64; 6],
+    /// 1/(A T_s²).
+    pub acceleration_limit: [f64; 6],
+    /// 1/(J T_s³).
+    pub jerk_limit: [f64; 6],
+    /// Largest streamed step, m and rad.
+    pub stream_step: [f64; 6],
+    /// Largest streamed rate, per s.
+    pub stream_rate: [f64; 6],
+    /// Largest streamed acceleration, per s².
+    pub stream_acceleration: [f64; 6],
+    /// Ticks after which a stream is stale.
+    pub stale_ticks: u32,
+    /// Coordinates of the user.
+    pub frames: Frames,
+    /// By the word `selector`.
+    pub trajectories: Vec<Trajectory>,
+}
+
+/// Coordinates of the user.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Frames {
+    /// Those of the platform.
+    Parallel,
+    /// Rotations about a tool point.
+    Tool {
+        /// In {P}, m.
+        point: [f64; 3],
+        /// Largest angle that is meant, rad.
+        largest_angle: f64,
+    },
+    /// Rotations about a tool point, along axes of its own.
+    Work {
+        /// Columns are the axes in {B}.
+        axes: [[f64; 3]; 3],
+        /// In {P}, m.
+        point: [f64; 3],
+        /// Largest angle that is meant, rad.
+        largest_angle: f64,
+    },
+}
+
+/// A trajectory that the controller can play.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trajectory {
+    /// Its name in the spec.
+    pub name: String,
+    /// What it is.
+    pub path: Path,
+}
+
+/// Poses over time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Path {
+    /// Analytic pieces.
+    Segments {
+        /// First pose, m and rad.
+        start: [f64; 6],
+        /// In the order of time.
+        segments: Vec<Segment>,
+        /// First tick not before the end.
+        ticks: u32,
+        /// Last pose, m and rad.
+        end: [f64; 6],
+    },
+    /// Rows joined by a cubic spline.
+    Table {
+        /// Nodes; the first again at the end if it repeats.
+        rows: Vec<Row>,
+        /// Ticks from row to row.
+        row_ticks: u32,
+        /// 1/row_ticks.
+        per_tick: f64,
+        /// Rows per s.
+        per_second: f64,
+        /// 6 · (rows per s)².
+        bend_rate: f64,
+        /// Begins again after the last row.
+        repeat: bool,
+    },
+}
+
+/// Line and growing sinusoid on every axis; w = 0..1 over the segment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Segment {
+    /// Tick at which it begins.
+    pub first: u32,
+    /// w per tick.
+    pub per_tick: f64,
+    /// w per s.
+    pub per_second: f64,
+    /// Phase at `first`, turn/2⁶⁴.
+    pub phase: u64,
+    /// Phase per tick, turn/2⁶⁴.
+    pub phase_step: u64,
+    /// rad/s.
+    pub angular: f64,
+    /// By coordinate.
+    pub axes: [SegmentAxis; 6],
+}
+
+/// place + slope w + (a + b w) sin + (c + d w) cos, m or rad.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SegmentAxis {
+    /// At w = 0.
+    pub place: f64,
+    /// Over w = 0..1.
+    pub slope: f64,
+    /// a, b.
+    pub sine: [f64; 2],
+    /// c, d.
+    pub cosine: [f64; 2],
+}
+
+/// Node of a spline.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Row {
+    /// m and rad.
+    pub pose: [f64; 6],
+    /// Second derivative · (row time)²/6.
+    pub bend: [f64; 6],
+}
+
+impl Frames {
+    /// With every constant rounded to `scalar`.
+    #[must_use]
+    pub fn rounded(&self, scalar: Scalar) -> Self {
+        let round = |value: f64| scalar.round(value);
+        match *self {
+            Self::Parallel => Self::Parallel,
+            Self::Tool { point, largest_angle } => {
+                Self::Tool { point: point.map(round), largest_angle: round(largest_angle) }
+            }
+            Self::Work { axes, point, largest_angle } => Self::Work {
+                axes: axes.map(|row| row.map(round)),
+                point: point.map(round),
+                largest_angle: round(largest_angle),
+            },
+        }
+    }
+}
+
+impl Path {
+    /// With every constant rounded to `scalar`.
+    #[must_use]
+    pub fn rounded(mut self, scalar: Scalar) -> Self {
+        let round = |value: &mut f64| *value = scalar.round(*value);
+        match &mut self {
+            Self::Segments { start, segments, end, .. } => {
+                start.iter_mut().chain(end).for_each(round);
+                for segment in segments {
+                    [&mut segment.per_tick, &mut segment.per_second, &mut segment.angular].into_iter().for_each(round);
+                    for axis in &mut segment.axes {
+                        [&mut axis.place, &mut axis.slope].into_iter().for_each(round);
+                        axis.sine.iter_mut().chain(&mut axis.cosine).for_each(round);
+                    }
+                }
+            }
+            Self::Table { rows, per_tick, per_second, bend_rate, .. } => {
+                [per_tick, per_second, bend_rate].into_iter().for_each(round);
+                for row in rows {
+                    row.pose.iter_mut().chain(&mut row.bend).for_each(round);
+                }
+            }
+        }
+        self
+    }
 }

@@ -20,6 +20,7 @@ mod reference;
 mod schema;
 mod source;
 mod syntax;
+mod task_space;
 mod text;
 mod value;
 

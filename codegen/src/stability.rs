@@ -9,6 +9,7 @@
 //!    the integrator meets the resonance.
 
 mod jury;
+pub mod platform;
 mod sampled;
 
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};

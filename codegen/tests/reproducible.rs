@@ -67,8 +67,7 @@ fn the_folder_and_the_name_of_the_spec_do_not_matter() {
 
     fs::create_dir_all(folder.path("deep er/ünïcode")).unwrap();
     fs::create_dir(folder.path("deep er/ünïcode/records")).unwrap();
-    for (from, to) in
-        [("legs.toml", "my platform.toml"), ("records/reference-forc.csv", "records/reference-forc.csv")]
+    for (from, to) in [("legs.toml", "my platform.toml"), ("records/reference-forc.csv", "records/reference-forc.csv")]
     {
         fs::copy(folder.path(from), folder.path("deep er/ünïcode").join(to)).unwrap();
     }

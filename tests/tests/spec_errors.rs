@@ -9,10 +9,10 @@ mod support {
 }
 
 use specgen::diagnostic::{Diagnostic, codes, render};
-use specgen::spec::keys::{Item, Key, Presence, SECTIONS, Section, Shape};
+use specgen::spec::keys::{Item, Key, Kind, Presence, SECTIONS, Section, Shape};
 use specgen::spec::{self, SpecSource};
 use specgen::stability;
-use support::specs::{errors, every_key, folder_with_records, line_of, source, spec_files};
+use support::specs::{Choice, LEGS, PLATFORM, errors, every_key, folder_with_records, line_of, source, spec_files};
 
 #[test]
 fn every_spec_of_the_repository_is_accepted_without_a_warning_and_stable() {
@@ -44,25 +44,39 @@ struct Bench {
 }
 
 impl Bench {
-    /// The text with the line of `section`.`key` replaced, and the number of that line.
+    /// The kind of spec in which the key stands.
+    fn choice(section: &Section, key: &Key) -> Choice {
+        match (section.name, key.presence) {
+            ("adaptation", _) if key.name.ends_with("_bandwidth") => Choice { weights: false, ..LEGS },
+            ("adaptation" | "controller", _) => LEGS,
+            (_, Presence::Form(form)) => Choice { joints: form.contains("one by one"), ..PLATFORM },
+            ("trajectory", _) => Choice { waveform: matches!(key.name, "file" | "period" | "repeat"), ..PLATFORM },
+            _ => PLATFORM,
+        }
+    }
+
+    /// The text with the first line of `section`.`key` replaced, and the number of that line.
     fn with(section: &Section, key: &Key, lines: &str) -> (String, usize) {
-        let mut text = every_key();
-        // The bandwidths are not in the text: they take the line of the weight.
-        let stands_for = match key.presence {
-            Presence::InsteadOf(other) if key.name.ends_with("_bandwidth") => other,
-            _ => key.name,
-        };
-        let header = if section.name.is_empty() { String::new() } else { format!("[{}]\n", section.name) };
+        let mut text = Self::choice(section, key).text();
+        let header = if section.name.is_empty() { String::new() } else { section.header() + "\n" };
         let from = text.find(&header).expect("section") + header.len();
-        let start = if text[from..].starts_with(&format!("{stands_for} = ")) {
+        let start = if text[from..].starts_with(&format!("{} = ", key.name)) {
             from
         } else {
-            from + text[from..].find(&format!("\n{stands_for} = ")).expect("key") + 1
+            from + text[from..].find(&format!("\n{} = ", key.name)).expect("key") + 1
         };
         let end = start + text[start..].find('\n').expect("line end") + 1;
         text.replace_range(start..end, lines);
         let line = 1 + text[..start].matches('\n').count();
         (text, line)
+    }
+
+    /// Key path of the first table's key.
+    fn path(section: &Section, name: &str) -> String {
+        match section.kind {
+            Kind::Repeated(..) => format!("{}[0].{name}", section.name),
+            Kind::Plain | Kind::Optional => section.path(name),
+        }
     }
 
     fn findings(&self, text: &str) -> Vec<Diagnostic> {
@@ -93,8 +107,19 @@ impl Bench {
 fn items(key: &Key) -> Vec<Item> {
     match key.shape {
         Shape::One(item) => vec![item],
-        Shape::List(items) => items.to_vec(),
+        Shape::List(items) | Shape::Leading(_, items) => items.to_vec(),
+        // Of the first row; the rows are alike.
+        Shape::Rows(_, items) => items.to_vec(),
         Shape::Records => Vec::new(),
+    }
+}
+
+/// Key path of the value `index` of the key at `path`.
+fn item_path(key: &Key, path: &str, index: usize) -> String {
+    match key.shape {
+        Shape::One(_) => path.to_owned(),
+        Shape::Rows(..) => format!("{path}[0][{index}]"),
+        Shape::List(_) | Shape::Leading(..) | Shape::Records => format!("{path}[{index}]"),
     }
 }
 
@@ -108,15 +133,31 @@ fn line_with(key: &Key, index: usize, literal: &str) -> String {
             values[index] = literal;
             format!("{} = [{}]\n", key.name, values.join(", "))
         }
+        // Higher powers than the example's stand before it as zero.
+        Shape::Leading(_, items) => {
+            let zero = |item: &Item| match item {
+                Item::Quantity { unit, .. } => format!("\"0 {unit}\""),
+                _ => panic!("a quantity is expected"),
+            };
+            let mut values: Vec<String> = items.iter().take(index.max(1) + 1).map(zero).collect();
+            values[index] = literal.to_owned();
+            format!("{} = [{}]\n", key.name, values.join(", "))
+        }
+        Shape::Rows(..) => {
+            let (row, rest) = key.example[2..].split_once(']').expect("rows");
+            let mut values: Vec<&str> = row.split(", ").collect();
+            values[index] = literal;
+            format!("{} = [[{}]{rest}\n", key.name, values.join(", "))
+        }
     }
 }
 
 /// Bad literals for an item: what is wrong, the text, the code.
 fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
-    let mut bad = vec![
-        ("wrong type", "true".to_owned(), codes::WRONG_TYPE),
-        ("table", "{ a = 1 }".to_owned(), codes::WRONG_TYPE),
-    ];
+    let mut bad = vec![("table", "{ a = 1 }".to_owned(), codes::WRONG_TYPE)];
+    if !matches!(item, Item::Flag) {
+        bad.push(("wrong type", "true".to_owned(), codes::WRONG_TYPE));
+    }
     match item {
         Item::Quantity { unit, range, .. } => {
             bad.push(("no unit", "3".to_owned(), codes::UNIT_MISSING));
@@ -145,7 +186,7 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
             bad.push(("overflow", "1e999".to_owned(), codes::NOT_FINITE));
             bad.push(("underflow", "1e-999".to_owned(), codes::NOT_FINITE));
             bad.push(("too large", format!("{:?}", range.max * 1.01), codes::OUT_OF_RANGE));
-            bad.push(("too small", "-0.001".to_owned(), codes::OUT_OF_RANGE));
+            bad.push(("too small", format!("{:?}", range.min - 0.001), codes::OUT_OF_RANGE));
         }
         Item::Integer(min, max) => {
             bad.push(("text", format!("\"{min}\""), codes::WRONG_TYPE));
@@ -159,6 +200,16 @@ fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
             bad.push(("unknown word", "\"other\"".to_owned(), codes::UNKNOWN_CHOICE));
             bad.push(("capitals", format!("\"{}\"", words[0].to_uppercase()), codes::UNKNOWN_CHOICE));
             bad.push(("number", "1".to_owned(), codes::WRONG_TYPE));
+        }
+        Item::Flag => {
+            bad.push(("text", "\"true\"".to_owned(), codes::WRONG_TYPE));
+            bad.push(("number", "1".to_owned(), codes::WRONG_TYPE));
+        }
+        Item::File => {
+            bad.push(("number", "1".to_owned(), codes::WRONG_TYPE));
+            for name in ["", " ", "/etc/hosts", "C:/a.csv", "a\\\\b.csv"] {
+                bad.push(("not relative", format!("\"{name}\""), codes::RECORD_PATH));
+            }
         }
         Item::Name => {
             for name in ["", "1st", "two words", "größe", "a/b"] {
@@ -176,7 +227,7 @@ fn every_key_is_checked_in_every_way() {
     assert!(errors(&bench.findings(&every_key())).is_empty());
     for section in SECTIONS {
         for key in section.keys {
-            let path = section.path(key.name);
+            let path = Bench::path(section, key.name);
             let case = |lines: String, code, about: &str, what| Case {
                 key,
                 path: &path,
@@ -186,7 +237,7 @@ fn every_key_is_checked_in_every_way() {
                 what,
             };
             for (i, item) in items(key).into_iter().enumerate() {
-                let about = if matches!(key.shape, Shape::List(_)) { format!("{path}[{i}]") } else { path.clone() };
+                let about = item_path(key, &path, i);
                 for (what, literal, code) in bad_literals(item) {
                     bench.check(section, case(line_with(key, i, &literal), code, &about, what), 0);
                 }
@@ -194,8 +245,17 @@ fn every_key_is_checked_in_every_way() {
             if !matches!(key.shape, Shape::One(_)) {
                 bench.check(section, case(format!("{} = 1\n", key.name), codes::WRONG_TYPE, &path, "not an array"), 0);
             }
-            if matches!(key.shape, Shape::List(_)) {
-                let longer = format!("{}, {}]", key.example.trim_end_matches(']'), "1");
+            if let Shape::Rows(..) = key.shape {
+                let (_, rest) = key.example.split_once("], ").expect("rows");
+                let rows = format!("{} = [{rest}\n", key.name);
+                bench.check(section, case(rows, codes::WRONG_COUNT, &path, "a row too few"), 0);
+                let row = format!("{} = [[], {rest}\n", key.name);
+                bench.check(section, case(row, codes::WRONG_COUNT, &format!("{path}[0]"), "an empty row"), 0);
+                let row = format!("{} = [1, {rest}\n", key.name);
+                bench.check(section, case(row, codes::WRONG_TYPE, &format!("{path}[0]"), "a row that is none"), 0);
+            }
+            if let Shape::List(_) | Shape::Leading(..) = key.shape {
+                let longer = format!("{}{}]", key.example.trim_end_matches(']'), ", 1".repeat(5));
                 bench.check(
                     section,
                     case(format!("{} = {longer}\n", key.name), codes::WRONG_COUNT, &path, "too many"),
@@ -208,7 +268,7 @@ fn every_key_is_checked_in_every_way() {
             let slip = format!("{}x = {}\n", key.name, key.example);
             bench.check(
                 section,
-                case(slip.clone(), codes::UNKNOWN_KEY, &section.path(&format!("{}x", key.name)), "misspelt"),
+                case(slip.clone(), codes::UNKNOWN_KEY, &Bench::path(section, &format!("{}x", key.name)), "misspelt"),
                 0,
             );
             let (text, _) = Bench::with(section, key, &slip);
@@ -227,16 +287,16 @@ fn every_key_may_be_missing_only_if_it_has_a_default() {
     let bench = Bench { folder: folder_with_records(), cases: 0 };
     for section in SECTIONS {
         for key in section.keys {
-            let path = section.path(key.name);
+            let path = Bench::path(section, key.name);
             let (text, _) = Bench::with(section, key, "");
             let findings = bench.findings(&text);
             let errors = errors(&findings);
             match key.presence {
-                Presence::Required => {
+                Presence::Required | Presence::Form(_) => {
                     assert_eq!(errors.len(), 1, "{path}: {findings:#?}");
                     assert_eq!((errors[0].code, errors[0].key.as_str()), (codes::MISSING_KEY, path.as_str()));
                     assert!(errors[0].help.contains(key.name), "{path}: {}", errors[0].help);
-                    let header = if section.name.is_empty() { String::new() } else { format!("[{}]", section.name) };
+                    let header = section.header();
                     let line = 1 + text[..text.find(&header).expect("header")].matches('\n').count();
                     assert_eq!(line_of(errors[0], &text), line, "{path} points at its section");
                 }
@@ -249,6 +309,11 @@ fn every_key_may_be_missing_only_if_it_has_a_default() {
                 Presence::Default(_) | Presence::Optional => {
                     assert!(errors.is_empty(), "{path}: {findings:#?}")
                 }
+                Presence::Rule(rule) => {
+                    let found: Vec<_> = errors.iter().map(|d| (d.code, d.key.as_str())).collect();
+                    let expected = [(codes::MISSING_KEY, path.as_str())];
+                    assert_eq!(found, if rule.contains("error") { &expected[..] } else { &[] }, "{path}: {rule}");
+                }
             }
         }
     }
@@ -258,7 +323,9 @@ fn every_key_may_be_missing_only_if_it_has_a_default() {
 fn every_section_may_be_missing_only_if_nothing_in_it_is_required() {
     let bench = Bench { folder: folder_with_records(), cases: 0 };
     let whole = every_key();
-    for section in SECTIONS.iter().filter(|s| !s.name.is_empty() && s.name != "target") {
+    // Without [control] its parts are refused; repeated sections are counted: both have tests of their own.
+    let apart = |section: &Section| matches!(section.kind, Kind::Repeated(..)) || section.name == "control";
+    for section in SECTIONS.iter().filter(|s| !s.name.is_empty() && s.name != "target" && !apart(s)) {
         let start = whole.find(&format!("[{}]\n", section.name)).expect("section");
         let end = whole[start + 1..].find("\n[").map_or(whole.len(), |i| start + 2 + i);
         let text = format!("{}{}", &whole[..start], &whole[end..]);

@@ -62,7 +62,7 @@ codes! {
     UNKNOWN_CHOICE = "E0213", "unknown choice",
         "The key takes one of a few words, listed in the help.";
     ALTERNATIVES = "E0214", "one of two keys",
-        "A weight may be given per run or as a bandwidth, not both; a mode that uses the weight needs one of them.";
+        "A weight may be given per run or as a bandwidth, not both; a mode that uses the weight needs one of them. Joints lie on circles or are given one by one, not both. With [control] both bandwidths are given or neither.";
     OUT_OF_RANGE = "E0301", "out of range",
         "The value lies outside what the key takes. `docs/spec-reference.md` lists the ranges.";
     WRONG_ORDER = "E0302", "limits in the wrong order",
@@ -71,8 +71,8 @@ codes! {
         "The controller would ask for voltages that the converter cannot make.";
     RECORD_COUNT = "E0304", "one or six records",
         "Either one record identifies all legs, or each leg has its own.";
-    RECORD_PATH = "E0305", "record path not relative",
-        "Records are named relative to the spec, with forward slashes, so that the folder can move to another machine.";
+    RECORD_PATH = "E0305", "file path not relative",
+        "Records and waveforms are named relative to the spec, with forward slashes, so that the folder can move to another machine.";
     RECORD_UNREADABLE = "E0306", "record cannot be read",
         "The file does not exist beside the spec, is a folder, or may not be read.";
     BANDWIDTH_TOO_HIGH = "E0307", "bandwidth too high",
@@ -93,14 +93,96 @@ codes! {
         "Within one period the voltage may change by less than one code, so that it could never move.";
     BUDGET_NOT_WHOLE = "E0315", "not a whole number of bytes",
         "Memory is counted in whole bytes.";
+    WITHOUT_CONTROL = "E0316", "belongs to the task-space controller",
+        "Gauges that see the platform, their calibration and trajectories are for a spec with [control]. Without it each leg has its own gauge, and these would silently do nothing.";
+    GAUGE_COUNT = "E0317", "not six gauges",
+        "Six gauges, each a [[gauge]] section, tell the six coordinates of a pose.";
+    BAD_DIRECTION = "E0318", "not a direction, or one along the target",
+        "A direction is a vector other than zero. A gauge whose line lies nearly in its target plane (within 6 degrees) sees no motion along the line, and a tilt as a large one.";
+    LEG_KEY_WITH_CONTROL = "E0319", "key of the leg feed-forward beside [control]",
+        "The task-space controller adapts in every tick, with bandwidths that hold at any period, and its set-point is a pose.";
+    NOTCH_DAMPING = "E0320", "notch below the mode's own damping",
+        "A notch replaces the damping of a mode by notch_damping; at or below modal_damping it would raise the resonance.";
+    CUTOFF_TOO_HIGH = "E0321", "velocity filter above half the tick rate",
+        "A low-pass above pi rad / period does not filter anything that the ticks can show.";
+    TRAJECTORY_KEY = "E0322", "key of another kind of trajectory",
+        "The paper's paths take frequency and as_printed; a waveform takes file, period and repeat.";
+    NAME_TAKEN = "E0323", "name given twice",
+        "Trajectories are told apart by their names.";
+    BIAS_OUTSIDE = "E0324", "bias outside the workspace",
+        "The workspace bounds the pose from rest with the bias in it: no set-point could be reached.";
+    CALIBRATION_PARTLY = "E0325", "calibration of some gauges only",
+        "The gauge words are volts for all six gauges or metres for all six.";
+    TOO_MANY_TRAJECTORIES = "E0326", "too many trajectories",
+        "The controller chooses among at most 32.";
     UNSTABLE_STATIC = "E0401", "adaptation unstable on any leg",
         "With these weights and the declared gain_ratio the loop grows even on a leg without dynamics (Appendix B). The help names the largest weight that would do.";
     UNSTABLE_SAMPLED = "E0402", "adaptation unstable on this leg",
         "The sampled loop of amplifier lag, resonance and adaptation has a spectral radius of 1 or more. The help names the largest weight that would do; a longer run helps as well.";
+    NO_MODES = "E0430", "the platform has no six modes on its legs",
+        "Mass matrix and leg stiffness at rest must be positive definite: every motion has a mass and a stiffness. Check geometry, masses and actuator.axial_stiffness.";
+    UNSTABLE_PLATFORM = "E0431", "a control mode unstable on this platform",
+        "One tick of the closed loop (amplifier lag, modes of the platform on its legs, notch, gains, adaptation) has a spectral radius of 1 or more somewhere in gain_ratio, free or touching the declared work piece. Every mode that a running controller can be switched to is checked. The help names the largest factor or bandwidth that would do.";
+    NO_TUNING = "E0432", "no start values hold",
+        "The spec leaves gains or bandwidths to the compiler, and its rule found none that are stable. A higher tick rate, a notch (control.notch_damping), more damping or a narrower gain_ratio helps.";
+    THIN_MARGIN = "W0433", "stable, but not by much",
+        "A gain margin below 1.5 or a delay margin below half a tick: a platform a little softer, less damped or later than the spec says may be unstable.";
+    MODE_NOT_NOTCHED = "W0434", "a mode too fast for the notch",
+        "The mode lies above nine tenths of half the tick rate, where a sampled notch cannot sit on it. The stability check includes it.";
+    BIAS_UNREACHABLE = "E0440", "bias out of reach",
+        "At the pose control.setpoint.bias a leg would be shorter than at zero volts or longer than its stroke.";
+    AXIS_UNREACHABLE = "E0441", "workspace bound that no pose reaches",
+        "Moving along this axis alone from the middle of the strokes, the legs end before the bound does.";
+    TRAJECTORY_UNREACHABLE = "E0442", "trajectory out of reach",
+        "Somewhere on the declared trajectory a leg would be shorter than at zero volts or longer than its stroke. The help names the bias in z that would make it fit, if there is one.";
+    NEAR_SINGULAR = "E0443", "geometry nearly singular inside the workspace",
+        "Somewhere in the declared workspace the legs hardly hold the platform: the condition number of their Jacobian, angles taken at the joint radius, exceeds 10000.";
+    NO_ROOM = "W0444", "bias without room for corrections",
+        "A leg stands within a hundredth of its stroke of an end, so that feedback and adaptation can move it one way only. Corners of the declared workspace beyond reach are usual for a hexapod and not a finding; `specgen check` shows how much of it is reached.";
     TOO_FEW_CODES = "E0410", "converter too coarse for the grid",
         "There are fewer than two converter codes to a cell of the Preisach grid.";
     WORKSPACE_TOO_LARGE = "E0412", "workspace too large for the legs",
         "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
+    ILL_CONDITIONED = "E0413", "leg forces not determined in the workspace",
+        "The equations for the leg forces come close to singular at some pose of the declared workspace, and digits would be lost there. Change the geometry so that the legs point in more different directions, or reduce the workspace.";
+    PROBE_ALONG_PLANE = "E0430", "gauge along its target plane",
+        "A gauge sees its target move along its line; if the line lies in the plane, or nearly so, it sees nothing of that.";
+    PROBE_MISSES = "E0431", "gauge that misses the platform",
+        "The line of the gauge meets its target plane far from the platform: most likely a frame is mistaken. The line is in {B}, the plane in {P}, whose origin is P_C.";
+    GAUGES_BLIND = "E0432", "gauges that leave a motion unseen",
+        "Six readings fix a pose only if no motion leaves all of them as they are, or nearly so. The message names the motion that is seen least.";
+    GAUGE_RANGE = "E0433", "workspace beyond the gauges' range",
+        "A pose that the controller would accept could not be measured.";
+    CALIBRATION_AMBIGUOUS = "E0434", "calibration that cannot be inverted",
+        "Over sensor.range a calibration rises or falls all the way, so that every raw value means one reading.";
+    GAUGES_DIVERGE = "E0435", "workspace too large for the gauges' equations",
+        "They are solved for small motions, by a number of passes that the compiler counts.";
+    ZERO_OUTSIDE = "E0450", "bias or work zero outside the workspace",
+        "Set-points are counted from the bias pose and the offset of the work frame: both must lie where the platform can go.";
+    MOVES_TOO_SLOW = "E0451", "limits of moves too low",
+        "At these limits of speed, acceleration and jerk a move across the workspace never comes to its end.";
+    FRAMES_TOO_WIDE = "E0452", "workspace too wide for user frames",
+        "Work and tool frames are computed for small rotations.";
+    TRAJECTORY_JUMPS = "E0453", "trajectory that jumps",
+        "No platform follows a jump: its legs would be driven at their limits. The paper's printed trajectories jump; the corrected ones do not.";
+    TRAJECTORY_OUTSIDE = "E0454", "trajectory outside the workspace",
+        "At some time the pose, with the bias, leaves the declared workspace. The message names the time and the axis that is worst.";
+    TRAJECTORY_TOO_FAST = "E0455", "trajectory too fast",
+        "At some time an axis is faster than a streamed set-point may be.";
+    TRAJECTORY_TICKS = "E0456", "trajectory that does not fit the ticks",
+        "Rows of a table are a whole number of ticks apart, a sinusoid is slower than half the tick rate, and no trajectory is longer than about four million ticks.";
+    WAVEFORM_CLOSED_TWICE = "E0457", "last row given twice",
+        "A table that repeats goes from its last row to its first: a last row that is the first again would make it stand still for a row.";
+    TRAJECTORY_CORNERS = "W0458", "trajectory with corners",
+        "Where the slope changes at once the platform rings, whatever the controller. The paper's trajectories have such corners.";
+    WAVEFORM_HEADER = "E0460", "a table of poses without its columns",
+        "The first line names the columns by axis and unit: x, y, z in nm, um, mm or m, theta_x, theta_y, theta_z in nrad, urad, mrad or rad, such as `x_um,theta_z_urad`, and optionally `time_s`.";
+    WAVEFORM_VALUE = "E0461", "a pose that is not a number",
+        "Values are finite plain numbers with a decimal point; every line has all columns.";
+    WAVEFORM_TIME = "E0462", "times that do not fit the period",
+        "The time column rises from row to row by trajectory.period.";
+    WAVEFORM_LENGTH = "E0463", "too few or too many rows",
+        "A table of poses has at least two rows, and no more than a microcontroller holds.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",
@@ -175,6 +257,8 @@ codes! {
         "The radius of gyration is unusual for the size of the platform, though possible.";
     UNUSED_WEIGHT = "W0307", "weight that the mode does not use",
         "The key is checked and kept for a later change of mode, but has no effect at start-up.";
+    GAINS_UNUSED = "W0308", "gains without a task-space controller",
+        "The leg feed-forward has no feedback: [gains] and [position_gains] take effect with [control].";
     TRUNCATED = "W0001", "further findings left out",
         "Only the first findings are shown; mend them and run again.";
 }

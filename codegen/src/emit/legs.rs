@@ -2,6 +2,7 @@
 
 pub mod config;
 pub mod crate_root;
+pub mod stages;
 pub mod state;
 pub mod step;
 pub mod words;

@@ -1,7 +1,7 @@
 //! Checked values to the [`Model`].
 
 use super::fields::Fields;
-use super::joints;
+use super::{joints, task_space};
 use crate::model::{
     Actuator, Adaptation, AdaptationMode, Amplifier, ControllerOptions, Dac, Geometry, Hysteresis, LegBody, Mcu, Model,
     RigidBody, Scalar, Sensor, SetpointKind, Target, Timing, Workspace,
@@ -56,19 +56,23 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
             setpoint: if f.choice("controller.setpoint")? == "leg" { SetpointKind::Leg } else { SetpointKind::Pose },
         },
         target: target(f)?,
-        task_space: None,
+        task_space: task_space::task_space(f)?,
         spans: f.spans(),
     })
 }
 
 pub(super) fn geometry(f: &Fields) -> Option<Geometry> {
+    let height = f.number("geometry.height")?;
+    if let Some(base_joints) = f.rows("geometry.base_joints") {
+        return Some(Geometry { base_joints, platform_joints: f.rows("geometry.platform_joints")?, height });
+    }
     Some(Geometry {
         base_joints: joints::base_joints(f.number("geometry.base_radius")?, f.number("geometry.base_angle")?),
         platform_joints: joints::platform_joints(
             f.number("geometry.platform_radius")?,
             f.number("geometry.platform_angle")?,
         ),
-        height: f.number("geometry.height")?,
+        height,
     })
 }
 
@@ -98,6 +102,12 @@ pub(super) fn weight(f: &Fields, which: &str) -> Option<f64> {
     }
     let run: u32 = f.whole("adaptation.run_interval")?;
     Some(f.number(&format!("adaptation.{which}_bandwidth"))? * f.number("timing.period")? * f64::from(run))
+}
+
+/// `vector` with length 1; `None` if it has none worth speaking of.
+pub(super) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
+    let length = libm::sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+    (length > 1e-9).then(|| vector.map(|component| component / length))
 }
 
 fn target(f: &Fields) -> Option<Target> {

@@ -4,9 +4,12 @@
 //! (the `?` on `Option`). So one run finds everything.
 
 mod adaptation;
+mod control;
 mod electrical;
+mod gauges;
 mod mechanics;
 mod records;
+mod trajectories;
 
 use std::path::Path;
 
@@ -22,6 +25,7 @@ const CHECKS: &[Check] = &[
     mechanics::leg_gyration,
     mechanics::platform_inertia,
     mechanics::platform_gyration,
+    mechanics::legs_have_length,
     mechanics::geometry_holds,
     mechanics::workspace_in_reach,
     electrical::limits_in_order,
@@ -36,6 +40,19 @@ const CHECKS: &[Check] = &[
     adaptation::weights_for_mode,
     adaptation::bandwidths_fit_period,
     adaptation::gain_ratio_in_order,
+    control::parts_need_it,
+    control::no_leg_keys,
+    control::both_bandwidths,
+    control::notch,
+    control::cutoff_below_tick_rate,
+    control::environment_for_model,
+    control::bias_inside_workspace,
+    gauges::six,
+    gauges::directions,
+    gauges::calibrated_alike,
+    trajectories::keys_of_kind,
+    trajectories::names_differ,
+    trajectories::not_too_many,
 ];
 
 /// Runs every check. `dir` is the folder that records are relative to.

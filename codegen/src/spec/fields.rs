@@ -9,6 +9,7 @@ pub(super) enum Parsed {
     /// A quantity (SI) or a number; one or a list.
     Numbers(Vec<f64>),
     Integer(i64),
+    Flag(bool),
     Choice(&'static str),
     Name(String),
     Texts(Vec<String>),
@@ -31,11 +32,33 @@ pub(super) struct Field {
 #[derive(Debug, Default)]
 pub(super) struct Fields {
     map: BTreeMap<String, Field>,
+    /// Tables that stand in the file, by path (`control`, `gauge[2]`), and where.
+    tables: BTreeMap<String, Range<usize>>,
+    /// Tables of each repeated section.
+    counts: BTreeMap<&'static str, usize>,
 }
 
 impl Fields {
     pub(super) fn insert(&mut self, path: String, field: Field) {
         self.map.insert(path, field);
+    }
+
+    pub(super) fn insert_table(&mut self, path: String, span: Range<usize>) {
+        self.tables.insert(path, span);
+    }
+
+    pub(super) fn insert_count(&mut self, section: &'static str, count: usize) {
+        self.counts.insert(section, count);
+    }
+
+    /// Where the table at `path` stands, `None` if it is not in the file.
+    pub(super) fn table(&self, path: &str) -> Option<Range<usize>> {
+        self.tables.get(path).cloned()
+    }
+
+    /// How many tables of a repeated section there are.
+    pub(super) fn count(&self, section: &str) -> usize {
+        self.counts.get(section).copied().unwrap_or(0)
     }
 
     pub(super) fn get(&self, path: &str) -> Option<&Field> {
@@ -54,6 +77,34 @@ impl Fields {
     pub(super) fn list<const N: usize>(&self, path: &str) -> Option<[f64; N]> {
         match &self.get(path)?.parsed {
             Parsed::Numbers(values) => values.as_slice().try_into().ok(),
+            _ => None,
+        }
+    }
+
+    /// All numbers of a list whose length is not fixed.
+    pub(super) fn numbers(&self, path: &str) -> Option<&[f64]> {
+        match &self.get(path)?.parsed {
+            Parsed::Numbers(values) => Some(values),
+            _ => None,
+        }
+    }
+
+    /// The rows of a [`super::keys::Shape::Rows`].
+    pub(super) fn rows<const R: usize, const C: usize>(&self, path: &str) -> Option<[[f64; C]; R]> {
+        let mut rows = [[0.0; C]; R];
+        let values = self.numbers(path)?;
+        if values.len() != R * C {
+            return None;
+        }
+        for (row, found) in rows.iter_mut().zip(values.chunks_exact(C)) {
+            row.copy_from_slice(found);
+        }
+        Some(rows)
+    }
+
+    pub(super) fn flag(&self, path: &str) -> Option<bool> {
+        match self.get(path)?.parsed {
+            Parsed::Flag(value) => Some(value),
             _ => None,
         }
     }
@@ -101,9 +152,9 @@ impl Fields {
         self.get(path).and_then(|field| field.items.get(index).cloned()).unwrap_or_else(|| self.span(path))
     }
 
-    /// Where every value stands, lists item by item too: `actuator.voltage` and `actuator.voltage[1]`.
+    /// Where every table and value stands, lists item by item too: `actuator.voltage` and `actuator.voltage[1]`.
     pub(super) fn spans(&self) -> BTreeMap<String, Range<usize>> {
-        let mut spans = BTreeMap::new();
+        let mut spans = self.tables.clone();
         for (path, field) in &self.map {
             spans.insert(path.clone(), field.span.clone());
             for (i, item) in field.items.iter().enumerate() {

@@ -17,13 +17,27 @@ pub const SCHEMA_VERSION: i64 = 1;
 pub struct Section {
     /// Path such as `target.budget`; empty for the keys before the first table.
     pub name: &'static str,
-    /// May be left out as a whole although keys in it are required.
-    pub optional: bool,
+    /// How often it stands in a file.
+    pub kind: Kind,
     /// One line for the reference.
     pub doc: &'static str,
     /// Its keys, in the order of the reference.
     pub keys: &'static [Key],
 }
+
+/// How often a section stands in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Once; it may be left out if no key in it must be given.
+    Plain,
+    /// Once, or left out as a whole although keys in it are required.
+    Optional,
+    /// At least and at most so many times, with double brackets: `[[gauge]]`. Checks count them.
+    Repeated(usize, usize),
+}
+
+/// Most tables of a repeated section that are read; no section may have more.
+pub const MAX_TABLES: usize = 32;
 
 /// One key.
 #[derive(Debug)]
@@ -49,6 +63,10 @@ pub enum Shape {
     One(Item),
     /// An array with exactly these items.
     List(&'static [Item]),
+    /// An array of so many arrays, each with exactly these items.
+    Rows(usize, &'static [Item]),
+    /// An array with at least so many of these items, from the first one on.
+    Leading(usize, &'static [Item]),
     /// An array of one or six file names, relative to the spec.
     Records,
 }
@@ -71,6 +89,10 @@ pub enum Item {
     Integer(i64, i64),
     /// One of these strings.
     Choice(&'static [&'static str]),
+    /// `true` or `false`.
+    Flag,
+    /// A file name relative to the spec.
+    File,
     /// A name: ASCII letter first, then letters, digits, `-` and `_`, at most [`MAX_NAME`] characters.
     Name,
 }
@@ -130,30 +152,70 @@ pub enum Presence {
     Optional,
     /// Instead of another key, which must not stand beside it; whether one is needed depends on the mode.
     InsteadOf(&'static str),
+    /// It belongs to the form of this name: the keys of exactly one form stand in the section, all of them.
+    Form(&'static str),
+    /// What this says happens; a check or the building of the model sees to it.
+    Rule(&'static str),
 }
 
 impl Section {
     /// Whether a file without this table is refused.
     #[must_use]
     pub fn is_required(&self) -> bool {
-        !self.optional && self.keys.iter().any(|key| key.presence == Presence::Required)
+        let needed = |key: &Key| matches!(key.presence, Presence::Required | Presence::Form(_));
+        self.kind == Kind::Plain && self.keys.iter().any(needed)
     }
 
     /// Key path of one of its keys: `geometry.height`, or `name` before the first table.
     #[must_use]
     pub fn path(&self, key: &str) -> String {
-        if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
+        join(self.name, key)
+    }
+
+    /// Its header, `[name]` or `[[name]]`; empty before the first section.
+    #[must_use]
+    pub fn header(&self) -> String {
+        match self.kind {
+            _ if self.name.is_empty() => String::new(),
+            Kind::Repeated(..) => format!("[[{}]]", self.name),
+            Kind::Plain | Kind::Optional => format!("[{}]", self.name),
+        }
+    }
+
+    /// The forms of its keys ([`Presence::Form`]), in the order of the table.
+    #[must_use]
+    pub fn forms(&self) -> Vec<&'static str> {
+        let mut forms = Vec::new();
+        for key in self.keys {
+            match key.presence {
+                Presence::Form(form) if !forms.contains(&form) => forms.push(form),
+                _ => {}
+            }
+        }
+        forms
     }
 
     /// The section as it may be written, from the examples of its keys.
     #[must_use]
     pub fn example(&self, required_only: bool) -> String {
-        let mut text = if self.name.is_empty() { String::new() } else { format!("[{}]\n", self.name) };
-        for key in self.keys.iter().filter(|key| !required_only || key.presence == Presence::Required) {
+        let mut text = self.header();
+        if !text.is_empty() {
+            text.push('\n');
+        }
+        let first_form = self.forms().first().map(|form| Presence::Form(form));
+        let needed =
+            |key: &&Key| key.presence == Presence::Required || Some(key.presence) == first_form || !required_only;
+        for key in self.keys.iter().filter(needed) {
             text.push_str(&format!("{} = {}\n", key.name, key.example));
         }
         text
     }
+}
+
+/// Key path of `key` in the table at `table`: `gauge[2].point`, or `name` before the first table.
+#[must_use]
+pub fn join(table: &str, key: &str) -> String {
+    if table.is_empty() { key.to_owned() } else { format!("{table}.{key}") }
 }
 
 /// The section called `name`.
@@ -162,9 +224,10 @@ pub fn section(name: &str) -> Option<&'static Section> {
     SECTIONS.iter().find(|section| section.name == name)
 }
 
-/// The key at `path` (`geometry.height`).
+/// The key at `path` (`geometry.height`, `gauge[2].point`).
 #[must_use]
 pub fn key(path: &str) -> Option<&'static Key> {
     let (section_name, key_name) = path.rsplit_once('.').unwrap_or(("", path));
+    let section_name = section_name.split('[').next().unwrap_or(section_name);
     section(section_name)?.keys.iter().find(|key| key.name == key_name)
 }

@@ -24,14 +24,15 @@ pub(super) fn kind_of(value: &DeValue<'_>) -> &'static str {
 pub(super) fn example_of(key: &Key, path: &str) -> String {
     let index: Option<usize> = path.rsplit_once('[').and_then(|(_, rest)| rest.trim_end_matches(']').parse().ok());
     let items = key.example.trim_start_matches('[').trim_end_matches(']');
-    index.and_then(|i| items.split(", ").nth(i)).unwrap_or(key.example).to_owned()
+    let item = index.and_then(|i| items.split(", ").nth(i)).map(|item| item.trim_matches(['[', ']']));
+    item.unwrap_or(key.example).to_owned()
 }
 
 /// The item that `path` names.
 fn item_of(key: &Key, path: &str) -> Option<Item> {
     match key.shape {
         Shape::One(item) => Some(item),
-        Shape::List(items) => {
+        Shape::List(items) | Shape::Rows(_, items) | Shape::Leading(_, items) => {
             let index = path.rsplit_once('[').and_then(|(_, rest)| rest.trim_end_matches(']').parse::<usize>().ok());
             items.get(index.unwrap_or(0)).copied()
         }
@@ -50,6 +51,8 @@ pub(super) fn range_of(item: Item) -> String {
             bounds(range, scale, unit)
         }
         Item::Choice(words) => text::alternatives(words),
+        Item::Flag => "true or false".to_owned(),
+        Item::File => "a file".to_owned(),
         Item::Name => "a name".to_owned(),
     }
 }

@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::fields::{Field, Fields};
 use super::findings::Findings;
-use super::keys::{self, Key, Presence, SECTIONS, Section};
+use super::keys::{self, Key, Kind, MAX_TABLES, Presence, SECTIONS, Section};
 use super::names::{Meaning, child_name, elsewhere, known_names, lookup};
 use super::value::ValueReader;
 use super::{messages, text};
@@ -17,7 +17,9 @@ use crate::diagnostic::codes;
 /// Reads every value of `root`; what is wrong goes to `findings`.
 pub(super) fn read(source: &str, root: &DeTable<'_>, findings: &mut Findings) -> Fields {
     let mut reader = Reader { source, fields: Fields::default(), findings, seen: BTreeSet::new() };
-    reader.table("", root, None);
+    if let Some(section) = keys::section("") {
+        reader.table(section, "", root, None);
+    }
     reader.missing_sections();
     reader.fields
 }
@@ -31,36 +33,108 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Reads the table of `section_name`, whose header stands at `header`.
-    fn table(&mut self, section_name: &'static str, table: &DeTable<'_>, header: Option<Range<usize>>) {
-        let Some(section) = keys::section(section_name) else {
-            return;
-        };
+    /// Reads one table of `section`, with the key path `path` and its header at `header`.
+    fn table(&mut self, section: &'static Section, path: &str, table: &DeTable<'_>, header: Option<Range<usize>>) {
         self.seen.insert(section.name);
-        let mut found: BTreeMap<&'static str, ()> = BTreeMap::new();
+        let mut found: BTreeMap<&'static str, Range<usize>> = BTreeMap::new();
         // A section may hold sections only and no key of its own: its place is then the first name in it.
         let header = header
             .or_else(|| table.iter().map(|(name, _)| text::clamp(self.source, name.span())).min_by_key(|s| s.start));
         let header = header.unwrap_or(0..0);
+        if !path.is_empty() {
+            self.fields.insert_table(path.to_owned(), header.clone());
+        }
         for (name, value) in table {
-            match self.meaning(section, table, name) {
+            match self.meaning(section, path, table, name) {
                 Some(Meaning::Key(key)) => {
-                    found.insert(key.name, ());
-                    self.value(section, key, value);
+                    found.insert(key.name, text::clamp(self.source, name.span()));
+                    self.value(path, key, value);
+                }
+                Some(Meaning::Section(inner)) if matches!(inner.kind, Kind::Repeated(..)) => {
+                    self.tables(inner, name, value)
                 }
                 Some(Meaning::Section(inner)) => self.section(inner, name, value),
                 None => {}
             }
         }
+        let form = self.form(section, path, &found);
         for key in section.keys.iter().filter(|key| !found.contains_key(key.name)) {
-            self.absent(section, key, &header);
+            self.absent(section, path, key, form, &header);
         }
+    }
+
+    /// The form that the keys in `found` are of, the first one if there is none of any; two forms are a finding.
+    fn form(
+        &mut self,
+        section: &'static Section,
+        path: &str,
+        found: &BTreeMap<&'static str, Range<usize>>,
+    ) -> Option<&'static str> {
+        let forms = section.forms();
+        let keys_of = |form| section.keys.iter().filter(move |key| key.presence == Presence::Form(form));
+        let given: Vec<_> =
+            forms.iter().filter_map(|form| keys_of(form).find(|key| found.contains_key(key.name))).collect();
+        if let [first, second, ..] = given.as_slice() {
+            let names = |form: &Presence| {
+                let keys = section.keys.iter().filter(|key| key.presence == *form).map(|key| key.name);
+                keys.collect::<Vec<_>>().join(", ")
+            };
+            self.findings.error(
+                codes::ALTERNATIVES,
+                &keys::join(path, second.name),
+                found.get(second.name).cloned().unwrap_or(0..0),
+                format!("`{}` stands beside `{}`: each says the same in its own way", second.name, first.name),
+                format!("keep one form whole: {}; or {}", names(&first.presence), names(&second.presence)),
+            );
+            // What is missing of either is no news.
+            return None;
+        }
+        match given.first().map(|key| key.presence) {
+            Some(Presence::Form(form)) => Some(form),
+            _ => forms.first().copied(),
+        }
+    }
+
+    /// Reads the tables of a repeated section.
+    fn tables(
+        &mut self,
+        section: &'static Section,
+        name: &Spanned<toml::de::DeString<'_>>,
+        value: &Spanned<DeValue<'_>>,
+    ) {
+        self.seen.insert(section.name);
+        let name_span = text::clamp(self.source, name.span());
+        let DeValue::Array(array) = value.get_ref() else {
+            self.not_repeated(section, section.name, name_span, value.get_ref());
+            return;
+        };
+        self.fields.insert_count(section.name, array.len());
+        for (i, element) in array.iter().enumerate().take(MAX_TABLES) {
+            let path = format!("{}[{i}]", section.name);
+            let span = text::clamp(self.source, element.span());
+            // A table of its own spans no more than its header; one written inline spans its keys too.
+            match element.get_ref() {
+                DeValue::Table(table) => self.table(section, &path, table, Some(span)),
+                other => self.not_repeated(section, &path, span, other),
+            }
+        }
+    }
+
+    fn not_repeated(&mut self, section: &Section, path: &str, span: Range<usize>, value: &DeValue<'_>) {
+        self.findings.error(
+            codes::WRONG_TYPE,
+            path,
+            span,
+            format!("`{path}` is {}, expected sections {}", messages::kind_of(value), section.header()),
+            format!("write each as a section of its own, with double brackets:\n{}", section.example(true).trim_end()),
+        );
     }
 
     /// What `name` stands for; a slip of a known name counts as that name if it is not there itself.
     fn meaning(
         &mut self,
         section: &'static Section,
+        path: &str,
         table: &DeTable<'_>,
         name: &Spanned<toml::de::DeString<'_>>,
     ) -> Option<Meaning> {
@@ -68,31 +142,33 @@ impl Reader<'_> {
         if let Some(exact) = lookup(section, written) {
             return Some(exact);
         }
-        let is_table = table.get(written).is_some_and(|value| value.get_ref().is_table());
+        let is_table = table.get(written).is_some_and(|value| holds_keys(value.get_ref()));
         let candidates = |wants_table: bool| {
             let sections = SECTIONS.iter().filter(move |_| wants_table).filter_map(|s| child_name(section, s));
             let keys = section.keys.iter().filter(move |_| !wants_table).map(|key| key.name);
             sections.chain(keys)
         };
         let meant = text::nearest(written, candidates(is_table)).filter(|meant| !table.contains_key(*meant));
-        self.unknown(section, name, is_table, meant);
+        self.unknown(section, path, name, is_table, meant);
         meant.and_then(|meant| lookup(section, meant))
     }
 
     fn unknown(
         &mut self,
         section: &Section,
+        table: &str,
         name: &Spanned<toml::de::DeString<'_>>,
         is_table: bool,
         meant: Option<&str>,
     ) {
         let written = name.get_ref().as_ref();
-        let path = section.path(&text::shorten(written));
+        let path = keys::join(table, &text::shorten(written));
         let (code, what) = if is_table { (codes::UNKNOWN_SECTION, "section") } else { (codes::UNKNOWN_KEY, "key") };
-        let place = if section.name.is_empty() { String::new() } else { format!(" in [{}]", section.name) };
+        let place = if section.name.is_empty() { String::new() } else { format!(" in {}", section.header()) };
         let help = match (meant, elsewhere(section, written)) {
             (Some(meant), _) => format!("did you mean `{meant}`?"),
             (None, Some(path)) if is_table => format!("did you mean `{path}`?"),
+            (None, Some(path)) if path.starts_with('[') => format!("there is a section {path}: does it belong there?"),
             (None, Some(path)) => format!("`{path}` exists: did it slip out of its section?"),
             (None, None) => format!("take it out; {}", known_names(section, is_table)),
         };
@@ -108,7 +184,7 @@ impl Reader<'_> {
     ) {
         let span = text::clamp(self.source, name.span());
         if let DeValue::Table(table) = value.get_ref() {
-            self.table(section.name, table, Some(span));
+            self.table(section, section.name, table, Some(span));
             return;
         }
         self.seen.insert(section.name);
@@ -122,8 +198,8 @@ impl Reader<'_> {
         );
     }
 
-    fn value(&mut self, section: &Section, key: &'static Key, value: &Spanned<DeValue<'_>>) {
-        let path = section.path(key.name);
+    fn value(&mut self, table: &str, key: &'static Key, value: &Spanned<DeValue<'_>>) {
+        let path = keys::join(table, key.name);
         let mut reader = ValueReader { source: self.source, key, path: &path, findings: self.findings };
         if let Some(field) = reader.read(value) {
             self.fields.insert(path, field);
@@ -131,14 +207,22 @@ impl Reader<'_> {
     }
 
     /// A key that is not in its section: a default takes its place, or a finding.
-    fn absent(&mut self, section: &'static Section, key: &'static Key, header: &Range<usize>) {
+    fn absent(
+        &mut self,
+        section: &'static Section,
+        table: &str,
+        key: &'static Key,
+        form: Option<&'static str>,
+        header: &Range<usize>,
+    ) {
+        let path = keys::join(table, key.name);
         match key.presence {
-            Presence::Required => {
-                let path = section.path(key.name);
+            Presence::Form(of) if Some(of) != form => {}
+            Presence::Required | Presence::Form(_) => {
                 let place = if section.name.is_empty() {
                     "at the start of the file, before the first section".to_owned()
                 } else {
-                    format!("in [{}]", section.name)
+                    format!("in {}", section.header())
                 };
                 self.findings.error(
                     codes::MISSING_KEY,
@@ -148,17 +232,16 @@ impl Reader<'_> {
                     format!("write, {place}: {} = {}. {}", key.name, key.example, key.doc),
                 );
             }
-            Presence::Default(literal) => self.default(section, key, literal, header),
-            Presence::Optional | Presence::InsteadOf(_) => {}
+            Presence::Default(literal) => self.default(path, key, literal, header),
+            Presence::Optional | Presence::InsteadOf(_) | Presence::Rule(_) => {}
         }
     }
 
-    fn default(&mut self, section: &'static Section, key: &'static Key, literal: &str, header: &Range<usize>) {
+    fn default(&mut self, path: String, key: &'static Key, literal: &str, header: &Range<usize>) {
         // A default is read as if it stood in the file; a test reads every default of the key table.
         let Ok(value) = DeValue::parse(literal) else {
             return;
         };
-        let path = section.path(key.name);
         let mut reader = ValueReader { source: literal, key, path: &path, findings: self.findings };
         if let Some(field) = reader.read(&value) {
             let items = field.items.iter().map(|_| header.clone()).collect();
@@ -180,13 +263,28 @@ impl Reader<'_> {
                     format!("section [{}] is missing", section.name),
                     format!("{} Write:\n{}", section.doc, section.example(true).trim_end()),
                 );
-            } else if !section.optional {
+            } else if section.kind == Kind::Plain && self.outer_is_there(section) {
                 // The place of its defaults is the start of the file.
                 for key in section.keys {
-                    self.absent(section, key, &(0..0));
+                    self.absent(section, section.name, key, None, &(0..0));
                 }
             }
         }
+    }
+
+    /// Whether the section that `section` stands in is in the file, or need not be.
+    fn outer_is_there(&self, section: &Section) -> bool {
+        let outer = section.name.rsplit_once('.').and_then(|(outer, _)| keys::section(outer));
+        outer.is_none_or(|outer| outer.kind == Kind::Plain || self.seen.contains(outer.name))
+    }
+}
+
+/// A table, or tables with double brackets.
+fn holds_keys(value: &DeValue<'_>) -> bool {
+    match value {
+        DeValue::Table(_) => true,
+        DeValue::Array(array) => !array.is_empty() && array.iter().all(|element| element.get_ref().is_table()),
+        _ => false,
     }
 }
 

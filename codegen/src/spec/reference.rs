@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::keys::{Key, Presence, SECTIONS, Shape};
+use super::keys::{Key, Kind, Presence, SECTIONS, Shape};
 use super::messages::range_of;
 
 const HEAD: &str = "\
@@ -26,9 +26,12 @@ File names are relative to the spec and use forward slashes.
 pub fn reference_markdown() -> String {
     let mut text = HEAD.to_owned();
     for section in SECTIONS {
-        let title =
-            if section.name.is_empty() { "Before the first section".to_owned() } else { format!("[{}]", section.name) };
-        let optional = if section.optional { " Optional; if it is there, it is there whole." } else { "" };
+        let title = if section.name.is_empty() { "Before the first section".to_owned() } else { section.header() };
+        let optional = if section.kind == Kind::Optional {
+            " Optional; if it is there, it has every key without a default."
+        } else {
+            ""
+        };
         // Writing to a String cannot fail.
         let _ = write!(
             text,
@@ -57,17 +60,22 @@ fn form(key: &Key) -> String {
         Shape::List(items) if items.len() > 3 => {
             format!("{} values, `{}`", items.len(), key.example)
         }
-        Shape::List(_) => format!("`{}`", key.example),
+        Shape::List(_) | Shape::Leading(..) => format!("`{}`", key.example),
+        Shape::Rows(count, items) => format!("{count} rows of {} values, `{}`", items.len(), key.example),
     }
 }
 
 fn range(key: &Key) -> String {
     match key.shape {
         Shape::One(item) => range_of(item),
-        Shape::List(items) => {
+        Shape::List(items) | Shape::Rows(_, items) => {
             let mut ranges: Vec<String> = items.iter().map(|item| range_of(*item)).collect();
             ranges.dedup();
             format!("each {}", ranges.join(", then "))
+        }
+        Shape::Leading(least, items) => {
+            let ranges: Vec<String> = items.iter().map(|item| range_of(*item)).collect();
+            format!("{least} to {} values: {}", items.len(), ranges.join(", then "))
         }
         Shape::Records => "1 or 6 files".to_owned(),
     }
@@ -79,6 +87,8 @@ fn absence(key: &Key) -> String {
         Presence::Default(literal) => format!("`{literal}`"),
         Presence::Optional => "no check".to_owned(),
         Presence::InsteadOf(other) => format!("see `{other}`"),
+        Presence::Form(form) => format!("error, unless in another form than {form}"),
+        Presence::Rule(rule) => rule.to_owned(),
     }
 }
 

@@ -5,7 +5,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::keys::{Item, Key, MAX_NAME, Presence, SECTIONS, Section, Shape};
+use super::keys::{Item, Key, Kind, MAX_NAME, Presence, SECTIONS, Section, Shape};
 use super::messages::range_of;
 
 /// A sign, a number, and a unit that starts with a letter, a degree sign or a bracket.
@@ -41,7 +41,14 @@ fn table(name: &str) -> Map<String, Value> {
     }
     for inner in SECTIONS.iter().filter(|inner| parent(inner) == Some(name)) {
         let last = inner.name.rsplit('.').next().unwrap_or(inner.name);
-        properties.insert(last.into(), Value::Object(table(inner.name)));
+        let object = Value::Object(table(inner.name));
+        let one_or_many = match inner.kind {
+            Kind::Repeated(least, most) => {
+                json!({"type": "array", "items": object, "minItems": least, "maxItems": most})
+            }
+            Kind::Plain | Kind::Optional => object,
+        };
+        properties.insert(last.into(), one_or_many);
         if inner.is_required() {
             required.push(last);
         }
@@ -52,6 +59,9 @@ fn table(name: &str) -> Map<String, Value> {
     object.insert("properties".into(), Value::Object(properties));
     if !required.is_empty() {
         object.insert("required".into(), json!(required));
+    }
+    if !section.forms().is_empty() {
+        object.insert("oneOf".into(), Value::Array(forms(section)));
     }
     let exclusive = exclusive_pairs(section);
     if !exclusive.is_empty() {
@@ -80,19 +90,45 @@ fn exclusive_pairs(section: &Section) -> Vec<Value> {
         .collect()
 }
 
+/// For each form: all of its keys, and none of another form.
+fn forms(section: &Section) -> Vec<Value> {
+    let names = |wanted: &dyn Fn(Presence) -> bool| -> Vec<&str> {
+        section.keys.iter().filter(|key| wanted(key.presence)).map(|key| key.name).collect()
+    };
+    let one_form = |form: &'static str| {
+        let own = names(&|presence| presence == Presence::Form(form));
+        let other = names(&|presence| matches!(presence, Presence::Form(of) if of != form));
+        let none: Vec<Value> = other.iter().map(|name| json!({"required": [name]})).collect();
+        json!({"required": own, "not": {"anyOf": none}})
+    };
+    section.forms().into_iter().map(one_form).collect()
+}
+
+/// The schema of an array of `items`, of which those after the first `least` may be left out.
+fn array_schema(items: &[Item], least: usize) -> Map<String, Value> {
+    let mut array = Map::new();
+    array.insert("type".into(), json!("array"));
+    array.insert("items".into(), Value::Array(items.iter().map(|i| Value::Object(item_schema(*i))).collect()));
+    array.insert("minItems".into(), json!(least));
+    array.insert("maxItems".into(), json!(items.len()));
+    array
+}
+
 fn key_schema(key: &Key) -> Value {
     let mut schema = match key.shape {
         Shape::One(item) => item_schema(item),
-        Shape::List(items) => {
+        Shape::List(items) => array_schema(items, items.len()),
+        Shape::Leading(least, items) => array_schema(items, least),
+        Shape::Rows(count, items) => {
             let mut array = Map::new();
             array.insert("type".into(), json!("array"));
-            array.insert("items".into(), Value::Array(items.iter().map(|i| Value::Object(item_schema(*i))).collect()));
-            array.insert("minItems".into(), json!(items.len()));
-            array.insert("maxItems".into(), json!(items.len()));
+            array.insert("items".into(), Value::Object(array_schema(items, items.len())));
+            array.insert("minItems".into(), json!(count));
+            array.insert("maxItems".into(), json!(count));
             array
         }
         Shape::Records => {
-            let file = json!({"type": "string", "pattern": r"^[^/\\][^\\]*$"});
+            let file = Value::Object(item_schema(Item::File));
             let lists = json!([{"minItems": 1, "maxItems": 1}, {"minItems": 6, "maxItems": 6}]);
             let mut array = Map::new();
             array.insert("type".into(), json!("array"));
@@ -135,6 +171,8 @@ fn item_schema(item: Item) -> Map<String, Value> {
         Item::Integer(min, max) if min == max => json!({"const": min}),
         Item::Integer(min, max) => json!({"type": "integer", "minimum": min, "maximum": max}),
         Item::Choice(words) => json!({"type": "string", "enum": words}),
+        Item::Flag => json!({"type": "boolean"}),
+        Item::File => json!({"type": "string", "pattern": r"^[^/\\][^\\]*$"}),
         Item::Name => {
             json!({"type": "string", "pattern": "^[A-Za-z][A-Za-z0-9_-]*$", "maxLength": MAX_NAME})
         }

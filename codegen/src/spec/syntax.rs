@@ -8,7 +8,7 @@ use std::ops::Range;
 use toml::de::DeTable;
 
 use super::findings::{Findings, MAX_FINDINGS};
-use super::text;
+use super::{keys, text};
 use crate::diagnostic::{Place, codes};
 
 /// A parsed file.
@@ -115,9 +115,10 @@ fn duplicate(source: &str, span: Range<usize>, findings: &mut Findings) {
     let (key, first) = if is_header {
         (name.to_owned(), first_line(source, 0, &span, |line| header_name(line) == Some(header)))
     } else {
-        let key = if header.is_empty() { name.to_owned() } else { format!("{header}.{name}") };
         // Before its section, a key of the same name belongs elsewhere.
-        let from = section_start(source, header);
+        let (from, repetition) = section_start(source, header, span.start);
+        let table = repetition.map_or_else(|| header.to_owned(), |index| format!("{header}[{index}]"));
+        let key = keys::join(&table, name);
         (key, first_line(source, from, &span, |line| key_name(line) == Some(name)))
     };
     let before = first.map_or_else(String::new, |line| format!(", first on line {line}"));
@@ -141,8 +142,17 @@ fn header_before(source: &str, offset: usize) -> (&str, bool) {
     (source[..line_start].lines().rev().find_map(header_name).unwrap_or(""), false)
 }
 
-fn section_start(source: &str, header: &str) -> usize {
-    lines_with_offsets(source).find(|(_, line)| header_name(line) == Some(header)).map_or(0, |(offset, _)| offset)
+/// Start of the last section `header` before byte `before`, and its number from 0 if it has double brackets.
+fn section_start(source: &str, header: &str, before: usize) -> (usize, Option<usize>) {
+    let mut start = 0;
+    let mut seen: usize = 0;
+    let mut repeated = false;
+    for (offset, line) in lines_with_offsets(&source[..before]).filter(|(_, line)| header_name(line) == Some(header)) {
+        start = offset;
+        seen += 1;
+        repeated = line.trim_start().starts_with("[[");
+    }
+    (start, repeated.then(|| seen.saturating_sub(1)))
 }
 
 /// Number (from 1) of the first line between byte `from` and the line of `span` that `matches`.
@@ -212,5 +222,13 @@ mod tests {
         parse("x = 1\n[a]\ny = 1\n[b]\nx = 2\nx = 3\n", &mut findings);
         assert_eq!(findings.all()[0].key, "b.x");
         assert!(findings.all()[0].message.contains("line 5"), "{}", findings.all()[0].message);
+    }
+
+    #[test]
+    fn a_duplicate_in_a_repeated_section_names_its_own_table() {
+        let mut findings = Findings::default();
+        parse("[[g]]\nx = 1\n[a]\nx = 1\n[[g]]\nx = 2\nx = 3\n", &mut findings);
+        assert_eq!(findings.all()[0].key, "g[1].x");
+        assert!(findings.all()[0].message.contains("line 6"), "{}", findings.all()[0].message);
     }
 }

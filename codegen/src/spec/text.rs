@@ -39,6 +39,12 @@ pub(super) fn clamp(source: &str, span: Range<usize>) -> Range<usize> {
     start..end
 }
 
+/// Relative on every system: no root, no drive, no backslash.
+pub(super) fn is_relative_path(path: &str) -> bool {
+    let drive = path.as_bytes().get(1) == Some(&b':');
+    !path.trim().is_empty() && !path.starts_with('/') && !path.contains('\\') && !drive
+}
+
 /// A number for a message: up to four significant digits, without trailing zeros.
 pub(super) fn number(value: f64) -> String {
     if value == 0.0 {

@@ -25,6 +25,7 @@ pub(super) struct ValueReader<'a> {
 enum Scalar {
     Number(f64),
     Integer(i64),
+    Flag(bool),
     Choice(&'static str),
     Name(String),
 }
@@ -38,46 +39,85 @@ impl ValueReader<'_> {
                 let parsed = match self.scalar(item, self.path, value)? {
                     Scalar::Number(number) => Parsed::Numbers(vec![number]),
                     Scalar::Integer(integer) => Parsed::Integer(integer),
+                    Scalar::Flag(flag) => Parsed::Flag(flag),
                     Scalar::Choice(word) => Parsed::Choice(word),
                     Scalar::Name(name) => Parsed::Name(name),
                 };
                 (parsed, Vec::new())
             }
-            Shape::List(items) => self.list(items, value)?,
+            Shape::List(items) => {
+                let (numbers, spans) = self.list(self.path, items, items.len(), value)?;
+                (Parsed::Numbers(numbers), spans)
+            }
+            Shape::Leading(least, items) => {
+                let (numbers, spans) = self.list(self.path, items, least, value)?;
+                (Parsed::Numbers(numbers), spans)
+            }
+            Shape::Rows(count, items) => self.rows(count, items, value)?,
             Shape::Records => self.records(value)?,
         };
         Some(Field { parsed, span, items, given: true })
     }
 
-    fn list(&mut self, items: &'static [Item], value: &Spanned<DeValue<'_>>) -> Option<(Parsed, Vec<Range<usize>>)> {
+    /// An array of `items`, of which those after the first `least` may be left out: numbers and places.
+    fn list(
+        &mut self,
+        path: &str,
+        items: &'static [Item],
+        least: usize,
+        value: &Spanned<DeValue<'_>>,
+    ) -> Option<(Vec<f64>, Vec<Range<usize>>)> {
+        let wanted = if least == items.len() { items.len().to_string() } else { format!("{least} to {}", items.len()) };
         let DeValue::Array(array) = value.get_ref() else {
-            return self.wrong_type(self.path, value, &format!("an array of {} values", items.len()), None);
+            return self.wrong_type(path, value, &format!("an array of {wanted} values"), None);
         };
         let mut numbers = Vec::new();
         let mut spans = Vec::new();
         for (i, (item, element)) in items.iter().zip(array.iter()).enumerate() {
             spans.push(text::clamp(self.source, element.span()));
-            if let Some(Scalar::Number(number)) = self.scalar(*item, &format!("{}[{i}]", self.path), element) {
+            if let Some(Scalar::Number(number)) = self.scalar(*item, &format!("{path}[{i}]"), element) {
                 numbers.push(number);
             }
         }
-        if array.len() != items.len() {
-            self.findings.error(
-                codes::WRONG_COUNT,
-                self.path,
-                text::clamp(self.source, value.span()),
-                format!(
-                    "`{}` has {} value{}, expected {}",
-                    self.path,
-                    array.len(),
-                    if array.len() == 1 { "" } else { "s" },
-                    items.len()
-                ),
-                format!("write {} values: {} = {}", items.len(), self.key.name, self.key.example),
-            );
+        if !(least..=items.len()).contains(&array.len()) {
+            self.wrong_count(path, value, array.len(), "value", &wanted);
             return None;
         }
-        (numbers.len() == items.len()).then_some((Parsed::Numbers(numbers), spans))
+        (numbers.len() == array.len()).then_some((numbers, spans))
+    }
+
+    fn rows(
+        &mut self,
+        count: usize,
+        items: &'static [Item],
+        value: &Spanned<DeValue<'_>>,
+    ) -> Option<(Parsed, Vec<Range<usize>>)> {
+        let DeValue::Array(array) = value.get_ref() else {
+            return self.wrong_type(self.path, value, &format!("an array of {count} arrays"), None);
+        };
+        let mut numbers = Vec::new();
+        let mut spans = Vec::new();
+        for (i, element) in array.iter().enumerate().take(count) {
+            spans.push(text::clamp(self.source, element.span()));
+            if let Some((row, _)) = self.list(&format!("{}[{i}]", self.path), items, items.len(), element) {
+                numbers.extend(row);
+            }
+        }
+        if array.len() != count {
+            self.wrong_count(self.path, value, array.len(), "row", &count.to_string());
+            return None;
+        }
+        (numbers.len() == count * items.len()).then_some((Parsed::Numbers(numbers), spans))
+    }
+
+    fn wrong_count(&mut self, path: &str, value: &Spanned<DeValue<'_>>, found: usize, what: &str, wanted: &str) {
+        self.findings.error(
+            codes::WRONG_COUNT,
+            path,
+            text::clamp(self.source, value.span()),
+            format!("`{path}` has {found} {what}{}, expected {wanted}", if found == 1 { "" } else { "s" }),
+            format!("write {wanted} {what}s: {} = {}", self.key.name, self.key.example),
+        );
     }
 
     fn records(&mut self, value: &Spanned<DeValue<'_>>) -> Option<(Parsed, Vec<Range<usize>>)> {
@@ -128,6 +168,11 @@ impl ValueReader<'_> {
                 }
                 known.map(|word| Scalar::Choice(word))
             }
+            Item::Flag => match value.get_ref() {
+                DeValue::Boolean(flag) => Some(Scalar::Flag(*flag)),
+                _ => self.wrong_type(path, value, "true or false", None),
+            },
+            Item::File => self.file(path, value).map(Scalar::Name),
             Item::Name => self.name(path, value).map(Scalar::Name),
         }
     }
@@ -152,6 +197,23 @@ impl ValueReader<'_> {
             format!(
                 "use a letter, then letters, digits, - and _, at most {MAX_NAME} characters, such as \"{such_as}\""
             ),
+        );
+        None
+    }
+
+    fn file(&mut self, path: &str, value: &Spanned<DeValue<'_>>) -> Option<String> {
+        let DeValue::String(found) = value.get_ref() else {
+            return self.wrong_type(path, value, "a file name", None);
+        };
+        if text::is_relative_path(found) {
+            return Some(found.to_string());
+        }
+        self.findings.error(
+            codes::RECORD_PATH,
+            path,
+            text::clamp(self.source, value.span()),
+            format!("\"{}\" is not a path relative to the spec", text::shorten(found)),
+            format!("put the file beside the spec and name it as in {}", self.key.example),
         );
         None
     }

@@ -13,6 +13,21 @@ pub fn sine_cosine<T: Real>(angle: T) -> (T, T) {
     (sine_kernel(angle, square), cosine_kernel(square))
 }
 
+/// sin and 1 − cos of `angle` (rad, |angle| ≤ π/4), each within 2 ulp of itself: nothing cancels near zero.
+#[inline]
+#[must_use]
+pub fn sine_versine<T: Real>(angle: T) -> (T, T) {
+    let square = angle * angle;
+    (sine_kernel(angle, square), square * (T::HALF - square * cosine_tail(square)))
+}
+
+/// 1 − cos of `angle`, see [`sine_versine`].
+#[inline]
+#[must_use]
+pub fn versine<T: Real>(angle: T) -> T {
+    sine_versine(angle).1
+}
+
 /// sin and cos of `phase`/2⁶⁴ of a turn. Every phase is meant; the reduction to an eighth of a turn is exact.
 ///
 /// A phase accumulator of this form runs for ever without drift: it wraps where the turn does. Absolute error within
@@ -54,10 +69,11 @@ fn sine_kernel<T: Real>(angle: T, z: T) -> T {
     angle + angle * z * tail
 }
 
+/// (cos x − 1 + x²/2) / x⁴ as a function of z = x².
 #[inline]
-fn cosine_kernel<T: Real>(z: T) -> T {
+fn cosine_tail<T: Real>(z: T) -> T {
     let c = T::from_f64;
-    let tail = if T::SINGLE {
+    if T::SINGLE {
         c(4.166_664_568_298_827e-2) + z * (c(-1.388_731_625_493_765e-3) + z * c(2.443_315_711_809_948e-5))
     } else {
         c(4.166_666_666_666_660_190_37e-2)
@@ -65,7 +81,12 @@ fn cosine_kernel<T: Real>(z: T) -> T {
                 + z * (c(2.480_158_728_947_672_941_78e-5)
                     + z * (c(-2.755_731_435_139_066_330_35e-7)
                         + z * (c(2.087_572_321_298_174_827_90e-9) + z * c(-1.135_964_755_778_819_482_65e-11)))))
-    };
+    }
+}
+
+#[inline]
+fn cosine_kernel<T: Real>(z: T) -> T {
+    let tail = cosine_tail(z);
     // What 1 − z/2 rounds off is put back.
     let half = T::HALF * z;
     let near = T::ONE - half;

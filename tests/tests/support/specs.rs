@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use specgen::diagnostic::{Diagnostic, Place, Severity};
 use specgen::spec::SpecSource;
-use specgen::spec::keys::{Presence, SECTIONS};
+use specgen::spec::keys::{Key, Kind, Presence, SECTIONS, Section};
 
 /// Folder of the repository.
 pub fn root() -> PathBuf {
@@ -48,21 +48,69 @@ pub fn source(text: &str, name: &str, folder: &tempfile::TempDir) -> SpecSource 
     SpecSource { display_name: name.to_owned(), text: text.to_owned(), dir: folder.path().join("specs") }
 }
 
-/// A spec with every key of the key table but the bandwidths, each on a line of its own.
-pub fn every_key() -> String {
-    let mut text = String::new();
-    for section in SECTIONS {
-        if !section.name.is_empty() {
-            text.push_str(&format!("[{}]\n", section.name));
-        }
-        for key in section.keys {
-            let is_bandwidth = matches!(key.presence, Presence::InsteadOf(_)) && key.name.ends_with("_bandwidth");
-            if !is_bandwidth {
-                text.push_str(&format!("{} = {}\n", key.name, key.example));
-            }
+/// Sections that a spec without `[control]` does not have.
+pub fn is_task_space(section: &Section) -> bool {
+    section.name.starts_with("control") && section.name != "controller"
+        || matches!(section.name, "gains" | "position_gains" | "gauge" | "trajectory")
+}
+
+/// What a spec with every key leaves out: one of two keys, one of two forms, and what the other kind of spec has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Choice {
+    /// With `[control]` and all that belongs to it.
+    pub control: bool,
+    /// Weights per run instead of bandwidths; without `[control]` only.
+    pub weights: bool,
+    /// Joints one by one instead of joint circles.
+    pub joints: bool,
+    /// The first trajectory is a waveform instead of a path of the paper.
+    pub waveform: bool,
+}
+
+/// The task-space controller, with joint circles and a path of the paper.
+pub const PLATFORM: Choice = Choice { control: true, weights: false, joints: false, waveform: false };
+
+/// The leg feed-forward, with weights per run.
+pub const LEGS: Choice = Choice { control: false, weights: true, joints: false, waveform: false };
+
+impl Choice {
+    /// Whether the key stands in the text.
+    fn takes(self, section: &Section, key: &Key) -> bool {
+        let of_waveform = matches!(key.name, "file" | "period" | "repeat");
+        match (section.name, key.presence) {
+            (_, Presence::InsteadOf(_)) => key.name.ends_with("_weight") == self.weights,
+            (_, Presence::Form(form)) => form.contains("one by one") == self.joints,
+            ("sensor", _) if key.name == "calibration" => self.control,
+            ("trajectory", Presence::Rule(_)) => of_waveform == self.waveform,
+            _ => true,
         }
     }
-    text
+
+    /// One table of a section, its header first.
+    fn table(self, section: &Section) -> String {
+        let header = section.header();
+        let mut text = if header.is_empty() { header } else { header + "\n" };
+        for key in section.keys.iter().filter(|key| self.takes(section, key)) {
+            let waveform = section.name == "trajectory" && key.name == "kind" && self.waveform;
+            text.push_str(&format!("{} = {}\n", key.name, if waveform { "\"waveform\"" } else { key.example }));
+        }
+        text
+    }
+
+    /// A spec with every key of the key table that can stand beside the others, each on a line of its own.
+    pub fn text(self) -> String {
+        let sections = SECTIONS.iter().filter(|section| self.control || !is_task_space(section));
+        let tables = |section: &Section| match section.kind {
+            Kind::Repeated(least, _) => self.table(section).repeat(least.max(1)),
+            Kind::Plain | Kind::Optional => self.table(section),
+        };
+        sections.map(tables).collect()
+    }
+}
+
+/// The spec of the task-space controller with every key.
+pub fn every_key() -> String {
+    PLATFORM.text()
 }
 
 /// Line of a finding, from 1.

@@ -32,9 +32,11 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![deny(missing_docs)]
 
         mod config;
+        pub mod dynamics;
         pub mod hysteresis;
         pub mod kinematics;
         pub mod limits;
+        pub mod stages;
         mod state;
         mod step;
         mod words;

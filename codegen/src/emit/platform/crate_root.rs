@@ -41,6 +41,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod limits;
         pub mod sensing;
         pub mod setpoint;
+        pub mod stages;
         mod state;
         mod step;
         pub mod task_space;

@@ -8,8 +8,7 @@ pub fn emit() -> TokenStream {
         #![doc = " What the controller remembers from tick to tick. No NaN or infinity is ever stored here."]
 
         use specgen_runtime::setpoint::{Generator, Target};
-        use specgen_runtime::velocity::Velocity;
-        use specgen_runtime::{ControlMode, Digest, Estimate, Integral, NotchState, Transfer};
+        use specgen_runtime::{ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer};
 
         use crate::hysteresis::Memory;
         use crate::{LEGS, Real, limits};
@@ -37,7 +36,7 @@ pub fn emit() -> TokenStream {
             /// h: pose from rest, from the last gauge readings that were believed, m and rad.
             pub pose: [Real; 6],
             /// ḣ: its filtered derivative.
-            pub velocity: Velocity<Real>,
+            pub rate: Rate<Real>,
             /// Where set-points come from.
             pub generator: Generator<Real>,
             /// h_d at the end of the interval now running.
@@ -80,7 +79,7 @@ pub fn emit() -> TokenStream {
                 Self {
                     legs: [leg; LEGS],
                     pose: [0.0; 6],
-                    velocity: Velocity::new(),
+                    rate: Rate::new(),
                     generator: Generator::new(),
                     target: Target::new(),
                     error: [0.0; 6],
@@ -110,7 +109,7 @@ pub fn emit() -> TokenStream {
                         digest.real(*value);
                     }
                 }
-                self.velocity.digest(&mut digest);
+                self.rate.digest(&mut digest);
                 self.generator.digest(&mut digest);
                 self.target.digest(&mut digest);
                 self.error_notch.digest(&mut digest);

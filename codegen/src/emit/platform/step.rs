@@ -27,7 +27,7 @@ pub fn emit() -> TokenStream {
         use specgen_runtime::setpoint::{Command, Target};
         use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _};
 
-        use crate::dynamics::Load;
+        use crate::dynamics::{Load, Motion};
         use crate::hysteresis::{TABLES, Table};
         use crate::limits::DAC;
         use crate::setpoint::PLAN;
@@ -89,7 +89,7 @@ pub fn emit() -> TokenStream {
         /// One control tick. See the module for the timing.
         pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
             let entered = enter_mode(config, state);
-            let gauge_faults = sensing::sense(state, &input.gauge);
+            let gauge_faults = sense(state, &input.gauge);
             if gauge_faults == 0 {
                 learn(config, state);
             }
@@ -162,9 +162,22 @@ pub fn emit() -> TokenStream {
             true
         }
 
+        /// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.
+        #[inline]
+        pub(crate) fn sense(state: &mut State, gauge: &[Real; 6]) -> u32 {
+            let faults = sensing::faults(gauge);
+            if faults == 0 {
+                state.pose = sensing::pose(gauge);
+                state.rate.update(&sensing::RATE, &state.pose);
+            } else {
+                state.rate.coast(&sensing::RATE);
+            }
+            faults
+        }
+
         /// What the readings teach: the integral of (7) and the run-to-run estimates.
         #[inline]
-        fn learn(config: &Config, state: &mut State) {
+        pub(crate) fn learn(config: &Config, state: &mut State) {
             let mode = config.mode();
             if mode.feeds_back() {
                 let error = difference(&state.target.pose, &state.pose);
@@ -216,13 +229,13 @@ pub fn emit() -> TokenStream {
             if !config.damps() {
                 return [0.0; LEGS];
             }
-            let error = difference(&state.target.rate, &state.velocity.rate);
+            let error = difference(&state.target.rate, state.rate.value());
             transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error))
         }
 
         /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
         #[inline]
-        fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load {
+        pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load<Real> {
             let wrench = match config.interaction() {
                 Interaction::Neglected => [0.0; 6],
                 Interaction::Measured => state.wrench,
@@ -232,12 +245,12 @@ pub fn emit() -> TokenStream {
                     force_of(&environment.stiffness, &compressed)
                 }
             };
-            dynamics::load(&target.pose, &target.rate, &target.acceleration, &wrench)
+            dynamics::load(&Motion { pose: target.pose, rate: target.rate, acceleration: target.acceleration }, &wrench)
         }
 
         /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.
         #[inline]
-        fn feedback(config: &Config, state: &State) -> [Real; LEGS] {
+        pub(crate) fn feedback(config: &Config, state: &State) -> [Real; LEGS] {
             if !config.mode().feeds_back() {
                 return [0.0; LEGS];
             }

@@ -1,6 +1,6 @@
 //! Weights, bandwidths and modes of the run-to-run adaptation. Stability needs the sampled leg and comes later.
 
-use super::in_order;
+use super::{control, in_order};
 use crate::diagnostic::codes;
 use crate::model::AdaptationMode;
 use crate::spec::build;
@@ -35,6 +35,10 @@ pub(super) fn alternatives(f: &Fields, findings: &mut Findings) -> Option<()> {
 }
 
 pub(super) fn weights_for_mode(f: &Fields, findings: &mut Findings) -> Option<()> {
+    // The task-space controller has bandwidths of its own choice, and uses both after a change of mode.
+    if control::there(f).is_some() {
+        return None;
+    }
     let mode = build::mode(f)?;
     let word = f.choice("adaptation.mode")?;
     for which in WHICH {

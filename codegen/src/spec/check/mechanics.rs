@@ -30,11 +30,17 @@ fn legs_at_rest(geometry: &Geometry) -> Legs {
     legs
 }
 
+/// Below this length at rest a leg is a mistake, m.
+const SHORTEST_LEG: f64 = 1e-3;
+
 /// Radii of gyration that a platform usually has, in radii of its joint circle.
 const SOUND: std::ops::RangeInclusive<f64> = 0.1..=3.0;
 
 fn shortest_leg(f: &Fields) -> Option<f64> {
     let legs = legs_at_rest(&build::geometry(f)?);
+    if legs.lengths.iter().any(|length| *length < SHORTEST_LEG) {
+        return None;
+    }
     Some(legs.lengths.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a }))
 }
 
@@ -144,9 +150,28 @@ pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<(
     Some(())
 }
 
+/// A leg without length has no direction.
+pub(super) fn legs_have_length(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let lengths = legs_at_rest(&build::geometry(f)?).lengths;
+    let leg = lengths.iter().position(|length| *length < SHORTEST_LEG)?;
+    let path = if f.given("geometry.base_joints") { "geometry.platform_joints" } else { "geometry.height" };
+    findings.error(
+        codes::DEGENERATE_GEOMETRY,
+        path,
+        f.item_span(path, leg),
+        format!("the joints of leg {leg} (from 0) are only {} mm apart at rest", number(lengths[leg] * 1e3)),
+        "base joints are in {B}, platform joints in {P}, which `height` puts above {B}: check that neither is given in the other frame".to_owned(),
+    );
+    Some(())
+}
+
 pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> {
     let geometry = build::geometry(f)?;
-    let mut jacobian = legs_at_rest(&geometry).jacobian;
+    let legs = legs_at_rest(&geometry);
+    if legs.lengths.iter().any(|length| *length < SHORTEST_LEG) {
+        return None;
+    }
+    let mut jacobian = legs.jacobian;
     // Rotations in lengths at the joint circle, so that the condition has no unit.
     for column in 3..6 {
         jacobian.column_mut(column).unscale_mut(geometry.joint_radius());
@@ -173,7 +198,10 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
 /// Whether each axis alone, within its bound, needs no more than the stroke. The whole box may need more: the
 /// controller limits each leg.
 pub(super) fn workspace_in_reach(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let jacobian = legs_at_rest(&build::geometry(f)?).jacobian;
+    let Legs { jacobian, lengths } = legs_at_rest(&build::geometry(f)?);
+    if lengths.iter().any(|length| *length < SHORTEST_LEG) {
+        return None;
+    }
     let stroke = f.number("actuator.stroke")?;
     for (path, first, unit, scale) in [("workspace.translation", 0, "um", 1e6), ("workspace.rotation", 3, "mrad", 1e3)]
     {

@@ -22,7 +22,7 @@ pub(in crate::spec) fn readable(f: &Fields, dir: &Path, findings: &mut Findings)
         );
     }
     for (i, record) in records.iter().enumerate() {
-        let finding = if is_relative(record) {
+        let finding = if text::is_relative_path(record) {
             cannot_open(&dir.join(record)).map(|reason| {
                 (
                     codes::RECORD_UNREADABLE,
@@ -42,12 +42,6 @@ pub(in crate::spec) fn readable(f: &Fields, dir: &Path, findings: &mut Findings)
         }
     }
     Some(())
-}
-
-/// Relative on every system: no root, no drive, no backslash.
-fn is_relative(path: &str) -> bool {
-    let drive = path.as_bytes().get(1) == Some(&b':');
-    !path.trim().is_empty() && !path.starts_with('/') && !path.contains('\\') && !drive
 }
 
 fn cannot_open(path: &Path) -> Option<String> {

@@ -1,8 +1,8 @@
 //! The rows of the key table.
 
-use super::{Dimension, Item, Key, Presence, Range, SCHEMA_VERSION, Section, Shape};
+use super::{Dimension, Item, Key, Kind, MAX_TABLES, Presence, Range, SCHEMA_VERSION, Section, Shape};
 use crate::identify::MAX_GRID;
-use Presence::{Default, InsteadOf, Optional, Required};
+use Presence::{Default, Form, InsteadOf, Optional, Required, Rule};
 
 const fn row(
     name: &'static str,
@@ -29,6 +29,11 @@ const fn integer(min: i64, max: i64) -> Shape {
 
 const RADIUS: Range = Range::closed(1e-3, 10.0);
 const JOINT_ANGLE: Range = Range::open(0.0, 2.0 * std::f64::consts::FRAC_PI_3);
+const CIRCLES: &str = "joint circles";
+const JOINTS: &str = "joints one by one";
+const JOINT: &[Item] = &[CENTER; 3];
+const BASE_JOINTS: &str = "[[\"78 mm\", \"128 mm\", \"0 mm\"], [\"72 mm\", \"132 mm\", \"0 mm\"], [\"-150 mm\", \"3 mm\", \"0 mm\"], [\"-150 mm\", \"-3 mm\", \"0 mm\"], [\"72 mm\", \"-132 mm\", \"0 mm\"], [\"78 mm\", \"-128 mm\", \"0 mm\"]]";
+const PLATFORM_JOINTS: &str = "[[\"100 mm\", \"2 mm\", \"0 mm\"], [\"-48 mm\", \"88 mm\", \"0 mm\"], [\"-52 mm\", \"86 mm\", \"0 mm\"], [\"-52 mm\", \"-86 mm\", \"0 mm\"], [\"-48 mm\", \"-88 mm\", \"0 mm\"], [\"100 mm\", \"-2 mm\", \"0 mm\"]]";
 const BODY_MASS: Range = Range::closed(1e-6, 1e4);
 const MOMENT: Range = Range::above(0.0, 1e4);
 const PRODUCT: Item = item(Dimension::INERTIA, Range::closed(-1e4, 1e4), "g mm^2");
@@ -55,13 +60,88 @@ const STIFFNESS_RATES: &[Item] =
     &gains(Dimension::STIFFNESS_RATE, "N/(m s)", Dimension::TURN_STIFFNESS_RATE, "N m/(rad s)");
 const DAMPINGS: &[Item] = &gains(Dimension::DAMPING, "N s/m", Dimension::TURN_DAMPING, "N m s/rad");
 
+const GAINS: &[Key] = &[
+    row(
+        "proportional",
+        Shape::List(STIFFNESSES),
+        Required,
+        "k_p",
+        "[\"5e6 N/m\", \"5e6 N/m\", \"2e7 N/m\", \"1e5 N m/rad\", \"1e5 N m/rad\", \"5e4 N m/rad\"]",
+        "Proportional gain.",
+    ),
+    row(
+        "integral",
+        Shape::List(STIFFNESS_RATES),
+        Required,
+        "k_I",
+        "[\"4e7 N/(m s)\", \"4e7 N/(m s)\", \"2e8 N/(m s)\", \"1e6 N m/(rad s)\", \"1e6 N m/(rad s)\", \"5e5 N m/(rad s)\"]",
+        "Integral gain.",
+    ),
+    row(
+        "derivative",
+        Shape::List(DAMPINGS),
+        Required,
+        "k_v",
+        "[\"0 N s/m\", \"0 N s/m\", \"0 N s/m\", \"0 N m s/rad\", \"0 N m s/rad\", \"0 N m s/rad\"]",
+        "Derivative gain.",
+    ),
+];
+
+const DIRECTION: Item = Item::Number(Range::closed(-1e3, 1e3));
+// From V to m: the k-th coefficient in m/V^k.
+const CALIBRATION: Shape = Shape::Leading(
+    2,
+    &[
+        item(per_volt(0), Range::closed(-0.1, 0.1), "um"),
+        item(per_volt(1), Range::closed(-1.0, 1.0), "um/V"),
+        item(per_volt(2), Range::closed(-1.0, 1.0), "um/V^2"),
+        item(per_volt(3), Range::closed(-1.0, 1.0), "um/V^3"),
+        item(per_volt(4), Range::closed(-1.0, 1.0), "um/V^4"),
+        item(per_volt(5), Range::closed(-1.0, 1.0), "um/V^5"),
+    ],
+);
+
+const fn per_volt(power: i8) -> Dimension {
+    Dimension::new([1, 0, 0, -power, 0, 0])
+}
+
+/// x, y, z with one dimension, then the three rotations with another.
+const fn six(along: Item, about: Item) -> [Item; 6] {
+    [along, along, along, about, about, about]
+}
+
+const POSE: &[Item] = &six(
+    item(Dimension::LENGTH, Range::closed(-0.1, 0.1), "um"),
+    item(Dimension::ANGLE, Range::closed(-0.5, 0.5), "urad"),
+);
+const FRAME: &[Item] = &six(CENTER, item(Dimension::ANGLE, Range::closed(-TURN_AROUND, TURN_AROUND), "rad"));
+const TURN_AROUND: f64 = std::f64::consts::PI;
+const SPEEDS: &[Item] = &six(
+    item(Dimension::SPEED, Range::above(0.0, 100.0), "um/s"),
+    item(Dimension::ANGULAR_RATE, Range::above(0.0, 1e3), "mrad/s"),
+);
+const ACCELERATIONS: &[Item] = &six(
+    item(Dimension::ACCELERATION, Range::above(0.0, 1e5), "mm/s^2"),
+    item(Dimension::ANGULAR_ACCELERATION, Range::above(0.0, 1e6), "mrad/s^2"),
+);
+const JERKS: &[Item] = &six(
+    item(Dimension::JERK, Range::above(0.0, 1e8), "m/s^3"),
+    item(Dimension::ANGULAR_JERK, Range::above(0.0, 1e9), "rad/s^3"),
+);
+const NO_POSE: &str = "[\"0 um\", \"0 um\", \"0 um\", \"0 urad\", \"0 urad\", \"0 urad\"]";
+const SLOW_SPEED: &str = "[\"100 um/s\", \"100 um/s\", \"100 um/s\", \"1 mrad/s\", \"1 mrad/s\", \"1 mrad/s\"]";
+const SLOW_ACCELERATION: &str =
+    "[\"10 mm/s^2\", \"10 mm/s^2\", \"10 mm/s^2\", \"100 mrad/s^2\", \"100 mrad/s^2\", \"100 mrad/s^2\"]";
+const SLOW_JERK: &str = "[\"1 m/s^3\", \"1 m/s^3\", \"1 m/s^3\", \"10 rad/s^3\", \"10 rad/s^3\", \"10 rad/s^3\"]";
+const STREAM_SPEED: &str = "[\"5 mm/s\", \"5 mm/s\", \"5 mm/s\", \"50 mrad/s\", \"50 mrad/s\", \"50 mrad/s\"]";
+
 /// Every section, in the order of the reference. Sections that hold others come before them.
 // One row a line: this is a table.
 #[rustfmt::skip]
 pub const SECTIONS: &[Section] = &[
     Section {
         name: "",
-        optional: false,
+        kind: Kind::Plain,
         doc: "The keys before the first section.",
         keys: &[
             row("schema", integer(SCHEMA_VERSION, SCHEMA_VERSION), Required, "", "1", "Version of this language."),
@@ -77,19 +157,21 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "geometry",
-        optional: false,
-        doc: "Joint circles of base and platform, equations (1) and (2), and the pose at rest.",
+        kind: Kind::Plain,
+        doc: "Joints of base and platform, on circles as in equations (1) and (2) or one by one, and the pose at rest.",
         keys: &[
-            row("base_radius", one(Dimension::LENGTH, RADIUS, "mm"), Required, "r_B", "\"150 mm\"", "Radius of the circle through the six base joints."),
-            row("platform_radius", one(Dimension::LENGTH, RADIUS, "mm"), Required, "r_P", "\"100 mm\"", "Radius of the circle through the six platform joints."),
-            row("base_angle", one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Required, "alpha_B", "\"0.012 pi rad\"", "Angle between the two base joints of a pair."),
-            row("platform_angle", one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Required, "alpha_P", "\"0.012 pi rad\"", "Angle between the two platform joints of a pair."),
-            row("height", one(Dimension::LENGTH, RADIUS, "mm"), Required, "P_z", "\"180 mm\"", "Height of the platform's joint plane above the base's at rest."),
+            row("base_radius", one(Dimension::LENGTH, RADIUS, "mm"), Form(CIRCLES), "r_B", "\"150 mm\"", "Radius of the circle through the six base joints."),
+            row("platform_radius", one(Dimension::LENGTH, RADIUS, "mm"), Form(CIRCLES), "r_P", "\"100 mm\"", "Radius of the circle through the six platform joints."),
+            row("base_angle", one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Form(CIRCLES), "alpha_B", "\"0.012 pi rad\"", "Angle between the two base joints of a pair."),
+            row("platform_angle", one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Form(CIRCLES), "alpha_P", "\"0.012 pi rad\"", "Angle between the two platform joints of a pair."),
+            row("height", one(Dimension::LENGTH, RADIUS, "mm"), Required, "P_z", "\"180 mm\"", "Height of P_C, the origin of {P}, above that of {B} at rest; with joint circles, of the platform's joint plane above the base's."),
+            row("base_joints", Shape::Rows(6, JOINT), Form(JOINTS), "B_i", BASE_JOINTS, "The six base joints in {B}, leg by leg: where the joints lie on no circle."),
+            row("platform_joints", Shape::Rows(6, JOINT), Form(JOINTS), "P_i", PLATFORM_JOINTS, "The six platform joints in {P}, leg by leg."),
         ],
     },
     Section {
         name: "platform",
-        optional: false,
+        kind: Kind::Plain,
         doc: "The moving platform as a rigid body, in its own frame {P}, Table 4.",
         keys: &[
             row("mass", one(Dimension::MASS, BODY_MASS, "kg"), Required, "m", "\"1.195 kg\"", "Mass with everything that is mounted on it."),
@@ -100,7 +182,7 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "leg",
-        optional: false,
+        kind: Kind::Plain,
         doc: "The two parts of a leg, the same for all six, Table 4.",
         keys: &[
             row("fixed_mass", one(Dimension::MASS, BODY_MASS, "g"), Required, "m_s", "\"90.26 g\"", "Mass of the part at the base joint."),
@@ -113,7 +195,7 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "actuator",
-        optional: false,
+        kind: Kind::Plain,
         doc: "The piezo stacks of a leg.",
         keys: &[
             row("stacks", integer(1, 1000), Required, "", "5", "Stacks in series in one leg."),
@@ -128,7 +210,7 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "amplifier",
-        optional: false,
+        kind: Kind::Plain,
         doc: "Power amplifier between converter and stack. No lag is the cautious default: lag damps the resonance.",
         keys: &[
             row("lag", one(Dimension::TIME, Range::closed(0.0, 10.0), "ms"), Default("\"0 ms\""), "", "\"0.35 ms\"", "Time constant of its first-order lag."),
@@ -137,7 +219,7 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "dac",
-        optional: false,
+        kind: Kind::Plain,
         doc: "Converter that drives the amplifier, in volts at the stack.",
         keys: &[
             row("bits", integer(8, 24), Required, "", "16", "Resolution."),
@@ -146,17 +228,18 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "sensor",
-        optional: false,
-        doc: "Displacement gauge of a leg.",
+        kind: Kind::Plain,
+        doc: "Displacement gauge of a leg; with [control], of the six that see the platform.",
         keys: &[
             row("range", Shape::List(&[READING; 2]), Required, "", "[\"-2 um\", \"48 um\"]", "Smallest and largest displacement that it can report."),
             row("noise", one(Dimension::LENGTH, Range::closed(0.0, 1e-3), "nm"), Default("\"0 nm\""), "", "\"2.2 nm\"", "Noise, rms."),
             row("bits", integer(8, 32), Required, "", "16", "Resolution of its converter over the range."),
+            row("calibration", CALIBRATION, Rule("the gauge words are metres"), "", "[\"-2 um\", \"5 um/V\"]", "With [control]: displacement as a polynomial of the gauge's voltage, lowest power first; the gauge words are then volts. For all six gauges; a gauge may have its own."),
         ],
     },
     Section {
         name: "hysteresis",
-        optional: false,
+        kind: Kind::Plain,
         doc: "The inverse Preisach model and the measurements that identify it.",
         keys: &[
             row("grid", integer(2, MAX_GRID as i64), Default("32"), "N", "32", "Intervals per axis of the Preisach plane; the table grows and the error falls with its square."),
@@ -166,8 +249,8 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "adaptation",
-        optional: false,
-        doc: "Run-to-run adaptation, Appendix B. A mode that uses a weight needs it, as weight per run or as bandwidth.",
+        kind: Kind::Plain,
+        doc: "Run-to-run adaptation, Appendix B. A mode that uses a weight needs it, as weight per run or as bandwidth. With [control] both bandwidths are given, or neither: the compiler then derives them.",
         keys: &[
             row("mode", Shape::One(Item::Choice(&["invhys", "ewma", "pcc"])), Default("\"invhys\""), "", "\"pcc\"", "Inverse model alone; with the level estimate (AII.3); with level and drift (AII.5), (AII.6)."),
             row("level_weight", WEIGHT, InsteadOf("level_bandwidth"), "omega_1", "0.252", "Weight of a new reading in the level estimate, per run."),
@@ -179,25 +262,97 @@ pub const SECTIONS: &[Section] = &[
         ],
     },
     Section {
-        name: "gains",
-        optional: true,
-        doc: "Diagonal gains of (7) in the order x, y, z, theta_x, theta_y, theta_z. Held for the task-space controller.",
+        name: "control",
+        kind: Kind::Optional,
+        doc: "The task-space controller of section 4. With it the six gauges see the platform ([[gauge]]); without it each leg has its own gauge and its own feed-forward.",
         keys: &[
-            row("proportional", Shape::List(STIFFNESSES), Required, "k_p", "[\"5e6 N/m\", \"5e6 N/m\", \"2e7 N/m\", \"1e5 N m/rad\", \"1e5 N m/rad\", \"5e4 N m/rad\"]", "Proportional gain."),
-            row("integral", Shape::List(STIFFNESS_RATES), Required, "k_I", "[\"4e7 N/(m s)\", \"4e7 N/(m s)\", \"2e8 N/(m s)\", \"1e6 N m/(rad s)\", \"1e6 N m/(rad s)\", \"5e5 N m/(rad s)\"]", "Integral gain."),
-            row("derivative", Shape::List(DAMPINGS), Required, "k_v", "[\"0 N s/m\", \"0 N s/m\", \"0 N s/m\", \"0 N m s/rad\", \"0 N m s/rad\", \"0 N m s/rad\"]", "Derivative gain."),
-            row("environment", Shape::List(STIFFNESSES), Required, "K_e", "[\"0 N/m\", \"0 N/m\", \"0 N/m\", \"0 N m/rad\", \"0 N m/rad\", \"0 N m/rad\"]", "Stiffness of the work piece that the platform presses on."),
+            row("mode", Shape::One(Item::Choice(&["p/f", "p", "f"])), Default("\"p/f\""), "", "\"p/f\"", "Loops closed at start-up: position feedback and feed-forward, feedback alone, feed-forward alone. How the feed-forward adapts is `adaptation.mode`."),
+            row("modal_damping", Shape::One(Item::Number(Range::open(0.0, 1.0))), Required, "zeta", "0.02", "Damping ratio of the lowest mode of the platform on its legs. Give what is measured, or less: less is the cautious side."),
+            row("notch", Shape::One(Item::Flag), Default("true"), "", "true", "Whether a modal notch stands in the feedback; without one the bandwidth falls to about a twelfth."),
+            row("notch_damping", Shape::One(Item::Number(Range::above(0.0, 1.0))), Rule("1, with a notch"), "zeta_d", "1.0", "Damping ratio that the notch leaves of each mode, above `modal_damping`."),
+            row("velocity_cutoff", BANDWIDTH, Rule("0.6 pi rad / period"), "", "\"9e3 rad/s\"", "First-order low-pass of the pose derivative, below half the tick rate (pi rad / period)."),
+            row("interaction", Shape::One(Item::Choice(&["none", "modelled", "measured"])), Default("\"none\""), "", "\"none\"", "Where the interaction force of the feed-forward comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words."),
+            row("transfer_time", one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("\"50 ms\""), "", "\"50 ms\"", "Time constant with which the offset fades that makes a change of mode bumpless."),
+        ],
+    },
+    Section {
+        name: "control.environment",
+        kind: Kind::Optional,
+        doc: "The work piece that the platform presses on, in the order x, y, z, theta_x, theta_y, theta_z at P_C.",
+        keys: &[
+            row("stiffness", Shape::List(STIFFNESSES), Required, "K_e", "[\"0 N/m\", \"0 N/m\", \"3e6 N/m\", \"0 N m/rad\", \"0 N m/rad\", \"0 N m/rad\"]", "Diagonal of its stiffness."),
+            row("rest", Shape::List(POSE), Default(NO_POSE), "h_e", NO_POSE, "Pose, from rest, at which it is unloaded."),
+        ],
+    },
+    Section {
+        name: "control.setpoint",
+        kind: Kind::Plain,
+        doc: "Limits of the set-point generator, in the order x, y, z, theta_x, theta_y, theta_z of {B}.",
+        keys: &[
+            row("bias", Shape::List(POSE), Default(NO_POSE), "", "[\"0 um\", \"0 um\", \"10 um\", \"0 urad\", \"0 urad\", \"0 urad\"]", "Pose, from rest, that every set-point is added to: room for corrections downward. It is approached slowly after start-up."),
+            row("speed", Shape::List(SPEEDS), Default(SLOW_SPEED), "", SLOW_SPEED, "Largest speed of bias and point-to-point moves."),
+            row("acceleration", Shape::List(ACCELERATIONS), Default(SLOW_ACCELERATION), "", SLOW_ACCELERATION, "Their largest acceleration."),
+            row("jerk", Shape::List(JERKS), Default(SLOW_JERK), "", SLOW_JERK, "Their largest jerk."),
+            row("stream_speed", Shape::List(SPEEDS), Default(STREAM_SPEED), "", STREAM_SPEED, "A streamed set-point further from the last one than this in a period is a jump, and refused."),
+            row("stale_ticks", integer(1, 1_000_000), Default("10"), "", "10", "A stream that brings nothing new for so many ticks is stale, and the last set-point is held."),
+        ],
+    },
+    Section {
+        name: "control.frames",
+        kind: Kind::Plain,
+        doc: "Coordinates that set-points are given in.",
+        keys: &[
+            row("work", Shape::List(FRAME), Default(NO_POSE), "", "[\"0 mm\", \"0 mm\", \"0 mm\", \"0 deg\", \"0 deg\", \"30 deg\"]", "Work frame in {B}, about P_C at rest: offset and angles, R = Rz Ry Rx."),
+            row("tool", Shape::List(&[CENTER; 3]), Default("[\"0 mm\", \"0 mm\", \"0 mm\"]"), "", "[\"0 mm\", \"0 mm\", \"40 mm\"]", "Tool point in {P}: what set-points place, and what rotations turn about."),
+        ],
+    },
+    Section {
+        name: "gains",
+        kind: Kind::Optional,
+        doc: "Diagonal gains of (7) for P/F in the order x, y, z, theta_x, theta_y, theta_z. Without it the compiler derives them.",
+        keys: GAINS,
+    },
+    Section {
+        name: "position_gains",
+        kind: Kind::Optional,
+        doc: "The same for P alone.",
+        keys: GAINS,
+    },
+    Section {
+        name: "gauge",
+        kind: Kind::Repeated(6, 6),
+        doc: "One of the six gauges that see the platform, in the order of the gauge words; with [control], and with it alone. A gauge fixed in {B} measures along a line to a plane on the platform, from rest.",
+        keys: &[
+            row("point", Shape::List(&[CENTER; 3]), Required, "", "[\"80 mm\", \"0 mm\", \"180 mm\"]", "A point of the measuring line in {B}."),
+            row("direction", Shape::List(&[DIRECTION; 3]), Required, "", "[0, 0, 1]", "Direction of the line in {B}, of any length: the reading grows when the target moves this way."),
+            row("target_point", Shape::List(&[CENTER; 3]), Rule("`point`, at rest"), "", "[\"80 mm\", \"0 mm\", \"0 mm\"]", "A point of the target plane in {P}."),
+            row("target_normal", Shape::List(&[DIRECTION; 3]), Rule("`direction`"), "", "[0, 0, 1]", "Normal of the target plane in {P}, of any length and either sign."),
+            row("calibration", CALIBRATION, Rule("`sensor.calibration`"), "", "[\"-2 um\", \"5 um/V\"]", "Displacement of this gauge as a polynomial of its voltage, lowest power first."),
+        ],
+    },
+    Section {
+        name: "trajectory",
+        kind: Kind::Repeated(0, MAX_TABLES),
+        doc: "A trajectory that the controller can play, numbered from 0 in the order of the file; with [control] alone.",
+        keys: &[
+            row("name", Shape::One(Item::Name), Required, "", "\"circle\"", "Its name, once in the file."),
+            row("kind", Shape::One(Item::Choice(&["case-1", "case-2", "machining", "waveform"])), Required, "", "\"case-1\"", "One of the paper's paths, or a table of poses."),
+            row("frequency", one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Rule("error, but for a waveform"), "f_c", "\"1 Hz\"", "Of a paper's path: operating frequency."),
+            row("as_printed", Shape::One(Item::Flag), Rule("`false`"), "", "false", "Of a paper's path: the formulas as printed, with their jumps."),
+            row("file", Shape::One(Item::File), Rule("error for a waveform"), "", "\"waveforms/circle.csv\"", "Of a waveform: the table of poses, a CSV file relative to the spec."),
+            row("period", one(Dimension::TIME, Range::closed(1e-6, 3600.0), "ms"), Rule("error for a waveform"), "", "\"1 ms\"", "Of a waveform: time from one row to the next."),
+            row("repeat", Shape::One(Item::Flag), Rule("`false`"), "", "false", "Of a waveform: whether it begins again after the last row."),
         ],
     },
     Section {
         name: "timing",
-        optional: false,
+        kind: Kind::Plain,
         doc: "Control timing.",
         keys: &[row("period", one(Dimension::TIME, Range::closed(1e-6, 10.0), "us"), Required, "T_s", "\"200 us\"", "Control period.")],
     },
     Section {
         name: "workspace",
-        optional: false,
+        kind: Kind::Plain,
         doc: "Bounds on the pose that may be asked for, from rest.",
         keys: &[
             row("translation", Shape::List(&[TRAVEL; 3]), Required, "", "[\"40 um\", \"40 um\", \"40 um\"]", "Bounds on |x|, |y|, |z|."),
@@ -206,7 +361,7 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "controller",
-        optional: false,
+        kind: Kind::Plain,
         doc: "What is emitted.",
         keys: &[
             row("scalar", Shape::One(Item::Choice(&["f32", "f64"])), Default("\"f64\""), "", "\"f64\"", "Arithmetic of the controller."),
@@ -215,13 +370,13 @@ pub const SECTIONS: &[Section] = &[
     },
     Section {
         name: "target",
-        optional: false,
+        kind: Kind::Plain,
         doc: "What it runs on.",
         keys: &[row("mcu", Shape::One(Item::Choice(&["mps2-an500", "mps2-an386"])), Default("\"mps2-an500\""), "", "\"mps2-an500\"", "Cortex-M7 with double-precision FPU, or Cortex-M4F with single precision.")],
     },
     Section {
         name: "target.budget",
-        optional: false,
+        kind: Kind::Plain,
         doc: "What it may use there; a build that needs more is refused.",
         keys: &[
             row("flash", BYTES, Optional, "", "\"128 KiB\"", "Flash."),

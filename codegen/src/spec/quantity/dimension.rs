@@ -51,6 +51,17 @@ impl Dimension {
     /// N m s/rad
     pub const TURN_DAMPING: Self = Self::new([2, 1, -1, 0, -1, 0]);
 
+    /// m/s
+    pub const SPEED: Self = Self::new([1, 0, -1, 0, 0, 0]);
+    /// m/s²
+    pub const ACCELERATION: Self = Self::new([1, 0, -2, 0, 0, 0]);
+    /// m/s³
+    pub const JERK: Self = Self::new([1, 0, -3, 0, 0, 0]);
+    /// rad/s²
+    pub const ANGULAR_ACCELERATION: Self = Self::new([0, 0, -2, 0, 1, 0]);
+    /// rad/s³
+    pub const ANGULAR_JERK: Self = Self::new([0, 0, -3, 0, 1, 0]);
+
     /// From the exponents of m, kg, s, V, rad, byte.
     #[must_use]
     pub const fn new(exponents: [i8; 6]) -> Self {
@@ -121,8 +132,11 @@ const NAMES: &[(Dimension, &str)] = &[
     (Dimension::new([2, 1, -2, 0, 0, 0]), "a torque or an energy"),
     (Dimension::new([2, 1, -3, 0, 0, 0]), "a power"),
     (Dimension::new([-1, 1, -2, 0, 0, 0]), "a pressure"),
-    (Dimension::new([1, 0, -1, 0, 0, 0]), "a speed"),
-    (Dimension::new([1, 0, -2, 0, 0, 0]), "an acceleration"),
+    (Dimension::SPEED, "a speed"),
+    (Dimension::ACCELERATION, "an acceleration"),
+    (Dimension::JERK, "a jerk"),
+    (Dimension::ANGULAR_ACCELERATION, "an angular acceleration"),
+    (Dimension::ANGULAR_JERK, "an angular jerk"),
     (Dimension::new([2, 0, 0, 0, 0, 0]), "an area"),
     (Dimension::new([3, 0, 0, 0, 0, 0]), "a volume"),
     (Dimension::new([1, 1, 0, 0, 0, 0]), "a mass times a length"),

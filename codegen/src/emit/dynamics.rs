@@ -1,0 +1,133 @@
+//! `src/dynamics.rs`: constants of the inverse dynamics and thin functions over the runtime's kernel. Reads
+//! [`ir::Dynamics`](crate::ir::Dynamics); exports `PLATFORM`, `leg_forces`, `load` and the functions for analysis.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+use specgen_runtime::dynamics::LANES;
+
+use super::literal;
+use crate::ir::{DynamicsLeg, Ir};
+
+pub fn emit(ir: &Ir) -> TokenStream {
+    let d = &ir.dynamics;
+    let real = |value| literal::real(ir.scalar, value);
+    let reals = |values: &[f64]| literal::reals(ir.scalar, values);
+    let groups = d.legs.chunks(LANES).map(|legs| group(ir, legs));
+    let order = d.order.map(literal::count);
+    let rows = d.rows.map(literal::count);
+    let (flat_base, flat_platform) = (d.flat_base, d.flat_platform);
+    let (base_depth, mass, gravity) = (real(d.base_depth), real(d.mass), real(d.gravity));
+    let (pole, first_moment, pole_moment) = (reals(&d.pole), reals(&d.first_moment), reals(&d.pole_moment));
+    let second_moment = literal::vectors(ir.scalar, &d.second_moment);
+    let (extensible_moment, leg_inertia, leg_weight_moment) =
+        (real(d.extensible_moment), real(d.leg_inertia), real(d.leg_weight_moment));
+    let pivots_doc = format!(
+        " Over the declared workspace the smallest pivot of the elimination is {:.3} of the largest or more.",
+        d.pivot_ratio
+    );
+    quote! {
+        #![doc = " Inverse dynamics: motion of the platform to leg forces and leg displacements."]
+        #![doc = ""]
+        #![doc = " Poses are from rest, [x y z θx θy θz] in m and rad; rates and accelerations are their time derivatives. The model and its range are"]
+        #![doc = " in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared workspace only."]
+
+        use specgen_runtime::dynamics::LegGroup;
+        use specgen_runtime::Platform;
+
+        pub use specgen_runtime::{Load, Motion};
+
+        use crate::Real;
+
+        /// Constants of the platform; from `geometry`, `platform` and `leg`.
+        ///
+        #[doc = #pivots_doc]
+        pub const PLATFORM: Platform<Real> = Platform {
+            groups: [#(#groups),*],
+            order: [#(#order),*],
+            rows: [#(#rows),*],
+            flat_base: #flat_base,
+            flat_platform: #flat_platform,
+            base_depth: #base_depth,
+            pole: [#pole],
+            mass: #mass,
+            first_moment: [#first_moment],
+            pole_moment: [#pole_moment],
+            second_moment: #second_moment,
+            extensible_moment: #extensible_moment,
+            leg_inertia: #leg_inertia,
+            leg_weight_moment: #leg_weight_moment,
+            gravity: #gravity,
+        };
+
+        /// Six leg forces for a motion, N, > 0 pushes the platform: J⁻ᵀ (M ḧ + C ḣ + G).
+        #[inline]
+        #[must_use]
+        pub fn leg_forces(motion: &Motion<Real>) -> [Real; 6] {
+            PLATFORM.leg_forces(motion)
+        }
+
+        /// Leg displacements (m) and leg forces (N) for a motion under a wrench on the platform: force (N) and torque (N m) about
+        /// P_C, base axes.
+        #[inline]
+        #[must_use]
+        pub fn load(motion: &Motion<Real>, wrench: &[Real; 6]) -> Load<Real> {
+            PLATFORM.load(motion, wrench)
+        }
+
+        /// M(h): kg, kg m, kg m². For analysis.
+        #[inline]
+        #[must_use]
+        pub fn mass_matrix(pose: &[Real; 6]) -> [[Real; 6]; 6] {
+            PLATFORM.mass_matrix(pose)
+        }
+
+        /// C(h, ḣ) ḣ: N, N m. For analysis.
+        #[inline]
+        #[must_use]
+        pub fn coriolis(pose: &[Real; 6], rate: &[Real; 6]) -> [Real; 6] {
+            PLATFORM.coriolis(pose, rate)
+        }
+
+        /// G(h): N, N m. For analysis.
+        #[inline]
+        #[must_use]
+        pub fn gravity(pose: &[Real; 6]) -> [Real; 6] {
+            PLATFORM.gravity(pose)
+        }
+
+        /// J(h) = ∂l/∂h, a row per leg: m/m, m/rad. For analysis.
+        #[inline]
+        #[must_use]
+        pub fn jacobian(pose: &[Real; 6]) -> [[Real; 6]; 6] {
+            PLATFORM.jacobian(pose)
+        }
+    }
+}
+
+/// Legs side by side: each number of the group holds one of every leg.
+fn group(ir: &Ir, legs: &[DynamicsLeg]) -> TokenStream {
+    let numbers = |value: &dyn Fn(&DynamicsLeg) -> f64| {
+        let values: Vec<f64> = legs.iter().map(value).collect();
+        let values = literal::reals(ir.scalar, &values);
+        quote! { [#values] }
+    };
+    let vectors = |value: &dyn Fn(&DynamicsLeg) -> [f64; 3]| {
+        let axes = [0, 1, 2].map(|axis| numbers(&|leg| value(leg)[axis]));
+        quote! { [#(#axes),*] }
+    };
+    let (base, joint) = (vectors(&|leg| leg.base), vectors(&|leg| leg.joint));
+    let (arm, rest) = (vectors(&|leg| leg.arm), vectors(&|leg| leg.rest));
+    let (length, inverse_length) = (numbers(&|leg| leg.length), numbers(&|leg| leg.inverse_length));
+    let half_inverse_square = numbers(&|leg| leg.half_inverse_square);
+    quote! {
+        LegGroup {
+            base: #base,
+            joint: #joint,
+            arm: #arm,
+            rest: #rest,
+            length: #length,
+            inverse_length: #inverse_length,
+            half_inverse_square: #half_inverse_square,
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! The task-space controller: its own values, and what goes with it or without it.
+
+use std::f64::consts::PI;
+
+use crate::diagnostic::codes;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+use crate::spec::text::number;
+
+/// `Some` in a spec with `[control]`.
+pub(super) fn there(f: &Fields) -> Option<()> {
+    f.table("control").map(|_| ())
+}
+
+/// What would silently do nothing without `[control]`.
+pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
+    if there(f).is_some() {
+        return Some(());
+    }
+    let tables = ["gauge", "trajectory"].map(|section| format!("{section}[0]"));
+    let parts = tables.iter().filter_map(|path| Some((path.as_str(), f.table(path)?)));
+    let key = "sensor.calibration";
+    let calibration = f.given(key).then(|| (key, f.span(key)));
+    for (path, span) in parts.chain(calibration) {
+        let what = path.split('[').next().unwrap_or(path);
+        findings.error(
+            codes::WITHOUT_CONTROL,
+            path,
+            span,
+            format!("`{what}` is for the task-space controller, but there is no section [control]"),
+            "write [control] with modal_damping = 0.02 and six sections [[gauge]], or take this out".to_owned(),
+        );
+    }
+    for section in ["gains", "position_gains"] {
+        if let Some(span) = f.table(section) {
+            findings.warning(
+                codes::GAINS_UNUSED,
+                section,
+                span,
+                format!("[{section}] has no effect without [control]: the leg feed-forward has no feedback"),
+                "write [control] for the task-space controller, or take the gains out".to_owned(),
+            );
+        }
+    }
+    Some(())
+}
+
+/// Weights per run, runs of several ticks and leg set-points are the leg feed-forward's.
+pub(super) fn no_leg_keys(f: &Fields, findings: &mut Findings) -> Option<()> {
+    there(f)?;
+    let mut refuse = |path: &str, why: &str, mend: &str| {
+        findings.error(
+            codes::LEG_KEY_WITH_CONTROL,
+            path,
+            f.span(path),
+            format!("`{path}` stands beside [control]: {why}"),
+            mend.to_owned(),
+        );
+    };
+    for which in ["level", "drift"] {
+        let path = format!("adaptation.{which}_weight");
+        if f.given(&path) {
+            refuse(
+                &path,
+                "a weight per run is another controller at another period",
+                &format!("write {which}_bandwidth in rad/s, or leave both bandwidths to the compiler"),
+            );
+        }
+    }
+    if f.integer("adaptation.run_interval").is_some_and(|ticks| ticks != 1) {
+        refuse(
+            "adaptation.run_interval",
+            "the task-space controller adapts in every tick",
+            "take it out; a smaller bandwidth does what a longer run would",
+        );
+    }
+    if f.choice("controller.setpoint") == Some("leg") {
+        refuse(
+            "controller.setpoint",
+            "its set-point is a pose",
+            "write setpoint = \"pose\", or take [control] out for a leg feed-forward",
+        );
+    }
+    Some(())
+}
+
+pub(super) fn both_bandwidths(f: &Fields, findings: &mut Findings) -> Option<()> {
+    there(f)?;
+    let (level, drift) = ("adaptation.level_bandwidth", "adaptation.drift_bandwidth");
+    let (given, missing) = match (f.given(level), f.given(drift)) {
+        (true, false) => (level, drift),
+        (false, true) => (drift, level),
+        _ => return Some(()),
+    };
+    if findings.mentions(&[missing]) {
+        return Some(());
+    }
+    findings.error(
+        codes::ALTERNATIVES,
+        given,
+        f.span(given),
+        format!("`{given}` stands without `{missing}`: the adaptation may be changed at run time and needs both"),
+        "give both bandwidths, such as \"450 rad/s\" and \"20 rad/s\", or neither: the compiler then derives them"
+            .to_owned(),
+    );
+    Some(())
+}
+
+pub(super) fn notch(f: &Fields, findings: &mut Findings) -> Option<()> {
+    there(f)?;
+    let path = "control.notch_damping";
+    let damping = f.number(path)?;
+    if !f.flag("control.notch")? {
+        findings.error(
+            codes::ALTERNATIVES,
+            path,
+            f.span(path),
+            format!("`{path}` stands beside notch = false: there is no notch to damp"),
+            "take one of the two out".to_owned(),
+        );
+        return Some(());
+    }
+    let own = f.number("control.modal_damping")?;
+    if damping <= own {
+        findings.error(
+            codes::NOTCH_DAMPING,
+            path,
+            f.span(path),
+            format!("`{path}` is {}, not above `control.modal_damping`, {}", number(damping), number(own)),
+            "write notch_damping = 1.0, the usual choice, or take the notch out with notch = false".to_owned(),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn cutoff_below_tick_rate(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let path = "control.velocity_cutoff";
+    let (cutoff, limit) = (f.number(path)?, PI / f.number("timing.period")?);
+    if cutoff >= limit {
+        findings.error(
+            codes::CUTOFF_TOO_HIGH,
+            path,
+            f.span(path),
+            format!(
+                "`{path}` is {} rad/s, expected less than half the tick rate, {} rad/s",
+                number(cutoff),
+                number(limit)
+            ),
+            format!("write \"{} rad/s\" or less, or shorten `timing.period`", number(0.6 * limit)),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn environment_for_model(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let path = "control.interaction";
+    if f.choice(path)? == "modelled" && f.table("control.environment").is_none() {
+        findings.error(
+            codes::MISSING_SECTION,
+            "control.environment",
+            f.span(path),
+            "interaction = \"modelled\" needs the stiffness in section [control.environment]".to_owned(),
+            "write [control.environment] with stiffness = [...], six values in N/m and N m/rad; or interaction = \"none\""
+                .to_owned(),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn bias_inside_workspace(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let path = "control.setpoint.bias";
+    let bias = f.list::<6>(path)?;
+    let bounds = [f.list::<3>("workspace.translation"), f.list::<3>("workspace.rotation")];
+    for (axis, value) in bias.into_iter().enumerate() {
+        let Some(bound) = bounds[axis / 3].map(|bounds| bounds[axis % 3]) else {
+            continue;
+        };
+        if value.abs() <= bound {
+            continue;
+        }
+        let (unit, scale) = if axis < 3 { ("um", 1e6) } else { ("urad", 1e6) };
+        findings.error(
+            codes::BIAS_OUTSIDE,
+            &format!("{path}[{axis}]"),
+            f.item_span(path, axis),
+            format!(
+                "the bias of {} {unit} is outside the workspace of {} {unit} on this axis",
+                number(value * scale),
+                number(bound * scale)
+            ),
+            "the workspace counts from rest with the bias in it: widen [workspace] or reduce the bias".to_owned(),
+        );
+    }
+    Some(())
+}

@@ -1,0 +1,89 @@
+//! The six gauges that see the platform. Whether they see every direction needs the lowering.
+
+use super::control;
+use crate::diagnostic::codes;
+use crate::spec::build;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+use crate::spec::text::number;
+
+/// Least |cos| between the measuring line and the normal of its target.
+const STEEPEST: f64 = 0.1;
+
+pub(super) fn six(f: &Fields, findings: &mut Findings) -> Option<()> {
+    control::there(f)?;
+    let count = f.count("gauge");
+    if count == 6 || findings.mentions(&["gauge"]) {
+        return Some(());
+    }
+    // The seventh is one too many; without any, [control] asks for them.
+    let path = if count > 6 { "gauge[6]" } else { "gauge" };
+    let last = format!("gauge[{}]", count.saturating_sub(1));
+    let place = if count > 6 { f.table(path) } else { f.table(&last).or_else(|| f.table("control")) };
+    findings.error(
+        codes::GAUGE_COUNT,
+        path,
+        place.unwrap_or(0..0),
+        format!("there are {count} sections [[gauge]], expected 6"),
+        "write one for each gauge, in the order of the gauge words:\n[[gauge]]\npoint = [\"80 mm\", \"0 mm\", \"180 mm\"]\ndirection = [0, 0, 1]".to_owned(),
+    );
+    Some(())
+}
+
+pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for gauge in 0..f.count("gauge") {
+        let paths = ["direction", "target_normal"].map(|key| format!("gauge[{gauge}].{key}"));
+        let mut units = [None; 2];
+        for (path, unit) in paths.iter().zip(&mut units) {
+            let Some(vector) = f.list::<3>(path) else {
+                continue;
+            };
+            *unit = build::unit(vector);
+            if unit.is_none() {
+                findings.error(
+                    codes::BAD_DIRECTION,
+                    path,
+                    f.span(path),
+                    format!("`{path}` has no length, so that it points nowhere"),
+                    "write a direction such as [0, 0, 1]".to_owned(),
+                );
+            }
+        }
+        let [Some(line), Some(normal)] = units else {
+            continue;
+        };
+        let cosine = line[0] * normal[0] + line[1] * normal[1] + line[2] * normal[2];
+        if cosine.abs() < STEEPEST {
+            findings.error(
+                codes::BAD_DIRECTION,
+                &paths[1],
+                f.span(&paths[1]),
+                format!(
+                    "the gauge looks along its target: its direction and the target's normal have a cosine of {}",
+                    number(cosine)
+                ),
+                "turn the target to face the gauge; without target_normal it does".to_owned(),
+            );
+        }
+    }
+    Some(())
+}
+
+pub(super) fn calibrated_alike(f: &Fields, findings: &mut Findings) -> Option<()> {
+    control::there(f)?;
+    if f.given("sensor.calibration") || findings.mentions(&["sensor.calibration"]) {
+        return Some(());
+    }
+    let paths: Vec<String> = (0..f.count("gauge")).map(|gauge| format!("gauge[{gauge}].calibration")).collect();
+    let first = paths.iter().find(|path| f.given(path))?;
+    let without = paths.iter().position(|path| !f.given(path) && !findings.mentions(&[path]))?;
+    findings.error(
+        codes::CALIBRATION_PARTLY,
+        first,
+        f.span(first),
+        format!("`{first}` is given, but gauge[{without}] has no calibration"),
+        "calibrate every gauge, or write the calibration of all in [sensor] and only what differs in [[gauge]]"
+            .to_owned(),
+    );
+    Some(())
+}

@@ -1,0 +1,81 @@
+//! The trajectories that the controller can play; what a waveform holds is read later.
+
+use crate::diagnostic::codes;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+use crate::spec::keys::{self, MAX_TABLES};
+
+const OF_PAPER: [&str; 2] = ["frequency", "as_printed"];
+const OF_WAVEFORM: [&str; 3] = ["file", "period", "repeat"];
+
+pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for index in 0..f.count("trajectory") {
+        let table = format!("trajectory[{index}]");
+        let Some(kind) = f.choice(&keys::join(&table, "kind")) else {
+            continue;
+        };
+        let is_waveform = kind == "waveform";
+        let foreign: &[&str] = if is_waveform { &OF_PAPER } else { &OF_WAVEFORM };
+        for path in foreign.iter().map(|key| keys::join(&table, key)).filter(|path| f.given(path)) {
+            findings.error(
+                codes::TRAJECTORY_KEY,
+                &path,
+                f.span(&path),
+                format!("`{path}` has no meaning for a trajectory of kind \"{kind}\""),
+                format!(
+                    "take it out; kind \"{kind}\" takes {}",
+                    if is_waveform { OF_WAVEFORM.join(", ") } else { OF_PAPER.join(", ") }
+                ),
+            );
+        }
+        let needed: &[&str] = if is_waveform { &["file", "period"] } else { &["frequency"] };
+        for path in needed.iter().map(|key| keys::join(&table, key)) {
+            if f.get(&path).is_some() || findings.mentions(&[&path]) {
+                continue;
+            }
+            let key = keys::key(&path)?;
+            findings.error(
+                codes::MISSING_KEY,
+                &path,
+                f.table(&table).unwrap_or(0..0),
+                format!("`{path}` is missing: kind \"{kind}\" needs it"),
+                format!("write, in [[trajectory]]: {} = {}. {}", key.name, key.example, key.doc),
+            );
+        }
+    }
+    Some(())
+}
+
+pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for index in 0..f.count("trajectory") {
+        let path = format!("trajectory[{index}].name");
+        let Some(name) = f.name(&path) else {
+            continue;
+        };
+        let Some(first) = (0..index).find(|other| f.name(&format!("trajectory[{other}].name")) == Some(name)) else {
+            continue;
+        };
+        findings.error(
+            codes::NAME_TAKEN,
+            &path,
+            f.span(&path),
+            format!("trajectory[{first}] is called \"{name}\" as well"),
+            "give each trajectory a name of its own".to_owned(),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let count = f.count("trajectory");
+    if count > MAX_TABLES {
+        findings.error(
+            codes::TOO_MANY_TRAJECTORIES,
+            "trajectory",
+            f.table("trajectory[0]").unwrap_or(0..0),
+            format!("there are {count} trajectories, expected at most {MAX_TABLES}"),
+            "take some out, or join waveforms that are played one after the other".to_owned(),
+        );
+    }
+    Some(())
+}

@@ -1,0 +1,372 @@
+//! One tick of the closed loop as a matrix: the plant, sampled exactly, and the controller's tick, line by line.
+//!
+//! Everything is in modal coordinates z = V⁻¹ x, where leg motions are V⁻¹ J⁻¹ of leg coordinates and a wrench w is
+//! V⁻¹ K⁻¹ w, the leg motion that it asks for. Set-point and load are zero: only what is fed back matters.
+//!
+//! ```text
+//! e  = N(−z) ;   s ← s + T k_I e ;   u = K⁻¹ (k_p e + s)
+//! ν  = N(z − u_last) ;   δ̂ ← δ̂ + ω1 (ν + φ̂) ;   φ̂ ← φ̂ + ω2 ν          Y − (q̂ − p) − δ̂ − φ̂ is z − u_last
+//! v  ← a v + (1 − a) (z − z_last)/T ;   p = K⁻¹ (K_w z − k_v v)          K_w: measured interaction force
+//! q̂ = u − δ̂ − φ̂ + p ;   d = λ q̂, late by the delay
+//! ```
+
+use super::law::{Adapting, Law, Tuning};
+use super::modes::ModalBasis;
+use super::notch::{Biquad, Notch};
+use super::sampled::{Plant, STATES};
+use crate::numerics::{Matrix, Matrix6, eigenvalues};
+
+/// A linear combination of the states.
+type Signal = Vec<f64>;
+
+/// What the loop is tried under.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conditions {
+    /// λ = ρ/ρ̂ of the actuators.
+    pub gain_ratio: f64,
+    /// Axial stiffness of the legs against the nominal one, which the controller assumes; damping ratios stay.
+    pub stiffness: f64,
+    /// Damping ratios against the nominal ones.
+    pub damping: f64,
+    /// Ticks between reading the gauges and the voltage, beyond none.
+    pub delay: f64,
+    /// Whether the platform touches the declared work piece.
+    pub touching: bool,
+}
+
+impl Conditions {
+    /// As declared.
+    pub const NOMINAL: Self = Self { gain_ratio: 1.0, stiffness: 1.0, damping: 1.0, delay: 0.0, touching: false };
+}
+
+/// A platform and its controller, up to the tuning.
+#[derive(Debug, Clone)]
+pub struct ClosedLoop {
+    /// Modes of the free platform.
+    pub basis: ModalBasis,
+    /// ζ of each mode.
+    pub damping: [f64; 6],
+    /// T_s, s.
+    pub period: f64,
+    /// Amplifier lag τ, s.
+    pub lag: f64,
+    /// On feedback.
+    pub notch: Option<Notch>,
+    /// Cut-off of the velocity filter, rad/s.
+    pub velocity_cutoff: f64,
+    /// Diagonal of K_e, N/m and N m/rad.
+    pub environment: [f64; 6],
+    /// Whether the interaction force is measured and fed forward, which closes a loop through K_e.
+    pub measured: bool,
+}
+
+impl ClosedLoop {
+    /// Largest magnitude of an eigenvalue of one tick; infinite if it cannot be found.
+    #[must_use]
+    pub fn spectral_radius(&self, law: Law, tuning: &Tuning, conditions: &Conditions) -> f64 {
+        let Some(values) = eigenvalues(&self.transition(law, tuning, conditions)) else {
+            return f64::INFINITY;
+        };
+        let mut largest = 0.0;
+        for (re, im) in values {
+            let magnitude = libm::hypot(re, im);
+            if magnitude > largest || magnitude.is_nan() {
+                largest = magnitude;
+            }
+        }
+        largest
+    }
+
+    /// The matrix of one tick. States that the law or the tuning does not use are left out: an idle integrator would read
+    /// as an eigenvalue of 1.
+    #[must_use]
+    pub fn transition(&self, law: Law, tuning: &Tuning, conditions: &Conditions) -> Matrix {
+        Assembly::new(self, law, tuning, conditions).matrix()
+    }
+
+    fn contact(&self, touching: bool) -> Matrix6 {
+        if touching { self.basis.couple(&self.environment) } else { [[0.0; 6]; 6] }
+    }
+
+    /// diag(ω⁻²) A: from a modal force to the leg motion that it asks for.
+    fn asked(&self, modal_force: &Matrix6) -> Matrix6 {
+        core::array::from_fn(|i| {
+            let square = self.basis.frequencies[i] * self.basis.frequencies[i];
+            modal_force[i].map(|x| x / square)
+        })
+    }
+}
+
+/// Axes whose factor is not zero.
+fn used(factors: &[f64; 6]) -> Vec<usize> {
+    (0..6).filter(|&axis| factors[axis] != 0.0).collect()
+}
+
+/// Where each group of states begins.
+#[derive(Debug, Clone)]
+struct Layout {
+    history: usize,
+    error_notch: usize,
+    innovation_notch: usize,
+    last_feedback: usize,
+    integral: usize,
+    level: usize,
+    drift: usize,
+    last_pose: usize,
+    velocity: usize,
+    total: usize,
+}
+
+struct Assembly<'a> {
+    of: &'a ClosedLoop,
+    tuning: &'a Tuning,
+    conditions: &'a Conditions,
+    feeds_back: bool,
+    adapts: bool,
+    drifts: bool,
+    integrating: Vec<usize>,
+    damped: Vec<usize>,
+    layout: Layout,
+    next: Matrix,
+}
+
+impl<'a> Assembly<'a> {
+    fn new(of: &'a ClosedLoop, law: Law, tuning: &'a Tuning, conditions: &'a Conditions) -> Self {
+        let feeds_back = law.feeds_back();
+        let adapts = law.adapting() != Adapting::Invhys && tuning.level_bandwidth != 0.0;
+        let drifts = adapts && law.adapting() == Adapting::Pcc && tuning.drift_bandwidth != 0.0;
+        let integrating = if feeds_back { used(&tuning.integral) } else { Vec::new() };
+        let damped = if feeds_back { used(&tuning.derivative) } else { Vec::new() };
+        let notch = |wanted: bool| if wanted && of.notch.is_some() { 12 } else { 0 };
+        let mut total = STATES;
+        let mut take = |count: usize| {
+            total += count;
+            total - count
+        };
+        let history = take(6 * libm::ceil(conditions.delay) as usize);
+        let error_notch = take(notch(feeds_back));
+        let innovation_notch = take(notch(adapts));
+        let last_feedback = take(if feeds_back && adapts { 6 } else { 0 });
+        let integral = take(integrating.len());
+        let level = take(if adapts { 6 } else { 0 });
+        let drift = take(if drifts { 6 } else { 0 });
+        let last_pose = take(damped.len());
+        let velocity = take(damped.len());
+        let layout = Layout {
+            history,
+            error_notch,
+            innovation_notch,
+            last_feedback,
+            integral,
+            level,
+            drift,
+            last_pose,
+            velocity,
+            total,
+        };
+        let next = Matrix::zeros(total);
+        Self { of, tuning, conditions, feeds_back, adapts, drifts, integrating, damped, layout, next }
+    }
+
+    fn matrix(mut self) -> Matrix {
+        let place: [Signal; 6] = core::array::from_fn(|i| self.state(6 + i));
+        let feedback = self.feedback(&place);
+        let estimates = self.adaptation(&place, &feedback);
+        let load = self.load(&place);
+        let request: [Signal; 6] = core::array::from_fn(|i| {
+            let mut request = feedback[i].clone();
+            add(&mut request, -1.0, &estimates[i]);
+            add(&mut request, 1.0, &load[i]);
+            request
+        });
+        self.plant(&request);
+        self.next
+    }
+
+    fn zero(&self) -> Signal {
+        vec![0.0; self.layout.total]
+    }
+
+    fn zeros(&self) -> [Signal; 6] {
+        core::array::from_fn(|_| self.zero())
+    }
+
+    fn state(&self, index: usize) -> Signal {
+        let mut signal = self.zero();
+        signal[index] = 1.0;
+        signal
+    }
+
+    /// The notch on six modal signals, its states at `first`.
+    fn notched(&mut self, first: usize, input: &[Signal; 6]) -> [Signal; 6] {
+        let Some(notch) = &self.of.notch else {
+            return input.clone();
+        };
+        let sections: [Biquad; 6] = notch.sections;
+        core::array::from_fn(|i| {
+            let Biquad { b, a } = sections[i];
+            let (s1, s2) = (first + 2 * i, first + 2 * i + 1);
+            let mut output = self.state(s1);
+            add(&mut output, b[0], &input[i]);
+            let mut next = self.state(s2);
+            add(&mut next, b[1], &input[i]);
+            add(&mut next, -a[0], &output);
+            self.next.set_row(s1, &next);
+            let mut next = self.zero();
+            add(&mut next, b[2], &input[i]);
+            add(&mut next, -a[1], &output);
+            self.next.set_row(s2, &next);
+            output
+        })
+    }
+
+    /// u = K⁻¹ (k_p e + s).
+    fn feedback(&mut self, place: &[Signal; 6]) -> [Signal; 6] {
+        let mut feedback = self.zeros();
+        if !self.feeds_back {
+            return feedback;
+        }
+        let minus = core::array::from_fn(|i| scaled(-1.0, &place[i]));
+        let error = self.notched(self.layout.error_notch, &minus);
+        let proportional = self.of.asked(&self.of.basis.couple(&self.tuning.proportional));
+        for (out, row) in feedback.iter_mut().zip(&proportional) {
+            for (factor, signal) in row.iter().zip(&error) {
+                add(out, *factor, signal);
+            }
+        }
+        for (k, axis) in self.integrating.clone().into_iter().enumerate() {
+            // In units of the stiffness of its axis, so that the states are alike in size.
+            let index = self.layout.integral + k;
+            let stiffness = self.of.basis.axis_stiffness[axis];
+            let gain = self.of.period * self.tuning.integral[axis] / stiffness;
+            let mut integral = self.state(index);
+            for (factor, signal) in self.of.basis.from_modal[axis].iter().zip(&error) {
+                add(&mut integral, gain * factor, signal);
+            }
+            self.next.set_row(index, &integral);
+            for (out, compliance) in feedback.iter_mut().zip(self.of.basis.compliance(axis)) {
+                add(out, stiffness * compliance, &integral);
+            }
+        }
+        feedback
+    }
+
+    /// δ̂ + φ̂ after the reading.
+    fn adaptation(&mut self, place: &[Signal; 6], feedback: &[Signal; 6]) -> [Signal; 6] {
+        let mut estimates = self.zeros();
+        if !self.adapts {
+            return estimates;
+        }
+        let mut innovation = place.clone();
+        if self.feeds_back {
+            for i in 0..6 {
+                let index = self.layout.last_feedback + i;
+                innovation[i][index] -= 1.0;
+                self.next.set_row(index, &feedback[i]);
+            }
+        }
+        let innovation = self.notched(self.layout.innovation_notch, &innovation);
+        let level_weight = self.of.period * self.tuning.level_bandwidth;
+        let drift_weight = self.of.period * self.tuning.drift_bandwidth;
+        for i in 0..6 {
+            let mut level = self.state(self.layout.level + i);
+            add(&mut level, level_weight, &innovation[i]);
+            if self.drifts {
+                let index = self.layout.drift + i;
+                level[index] += level_weight;
+                let mut drift = self.state(index);
+                add(&mut drift, drift_weight, &innovation[i]);
+                self.next.set_row(index, &drift);
+                add(&mut estimates[i], 1.0, &drift);
+            }
+            self.next.set_row(self.layout.level + i, &level);
+            add(&mut estimates[i], 1.0, &level);
+        }
+        estimates
+    }
+
+    /// p = K⁻¹ (K_w z − k_v v): known to the model, so the innovation does not see it.
+    fn load(&mut self, place: &[Signal; 6]) -> [Signal; 6] {
+        let mut load = self.zeros();
+        if self.of.measured && self.conditions.touching {
+            let fed = self.of.asked(&self.of.contact(true));
+            for (out, row) in load.iter_mut().zip(&fed) {
+                for (factor, signal) in row.iter().zip(place) {
+                    add(out, *factor, signal);
+                }
+            }
+        }
+        let pole = libm::exp(-self.of.velocity_cutoff * self.of.period);
+        for (k, axis) in self.damped.clone().into_iter().enumerate() {
+            let (last, index) = (self.layout.last_pose + k, self.layout.velocity + k);
+            let mut pose = self.zero();
+            for (factor, signal) in self.of.basis.from_modal[axis].iter().zip(place) {
+                add(&mut pose, *factor, signal);
+            }
+            // Displacement per tick.
+            let mut velocity = scaled(pole, &self.state(index));
+            add(&mut velocity, 1.0 - pole, &pose);
+            velocity[last] -= 1.0 - pole;
+            self.next.set_row(last, &pose);
+            self.next.set_row(index, &velocity);
+            let gain = self.tuning.derivative[axis] / self.of.period;
+            for (out, compliance) in load.iter_mut().zip(self.of.basis.compliance(axis)) {
+                add(out, -gain * compliance, &velocity);
+            }
+        }
+        load
+    }
+
+    /// The plant under the requests that act during this tick, and the requests still on their way.
+    fn plant(&mut self, request: &[Signal; 6]) {
+        let lag = if self.of.lag > 1e-4 * self.of.period { self.of.lag } else { 1e-4 * self.of.period };
+        let contact = self.of.contact(self.conditions.touching);
+        let damping = self.of.damping.map(|ratio| ratio * self.conditions.damping);
+        let plant = Plant::new(&self.of.basis, &damping, self.conditions.stiffness, &contact, lag);
+        let whole = libm::floor(self.conditions.delay);
+        let part = self.conditions.delay - whole;
+        // Request of `age` ticks ago.
+        let aged = |this: &Self, age: usize, i: usize| {
+            if age == 0 { request[i].clone() } else { this.state(this.layout.history + 6 * (age - 1) + i) }
+        };
+        let over_tick = plant.sample(self.of.period);
+        let late = (part > 0.0).then(|| plant.sample(self.of.period * (1.0 - part)).input);
+        for row in 0..STATES {
+            let mut next = self.zero();
+            for (column, factor) in over_tick.transition[row].iter().enumerate() {
+                next[column] += factor;
+            }
+            for i in 0..6 {
+                let all = over_tick.input[row][i];
+                let newer = late.as_ref().map_or(all, |input| input[row][i]);
+                let age = whole as usize;
+                add(&mut next, self.conditions.gain_ratio * newer, &aged(self, age, i));
+                if late.is_some() {
+                    add(&mut next, self.conditions.gain_ratio * (all - newer), &aged(self, age + 1, i));
+                }
+            }
+            self.next.set_row(row, &next);
+        }
+        let ages = (self.layout.error_notch - self.layout.history) / 6;
+        for age in 0..ages {
+            for i in 0..6 {
+                let signal = aged(self, age, i);
+                self.next.set_row(self.layout.history + 6 * age + i, &signal);
+            }
+        }
+    }
+}
+
+fn add(sum: &mut Signal, factor: f64, signal: &Signal) {
+    // Zero times anything is left out, so that what does not couple stays exactly apart.
+    if factor == 0.0 {
+        return;
+    }
+    for (a, b) in sum.iter_mut().zip(signal) {
+        *a += factor * b;
+    }
+}
+
+fn scaled(factor: f64, signal: &Signal) -> Signal {
+    signal.iter().map(|x| factor * x).collect()
+}

@@ -1,0 +1,70 @@
+//! The design as text for `specgen check`.
+
+use core::f64::consts::TAU;
+use std::fmt::Write as _;
+
+use super::Design;
+use super::law::Tuning;
+
+/// A few lines: modes, gains, and a table of margins.
+#[must_use]
+pub fn describe(design: &Design) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let frequencies: Vec<String> = design.modes.iter().map(|mode| format!("{:.1}", mode.frequency / TAU)).collect();
+    let _ = writeln!(
+        text,
+        "  platform modes: {} Hz, damping ratio {:.4} to {:.4}",
+        frequencies.join(", "),
+        design.modes[0].damping_ratio,
+        design.modes[5].damping_ratio
+    );
+    let notch = if design.notch.is_some() { "with the modal notch" } else { "without a notch" };
+    let _ = writeln!(
+        text,
+        "  level estimate stable up to {:.1} rad/s {notch}; here {:.1}, drift {:.2} rad/s",
+        design.bandwidth_limit, design.combined.level_bandwidth, design.combined.drift_bandwidth
+    );
+    let _ = write!(text, "{}", gains("gains", &design.combined));
+    let _ = write!(text, "{}", gains("gains of P alone", &design.position));
+    let touching = if design.touching { "free and touching the declared work piece" } else { "free of contact" };
+    let _ = writeln!(text, "  every control mode, checked {touching}:");
+    let _ = writeln!(
+        text,
+        "  {:<12}{:>9}{:>8}{:>8}{:>16}{:>12}{:>22}",
+        "mode", "radius", "λ <", "gain ×", "delay, ticks", "settles, ms", "least damped"
+    );
+    for one in &design.margins {
+        let or =
+            |value: Option<f64>, none: &str, digits: usize| value.map_or(none.to_owned(), |x| format!("{x:.digits$}"));
+        let least = one.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
+        let least = least.map_or("-".to_owned(), |mode| format!("{:.0} Hz, {:.4}", mode.frequency, mode.damping_ratio));
+        let _ = writeln!(
+            text,
+            "  {:<12}{:>9.5}{:>8}{:>8}{:>16}{:>12}{:>22}",
+            one.law.name(),
+            one.spectral_radius,
+            or(one.gain_ratio_limit, "> 10", 2),
+            or(one.gain_margin, "-", 2),
+            or(one.delay_margin_ticks, "> 5", 2),
+            or(one.settling.map(|time| time * 1e3), "-", 1),
+            least
+        );
+    }
+    text
+}
+
+fn gains(name: &str, tuning: &Tuning) -> String {
+    let list = |values: &[f64; 6]| {
+        let shown: Vec<String> = values.iter().map(|value| format!("{value:.3e}")).collect();
+        shown.join(" ")
+    };
+    let mut text = format!("  {name}: k_p {} N/m, N m/rad\n", list(&tuning.proportional));
+    let indent = " ".repeat(name.len() + 4);
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "{indent}k_I {} N/(m s), N m/(rad s)", list(&tuning.integral));
+    if tuning.derivative != [0.0; 6] {
+        let _ = writeln!(text, "{indent}k_v {} N s/m, N m s/rad", list(&tuning.derivative));
+    }
+    text
+}

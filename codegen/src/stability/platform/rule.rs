@@ -1,0 +1,142 @@
+//! Start values of gains and bandwidths where a spec gives none.
+//!
+//! From Ω, the bandwidth at which the level estimate alone becomes unstable: Ω1 = Ω/4.5, Ω2 = 0.044 Ω1, k_I = Ω/12 · K,
+//! k_p = 0.05 K (without notch 0.005), P alone k_I = Ω/2 · K, with K = diag(Jᵀ k_a J). Then all of them × 0.85 until the
+//! loop holds with λ = 2, with stiffness ± 15 % at λ = 1.4, and with one more tick of delay at λ = 1.3, each with 0.7 of the
+//! damping, free and touching the declared work piece.
+
+use super::closed_loop::{ClosedLoop, Conditions};
+use super::law::{Adapting, Law, Tuning};
+use super::search::largest_stable;
+use super::{LARGEST_RADIUS, nominal_conditions};
+
+/// Ω over the level bandwidth.
+const LEVEL: f64 = 4.5;
+/// Drift over level bandwidth.
+const DRIFT: f64 = 0.044;
+/// Ω over k_I/K, with F and alone.
+const INTEGRAL: f64 = 12.0;
+const INTEGRAL_ALONE: f64 = 2.0;
+/// k_p/K with and without notch.
+const PROPORTIONAL: f64 = 0.05;
+const PROPORTIONAL_PLAIN: f64 = 0.005;
+/// One step of shrinking, and how many are tried: 0.85⁴⁰ is 0.0015.
+const SHRINK: f64 = 0.85;
+const SHRINKS: u32 = 40;
+
+/// What a rule's values must hold under.
+const ROBUST: [Conditions; 4] = [
+    Conditions { gain_ratio: 2.0, damping: 0.7, ..Conditions::NOMINAL },
+    Conditions { gain_ratio: 1.4, damping: 0.7, stiffness: 0.85, ..Conditions::NOMINAL },
+    Conditions { gain_ratio: 1.4, damping: 0.7, stiffness: 1.15, ..Conditions::NOMINAL },
+    Conditions { gain_ratio: 1.3, damping: 0.7, delay: 1.0, ..Conditions::NOMINAL },
+];
+
+/// Ω, rad/s: first level bandwidth at which EWMA alone is unstable on the nominal platform; 1/T_s, a weight of 1, if none
+/// is; zero if even a ten-thousandth of that is.
+#[must_use]
+pub fn bandwidth_limit(closed_loop: &ClosedLoop) -> f64 {
+    let fastest = 1.0 / closed_loop.period;
+    largest_stable(1e-4 * fastest, fastest, 1.15, |bandwidth| {
+        let tuning = Tuning { level_bandwidth: bandwidth, ..Tuning::NONE };
+        is_stable(closed_loop, Law::Feedforward(Adapting::Ewma), &tuning, &Conditions::NOMINAL)
+    })
+    .unwrap_or(0.0)
+}
+
+/// Gains and bandwidths of P/F: those given stay, the others follow the rule.
+pub(super) fn combined(closed_loop: &ClosedLoop, limit: f64, given: Given, ratios: [f64; 2]) -> Tuning {
+    const ADAPTED: [Law; 2] = [Law::Feedforward(Adapting::Ewma), Law::Feedforward(Adapting::Pcc)];
+    const CLOSED: [Law; 3] =
+        [Law::Combined(Adapting::Invhys), Law::Combined(Adapting::Ewma), Law::Combined(Adapting::Pcc)];
+    let stiffness = &closed_loop.basis.axis_stiffness;
+    let level_bandwidth = limit / LEVEL;
+    let start = Tuning {
+        proportional: stiffness.map(|k| proportional(closed_loop) * k),
+        integral: stiffness.map(|k| limit / INTEGRAL * k),
+        derivative: [0.0; 6],
+        level_bandwidth,
+        drift_bandwidth: DRIFT * level_bandwidth,
+    };
+    let fixed: &[Law] = match (given.gains.is_some(), given.bandwidths.is_some()) {
+        (true, true) => return given.over(&start),
+        (true, false) => &CLOSED[..1],
+        (false, true) => &ADAPTED,
+        (false, false) => &[],
+    };
+    let free: Vec<Law> = ADAPTED.into_iter().chain(CLOSED).filter(|law| !fixed.contains(law)).collect();
+    shrink(closed_loop, &free, fixed, ratios, |factor| given.over(&start.scaled(factor, factor)))
+}
+
+/// Gains of P alone.
+pub(super) fn alone(closed_loop: &ClosedLoop, limit: f64, ratios: [f64; 2]) -> Tuning {
+    let stiffness = &closed_loop.basis.axis_stiffness;
+    let start = Tuning {
+        proportional: stiffness.map(|k| proportional(closed_loop) * k),
+        integral: stiffness.map(|k| limit / INTEGRAL_ALONE * k),
+        ..Tuning::NONE
+    };
+    shrink(closed_loop, &[Law::Position], &[], ratios, |factor| start.scaled(factor, factor))
+}
+
+/// What the spec gives of a tuning.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Given<'a> {
+    pub(super) gains: Option<&'a Tuning>,
+    /// Ω1, Ω2.
+    pub(super) bandwidths: Option<[f64; 2]>,
+}
+
+impl Given<'_> {
+    /// What is given, in place of the rule's.
+    fn over(&self, rule: &Tuning) -> Tuning {
+        let mut tuning = *rule;
+        if let Some(gains) = self.gains {
+            tuning.proportional = gains.proportional;
+            tuning.integral = gains.integral;
+            tuning.derivative = gains.derivative;
+        }
+        if let Some([level, drift]) = self.bandwidths {
+            tuning.level_bandwidth = level;
+            tuning.drift_bandwidth = drift;
+        }
+        tuning
+    }
+}
+
+fn proportional(closed_loop: &ClosedLoop) -> f64 {
+    if closed_loop.notch.is_some() { PROPORTIONAL } else { PROPORTIONAL_PLAIN }
+}
+
+pub(super) fn is_stable(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &Conditions) -> bool {
+    closed_loop.spectral_radius(law, tuning, conditions) <= LARGEST_RADIUS
+}
+
+/// The first tuning on the way down that holds; the last one tried if none does, which the check then refuses.
+///
+/// A condition that a `fixed` law does not hold under, whose numbers are the spec's, is not asked of the others: the rule
+/// cannot mend it.
+fn shrink(
+    closed_loop: &ClosedLoop,
+    laws: &[Law],
+    fixed: &[Law],
+    ratios: [f64; 2],
+    tuning: impl Fn(f64) -> Tuning,
+) -> Tuning {
+    let contacts: &[bool] = if closed_loop.environment == [0.0; 6] { &[false] } else { &[false, true] };
+    let mut asked: Vec<Conditions> = ROBUST
+        .iter()
+        .flat_map(|conditions| contacts.iter().map(|&touching| Conditions { touching, ..*conditions }))
+        .chain(nominal_conditions(closed_loop, ratios))
+        .collect();
+    asked.retain(|conditions| fixed.iter().all(|&law| is_stable(closed_loop, law, &tuning(1.0), conditions)));
+    let mut factor = 1.0;
+    for _ in 0..SHRINKS {
+        let tried = tuning(factor);
+        if laws.iter().all(|&law| asked.iter().all(|conditions| is_stable(closed_loop, law, &tried, conditions))) {
+            return tried;
+        }
+        factor *= SHRINK;
+    }
+    tuning(factor)
+}
