@@ -8,9 +8,11 @@ use crate::emit;
 use crate::everett::EverettTable;
 use crate::identify;
 use crate::ir::Ir;
-use crate::lower::lower;
+use crate::lower::{PoseNoise, lower, platform, pose_noise};
 use crate::model::Model;
+use crate::reach::{self, Reach};
 use crate::spec::{self, SpecSource};
+use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
 use crate::workspace;
 
@@ -27,8 +29,14 @@ pub struct Compiled {
     pub model: Model,
     /// How each record was identified, in the order of `hysteresis.records`; none for one that is a table already.
     pub records: Vec<Option<identify::Report>>,
-    /// Stability of the adaptation.
-    pub margins: Margins,
+    /// Stability of the adaptation of six legs with their own gauges.
+    pub margins: Option<Margins>,
+    /// Modes, tuning and margins of a controller in task space.
+    pub design: Option<Design>,
+    /// Travel of the platform, and how well its legs hold it, for a controller in task space.
+    pub reach: Option<Reach>,
+    /// Noise of the measured pose, with gauges that see the platform.
+    pub pose_noise: Option<PoseNoise>,
     /// Every constant of the controller.
     pub ir: Ir,
     /// Files of the workspace: path, text.
@@ -57,14 +65,27 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
         return Err(Refused { source: Some(source), findings });
     };
     // Stability and records do not depend on each other: report both.
-    let margins = stability::check(&model).map_err(|found| findings.extend(found));
+    let stability = check_stability(&model).map_err(|found| findings.extend(found));
     let identified = identify_records(&source, &model).map_err(|found| findings.extend(found));
-    let (Ok(margins), Ok(identified)) = (margins, identified) else {
+    let (Ok((margins, design)), Ok(identified)) = (stability, identified) else {
         return Err(Refused { source: Some(source), findings });
     };
     findings.extend(identified.findings);
-    let ir = match lower(&model, &identified.tables, &digest(&source, &identified.texts)) {
-        Ok(ir) => ir,
+    findings.extend(design.iter().flat_map(|design| design.findings.clone()));
+    let reach = match check_reach(&model, &identified.tables) {
+        Ok(None) => None,
+        Ok(Some((reach, found))) => {
+            findings.extend(found);
+            Some(reach)
+        }
+        Err(found) => {
+            findings.extend(found);
+            return Err(Refused { source: Some(source), findings });
+        }
+    };
+    let lowered = lower(&model, design.as_ref(), &identified.tables, &digest(&source, &identified.texts));
+    let (ir, pose_noise) = match lowered.and_then(|ir| Ok((ir, pose_noise(&model)?))) {
+        Ok(both) => both,
         Err(found) => {
             findings.extend(found);
             return Err(Refused { source: Some(source), findings });
@@ -72,7 +93,28 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
     };
     let files = workspace::files(&ir, &emit::emit(&ir));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
-    Ok(Compiled { source, model, records: identified.reports, margins, ir, files, findings })
+    Ok(Compiled { source, model, records: identified.reports, margins, design, reach, pose_noise, ir, files, findings })
+}
+
+/// Legs with their own gauges adapt each on its own; a controller in task space closes its loops over the platform's modes.
+fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<Design>), Vec<Diagnostic>> {
+    match &model.task_space {
+        None => stability::check(model).map(|margins| (Some(margins), None)),
+        Some(task) => {
+            let rest = RestDynamics::of(&platform(model)?);
+            stability::platform::design(model, task, &rest).map(|design| (None, Some(design)))
+        }
+    }
+}
+
+/// Where the legs reach: as far as both the data sheet's stroke and every leg's table allow.
+fn check_reach(model: &Model, tables: &[EverettTable]) -> Result<Option<(Reach, Vec<Diagnostic>)>, Vec<Diagnostic>> {
+    let Some(task) = &model.task_space else {
+        return Ok(None);
+    };
+    let largest = tables.iter().map(|table| table.node(table.grid, 0));
+    let stroke = largest.fold(model.actuator.stroke, |a, b| if b < a { b } else { a });
+    reach::check(model, task, &platform(model)?, stroke).map(Some)
 }
 
 /// What the records of a spec yield.

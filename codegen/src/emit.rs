@@ -2,22 +2,29 @@
 //!
 //! One emitter per emitted file. Emitters are infallible and do no arithmetic: whatever can fail failed in lowering.
 
-mod config;
-mod crate_root;
+//!
+//! Files that every controller has are emitted here; what differs between six legs with their own gauges and a platform in
+//! task space lies in [`legs`] and [`platform`].
+
+mod description;
 mod dynamics;
 mod format;
 mod hysteresis;
+mod identity;
 mod kinematics;
+mod legs;
 mod limits;
 mod literal;
 mod manifest;
-mod state;
-mod step;
-mod words;
+mod platform;
+mod sensing;
+mod stage_type;
 
 use std::collections::BTreeMap;
 
-use crate::ir::Ir;
+use proc_macro2::TokenStream;
+
+use crate::ir::{Ir, TaskSpace};
 
 /// Files of the emitted crate: path relative to the crate, text.
 pub type EmittedCrate = BTreeMap<String, String>;
@@ -25,20 +32,43 @@ pub type EmittedCrate = BTreeMap<String, String>;
 /// Emits the controller crate.
 #[must_use]
 pub fn emit(ir: &Ir) -> EmittedCrate {
-    let sources = [
-        ("src/config.rs", config::emit(ir)),
+    let mut sources = vec![
         ("src/dynamics.rs", dynamics::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
-        ("src/lib.rs", crate_root::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
-        ("src/state.rs", state::emit(ir)),
-        ("src/step.rs", step::emit(ir)),
-        ("src/words.rs", words::emit(ir)),
     ];
+    match &ir.task_space {
+        None => sources.extend(legs_sources(ir)),
+        Some(task) => sources.extend(platform_sources(ir, task)),
+    }
     let header = format::header(ir);
     let mut files: EmittedCrate =
         sources.into_iter().map(|(path, tokens)| (path.to_owned(), format::source(&header, tokens))).collect();
     files.insert("Cargo.toml".to_owned(), manifest::emit(ir));
     files
+}
+
+fn legs_sources(ir: &Ir) -> Vec<(&'static str, TokenStream)> {
+    vec![
+        ("src/config.rs", legs::config::emit(ir)),
+        ("src/lib.rs", legs::crate_root::emit(ir)),
+        ("src/stages.rs", legs::stages::emit()),
+        ("src/state.rs", legs::state::emit(ir)),
+        ("src/step.rs", legs::step::emit(ir)),
+        ("src/words.rs", legs::words::emit(ir)),
+    ]
+}
+
+fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream)> {
+    vec![
+        ("src/config.rs", platform::config::emit(ir, &task.defaults)),
+        ("src/lib.rs", platform::crate_root::emit(ir)),
+        ("src/sensing.rs", sensing::emit(ir.scalar, &task.sensing)),
+        ("src/stages.rs", platform::stages::emit()),
+        ("src/state.rs", platform::state::emit()),
+        ("src/step.rs", platform::step::emit()),
+        ("src/task_space.rs", platform::task_space::emit(ir, task)),
+        ("src/words.rs", platform::words::emit(ir, task)),
+    ]
 }

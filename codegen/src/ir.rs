@@ -72,6 +72,9 @@ pub struct Ir {
     pub bounds: Bounds,
     /// Config at start-up.
     pub defaults: Defaults,
+    /// Control in task space; none for six legs with their own gauges.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub task_space: Option<TaskSpace>,
 }
 
 /// Leg kinematics in difference form.
@@ -91,6 +94,10 @@ pub struct Kinematics {
     pub newton_steps: u32,
     /// Largest |Δl| over the accepted poses, m (bound; sizes the Newton steps).
     pub largest_displacement: f64,
+    /// J⁻¹ of the legs at rest: pose coordinates (rows) per leg displacement (columns), m/m and rad/m.
+    pub inverse_jacobian: [[f64; 6]; LEGS],
+    /// Corrections of the forward kinematics over the accepted poses.
+    pub corrections: u32,
 }
 
 /// Inverse dynamics: the constants of [`specgen_runtime::Platform`], where each is explained.
@@ -306,4 +313,157 @@ pub enum Setpoint {
     Pose,
     /// Leg displacements.
     Leg,
+}
+
+/// Control in task space.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TaskSpace {
+    /// Gauges to pose and its rate.
+    pub sensing: Sensing,
+    /// Constants of the control law.
+    pub law: ControlLaw,
+    /// Config at start-up.
+    pub defaults: PlatformDefaults,
+}
+
+/// Constants of (7), at rest.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ControlLaw {
+    /// T_s, s.
+    pub period: f64,
+    /// 1/k_a, m/N.
+    pub compliance: f64,
+    /// J⁻ᵀ/k_a, m/N and 1/N.
+    pub wrench_to_legs: [[f64; 6]; LEGS],
+    /// Leg forces at rest, N.
+    pub rest_force: [f64; LEGS],
+    /// Largest component of a measured wrench, N and N m.
+    pub wrench_limit: [f64; 6],
+    /// Part of the transfer offset left after a tick.
+    pub transfer_keep: f64,
+    /// Transfer offset that is as good as none, m.
+    pub transfer_negligible: f64,
+    /// Drive of mode P, cells of the Everett grid per metre.
+    pub cells_per_metre: f64,
+    /// Its inverse.
+    pub metres_per_cell: f64,
+    /// Pose that user set-points are measured from, m and rad.
+    pub bias: [f64; 6],
+    /// Modal notch, if declared.
+    pub notch: Option<Notch>,
+}
+
+/// Six biquads in modal coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Notch {
+    /// V⁻¹.
+    pub pose_to_modes: [[f64; 6]; 6],
+    /// V.
+    pub modes_to_pose: [[f64; 6]; 6],
+    /// V⁻¹ J⁻¹.
+    pub legs_to_modes: [[f64; 6]; 6],
+    /// J V.
+    pub modes_to_legs: [[f64; 6]; 6],
+    /// One for each mode.
+    pub sections: [Section; 6],
+}
+
+/// A biquad with a₀ = 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Section {
+    /// b₀, b₁, b₂.
+    pub b: [f64; 3],
+    /// a₁, a₂.
+    pub a: [f64; 2],
+}
+
+/// Control mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// Position feedback alone.
+    P,
+    /// Feed-forward alone.
+    F,
+    /// Both.
+    PF,
+}
+
+/// Where the interaction force comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Interaction {
+    /// Left to the feedback.
+    Neglected,
+    /// K_e (h_d − h_e).
+    Modelled,
+    /// Force/torque sensor.
+    Measured,
+}
+
+/// Diagonal gains of (7).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gains {
+    /// k_p.
+    pub proportional: [f64; 6],
+    /// k_I.
+    pub integral: [f64; 6],
+    /// k_v.
+    pub derivative: [f64; 6],
+}
+
+/// Config of a platform at start-up; code limits are in [`Defaults`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlatformDefaults {
+    /// P, F or P/F.
+    pub mode: Mode,
+    /// Run-to-run law of F and P/F.
+    pub law: Law,
+    /// Where the interaction force comes from.
+    pub interaction: Interaction,
+    /// ω or ω1 per tick.
+    pub level_weight: f64,
+    /// ω2 per tick.
+    pub drift_weight: f64,
+    /// Gains of P/F.
+    pub gains: Gains,
+    /// Gains of P alone.
+    pub position_gains: Gains,
+    /// K_e.
+    pub environment_stiffness: [f64; 6],
+    /// h_e.
+    pub environment_rest: [f64; 6],
+}
+
+/// Gauges to pose and its rate. The constants are those of `specgen_runtime::sensing::Gauges`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sensing {
+    /// n of each gauge, unit, {B}.
+    pub direction: [[f64; 3]; 6],
+    /// m of each gauge: normal of its plane over n·normal, {P}.
+    pub normal: [[f64; 3]; 6],
+    /// m × n of each gauge.
+    pub skew: [[f64; 3]; 6],
+    /// c of each gauge: where its line pierces the plane at rest, {P}, m.
+    pub pierced: [[f64; 3]; 6],
+    /// J⁻¹ at rest: pose coordinates (rows) per reading (columns), m/m and rad/m.
+    pub inverse: [[f64; 6]; 6],
+    /// J⁻¹ of the second-degree terms: pose coordinates (rows) per product of two turns (columns).
+    pub curvature: [[f64; 6]; 6],
+    /// Passes after the first guess.
+    pub passes: u32,
+    /// What the passes leave over the accepted poses, in exact arithmetic: m, rad.
+    pub remainder: [f64; 2],
+    /// Coefficients of asin x / x in x² after the leading 1.
+    pub arc_sine: Vec<f64>,
+    /// Coefficients of atan x / x in x² after the leading 1.
+    pub arc_tangent: Vec<f64>,
+    /// Polynomial of each gauge from its raw word to m, lowest power first, all of one length; none: the words are m.
+    pub calibration: Option<[Vec<f64>; 6]>,
+    /// Raw words that are believed, per gauge, in the unit of the word.
+    pub raw_limits: [[f64; 2]; 6],
+    /// exp(−ω_c T) of the rate filter.
+    pub rate_keep: f64,
+    /// (1 − exp(−ω_c T))/T of the rate filter, 1/s.
+    pub rate_gain: f64,
 }

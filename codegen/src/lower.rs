@@ -5,26 +5,38 @@
 mod actuation;
 mod dynamics;
 mod kinematics;
+mod linear;
+mod sensing;
+mod task_space;
 
 pub use dynamics::{GRAVITY, platform};
-pub use kinematics::joint_positions;
+pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
+pub use sensing::{PoseNoise, pose_noise};
 
 use crate::diagnostic::Diagnostic;
 use crate::everett::EverettTable;
-use crate::ir::{Bounds, Defaults, Hysteresis, Ir, LEGS, Law, Scalar, Setpoint};
+use crate::ir::{Bounds, Defaults, Hysteresis, Ir, LEGS, Law, Scalar, Setpoint, TaskSpace};
 use crate::model::{self, Model};
+use crate::stability::platform::{Design, RestDynamics};
+use specgen_runtime::Motion;
 
 /// Beyond this many strokes a leg set-point is a mistake, not a demand to saturate on.
 const LEG_SETPOINT_STROKES: f64 = 2.0;
 
 /// Computes every constant of the controller.
 ///
-/// `tables` holds one Everett table for all legs or one for each; `digest` is the hex digest of spec and records.
+/// `design` is the tuning of a controller in task space, none for six legs with their own gauges; `tables` holds one Everett
+/// table for all legs or one for each; `digest` is the hex digest of spec and records.
 ///
 /// # Errors
 /// Findings about values that cannot be turned into a controller (a converter too coarse
 /// for the grid, a workspace too large for the legs), with their place in the spec.
-pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir, Vec<Diagnostic>> {
+pub fn lower(
+    model: &Model,
+    design: Option<&Design>,
+    tables: &[EverettTable],
+    digest: &str,
+) -> Result<Ir, Vec<Diagnostic>> {
     let scalar = match model.controller.scalar {
         model::Scalar::F32 => Scalar::F32,
         model::Scalar::F64 => Scalar::F64,
@@ -66,6 +78,27 @@ pub fn lower(model: &Model, tables: &[EverettTable], digest: &str) -> Result<Ir,
             period: model.timing.period,
             leg_gain: model.actuator.leg_gain(),
         },
+        task_space: match (&model.task_space, design) {
+            (Some(task), Some(design)) => Some(task_space(model, task, scalar, design)?),
+            _ => None,
+        },
+    })
+}
+
+/// What a controller in task space has of its own.
+fn task_space(
+    model: &Model,
+    task: &model::TaskSpace,
+    scalar: Scalar,
+    design: &Design,
+) -> Result<TaskSpace, Vec<Diagnostic>> {
+    let platform = platform(model)?;
+    let rest = RestDynamics::of(&platform);
+    let rest_force = platform.leg_forces(&Motion::new());
+    Ok(TaskSpace {
+        sensing: sensing::lower(model, task, scalar)?,
+        law: task_space::law(model, task, scalar, &rest, &rest_force, design),
+        defaults: task_space::defaults(model, task, scalar, design),
     })
 }
 

@@ -95,6 +95,13 @@ pub enum RunError {
         /// Length of the trajectory, s.
         duration: f64,
     },
+    /// A platform controller did not come to its bias pose.
+    NotReady {
+        /// How long it was given, s.
+        limit: f64,
+        /// Its status word then.
+        status: u32,
+    },
 }
 
 impl fmt::Display for RunError {
@@ -111,6 +118,12 @@ impl fmt::Display for RunError {
                 write!(
                     f,
                     "a control interval of {interval} s in a trajectory of {duration} s; expected 1 to 100,000,000 ticks of at most {LONGEST_INTERVAL} s"
+                )
+            }
+            Self::NotReady { limit, status } => {
+                write!(
+                    f,
+                    "the controller is still on its way to the bias pose after {limit} s (status {status:#x}); lower the bias or raise its speed in the spec"
                 )
             }
         }
@@ -168,13 +181,7 @@ impl<P: Plant> Rig<P> {
         trajectory: &dyn LegTrajectory,
         interval: f64,
     ) -> Result<Run, RunError> {
-        let duration = trajectory.duration();
-        // The slack keeps the last tick when the ratio is whole but for rounding.
-        let ticks = libm::floor(duration / interval + 1e-6);
-        if !(interval > 0.0 && interval <= LONGEST_INTERVAL && (1.0..=1e8).contains(&ticks)) {
-            return Err(RunError::Timing { interval, duration });
-        }
-        let ticks = ticks as usize;
+        let ticks = ticks_within(trajectory.duration(), interval)?;
 
         let wiring = Wiring::of(controller)?;
         let mut trace = Trace::new(controller.description().clone());
@@ -211,6 +218,17 @@ impl<P: Plant> Rig<P> {
 
     fn read(&mut self) -> [f64; LEGS] {
         self.channels.each_mut().map(|channel| channel.gauge.read(channel.leg.displacement()))
+    }
+}
+
+/// Number of ticks of `interval` (s) in `duration` (s).
+pub(crate) fn ticks_within(duration: f64, interval: f64) -> Result<usize, RunError> {
+    // The slack keeps the last tick when the ratio is whole but for rounding.
+    let ticks = libm::floor(duration / interval + 1e-6);
+    if interval > 0.0 && interval <= LONGEST_INTERVAL && (1.0..=1e8).contains(&ticks) {
+        Ok(ticks as usize)
+    } else {
+        Err(RunError::Timing { interval, duration })
     }
 }
 

@@ -18,6 +18,7 @@ pub mod noise;
 #[cfg(any(test, feature = "oracle"))]
 pub mod oracle;
 pub mod plant;
+pub mod platform;
 pub mod replay;
 pub mod scenario;
 pub mod stimulus;

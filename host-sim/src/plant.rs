@@ -5,9 +5,12 @@ mod filter;
 mod leg;
 mod parameters;
 mod play;
+mod stack;
 
 pub use leg::LegPlant;
+pub(crate) use parameters::Bound;
 pub use parameters::{LegParameters, NoiseParameters, ParameterError, REFERENCE_LEG};
+pub use stack::Stack;
 
 /// One leg that takes a held voltage and moves.
 pub trait Plant {

@@ -3,6 +3,8 @@
 //! Not a plausible machine: smooth motion, white steps, demands beyond both limits, reversals on grid thresholds,
 //! and numbers that no sensor gives (±0, subnormals, NaN with several payloads, ±∞, the largest finite ones).
 
+pub mod platform;
+
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 

@@ -1,5 +1,10 @@
 //! Set-points over time.
 
+mod jet;
+mod paper;
+
+pub use paper::{Jump, PaperPath, PaperPose, Reading};
+
 /// A motion of the six legs from time 0.
 pub trait LegTrajectory {
     /// Length in s.
@@ -7,6 +12,31 @@ pub trait LegTrajectory {
 
     /// Leg displacements in m at `time` (s, 0 to the duration).
     fn displacements(&self, time: f64) -> [f64; 6];
+}
+
+/// A motion of the platform from time 0.
+pub trait PoseTrajectory {
+    /// Length in s.
+    fn duration(&self) -> f64;
+
+    /// Pose with its derivatives at `time` (s, 0 to the duration).
+    ///
+    /// Poses are user poses: a rig adds them to the bias pose of the controller.
+    fn target(&self, time: f64) -> PoseTarget;
+}
+
+/// Where the platform is to be, and how it is to move there.
+///
+/// Coordinates h = [x, y, z, θx, θy, θz]: P_C from its rest place in the base frame (m), and the angles of
+/// R = Rz Ry Rx (rad).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PoseTarget {
+    /// h, m and rad.
+    pub pose: [f64; 6],
+    /// ḣ, m/s and rad/s: rates of the six numbers, not angular velocity.
+    pub rate: [f64; 6],
+    /// ḧ, m/s² and rad/s².
+    pub acceleration: [f64; 6],
 }
 
 /// The leg trajectory of the paper's §3, the same on all six legs, as printed:

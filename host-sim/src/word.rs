@@ -80,7 +80,7 @@ pub enum WordKind {
 }
 
 /// Names (without index) of the words that are integers; all others are real. Part of the controller's interface.
-const INTEGERS: [&str; 9] = [
+const INTEGERS: [&str; 13] = [
     "dac_code",
     "status",
     "state_digest",
@@ -90,6 +90,10 @@ const INTEGERS: [&str; 9] = [
     "max_step_codes",
     "code_min",
     "code_max",
+    "command",
+    "selector",
+    "sequence",
+    "interaction",
 ];
 
 impl WordKind {

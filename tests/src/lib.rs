@@ -3,6 +3,8 @@
 //! Controllers are emitted into `target/tests`, built there for the host and for the emulated microcontrollers, and run
 //! through their words: what is tested is what a user gets.
 
+pub mod pair;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,6 +13,7 @@ use std::sync::{Mutex, PoisonError};
 use host_sim::controller::{Controller, TickController};
 use host_sim::description::Description;
 use host_sim::replay;
+use host_sim::stimulus::platform::{self as platform_stimulus, PlatformInputs};
 use host_sim::stimulus::{self, InputRecording, Setpoints};
 use host_sim::trace::Trace;
 use specgen::compile::{Compiled, compile};
@@ -120,6 +123,24 @@ impl Emitted {
             Setpoints::Leg { stroke, everett }
         };
         stimulus::record(description, &setpoints, rows, seed).expect("the controller has set-point and gauge words")
+    }
+
+    /// Input rows of every kind that a tick of a platform may meet.
+    ///
+    /// # Panics
+    /// If the controller is not one in task space.
+    #[must_use]
+    pub fn platform_stimulus(&self, description: &Description, rows: usize, seed: u64) -> InputRecording {
+        let ir = &self.compiled.ir;
+        let task = self.compiled.model.task_space.as_ref().expect("a controller in task space");
+        let inputs = PlatformInputs {
+            bounds: ir.bounds.pose,
+            bias: task.setpoint.bias,
+            period: ir.defaults.period,
+            gauge: ir.bounds.sensor,
+            trajectories: task.trajectories.len() as u32,
+        };
+        platform_stimulus::record(description, &inputs, rows, seed).expect("the words of a platform")
     }
 }
 

@@ -5,6 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::lower::joint_positions;
 use specgen_tests::Emitted;
+use specgen_tests::pair::Pair;
 
 const POSES: usize = 20_000;
 const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
@@ -38,66 +39,9 @@ fn emitted(name: &str, edits: &[(&str, &str)], poses: &[[f64; 6]]) -> (Vec<[f64;
     (rounded, displacements)
 }
 
-/// Σ of exact products and sums as an unevaluated pair (Dekker, Knuth): about 32 digits, for an oracle without cancellation.
-#[derive(Clone, Copy)]
-struct Pair(f64, f64);
-
-impl Pair {
-    fn sum(a: f64, b: f64) -> Self {
-        let s = a + b;
-        let t = s - a;
-        Self(s, (a - (s - t)) + (b - t))
-    }
-    fn of(x: f64) -> Self {
-        Self(x, 0.0)
-    }
-    fn add(self, other: Self) -> Self {
-        let Self(s, e) = Self::sum(self.0, other.0);
-        Self::sum(s, e + self.1 + other.1)
-    }
-    fn mul(self, other: Self) -> Self {
-        let p = self.0 * other.0;
-        let e = f64::mul_add(self.0, other.0, -p) + self.0 * other.1 + self.1 * other.0;
-        Self::sum(p, e)
-    }
-    fn neg(self) -> Self {
-        Self(-self.0, -self.1)
-    }
-    fn sqrt(self) -> Self {
-        let root = Self::of(self.0.sqrt());
-        // One Newton step in pairs: r + (x − r²) / 2r.
-        let rest = self.add(root.mul(root).neg());
-        root.add(Self::of((rest.0 + rest.1) / (2.0 * root.0)))
-    }
-    /// sin and cos of a small angle by series in pairs.
-    fn sin_cos(angle: f64) -> (Self, Self) {
-        let (mut sin, mut cos) = (Self::of(0.0), Self::of(0.0));
-        let mut term = Self::of(1.0);
-        for k in 0..24_u32 {
-            match k % 4 {
-                0 => cos = cos.add(term),
-                1 => sin = sin.add(term),
-                2 => cos = cos.add(term.neg()),
-                _ => sin = sin.add(term.neg()),
-            }
-            // 1/(k+1) as a pair.
-            let n = f64::from(k + 1);
-            let inverse = 1.0 / n;
-            let inverse = Self::sum(inverse, -f64::mul_add(inverse, n, -1.0) / n);
-            term = term.mul(Self::of(angle)).mul(inverse);
-        }
-        (sin, cos)
-    }
-}
-
 /// |P + R P_i − B_i| − l₀ with R = Rz Ry Rx, in pairs.
 fn textbook(pose: &[f64; 6], base: &[[f64; 3]; 6], platform: &[[f64; 3]; 6], height: f64) -> [f64; 6] {
-    let [(sx, cx), (sy, cy), (sz, cz)] = [pose[3], pose[4], pose[5]].map(Pair::sin_cos);
-    let r = [
-        [cy.mul(cz), sx.mul(sy).mul(cz).add(cx.mul(sz).neg()), cx.mul(sy).mul(cz).add(sx.mul(sz))],
-        [cy.mul(sz), sx.mul(sy).mul(sz).add(cx.mul(cz)), cx.mul(sy).mul(sz).add(sx.mul(cz).neg())],
-        [sy.neg(), sx.mul(cy), cx.mul(cy)],
-    ];
+    let r = Pair::rotation([pose[3], pose[4], pose[5]]);
     let rest = [0.0, 0.0, height];
     std::array::from_fn(|leg| {
         let length = |turned: [Pair; 3], moved: [f64; 3]| {

@@ -65,23 +65,41 @@ fn json_names_file_line_and_column() {
     assert!(json[0]["help"].as_str().is_some_and(|help| help.contains("180 mm")));
 }
 
-/// The text with every section as an inline table or as dotted keys.
+/// The text with every section as an inline table or as dotted keys; sections with double brackets become arrays.
 fn flattened(text: &str, inline: bool) -> String {
-    let (mut top, mut section, mut open) = (String::new(), String::new(), String::new());
+    let (mut top, mut sections): (String, Vec<(String, String)>) = (String::new(), Vec::new());
     for line in text.lines() {
         if let Some(name) = line.strip_prefix('[').and_then(|l| l.strip_suffix(']')) {
-            if !open.is_empty() {
-                top.push_str(&format!("{section} = {{ {open} }}\n"));
-                open.clear();
-            }
-            section = name.to_owned();
-        } else if section.is_empty() {
-            top.push_str(&format!("{line}\n"));
-        } else if inline && section != "target" && section != "target.budget" {
-            let comma = if open.is_empty() { "" } else { ", " };
-            open.push_str(&format!("{comma}{line}"));
+            sections.push((name.to_owned(), String::new()));
+        } else if let Some((_, keys)) = sections.last_mut() {
+            keys.push_str(&format!("{}{line}", if keys.is_empty() { "" } else { ", " }));
         } else {
-            top.push_str(&format!("{section}.{line}\n"));
+            top.push_str(&format!("{line}\n"));
+        }
+    }
+    let mut repeated: std::collections::BTreeMap<String, Vec<String>> = std::collections::BTreeMap::new();
+    for (name, keys) in &sections {
+        // An inline table is closed: one that holds sections can only be written with dots.
+        let holds_sections = sections.iter().any(|(other, _)| other.starts_with(&format!("{name}.")));
+        if let Some(name) = name.strip_prefix('[').and_then(|n| n.strip_suffix(']')) {
+            repeated.entry(name.to_owned()).or_default().push(format!("{{ {keys} }}"));
+        } else if inline && !holds_sections && !name.contains('.') {
+            top.push_str(&format!("{name} = {{ {keys} }}\n"));
+        }
+    }
+    for (name, tables) in repeated {
+        top.push_str(&format!("{name} = [{}]\n", tables.join(", ")));
+    }
+    // Line by line, as the keys of an inline table are hard to tell apart again.
+    let mut section = None;
+    for line in text.lines() {
+        if let Some(name) = line.strip_prefix('[').and_then(|l| l.strip_suffix(']')) {
+            section = Some(name);
+        } else if let Some(name) = section.filter(|name| !name.starts_with('[')) {
+            let written = format!("{name} = {{");
+            if !top.lines().any(|done| done.starts_with(&written)) {
+                top.push_str(&format!("{name}.{line}\n"));
+            }
         }
     }
     top
@@ -111,6 +129,10 @@ fn hostile_files_are_refused_in_good_time() {
     let texts = [
         fill("a=1\n"),
         fill("[geometry]\n"),
+        fill("[[gauge]]\n"),
+        fill("[[gauge]]\npoint = 1\npoint = 2\n"),
+        format!("gauge = [{}]", fill("{},")),
+        format!("[geometry]\nbase_joints = [{}]", fill("[1],")),
         fill("mass = 1 kg\n"),
         fill("["),
         format!("a={}", fill("[")),

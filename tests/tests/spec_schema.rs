@@ -41,7 +41,7 @@ fn bad_specs_are_invalid() {
     let validator = validator();
     let good = as_json(&every_key());
     assert!(validator.is_valid(&good));
-    let changes: [(&str, Value); 11] = [
+    let changes: [(&str, Value); 18] = [
         ("/name", json!("two words")),
         ("/schema", json!(2)),
         ("/geometry/height", json!(180)),
@@ -51,7 +51,14 @@ fn bad_specs_are_invalid() {
         ("/dac/bits", json!(4)),
         ("/dac/range", json!(["0 V"])),
         ("/adaptation/mode", json!("pid")),
-        ("/adaptation/level_bandwidth", json!("450 rad/s")),
+        ("/adaptation/level_weight", json!(0.252)),
+        ("/geometry/base_joints", json!([["1 mm", "2 mm", "3 mm"]])),
+        ("/control/mode", json!("pid")),
+        ("/control/notch", json!("true")),
+        ("/gauge/0/direction", json!([0, 0])),
+        ("/gauge/5/points", json!(["80 mm", "0 mm", "180 mm"])),
+        ("/gauge", json!([])),
+        ("/trajectory/0/kind", json!("case-3")),
         ("/hysteresis/records", json!(["a.csv", "b.csv"])),
     ];
     for (pointer, value) in changes {
@@ -60,7 +67,14 @@ fn bad_specs_are_invalid() {
         bad.pointer_mut(parent).and_then(Value::as_object_mut).expect("a table").insert(name.to_owned(), value.clone());
         assert!(!validator.is_valid(&bad), "{pointer} = {value}");
     }
-    for pointer in ["/geometry/height", "/timing", "/gains/integral"] {
+    for pointer in [
+        "/geometry/height",
+        "/geometry/base_angle",
+        "/timing",
+        "/gains/integral",
+        "/gauge/3/point",
+        "/control/modal_damping",
+    ] {
         let mut bad = good.clone();
         let (parent, name) = pointer.rsplit_once('/').expect("a pointer");
         bad.pointer_mut(parent).and_then(Value::as_object_mut).expect("a table").remove(name).expect("was there");

@@ -36,6 +36,12 @@ pub fn vectors(scalar: Scalar, rows: &[[f64; 3]]) -> TokenStream {
     quote! { [#([#rows]),*] }
 }
 
+/// Rows of six numbers.
+pub fn matrix(scalar: Scalar, rows: &[[f64; 6]]) -> TokenStream {
+    let rows = rows.iter().map(|row| reals(scalar, row));
+    quote! { [#([#rows]),*] }
+}
+
 /// An unsigned integer without suffix.
 pub fn count(value: usize) -> Literal {
     Literal::usize_unsuffixed(value)

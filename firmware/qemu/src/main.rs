@@ -87,7 +87,7 @@ fn replay() -> Result<(), Exit> {
         overflows: counter.overflows(),
     };
     let stats_file = File::create(b"stats.bin\0").ok_or(Exit::CannotWrite)?;
-    let written = stats::write(&stats_file, &summary, &stages.all());
+    let written = stats::write(&stats_file, &summary, stages.all());
     if written && stats_file.close() && output.close() { Ok(()) } else { Err(Exit::CannotWrite) }
 }
 

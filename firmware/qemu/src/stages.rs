@@ -1,85 +1,65 @@
-//! What is counted beside the whole tick: parts of the controller, called on copies.
-//!
-//! To add a stage: name it in [`Stages::new`] and measure it in [`Stages::measure`]. Nothing here may touch
-//! the state that the replay steps.
+//! What is counted beside the whole tick: the controller's own list of its parts, called on copies of the state.
 
 use crate::instructions::InstructionCounter;
 use crate::stats::Stage;
-use controller::hysteresis::{TABLES, Table};
-use controller::{Config, LEGS, LegState, Real, SetpointKind, State, TickInput, actuate, kinematics, limits};
-use core::hint::black_box;
+use controller::stages::{STAGE_COUNT, STAGES, prepare};
+use controller::{Config, State, TickInput};
 
-/// Stages in the order in which they are reported.
+/// The stages are measured on every so-manieth tick: each needs a copy of the state.
+const INTERVAL: u64 = 8;
+
+/// Counts so far.
 pub struct Stages {
-    /// The whole of `controller::step`.
-    step: Stage,
-    /// Pose to six leg displacements.
-    kinematics: Stage,
-    /// Γ⁻¹ of one leg: displacement to drive.
-    inverse: Stage,
-    /// One leg from demand to code: Γ⁻¹, converter and limits, and the reversal memory brought up to date.
-    actuate: Stage,
+    /// The whole of `controller::step`, then [`STAGES`].
+    counts: [Stage; STAGE_COUNT + 1],
+    ticks: u64,
 }
 
 impl Stages {
     /// Nothing counted yet.
     pub const fn new() -> Self {
-        Self {
-            step: Stage::new("step"),
-            kinematics: Stage::new("kinematics"),
-            inverse: Stage::new("inverse"),
-            actuate: Stage::new("actuate"),
+        let mut counts = [Stage::new("step"); STAGE_COUNT + 1];
+        let mut index = 0;
+        while index < STAGE_COUNT {
+            counts[index + 1] = Stage::new(STAGES[index].name);
+            index += 1;
         }
+        Self { counts, ticks: 0 }
     }
 
     /// Adds one tick of `controller::step`.
     pub fn add_step(&mut self, instructions: u32) {
-        self.step.add(instructions);
+        self.counts[0].add(instructions);
     }
 
-    /// Measures the parts for the tick that is about to be stepped.
-    ///
-    /// The legs are asked for the demand of this tick with the estimates of the last one, which differs from what the
-    /// tick itself asks by one update of the estimates.
+    /// Measures the parts for the tick that is about to be stepped. Nothing here touches the state that the replay steps.
     #[inline(never)]
+    #[allow(unsafe_code)] // Stages are called from assembly that counts them.
     pub fn measure(&mut self, counter: &mut InstructionCounter, config: &Config, state: &State, input: &TickInput) {
-        let mut demand = state.demand;
-        match config.setpoint() {
-            SetpointKind::Pose if kinematics::pose_is_accepted(&input.setpoint) => {
-                let (displacements, instructions) = counter.measure(|| pose_to_legs(black_box(&input.setpoint)));
-                self.kinematics.add(instructions);
-                demand = displacements;
-            }
-            SetpointKind::Leg if limits::leg_setpoint_is_accepted(&input.setpoint) => demand = input.setpoint,
-            _ => {}
+        let due = self.ticks % INTERVAL == 0;
+        self.ticks += 1;
+        if !due {
+            return;
         }
-        for ((leg, table), demand) in state.legs.iter().zip(&TABLES).zip(demand) {
-            let request = demand - leg.estimate.correction();
-            let (_, instructions) = counter.measure(|| invert(black_box(leg), table, request));
-            self.inverse.add(instructions);
-            let mut copy = *leg;
-            let (_, instructions) = counter.measure(|| drive_leg(config, black_box(&mut copy), table, demand));
-            self.actuate.add(instructions);
+        let mut prepared = *state;
+        prepare(config, &mut prepared, input);
+        for (stage, count) in STAGES.iter().zip(self.counts.iter_mut().skip(1)) {
+            for leg in 0..stage.calls {
+                let mut copy = prepared;
+                let arguments = [
+                    (&raw const *config) as usize,
+                    (&raw mut copy) as usize,
+                    (&raw const *input) as usize,
+                    leg,
+                ];
+                // SAFETY: a stage is a C function of these four words.
+                count.add(unsafe { counter.measure_call(stage.run as *const (), arguments) });
+            }
         }
     }
 
     /// All of them.
-    pub fn all(&self) -> [Stage; 4] {
-        [self.step, self.kinematics, self.inverse, self.actuate]
+    pub fn all(&self) -> &[Stage] {
+        &self.counts
     }
-}
-
-#[inline(never)]
-fn pose_to_legs(pose: &[Real; 6]) -> [Real; LEGS] {
-    kinematics::leg_displacements(pose)
-}
-
-#[inline(never)]
-fn invert(leg: &LegState, table: &Table, request: Real) -> Real {
-    leg.memory.solve(table, request)
-}
-
-#[inline(never)]
-fn drive_leg(config: &Config, leg: &mut LegState, table: &Table, demand: Real) -> bool {
-    actuate(config, leg, table, demand)
 }

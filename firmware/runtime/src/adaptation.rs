@@ -70,6 +70,24 @@ impl<T: Real> Estimate<T> {
         }
     }
 
+    /// The same law with the innovation ν = m − δ̂ − φ̂ in place of m, so that ν may have been filtered on the way (the
+    /// modal notch): δ̂ ← δ̂ + ω1 (ν + φ̂), φ̂ ← φ̂ + ω2 ν with the old φ̂ in both. Without a filter it is [`Estimate::update`].
+    #[inline]
+    pub fn correct(&mut self, law: Law, level_weight: T, drift_weight: T, innovation: T) {
+        let old_drift = self.drift;
+        match law {
+            Law::Invhys => *self = Self::new(),
+            Law::Ewma => {
+                self.level = self.level + level_weight * innovation;
+                self.drift = T::ZERO;
+            }
+            Law::Pcc => {
+                self.level = self.level + level_weight * (innovation + old_drift);
+                self.drift = old_drift + drift_weight * innovation;
+            }
+        }
+    }
+
     /// Adds the estimates to a digest.
     pub fn digest(&self, digest: &mut Digest) {
         digest.real(self.level);

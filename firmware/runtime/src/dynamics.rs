@@ -52,6 +52,20 @@ pub struct Motion<T> {
     pub acceleration: [T; 6],
 }
 
+impl<T: Real> Default for Motion<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Motion<T> {
+    /// Standstill at rest.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { pose: [T::ZERO; 6], rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] }
+    }
+}
+
 /// What the legs must do for a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Load<T> {

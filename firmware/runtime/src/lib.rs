@@ -11,7 +11,17 @@
 //! | [`everett`] | Everett function on a grid: look-up and inverse along one branch | section 3 |
 //! | [`memory`] | reversal memory: forward Preisach model, its inverse, bounded storage | section 3, operator Γ and Γ⁻¹ |
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
+//! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
+//! | [`feedback`] | position feedback with anti-windup | (7) |
+//! | [`notch`] | modal notch of the feedback | |
+//! | [`transfer`] | bumpless change of mode | |
+//! | [`setpoint`] | bias, moves, trajectories, streams; user frames | section 4, trajectories |
+//! | [`linear`] | six-vectors and constant maps | |
 //! | [`dac`] | converter codes with voltage and slew limits | section 4, amplifiers |
+//! | [`attitude`] | R = Rz Ry Rx by sine and versine; rates of its angles and angular velocity | (AI.1) |
+//! | [`kinematics`] | pose to leg displacements in difference form, and back | (1), (2), (AI.2)–(AI.4) |
+//! | [`sensing`] | pose from six gauges that see the platform | section 4 |
+//! | [`velocity`] | rate of the measured pose, filtered | (7), k_v |
 //! | [`dynamics`] | motion of the platform to leg forces and displacements | (4), (AI.1)–(AI.17) |
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
@@ -21,18 +31,36 @@
 //! (their results on ±0 and NaN, or their assertions, depend on the compiler), sums in written order.
 
 pub mod adaptation;
+pub mod attitude;
 pub mod dac;
 pub mod digest;
 pub mod dynamics;
 pub mod everett;
+pub mod feedback;
+pub mod kinematics;
+pub mod linear;
 pub mod memory;
+pub mod mode;
+pub mod notch;
 pub mod real;
+pub mod sensing;
+pub mod setpoint;
+pub mod transfer;
 pub mod trig;
+pub mod velocity;
 
 pub use adaptation::{Estimate, Law};
+pub use attitude::{Attitude, Series};
 pub use dac::{CodeLimits, Dac};
 pub use digest::Digest;
 pub use dynamics::{Load, Motion, Platform};
 pub use everett::Everett;
+pub use feedback::{Gains, Integral};
+pub use kinematics::Legs;
 pub use memory::ReversalMemory;
+pub use mode::{ControlMode, Interaction};
+pub use notch::{NotchState, Section};
 pub use real::Real;
+pub use sensing::{Calibration, Gauges};
+pub use transfer::Transfer;
+pub use velocity::{Rate, RateFilter};

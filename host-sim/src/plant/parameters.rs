@@ -94,7 +94,7 @@ pub struct ParameterError {
 
 impl fmt::Display for ParameterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: not a usable leg plant", self.file)?;
+        write!(f, "{}: not a usable plant", self.file)?;
         for finding in &self.findings {
             write!(f, "\n  {finding}")?;
         }
@@ -150,9 +150,7 @@ impl LegParameters {
             out.push(format!("`units` is {:?}; expected \"V, um, s\": convert the values", self.units));
         }
         let mut expect = |field: &str, value: f64, low: Bound, high: Bound| {
-            if let Some(finding) = out_of_range(field, value, low, high) {
-                out.push(finding);
-            }
+            out.extend(low.and(high, field, value));
         };
         use Bound::{Above, AtLeast, AtMost, Below};
         expect("u_max", self.u_max, Above(0.0), AtMost(1000.0));
@@ -202,8 +200,9 @@ impl LegParameters {
     }
 }
 
+/// One end of a range.
 #[derive(Clone, Copy)]
-enum Bound {
+pub(crate) enum Bound {
     Above(f64),
     AtLeast(f64),
     AtMost(f64),
@@ -219,6 +218,12 @@ impl Bound {
             Self::Below(bound) => value < bound,
         }
     }
+
+    /// What is wrong with `value`, which is to keep both bounds. A NaN holds no bound, so it is found too.
+    pub(crate) fn and(self, other: Self, field: &str, value: f64) -> Option<String> {
+        let good = self.holds(value) && other.holds(value);
+        (!good).then(|| format!("`{field}` is {value}; expected a number {self} and {other}"))
+    }
 }
 
 impl fmt::Display for Bound {
@@ -230,12 +235,6 @@ impl fmt::Display for Bound {
             Self::Below(bound) => write!(f, "< {bound}"),
         }
     }
-}
-
-/// A NaN holds no bound, so it is found too.
-fn out_of_range(field: &str, value: f64, low: Bound, high: Bound) -> Option<String> {
-    let good = low.holds(value) && high.holds(value);
-    (!good).then(|| format!("`{field}` is {value}; expected a number {low} and {high}"))
 }
 
 #[cfg(test)]
@@ -271,7 +270,7 @@ mod tests {
     fn findings_name_file_field_value_and_expectation() {
         assert_eq!(
             refused("\"u_max\": 100.0", "\"u_max\": -5"),
-            "leg.json: not a usable leg plant\n  `u_max` is -5; expected a number > 0 and <= 1000"
+            "leg.json: not a usable plant\n  `u_max` is -5; expected a number > 0 and <= 1000"
         );
         assert!(refused("45.0\n", "-45.0\n").contains("`play_thresholds_V[23]` is -45"));
         assert!(refused("[0.05, ", "[").contains("`creep_weights` has 5 values but `creep_rates_per_s` has 4"));
@@ -294,6 +293,6 @@ mod tests {
         assert!(refused("\"zeta\": 0.1", "\"zeta\": \"0.1\"").contains("invalid type: string"));
         assert!(refused("\"zeta\": 0.1", "\"zeta\": NaN").contains("line 12"));
         let absent = LegParameters::load(Path::new("no/such.json")).unwrap_err().to_string();
-        assert!(absent.starts_with("no/such.json: not a usable leg plant\n  cannot be read"), "{absent}");
+        assert!(absent.starts_with("no/such.json: not a usable plant\n  cannot be read"), "{absent}");
     }
 }

@@ -1,4 +1,4 @@
-//! `src/step.rs`: one control tick. The order of the stages; constants come from the other files.
+//! `src/step.rs` of six legs: one control tick. The order of the stages; constants come from the other files.
 
 use proc_macro2::TokenStream;
 use quote::quote;
@@ -86,7 +86,7 @@ pub fn emit(_ir: &Ir) -> TokenStream {
 
         /// T = Δl(h_d), or T itself. A set-point that is not accepted leaves the last demand standing.
         #[inline]
-        fn take_setpoint(config: &Config, state: &mut State, input: &TickInput) -> bool {
+        pub(crate) fn take_setpoint(config: &Config, state: &mut State, input: &TickInput) -> bool {
             let accepted = match config.setpoint() {
                 SetpointKind::Pose => kinematics::pose_is_accepted(&input.setpoint),
                 SetpointKind::Leg => limits::leg_setpoint_is_accepted(&input.setpoint),

@@ -1,16 +1,14 @@
-//! `src/lib.rs`: documentation of the controller and its public names. Reads the name, digest and scalar of the IR.
+//! `src/lib.rs` of six legs: documentation of the controller and its public names.
 
 use proc_macro2::TokenStream;
-use quote::{format_ident, quote};
+use quote::quote;
 
-use super::literal;
+use crate::emit::identity;
 use crate::ir::Ir;
 
 pub fn emit(ir: &Ir) -> TokenStream {
-    let title = format!(" Controller of platform `{}`.", ir.name);
-    let scalar = format_ident!("f{}", ir.scalar.bits().to_string());
-    let bits = literal::count(ir.scalar.bits() as usize);
-    let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
+    let title = identity::title(ir);
+    let identity = identity::emit(ir);
     quote! {
         #![doc = #title]
         #![doc = ""]
@@ -38,6 +36,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod hysteresis;
         pub mod kinematics;
         pub mod limits;
+        pub mod stages;
         mod state;
         mod step;
         mod words;
@@ -48,17 +47,6 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub use step::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, TickInput, TickOutput, actuate, step};
         pub use words::{CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS};
 
-        /// Floating-point type of this controller; from `controller.scalar`.
-        pub type Real = #scalar;
-        /// Width of [`Real`].
-        pub const SCALAR_BITS: u32 = #bits;
-        /// Number of legs.
-        pub const LEGS: usize = 6;
-        /// Name of the platform.
-        pub const SPEC_NAME: &str = #name;
-        /// SHA-256 of the spec and of the records it names.
-        pub const SPEC_DIGEST: &str = #digest;
-        /// Version of the compiler.
-        pub const SPECGEN_VERSION: &str = #version;
+        #identity
     }
 }

@@ -1,17 +1,14 @@
-//! `src/words.rs`: inputs, outputs and config as named 64-bit words, for traces and links. The same for every spec.
+//! `src/words.rs` of six legs: inputs, outputs and config as named 64-bit words, for traces and links. The same for every spec.
 
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::literal;
-use crate::ir::{Ir, LEGS};
+use crate::emit::{description, literal};
+use crate::ir::Ir;
 
 pub fn emit(ir: &Ir) -> TokenStream {
-    let per_leg = |names: &[&str]| -> Vec<String> {
-        names.iter().flat_map(|name| (0..LEGS).map(move |leg| format!("{name}[{leg}]"))).collect()
-    };
-    let inputs = per_leg(&["setpoint", "displacement"]);
-    let mut outputs = per_leg(&["voltage", "requested", "demand", "level", "drift", "dac_code"]);
+    let inputs = description::vectors(&["setpoint", "displacement"]);
+    let mut outputs = description::vectors(&["voltage", "requested", "demand", "level", "drift", "dac_code"]);
     outputs.push("status".to_owned());
     let config = [
         "mode",
@@ -22,22 +19,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
         "max_step_codes",
         "code_min",
         "code_max",
-    ];
-    let description = format!(
-        "name={}\ndigest={}\nversion={}\nscalar_bits={}\nleg_gain={:?}\nperiod={:?}\ngrid={}\ndrive_range={:?},{:?}\nconfig_names={}\ninput_names={}\noutput_names={}\n",
-        ir.name,
-        ir.digest,
-        ir.specgen_version,
-        ir.scalar.bits(),
-        ir.defaults.leg_gain,
-        ir.defaults.period,
-        ir.hysteresis.grid,
-        ir.actuation.voltage[0],
-        ir.actuation.voltage[1],
-        config.join(","),
-        inputs.join(","),
-        outputs.join(","),
-    );
+    ]
+    .map(str::to_owned);
+    let description = description::text(ir, "legs", &inputs, &outputs, &config);
     let (input_words, output_words, config_words) =
         (literal::count(inputs.len()), literal::count(outputs.len()), literal::count(config.len()));
     quote! {

@@ -1,9 +1,9 @@
-//! `src/config.rs`: what may change while running. Reads [`ir::Defaults`](crate::ir::Defaults).
+//! `src/config.rs` of six legs: what may change while running. Reads [`ir::Defaults`](crate::ir::Defaults).
 
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::literal;
+use crate::emit::literal;
 use crate::ir::{Ir, Law, Setpoint};
 
 pub fn emit(ir: &Ir) -> TokenStream {

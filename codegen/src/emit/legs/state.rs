@@ -1,4 +1,4 @@
-//! `src/state.rs`: what the controller remembers. The same for every spec; sizes come from the other files.
+//! `src/state.rs` of six legs: what the controller remembers. The same for every spec; sizes come from the other files.
 
 use proc_macro2::TokenStream;
 use quote::quote;

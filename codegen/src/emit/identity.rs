@@ -1,0 +1,33 @@
+//! What every emitted controller is called: platform, digest, scalar. The end of `src/lib.rs`.
+
+use proc_macro2::TokenStream;
+use quote::{format_ident, quote};
+
+use super::literal;
+use crate::ir::Ir;
+
+/// First line of the crate's documentation.
+pub fn title(ir: &Ir) -> String {
+    format!(" Controller of platform `{}`.", ir.name)
+}
+
+/// Scalar type and identity.
+pub fn emit(ir: &Ir) -> TokenStream {
+    let scalar = format_ident!("f{}", ir.scalar.bits().to_string());
+    let bits = literal::count(ir.scalar.bits() as usize);
+    let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
+    quote! {
+        /// Floating-point type of this controller; from `controller.scalar`.
+        pub type Real = #scalar;
+        /// Width of [`Real`].
+        pub const SCALAR_BITS: u32 = #bits;
+        /// Number of legs.
+        pub const LEGS: usize = 6;
+        /// Name of the platform.
+        pub const SPEC_NAME: &str = #name;
+        /// SHA-256 of the spec and of the records it names.
+        pub const SPEC_DIGEST: &str = #digest;
+        /// Version of the compiler.
+        pub const SPECGEN_VERSION: &str = #version;
+    }
+}

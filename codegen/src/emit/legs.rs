@@ -1,0 +1,8 @@
+//! The controller of six legs with their own gauges: hysteresis feed-forward alone.
+
+pub mod config;
+pub mod crate_root;
+pub mod stages;
+pub mod state;
+pub mod step;
+pub mod words;

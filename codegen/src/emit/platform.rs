@@ -1,0 +1,9 @@
+//! The controller of the platform in task space: P, F and P/F.
+
+pub mod config;
+pub mod crate_root;
+pub mod stages;
+pub mod state;
+pub mod step;
+pub mod task_space;
+pub mod words;

@@ -1,0 +1,127 @@
+//! `src/state.rs` of a platform: what the controller remembers. The same for every spec; sizes come from the other files.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+pub fn emit() -> TokenStream {
+    quote! {
+        #![doc = " What the controller remembers from tick to tick. No NaN or infinity is ever stored here."]
+
+        use specgen_runtime::setpoint::{Generator, Target};
+        use specgen_runtime::{ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer};
+
+        use crate::hysteresis::Memory;
+        use crate::{LEGS, Real, limits};
+
+        /// State of one leg.
+        #[derive(Debug, Clone, Copy)]
+        pub struct LegState {
+            /// Reversal memory of the drive that was really applied.
+            pub memory: Memory,
+            /// δ̂ and φ̂, m.
+            pub estimate: Estimate<Real>,
+            /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.
+            pub requested: Real,
+            /// Part of the last request that a limit withheld, m; zero for a leg that was free.
+            pub excess: Real,
+            /// Converter code now held at the output.
+            pub code: i32,
+        }
+
+        /// State of the controller.
+        #[derive(Debug, Clone, Copy)]
+        pub struct State {
+            /// Legs 0 to 5.
+            pub legs: [LegState; LEGS],
+            /// h: pose from rest, from the last gauge readings that were believed, m and rad.
+            pub pose: [Real; 6],
+            /// ḣ: its filtered derivative.
+            pub rate: Rate<Real>,
+            /// Where set-points come from.
+            pub generator: Generator<Real>,
+            /// h_d at the end of the interval now running.
+            pub target: Target<Real>,
+            /// N(h_d − h), the pose error behind the notch, m and rad.
+            pub error: [Real; 6],
+            /// Notch on the pose error.
+            pub error_notch: NotchState<Real>,
+            /// Notch on the innovations of the legs.
+            pub innovation_notch: NotchState<Real>,
+            /// k_I ∫e.
+            pub integral: Integral<Real>,
+            /// p: deflection of each leg under the known load of the interval now running, m.
+            pub load: [Real; LEGS],
+            /// Interaction wrench last believed, N and N m.
+            pub wrench: [Real; 6],
+            /// What is left of the last change of mode.
+            pub transfer: Transfer<Real>,
+            /// Mode of the last tick; none before the first.
+            pub mode: Option<ControlMode>,
+        }
+
+        impl Default for State {
+            fn default() -> Self {
+                Self::new()
+            }
+        }
+
+        impl State {
+            /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there, no correction.
+            #[must_use]
+            pub const fn new() -> Self {
+                let leg = LegState {
+                    memory: Memory::new(),
+                    estimate: Estimate::new(),
+                    requested: 0.0,
+                    excess: 0.0,
+                    code: limits::CODES[0],
+                };
+                Self {
+                    legs: [leg; LEGS],
+                    pose: [0.0; 6],
+                    rate: Rate::new(),
+                    generator: Generator::new(),
+                    target: Target::new(),
+                    error: [0.0; 6],
+                    error_notch: NotchState::new(),
+                    innovation_notch: NotchState::new(),
+                    integral: Integral::new(),
+                    load: [0.0; LEGS],
+                    wrench: [0.0; 6],
+                    transfer: Transfer::new(),
+                    mode: None,
+                }
+            }
+
+            /// Fingerprint of everything that later ticks depend on, for comparing two machines bit for bit.
+            #[must_use]
+            pub fn digest(&self) -> u64 {
+                let mut digest = Digest::new();
+                for leg in &self.legs {
+                    leg.memory.digest(&mut digest);
+                    leg.estimate.digest(&mut digest);
+                    digest.real(leg.requested);
+                    digest.real(leg.excess);
+                    digest.word(leg.code as u32 as u64);
+                }
+                for vector in [&self.pose, &self.error, &self.load, &self.wrench] {
+                    for value in vector {
+                        digest.real(*value);
+                    }
+                }
+                self.rate.digest(&mut digest);
+                self.generator.digest(&mut digest);
+                self.target.digest(&mut digest);
+                self.error_notch.digest(&mut digest);
+                self.innovation_notch.digest(&mut digest);
+                self.integral.digest(&mut digest);
+                self.transfer.digest(&mut digest);
+                digest.word(match self.mode {
+                    None => 0,
+                    Some(mode) => 1 + mode.word(),
+                });
+                digest.finish()
+            }
+        }
+    }
+}

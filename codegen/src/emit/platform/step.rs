@@ -1,0 +1,290 @@
+//! `src/step.rs` of a platform: one control tick. The order of the stages; constants come from the other files.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+pub fn emit() -> TokenStream {
+    quote! {
+        #![doc = " One control tick."]
+        #![doc = ""]
+        #![doc = " At time t_n the interval that the voltages u_n were held over has just ended and the gauges are read; the set-point is"]
+        #![doc = " that of the END of the interval that begins now, t_{n+1}, and the voltages that come out are held over it."]
+        #![doc = ""]
+        #![doc = " ```text"]
+        #![doc = " sense      gauges → h                                                      pose from rest"]
+        #![doc = " learn      e = N(h_d(t_n) − h) ;  s ← s + T k_I e                          (7), held where it would wind up"]
+        #![doc = "            ν = N(Δl(h) − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                    (AII.3), (AII.5), (AII.6)"]
+        #![doc = " setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}"]
+        #![doc = " load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)"]
+        #![doc = "            + J⁻ᵀ k_v ė/k_a"]
+        #![doc = " legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is what was really requested"]
+        #![doc = " ```"]
+        #![doc = " N is the modal notch. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback"]
+        #![doc = " is none and does not."]
+
+        use specgen_runtime::feedback::{force_of, winds_up};
+        use specgen_runtime::linear::{difference, transform};
+        use specgen_runtime::setpoint::{Command, Target};
+        use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _};
+
+        use crate::dynamics::{Load, Motion};
+        use crate::hysteresis::{TABLES, Table};
+        use crate::limits::DAC;
+        use crate::setpoint::PLAN;
+        use crate::task_space::{
+            COMPLIANCE, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
+            linear_displacement, linear_drive, notch_error, notch_innovation,
+        };
+        use crate::{Config, LEGS, LegState, Real, State, dynamics, kinematics, sensing};
+
+        /// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
+        pub const LEG_LIMITED: u32 = 0x3f;
+        /// Bits 8 to 13: gauge not finite or out of range. The pose, the integral and the estimates were held.
+        pub const GAUGE_FAULT: u32 = 0x3f00;
+        /// Bit 16: set-point not finite, out of the workspace or a jump; the last one was held.
+        pub const SETPOINT_FAULT: u32 = 0x1_0000;
+        /// Bit 17: the stream of set-points is stale; brought to rest.
+        pub const SETPOINT_STALE: u32 = 0x2_0000;
+        /// Bit 18: bias, move or trajectory under way.
+        pub const GENERATOR_BUSY: u32 = 0x4_0000;
+        /// Bit 19: measured wrench not finite or out of range; the last one believed was kept.
+        pub const WRENCH_FAULT: u32 = 0x8_0000;
+
+        /// What a tick reads.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct TickInput {
+            /// What the platform is to do.
+            pub command: Command<Real>,
+            /// Reading of each gauge: V if the spec gives a calibration, else m from rest.
+            pub gauge: [Real; 6],
+            /// Measured force (N) and torque (N m) of the work piece ON the platform, about P_C, base axes.
+            pub wrench: [Real; 6],
+        }
+
+        /// What a tick yields. Every number is finite.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct TickOutput {
+            /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
+            pub voltage: [Real; LEGS],
+            /// q̂ = ρ̂X: displacement really requested of each leg, after all limits, m.
+            pub requested: [Real; LEGS],
+            /// Δl(h_d): displacement of each leg at the set-point, m.
+            pub demand: [Real; LEGS],
+            /// δ̂ of each leg, m.
+            pub level: [Real; LEGS],
+            /// φ̂ of each leg, m.
+            pub drift: [Real; LEGS],
+            /// Converter code of each leg.
+            pub dac_code: [i32; LEGS],
+            /// h: measured pose from rest, m and rad.
+            pub pose: [Real; 6],
+            /// h_d at the end of the coming interval, from rest, m and rad.
+            pub target: [Real; 6],
+            /// p: deflection of each leg under the known load, m.
+            pub load: [Real; LEGS],
+            /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`], [`SETPOINT_STALE`], [`GENERATOR_BUSY`], [`WRENCH_FAULT`].
+            pub status: u32,
+        }
+
+        /// One control tick. See the module for the timing.
+        pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
+            let entered = enter_mode(config, state);
+            let gauge_faults = sense(state, &input.gauge);
+            if gauge_faults == 0 {
+                learn(config, state);
+            }
+            let wrench_good = take_wrench(state, &input.wrench);
+            let damping = damping(config, state);
+            let (target, setpoint_status) = state.generator.next(&PLAN, &input.command);
+            let Load { displacement: demand, force } = known_load(config, state, &target);
+            let feedback = feedback(config, state);
+            if !entered {
+                state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
+            }
+            let mut output = TickOutput {
+                voltage: [0.0; LEGS],
+                requested: [0.0; LEGS],
+                demand,
+                level: [0.0; LEGS],
+                drift: [0.0; LEGS],
+                dac_code: [0; LEGS],
+                pose: state.pose,
+                target: target.pose,
+                load: [0.0; LEGS],
+                status: gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
+            };
+            for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
+                let load = (force[index] - REST_FORCE[index]) * COMPLIANCE + damping[index];
+                let request = demand[index] + load + feedback[index] - leg.estimate.correction();
+                if entered {
+                    state.transfer.offset[index] = leg.requested - request;
+                }
+                let limited = actuate(config, leg, table, request + state.transfer.offset[index]);
+                state.load[index] = load;
+                output.load[index] = load;
+                output.voltage[index] = DAC.voltage(leg.code);
+                output.requested[index] = leg.requested;
+                output.level[index] = leg.estimate.level;
+                output.drift[index] = leg.estimate.drift;
+                output.dac_code[index] = leg.code;
+                output.status |= (limited as u32) << index;
+            }
+            state.target = target;
+            output
+        }
+
+        /// Whether this tick is the first of its mode. If so, what the mode does not use is put at rest; the first request then
+        /// defines the offset that keeps the voltages where they are.
+        #[inline]
+        fn enter_mode(config: &Config, state: &mut State) -> bool {
+            let mode = config.mode();
+            if state.mode == Some(mode) {
+                return false;
+            }
+            state.mode = Some(mode);
+            for leg in &mut state.legs {
+                match mode.law() {
+                    Law::Invhys => leg.estimate = Estimate::new(),
+                    Law::Ewma => leg.estimate.drift = 0.0,
+                    Law::Pcc => {}
+                }
+                leg.requested = requested(mode, leg);
+                leg.excess = 0.0;
+            }
+            if mode.law() == Law::Invhys {
+                state.innovation_notch = NotchState::new();
+            }
+            if !mode.feeds_back() {
+                state.integral = Integral::new();
+                state.error_notch = NotchState::new();
+                state.error = [0.0; 6];
+            }
+            true
+        }
+
+        /// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.
+        #[inline]
+        pub(crate) fn sense(state: &mut State, gauge: &[Real; 6]) -> u32 {
+            let faults = sensing::faults(gauge);
+            if faults == 0 {
+                state.pose = sensing::pose(gauge);
+                state.rate.update(&sensing::RATE, &state.pose);
+            } else {
+                state.rate.coast(&sensing::RATE);
+            }
+            faults
+        }
+
+        /// What the readings teach: the integral of (7) and the run-to-run estimates.
+        #[inline]
+        pub(crate) fn learn(config: &Config, state: &mut State) {
+            let mode = config.mode();
+            if mode.feeds_back() {
+                let error = difference(&state.target.pose, &state.pose);
+                state.error = notch_error(&mut state.error_notch, &error);
+                let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
+                if !would_wind_up(&state.legs, &growth) {
+                    state.integral.grow(&growth);
+                }
+            }
+            if mode.law() != Law::Invhys {
+                let measured = kinematics::leg_displacements(&state.pose);
+                let mut innovation = [0.0; LEGS];
+                for (index, leg) in state.legs.iter().enumerate() {
+                    let model_error = measured[index] - (leg.requested - state.load[index]);
+                    innovation[index] = model_error - leg.estimate.correction();
+                }
+                let innovation = notch_innovation(&mut state.innovation_notch, &innovation);
+                for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
+                    leg.estimate.correct(mode.law(), config.level_weight(), config.drift_weight(), innovation);
+                }
+            }
+        }
+
+        /// Whether the integral's growth would push a leg further beyond the limit that holds it back.
+        #[inline]
+        fn would_wind_up(legs: &[LegState; LEGS], growth: &[Real; 6]) -> bool {
+            let mut excess = [0.0; LEGS];
+            let mut any = false;
+            for (excess, leg) in excess.iter_mut().zip(legs) {
+                *excess = leg.excess;
+                any |= leg.excess != 0.0;
+            }
+            any && winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
+        }
+
+        /// The measured wrench, if it is to be believed.
+        #[inline]
+        fn take_wrench(state: &mut State, wrench: &[Real; 6]) -> bool {
+            let good = wrench.iter().zip(&WRENCH_LIMIT).all(|(value, limit)| (-*limit..=*limit).contains(value));
+            if good {
+                state.wrench = *wrench;
+            }
+            good
+        }
+
+        /// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg.
+        #[inline]
+        fn damping(config: &Config, state: &State) -> [Real; LEGS] {
+            if !config.damps() {
+                return [0.0; LEGS];
+            }
+            let error = difference(&state.target.rate, state.rate.value());
+            transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error))
+        }
+
+        /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
+        #[inline]
+        pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load<Real> {
+            let wrench = match config.interaction() {
+                Interaction::Neglected => [0.0; 6],
+                Interaction::Measured => state.wrench,
+                Interaction::Modelled => {
+                    let environment = config.environment();
+                    let compressed = difference(&environment.rest, &target.pose);
+                    force_of(&environment.stiffness, &compressed)
+                }
+            };
+            dynamics::load(&Motion { pose: target.pose, rate: target.rate, acceleration: target.acceleration }, &wrench)
+        }
+
+        /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.
+        #[inline]
+        pub(crate) fn feedback(config: &Config, state: &State) -> [Real; LEGS] {
+            if !config.mode().feeds_back() {
+                return [0.0; LEGS];
+            }
+            let mut force = force_of(&config.active_gains().proportional, &state.error);
+            for (force, integral) in force.iter_mut().zip(&state.integral.force) {
+                *force += *integral;
+            }
+            transform(&WRENCH_TO_LEGS, &force)
+        }
+
+        /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,
+        /// voltage or slew rate held the leg back.
+        #[inline]
+        pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
+            let mode = config.mode();
+            let (drive, out_of_reach) = if mode.inverts() {
+                let out_of_reach = !(request >= Real::ZERO && request <= table.full_displacement());
+                (leg.memory.solve(table, request), out_of_reach)
+            } else {
+                (linear_drive(request), false)
+            };
+            let (code, held_back) = DAC.code(drive, leg.code, config.code_limits());
+            leg.code = code;
+            leg.memory.apply(table, DAC.drive(code));
+            leg.requested = requested(mode, leg);
+            let limited = out_of_reach || held_back;
+            leg.excess = if limited { request - leg.requested } else { 0.0 };
+            limited
+        }
+
+        /// What the code that is held means in the leg model of a mode, m.
+        #[inline]
+        fn requested(mode: ControlMode, leg: &LegState) -> Real {
+            if mode.inverts() { leg.memory.displacement() } else { linear_displacement(DAC.drive(leg.code)) }
+        }
+    }
+}

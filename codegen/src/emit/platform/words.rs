@@ -1,0 +1,193 @@
+//! `src/words.rs` of a platform: inputs, outputs and config as named 64-bit words, for traces and links. The same for every
+//! spec.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use crate::emit::{description, literal};
+use crate::ir::{Ir, TaskSpace};
+
+/// Vectors of the input that a command brings, and those that are measured.
+const COMMAND_VECTORS: [&str; 3] = ["setpoint", "setpoint_rate", "setpoint_acceleration"];
+const MEASURED_VECTORS: [&str; 2] = ["gauge", "wrench"];
+const OUTPUT_VECTORS: [&str; 9] =
+    ["voltage", "requested", "demand", "level", "drift", "dac_code", "pose", "target", "load"];
+const GAIN_VECTORS: [&str; 8] =
+    ["kp", "ki", "kv", "position_kp", "position_ki", "position_kv", "environment_stiffness", "environment_rest"];
+
+pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
+    let mut inputs: Vec<String> = ["command", "selector", "sequence"].map(str::to_owned).to_vec();
+    inputs.extend(description::vectors(&COMMAND_VECTORS));
+    inputs.extend(description::vectors(&MEASURED_VECTORS));
+    let mut outputs = description::vectors(&OUTPUT_VECTORS);
+    outputs.push("status".to_owned());
+    let mut config: Vec<String> =
+        ["mode", "interaction", "level_weight", "drift_weight", "max_step_codes", "code_min", "code_max"]
+            .map(str::to_owned)
+            .to_vec();
+    let gains_at = literal::count(config.len());
+    config.extend(description::vectors(&GAIN_VECTORS));
+    let bias: Vec<String> = task.law.bias.iter().map(|value| format!("{value:?}")).collect();
+    let description =
+        description::text(ir, "platform", &inputs, &outputs, &config) + &format!("bias={}\n", bias.join(","));
+    let (input_words, output_words, config_words) =
+        (literal::count(inputs.len()), literal::count(outputs.len()), literal::count(config.len()));
+    quote! {
+        #![doc = " Inputs, outputs and settings as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target"]
+        #![doc = " reads and writes these, so that two of them can be compared bit for bit."]
+
+        use specgen_runtime::setpoint::{Command, CommandKind, Target};
+        use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Real as _};
+
+        use crate::config::Environment;
+        use crate::{Config, ConfigError, LEGS, Real, TickInput, TickOutput};
+
+        /// Words of a tick's input.
+        pub const INPUT_WORDS: usize = #input_words;
+        /// Words of a tick's output.
+        pub const OUTPUT_WORDS: usize = #output_words;
+        /// Words of the settings.
+        pub const CONFIG_WORDS: usize = #config_words;
+        /// Names of the input words. `command` is 0 hold, 1 stream, 2 move, 3 trajectory.
+        pub const INPUT_NAMES: [&str; INPUT_WORDS] = [#(#inputs),*];
+        /// Names of the output words.
+        pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] = [#(#outputs),*];
+        /// Names of the settings. `mode` is 0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same. `interaction` is 0
+        /// neglected, 1 modelled, 2 measured. `kp`, `ki`, `kv` are the gains of P/F, `position_…` those of P.
+        pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = [#(#config),*];
+        /// First word of the weights, of the code limits and of the gains in [`CONFIG_NAMES`].
+        pub(crate) const CONFIG_WEIGHTS: usize = 2;
+        pub(crate) const CONFIG_CODES: usize = 4;
+        pub(crate) const CONFIG_GAINS: usize = #gains_at;
+        /// First measured word in [`INPUT_NAMES`].
+        const INPUT_MEASURED: usize = 21;
+
+        /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
+        pub const DESCRIPTION: &str = #description;
+
+        impl TickInput {
+            /// From words in the order of [`INPUT_NAMES`].
+            #[must_use]
+            pub fn from_words(words: &[u64; INPUT_WORDS]) -> Self {
+                Self {
+                    command: Command {
+                        kind: CommandKind::from_word(words[0]),
+                        selector: saturated(words[1]),
+                        sequence: saturated(words[2]),
+                        target: Target { pose: six(words, 3), rate: six(words, 9), acceleration: six(words, 15) },
+                    },
+                    gauge: six(words, INPUT_MEASURED),
+                    wrench: six(words, INPUT_MEASURED + 6),
+                }
+            }
+        }
+
+        impl TickOutput {
+            /// Words in the order of [`OUTPUT_NAMES`].
+            #[must_use]
+            pub fn to_words(&self) -> [u64; OUTPUT_WORDS] {
+                let mut words = [0; OUTPUT_WORDS];
+                for index in 0..LEGS {
+                    words[index] = self.voltage[index].to_word();
+                    words[LEGS + index] = self.requested[index].to_word();
+                    words[2 * LEGS + index] = self.demand[index].to_word();
+                    words[3 * LEGS + index] = self.level[index].to_word();
+                    words[4 * LEGS + index] = self.drift[index].to_word();
+                    words[5 * LEGS + index] = self.dac_code[index] as u32 as u64;
+                    words[6 * LEGS + index] = self.pose[index].to_word();
+                    words[7 * LEGS + index] = self.target[index].to_word();
+                    words[8 * LEGS + index] = self.load[index].to_word();
+                }
+                words[9 * LEGS] = self.status as u64;
+                words
+            }
+        }
+
+        impl Config {
+            /// From words in the order of [`CONFIG_NAMES`].
+            ///
+            /// # Errors
+            /// The first word that is out of range.
+            pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
+                let Some(mode) = ControlMode::from_word(words[0]) else {
+                    return Err(ConfigError { word: 0 });
+                };
+                let Some(interaction) = Interaction::from_word(words[1]) else {
+                    return Err(ConfigError { word: 1 });
+                };
+                let limits = CodeLimits {
+                    max_step: code(words[CONFIG_CODES]),
+                    min: code(words[CONFIG_CODES + 1]),
+                    max: code(words[CONFIG_CODES + 2]),
+                };
+                let gains = |first: usize| Gains {
+                    proportional: six(words, first),
+                    integral: six(words, first + 6),
+                    derivative: six(words, first + 12),
+                };
+                let environment =
+                    Environment { stiffness: six(words, CONFIG_GAINS + 36), rest: six(words, CONFIG_GAINS + 42) };
+                Self::new()
+                    .with_mode(mode)
+                    .with_interaction(interaction)
+                    .with_weights(
+                        Real::from_word(words[CONFIG_WEIGHTS]),
+                        Real::from_word(words[CONFIG_WEIGHTS + 1]),
+                    )?
+                    .with_code_limits(limits)?
+                    .with_gains(gains(CONFIG_GAINS), gains(CONFIG_GAINS + 18))?
+                    .with_environment(environment)
+            }
+
+            /// Words in the order of [`CONFIG_NAMES`].
+            #[must_use]
+            pub fn to_words(&self) -> [u64; CONFIG_WORDS] {
+                let mut words = [0; CONFIG_WORDS];
+                let limits = self.code_limits();
+                words[0] = self.mode().word();
+                words[1] = self.interaction().word();
+                words[CONFIG_WEIGHTS] = self.level_weight().to_word();
+                words[CONFIG_WEIGHTS + 1] = self.drift_weight().to_word();
+                words[CONFIG_CODES] = limits.max_step as u32 as u64;
+                words[CONFIG_CODES + 1] = limits.min as u32 as u64;
+                words[CONFIG_CODES + 2] = limits.max as u32 as u64;
+                let (combined, position) = (self.gains(), self.position_gains());
+                let vectors = [
+                    &combined.proportional,
+                    &combined.integral,
+                    &combined.derivative,
+                    &position.proportional,
+                    &position.integral,
+                    &position.derivative,
+                    &self.environment().stiffness,
+                    &self.environment().rest,
+                ];
+                for (slots, vector) in words[CONFIG_GAINS..].chunks_exact_mut(6).zip(vectors) {
+                    for (slot, value) in slots.iter_mut().zip(vector) {
+                        *slot = value.to_word();
+                    }
+                }
+                words
+            }
+        }
+
+        /// Six numbers from the word `first` on; zero beyond the end.
+        fn six(words: &[u64], first: usize) -> [Real; 6] {
+            let mut vector = [0.0; 6];
+            for (value, word) in vector.iter_mut().zip(words.iter().skip(first)) {
+                *value = Real::from_word(*word);
+            }
+            vector
+        }
+
+        /// A code from its word; anything that is no code becomes −1, which no limit accepts.
+        fn code(word: u64) -> i32 {
+            if word > i32::MAX as u64 { -1 } else { word as i32 }
+        }
+
+        /// A counter from its word.
+        fn saturated(word: u64) -> u32 {
+            if word > u32::MAX as u64 { u32::MAX } else { word as u32 }
+        }
+    }
+}

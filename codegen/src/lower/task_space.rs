@@ -1,0 +1,92 @@
+//! Constants of the control law in task space: maps at rest, modal notch, settings at start-up.
+
+use super::linear;
+use crate::ir::{ControlLaw, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Scalar, Section};
+use crate::model::{self, Model};
+use crate::numerics::{Matrix6, multiply6, transpose6};
+use crate::stability::platform::{self as design, Design, RestDynamics};
+
+/// Offset of a change of mode that is over, m: far below what a gauge sees.
+const TRANSFER_NEGLIGIBLE: f64 = 1e-15;
+
+/// Constants of (7) and of the composition of P and F. `rest_force` are the leg forces at rest, N.
+pub(super) fn law(
+    model: &Model,
+    task: &model::TaskSpace,
+    scalar: Scalar,
+    rest: &RestDynamics,
+    rest_force: &[f64; LEGS],
+    design: &Design,
+) -> ControlLaw {
+    let round = |value: f64| scalar.round(value);
+    let round_all = |matrix: Matrix6| matrix.map(|row| row.map(round));
+    let compliance = 1.0 / model.actuator.axial_stiffness;
+    // Lowering of the dynamics has refused a singular geometry.
+    let legs_to_pose = linear::inverse(&rest.jacobian).unwrap_or([[0.0; 6]; 6]);
+    let wrench_to_legs = transpose6(&legs_to_pose).map(|row| row.map(|value| value * compliance));
+    let notch = design.notch.as_ref().map(|notch| Notch {
+        pose_to_modes: round_all(notch.to_modal),
+        modes_to_pose: round_all(notch.from_modal),
+        legs_to_modes: round_all(multiply6(&notch.to_modal, &legs_to_pose)),
+        modes_to_legs: round_all(multiply6(&rest.jacobian, &notch.from_modal)),
+        sections: notch.sections.map(|section| Section { b: section.b.map(round), a: section.a.map(round) }),
+    });
+    let volts_per_cell = (model.actuator.voltage[1] - model.actuator.voltage[0]) / model.hysteresis.grid as f64;
+    let metres_per_cell = model.actuator.leg_gain() * volts_per_cell;
+    ControlLaw {
+        period: round(model.timing.period),
+        compliance: round(compliance),
+        wrench_to_legs: round_all(wrench_to_legs),
+        rest_force: rest_force.map(round),
+        wrench_limit: largest_wrench(model).map(round),
+        transfer_keep: round(libm::exp(-model.timing.period / task.transfer_time)),
+        transfer_negligible: round(TRANSFER_NEGLIGIBLE),
+        cells_per_metre: round(1.0 / metres_per_cell),
+        metres_per_cell: round(metres_per_cell),
+        bias: task.setpoint.bias,
+        notch,
+    }
+}
+
+/// What six blocked legs can exert: a sensor that reads more is wrong. N and N m about P_C.
+fn largest_wrench(model: &Model) -> [f64; 6] {
+    let force = LEGS as f64 * model.actuator.axial_stiffness * model.actuator.stroke;
+    let radius = model.geometry.platform_joints.iter().fold(0.0, |most: f64, joint| {
+        let length = libm::sqrt(joint[0] * joint[0] + joint[1] * joint[1] + joint[2] * joint[2]);
+        if length > most { length } else { most }
+    });
+    [force, force, force, force * radius, force * radius, force * radius]
+}
+
+/// Config at start-up.
+pub(super) fn defaults(model: &Model, task: &model::TaskSpace, scalar: Scalar, design: &Design) -> PlatformDefaults {
+    let round = |value: f64| scalar.round(value);
+    let gains = |tuning: &design::Tuning| Gains {
+        proportional: tuning.proportional.map(round),
+        integral: tuning.integral.map(round),
+        derivative: tuning.derivative.map(round),
+    };
+    PlatformDefaults {
+        mode: match task.mode {
+            model::ControlMode::P => Mode::P,
+            model::ControlMode::F => Mode::F,
+            model::ControlMode::PF => Mode::PF,
+        },
+        law: match model.adaptation.mode {
+            model::AdaptationMode::Invhys => Law::Invhys,
+            model::AdaptationMode::Ewma => Law::Ewma,
+            model::AdaptationMode::Pcc => Law::Pcc,
+        },
+        interaction: match task.interaction {
+            model::Interaction::None => Interaction::Neglected,
+            model::Interaction::Modelled => Interaction::Modelled,
+            model::Interaction::Measured => Interaction::Measured,
+        },
+        level_weight: round(design.combined.level_bandwidth * model.timing.period),
+        drift_weight: round(design.combined.drift_bandwidth * model.timing.period),
+        gains: gains(&design.combined),
+        position_gains: gains(&design.position),
+        environment_stiffness: task.environment.stiffness.map(round),
+        environment_rest: task.environment.rest.map(round),
+    }
+}

@@ -1,0 +1,89 @@
+//! Feedback of (7): k_p e + k_I ∫e, as a generalised force on the platform, with anti-windup.
+//!
+//! The integral is kept as the force it exerts (N, N m), not as ∫e: a change of gain then moves nothing.
+
+use crate::digest::Digest;
+use crate::real::Real;
+
+/// Diagonal gains of (7): x, y, z, θx, θy, θz.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gains<T> {
+    /// k_p, N/m and N m/rad.
+    pub proportional: [T; 6],
+    /// k_I, N/(m s) and N m/(rad s).
+    pub integral: [T; 6],
+    /// k_v, N s/m and N m s/rad.
+    pub derivative: [T; 6],
+}
+
+/// `gain · error`, axis by axis.
+#[inline]
+#[must_use]
+pub fn force_of<T: Real>(gain: &[T; 6], error: &[T; 6]) -> [T; 6] {
+    let mut force = *gain;
+    for (force, error) in force.iter_mut().zip(error) {
+        *force = *force * *error;
+    }
+    force
+}
+
+/// The integral part of (7), as a generalised force. Zero at reset.
+#[derive(Debug, Clone, Copy)]
+pub struct Integral<T> {
+    /// k_I ∫e, N and N m.
+    pub force: [T; 6],
+}
+
+impl<T: Real> Default for Integral<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Integral<T> {
+    /// No force.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { force: [T::ZERO; 6] }
+    }
+
+    /// One tick's growth T_s k_I e.
+    #[inline]
+    #[must_use]
+    pub fn growth(gain: &[T; 6], period: T, error: &[T; 6]) -> [T; 6] {
+        let mut growth = force_of(gain, error);
+        for value in &mut growth {
+            *value = period * *value;
+        }
+        growth
+    }
+
+    /// Adds a tick's growth.
+    #[inline]
+    pub fn grow(&mut self, growth: &[T; 6]) {
+        for (force, growth) in self.force.iter_mut().zip(growth) {
+            *force = *force + *growth;
+        }
+    }
+
+    /// Adds the state to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        for value in &self.force {
+            digest.real(*value);
+        }
+    }
+}
+
+/// Whether a growth that moves the legs' requests by `push` would drive a leg further beyond the limit that holds it back.
+///
+/// `excess` is what each leg was asked for beyond what it could do (m; zero for a leg that is free). Growth that leads back
+/// is let through: an integral that is held whatever the error may keep a leg at its limit for ever.
+#[inline]
+#[must_use]
+pub fn winds_up<T: Real>(excess: &[T; 6], push: &[T; 6]) -> bool {
+    let mut outward = false;
+    for (excess, push) in excess.iter().zip(push) {
+        outward |= (*excess > T::ZERO && *push > T::ZERO) || (*excess < T::ZERO && *push < T::ZERO);
+    }
+    outward
+}

@@ -1,0 +1,97 @@
+//! Leg kinematics in difference form: leg displacements from rest, without the cancellation of |r| − l₀, and back.
+//!
+//! ```text
+//! d_i  = t + (R − I) P_i                    how far platform joint i moved
+//! Δl_i = |r₀_i + d_i| − l₀_i                the root of Δl² + 2 l₀ Δl = (2 r₀ + d)·d
+//! h ← h + J⁻¹ (Δl − Δl(h)),  J = ∂l/∂h at rest      forward kinematics, a fixed number of times
+//! ```
+
+use crate::attitude::Series;
+use crate::real::Real;
+
+/// The legs of a platform.
+#[derive(Debug, Clone, Copy)]
+pub struct Legs<'a, T> {
+    /// Leg vectors at rest r₀ = P₀ + P_i − B_i (AI.2), base frame, m.
+    pub rest_leg: [[T; 3]; 6],
+    /// Platform joints P_i (2), (AI.4), platform frame, m.
+    pub platform_joint: [[T; 3]; 6],
+    /// Leg lengths at rest l₀ = |r₀|, m.
+    pub rest_length: [T; 6],
+    /// Sine and versine over the angles that occur.
+    pub series: Series<'a, T>,
+    /// Newton steps from s / (2 l₀) to the root.
+    pub newton_steps: usize,
+}
+
+impl<T: Real> Legs<'_, T> {
+    /// Δl_i = |P₀ + t + R P_i − B_i| − l₀ of each leg, m, positive when it gets longer.
+    ///
+    /// `pose` is [x y z θx θy θz] from rest: translation t of P_C in {B} (m) and rotation R = Rz(θz) Ry(θy) Rx(θx) about
+    /// fixed axes (AI.1) (rad), within the bounds that series and steps are made for.
+    #[inline]
+    #[must_use]
+    pub fn displacements(&self, pose: &[T; 6]) -> [T; 6] {
+        let [x, y, z, tilt_x, tilt_y, tilt_z] = *pose;
+        let turn = self.series.attitude([tilt_x, tilt_y, tilt_z]).rotation_less_identity();
+        let mut displacements = [T::ZERO; 6];
+        for (leg, displacement) in displacements.iter_mut().enumerate() {
+            let p = self.platform_joint[leg];
+            let moved = [
+                x + turn[0][0] * p[0] + turn[0][1] * p[1] + turn[0][2] * p[2],
+                y + turn[1][0] * p[0] + turn[1][1] * p[1] + turn[1][2] * p[2],
+                z + turn[2][0] * p[0] + turn[2][1] * p[1] + turn[2][2] * p[2],
+            ];
+            *displacement = self.extension(leg, &moved);
+        }
+        displacements
+    }
+
+    /// |r₀ + d| − l₀ for a joint that moved by d: the root Δl of Δl² + 2 l₀ Δl = s with s = (2 r₀ + d)·d.
+    #[inline]
+    fn extension(&self, leg: usize, moved: &[T; 3]) -> T {
+        let (rest, length) = (&self.rest_leg[leg], self.rest_length[leg]);
+        let two = T::ONE + T::ONE;
+        let s = (two * rest[0] + moved[0]) * moved[0]
+            + (two * rest[1] + moved[1]) * moved[1]
+            + (two * rest[2] + moved[2]) * moved[2];
+        let mut root = s / (two * length);
+        for _ in 0..self.newton_steps {
+            root = (s + root * root) / (two * (length + root));
+        }
+        root
+    }
+
+    /// The pose at which the legs have these displacements (m): forward kinematics.
+    ///
+    /// `inverse` is J⁻¹ of the legs at rest, J = ∂l/∂h; each of the `corrections` brings the pose nearer by the factor that
+    /// J changes by within the workspace.
+    #[inline]
+    #[must_use]
+    pub fn pose(&self, inverse: &[[T; 6]; 6], corrections: usize, displacements: &[T; 6]) -> [T; 6] {
+        let mut pose = times(inverse, displacements);
+        for _ in 0..corrections {
+            let reached = self.displacements(&pose);
+            let mut missing = [T::ZERO; 6];
+            for leg in 0..6 {
+                missing[leg] = displacements[leg] - reached[leg];
+            }
+            let correction = times(inverse, &missing);
+            for axis in 0..6 {
+                pose[axis] = pose[axis] + correction[axis];
+            }
+        }
+        pose
+    }
+}
+
+/// M x, each row summed from the left.
+#[inline]
+pub fn times<T: Real>(matrix: &[[T; 6]; 6], x: &[T; 6]) -> [T; 6] {
+    let mut product = [T::ZERO; 6];
+    for row in 0..6 {
+        let m = &matrix[row];
+        product[row] = m[0] * x[0] + m[1] * x[1] + m[2] * x[2] + m[3] * x[3] + m[4] * x[4] + m[5] * x[5];
+    }
+    product
+}

@@ -1,0 +1,123 @@
+//! Which parts of the control law are at work.
+
+use crate::adaptation::Law;
+
+/// Control mode of section 4.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ControlMode {
+    /// P: position tracking (7) on a linear leg, u = q/ρ̂; no hysteresis model, no adaptation.
+    P,
+    /// F: hysteresis feed-forward (Fig. 5) on the measured leg displacements; no position feedback.
+    F(Law),
+    /// P/F: both, with the feed-forward under the position feedback.
+    PF(Law),
+}
+
+impl ControlMode {
+    /// Whether (7) feeds the pose error back.
+    #[inline]
+    #[must_use]
+    pub const fn feeds_back(self) -> bool {
+        !matches!(self, Self::F(_))
+    }
+
+    /// Whether the legs go through the inverse Preisach model.
+    #[inline]
+    #[must_use]
+    pub const fn inverts(self) -> bool {
+        !matches!(self, Self::P)
+    }
+
+    /// Run-to-run law; `Invhys` where nothing adapts.
+    #[inline]
+    #[must_use]
+    pub const fn law(self) -> Law {
+        match self {
+            Self::P => Law::Invhys,
+            Self::F(law) | Self::PF(law) => law,
+        }
+    }
+
+    /// 0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same.
+    #[inline]
+    #[must_use]
+    pub const fn word(self) -> u64 {
+        let law = match self.law() {
+            Law::Invhys => 0,
+            Law::Ewma => 1,
+            Law::Pcc => 2,
+        };
+        match self {
+            Self::P => 0,
+            Self::F(_) => 1 + law,
+            Self::PF(_) => 4 + law,
+        }
+    }
+
+    /// The inverse of [`ControlMode::word`]; none for any other number.
+    #[must_use]
+    pub const fn from_word(word: u64) -> Option<Self> {
+        Some(match word {
+            0 => Self::P,
+            1 => Self::F(Law::Invhys),
+            2 => Self::F(Law::Ewma),
+            3 => Self::F(Law::Pcc),
+            4 => Self::PF(Law::Invhys),
+            5 => Self::PF(Law::Ewma),
+            6 => Self::PF(Law::Pcc),
+            _ => return None,
+        })
+    }
+}
+
+/// Where the force between platform and work piece in (7) comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interaction {
+    /// There is none, or it is left to the feedback.
+    Neglected,
+    /// K_e (h_d − h_e) with the stiffness in the settings.
+    Modelled,
+    /// The force/torque sensor.
+    Measured,
+}
+
+impl Interaction {
+    /// 0 neglected, 1 modelled, 2 measured.
+    #[inline]
+    #[must_use]
+    pub const fn word(self) -> u64 {
+        match self {
+            Self::Neglected => 0,
+            Self::Modelled => 1,
+            Self::Measured => 2,
+        }
+    }
+
+    /// The inverse of [`Interaction::word`]; none for any other number.
+    #[must_use]
+    pub const fn from_word(word: u64) -> Option<Self> {
+        Some(match word {
+            0 => Self::Neglected,
+            1 => Self::Modelled,
+            2 => Self::Measured,
+            _ => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_read_back_and_others_are_refused() {
+        for word in 0..7 {
+            assert_eq!(ControlMode::from_word(word).map(ControlMode::word), Some(word));
+        }
+        assert_eq!(ControlMode::from_word(7), None);
+        for word in 0..3 {
+            assert_eq!(Interaction::from_word(word).map(Interaction::word), Some(word));
+        }
+        assert_eq!(Interaction::from_word(u64::MAX), None);
+    }
+}

@@ -1,0 +1,211 @@
+//! Pose from six gauges that see the platform.
+//!
+//! Gauge k measures along a line fixed in the base, of direction n (unit, {B}), to a plane fixed to the platform; at rest the line
+//! pierces the plane at c ({P}) and the reading is zero. With m the plane's normal ({P}), scaled so that m·n = 1:
+//!
+//! ```text
+//! y = [(R m)·t − ((R − I) m)·c] / [1 + n·(R − I) m]                       reading of a pose, in difference form
+//! ```
+//!
+//! The other way round, take u = D Rᵀt and the turn as R = I + (ψ× + ½ ψ×²)/D with D = 1 + ¼|ψ|² (Cayley; |ψ| = 2 tan(φ/2) for a
+//! turn by φ). The equations of the six gauges are then polynomials of second degree in ψ, and linear in u:
+//!
+//! ```text
+//! m·u + (c × m)·ψ = y (1 − ¼|ψ|²) + y [(m × n)·ψ + ½ (m·ψ)(n·ψ)] + ½ [(m·ψ)(c·ψ) − (m·c)|ψ|²]
+//! ```
+//!
+//! The left side is J [u; ψ] with the Jacobian J of the gauges at rest. J⁻¹ of the readings is the first guess; a pass puts ψ
+//! into the right side, which is small by the angle. All but the last pass need ψ alone. No sine or cosine is needed; three
+//! divisions and three short series turn ψ into θ.
+//!
+//! A gauge along an axis of the base, or normal to its plane, has zeros among its constants. Their terms are left out, so that with
+//! the constants known to the compiler they cost nothing: an axis-aligned layout takes less than half of what a skew one does.
+
+use crate::attitude::{Series, horner, odd_series};
+use crate::real::Real;
+
+/// Six gauges. Every constant belongs to the rest pose.
+#[derive(Debug, Clone, Copy)]
+pub struct Gauges<'a, T> {
+    /// n of each gauge, unit, {B}.
+    pub direction: [[T; 3]; 6],
+    /// m of each gauge: the plane's normal over its product with n, {P}.
+    pub normal: [[T; 3]; 6],
+    /// m × n of each gauge; zero where the line is normal to its plane.
+    pub skew: [[T; 3]; 6],
+    /// c of each gauge: where the line pierces the plane at rest, {P}, m.
+    pub pierced: [[T; 3]; 6],
+    /// J⁻¹: pose coordinates (rows) per reading (columns), m/m and rad/m.
+    pub inverse: [[T; 6]; 6],
+    /// J⁻¹ of ½ [(m·ψ)(c·ψ) − (m·c)|ψ|²]: pose coordinates (rows) per ψx², ψy², ψz², ψxψy, ψxψz, ψyψz (columns).
+    pub curvature: [[T; 6]; 6],
+    /// Passes after the first guess, at least 1.
+    pub passes: usize,
+    /// Coefficients of asin x / x in x² after the leading 1.
+    pub arc_sine: &'a [T],
+    /// Coefficients of atan x / x in x² after the leading 1.
+    pub arc_tangent: &'a [T],
+}
+
+impl<T: Real> Gauges<'_, T> {
+    /// Readings of a pose [x y z θx θy θz] from rest (m, rad), m. `series` must hold for its angles.
+    #[inline]
+    #[must_use]
+    pub fn readings(&self, series: &Series<'_, T>, pose: &[T; 6]) -> [T; 6] {
+        let [x, y, z, tilt_x, tilt_y, tilt_z] = *pose;
+        let turn = series.attitude([tilt_x, tilt_y, tilt_z]).rotation_less_identity();
+        each(|k| {
+            let normal = &self.normal[k];
+            let turned = [dot3(&turn[0], normal), dot3(&turn[1], normal), dot3(&turn[2], normal)];
+            let moved = (normal[0] + turned[0]) * x + (normal[1] + turned[1]) * y + (normal[2] + turned[2]) * z;
+            (moved - dot3(&turned, &self.pierced[k])) / (T::ONE + dot3(&turned, &self.direction[k]))
+        })
+    }
+
+    /// The pose [x y z θx θy θz] from rest (m, rad) at which the gauges read `readings` (m).
+    ///
+    /// Exact to what the passes were counted for over the declared workspace; finite for every reading that the gauges can give.
+    #[inline]
+    #[must_use]
+    pub fn pose(&self, readings: &[T; 6]) -> [T; 6] {
+        let guess = each(|row| dot6(&self.inverse[row], readings));
+        let mut psi = [guess[3], guess[4], guess[5]];
+        for _ in 1..self.passes {
+            let terms = self.terms(readings, &psi);
+            psi = [self.row(3, &guess, &terms), self.row(4, &guess, &terms), self.row(5, &guess, &terms)];
+        }
+        let terms = self.terms(readings, &psi);
+        let [x, y, z, a, b, c] = each(|row| self.row(row, &guess, &terms));
+        self.coordinates([x, y, z], [a, b, c])
+    }
+
+    /// The terms of second degree and above, for the turn ψ.
+    #[inline]
+    fn terms(&self, readings: &[T; 6], psi: &[T; 3]) -> Terms<T> {
+        let [a, b, c] = *psi;
+        let products = [a * a, b * b, c * c, a * b, a * c, b * c];
+        let quarter = T::HALF * T::HALF;
+        Terms {
+            products,
+            scale: T::ONE - quarter * (products[0] + products[1] + products[2]),
+            oblique: each(|k| {
+                let along = T::HALF * dot3(&self.normal[k], psi) * dot3(&self.direction[k], psi);
+                readings[k] * plus3(along, &self.skew[k], psi)
+            }),
+        }
+    }
+
+    /// One coordinate of [u; ψ].
+    #[inline]
+    fn row(&self, row: usize, guess: &[T; 6], terms: &Terms<T>) -> T {
+        let curved = plus6(guess[row] * terms.scale, &self.curvature[row], &terms.products);
+        plus6(curved, &self.inverse[row], &terms.oblique)
+    }
+
+    /// [u; ψ] to [t; θ].
+    #[inline]
+    fn coordinates(&self, u: [T; 3], psi: [T; 3]) -> [T; 6] {
+        let [a, b, c] = psi;
+        let quarter = T::HALF * T::HALF;
+        let (aa, bb, cc) = (quarter * (a * a), quarter * (b * b), quarter * (c * c));
+        let inverse = T::ONE / (T::ONE + (aa + bb + cc));
+        // t = R u/D.
+        let moved = [u[0] * inverse, u[1] * inverse, u[2] * inverse];
+        let once = cross(&psi, &moved);
+        let twice = cross(&psi, &once);
+        let turned = |k: usize| moved[k] + inverse * (once[k] + T::HALF * twice[k]);
+        // tan θx = r21/r22, sin θy = −r20, tan θz = r10/r00, each times D.
+        let tangent_x = (a + T::HALF * (b * c)) / (T::ONE + (cc - aa - bb));
+        let sine_y = (b - T::HALF * (a * c)) * inverse;
+        let tangent_z = (c + T::HALF * (a * b)) / (T::ONE + (aa - bb - cc));
+        [
+            turned(0),
+            turned(1),
+            turned(2),
+            odd_series(self.arc_tangent, tangent_x),
+            odd_series(self.arc_sine, sine_y),
+            odd_series(self.arc_tangent, tangent_z),
+        ]
+    }
+}
+
+/// The right side of the equations but for the readings themselves.
+struct Terms<T> {
+    /// ψx², ψy², ψz², ψxψy, ψxψz, ψyψz.
+    products: [T; 6],
+    /// 1 − ¼|ψ|².
+    scale: T,
+    /// y [(m × n)·ψ + ½ (m·ψ)(n·ψ)] of each gauge, m.
+    oblique: [T; 6],
+}
+
+/// Raw gauge words to readings: a polynomial of the raw value for each gauge, lowest power first.
+#[derive(Debug, Clone, Copy)]
+pub struct Calibration<T, const N: usize> {
+    /// m, m per unit, m per unit², …
+    pub coefficients: [[T; N]; 6],
+}
+
+impl<T: Real, const N: usize> Calibration<T, N> {
+    /// Readings, m.
+    #[inline]
+    #[must_use]
+    pub fn readings(&self, raw: &[T; 6]) -> [T; 6] {
+        each(|k| match horner(&self.coefficients[k], raw[k]) {
+            Some(reading) => reading,
+            None => T::ZERO,
+        })
+    }
+}
+
+/// Gauges whose raw value is not finite or not within its limits: bit k for gauge k.
+#[inline]
+#[must_use]
+pub fn faults<T: Real>(raw: &[T; 6], limits: &[[T; 2]; 6]) -> u32 {
+    let mut bits = 0;
+    for (k, (value, [low, high])) in raw.iter().zip(limits).enumerate() {
+        // Written so that a NaN is a fault.
+        let good = *value >= *low && *value <= *high;
+        bits |= u32::from(!good) << k;
+    }
+    bits
+}
+
+/// [f(0), …, f(5)], spelled out so that constants at a known index are known.
+#[inline(always)]
+fn each<T>(f: impl Fn(usize) -> T) -> [T; 6] {
+    [f(0), f(1), f(2), f(3), f(4), f(5)]
+}
+
+/// sum + constant·x; a constant zero has no term.
+#[inline(always)]
+fn plus<T: Real>(sum: T, constant: T, x: T) -> T {
+    if constant == T::ZERO { sum } else { sum + constant * x }
+}
+
+#[inline(always)]
+fn plus3<T: Real>(sum: T, c: &[T; 3], x: &[T; 3]) -> T {
+    plus(plus(plus(sum, c[0], x[0]), c[1], x[1]), c[2], x[2])
+}
+
+#[inline(always)]
+fn plus6<T: Real>(sum: T, c: &[T; 6], x: &[T; 6]) -> T {
+    let half = plus(plus(plus(sum, c[0], x[0]), c[1], x[1]), c[2], x[2]);
+    plus(plus(plus(half, c[3], x[3]), c[4], x[4]), c[5], x[5])
+}
+
+/// c·x from the left; −0 is what a sum begins with that adds nothing to its first term.
+#[inline(always)]
+fn dot3<T: Real>(c: &[T; 3], x: &[T; 3]) -> T {
+    plus3(-T::ZERO, c, x)
+}
+
+#[inline(always)]
+fn dot6<T: Real>(c: &[T; 6], x: &[T; 6]) -> T {
+    plus6(-T::ZERO, c, x)
+}
+
+#[inline(always)]
+fn cross<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

@@ -1,0 +1,162 @@
+//! Set-points: where the platform is to be at the end of the coming interval, and how it is to move there.
+//!
+//! | part | what |
+//! |---|---|
+//! | [`Generator`] | bias, hold, stream, move, trajectory; what is refused, and how a motion ends early |
+//! | [`Profile`] | jerk-limited motion from rest to rest |
+//! | [`Stop`] | to standstill from any motion |
+//! | [`Trajectory`] | prepared motions: segments of polynomial and sinusoid, tables with cubic splines |
+//! | [`Frames`] | work and tool coordinates of the user to coordinates of the platform |
+//!
+//! Coordinates h = [x y z θx θy θz] from rest: P_C in the base frame (m) and the angles of R = Rz Ry Rx (rad). Rates and
+//! accelerations are the time derivatives of these six numbers. They are analytic piece by piece: a difference would
+//! put an impulse into the force feed-forward wherever a path has a corner.
+
+mod frames;
+mod generator;
+mod profile;
+mod stop;
+mod trajectory;
+
+use crate::digest::Digest;
+use crate::real::Real;
+
+pub use frames::{Frames, Parallel, Tool, Work};
+pub use generator::{BUSY, Generator, REFUSED, STALE};
+pub use profile::{LONGEST, MoveLimits, Profile};
+pub use stop::Stop;
+pub use trajectory::{Axis, Row, Segment, Table, Trajectory};
+
+/// Six coordinates with their first and second time derivatives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Target<T> {
+    /// m and rad.
+    pub pose: [T; 6],
+    /// m/s and rad/s.
+    pub rate: [T; 6],
+    /// m/s² and rad/s².
+    pub acceleration: [T; 6],
+}
+
+impl<T: Real> Default for Target<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Target<T> {
+    /// Standstill at rest.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self::at([T::ZERO; 6])
+    }
+
+    /// Standstill at `pose` (m and rad).
+    #[must_use]
+    pub const fn at(pose: [T; 6]) -> Self {
+        Self { pose, rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] }
+    }
+
+    /// Adds the numbers to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        for numbers in [&self.pose, &self.rate, &self.acceleration] {
+            for number in numbers {
+                digest.real(*number);
+            }
+        }
+    }
+}
+
+/// What the user wants done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CommandKind {
+    /// Stand still.
+    Hold,
+    /// Follow the streamed set-points.
+    Stream,
+    /// Go to the pose of [`Command::target`].
+    Move,
+    /// Play the trajectory [`Command::selector`].
+    Trajectory,
+    /// None of these: refused, and held.
+    Unknown,
+}
+
+impl CommandKind {
+    /// 0 hold, 1 stream, 2 move, 3 trajectory.
+    #[inline]
+    #[must_use]
+    pub const fn from_word(word: u64) -> Self {
+        match word {
+            0 => Self::Hold,
+            1 => Self::Stream,
+            2 => Self::Move,
+            3 => Self::Trajectory,
+            _ => Self::Unknown,
+        }
+    }
+}
+
+/// A command; it holds for as long as it is given.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Command<T> {
+    /// What.
+    pub kind: CommandKind,
+    /// Index of the trajectory.
+    pub selector: u32,
+    /// Counter of streamed set-points: a new value marks a fresh one.
+    pub sequence: u32,
+    /// Streamed set-point at the end of the coming interval, or the pose of a move; in the user's frames.
+    pub target: Target<T>,
+}
+
+/// What the spec fixes about set-points.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan<T: Real, F> {
+    /// T_s, s.
+    pub period: T,
+    /// 1/T_s, 1/s.
+    pub rate: T,
+    /// 1/T_s², 1/s².
+    pub square_rate: T,
+    /// Pose that every set-point is added to, m and rad.
+    pub bias: [T; 6],
+    /// The user's coordinates of that pose.
+    pub home: [T; 6],
+    /// Largest |pose component| given out, the bias included, m and rad.
+    pub bound: [T; 6],
+    /// Limits of bias, moves and stops.
+    pub limits: MoveLimits<T>,
+    /// Largest step of a stream in a tick, m and rad.
+    pub stream_step: [T; 6],
+    /// Largest rate that a stream may state, m/s and rad/s.
+    pub stream_rate: [T; 6],
+    /// Largest acceleration that a stream may state, m/s² and rad/s².
+    pub stream_acceleration: [T; 6],
+    /// Ticks without a fresh set-point after which a stream is stale, ≥ 1.
+    pub stale_ticks: u32,
+    /// The user's frames.
+    pub frames: F,
+    /// Prepared motions by [`Command::selector`].
+    pub trajectories: &'static [Trajectory<T>],
+}
+
+impl<T: Real, F: Frames<T>> Plan<T, F> {
+    /// The user's set-point as one of the platform, if it lies within the workspace and is finite.
+    #[inline]
+    #[must_use]
+    pub fn accepted(&self, user: &Target<T>) -> Option<Target<T>> {
+        let mut target = self.frames.to_platform(user)?;
+        for (value, bias) in target.pose.iter_mut().zip(&self.bias) {
+            *value = *value + *bias;
+        }
+        self.is_inside(&target.pose).then_some(target)
+    }
+
+    /// Every component finite and within the workspace.
+    #[inline]
+    #[must_use]
+    pub fn is_inside(&self, pose: &[T; 6]) -> bool {
+        pose.iter().zip(&self.bound).all(|(value, bound)| value.abs() <= *bound)
+    }
+}

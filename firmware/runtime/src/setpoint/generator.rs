@@ -1,0 +1,373 @@
+//! The state machine of set-points.
+//!
+//! ```text
+//! reset ─► bias ─► hold ─┬─► move ───────────────────────────┬─► hold
+//!                        ├─► move to the start ─► trajectory ─┤
+//!                        └─► stream ◄──────────┐              │
+//!          any motion, on another command ─► stop ────────────┘
+//! ```
+//! * **Bias**: from rest to the bias pose, as a move, before anything else is looked at.
+//! * **Hold**: stands still.
+//! * **Move**: one straight motion of limited speed, acceleration and jerk ([`Profile`]) to the pose of the command,
+//!   latched when it begins. While the command stays, a changed pose is gone to once the move has ended.
+//! * **Trajectory**: first a move to its start, then the trajectory, once; again after another command or selector.
+//! * **Stream**: a fresh set-point is followed at once if it and its derivatives are believed: finite, within the
+//!   workspace, no step beyond the stream's speed. Between fresh ones the last rate is continued, for fewer than
+//!   `stale_ticks` ticks. Then, or at a set-point that is not believed, the platform stops ([`Stop`]); it follows again as
+//!   soon as a fresh one is within a step of where it is.
+//! * **Stop**: any other command during a motion; obeyed when standing. A motion that would leave the workspace after
+//!   all (the frames bend the way) is frozen at its last pose.
+//!
+//! Nothing non-finite and no pose outside the workspace is ever given out or kept, whatever the command. From tick to tick
+//! no axis moves further than speed · T_s in a move, or the stream's speed · T_s in a stream.
+
+use super::profile::Profile;
+use super::stop::Stop;
+use super::trajectory::Cursor;
+use super::{Command, CommandKind, Frames, Plan, Target};
+use crate::digest::Digest;
+use crate::real::Real;
+
+/// Status: a set-point or command is refused and the platform held, for it is not finite, out of the workspace, or a jump.
+pub const REFUSED: u32 = 1 << 16;
+/// Status: the stream is stale and the platform held.
+pub const STALE: u32 = 1 << 17;
+/// Status: bias, move, trajectory or stop under way.
+pub const BUSY: u32 = 1 << 18;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    Reset,
+    Bias,
+    Hold,
+    Stream,
+    Move,
+    Approach(u32),
+    Play(u32),
+    Stop,
+}
+
+/// Set-points of one platform.
+#[derive(Debug, Clone, Copy)]
+pub struct Generator<T> {
+    phase: Phase,
+    /// Where it is in the user's frames; where the bias leads, until it is reached.
+    user: Target<T>,
+    /// What was given out last.
+    target: Target<T>,
+    /// Straight motion under way: start, end, end − start, course, tick.
+    start: [T; 6],
+    goal: [T; 6],
+    way: [T; 6],
+    profile: Profile<T>,
+    tick: i32,
+    stop: Stop<T>,
+    cursor: Cursor,
+    /// Trajectory that was played to its end under the present command.
+    finished: Option<u32>,
+    /// Last counter of the stream, and ticks without a believed set-point under the command to stream.
+    sequence: u32,
+    age: u32,
+}
+
+impl<T: Real> Default for Generator<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Generator<T> {
+    /// At rest, bias not yet approached.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            phase: Phase::Reset,
+            user: Target::new(),
+            target: Target::new(),
+            start: [T::ZERO; 6],
+            goal: [T::ZERO; 6],
+            way: [T::ZERO; 6],
+            profile: Profile::new(),
+            tick: 0,
+            stop: Stop::new(),
+            cursor: Cursor::new(),
+            finished: None,
+            sequence: 0,
+            age: 0,
+        }
+    }
+
+    /// Set-point at the end of the coming interval, from rest and with the bias, and [`REFUSED`], [`STALE`], [`BUSY`].
+    #[inline]
+    pub fn next<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>) -> (Target<T>, u32) {
+        let fresh = command.sequence != self.sequence;
+        self.sequence = command.sequence;
+        let streams = command.kind == CommandKind::Stream;
+        if streams && matches!(self.phase, Phase::Stream | Phase::Hold | Phase::Stop) {
+            return self.stream(plan, command, fresh);
+        }
+        self.age = 0;
+        let status = self.obey(plan, command);
+        self.advance(plan, status)
+    }
+
+    /// One tick under the command to stream.
+    #[inline]
+    fn stream<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>, fresh: bool) -> (Target<T>, u32) {
+        self.finished = None;
+        let mut status = 0;
+        if fresh {
+            if let Some(target) = self.believed(plan, &command.target) {
+                self.phase = Phase::Stream;
+                self.age = 0;
+                self.user = command.target;
+                self.target = target;
+                return (target, 0);
+            }
+            status = REFUSED;
+        }
+        self.age = self.age.saturating_add(1);
+        let stale = self.age >= plan.stale_ticks;
+        if stale {
+            status |= STALE;
+        }
+        if self.phase == Phase::Stream && (fresh || stale) {
+            self.begin_stop(plan);
+        }
+        self.advance(plan, status)
+    }
+
+    /// The streamed set-point for the platform, if it is to be followed from where the platform is.
+    #[inline]
+    fn believed<F: Frames<T>>(&self, plan: &Plan<T, F>, user: &Target<T>) -> Option<Target<T>> {
+        for axis in 0..6 {
+            // A NaN fails every comparison.
+            let good = (user.pose[axis] - self.user.pose[axis]).abs() <= plan.stream_step[axis]
+                && user.rate[axis].abs() <= plan.stream_rate[axis]
+                && user.acceleration[axis].abs() <= plan.stream_acceleration[axis];
+            if !good {
+                return None;
+            }
+        }
+        plan.accepted(user)
+    }
+
+    /// Begins and ends motions as the command wants; returns the status of a refusal.
+    #[inline]
+    fn obey<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>) -> u32 {
+        let played = match command.kind {
+            CommandKind::Trajectory => Some(command.selector),
+            _ => None,
+        };
+        if self.finished != played {
+            self.finished = None;
+        }
+        match self.phase {
+            Phase::Reset => {
+                if !self.begin_bias(plan) {
+                    return REFUSED;
+                }
+            }
+            Phase::Bias | Phase::Stop => {}
+            Phase::Stream => self.begin_stop(plan),
+            Phase::Move if command.kind == CommandKind::Move => {}
+            Phase::Approach(index) | Phase::Play(index) if played == Some(index) => {}
+            Phase::Move | Phase::Approach(_) | Phase::Play(_) => self.begin_stop(plan),
+            Phase::Hold => {}
+        }
+        let accepted = match command.kind {
+            CommandKind::Hold | CommandKind::Stream => true,
+            CommandKind::Unknown => false,
+            CommandKind::Move => self.phase != Phase::Hold || self.begin_move(plan, &command.target.pose, Phase::Move),
+            CommandKind::Trajectory => self.phase != Phase::Hold || self.begin_trajectory(plan, command.selector),
+        };
+        if accepted { 0 } else { REFUSED }
+    }
+
+    /// The bias is a move of the platform itself, for the user's frames may bend the way. Without it nothing moves.
+    #[inline(never)]
+    fn begin_bias<F: Frames<T>>(&mut self, plan: &Plan<T, F>) -> bool {
+        self.user = Target::at(plan.home);
+        match plan.accepted(&self.user) {
+            Some(goal) => self.begin_straight(plan, &[T::ZERO; 6], &goal.pose, Phase::Bias),
+            None => false,
+        }
+    }
+
+    /// Whether the goal is one; begins no motion if it is reached.
+    #[inline(never)]
+    fn begin_move<F: Frames<T>>(&mut self, plan: &Plan<T, F>, goal: &[T; 6], phase: Phase) -> bool {
+        if *goal == self.user.pose {
+            return true;
+        }
+        let from = self.user.pose;
+        plan.accepted(&Target::at(*goal)).is_some() && self.begin_straight(plan, &from, goal, phase)
+    }
+
+    fn begin_straight<F: Frames<T>>(&mut self, plan: &Plan<T, F>, from: &[T; 6], to: &[T; 6], phase: Phase) -> bool {
+        self.start = *from;
+        self.goal = *to;
+        for axis in 0..6 {
+            self.way[axis] = to[axis] - from[axis];
+        }
+        match Profile::plan(&self.way, &plan.limits) {
+            Some(profile) => {
+                self.profile = profile;
+                self.tick = 0;
+                self.phase = phase;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Whether the platform is at, or can go to, the start of a trajectory.
+    fn begin_trajectory<F: Frames<T>>(&mut self, plan: &Plan<T, F>, selector: u32) -> bool {
+        if self.finished == Some(selector) {
+            return true;
+        }
+        let Some(trajectory) = plan.trajectories.get(selector as usize) else {
+            return false;
+        };
+        let start = trajectory.start();
+        if start == self.user.pose {
+            self.phase = Phase::Play(selector);
+            self.cursor = Cursor::new();
+            return true;
+        }
+        self.begin_move(plan, &start, Phase::Approach(selector))
+    }
+
+    fn begin_stop<F: Frames<T>>(&mut self, plan: &Plan<T, F>) {
+        if self.user.rate == [T::ZERO; 6] {
+            self.rest();
+        } else {
+            self.stop = Stop::plan(plan, &self.user);
+            self.phase = Phase::Stop;
+        }
+    }
+
+    /// Stands still where it is.
+    fn rest(&mut self) {
+        self.phase = Phase::Hold;
+        self.user = Target::at(self.user.pose);
+        self.target = Target::at(self.target.pose);
+    }
+
+    /// One tick of the motion under way.
+    #[inline]
+    fn advance<F: Frames<T>>(&mut self, plan: &Plan<T, F>, status: u32) -> (Target<T>, u32) {
+        let busy = status | BUSY;
+        match self.phase {
+            Phase::Hold | Phase::Reset => (self.target, status),
+            Phase::Bias => {
+                let (target, ended) = self.straight(plan);
+                self.target = target;
+                self.arrive(ended);
+                (target, if ended { status } else { busy })
+            }
+            Phase::Stream => {
+                let mut user = Target { acceleration: [T::ZERO; 6], ..self.user };
+                for (value, rate) in user.pose.iter_mut().zip(&user.rate) {
+                    *value = *value + *rate * plan.period;
+                }
+                self.commit(plan, user, false, status, status)
+            }
+            Phase::Move | Phase::Approach(_) => {
+                let (user, ended) = self.straight(plan);
+                self.commit(plan, user, ended, busy, status)
+            }
+            Phase::Stop => {
+                let (user, ended) = self.stop.next(plan);
+                self.commit(plan, user, ended, busy, status)
+            }
+            Phase::Play(index) => {
+                let (user, ended) = match plan.trajectories.get(index as usize) {
+                    Some(trajectory) => trajectory.next(&mut self.cursor),
+                    None => (self.user, true),
+                };
+                if ended {
+                    self.finished = Some(index);
+                }
+                self.commit(plan, user, ended, busy, status)
+            }
+        }
+    }
+
+    /// The straight motion one tick on, and whether it has arrived.
+    #[inline]
+    fn straight<F>(&mut self, plan: &Plan<T, F>) -> (Target<T>, bool) {
+        self.tick += 1;
+        let ended = self.tick >= self.profile.ticks();
+        let progress = self.profile.at(self.tick);
+        let (rate, acceleration) = (progress.rate * plan.rate, progress.acceleration * plan.square_rate);
+        if ended {
+            // Exactly: start + way may miss it by a rounding.
+            return (Target::at(self.goal), true);
+        }
+        let mut target = Target::at(self.start);
+        for axis in 0..6 {
+            let way = self.way[axis];
+            target.pose[axis] = target.pose[axis] + way * progress.place;
+            target.rate[axis] = way * rate;
+            target.acceleration[axis] = way * acceleration;
+        }
+        (target, false)
+    }
+
+    /// Takes the proposed set-point, or freezes where it would leave the workspace.
+    #[inline]
+    fn commit<F: Frames<T>>(
+        &mut self,
+        plan: &Plan<T, F>,
+        user: Target<T>,
+        ended: bool,
+        moving: u32,
+        standing: u32,
+    ) -> (Target<T>, u32) {
+        match plan.accepted(&user) {
+            Some(target) => {
+                self.user = user;
+                self.target = target;
+                self.arrive(ended);
+                (target, if ended { standing } else { moving })
+            }
+            None => {
+                self.rest();
+                (self.target, standing | REFUSED)
+            }
+        }
+    }
+
+    #[inline]
+    fn arrive(&mut self, ended: bool) {
+        if ended {
+            self.phase = Phase::Hold;
+        }
+    }
+
+    /// Adds the state to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        let (phase, index) = match self.phase {
+            Phase::Reset => (0, 0),
+            Phase::Bias => (1, 0),
+            Phase::Hold => (2, 0),
+            Phase::Stream => (3, 0),
+            Phase::Move => (4, 0),
+            Phase::Approach(index) => (5, index),
+            Phase::Play(index) => (6, index),
+            Phase::Stop => (7, 0),
+        };
+        digest.word(phase << 32 | index as u64);
+        self.user.digest(digest);
+        self.target.digest(digest);
+        for number in self.start.iter().chain(&self.goal).chain(&self.way) {
+            digest.real(*number);
+        }
+        digest.word((self.tick as u32 as u64) << 32 | self.profile.ticks() as u32 as u64);
+        self.stop.digest(digest);
+        digest.word((self.cursor.part as u64) << 32 | self.cursor.tick as u32 as u64);
+        digest.word(self.finished.map_or(u64::MAX, u64::from));
+        digest.word((self.sequence as u64) << 32 | self.age as u64);
+    }
+}

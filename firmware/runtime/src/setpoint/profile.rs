@@ -1,0 +1,168 @@
+//! Point to point with limited speed, acceleration and jerk: the S-curve of seven phases, in whole ticks.
+//!
+//! All axes share one course s from 0 to 1, so that they start and end together and the path is straight:
+//! h = h₀ + Δ s(k). With n ticks of jerk, m ≥ n ticks from the start until the acceleration falls again, and L ticks
+//! that the whole way would take at full speed,
+//!
+//! ```text
+//! k:      0      n          m     m+n            L       L+n        L+m    L+m+n
+//! jerk    +j     0          −j     0             −j       0          +j
+//! j = 1/(n m L)     peak acceleration 1/(m L)     peak speed 1/L            (per tick)
+//! ```
+//! The least n, m and L, in this order, that keep every axis within its limits are looked for in integers, without a
+//! root: see [`Profile::plan`].
+
+use crate::real::Real;
+
+/// Longest phase that is looked for, ticks: 2²¹ is 3.5 min at 10 kHz.
+pub const LONGEST: i32 = 1 << BITS;
+const BITS: u32 = 21;
+
+/// Reciprocal limits of one tick, by axis: 1/(V T_s), 1/(A T_s²), 1/(J T_s³), per m or rad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MoveLimits<T> {
+    /// Of speed.
+    pub speed: [T; 6],
+    /// Of acceleration.
+    pub acceleration: [T; 6],
+    /// Of jerk.
+    pub jerk: [T; 6],
+}
+
+/// A course from 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Profile<T> {
+    /// n.
+    jerk_ticks: i32,
+    /// m.
+    rise_ticks: i32,
+    /// L + m + n.
+    ticks: i32,
+    /// j, per tick³.
+    jerk: T,
+    /// Peak acceleration, per tick².
+    acceleration: T,
+    /// Peak speed, per tick.
+    speed: T,
+}
+
+/// Progress at a tick: s, ṡ per tick, s̈ per tick².
+pub(super) struct Progress<T> {
+    pub place: T,
+    pub rate: T,
+    pub acceleration: T,
+}
+
+/// Largest |value · factor|.
+pub(super) fn largest<T: Real>(values: &[T; 6], factors: &[T; 6]) -> T {
+    let mut largest = T::ZERO;
+    for (value, factor) in values.iter().zip(factors) {
+        let product = value.abs() * *factor;
+        if product > largest {
+            largest = product;
+        }
+    }
+    largest
+}
+
+/// The least n in 1..=[`LONGEST`] that is `enough`, which must hold above it too; none if there is none.
+pub(super) fn least<T: Real>(enough: impl Fn(T) -> bool) -> Option<i32> {
+    let mut too_few = 0;
+    for bit in 0..=BITS {
+        let tried = too_few + (LONGEST >> bit);
+        if !enough(T::from_i32(tried)) {
+            too_few = tried;
+        }
+    }
+    (too_few < LONGEST).then_some(too_few + 1)
+}
+
+impl<T: Real> Default for Profile<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Profile<T> {
+    /// No way to go.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { jerk_ticks: 0, rise_ticks: 0, ticks: 0, jerk: T::ZERO, acceleration: T::ZERO, speed: T::ZERO }
+    }
+
+    /// The course for a way of `delta` (m and rad, finite); none if it would take longer than [`LONGEST`].
+    #[must_use]
+    pub fn plan(delta: &[T; 6], limits: &MoveLimits<T>) -> Option<Self> {
+        // Limits of s: speed ≤ 1/v, acceleration ≤ 1/a, jerk ≤ 1/j.
+        let v = largest(delta, &limits.speed);
+        let a = largest(delta, &limits.acceleration);
+        let j = largest(delta, &limits.jerk);
+        // Jerk until it has built up the full acceleration, or the full speed, or a quarter of the time is over.
+        let jerk_ticks: i32 = least(|n: T| n * a >= j || n * n * v >= j || (n * n * n) + (n * n * n) >= j)?;
+        let n = T::from_i32(jerk_ticks);
+        let for_jerk = j / n;
+        let a = if for_jerk > a { for_jerk } else { a };
+        // Then the acceleration is kept until it has built up the full speed, or half the way is done.
+        let rise_ticks: i32 = least(|m: T| m >= n && (m * v >= a || m * (m + n) >= a))?;
+        let m = T::from_i32(rise_ticks);
+        let for_acceleration = a / m;
+        let span = if for_acceleration > v { for_acceleration } else { v };
+        let mut span_ticks = span.truncate();
+        if T::from_i32(span_ticks) < span {
+            span_ticks = span_ticks.saturating_add(1);
+        }
+        let both = jerk_ticks + rise_ticks;
+        if span_ticks < both {
+            span_ticks = both;
+        }
+        if span_ticks > LONGEST {
+            return None;
+        }
+        let speed = T::ONE / T::from_i32(span_ticks);
+        let acceleration = speed / m;
+        Some(Self { jerk_ticks, rise_ticks, ticks: span_ticks + both, jerk: acceleration / n, acceleration, speed })
+    }
+
+    /// Duration.
+    #[must_use]
+    pub fn ticks(&self) -> i32 {
+        self.ticks
+    }
+
+    /// Progress `tick` ticks after the start, 0 to [`Profile::ticks`]. The second half mirrors the first.
+    #[inline]
+    pub(super) fn at(&self, tick: i32) -> Progress<T> {
+        let left = self.ticks - tick;
+        if left < tick {
+            let mirrored = self.first_half(left);
+            Progress { place: T::ONE - mirrored.place, rate: mirrored.rate, acceleration: -mirrored.acceleration }
+        } else {
+            self.first_half(tick)
+        }
+    }
+
+    #[inline]
+    fn first_half(&self, tick: i32) -> Progress<T> {
+        let sixth = T::from_f64(1.0 / 6.0);
+        let both = self.jerk_ticks + self.rise_ticks;
+        if tick <= self.jerk_ticks {
+            let t = T::from_i32(tick);
+            let acceleration = self.jerk * t;
+            Progress { place: acceleration * t * t * sixth, rate: acceleration * t * T::HALF, acceleration }
+        } else if tick <= self.rise_ticks {
+            let (n, t) = (T::from_i32(self.jerk_ticks), T::from_i32(tick - self.jerk_ticks));
+            let early = self.acceleration * n * T::HALF;
+            let place = early * n * (sixth + sixth) + early * t + self.acceleration * t * t * T::HALF;
+            Progress { place, rate: early + self.acceleration * t, acceleration: self.acceleration }
+        } else if tick <= both {
+            // Seen from where full speed is reached, half of `both` behind a start at full speed.
+            let t = T::from_i32(both - tick);
+            let acceleration = self.jerk * t;
+            let place = self.speed * (T::from_i32(both) * T::HALF - t) + acceleration * t * t * sixth;
+            Progress { place, rate: self.speed - acceleration * t * T::HALF, acceleration }
+        } else {
+            let t = T::from_i32(tick) - T::from_i32(both) * T::HALF;
+            Progress { place: self.speed * t, rate: self.speed, acceleration: T::ZERO }
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! To standstill from any motion: pose and rate go on without a step, and the way is inside the workspace.
+//!
+//! Over D ticks the rate falls as v (1 − 3σ² + 2σ³), σ = k/D, and the way is D v/2, in the direction of v on every axis.
+//! The deceleration peaks at 1.5 v/D and its slope at 6 v/D². D is the least that keeps both within the limits of moves,
+//! and is halved while the platform would leave the workspace: walls come before comfort. The acceleration that the motion
+//! had is dropped at once.
+
+use super::profile::{LONGEST, MoveLimits, largest, least};
+use super::{Frames, Plan, Target};
+use crate::digest::Digest;
+use crate::real::Real;
+
+/// Halvings of D that are tried: after them a tick is all that is left.
+const HALVINGS: u32 = 21;
+
+/// A stop under way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stop<T> {
+    /// Where it began, in the user's frames, m and rad.
+    start: [T; 6],
+    /// Rate there, m and rad per tick.
+    rate: [T; 6],
+    /// D.
+    ticks: i32,
+    /// k.
+    tick: i32,
+}
+
+impl<T: Real> Default for Stop<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Stop<T> {
+    /// Nothing to stop.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { start: [T::ZERO; 6], rate: [T::ZERO; 6], ticks: 1, tick: 0 }
+    }
+
+    /// The stop from `user`, which is where the platform is and how it moves, in the user's frames.
+    #[must_use]
+    pub fn plan<F: Frames<T>>(plan: &Plan<T, F>, user: &Target<T>) -> Self {
+        let mut stop = Self { start: user.pose, rate: user.rate, ticks: LONGEST, tick: 0 };
+        for rate in &mut stop.rate {
+            *rate = *rate * plan.period;
+        }
+        let MoveLimits { acceleration, jerk, .. } = &plan.limits;
+        let a = largest(&stop.rate, acceleration) * T::from_f64(1.5);
+        let j = largest(&stop.rate, jerk) * T::from_f64(6.0);
+        if let Some(ticks) = least(|d: T| d >= a && d * d >= j) {
+            stop.ticks = ticks;
+        }
+        for _ in 0..HALVINGS {
+            if stop.ticks == 1 || plan.accepted(&Target::at(stop.end())).is_some() {
+                break;
+            }
+            stop.ticks = (stop.ticks + 1) / 2;
+        }
+        stop
+    }
+
+    /// Where it ends, m and rad.
+    fn end(&self) -> [T; 6] {
+        let half = T::from_i32(self.ticks) * T::HALF;
+        let mut end = self.start;
+        for (end, rate) in end.iter_mut().zip(&self.rate) {
+            *end = *end + *rate * half;
+        }
+        end
+    }
+
+    /// Set-point one tick on, and whether that is standstill.
+    #[inline]
+    pub(super) fn next<F>(&mut self, plan: &Plan<T, F>) -> (Target<T>, bool) {
+        self.tick += 1;
+        if self.tick >= self.ticks {
+            return (Target::at(self.end()), true);
+        }
+        let d = T::from_i32(self.ticks);
+        let s = T::from_i32(self.tick) / d;
+        let (two, three) = (T::from_f64(2.0), T::from_f64(3.0));
+        let square = s * s;
+        let way = d * s * (T::ONE - square + square * s * T::HALF);
+        let rate = (T::ONE - square * (three - two * s)) * plan.rate;
+        let acceleration = -(two * three) * s * (T::ONE - s) / d * plan.square_rate;
+        let mut target = Target::at(self.start);
+        for axis in 0..6 {
+            let v = self.rate[axis];
+            target.pose[axis] = target.pose[axis] + v * way;
+            target.rate[axis] = v * rate;
+            target.acceleration[axis] = v * acceleration;
+        }
+        (target, false)
+    }
+
+    pub(super) fn digest(&self, digest: &mut Digest) {
+        for number in self.start.iter().chain(&self.rate) {
+            digest.real(*number);
+        }
+        digest.word((self.ticks as u32 as u64) << 32 | self.tick as u32 as u64);
+    }
+}

@@ -1,0 +1,82 @@
+//! Rate of the measured pose: backward difference through a first-order low-pass.
+//!
+//! ```text
+//! v_n = (1 − α) v_{n−1} + (α/T) (h_n − h_{n−1}),   α = 1 − exp(−ω_c T)
+//! V(z)/H(z) = (α/T) (1 − z⁻¹) / (1 − (1 − α) z⁻¹)
+//! ```
+//! α makes the low-pass the exact sampled form of 1/(1 + s/ω_c). A ramp gives its slope once the start has died away
+//! (e^{−ω_c t}); a slow sine gives its derivative late by T/2 + (1 − α) T/α ≈ 1/ω_c. White noise of σ on the pose becomes
+//! σ (α/T) √(2/(2 − α)) on the rate.
+
+use crate::digest::Digest;
+use crate::real::Real;
+
+/// The filter of one controller: constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RateFilter<T> {
+    /// 1 − α = exp(−ω_c T), in [0, 1).
+    pub keep: T,
+    /// α/T, 1/s.
+    pub gain: T,
+}
+
+/// Rates of six coordinates: what is remembered. Zero at reset.
+#[derive(Debug, Clone, Copy)]
+pub struct Rate<T> {
+    /// Last pose, m and rad.
+    previous: [T; 6],
+    /// Last rate, per s.
+    value: [T; 6],
+    /// There is a last pose to take a difference from.
+    primed: bool,
+}
+
+impl<T: Real> Default for Rate<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Rate<T> {
+    /// At rest, without a last pose.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { previous: [T::ZERO; 6], value: [T::ZERO; 6], primed: false }
+    }
+
+    /// The estimate, m/s and rad/s (rates of the three angles, not angular velocity).
+    #[inline]
+    #[must_use]
+    pub fn value(&self) -> &[T; 6] {
+        &self.value
+    }
+
+    /// A new pose (finite), one period after the last call. The first one, and the first after [`Rate::coast`], only gives the next
+    /// one something to differ from: a jump over a gap is not a rate.
+    #[inline]
+    pub fn update(&mut self, filter: &RateFilter<T>, pose: &[T; 6]) {
+        for ((value, previous), present) in self.value.iter_mut().zip(&mut self.previous).zip(pose) {
+            let step = if self.primed { *present - *previous } else { T::ZERO };
+            *value = filter.keep * *value + filter.gain * step;
+            *previous = *present;
+        }
+        self.primed = true;
+    }
+
+    /// A period without a pose: the estimate dies away as the low-pass does.
+    #[inline]
+    pub fn coast(&mut self, filter: &RateFilter<T>) {
+        for value in &mut self.value {
+            *value = filter.keep * *value;
+        }
+        self.primed = false;
+    }
+
+    /// Adds what is remembered to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        for value in self.previous.iter().chain(&self.value) {
+            digest.real(*value);
+        }
+        digest.word(u64::from(self.primed));
+    }
+}

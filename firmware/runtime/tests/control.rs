@@ -1,0 +1,163 @@
+//! Kernels of the control law in task space: modal notch, integral, bumpless transfer, adaptation by innovations.
+
+use core::f64::consts::TAU;
+
+use specgen_runtime::feedback::winds_up;
+use specgen_runtime::{ControlMode, Estimate, Integral, Law, NotchState, Section, Transfer};
+
+const UNIT: [[f64; 6]; 6] = {
+    let mut unit = [[0.0; 6]; 6];
+    let mut k = 0;
+    while k < 6 {
+        unit[k][k] = 1.0;
+        k += 1;
+    }
+    unit
+};
+
+/// The notch of a mode at `frequency` (Hz) by the bilinear transformation with prewarping, sampled at 10 kHz.
+fn section(frequency: f64, damping: f64, notch_damping: f64) -> Section<f64> {
+    let k = (TAU * frequency / 2.0 / 10_000.0).tan();
+    let a0 = 1.0 + 2.0 * notch_damping * k + k * k;
+    Section {
+        b: [(1.0 + 2.0 * damping * k + k * k) / a0, 2.0 * (k * k - 1.0) / a0, (1.0 - 2.0 * damping * k + k * k) / a0],
+        a: [2.0 * (k * k - 1.0) / a0, (1.0 - 2.0 * notch_damping * k + k * k) / a0],
+    }
+}
+
+const MODES: [f64; 6] = [361.0, 361.5, 428.0, 428.5, 615.0, 795.0];
+
+/// Amplitude and phase of the settled answer of every mode to a sine of `frequency`.
+fn answer(sections: &[Section<f64>; 6], frequency: f64) -> [(f64, f64); 6] {
+    let mut notch = NotchState::new();
+    let step = TAU * frequency / 10_000.0;
+    let (settle, periods) = (4000, 20);
+    let count = (10_000.0 / frequency * f64::from(periods)).round() as u32;
+    let mut sums = [(0.0, 0.0); 6];
+    for tick in 0..settle + count {
+        let phase = step * f64::from(tick);
+        let out = notch.filter(sections, &UNIT, &UNIT, &[phase.sin(); 6]);
+        if tick >= settle {
+            for (sum, value) in sums.iter_mut().zip(out) {
+                sum.0 += value * phase.sin();
+                sum.1 += value * phase.cos();
+            }
+        }
+    }
+    sums.map(|(sine, cosine)| {
+        let (re, im) = (2.0 * sine / f64::from(count), 2.0 * cosine / f64::from(count));
+        (re.hypot(im), im.atan2(re))
+    })
+}
+
+/// The analogue notch (s² + 2ζωs + ω²)/(s² + 2ζ_dωs + ω²) at the frequency that the prewarped bilinear map puts there.
+#[test]
+fn the_notch_has_the_response_of_its_formula() {
+    let sections = MODES.map(|mode| section(mode, 0.02, 1.0));
+    for frequency in [1.0, 50.0, 250.0, 500.0, 1000.0] {
+        for ((gain, phase), mode) in answer(&sections, frequency).into_iter().zip(MODES) {
+            let warped = (TAU * frequency / 20_000.0).tan() / (TAU * mode / 20_000.0).tan();
+            let square = 1.0 - warped * warped;
+            let expected = (square.hypot(0.04 * warped)) / (square.hypot(2.0 * warped));
+            let angle = (0.04 * warped).atan2(square) - (2.0 * warped).atan2(square);
+            assert!((gain - expected).abs() < 1e-6, "{mode} Hz at {frequency} Hz: {gain}, {expected}");
+            let turn = (phase - angle) / TAU;
+            assert!((turn - turn.round()).abs() < 1e-6, "{mode} Hz at {frequency} Hz: {phase}, {angle}");
+        }
+    }
+}
+
+#[test]
+fn the_notch_leaves_a_constant_alone_and_takes_the_resonance_out() {
+    let sections = MODES.map(|mode| section(mode, 0.02, 1.0));
+    let mut notch = NotchState::new();
+    let mut out = [0.0; 6];
+    for _ in 0..2000 {
+        out = notch.filter(&sections, &UNIT, &UNIT, &[1e-6; 6]);
+    }
+    assert!(out.iter().all(|value| (value - 1e-6).abs() < 1e-15), "{out:?}");
+    let sections = [section(400.0, 0.02, 1.0); 6];
+    for (gain, _) in answer(&sections, 400.0) {
+        assert!((gain - 0.02).abs() < 1e-4, "{gain}");
+    }
+}
+
+#[test]
+fn the_notch_works_in_the_coordinates_it_is_given() {
+    // Two coupled axes: V mixes 0 and 1.
+    let mut into = UNIT;
+    into[0][1] = 0.5;
+    let mut from = UNIT;
+    from[0][1] = -0.5;
+    let sections = MODES.map(|mode| section(mode, 0.02, 1.0));
+    let (mut mixed, mut plain) = (NotchState::new(), NotchState::new());
+    for tick in 0..200 {
+        let modal: [f64; 6] = core::array::from_fn(|k| (f64::from(tick) * 0.1 * (k + 1) as f64).sin());
+        let mut pose = modal;
+        pose[0] += 0.5 * modal[1];
+        let expected = plain.filter(&sections, &UNIT, &UNIT, &modal);
+        let found = mixed.filter(&sections, &from, &into, &pose);
+        assert!((found[0] - expected[0] - 0.5 * expected[1]).abs() < 1e-14);
+        assert!((found[5] - expected[5]).abs() < 1e-14);
+    }
+}
+
+#[test]
+fn without_a_filter_innovations_and_model_errors_give_the_same_estimates() {
+    for law in [Law::Ewma, Law::Pcc] {
+        let (mut by_error, mut by_innovation) = (Estimate::<f64>::new(), Estimate::new());
+        for run in 0..1000 {
+            let model_error = 1e-6 * (f64::from(run) * 0.013).sin() + 3e-9 * f64::from(run);
+            let innovation = model_error - by_innovation.correction();
+            by_error.update(law, 0.252, 0.011, model_error);
+            by_innovation.correct(law, 0.252, 0.011, innovation);
+            assert!((by_error.level - by_innovation.level).abs() < 1e-17, "{law:?}");
+            assert!((by_error.drift - by_innovation.drift).abs() < 1e-17, "{law:?}");
+        }
+    }
+    let mut estimate = Estimate { level: 1.0, drift: 1.0 };
+    estimate.correct(Law::Invhys, 0.5, 0.5, 1.0);
+    assert_eq!((estimate.level, estimate.drift), (0.0, 0.0));
+}
+
+#[test]
+fn the_integral_grows_by_gain_times_error_and_is_held_only_outward() {
+    let mut integral = Integral::<f64>::new();
+    let growth = Integral::growth(&[2.0; 6], 1e-4, &[1.0, -1.0, 0.0, 4.0, 0.5, -2.0]);
+    integral.grow(&growth);
+    integral.grow(&growth);
+    assert_eq!(integral.force, [4e-4, -4e-4, 0.0, 1.6e-3, 2e-4, -8e-4]);
+
+    let mut excess = [0.0; 6];
+    assert!(!winds_up(&excess, &[1.0; 6]));
+    excess[2] = 1e-9;
+    assert!(winds_up(&excess, &[1.0; 6]));
+    assert!(!winds_up(&excess, &[-1.0; 6]));
+    assert!(!winds_up(&excess, &[1.0, 1.0, 0.0, 1.0, 1.0, 1.0]));
+    excess[2] = -1e-9;
+    assert!(winds_up(&excess, &[-1.0; 6]));
+}
+
+#[test]
+fn a_transfer_fades_to_nothing_without_subnormal_numbers() {
+    let mut transfer = Transfer::<f32>::new();
+    transfer.offset = [1e-6, -1e-6, 1e-30, 0.0, 5e-7, -3e-8];
+    let mut ticks = 0;
+    while transfer.offset != [0.0; 6] {
+        transfer.fade(0.99, 1e-15);
+        assert!(transfer.offset.iter().all(|offset| *offset == 0.0 || offset.is_normal()));
+        ticks += 1;
+        assert!(ticks < 3000);
+    }
+    // ln(1e-9)/ln(0.99)
+    assert!((2000..2100).contains(&ticks), "{ticks}");
+}
+
+#[test]
+fn modes_say_what_is_at_work() {
+    assert!(ControlMode::P.feeds_back() && !ControlMode::P.inverts());
+    assert!(!ControlMode::F(Law::Ewma).feeds_back() && ControlMode::F(Law::Ewma).inverts());
+    assert!(ControlMode::PF(Law::Pcc).feeds_back() && ControlMode::PF(Law::Pcc).inverts());
+    assert_eq!(ControlMode::PF(Law::Pcc).law(), Law::Pcc);
+    assert_eq!(ControlMode::P.law(), Law::Invhys);
+}

@@ -1,0 +1,58 @@
+//! The piezo stacks of a leg: from their voltage to the displacement of a free, massless leg.
+
+use super::LegParameters;
+use super::creep::CreepBank;
+use super::filter::Lag;
+use super::play::PlayBank;
+
+/// Plays, creep and asymmetry of a leg: the equations of the reference leg between amplifier and structure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stack {
+    rate: Lag,
+    plays: PlayBank,
+    creep: CreepBank,
+    asymmetry: f64,
+    drive_max: f64,
+    gain: f64,
+    step: f64,
+}
+
+impl Stack {
+    /// Stacks as built, from checked parameters.
+    #[must_use]
+    pub fn new(parameters: &LegParameters) -> Self {
+        let p = parameters;
+        Self {
+            rate: Lag::new(p.tau_rate_s),
+            plays: PlayBank::new(&p.play_thresholds_v, &p.play_weights, p.kappa, p.v0_v_per_s),
+            creep: CreepBank::new(&p.creep_rates_per_s, &p.creep_weights, &p.creep_thresholds_v),
+            asymmetry: p.s2,
+            drive_max: p.u_max,
+            gain: p.gain_um_per_v,
+            step: 0.0,
+        }
+    }
+
+    /// As built: never driven.
+    pub fn reset(&mut self) {
+        self.rate.reset();
+        self.plays.reset();
+        self.creep.reset();
+    }
+
+    /// Fixes the length of the steps that follow, s.
+    pub fn set_step(&mut self, step: f64) {
+        self.step = step;
+        self.rate.set_step(step);
+        self.creep.set_step(step);
+    }
+
+    /// Moves the voltage from `before` to `v` (V) within one step; returns the free displacement at its end, µm.
+    pub fn advance(&mut self, before: f64, v: f64) -> f64 {
+        let rate = self.rate.advance((v - before) / self.step);
+        let x = self.plays.advance(v, rate);
+        let c = self.creep.advance(v);
+        let bent = x + self.asymmetry * x * (1.0 - x / self.drive_max);
+        self.gain * (bent + c)
+    }
+}

@@ -1,0 +1,40 @@
+//! The platform as a plant: six hysteretic legs under a rigid body, seen by six gauges, pressing on a work part.
+//!
+//! ```text
+//! voltages ─► amplifier (lag, current) ─► stack (plays, creep, asymmetry) ─► d_i ┐ ×6
+//!                                                  axial stiffness and damping ──┴─► rigid platform ◄─ work part
+//!                                                       gauges ◄─ pose ─────────────────┘      └─► force sensor
+//! ```
+//! Nothing here is of the controller's own making: dynamics from the motion of the bodies, leg lengths and gauge readings
+//! by plain geometry, hysteresis that no Everett table holds. SI units; angles are those of R = Rz Ry Rx.
+
+mod amplifier;
+mod contact;
+mod gauge;
+mod geometry;
+mod inertia;
+mod linear;
+mod machine;
+mod parameters;
+pub mod rig;
+pub mod scenario;
+mod sensor;
+mod specimen;
+mod structure;
+pub mod table;
+
+pub use amplifier::Amplifier;
+pub use contact::{Contact, WorkPart, Wrench};
+pub use gauge::{GaugeSignal, Probe};
+pub use geometry::{Geometry, angles, rate_matrix, rotation};
+pub use inertia::Masses;
+#[cfg(any(test, feature = "oracle"))]
+pub(crate) use linear::exponential;
+pub use linear::{Matrix3, Matrix6, Six, Three};
+pub use machine::Machine;
+pub use parameters::{PlatformParameters, REFERENCE_PLATFORM};
+pub use rig::PlatformRig;
+pub use scenario::PlatformScenario;
+pub use sensor::ForceSensor;
+pub use specimen::Specimen;
+pub use structure::{Structure, StructureParameters};

@@ -1,0 +1,170 @@
+//! The whole machine: six amplifiers and stacks that drive the structure.
+
+use super::amplifier::Amplifier;
+use super::contact::{WorkPart, Wrench};
+use super::linear::Six;
+use super::specimen::Specimen;
+use super::structure::Structure;
+use crate::closed_loop::Preparation;
+use crate::plant::{Stack, steps_within};
+
+/// Amplifier and stacks of one leg.
+#[derive(Debug, Clone, PartialEq)]
+struct Actuator {
+    amplifier: Amplifier,
+    stack: Stack,
+    /// Free displacement now and at rest, µm.
+    displacement: f64,
+    rest: f64,
+    /// V.
+    peak: f64,
+}
+
+impl Actuator {
+    fn set_step(&mut self, step: f64) {
+        self.amplifier.set_step(step);
+        self.stack.set_step(step);
+    }
+
+    /// Holds `voltage` for one step.
+    fn advance(&mut self, voltage: f64) {
+        let before = self.amplifier.voltage();
+        let after = self.amplifier.advance(voltage);
+        self.displacement = self.stack.advance(before, after);
+    }
+
+    /// Free displacement from rest, m.
+    fn from_rest(&self) -> f64 {
+        (self.displacement - self.rest) * 1e-6
+    }
+}
+
+/// A platform that takes six held voltages and moves.
+///
+/// Poses count from rest: where it stands with the legs at 0 V when [`Machine::prepare`] ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Machine {
+    actuators: [Actuator; 6],
+    structure: Structure,
+    longest_step: f64,
+    step: f64,
+}
+
+impl Machine {
+    /// A machine as built: legs never driven, at rest.
+    #[must_use]
+    pub fn new(specimen: &Specimen) -> Self {
+        let nominal = &specimen.nominal;
+        let slew = nominal.amplifier_current_a / nominal.stack_capacitance_f;
+        let actuators = specimen.legs.each_ref().map(|leg| Actuator {
+            amplifier: Amplifier::new(leg.tau_amp_s, slew),
+            stack: Stack::new(leg),
+            displacement: 0.0,
+            rest: 0.0,
+            peak: leg.u_max,
+        });
+        let structure = Structure::new(specimen.structure(), nominal.step_s);
+        Self { actuators, structure, longest_step: nominal.step_s, step: 0.0 }
+    }
+
+    /// Sets the longest integration step, s (> 0).
+    pub fn set_longest_step(&mut self, step: f64) {
+        self.longest_step = step;
+    }
+
+    /// Pre-cycle of the free legs, all at once, and rest; then the platform stands still at the pose from which poses
+    /// count. The peak is held to each leg's own full drive.
+    ///
+    /// Quasi-static for the structure, which follows the legs without error: it is put to rest at the end.
+    pub fn prepare(&mut self, preparation: &Preparation) {
+        let Preparation { peak, rate, settle, update } = *preparation;
+        for actuator in &mut self.actuators {
+            let peak = if peak < actuator.peak { peak } else { actuator.peak };
+            let steps = steps_within(peak / rate, update);
+            actuator.set_step(peak / rate / f64::from(steps));
+            for step in (1..=steps).chain((0..steps).rev()) {
+                actuator.advance(peak * f64::from(step) / f64::from(steps));
+            }
+            if settle > 0.0 {
+                let steps = steps_within(settle, update);
+                actuator.set_step(settle / f64::from(steps));
+                for _ in 0..steps {
+                    actuator.advance(0.0);
+                }
+            }
+            actuator.rest = actuator.displacement;
+        }
+        self.step = 0.0;
+        self.structure.release();
+        self.structure.set_state(&[0.0; 6], &[0.0; 6], &[0.0; 6]);
+    }
+
+    /// Holds six voltages (V, at the amplifier inputs) for `interval` (s, > 0).
+    pub fn hold(&mut self, voltages: &Six, interval: f64) {
+        let steps = steps_within(interval, self.longest_step);
+        let step = interval / f64::from(steps);
+        if step.to_bits() != self.step.to_bits() {
+            self.step = step;
+            self.structure.set_step(step);
+            for actuator in &mut self.actuators {
+                actuator.set_step(step);
+            }
+        }
+        for _ in 0..steps {
+            for (actuator, voltage) in self.actuators.iter_mut().zip(voltages) {
+                actuator.advance(*voltage);
+            }
+            let displacement = self.free_displacements();
+            self.structure.advance(&displacement);
+        }
+    }
+
+    /// h, from rest, m and rad.
+    #[must_use]
+    pub fn pose(&self) -> Six {
+        self.structure.pose()
+    }
+
+    /// ḣ, m/s and rad/s.
+    #[must_use]
+    pub fn rate(&self) -> Six {
+        self.structure.rate()
+    }
+
+    /// d_i: what each leg would have moved without load since rest, m.
+    #[must_use]
+    pub fn free_displacements(&self) -> Six {
+        self.actuators.each_ref().map(Actuator::from_rest)
+    }
+
+    /// Voltages of the stacks, V.
+    #[must_use]
+    pub fn stack_voltages(&self) -> Six {
+        self.actuators.each_ref().map(|actuator| actuator.amplifier.voltage())
+    }
+
+    /// The structure.
+    #[must_use]
+    pub fn structure(&self) -> &Structure {
+        &self.structure
+    }
+
+    /// Makes contact at the present pose, unloaded.
+    pub fn touch(&mut self, part: WorkPart) {
+        self.structure.touch(part);
+    }
+
+    /// Takes the part away.
+    pub fn release(&mut self) {
+        self.structure.release();
+    }
+
+    /// What the part puts on the platform.
+    #[must_use]
+    pub fn wrench(&self) -> Wrench {
+        self.structure.contact().map_or_else(Wrench::default, |contact| contact.wrench(&self.pose()))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,145 @@
+//! The paper's experiments on a simulated platform: Tables 5 to 8 (free motion) and 9 (machining).
+
+use super::contact::WorkPart;
+use super::rig::{Noise, PlatformRig, PlatformRun, RunOptions};
+use super::specimen::Specimen;
+use super::table::{MachiningTable, PoseRow, PoseTable};
+use crate::closed_loop::{Preparation, RunError};
+use crate::controller::{ControllerError, TickController};
+use crate::trajectory::PoseTrajectory;
+
+/// Modes of a platform controller with the value of the `mode` word: P, F and P/F with the inverse hysteresis alone, with
+/// EWMA and with PCC.
+pub const PLATFORM_MODES: [(&str, u32); 7] =
+    [("p", 0), ("f-invhys", 1), ("f-ewma", 2), ("f-pcc", 3), ("pf-invhys", 4), ("pf-ewma", 5), ("pf-pcc", 6)];
+
+/// The modes of Tables 5 to 8.
+pub const FREE_MODES: [(&str, u32); 3] = [PLATFORM_MODES[4], PLATFORM_MODES[5], PLATFORM_MODES[6]];
+
+/// The modes of Table 9.
+pub const MACHINING_MODES: [(&str, u32); 2] = [PLATFORM_MODES[0], PLATFORM_MODES[6]];
+
+/// A trajectory with what its rows are called.
+pub struct NamedTrajectory<'a> {
+    /// Name: `case-1` and `case-2` are the paper's.
+    pub name: &'a str,
+    /// Operating frequency, Hz.
+    pub frequency: f64,
+    /// The motion.
+    pub trajectory: &'a dyn PoseTrajectory,
+}
+
+/// One machine, prepared once; every run starts from the same state.
+#[derive(Debug, Clone)]
+pub struct PlatformScenario {
+    prepared: PlatformRig,
+    /// How its runs are made.
+    pub options: RunOptions,
+}
+
+impl PlatformScenario {
+    /// A machine, pre-cycled, settled and zeroed as the parameters of its first leg say, with noise from `seed`.
+    #[must_use]
+    pub fn new(specimen: &Specimen, noise: &Noise, seed: u64, options: RunOptions) -> Self {
+        let mut prepared = PlatformRig::new(specimen, noise, seed);
+        let first = &specimen.legs[0];
+        prepared.prepare(&Preparation {
+            peak: first.u_max,
+            rate: first.forc_rate_v_per_s,
+            settle: first.settle_s,
+            update: first.step_s,
+        });
+        Self { prepared, options }
+    }
+
+    /// The prepared rig.
+    #[must_use]
+    pub fn rig(&self) -> &PlatformRig {
+        &self.prepared
+    }
+
+    /// The prepared rig, to change gauges or steps for all runs.
+    pub fn rig_mut(&mut self) -> &mut PlatformRig {
+        &mut self.prepared
+    }
+
+    /// Runs a trajectory with the controller as configured.
+    ///
+    /// # Errors
+    /// As [`PlatformRig::run`].
+    pub fn run(
+        &self,
+        controller: &mut dyn TickController,
+        trajectory: &dyn PoseTrajectory,
+    ) -> Result<PlatformRun, RunError> {
+        self.prepared.clone().run(controller, trajectory, &self.options)
+    }
+
+    /// Runs a trajectory against a work part.
+    ///
+    /// # Errors
+    /// As [`PlatformRig::run`].
+    pub fn machine(
+        &self,
+        controller: &mut dyn TickController,
+        trajectory: &dyn PoseTrajectory,
+        part: WorkPart,
+    ) -> Result<PlatformRun, RunError> {
+        let options = RunOptions { part: Some(part), ..self.options.clone() };
+        self.prepared.clone().run(controller, trajectory, &options)
+    }
+
+    /// Tables 5 to 8: every mode on every trajectory. The controller keeps the last mode; other configuration words are the
+    /// spec's.
+    ///
+    /// # Errors
+    /// As [`PlatformRig::run`], and if the controller has no `mode` word.
+    pub fn free_motion(
+        &self,
+        controller: &mut dyn TickController,
+        modes: &[(&str, u32)],
+        trajectories: &[NamedTrajectory],
+    ) -> Result<PoseTable, RunError> {
+        let mut table = PoseTable::default();
+        for NamedTrajectory { name, frequency, trajectory } in trajectories {
+            for &(mode, word) in modes {
+                select(controller, word)?;
+                let run = self.run(controller, *trajectory)?;
+                table.rows.push(PoseRow::of(name, mode, *frequency, &run.errors));
+            }
+        }
+        Ok(table)
+    }
+
+    /// Table 9: every mode on every part.
+    ///
+    /// # Errors
+    /// As [`PlatformScenario::free_motion`].
+    pub fn machining(
+        &self,
+        controller: &mut dyn TickController,
+        modes: &[(&str, u32)],
+        parts: &[(&str, WorkPart)],
+        trajectory: &dyn PoseTrajectory,
+    ) -> Result<MachiningTable, RunError> {
+        let mut table = MachiningTable::default();
+        for &(name, part) in parts {
+            for &(mode, word) in modes {
+                select(controller, word)?;
+                let run = self.machine(controller, trajectory, part)?;
+                table.push(name, mode, &run.errors);
+            }
+        }
+        Ok(table)
+    }
+}
+
+/// The spec's configuration with another mode.
+///
+/// # Errors
+/// If the controller has no such word or refuses the mode.
+pub fn select(controller: &mut dyn TickController, mode: u32) -> Result<(), ControllerError> {
+    let mut words = controller.default_config();
+    controller.description().set_config(&mut words, "mode", f64::from(mode))?;
+    controller.configure(&words)
+}

@@ -1,0 +1,136 @@
+//! One machine out of its tolerances: six different legs on a platform.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use super::linear::Six;
+use super::parameters::PlatformParameters;
+use super::structure::StructureParameters;
+use crate::noise::unit;
+use crate::plant::LegParameters;
+
+/// Relative tolerance of each parameter of a leg.
+const LEG_TOLERANCE: f64 = 0.1;
+
+/// Relative tolerance of the axial stiffness of a leg.
+const STIFFNESS_TOLERANCE: f64 = 0.05;
+
+/// Range of the nominal axial stiffness of random plants, relative to the parameter file's.
+const STIFFNESS_RANGE: [f64; 2] = [0.7, 1.4];
+
+/// Range of the damping ratio of the lowest mode of random plants.
+const DAMPING_RANGE: [f64; 2] = [0.01, 0.05];
+
+/// Streams of random numbers, apart from those of gauges, amplifiers and sensors.
+const TOLERANCE_STREAM: u64 = 1 << 32;
+const NOMINAL_STREAM: u64 = 2 << 32;
+
+/// A machine: its nominal data, and what its legs really are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Specimen {
+    /// What a spec of this machine says: `axial_stiffness_n_per_m` and `modal_damping` are its nominal values.
+    pub nominal: PlatformParameters,
+    /// The legs.
+    pub legs: [LegParameters; 6],
+    /// Axial stiffness of each leg, N/m.
+    pub stiffness: Six,
+}
+
+impl Specimen {
+    /// Six equal legs, no tolerances.
+    #[must_use]
+    pub fn ideal(nominal: &PlatformParameters, leg: &LegParameters) -> Self {
+        Self {
+            nominal: nominal.clone(),
+            legs: std::array::from_fn(|_| leg.clone()),
+            stiffness: [nominal.axial_stiffness_n_per_m; 6],
+        }
+    }
+
+    /// Every leg's gain, asymmetry, play thresholds, creep and amplifier lag within ±10 %, each on its own; its stiffness
+    /// within ±5 %.
+    #[must_use]
+    pub fn within_tolerances(nominal: &PlatformParameters, leg: &LegParameters, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(TOLERANCE_STREAM);
+        let mut factor = |tolerance: f64| 1.0 + tolerance * (2.0 * unit(&mut rng) - 1.0);
+        let legs = std::array::from_fn(|_| {
+            let mut own = leg.clone();
+            own.gain_um_per_v *= factor(LEG_TOLERANCE);
+            own.s2 *= factor(LEG_TOLERANCE);
+            own.tau_amp_s *= factor(LEG_TOLERANCE);
+            let (thresholds, creep) = (factor(LEG_TOLERANCE), factor(LEG_TOLERANCE));
+            own.play_thresholds_v.iter_mut().for_each(|r| *r *= thresholds);
+            own.creep_weights.iter_mut().for_each(|w| *w *= creep);
+            own
+        });
+        let stiffness = std::array::from_fn(|_| nominal.axial_stiffness_n_per_m * factor(STIFFNESS_TOLERANCE));
+        Self { nominal: nominal.clone(), legs, stiffness }
+    }
+
+    /// The reference machine: the shipped parameter files, tolerances of seed 1.
+    #[must_use]
+    pub fn reference() -> Self {
+        Self::within_tolerances(&PlatformParameters::reference(), &LegParameters::reference(), 1)
+    }
+
+    /// Random machine `number` of `seed`: nominal stiffness 0.7 to 1.4 times the reference platform's, damping ratio 1 to
+    /// 5 %, and tolerances as ever.
+    #[must_use]
+    pub fn random(seed: u64, number: u32) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(NOMINAL_STREAM + u64::from(number));
+        let mut within = |[low, high]: [f64; 2]| low + (high - low) * unit(&mut rng);
+        let mut nominal = PlatformParameters::reference();
+        nominal.axial_stiffness_n_per_m *= within(STIFFNESS_RANGE);
+        nominal.modal_damping = within(DAMPING_RANGE);
+        nominal.name = format!("random-{seed}-{number}");
+        // Far from the seeds that people use.
+        let tolerances = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(u64::from(number));
+        Self::within_tolerances(&nominal, &LegParameters::reference(), tolerances)
+    }
+
+    /// Its structure: c_i = β k_i with β = 2ζ/ω_1 of the nominal platform.
+    #[must_use]
+    pub fn structure(&self) -> StructureParameters {
+        let mut parameters = StructureParameters {
+            geometry: self.nominal.geometry(),
+            masses: self.nominal.masses(),
+            stiffness: [self.nominal.axial_stiffness_n_per_m; 6],
+            damping: [0.0; 6],
+        };
+        let lowest = parameters.modes().0[0];
+        parameters.stiffness = self.stiffness;
+        parameters.damping = self.stiffness.map(|k| 2.0 * self.nominal.modal_damping / lowest * k);
+        parameters
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tolerances_are_kept_used_and_repeat() {
+        let reference = LegParameters::reference();
+        let specimen = Specimen::reference();
+        assert_eq!(specimen, Specimen::reference());
+        let gains = specimen.legs.each_ref().map(|leg| leg.gain_um_per_v / reference.gain_um_per_v - 1.0);
+        assert!(gains.iter().all(|g| g.abs() <= 0.1) && gains.iter().any(|g| g.abs() > 0.05), "{gains:?}");
+        assert!(specimen.stiffness.iter().all(|k| (k / 1e7 - 1.0).abs() <= 0.05));
+        assert!(specimen.legs.windows(2).all(|pair| pair[0] != pair[1]));
+    }
+
+    #[test]
+    fn random_machines_fill_their_ranges() {
+        let machines: Vec<Specimen> = (0..50).map(|n| Specimen::random(7, n)).collect();
+        let ks: Vec<f64> = machines.iter().map(|m| m.nominal.axial_stiffness_n_per_m).collect();
+        let zetas: Vec<f64> = machines.iter().map(|m| m.nominal.modal_damping).collect();
+        assert!(ks.iter().all(|k| (0.7e7..=1.4e7).contains(k)) && zetas.iter().all(|z| (0.01..=0.05).contains(z)));
+        assert!(ks.iter().any(|k| *k < 0.8e7) && ks.iter().any(|k| *k > 1.3e7));
+        assert!(zetas.iter().any(|z| *z < 0.015) && zetas.iter().any(|z| *z > 0.045));
+        assert_eq!(machines[3], Specimen::random(7, 3));
+        assert_ne!(machines[3].legs, machines[4].legs);
+        assert_ne!(machines[3], Specimen::random(8, 3));
+    }
+}

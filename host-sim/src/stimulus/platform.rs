@@ -1,0 +1,309 @@
+//! Input recordings for a controller in task space: streams that are smooth, jump, leave the workspace or dry up, moves,
+//! trajectories, gauges and force sensors that disagree with all of it, and numbers that no sensor gives.
+
+use core::f64::consts::TAU;
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use super::{InputRecording, SPECIAL_SHARE, STRETCH, specials};
+use crate::description::{Description, DescriptionError};
+use crate::noise::unit;
+use crate::word::Scalar;
+
+/// Words of the command.
+const COMMAND: [&str; 3] = ["command", "selector", "sequence"];
+/// Vectors of a row, in the order of [`Row::vectors`].
+const VECTORS: [&str; 5] = ["setpoint", "setpoint_rate", "setpoint_acceleration", "gauge", "wrench"];
+
+/// What the platform takes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlatformInputs {
+    /// Bounds on the pose from rest: x, y, z (m), θx, θy, θz (rad).
+    pub bounds: [f64; 6],
+    /// Pose that set-points are measured from, likewise.
+    pub bias: [f64; 6],
+    /// Control period, s.
+    pub period: f64,
+    /// Lowest and highest word of each gauge that is believed (V or m).
+    pub gauge: [f64; 2],
+    /// Trajectories on board.
+    pub trajectories: u32,
+}
+
+/// How a stretch of rows is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Smooth,
+    Jumping,
+    Dry,
+    Beyond,
+    Move,
+    Trajectory,
+    Hold,
+    Special,
+}
+
+const CYCLE: [Kind; 10] = [
+    Kind::Smooth,
+    Kind::Hold,
+    Kind::Trajectory,
+    Kind::Smooth,
+    Kind::Dry,
+    Kind::Special,
+    Kind::Move,
+    Kind::Jumping,
+    Kind::Smooth,
+    Kind::Beyond,
+];
+
+/// One row before it becomes words.
+struct Row {
+    command: [u64; 3],
+    vectors: [[f64; 6]; VECTORS.len()],
+}
+
+/// Makes `rows` rows for a controller from `seed`.
+///
+/// # Errors
+/// If the controller lacks a word of a platform.
+pub fn record(
+    description: &Description,
+    inputs: &PlatformInputs,
+    rows: usize,
+    seed: u64,
+) -> Result<InputRecording, DescriptionError> {
+    let width = description.input_names.len();
+    let mut command = [0; COMMAND.len()];
+    for (place, name) in command.iter_mut().zip(COMMAND) {
+        *place = description.input(name)?;
+    }
+    let mut vectors = [[0; 6]; VECTORS.len()];
+    for (places, stem) in vectors.iter_mut().zip(VECTORS) {
+        for (axis, place) in places.iter_mut().enumerate() {
+            *place = description.input(&format!("{stem}[{axis}]"))?;
+        }
+    }
+    let mut generator = Generator::new(inputs, seed);
+    let mut words = vec![0; rows * width];
+    let mut stretches = CYCLE.iter().cycle();
+    let mut kind = Kind::Smooth;
+    let mut left = 0;
+    for row in words.chunks_exact_mut(width.max(1)) {
+        if left == 0 {
+            kind = stretches.next().copied().unwrap_or(kind);
+            left = STRETCH.0 + generator.below(STRETCH.1 - STRETCH.0);
+            // A move or a trajectory takes its time.
+            if matches!(kind, Kind::Move | Kind::Trajectory | Kind::Smooth) {
+                left *= 8;
+            }
+            generator.begin();
+        }
+        left -= 1;
+        let made = generator.row(kind);
+        for (place, word) in command.iter().zip(made.command) {
+            row[*place] = generator.integer(kind, word);
+        }
+        for (places, vector) in vectors.iter().zip(made.vectors) {
+            for (place, value) in places.iter().zip(vector) {
+                row[*place] = generator.word(description.scalar, kind, value);
+            }
+        }
+    }
+    Ok(InputRecording { width, words })
+}
+
+struct Generator<'a> {
+    rng: ChaCha8Rng,
+    inputs: &'a PlatformInputs,
+    sequence: u64,
+    /// Smooth motion: amplitude, angular frequency (rad/s), phase of each axis.
+    amplitude: [f64; 6],
+    frequency: [f64; 6],
+    phase: [f64; 6],
+    /// Destination of a move, trajectory, force of the stretch.
+    goal: [f64; 6],
+    selector: u64,
+    wrench: [f64; 6],
+    /// Gauges wander between the ends of their range.
+    gauge: [f64; 6],
+}
+
+impl<'a> Generator<'a> {
+    fn new(inputs: &'a PlatformInputs, seed: u64) -> Self {
+        Self {
+            rng: ChaCha8Rng::seed_from_u64(seed),
+            inputs,
+            sequence: 0,
+            amplitude: [0.0; 6],
+            frequency: [0.0; 6],
+            phase: [0.0; 6],
+            goal: [0.0; 6],
+            selector: 0,
+            wrench: [0.0; 6],
+            gauge: [0.5 * (inputs.gauge[0] + inputs.gauge[1]); 6],
+        }
+    }
+
+    fn below(&mut self, bound: u64) -> u64 {
+        self.rng.next_u64() % bound.max(1)
+    }
+
+    /// Uniform in [−1, 1).
+    fn symmetric(&mut self) -> f64 {
+        2.0 * unit(&mut self.rng) - 1.0
+    }
+
+    /// Room on either side of the bias.
+    fn room(&self, axis: usize) -> f64 {
+        self.inputs.bounds[axis] - self.inputs.bias[axis].abs()
+    }
+
+    fn begin(&mut self) {
+        for axis in 0..6 {
+            // 1 to 30 Hz, and a phase that begins at the bias so that the stream can be joined.
+            self.frequency[axis] = TAU * libm::exp(3.4 * unit(&mut self.rng));
+            self.amplitude[axis] = 0.3 * self.room(axis) * unit(&mut self.rng);
+            self.phase[axis] = 0.0;
+            self.goal[axis] = 0.5 * self.room(axis) * self.symmetric();
+            self.wrench[axis] = 3.0 * self.symmetric();
+        }
+        self.selector = self.below(u64::from(self.inputs.trajectories) + 1);
+    }
+
+    fn row(&mut self, kind: Kind) -> Row {
+        self.wander();
+        if kind != Kind::Dry {
+            self.sequence += 1;
+        }
+        let smooth = self.smooth();
+        let (command, [pose, rate, acceleration]) = match kind {
+            Kind::Smooth | Kind::Dry => (1, smooth),
+            Kind::Jumping => (1, [0, 1, 2].map(|_| std::array::from_fn(|axis| self.room(axis) * self.symmetric()))),
+            Kind::Beyond => {
+                (1, [0, 1, 2].map(|_| std::array::from_fn(|axis| 6.0 * self.room(axis) * self.symmetric())))
+            }
+            Kind::Move => (2, [self.goal, [0.0; 6], [0.0; 6]]),
+            Kind::Trajectory => (3, smooth),
+            Kind::Hold => (0, smooth),
+            Kind::Special => (self.below(5), smooth),
+        };
+        Row {
+            command: [command, self.selector, self.sequence],
+            vectors: [pose, rate, acceleration, self.gauge, self.wrench],
+        }
+    }
+
+    /// Pose, rate and acceleration of the smooth stream, one period on.
+    fn smooth(&mut self) -> [[f64; 6]; 3] {
+        let mut out = [[0.0; 6]; 3];
+        for axis in 0..6 {
+            let (amplitude, frequency) = (self.amplitude[axis], self.frequency[axis]);
+            self.phase[axis] += frequency * self.inputs.period;
+            // 1 − cos begins without a jump in pose and rate.
+            let (sine, cosine) = (libm::sin(self.phase[axis]), libm::cos(self.phase[axis]));
+            out[0][axis] = amplitude * (1.0 - cosine);
+            out[1][axis] = amplitude * frequency * sine;
+            out[2][axis] = amplitude * frequency * frequency * cosine;
+        }
+        out
+    }
+
+    /// Readings that change by a thousandth of the range and are now and then beyond its ends.
+    fn wander(&mut self) {
+        let [low, high] = self.inputs.gauge;
+        let span = high - low;
+        for axis in 0..6 {
+            let next = self.gauge[axis] + 2e-3 * span * self.symmetric();
+            let inside = (low - 1e-3 * span..=high + 1e-3 * span).contains(&next);
+            self.gauge[axis] = if inside { next } else { 0.5 * (low + high) };
+        }
+    }
+
+    fn word(&mut self, scalar: Scalar, kind: Kind, value: f64) -> u64 {
+        if kind == Kind::Special && self.below(SPECIAL_SHARE) == 0 {
+            let specials = specials(scalar);
+            let pick = self.below(specials.len() as u64) as usize;
+            return specials[pick];
+        }
+        scalar.encode(value)
+    }
+
+    fn integer(&mut self, kind: Kind, value: u64) -> u64 {
+        if kind == Kind::Special && self.below(SPECIAL_SHARE) == 0 { self.rng.next_u64() } else { value }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn description() -> Description {
+        let six = |stem: &str| (0..6).map(|k| format!("{stem}[{k}]")).collect::<Vec<_>>();
+        Description {
+            name: "platform".to_owned(),
+            digest: "0".to_owned(),
+            version: "0".to_owned(),
+            scalar: Scalar::F64,
+            config_names: vec!["mode".to_owned()],
+            input_names: COMMAND
+                .iter()
+                .map(|name| (*name).to_owned())
+                .chain(VECTORS.iter().flat_map(|v| six(v)))
+                .collect(),
+            output_names: vec!["status".to_owned()],
+        }
+    }
+
+    fn inputs() -> PlatformInputs {
+        PlatformInputs {
+            bounds: [40e-6, 40e-6, 40e-6, 4e-4, 4e-4, 4e-4],
+            bias: [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0],
+            period: 1e-4,
+            gauge: [-25e-6, 25e-6],
+            trajectories: 3,
+        }
+    }
+
+    #[test]
+    fn a_seed_repeats_and_another_differs() {
+        let make = |seed| record(&description(), &inputs(), 4000, seed).unwrap();
+        assert_eq!(make(1), make(1));
+        assert_ne!(make(1), make(2));
+        assert_eq!(make(1).rows().len(), 4000);
+    }
+
+    #[test]
+    fn every_command_occurs_and_so_do_impossible_numbers_and_dry_streams() {
+        let recording = record(&description(), &inputs(), 60_000, 1).unwrap();
+        for command in 0..4 {
+            assert!(recording.rows().filter(|row| row[0] == command).count() > 500, "{command}");
+        }
+        assert!(recording.rows().any(|row| row[0] > 4));
+        assert!(
+            recording.rows().filter(|row| row[3..].iter().any(|word| f64::from_bits(*word).is_nan())).count() > 100
+        );
+        let rows: Vec<&[u64]> = recording.rows().collect();
+        assert!(rows.windows(2).filter(|pair| pair[0][0] == 1 && pair[0][2] == pair[1][2]).count() > 200);
+        let beyond = rows.iter().filter(|row| f64::from_bits(row[3]).abs() > 40e-6).count();
+        assert!(beyond > 500, "{beyond}");
+    }
+
+    #[test]
+    fn a_smooth_stream_is_what_its_rates_say() {
+        let inputs = inputs();
+        let mut generator = Generator::new(&inputs, 5);
+        generator.begin();
+        let rows: Vec<Row> = (0..400).map(|_| generator.row(Kind::Smooth)).collect();
+        for three in rows.windows(3) {
+            let [before, now, after] = three else { continue };
+            for axis in 0..6 {
+                let rate = (after.vectors[0][axis] - before.vectors[0][axis]) / (2.0 * inputs.period);
+                let change = (after.vectors[1][axis] - before.vectors[1][axis]) / (2.0 * inputs.period);
+                let scale = generator.amplitude[axis] * generator.frequency[axis];
+                assert!((rate - now.vectors[1][axis]).abs() < 1e-4 * scale);
+                assert!((change - now.vectors[2][axis]).abs() < 1e-4 * scale * generator.frequency[axis]);
+            }
+        }
+    }
+}
