@@ -7,14 +7,14 @@ use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::emit;
 use crate::everett::EverettTable;
 use crate::identify;
-use crate::ir::Ir;
-use crate::lower::{PoseNoise, lower, platform, pose_noise};
-use crate::model::Model;
+use crate::ir::{Ir, Setpoints};
+use crate::lower::{PoseNoise, lower, platform, pose_noise, scalar, setpoint};
+use crate::model::{Model, TrajectoryKind};
 use crate::reach::{self, Reach};
 use crate::spec::{self, SpecSource};
 use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
-use crate::workspace;
+use crate::{waveform, workspace};
 
 /// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
 /// factor, a wrong unit is 1000.
@@ -67,12 +67,15 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
     // Stability and records do not depend on each other: report both.
     let stability = check_stability(&model).map_err(|found| findings.extend(found));
     let identified = identify_records(&source, &model).map_err(|found| findings.extend(found));
-    let (Ok((margins, design)), Ok(identified)) = (stability, identified) else {
+    let setpoints = lower_setpoints(&source, &model).map_err(|found| findings.extend(found));
+    let (Ok((margins, design)), Ok(mut identified), Ok(setpoints)) = (stability, identified, setpoints) else {
         return Err(Refused { source: Some(source), findings });
     };
     findings.extend(identified.findings);
     findings.extend(design.iter().flat_map(|design| design.findings.clone()));
-    let reach = match check_reach(&model, &identified.tables) {
+    findings.extend(setpoints.warnings);
+    identified.texts.extend(setpoints.texts);
+    let reach = match check_reach(&model, setpoints.setpoints.as_ref(), &identified.tables) {
         Ok(None) => None,
         Ok(Some((reach, found))) => {
             findings.extend(found);
@@ -83,7 +86,8 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
             return Err(Refused { source: Some(source), findings });
         }
     };
-    let lowered = lower(&model, design.as_ref(), &identified.tables, &digest(&source, &identified.texts));
+    let task = design.as_ref().zip(setpoints.setpoints);
+    let lowered = lower(&model, task, &identified.tables, &digest(&source, &identified.texts));
     let (ir, pose_noise) = match lowered.and_then(|ir| Ok((ir, pose_noise(&model)?))) {
         Ok(both) => both,
         Err(found) => {
@@ -107,14 +111,68 @@ fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<Design>), V
     }
 }
 
-/// Where the legs reach: as far as both the data sheet's stroke and every leg's table allow.
-fn check_reach(model: &Model, tables: &[EverettTable]) -> Result<Option<(Reach, Vec<Diagnostic>)>, Vec<Diagnostic>> {
-    let Some(task) = &model.task_space else {
+/// Where the legs reach, and that trajectories stay there: as far as both the data sheet's stroke and every leg's table
+/// allow.
+fn check_reach(
+    model: &Model,
+    setpoints: Option<&Setpoints>,
+    tables: &[EverettTable],
+) -> Result<Option<(Reach, Vec<Diagnostic>)>, Vec<Diagnostic>> {
+    let (Some(task), Some(setpoints)) = (&model.task_space, setpoints) else {
         return Ok(None);
     };
     let largest = tables.iter().map(|table| table.node(table.grid, 0));
     let stroke = largest.fold(model.actuator.stroke, |a, b| if b < a { b } else { a });
-    reach::check(model, task, &platform(model)?, stroke).map(Some)
+    let platform = platform(model)?;
+    let mut errors = Vec::new();
+    let reach = reach::check(model, task, &platform, stroke).map_err(|found| errors.extend(found));
+    for (index, poses) in setpoint::poses(model, task, setpoints)?.into_iter().enumerate() {
+        let key = format!("trajectory[{index}].kind");
+        let name = &task.trajectories[index].name;
+        if let Err(found) = reach::check_poses(model, &platform, stroke, [&key, name], poses.into_iter()) {
+            errors.extend(found);
+        }
+    }
+    match reach {
+        Ok(both) if errors.is_empty() => Ok(Some(both)),
+        _ => Err(errors),
+    }
+}
+
+/// What set-points yield.
+#[derive(Default)]
+struct LoweredSetpoints {
+    setpoints: Option<Setpoints>,
+    warnings: Vec<Diagnostic>,
+    /// Name and text of each table of poses, for the digest.
+    texts: Vec<(String, String)>,
+}
+
+fn lower_setpoints(source: &SpecSource, model: &Model) -> Result<LoweredSetpoints, Vec<Diagnostic>> {
+    let Some(task) = &model.task_space else { return Ok(LoweredSetpoints::default()) };
+    let mut texts = Vec::new();
+    let mut errors = Vec::new();
+    let mut waveforms = Vec::new();
+    for trajectory in &task.trajectories {
+        let TrajectoryKind::Waveform { file, period, .. } = &trajectory.kind else {
+            waveforms.push(None);
+            continue;
+        };
+        let read = waveform::read_file(&source.dir.join(file), file);
+        let parsed = read.and_then(|text| {
+            let parsed = waveform::parse(&text, file, *period);
+            texts.push((file.clone(), text));
+            parsed
+        });
+        waveforms.push(parsed.map_err(|found| errors.extend(found)).ok());
+    }
+    match setpoint::lower(model, task, &waveforms, scalar(model)) {
+        Ok((setpoints, warnings)) if errors.is_empty() => {
+            Ok(LoweredSetpoints { setpoints: Some(setpoints), warnings, texts })
+        }
+        Ok((_, warnings)) => Err(errors.into_iter().chain(warnings).collect()),
+        Err(found) => Err(errors.into_iter().chain(found).collect()),
+    }
 }
 
 /// What the records of a spec yield.

@@ -18,6 +18,7 @@ mod literal;
 mod manifest;
 mod platform;
 mod sensing;
+mod setpoint;
 mod stage_type;
 
 use std::collections::BTreeMap;
@@ -65,6 +66,7 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
         ("src/config.rs", platform::config::emit(ir, &task.defaults)),
         ("src/lib.rs", platform::crate_root::emit(ir)),
         ("src/sensing.rs", sensing::emit(ir.scalar, &task.sensing)),
+        ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
         ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),
         ("src/step.rs", platform::step::emit()),

@@ -14,7 +14,7 @@ mod columns;
 mod coverage;
 mod dead_time;
 mod export;
-mod findings;
+pub(crate) mod findings;
 pub mod nnls;
 mod normal;
 mod prior;

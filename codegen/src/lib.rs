@@ -20,4 +20,5 @@ pub mod spec;
 pub mod stability;
 pub mod target;
 pub mod verify;
+pub mod waveform;
 pub mod workspace;

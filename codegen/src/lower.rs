@@ -7,6 +7,7 @@ mod dynamics;
 mod kinematics;
 mod linear;
 mod sensing;
+pub mod setpoint;
 mod task_space;
 
 pub use dynamics::{GRAVITY, platform};
@@ -15,7 +16,7 @@ pub use sensing::{PoseNoise, pose_noise};
 
 use crate::diagnostic::Diagnostic;
 use crate::everett::EverettTable;
-use crate::ir::{Bounds, Defaults, Hysteresis, Ir, LEGS, Law, Scalar, Setpoint, TaskSpace};
+use crate::ir::{Bounds, Defaults, Hysteresis, Ir, LEGS, Law, Scalar, Setpoint, Setpoints, TaskSpace};
 use crate::model::{self, Model};
 use crate::stability::platform::{Design, RestDynamics};
 use specgen_runtime::Motion;
@@ -25,22 +26,19 @@ const LEG_SETPOINT_STROKES: f64 = 2.0;
 
 /// Computes every constant of the controller.
 ///
-/// `design` is the tuning of a controller in task space, none for six legs with their own gauges; `tables` holds one Everett
-/// table for all legs or one for each; `digest` is the hex digest of spec and records.
+/// `task` is the tuning of a controller in task space and its set-points ([`setpoint::lower`]), none for six legs with their own
+/// gauges; `tables` holds one Everett table for all legs or one for each; `digest` is the hex digest of spec and records.
 ///
 /// # Errors
 /// Findings about values that cannot be turned into a controller (a converter too coarse
 /// for the grid, a workspace too large for the legs), with their place in the spec.
 pub fn lower(
     model: &Model,
-    design: Option<&Design>,
+    task: Option<(&Design, Setpoints)>,
     tables: &[EverettTable],
     digest: &str,
 ) -> Result<Ir, Vec<Diagnostic>> {
-    let scalar = match model.controller.scalar {
-        model::Scalar::F32 => Scalar::F32,
-        model::Scalar::F64 => Scalar::F64,
-    };
+    let scalar = scalar(model);
     let hysteresis = hysteresis(model, tables, scalar);
     let (actuation, max_step) = actuation::lower(model, scalar)?;
     let stroke = model.actuator.stroke;
@@ -78,11 +76,20 @@ pub fn lower(
             period: model.timing.period,
             leg_gain: model.actuator.leg_gain(),
         },
-        task_space: match (&model.task_space, design) {
-            (Some(task), Some(design)) => Some(task_space(model, task, scalar, design)?),
+        task_space: match (&model.task_space, task) {
+            (Some(task), Some((design, setpoints))) => Some(task_space(model, task, scalar, design, setpoints)?),
             _ => None,
         },
     })
+}
+
+/// Arithmetic of the emitted controller.
+#[must_use]
+pub fn scalar(model: &Model) -> Scalar {
+    match model.controller.scalar {
+        model::Scalar::F32 => Scalar::F32,
+        model::Scalar::F64 => Scalar::F64,
+    }
 }
 
 /// What a controller in task space has of its own.
@@ -91,12 +98,14 @@ fn task_space(
     task: &model::TaskSpace,
     scalar: Scalar,
     design: &Design,
+    setpoints: Setpoints,
 ) -> Result<TaskSpace, Vec<Diagnostic>> {
     let platform = platform(model)?;
     let rest = RestDynamics::of(&platform);
     let rest_force = platform.leg_forces(&Motion::new());
     Ok(TaskSpace {
         sensing: sensing::lower(model, task, scalar)?,
+        setpoints,
         law: task_space::law(model, task, scalar, &rest, &rest_force, design),
         defaults: task_space::defaults(model, task, scalar, design),
     })

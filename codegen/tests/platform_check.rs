@@ -26,7 +26,7 @@ fn modes_margins_and_reach_are_reported() {
     }
     let document = folder.json(&["check", "platform.toml"]);
     assert_eq!(document.code, 0);
-    let design = &document.value["design"];
+    let design = &document.value["result"]["design"];
     let laws: Vec<&str> =
         design["margins"].as_array().unwrap().iter().map(|one| one["law"].as_str().unwrap()).collect();
     assert_eq!(laws, ["P", "F invhys", "F ewma", "F pcc", "P/F invhys", "P/F ewma", "P/F pcc"]);
@@ -34,7 +34,7 @@ fn modes_margins_and_reach_are_reported() {
         assert!(one["spectral_radius"].as_f64().unwrap() < 1.0, "{one}");
     }
     assert_eq!(design["modes"].as_array().unwrap().len(), 6);
-    assert!(document.value["reach"]["share"].as_f64().unwrap() > 0.0);
+    assert!(document.value["result"]["reach"]["share"].as_f64().unwrap() > 0.0);
 }
 
 /// The numbers of `name [a, b, …]` in a help.

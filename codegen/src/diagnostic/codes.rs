@@ -155,6 +155,32 @@ codes! {
         "Over sensor.range a calibration rises or falls all the way, so that every raw value means one reading.";
     GAUGES_DIVERGE = "E0435", "workspace too large for the gauges' equations",
         "They are solved for small motions, by a number of passes that the compiler counts.";
+    ZERO_OUTSIDE = "E0450", "bias or work zero outside the workspace",
+        "Set-points are counted from the bias pose and the offset of the work frame: both must lie where the platform can go.";
+    MOVES_TOO_SLOW = "E0451", "limits of moves too low",
+        "At these limits of speed, acceleration and jerk a move across the workspace never comes to its end.";
+    FRAMES_TOO_WIDE = "E0452", "workspace too wide for user frames",
+        "Work and tool frames are computed for small rotations.";
+    TRAJECTORY_JUMPS = "E0453", "trajectory that jumps",
+        "No platform follows a jump: its legs would be driven at their limits. The paper's printed trajectories jump; the corrected ones do not.";
+    TRAJECTORY_OUTSIDE = "E0454", "trajectory outside the workspace",
+        "At some time the pose, with the bias, leaves the declared workspace. The message names the time and the axis that is worst.";
+    TRAJECTORY_TOO_FAST = "E0455", "trajectory too fast",
+        "At some time an axis is faster than a streamed set-point may be.";
+    TRAJECTORY_TICKS = "E0456", "trajectory that does not fit the ticks",
+        "Rows of a table are a whole number of ticks apart, a sinusoid is slower than half the tick rate, and no trajectory is longer than about four million ticks.";
+    WAVEFORM_CLOSED_TWICE = "E0457", "last row given twice",
+        "A table that repeats goes from its last row to its first: a last row that is the first again would make it stand still for a row.";
+    TRAJECTORY_CORNERS = "W0458", "trajectory with corners",
+        "Where the slope changes at once the platform rings, whatever the controller. The paper's trajectories have such corners.";
+    WAVEFORM_HEADER = "E0460", "a table of poses without its columns",
+        "The first line names the columns by axis and unit: x, y, z in nm, um, mm or m, theta_x, theta_y, theta_z in nrad, urad, mrad or rad, such as `x_um,theta_z_urad`, and optionally `time_s`.";
+    WAVEFORM_VALUE = "E0461", "a pose that is not a number",
+        "Values are finite plain numbers with a decimal point; every line has all columns.";
+    WAVEFORM_TIME = "E0462", "times that do not fit the period",
+        "The time column rises from row to row by trajectory.period.";
+    WAVEFORM_LENGTH = "E0463", "too few or too many rows",
+        "A table of poses has at least two rows, and no more than a microcontroller holds.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",

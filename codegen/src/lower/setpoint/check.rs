@@ -1,0 +1,73 @@
+//! What every trajectory must keep: the workspace, and the speed that a stream may have.
+
+use super::{AXES, User, amount};
+use crate::model::{Model, SetpointRules};
+
+/// Where and by how much a trajectory breaks a rule.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Worst {
+    /// s from the start.
+    pub time: f64,
+    axis: usize,
+    /// m or rad (per s).
+    value: f64,
+    /// Value over its bound.
+    excess: f64,
+}
+
+/// Largest excesses over workspace and speed, as far as there are any.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Excesses {
+    pub place: Option<Worst>,
+    pub speed: Option<Worst>,
+}
+
+impl Excesses {
+    /// Looks at one tick: the user's pose (m, rad) and rate (per s).
+    pub fn look(&mut self, user: &User, rules: &SetpointRules, time: f64, pose: [f64; 6], rate: [f64; 6]) {
+        if let Some((axis, value)) = user.outside(pose) {
+            let excess = value.abs() / user.bound[axis];
+            keep(&mut self.place, Worst { time, axis, value, excess });
+        }
+        for (axis, value) in rate.into_iter().enumerate() {
+            let excess = value.abs() / rules.stream_speed[axis];
+            if excess > 1.0 {
+                keep(&mut self.speed, Worst { time, axis, value, excess });
+            }
+        }
+    }
+
+    /// What is wrong with place and speed, in words.
+    pub fn messages(&self, model: &Model, user: &User, rules: &SetpointRules) -> [Option<(Worst, String)>; 2] {
+        let place = self.place.map(|worst| {
+            let axis = worst.axis;
+            let message = format!(
+                "it puts {} at {} after {:.6} s, outside the workspace of ±{}, the bias included",
+                AXES[axis],
+                amount(axis, worst.value),
+                worst.time,
+                amount(axis, user.bound[axis])
+            );
+            (worst, message)
+        });
+        let speed = self.speed.map(|worst| {
+            let axis = worst.axis;
+            let message = format!(
+                "{} moves at {}/s after {:.6} s ({} in a tick), faster than control.setpoint.stream_speed, {}/s",
+                AXES[axis],
+                amount(axis, worst.value.abs()),
+                worst.time,
+                amount(axis, worst.value.abs() * model.timing.period),
+                amount(axis, rules.stream_speed[axis])
+            );
+            (worst, message)
+        });
+        [place, speed]
+    }
+}
+
+fn keep(slot: &mut Option<Worst>, worst: Worst) {
+    if slot.is_none_or(|old| worst.excess > old.excess) {
+        *slot = Some(worst);
+    }
+}
