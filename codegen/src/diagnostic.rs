@@ -5,6 +5,7 @@ mod json;
 mod position;
 mod render;
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;
 
@@ -53,6 +54,23 @@ pub struct Diagnostic {
     pub message: String,
     /// How to mend it.
     pub help: String,
+}
+
+impl Diagnostic {
+    /// A finding at the first of `keys` that stands in the spec, by its `spans`; at none of them, about the whole spec
+    /// and under the first.
+    #[must_use]
+    pub fn at(
+        spans: &BTreeMap<String, Range<usize>>,
+        keys: &[&str],
+        (severity, code): (Severity, &'static str),
+        message: String,
+        help: String,
+    ) -> Self {
+        let found = keys.iter().find_map(|key| spans.get(*key).map(|span| (*key, Place::Spec(span.clone()))));
+        let (key, place) = found.unwrap_or_else(|| (keys.first().copied().unwrap_or_default(), Place::Whole));
+        Self { severity, code, key: key.to_owned(), place, message, help }
+    }
 }
 
 const MARKDOWN_HEAD: &str = "\

@@ -15,6 +15,7 @@ pub mod ir;
 pub mod lower;
 pub mod model;
 pub mod numerics;
+pub mod reach;
 pub mod spec;
 pub mod stability;
 pub mod target;

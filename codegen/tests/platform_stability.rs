@@ -394,7 +394,7 @@ fn unstable_numbers_are_refused_at_their_key_and_what_is_offered_is_accepted() {
         let with =
             |scale: f64| designed(|_, task| task.position_gains = Some(gains_of(&rule.position.scaled(scale, 1.0))));
         let found = with(factor).unwrap_err();
-        assert_eq!((found.len(), found[0].code, found[0].key.as_str()), (1, "E0431", "gains.position.integral"));
+        assert_eq!((found.len(), found[0].code, found[0].key.as_str()), (1, "E0431", "position_gains.integral"));
         assert!(found[0].message.contains("control mode P is"), "{}", found[0].message);
         let accepted = offered(&found[0].help) * factor;
         assert!(with(accepted).is_ok() && with(1.07 * accepted).is_err(), "× {accepted}: {}", found[0].help);
@@ -433,7 +433,7 @@ fn thin_margins_and_modes_beyond_the_notch_are_pointed_out() {
     let rule = designed(|_, _| ()).unwrap();
     let thin = designed(|_, task| task.position_gains = Some(gains_of(&rule.position.scaled(2.2, 1.0)))).unwrap();
     assert_eq!(thin.findings.len(), 1, "{:#?}", thin.findings);
-    assert_eq!((thin.findings[0].code, thin.findings[0].key.as_str()), ("W0433", "gains.position.integral"));
+    assert_eq!((thin.findings[0].code, thin.findings[0].key.as_str()), ("W0433", "position_gains.integral"));
     assert!(rule.findings.is_empty());
     let slow = designed(|model, _| model.timing.period = 1.0 / 1500.0).unwrap();
     assert!(

@@ -148,7 +148,7 @@ fn goldens_are_fresh() {
 
 #[test]
 fn the_committed_controller_is_what_the_reference_spec_gives() {
-    let compiled = compile(&repository().join("specs/legs.toml")).unwrap();
+    let compiled = compile(&repository().join("specs/reference.toml")).unwrap();
     for (path, committed) in sources(&repository().join("firmware/controller")) {
         assert!(committed == compiled.files[&format!("controller/{path}")], "{path} is stale; run: cargo xtask bless");
     }

@@ -137,8 +137,8 @@ codes! {
         "Somewhere on the declared trajectory a leg would be shorter than at zero volts or longer than its stroke. The help names the bias in z that would make it fit, if there is one.";
     NEAR_SINGULAR = "E0443", "geometry nearly singular inside the workspace",
         "Somewhere in the declared workspace the legs hardly hold the platform: the condition number of their Jacobian, angles taken at the joint radius, exceeds 10000.";
-    WORKSPACE_PARTLY_REACHABLE = "W0444", "corners of the workspace out of reach",
-        "Usual for a hexapod: the poses it reaches are no box. The figure says how large a box around the bias is reachable as a whole; beyond it the controller limits the legs.";
+    NO_ROOM = "W0444", "bias without room for corrections",
+        "A leg stands within a hundredth of its stroke of an end, so that feedback and adaptation can move it one way only. Corners of the declared workspace beyond reach are usual for a hexapod and not a finding; `specgen check` shows how much of it is reached.";
     TOO_FEW_CODES = "E0410", "converter too coarse for the grid",
         "There are fewer than two converter codes to a cell of the Preisach grid.";
     WORKSPACE_TOO_LARGE = "E0412", "workspace too large for the legs",

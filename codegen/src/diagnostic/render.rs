@@ -59,12 +59,12 @@ fn one(diagnostic: &Diagnostic, source: &SpecSource, lines: &Lines<'_>, renderer
             if window.cut_left {
                 // The snippet would count the column from the cut: say where it is, and show the piece below.
                 let origin = Origin::path(path).line(spot.line).char_column(spot.column);
-                let snippet = Snippet::source(window.text)
+                let snippet = Snippet::source(without_c1(&window.text))
                     .line_start(spot.line)
                     .annotation(AnnotationKind::Primary.span(window.span));
                 title.element(origin).element(snippet).element(Level::HELP.message(help))
             } else {
-                let snippet = Snippet::source(window.text)
+                let snippet = Snippet::source(without_c1(&window.text))
                     .path(path)
                     .line_start(spot.line)
                     .annotation(AnnotationKind::Primary.span(window.span));
@@ -80,4 +80,32 @@ fn visible(text: &str) -> String {
     text.chars()
         .flat_map(|c| if c.is_control() && c != '\n' { c.escape_default().collect::<Vec<_>>() } else { vec![c] })
         .collect()
+}
+
+/// U+0080 to U+009F, which the snippet would leave as they are and a terminal may obey, as a mark of the same length in
+/// UTF-8: spans keep their places.
+fn without_c1(line: &str) -> String {
+    line.chars().map(|c| if matches!(c, '\u{80}'..='\u{9f}') { '\u{bf}' } else { c }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_control_character_of_a_spec_reaches_the_terminal() {
+        let text =
+            format!("a = {}\n", ('\u{1}'..='\u{9f}').filter(|c| c.is_control() && *c != '\n').collect::<String>());
+        let source = SpecSource { display_name: "x\u{9b}.toml".to_owned(), text, dir: ".".into() };
+        let finding = Diagnostic {
+            severity: Severity::Error,
+            code: "E0104",
+            key: String::new(),
+            place: Place::Spec(4..source.text.len() - 1),
+            message: "m\u{85}".to_owned(),
+            help: "h".to_owned(),
+        };
+        let shown = render(&[finding], &source, false);
+        assert!(!shown.contains(|c: char| c.is_control() && c != '\n'), "{shown:?}");
+    }
 }

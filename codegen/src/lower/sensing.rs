@@ -8,7 +8,7 @@ pub use noise::{PoseNoise, pose_noise};
 
 use specgen_runtime::{Gauges, Series};
 
-use super::kinematics::{bounds, series_of, tolerance};
+use super::kinematics::{bounds, leg_jacobian, series_of, tolerance};
 use super::linear::{grid, norm};
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::ir::{Scalar, Sensing};
@@ -167,38 +167,43 @@ fn arcs(largest: f64, scalar: Scalar) -> (Vec<f64>, Vec<f64>) {
     (arc_sine, arc_tangent)
 }
 
-/// A pose that is accepted must be one that the gauges can read, each axis by itself.
+/// A pose that is accepted must be one that the gauges can read: each axis by itself, up to its bound. Where that way lies
+/// below the reach of every leg, as all poses below rest do, it need not be read.
 fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
     const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
     let [low, high] = model.sensor.range;
-    let mut findings = Vec::new();
-    for (k, sensitivity) in layout.jacobian.iter().enumerate() {
-        // The axis that asks most of this gauge.
-        let asked = sensitivity.iter().zip(bounds(model)).map(|(s, bound)| s.abs() * bound).enumerate();
-        let (axis, most) =
-            asked.fold((0, 0.0), |best, (axis, asked)| if asked > best.1 { (axis, asked) } else { best });
-        if -most >= low && most <= high {
-            continue;
+    let legs = leg_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
+    let mut worst: Option<(f64, usize, usize, f64)> = None;
+    for (axis, bound) in bounds(model).into_iter().enumerate() {
+        for motion in [-bound, bound] {
+            if legs.iter().all(|leg| leg[axis] * motion < 0.0) {
+                continue;
+            }
+            for (k, sensitivity) in layout.jacobian.iter().enumerate() {
+                let reading = sensitivity[axis] * motion;
+                let beyond = if reading > high { reading - high } else { low - reading };
+                if beyond > 1e-9 * (high - low) && worst.is_none_or(|(most, ..)| beyond > most) {
+                    worst = Some((beyond, axis, k, reading));
+                }
+            }
         }
-        let (name, unit, scale) = if axis < 3 { ("translation", "µm", 1e6) } else { ("rotation", "mrad", 1e3) };
-        findings.push(finding(
-            model,
-            codes::GAUGE_RANGE,
-            "sensor.range",
-            format!(
-                "within the declared workspace, {} of ±{:.4} {unit} alone takes gauge {k} to ±{:.3} µm, beyond its range of {:.3} µm to {:.3} µm",
-                AXES[axis],
-                bounds(model)[axis] * scale,
-                most * 1e6,
-                low * 1e6,
-                high * 1e6
-            ),
-            format!("reduce workspace.{name}, or use gauges with a range of at least ±{:.3} µm about rest", most * 1e6),
-        ));
     }
-    // One of them says it.
-    findings.truncate(1);
-    findings
+    let Some((_, axis, k, reading)) = worst else { return Vec::new() };
+    let (name, unit, scale) = if axis < 3 { ("translation", "µm", 1e6) } else { ("rotation", "mrad", 1e3) };
+    vec![finding(
+        model,
+        codes::GAUGE_RANGE,
+        "sensor.range",
+        format!(
+            "within the declared workspace, {} of ±{:.4} {unit} alone takes gauge {k} to {:.3} µm, beyond its range of {:.3} µm to {:.3} µm",
+            AXES[axis],
+            bounds(model)[axis] * scale,
+            reading * 1e6,
+            low * 1e6,
+            high * 1e6
+        ),
+        format!("reduce workspace.{name}, or use gauges whose range takes in {:.3} µm", reading * 1e6),
+    )]
 }
 
 fn finding(model: &Model, code: &'static str, key: &str, message: String, help: String) -> Diagnostic {

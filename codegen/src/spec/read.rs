@@ -168,6 +168,7 @@ impl Reader<'_> {
         let help = match (meant, elsewhere(section, written)) {
             (Some(meant), _) => format!("did you mean `{meant}`?"),
             (None, Some(path)) if is_table => format!("did you mean `{path}`?"),
+            (None, Some(path)) if path.starts_with('[') => format!("there is a section {path}: does it belong there?"),
             (None, Some(path)) => format!("`{path}` exists: did it slip out of its section?"),
             (None, None) => format!("take it out; {}", known_names(section, is_table)),
         };

@@ -48,11 +48,15 @@ pub struct RestDynamics {
 }
 
 impl RestDynamics {
-    /// Of the model that the controller holds.
+    /// M and J of the controller's own model at rest.
     #[must_use]
     pub fn of(platform: &Platform<f64>) -> Self {
-        let rest = [0.0; 6];
-        Self { mass: platform.mass_matrix(&rest), jacobian: platform.jacobian(&rest) }
+        let mass = platform.mass_matrix(&[0.0; 6]);
+        Self {
+            // Symmetric but for rounding, which the modes must not see.
+            mass: core::array::from_fn(|i| core::array::from_fn(|j| 0.5 * (mass[i][j] + mass[j][i]))),
+            jacobian: platform.jacobian(&[0.0; 6]),
+        }
     }
 }
 
@@ -71,6 +75,8 @@ pub struct Design {
     pub combined: Tuning,
     /// Gains of P alone; its bandwidths are zero.
     pub position: Tuning,
+    /// Whether the check includes contact with the declared work piece.
+    pub touching: bool,
     /// Every control mode.
     pub margins: Vec<ModeMargins>,
     /// Warnings and notes about what is stable but thin.
@@ -124,6 +130,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         bandwidth_limit: limit,
         combined,
         position,
+        touching: closed_loop.environment != [0.0; 6],
         margins,
         findings,
     })

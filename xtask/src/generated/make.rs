@@ -55,7 +55,7 @@ pub fn docs(_: &Path) -> Result<Files, String> {
 
 /// The controller of the reference spec.
 pub fn reference_controller(root: &Path) -> Result<Files, String> {
-    Ok(emit::emit(&compiled(&root.join("specs/legs.toml"))?.ir))
+    Ok(emit::emit(&compiled(&root.join("specs/reference.toml"))?.ir))
 }
 
 /// IR and emitted crate of small specs; what is the same for every spec stands in `firmware/controller` already.

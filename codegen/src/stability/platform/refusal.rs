@@ -7,7 +7,7 @@ use super::law::{Adapting, Law, Tuning};
 use super::margins::ModeMargins;
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions, notch, worst_radius};
-use crate::diagnostic::{Diagnostic, Place, Severity, codes};
+use crate::diagnostic::{Diagnostic, Severity, codes};
 use crate::model::{Model, TaskSpace};
 
 const ADAPTED: [Law; 2] = [Law::Feedforward(Adapting::Ewma), Law::Feedforward(Adapting::Pcc)];
@@ -27,7 +27,7 @@ pub(super) fn no_modes(model: &Model) -> Diagnostic {
         model,
         Severity::Error,
         codes::NO_MODES,
-        &["geometry.height", "geometry"],
+        &["geometry"],
         "the platform has no six modes on its legs: its mass matrix or K = Jᵀ k_a J at rest is not positive definite"
             .to_owned(),
         "check [geometry] (six legs that hold every direction), the masses and inertias, and actuator.axial_stiffness"
@@ -64,7 +64,7 @@ pub(super) fn check(
     }
     if let Some(unstable) = case.unstable(&[Law::Position], position) {
         let largest = case.largest(&[Law::Position], |factor| position.scaled(factor, 1.0));
-        findings.push(case.gains("gains.position", task.position_gains.is_some(), unstable, position, largest));
+        findings.push(case.gains("position_gains", task.position_gains.is_some(), unstable, position, largest));
     }
     if findings.is_empty() { Ok(()) } else { Err(findings) }
 }
@@ -226,7 +226,7 @@ pub(super) fn thin(
     let groups: [(&[Law], &[&str]); 3] = [
         (&ADAPTED, &["adaptation.level_bandwidth", "adaptation.level_weight", "control"]),
         (&COMBINED, &["gains.integral", "gains.proportional", "gains", "control"]),
-        (&[Law::Position], &["gains.position.integral", "gains.position", "control"]),
+        (&[Law::Position], &["position_gains.integral", "position_gains", "control"]),
     ];
     for (laws, keys) in groups {
         let worst = margins.iter().filter(|one| laws.contains(&one.law)).find(|one| {
@@ -257,7 +257,7 @@ pub(super) fn thin(
             model,
             Severity::Warning,
             codes::MODE_NOT_NOTCHED,
-            &["control.notch_damping", "timing.period"],
+            &["control.notch_damping", "control.notch", "timing.period"],
             format!(
                 "the notch leaves out the modes at {}: they lie near or above half the tick rate, {:.0} Hz",
                 missed.join(", "),
@@ -278,7 +278,6 @@ fn shown(value: f64) -> f64 {
     libm::floor(value * scale) / scale
 }
 
-/// At the first of `keys` that the spec has.
 fn finding(
     model: &Model,
     severity: Severity,
@@ -287,12 +286,7 @@ fn finding(
     message: String,
     help: String,
 ) -> Diagnostic {
-    let at = keys.iter().find_map(|key| model.spans.get(*key).map(|span| (*key, span.clone())));
-    let (key, place) = at.map_or_else(
-        || (keys.first().copied().unwrap_or_default(), Place::Whole),
-        |(key, span)| (key, Place::Spec(span)),
-    );
-    Diagnostic { severity, code, key: key.to_owned(), place, message, help }
+    Diagnostic::at(&model.spans, keys, (severity, code), message, help)
 }
 
 #[cfg(test)]

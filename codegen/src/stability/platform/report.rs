@@ -27,13 +27,16 @@ pub fn describe(design: &Design) -> String {
     );
     let _ = write!(text, "{}", gains("gains", &design.combined));
     let _ = write!(text, "{}", gains("gains of P alone", &design.position));
+    let touching = if design.touching { "free and touching the declared work piece" } else { "free of contact" };
+    let _ = writeln!(text, "  every control mode, checked {touching}:");
     let _ = writeln!(
         text,
         "  {:<12}{:>9}{:>8}{:>8}{:>16}{:>12}{:>22}",
         "mode", "radius", "λ <", "gain ×", "delay, ticks", "settles, ms", "least damped"
     );
     for one in &design.margins {
-        let or = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |x| format!("{x:.digits$}"));
+        let or =
+            |value: Option<f64>, none: &str, digits: usize| value.map_or(none.to_owned(), |x| format!("{x:.digits$}"));
         let least = one.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
         let least = least.map_or("-".to_owned(), |mode| format!("{:.0} Hz, {:.4}", mode.frequency, mode.damping_ratio));
         let _ = writeln!(
@@ -41,10 +44,10 @@ pub fn describe(design: &Design) -> String {
             "  {:<12}{:>9.5}{:>8}{:>8}{:>16}{:>12}{:>22}",
             one.law.name(),
             one.spectral_radius,
-            or(one.gain_ratio_limit, 2),
-            or(one.gain_margin, 2),
-            or(one.delay_margin_ticks, 2),
-            or(one.settling.map(|time| time * 1e3), 1),
+            or(one.gain_ratio_limit, "> 10", 2),
+            or(one.gain_margin, "-", 2),
+            or(one.delay_margin_ticks, "> 5", 2),
+            or(one.settling.map(|time| time * 1e3), "-", 1),
             least
         );
     }

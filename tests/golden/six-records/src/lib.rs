@@ -24,9 +24,11 @@
 
 mod config;
 
+pub mod dynamics;
 pub mod hysteresis;
 pub mod kinematics;
 pub mod limits;
+pub mod stages;
 mod state;
 mod step;
 mod words;

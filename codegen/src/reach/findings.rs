@@ -1,0 +1,198 @@
+//! What the user is told about reach.
+
+use std::fmt::Write as _;
+
+use super::{PathReach, ROOM, Reach};
+use crate::diagnostic::{Diagnostic, Severity, codes};
+use crate::model::Model;
+
+/// A condition number above this is refused.
+const LARGEST_CONDITION: f64 = 1e4;
+const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
+/// Unit and factor of an axis in messages.
+const fn unit(axis: usize) -> (&'static str, f64) {
+    if axis < 3 { ("um", 1e6) } else { ("urad", 1e6) }
+}
+
+/// Findings about bias and workspace; `bias` is the path that stands still at the bias.
+pub(super) fn of(model: &Model, reach: &Reach, bias: &PathReach) -> Vec<Diagnostic> {
+    let mut findings = Vec::new();
+    findings.extend(of_bias(model, reach, bias));
+    for axis in 0..6 {
+        findings.extend(of_axis(model, reach, axis));
+    }
+    let conditioning = &reach.conditioning;
+    if conditioning.worst > LARGEST_CONDITION {
+        findings.push(finding(
+            model,
+            Severity::Error,
+            codes::NEAR_SINGULAR,
+            &["workspace.rotation", "workspace"],
+            format!(
+                "inside the declared workspace the legs hardly hold the platform: the condition number of their Jacobian \
+                 rises from {:.1} at rest to {:.3e} at {}",
+                conditioning.at_rest,
+                conditioning.worst,
+                pose(&conditioning.worst_pose)
+            ),
+            "reduce the workspace, or change the geometry: height comparable to the radii, joint pairs close".to_owned(),
+        ));
+    }
+    findings
+}
+
+fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic> {
+    const KEYS: [&str; 4] = ["control.setpoint.bias[2]", "control.setpoint.bias", "control.setpoint", "control"];
+    let [low, high] = reach.at_bias;
+    if beyond(reach.stroke, reach.at_bias) {
+        let help = advice(bias, "bias");
+        let message = format!(
+            "at the bias the legs would be at {:.3} um to {:.3} um, but they move between 0 and {:.3} um",
+            low * 1e6,
+            high * 1e6,
+            reach.stroke * 1e6
+        );
+        return Some(finding(model, Severity::Error, codes::BIAS_UNREACHABLE, &KEYS, message, help));
+    }
+    let room = ROOM * reach.stroke;
+    if low >= room && high <= reach.stroke - room {
+        return None;
+    }
+    let message = format!(
+        "at the bias a leg stands at {:.3} um of {:.3} um: there is no room for corrections beyond",
+        if low < room { low * 1e6 } else { high * 1e6 },
+        reach.stroke * 1e6
+    );
+    let middle = 0.5 * (reach.axes[2].from_middle[0] + reach.axes[2].from_middle[1]);
+    let help = format!("move the bias towards the middle of the strokes, where z is {:.1} um", middle * 1e6);
+    Some(finding(model, Severity::Warning, codes::NO_ROOM, &KEYS, message, help))
+}
+
+fn of_axis(model: &Model, reach: &Reach, axis: usize) -> Option<Diagnostic> {
+    let one = &reach.axes[axis];
+    let [low, high] = one.from_middle;
+    let furthest = if -low > high { -low } else { high };
+    if one.declared <= furthest * (1.0 + 1e-9) {
+        return None;
+    }
+    let (table, item) = if axis < 3 { ("workspace.translation", axis) } else { ("workspace.rotation", axis - 3) };
+    let key = format!("{table}[{item}]");
+    let (unit, scale) = unit(axis);
+    // Rounded down, so that the number shown is itself accepted.
+    let shown = libm::floor(furthest * scale * 100.0) / 100.0;
+    Some(finding(
+        model,
+        Severity::Error,
+        codes::AXIS_UNREACHABLE,
+        &[&key, table, "workspace"],
+        format!(
+            "no pose reaches |{}| = {:.2} {unit}: from the middle of the strokes, this axis alone goes from {:.2} to {:.2} {unit}",
+            AXES[axis],
+            one.declared * scale,
+            low * scale,
+            high * scale
+        ),
+        format!("at most {shown} {unit}; check the unit, or use legs with more stroke"),
+    ))
+}
+
+/// What is wrong with a path, if anything.
+pub(super) fn of_path(model: &Model, stroke: f64, [key, name]: [&str; 2], path: &PathReach) -> Option<Diagnostic> {
+    if path.poses == 0 || !beyond(stroke, path.displacement) {
+        return None;
+    }
+    let message = format!(
+        "`{name}` needs leg displacements from {:.3} um to {:.3} um, but the legs move between 0 and {:.3} um",
+        path.displacement[0] * 1e6,
+        path.displacement[1] * 1e6,
+        stroke * 1e6
+    );
+    let section = key.split('.').next().unwrap_or(key);
+    Some(finding(
+        model,
+        Severity::Error,
+        codes::TRAJECTORY_UNREACHABLE,
+        &[key, section],
+        message,
+        advice(path, "control.setpoint.bias"),
+    ))
+}
+
+/// Beyond the ends of the strokes by more than rounding; NaN is.
+fn beyond(stroke: f64, [low, high]: [f64; 2]) -> bool {
+    let inside = low >= -1e-9 * stroke && high <= (1.0 + 1e-9) * stroke;
+    !inside
+}
+
+fn advice(path: &PathReach, what: &str) -> String {
+    match path.shift {
+        // Rounded inwards.
+        Some([low, high]) => format!(
+            "add {} um to {} um to z of {what}, and it fits",
+            libm::ceil(low * 1e8) / 100.0,
+            libm::floor(high * 1e8) / 100.0
+        ),
+        None => format!("no z of {what} makes it fit: it is too large for this stroke; check its units, or reduce it"),
+    }
+}
+
+fn pose(pose: &[f64; 6]) -> String {
+    let parts: Vec<String> = pose
+        .iter()
+        .enumerate()
+        .map(|(axis, value)| format!("{} {:.1} {}", AXES[axis], value * unit(axis).1, unit(axis).0))
+        .collect();
+    parts.join(", ")
+}
+
+/// The reach as text for `specgen check`.
+#[must_use]
+pub fn describe(reach: &Reach) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "  reach of one axis alone, um and urad ({:.1} um legs): from the middle of the strokes | from the bias",
+        reach.stroke * 1e6
+    );
+    for (axis, one) in reach.axes.iter().enumerate() {
+        let scale = unit(axis).1;
+        let _ = writeln!(
+            text,
+            "    {:<3} {:>9.1} to {:>8.1} | {:>9.1} to {:>8.1}   (declared ±{:.1})",
+            AXES[axis],
+            one.from_middle[0] * scale,
+            one.from_middle[1] * scale,
+            one.from_bias[0] * scale,
+            one.from_bias[1] * scale,
+            one.declared * scale
+        );
+    }
+    let _ = writeln!(
+        text,
+        "  at the bias the legs stand at {:.1} to {:.1} um; {:.1} % of the declared workspace around it is reached corner by corner",
+        reach.at_bias[0] * 1e6,
+        reach.at_bias[1] * 1e6,
+        reach.share * 100.0
+    );
+    let conditioning = &reach.conditioning;
+    let _ = writeln!(
+        text,
+        "  condition of J {:.2} at rest, {:.2} at worst; no singular pose within {:.1} mm of the workspace",
+        conditioning.at_rest,
+        conditioning.worst,
+        conditioning.free_of_singularities * 1e3
+    );
+    text
+}
+
+fn finding(
+    model: &Model,
+    severity: Severity,
+    code: &'static str,
+    keys: &[&str],
+    message: String,
+    help: String,
+) -> Diagnostic {
+    Diagnostic::at(&model.spans, keys, (severity, code), message, help)
+}

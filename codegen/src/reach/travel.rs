@@ -1,0 +1,159 @@
+//! Leg displacements along axes, over boxes and along paths, from the kinematics that the controller uses.
+
+use nalgebra::{Matrix6, Vector6};
+use specgen_runtime::Platform;
+
+use super::{INTERIOR_POSES, PathReach, Pose, wider};
+
+/// Bisections of a travel: 2⁻⁴⁰ of it is far below an atom.
+const BISECTIONS: u32 = 40;
+/// The kinematics holds up to here, rad.
+const LARGEST_ANGLE: f64 = core::f64::consts::FRAC_PI_4;
+/// A leg counts as within its stroke up to this part of it beyond: rounding must not refuse a path that starts at rest.
+const SLACK: f64 = 1e-9;
+
+pub(super) struct Legs<'a> {
+    pub(super) platform: &'a Platform<f64>,
+    pub(super) stroke: f64,
+}
+
+impl Legs<'_> {
+    /// Smallest and largest leg displacement at a pose, m.
+    pub(super) fn span(&self, pose: &Pose) -> [f64; 2] {
+        let displacements = self.platform.displacements(pose);
+        displacements.iter().map(|x| [*x, *x]).fold([f64::INFINITY, f64::NEG_INFINITY], wider)
+    }
+
+    fn holds(&self, pose: &Pose) -> bool {
+        let [low, high] = self.span(pose);
+        low >= -SLACK * self.stroke && high <= (1.0 + SLACK) * self.stroke
+    }
+
+    /// The pose with every leg at half its stroke, by Newton steps from rest.
+    pub(super) fn middle(&self) -> Pose {
+        let mut pose = [0.0; 6];
+        for _ in 0..8 {
+            let missing = self.platform.displacements(&pose).map(|x| 0.5 * self.stroke - x);
+            let jacobian = self.platform.jacobian(&pose);
+            let rows = Matrix6::from_fn(|i, j| jacobian[i][j]);
+            let Some(step) = rows.lu().solve(&Vector6::from(missing)) else {
+                break;
+            };
+            for (x, dx) in pose.iter_mut().zip(step.iter()) {
+                *x += dx;
+            }
+        }
+        pose
+    }
+
+    /// Value of `axis` at which the first leg ends, moving it alone from `pose` in the direction of `sign`; its value at
+    /// `pose` if a leg is beyond its ends there.
+    pub(super) fn travel(&self, pose: &Pose, axis: usize, sign: f64) -> f64 {
+        let moved = |by: f64| {
+            let mut moved = *pose;
+            moved[axis] += sign * by;
+            moved
+        };
+        // No pose within reach is further than the strokes allow the steepest leg, twice over for the curvature.
+        let jacobian = self.platform.jacobian(pose);
+        let steepest = jacobian.iter().map(|row| row[axis].abs()).fold(0.0, |a: f64, b| if b > a { b } else { a });
+        let far = 2.0 * self.stroke / steepest;
+        let far = if axis >= 3 && far > LARGEST_ANGLE { LARGEST_ANGLE } else { far };
+        pose[axis] + sign * self.largest(far, |by| self.holds(&moved(by)))
+    }
+
+    /// Largest value up to `far` below which `holds`, by bisection; 0 if nowhere.
+    fn largest(&self, far: f64, holds: impl Fn(f64) -> bool) -> f64 {
+        if holds(far) {
+            return far;
+        }
+        let (mut good, mut bad) = (0.0, far);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (good + bad);
+            if holds(middle) { good = middle } else { bad = middle }
+        }
+        good
+    }
+
+    /// Part of the box, shrunk towards `bias`, of which all corners are in reach.
+    pub(super) fn share(&self, bias: &Pose, bounds: &Pose) -> f64 {
+        self.largest(1.0, |share| {
+            corners().all(|signs| {
+                let corner = core::array::from_fn(|i| bias[i] + share * (signs[i] * bounds[i] - bias[i]));
+                self.holds(&corner)
+            })
+        })
+    }
+
+    /// Upper bound of |Δl| over the whole box. With d the motion of a joint, |Δl − s·d| ≤ |d|²/(2 (l₀ − |d|)), and
+    /// |R − I − [θ]×| ≤ e^t − 1 − t with t = |θx| + |θy| + |θz|.
+    pub(super) fn bound(&self, bounds: &Pose, rest_lengths: &[f64; 6], joint_radius: f64) -> f64 {
+        let turn = bounds[3] + bounds[4] + bounds[5];
+        let second = (libm::exp(turn) - 1.0 - turn) * joint_radius;
+        let motion = bounds[0] + bounds[1] + bounds[2] + turn * joint_radius + second;
+        let jacobian = self.platform.jacobian(&[0.0; 6]);
+        let mut largest = 0.0;
+        for (row, length) in jacobian.iter().zip(rest_lengths) {
+            let mut linear = 0.0;
+            for (slope, bound) in row.iter().zip(bounds) {
+                linear += slope.abs() * bound;
+            }
+            let curvature = if motion < *length { motion * motion / (2.0 * (length - motion)) } else { motion };
+            let all = linear + second + curvature;
+            if all > largest {
+                largest = all;
+            }
+        }
+        largest
+    }
+
+    /// Displacements along a path, and by how much all of it may be moved along z. The legs' slopes in z are those at rest:
+    /// over the strokes of a piezo they do not change.
+    pub(super) fn shift(&self, poses: impl Iterator<Item = Pose>) -> PathReach {
+        let mut path = PathReach { poses: 0, displacement: [f64::INFINITY, f64::NEG_INFINITY], shift: None };
+        let slopes = self.platform.jacobian(&[0.0; 6]).map(|row| row[2]);
+        let (mut lowest, mut highest) = (f64::NEG_INFINITY, f64::INFINITY);
+        for pose in poses {
+            path.poses += 1;
+            for (x, slope) in self.platform.displacements(&pose).iter().zip(slopes) {
+                path.displacement = wider(path.displacement, [*x, *x]);
+                let (mut from, mut to) = (-x / slope, (self.stroke - x) / slope);
+                if slope < 0.0 {
+                    (from, to) = (to, from);
+                }
+                if from > lowest {
+                    lowest = from;
+                }
+                if to < highest {
+                    highest = to;
+                }
+            }
+        }
+        path.shift = (path.poses > 0 && lowest <= highest).then_some([lowest, highest]);
+        path
+    }
+}
+
+/// Signs of the 64 corners of a box.
+fn corners() -> impl Iterator<Item = [f64; 6]> {
+    (0..64_u32).map(|corner| core::array::from_fn(|axis| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 }))
+}
+
+/// Corners of the box, and interior poses spread evenly (Halton).
+pub(super) fn samples(bounds: &Pose) -> impl Iterator<Item = Pose> {
+    const PRIMES: [u32; 6] = [2, 3, 5, 7, 11, 13];
+    let interior = (1..=INTERIOR_POSES).map(|k| PRIMES.map(|prime| 2.0 * radical_inverse(k, prime) - 1.0));
+    let bounds = *bounds;
+    corners().chain(interior).map(move |part| core::array::from_fn(|axis| part[axis] * bounds[axis]))
+}
+
+/// Digits of `k` in `base`, mirrored at the point.
+fn radical_inverse(mut k: u32, base: u32) -> f64 {
+    let (mut value, mut weight) = (0.0, 1.0);
+    while k > 0 {
+        weight /= f64::from(base);
+        value += weight * f64::from(k % base);
+        k /= base;
+    }
+    value
+}
