@@ -3,7 +3,6 @@
 
 use proc_macro2::TokenStream;
 use quote::quote;
-use specgen_runtime::dynamics::LANES;
 
 use super::literal;
 use crate::ir::{DynamicsLeg, Ir};
@@ -12,8 +11,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let d = &ir.dynamics;
     let real = |value| literal::real(ir.scalar, value);
     let reals = |values: &[f64]| literal::reals(ir.scalar, values);
-    let groups = d.legs.chunks(LANES).map(|legs| group(ir, legs));
-    let order = d.order.map(literal::count);
+    let legs = d.legs.iter().map(|of| leg(ir, of));
+    let places = d.places.map(literal::count);
     let rows = d.rows.map(literal::count);
     let (flat_base, flat_platform) = (d.flat_base, d.flat_platform);
     let (base_depth, mass, gravity) = (real(d.base_depth), real(d.mass), real(d.gravity));
@@ -31,7 +30,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " Poses are from rest, [x y z θx θy θz] in m and rad; rates and accelerations are their time derivatives. The model and its range are"]
         #![doc = " in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared workspace only."]
 
-        use specgen_runtime::dynamics::LegGroup;
+        use specgen_runtime::dynamics::Leg;
         use specgen_runtime::Platform;
 
         pub use specgen_runtime::{Load, Motion};
@@ -42,8 +41,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
         ///
         #[doc = #pivots_doc]
         pub const PLATFORM: Platform<Real> = Platform {
-            groups: [#(#groups),*],
-            order: [#(#order),*],
+            legs: [#(#legs),*],
+            places: [#(#places),*],
             rows: [#(#rows),*],
             flat_base: #flat_base,
             flat_platform: #flat_platform,
@@ -104,27 +103,18 @@ pub fn emit(ir: &Ir) -> TokenStream {
     }
 }
 
-/// Legs side by side: each number of the group holds one of every leg.
-fn group(ir: &Ir, legs: &[DynamicsLeg]) -> TokenStream {
-    let numbers = |value: &dyn Fn(&DynamicsLeg) -> f64| {
-        let values: Vec<f64> = legs.iter().map(value).collect();
-        let values = literal::reals(ir.scalar, &values);
-        quote! { [#values] }
-    };
-    let vectors = |value: &dyn Fn(&DynamicsLeg) -> [f64; 3]| {
-        let axes = [0, 1, 2].map(|axis| numbers(&|leg| value(leg)[axis]));
-        quote! { [#(#axes),*] }
-    };
-    let (base, joint) = (vectors(&|leg| leg.base), vectors(&|leg| leg.joint));
-    let (arm, rest) = (vectors(&|leg| leg.arm), vectors(&|leg| leg.rest));
-    let (length, inverse_length) = (numbers(&|leg| leg.length), numbers(&|leg| leg.inverse_length));
-    let half_inverse_square = numbers(&|leg| leg.half_inverse_square);
+fn leg(ir: &Ir, leg: &DynamicsLeg) -> TokenStream {
+    let real = |value| literal::real(ir.scalar, value);
+    let vector = |value: &[f64; 3]| literal::reals(ir.scalar, value);
+    let (base, joint, arm, rest) = (vector(&leg.base), vector(&leg.joint), vector(&leg.arm), vector(&leg.rest));
+    let (length, inverse_length) = (real(leg.length), real(leg.inverse_length));
+    let half_inverse_square = real(leg.half_inverse_square);
     quote! {
-        LegGroup {
-            base: #base,
-            joint: #joint,
-            arm: #arm,
-            rest: #rest,
+        Leg {
+            base: [#base],
+            joint: [#joint],
+            arm: [#arm],
+            rest: [#rest],
             length: #length,
             inverse_length: #inverse_length,
             half_inverse_square: #half_inverse_square,
