@@ -31,7 +31,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared workspace only."]
 
         use specgen_runtime::dynamics::Leg;
-        use specgen_runtime::Platform;
+        use specgen_runtime::{Platform, Real as _};
 
         pub use specgen_runtime::{Load, Motion};
 
@@ -99,6 +99,28 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #[must_use]
         pub fn jacobian(pose: &[Real; 6]) -> [[Real; 6]; 6] {
             PLATFORM.jacobian(pose)
+        }
+
+        /// Words of a motion: pose, rate, acceleration.
+        pub const MOTION_WORDS: usize = 18;
+        /// Words of an analysis: J and M row by row, C ḣ, G, leg forces, leg displacements.
+        pub const ANALYSIS_WORDS: usize = 96;
+
+        /// All of the above for one motion, as words, for tools on a host.
+        #[must_use]
+        pub fn analysis(words: &[u64; MOTION_WORDS]) -> [u64; ANALYSIS_WORDS] {
+            let number = |k: usize| Real::from_word(words[k]);
+            let six = |k: usize| [number(k), number(k + 1), number(k + 2), number(k + 3), number(k + 4), number(k + 5)];
+            let motion = Motion { pose: six(0), rate: six(6), acceleration: six(12) };
+            let load = load(&motion, &[0.0; 6]);
+            let rows = [coriolis(&motion.pose, &motion.rate), gravity(&motion.pose), leg_forces(&motion), load.displacement];
+            let (jacobian, mass) = (jacobian(&motion.pose), mass_matrix(&motion.pose));
+            let mut out = [0; ANALYSIS_WORDS];
+            let values = jacobian.iter().chain(&mass).chain(&rows).flatten();
+            for (word, value) in out.iter_mut().zip(values) {
+                *word = value.to_word();
+            }
+            out
         }
     }
 }

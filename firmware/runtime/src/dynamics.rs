@@ -156,6 +156,14 @@ impl<T: Real> Platform<T> {
         self.by_leg(&self.balance::<1>(&Attitude::new(pose), &at_rest(pose), T::ZERO).displacements())
     }
 
+    /// Leg lengths l₀ at rest, m.
+    #[inline]
+    #[must_use]
+    pub fn rest_lengths(&self) -> [T; 6] {
+        let [a, b, c, d, e, f] = &self.legs;
+        self.by_leg(&[a.length, b.length, c.length, d.length, e.length, f.length])
+    }
+
     /// J = ∂l/∂h, row by leg: m/m and m/rad.
     #[inline]
     #[must_use]

@@ -78,7 +78,11 @@ impl<T: Real, const E: usize> Balance<T, E> {
 
 /// The column of the leg at place `J`, after those before it.
 #[inline(always)]
-fn factor<T: Real, const E: usize, const J: usize>(share: &Share<T, E>, before: [&Column<T>; J], rows: &[usize; 6]) -> Column<T> {
+fn factor<T: Real, const E: usize, const J: usize>(
+    share: &Share<T, E>,
+    before: [&Column<T>; J],
+    rows: &[usize; 6],
+) -> Column<T> {
     let mut entries = ordered(&share.column, rows);
     eliminate(&mut entries, before, rows);
     let inverse_pivot = T::ONE / entries[J % 6];

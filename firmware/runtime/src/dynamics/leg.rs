@@ -40,7 +40,11 @@ impl<T: Real, const B: usize, const P: usize> Round<'_, T, B, P> {
         let common = self.common;
         let number = |value: fn(&Leg<T>) -> T| Lanes(legs.map(value));
         let vector = |value: fn(&Leg<T>) -> &[T; 3]| {
-            [Lanes(legs.map(|leg| value(leg)[0])), Lanes(legs.map(|leg| value(leg)[1])), Lanes(legs.map(|leg| value(leg)[2]))]
+            [
+                Lanes(legs.map(|leg| value(leg)[0])),
+                Lanes(legs.map(|leg| value(leg)[1])),
+                Lanes(legs.map(|leg| value(leg)[2])),
+            ]
         };
         let (rest, joint, arm) = (vector(|leg| &leg.rest), vector(|leg| &leg.joint), vector(|leg| &leg.arm));
 
@@ -62,10 +66,9 @@ impl<T: Real, const B: usize, const P: usize> Round<'_, T, B, P> {
 
         // −l y of the module's documentation.
         let moment = Lanes::splat(platform.extensible_moment);
-        let rest_moment = moment - w * platform.leg_inertia;
-        let inertial = moment + rest_moment;
-        let half_coriolis = rest_moment * turning;
-        let coriolis = half_coriolis + half_coriolis;
+        let swing = w * platform.leg_inertia;
+        let inertial = moment + moment - swing;
+        let coriolis = (inertial - swing) * turning;
         let a = affine(&common.acceleration, &common.tow, &joint);
         let weight = common.leg_weight.map(Lanes::splat);
         let y = [
@@ -129,7 +132,11 @@ fn inverse_root<T: Real, const N: usize>(half: Lanes<T, N>) -> Lanes<T, N> {
 
 /// offset + m v, with the first `D` components of v.
 #[inline(always)]
-fn affine<T: Real, const N: usize, const D: usize>(offset: &[T; 3], m: &[[T; D]; 3], v: &Vectors<T, N>) -> Vectors<T, N> {
+fn affine<T: Real, const N: usize, const D: usize>(
+    offset: &[T; 3],
+    m: &[[T; D]; 3],
+    v: &Vectors<T, N>,
+) -> Vectors<T, N> {
     let mut out = offset.map(Lanes::splat);
     for (out, row) in out.iter_mut().zip(m) {
         for (m, v) in row.iter().zip(v) {
@@ -141,7 +148,12 @@ fn affine<T: Real, const N: usize, const D: usize>(offset: &[T; 3], m: &[[T; D];
 
 /// v + ω × P, with the first `dimensions` components of the joint.
 #[inline(always)]
-fn spun<T: Real, const N: usize>(v: &[T; 3], omega: &[T; 3], joint: &Vectors<T, N>, dimensions: usize) -> Vectors<T, N> {
+fn spun<T: Real, const N: usize>(
+    v: &[T; 3],
+    omega: &[T; 3],
+    joint: &Vectors<T, N>,
+    dimensions: usize,
+) -> Vectors<T, N> {
     let [p, q, r] = *omega;
     let [vx, vy, vz] = v.map(Lanes::splat);
     let (x, y) = (vx - joint[1] * r, vy + joint[0] * r);
