@@ -412,7 +412,7 @@ fn leg_lengths_are_exact_within_thirty_percent() {
     let rest = platform.rest_lengths();
     let (mut lowest, mut highest) = (1.0_f64, 1.0_f64);
     for k in 0..=200 {
-        let z = -0.08 + 0.15 * f64::from(k) / 200.0;
+        let z = -0.096 + 0.174 * f64::from(k) / 200.0;
         let found = platform.displacements(&[0.0, 0.0, z, 0.0, 0.0, 0.0]);
         let (b, p) = (model.geometry.base_joints[0], model.geometry.platform_joints[0]);
         let level = (p[0] - b[0]).powi(2) + (p[1] - b[1]).powi(2);

@@ -1,10 +1,12 @@
 //! `specgen dynamics`: M, C ḣ, G, J and leg forces of a platform at given states, by the model that its controller uses.
 
+use std::f64::consts::FRAC_PI_4;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::controller::{Controller, Dynamics};
+use nalgebra::{Rotation3, Vector3};
 use serde_json::{Value, json};
 use specgen_runtime::Motion;
 
@@ -12,9 +14,12 @@ use super::file::write_file;
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled};
 use crate::lower;
+use crate::model::Model;
 use crate::target;
 use crate::workspace;
 
+/// Leg lengths over those at rest.
+const LENGTH_RATIOS: std::ops::RangeInclusive<f64> = 0.7..=1.3;
 /// Longest file of states, bytes.
 const LARGEST: u64 = 64 << 20;
 
@@ -56,6 +61,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     for state in &states {
         let [mut pose, rate, acceleration] = state.given;
         pose[2] -= height;
+        within_range(&compiled.model, &pose)
+            .map_err(|text| Failure::Gate(format!("{}: state {}: {text}", arguments.states.display(), state.id)))?;
         let result = match &generated {
             Some(generated) => generated
                 .controller
@@ -88,6 +95,32 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             ui.result(&text, json!({ "states": states.len(), "file": path.display().to_string() }));
         }
         None => ui.result(&format!("{document:#}\n"), document),
+    }
+    Ok(())
+}
+
+/// The range that the dynamics are exact in, see [`specgen_runtime::dynamics`]. Lengths by the textbook formula: outside, the
+/// kernel's own are wrong.
+fn within_range(model: &Model, pose: &[f64; 6]) -> Result<(), String> {
+    let [x, y, z, a, b, c] = *pose;
+    if [a, b, c].iter().any(|angle| angle.abs() > FRAC_PI_4) {
+        return Err(format!("an angle is beyond ±{FRAC_PI_4:.4} rad, for which the dynamics are made"));
+    }
+    let turn = Rotation3::from_euler_angles(a, b, c);
+    let geometry = &model.geometry;
+    for (leg, (base, joint)) in geometry.base_joints.iter().zip(&geometry.platform_joints).enumerate() {
+        let (base, joint) = (Vector3::from(*base), Vector3::from(*joint));
+        let rest = (Vector3::new(0.0, 0.0, geometry.height) + joint - base).norm();
+        let ratio = (Vector3::new(x, y, geometry.height + z) + turn * joint - base).norm() / rest;
+        if !LENGTH_RATIOS.contains(&ratio) {
+            return Err(format!(
+                "leg {} has {ratio:.3} of its length at rest, beyond {} to {}, for which the dynamics are made; is the pose absolute or \
+                 from rest (--from-rest)?",
+                leg + 1,
+                LENGTH_RATIOS.start(),
+                LENGTH_RATIOS.end()
+            ));
+        }
     }
     Ok(())
 }
