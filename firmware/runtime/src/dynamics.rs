@@ -35,6 +35,7 @@ mod balance;
 mod lanes;
 mod leg;
 
+pub use crate::motion::Motion;
 use crate::real::Real;
 use attitude::Attitude;
 use balance::Balance;
@@ -46,31 +47,6 @@ const SIDE_BY_SIDE: bool = cfg!(not(target_arch = "arm"));
 
 /// Number of legs.
 const LEGS: usize = 6;
-
-/// Pose with its first and second time derivatives: m and rad, per s, per s².
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion<T> {
-    /// h.
-    pub pose: [T; 6],
-    /// ḣ.
-    pub rate: [T; 6],
-    /// ḧ.
-    pub acceleration: [T; 6],
-}
-
-impl<T: Real> Default for Motion<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<T: Real> Motion<T> {
-    /// Standstill at rest.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { pose: [T::ZERO; 6], rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] }
-    }
-}
 
 /// What the legs must do for a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]

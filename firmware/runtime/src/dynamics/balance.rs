@@ -86,6 +86,7 @@ fn factor<T: Real, const E: usize, const J: usize>(
     let mut entries = ordered(&share.column, rows);
     eliminate(&mut entries, before, rows);
     let inverse_pivot = T::ONE / entries[J % 6];
+    #[allow(clippy::needless_range_loop)] // Three arrays by one index.
     for i in 0..6 {
         if i > J {
             entries[i] = entries[i] * inverse_pivot;
