@@ -43,10 +43,9 @@ pub fn emit() -> TokenStream {
         /// Brings a copy of the state to where the stages find it, with each leg's request in place of its load; not measured.
         pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
             crate::step::sense(state, &input.gauge);
-            let (target, _) = state.generator.next(&PLAN, &input.command);
-            let load = known_load(config, state, &target);
+            state.generator.tick(&PLAN, &input.command);
+            let load = known_load(config, state, state.generator.target());
             let feedback = feedback(config, state);
-            state.target = target;
             for (index, leg) in state.legs.iter().enumerate() {
                 state.load[index] = load.displacement[index] + feedback[index] - leg.estimate.correction();
             }
@@ -64,7 +63,7 @@ pub fn emit() -> TokenStream {
 
         /// The modal notch on the pose error.
         extern "C" fn notch(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            let error = difference(&state.target.pose, &state.pose);
+            let error = difference(&state.generator.target().pose, &state.pose);
             state.error = notch_error(&mut state.error_notch, &error);
         }
 
@@ -75,19 +74,18 @@ pub fn emit() -> TokenStream {
 
         /// The generator of set-points.
         extern "C" fn setpoint(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
-            let (target, _) = state.generator.next(&PLAN, &input.command);
-            state.target = target;
+            state.generator.tick(&PLAN, &input.command);
         }
 
         /// h, ḣ, ḧ to six leg forces.
         extern "C" fn dynamics(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            let Target { pose, rate, acceleration } = state.target;
+            let Target { pose, rate, acceleration } = *state.generator.target();
             state.load = leg_forces(&Motion { pose, rate, acceleration });
         }
 
         /// The same with the interaction force, and with the leg displacements.
         extern "C" fn load(config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            let load = known_load(config, state, &state.target);
+            let load = known_load(config, state, state.generator.target());
             state.load = load.displacement;
             state.wrench = load.force;
         }

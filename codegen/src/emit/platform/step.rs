@@ -95,8 +95,8 @@ pub fn emit() -> TokenStream {
             }
             let wrench_good = take_wrench(state, &input.wrench);
             let damping = damping(config, state);
-            let (target, setpoint_status) = state.generator.next(&PLAN, &input.command);
-            let Load { displacement: demand, force } = known_load(config, state, &target);
+            let setpoint_status = state.generator.tick(&PLAN, &input.command);
+            let Load { displacement: demand, force } = known_load(config, state, state.generator.target());
             let feedback = feedback(config, state);
             if !entered {
                 state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
@@ -109,7 +109,7 @@ pub fn emit() -> TokenStream {
                 drift: [0.0; LEGS],
                 dac_code: [0; LEGS],
                 pose: state.pose,
-                target: target.pose,
+                target: state.generator.target().pose,
                 load: [0.0; LEGS],
                 status: gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
             };
@@ -129,7 +129,6 @@ pub fn emit() -> TokenStream {
                 output.dac_code[index] = leg.code;
                 output.status |= (limited as u32) << index;
             }
-            state.target = target;
             output
         }
 
@@ -180,7 +179,7 @@ pub fn emit() -> TokenStream {
         pub(crate) fn learn(config: &Config, state: &mut State) {
             let mode = config.mode();
             if mode.feeds_back() {
-                let error = difference(&state.target.pose, &state.pose);
+                let error = difference(&state.generator.target().pose, &state.pose);
                 state.error = notch_error(&mut state.error_notch, &error);
                 let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
                 if !would_wind_up(&state.legs, &growth) {
@@ -229,7 +228,7 @@ pub fn emit() -> TokenStream {
             if !config.damps() {
                 return [0.0; LEGS];
             }
-            let error = difference(&state.target.rate, state.rate.value());
+            let error = difference(&state.generator.target().rate, state.rate.value());
             transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error))
         }
 
