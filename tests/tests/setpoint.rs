@@ -16,7 +16,7 @@ use specgen_runtime::setpoint as runtime;
 use specgen_runtime::setpoint::{BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Plan, Target};
 use specgen_tests::{Emitted, compile_edited, repository};
 
-const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 const PATHS: [(model::PaperPath, PaperPath); 3] = [
     (model::PaperPath::Case1, PaperPath::Case1),
     (model::PaperPath::Case2, PaperPath::Case2),
