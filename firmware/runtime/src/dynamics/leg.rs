@@ -188,7 +188,7 @@ mod tests {
         }
     }
 
-    /// A host works on two legs at once, a Cortex-M in `f64` on one: their bits must be the same.
+    /// How many are worked on at once is a matter of speed alone.
     #[test]
     fn results_do_not_depend_on_how_many_legs_are_side_by_side() {
         let (first, second) = (leg(5), leg(50));
