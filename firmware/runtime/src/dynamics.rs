@@ -41,10 +41,6 @@ use attitude::Attitude;
 use balance::Balance;
 use leg::{Common, Round};
 
-/// Whether two legs are worked on at once in `f64`: they share loads and fill a vector register of a host, but ask for more
-/// registers than the 16 of a Cortex-M. In `f32` there are 32, and it always pays. Results are the same bits.
-const SIDE_BY_SIDE: bool = cfg!(not(target_arch = "arm"));
-
 /// Number of legs.
 const LEGS: usize = 6;
 
@@ -291,7 +287,8 @@ impl<T: Real> Platform<T> {
         let heave = [acceleration[0] + g * up_x, acceleration[1] + g * up_y, acceleration[2] + g * up_z];
         let [a, b, c, d, e, f] = &self.legs;
         let mut round = Round { platform: self, common: &common, wrench: self.body(&heave, &tow) };
-        let shares = if SIDE_BY_SIDE || T::SINGLE {
+        // Two at once share loads, but ask for more registers than a Cortex-M has in f64 (16; 32 in f32). The same bits.
+        let shares = if T::SINGLE {
             let ([a, b], [c, d], [e, f]) = (round.shares([a, b]), round.shares([c, d]), round.shares([e, f]));
             [a, b, c, d, e, f]
         } else {

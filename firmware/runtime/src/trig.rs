@@ -13,7 +13,7 @@ pub fn sine_cosine<T: Real>(angle: T) -> (T, T) {
     (sine_kernel(angle, square), cosine_kernel(square))
 }
 
-/// sin and 1 − cos of `angle` (rad, |angle| ≤ π/4), each within 2 ulp of itself: nothing cancels near zero.
+/// sin and 1 − cos of `angle` (rad, |angle| ≤ π/4), each within 3 ulp of itself: nothing cancels near zero.
 #[inline]
 #[must_use]
 pub fn sine_versine<T: Real>(angle: T) -> (T, T) {
