@@ -7,7 +7,7 @@ mod platform;
 use std::time::Duration;
 
 use host_sim::closed_loop::RunError;
-use host_sim::controller::Controller;
+use host_sim::controller::TickController;
 use host_sim::trace::{Trace, first_difference};
 use serde::Serialize;
 
@@ -25,7 +25,7 @@ const LIMIT: Duration = Duration::from_secs(600);
 ///
 /// # Errors
 /// It lacks a word, or a voltage is not finite.
-pub fn exercise(controller: &mut Controller, model: &Model, ir: &Ir, ticks: u32) -> Result<Trace, RunError> {
+pub fn exercise(controller: &mut dyn TickController, model: &Model, ir: &Ir, ticks: u32) -> Result<Trace, RunError> {
     match &model.task_space {
         Some(task) => platform::exercise(controller, model, task, ticks),
         None => Ok(legs::exercise(controller, model, ir, ticks)?),

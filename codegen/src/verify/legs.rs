@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use host_sim::controller::{Controller, ControllerError, TickController};
+use host_sim::controller::{ControllerError, TickController};
 use host_sim::noise::Gaussian;
 use host_sim::trace::Trace;
 
@@ -14,7 +14,7 @@ use crate::model::Model;
 ///
 /// # Errors
 /// It lacks a word.
-pub(super) fn exercise(controller: &mut Controller, model: &Model, ir: &Ir, ticks: u32) -> Result<Trace, ControllerError> {
+pub(super) fn exercise(controller: &mut dyn TickController, model: &Model, ir: &Ir, ticks: u32) -> Result<Trace, ControllerError> {
     controller.reset();
     let description = controller.description().clone();
     let mut trace = Trace::new(description.clone());

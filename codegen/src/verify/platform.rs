@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use host_sim::closed_loop::RunError;
-use host_sim::controller::Controller;
+use host_sim::controller::TickController;
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::rig::{BUSY, Bench, Command, Noise, Request, RunOptions};
 use host_sim::platform::{GaugeSignal, PlatformParameters, PlatformRig, PlatformScenario, Probe, Specimen};
@@ -16,7 +16,7 @@ use crate::model::{Model, TaskSpace};
 
 /// Way to the bias pose, then the first trajectory of the spec again and again; without one a slow motion of all six axes.
 pub(super) fn exercise(
-    controller: &mut Controller,
+    controller: &mut dyn TickController,
     model: &Model,
     task: &TaskSpace,
     ticks: u32,
