@@ -135,8 +135,6 @@ codes! {
         "Moving along this axis alone from the middle of the strokes, the legs end before the bound does.";
     TRAJECTORY_UNREACHABLE = "E0442", "trajectory out of reach",
         "Somewhere on the declared trajectory a leg would be shorter than at zero volts or longer than its stroke. The help names the bias in z that would make it fit, if there is one.";
-    NEAR_SINGULAR = "E0443", "geometry nearly singular inside the workspace",
-        "Somewhere in the declared workspace the legs hardly hold the platform: the condition number of their Jacobian, angles taken at the joint radius, exceeds 10000.";
     NO_ROOM = "W0444", "bias without room for corrections",
         "A leg stands within a hundredth of its stroke of an end, so that feedback and adaptation can move it one way only. Corners of the declared workspace beyond reach are usual for a hexapod and not a finding; `specgen check` shows how much of it is reached.";
     TOO_FEW_CODES = "E0410", "converter too coarse for the grid",
