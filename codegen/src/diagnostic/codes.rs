@@ -143,17 +143,17 @@ codes! {
         "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
     ILL_CONDITIONED = "E0413", "leg forces not determined in the workspace",
         "The equations for the leg forces come close to singular at some pose of the declared workspace, and digits would be lost there. Change the geometry so that the legs point in more different directions, or reduce the workspace.";
-    PROBE_ALONG_PLANE = "E0430", "gauge along its target plane",
+    PROBE_ALONG_PLANE = "E0420", "gauge along its target plane",
         "A gauge sees its target move along its line; if the line lies in the plane, or nearly so, it sees nothing of that.";
-    PROBE_MISSES = "E0431", "gauge that misses the platform",
+    PROBE_MISSES = "E0421", "gauge that misses the platform",
         "The line of the gauge meets its target plane far from the platform: most likely a frame is mistaken. The line is in {B}, the plane in {P}, whose origin is P_C.";
-    GAUGES_BLIND = "E0432", "gauges that leave a motion unseen",
+    GAUGES_BLIND = "E0422", "gauges that leave a motion unseen",
         "Six readings fix a pose only if no motion leaves all of them as they are, or nearly so. The message names the motion that is seen least.";
-    GAUGE_RANGE = "E0433", "workspace beyond the gauges' range",
+    GAUGE_RANGE = "E0423", "workspace beyond the gauges' range",
         "A pose that the controller would accept could not be measured.";
-    CALIBRATION_AMBIGUOUS = "E0434", "calibration that cannot be inverted",
+    CALIBRATION_AMBIGUOUS = "E0424", "calibration that cannot be inverted",
         "Over sensor.range a calibration rises or falls all the way, so that every raw value means one reading.";
-    GAUGES_DIVERGE = "E0435", "workspace too large for the gauges' equations",
+    GAUGES_DIVERGE = "E0425", "workspace too large for the gauges' equations",
         "They are solved for small motions, by a number of passes that the compiler counts.";
     ZERO_OUTSIDE = "E0450", "bias or work zero outside the workspace",
         "Set-points are counted from the bias pose and the offset of the work frame: both must lie where the platform can go.";
