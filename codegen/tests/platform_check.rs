@@ -112,3 +112,21 @@ fn a_bound_and_a_bias_beyond_the_strokes_are_refused() {
     let found = edit("translation = [\"50 um\"", "translation = [\"56 um\"");
     assert_eq!(found.finding("E0441")["key"], "workspace.translation[0]");
 }
+
+#[test]
+fn a_declared_trajectory_beyond_the_strokes_is_refused_at_its_place() {
+    let (folder, text) = folder("reference.toml");
+    // From the middle of the strokes case 1, which climbs by 40 um, leaves them at the top.
+    let lifted = text
+        .replace("bias         = [\"0 um\", \"0 um\", \"10 um\"", "bias         = [\"0 um\", \"0 um\", \"30 um\"")
+        .replace("translation = [\"50 um\", \"50 um\", ", "translation = [\"50 um\", \"50 um\", \"72 um\"] # ");
+    folder.write("bad.toml", &lifted);
+    let found = folder.json(&["check", "bad.toml"]);
+    assert_eq!(found.code, 1, "{:#}", found.value);
+    if let Some(finding) = found.findings().iter().find(|one| one["code"] == "E0442") {
+        assert_eq!(finding["key"], "trajectory[0].kind");
+        assert!(finding["message"].as_str().unwrap().contains("case-1"), "{finding}");
+    } else {
+        panic!("{:#}", found.value);
+    }
+}

@@ -8,6 +8,8 @@
 //! Nothing here is of the controller's own making: dynamics from the motion of the bodies, leg lengths and gauge readings
 //! by plain geometry, hysteresis that no Everett table holds. SI units; angles are those of R = Rz Ry Rx.
 
+#![allow(clippy::needless_range_loop, reason = "matrices are indexed as in their formulae")]
+
 mod amplifier;
 mod contact;
 mod gauge;

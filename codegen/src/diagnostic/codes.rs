@@ -143,8 +143,6 @@ codes! {
         "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
     ILL_CONDITIONED = "E0413", "leg forces not determined in the workspace",
         "The equations for the leg forces come close to singular at some pose of the declared workspace, and digits would be lost there. Change the geometry so that the legs point in more different directions, or reduce the workspace.";
-    PROBE_ALONG_PLANE = "E0420", "gauge along its target plane",
-        "A gauge sees its target move along its line; if the line lies in the plane, or nearly so, it sees nothing of that.";
     PROBE_MISSES = "E0421", "gauge that misses the platform",
         "The line of the gauge meets its target plane far from the platform: most likely a frame is mistaken. The line is in {B}, the plane in {P}, whose origin is P_C.";
     GAUGES_BLIND = "E0422", "gauges that leave a motion unseen",

@@ -29,13 +29,15 @@ pub(super) fn law(
         modes_to_pose: round_all(notch.from_modal),
         legs_to_modes: round_all(multiply6(&notch.to_modal, &legs_to_pose)),
         modes_to_legs: round_all(multiply6(&rest.jacobian, &notch.from_modal)),
-        sections: notch.sections.map(|section| Section { b: section.b.map(round), a: section.a.map(round) }),
+        // b₀ = 1 − g, b₁ = a₁, b₂ = a₂ + g.
+        sections: notch.sections.map(|section| Section { depth: round(1.0 - section.b[0]), a: section.a.map(round) }),
     });
     let volts_per_cell = (model.actuator.voltage[1] - model.actuator.voltage[0]) / model.hysteresis.grid as f64;
     let metres_per_cell = model.actuator.leg_gain() * volts_per_cell;
     ControlLaw {
         period: round(model.timing.period),
         compliance: round(compliance),
+        jacobian: round_all(rest.jacobian),
         wrench_to_legs: round_all(wrench_to_legs),
         rest_force: rest_force.map(round),
         wrench_limit: largest_wrench(model).map(round),

@@ -142,21 +142,16 @@ pub struct Plan<T: Real, F> {
 }
 
 impl<T: Real, F: Frames<T>> Plan<T, F> {
-    /// The user's set-point as one of the platform, if it lies within the workspace and is finite.
+    /// Puts the user's set-point as one of the platform into `target`, if it is finite and within the workspace.
     #[inline]
-    #[must_use]
-    pub fn accepted(&self, user: &Target<T>) -> Option<Target<T>> {
-        let mut target = self.frames.to_platform(user)?;
-        for (value, bias) in target.pose.iter_mut().zip(&self.bias) {
-            *value = *value + *bias;
-        }
-        self.is_inside(&target.pose).then_some(target)
+    pub fn admit(&self, user: &Target<T>, target: &mut Target<T>) -> bool {
+        self.frames.admit(user, &self.bias, &self.bound, target)
     }
 
-    /// Every component finite and within the workspace.
-    #[inline]
+    /// The user's pose as one of the platform, if it is finite and within the workspace.
     #[must_use]
-    pub fn is_inside(&self, pose: &[T; 6]) -> bool {
-        pose.iter().zip(&self.bound).all(|(value, bound)| value.abs() <= *bound)
+    pub fn admitted(&self, user: &[T; 6]) -> Option<[T; 6]> {
+        let mut target = Target::new();
+        self.admit(&Target::at(*user), &mut target).then_some(target.pose)
     }
 }

@@ -13,13 +13,16 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::design::{Gains, Plant};
+use super::design::{Gains, Plant, Rule};
 use super::notch::{Notch, NotchState};
 use super::preisach::{Memory, Table};
 use crate::closed_loop::LEGS;
 use crate::controller::{ControllerError, TickController};
 use crate::description::Description;
-use crate::platform::{Geometry, Masses, Matrix6, Probe, Six};
+use crate::forc::ReversalExperiment;
+use crate::noise::Gauge;
+use crate::plant::{LegParameters, LegPlant};
+use crate::platform::{Geometry, Masses, Matrix6, Probe, Six, Specimen};
 use crate::trajectory::PoseTarget;
 use crate::word::Scalar;
 
@@ -93,6 +96,47 @@ pub struct Settings {
     pub bias: Six,
     /// Time taken to it, s.
     pub bias_time: f64,
+}
+
+impl Settings {
+    /// For a machine, from its nominal data and reversal curves of every leg (32 intervals, 20 V/s), at a control period
+    /// (s): gains by the study's rule, bias 10 µm up in 0.3 s.
+    #[must_use]
+    pub fn of(specimen: &Specimen, period: f64, notch_damping: Option<f64>) -> Self {
+        let rule = Rule::of(&specimen.nominal, LegParameters::reference().tau_amp_s, period, notch_damping);
+        let design = rule.design();
+        Self {
+            plant: rule.plant().clone(),
+            notch_damping,
+            combined: design.combined,
+            position: design.position,
+            velocity: [0.0; 6],
+            velocity_cutoff: 3e3,
+            probes: specimen.nominal.probes,
+            tables: tables(&specimen.legs),
+            drive: Drive::reference(period),
+            bias: [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0],
+            bias_time: 0.3,
+        }
+    }
+}
+
+/// Everett tables of six legs as built, each from its own record with its gauge's noise; equal legs share one.
+fn tables(legs: &[LegParameters; LEGS]) -> [Table; LEGS] {
+    let of = |leg: usize| {
+        let parameters = &legs[leg];
+        let experiment = ReversalExperiment {
+            rows_per_interval: 1,
+            update: parameters.step_s,
+            drive_max: parameters.u_max,
+            ..ReversalExperiment::reference(32)
+        };
+        let mut gauge = Gauge::new(&parameters.noise, 1, leg as u64);
+        let record = experiment.run(&mut LegPlant::new(parameters), &mut gauge);
+        Table::from_record(&record, 32, parameters.u_max)
+    };
+    let first = of(0);
+    std::array::from_fn(|leg| if legs[leg] == legs[0] { first.clone() } else { of(leg) })
 }
 
 /// The set-point of each tick.
@@ -351,7 +395,7 @@ impl PlatformOracle {
 }
 
 /// The emitted controller's interface.
-fn description() -> Description {
+pub(crate) fn description() -> Description {
     let six = |stems: &[&str]| -> Vec<String> {
         stems.iter().flat_map(|stem| (0..LEGS).map(move |k| format!("{stem}[{k}]"))).collect()
     };

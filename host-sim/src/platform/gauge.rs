@@ -100,9 +100,9 @@ mod tests {
         assert!((turned[3] - 0.08 * libm::tan(theta)).abs() < 1e-15, "{turned:?}");
         assert!((turned[4] + 0.08 * libm::tan(theta)).abs() < 1e-15);
         assert!((turned[5] + 0.08 * libm::tan(theta)).abs() < 1e-15);
-        // A turn about x: a z probe at y = 80 mm meets the plane at y tan θ, wherever the target slid to.
-        let tilted = read([0.0, 0.0, 0.0, theta, 0.0, 0.0]);
-        assert!((tilted[0] - 0.08 * libm::tan(theta)).abs() < 1e-15, "{tilted:?}");
+        // A turn about y: a z probe at x = 80 mm meets the plane at −x tan θ, wherever the target slid to.
+        let tilted = read([0.0, 0.0, 0.0, 0.0, theta, 0.0]);
+        assert!((tilted[0] + 0.08 * libm::tan(theta)).abs() < 1e-15, "{tilted:?}");
     }
 
     #[test]

@@ -18,22 +18,40 @@ pub struct Geometry {
     pub height: f64,
 }
 
+/// sin and cos. Piezo platforms turn by less than a milliradian, where a short series is exact to the last bit or so.
+fn sincos(angle: f64) -> (f64, f64) {
+    if angle.abs() > 1e-2 {
+        return libm::sincos(angle);
+    }
+    let square = angle * angle;
+    let sin = angle - angle * square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0));
+    let cos = 1.0 - square * (0.5 - square * (1.0 / 24.0 - square / 720.0));
+    (sin, cos)
+}
+
+/// R and T(θ) of the angles [θx, θy, θz], rad.
+fn attitude(angles: Three) -> (Matrix3, Matrix3) {
+    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(sincos);
+    (
+        [
+            [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+            [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+            [-sy, cy * sx, cy * cx],
+        ],
+        [[cz * cy, -sz, 0.0], [sz * cy, cz, 0.0], [-sy, 0.0, 1.0]],
+    )
+}
+
 /// R of the angles [θx, θy, θz], rad.
 #[must_use]
 pub fn rotation(angles: Three) -> Matrix3 {
-    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(libm::sincos);
-    [
-        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
-        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
-        [-sy, cy * sx, cy * cx],
-    ]
+    attitude(angles).0
 }
 
 /// T(θ) of ω = T(θ) θ̇, ω in {B}: the axes about which the three angles turn, as columns.
 #[must_use]
 pub fn rate_matrix(angles: Three) -> Matrix3 {
-    let [_, (sy, cy), (sz, cz)] = angles.map(libm::sincos);
-    [[cz * cy, -sz, 0.0], [sz * cy, cz, 0.0], [-sy, 0.0, 1.0]]
+    attitude(angles).1
 }
 
 /// ∂(P_C + R a)/∂h of a point fixed to the platform, with `arm` = R a in {B}, and T(θ).
@@ -121,8 +139,12 @@ impl Geometry {
     /// Δl and J together.
     #[must_use]
     pub fn extensions_and_jacobian(&self, pose: &Six) -> (Six, Matrix6) {
-        let turn = rotation(angles(pose));
-        let rates = rate_matrix(angles(pose));
+        self.extensions_and_jacobian_from(&self.rest_lengths(), pose)
+    }
+
+    /// The same with the leg lengths at rest at hand.
+    pub(crate) fn extensions_and_jacobian_from(&self, rest_lengths: &Six, pose: &Six) -> (Six, Matrix6) {
+        let (turn, rates) = attitude(angles(pose));
         let mut extensions = [0.0; 6];
         let mut jacobian = [[0.0; 6]; 6];
         for leg in 0..6 {
@@ -132,10 +154,10 @@ impl Geometry {
             let shift = [pose[0] + (arm[0] - joint[0]), pose[1] + (arm[1] - joint[1]), pose[2] + (arm[2] - joint[2])];
             // l² − l0², without the large squares.
             let growth = 2.0 * dot(&rest, &shift) + dot(&shift, &shift);
-            let rest_square = dot(&rest, &rest);
-            let length = libm::sqrt(rest_square + growth);
-            extensions[leg] = growth / (length + libm::sqrt(rest_square));
-            let direction = [0, 1, 2].map(|k| (rest[k] + shift[k]) / length);
+            let length = libm::sqrt(dot(&rest, &rest) + growth);
+            extensions[leg] = growth / (length + rest_lengths[leg]);
+            let inverse = 1.0 / length;
+            let direction = [0, 1, 2].map(|k| (rest[k] + shift[k]) * inverse);
             let moment = cross(arm, direction);
             for k in 0..3 {
                 jacobian[leg][k] = direction[k];
@@ -154,6 +176,15 @@ mod tests {
 
     fn geometry() -> Geometry {
         Geometry::hexagonal([0.15, 0.1], [0.012 * PI; 2], 0.18)
+    }
+
+    #[test]
+    fn the_series_is_sine_and_cosine() {
+        for n in -1000..=1000 {
+            let angle = 1e-5 * f64::from(n);
+            let (sin, cos) = sincos(angle);
+            assert!((sin - libm::sin(angle)).abs() <= 2e-18 && (cos - libm::cos(angle)).abs() <= 2e-16, "{angle}");
+        }
     }
 
     #[test]

@@ -26,15 +26,16 @@ impl Actuator {
         self.stack.set_step(step);
     }
 
-    /// Holds `voltage` for one step.
-    fn advance(&mut self, voltage: f64) {
+    /// Holds `voltage` for one step, the `first` of an interval or a later one.
+    fn advance(&mut self, voltage: f64, first: bool) {
         let before = self.amplifier.voltage();
         let after = self.amplifier.advance(voltage);
-        self.displacement = self.stack.advance(before, after);
+        self.displacement =
+            if first { self.stack.advance(before, after) } else { self.stack.advance_on(before, after) };
     }
 
     /// Free displacement from rest, m.
-    fn from_rest(&self) -> f64 {
+    fn free_displacement(&self) -> f64 {
         (self.displacement - self.rest) * 1e-6
     }
 }
@@ -83,13 +84,13 @@ impl Machine {
             let steps = steps_within(peak / rate, update);
             actuator.set_step(peak / rate / f64::from(steps));
             for step in (1..=steps).chain((0..steps).rev()) {
-                actuator.advance(peak * f64::from(step) / f64::from(steps));
+                actuator.advance(peak * f64::from(step) / f64::from(steps), true);
             }
             if settle > 0.0 {
                 let steps = steps_within(settle, update);
                 actuator.set_step(settle / f64::from(steps));
                 for _ in 0..steps {
-                    actuator.advance(0.0);
+                    actuator.advance(0.0, true);
                 }
             }
             actuator.rest = actuator.displacement;
@@ -110,9 +111,9 @@ impl Machine {
                 actuator.set_step(step);
             }
         }
-        for _ in 0..steps {
+        for step in 0..steps {
             for (actuator, voltage) in self.actuators.iter_mut().zip(voltages) {
-                actuator.advance(*voltage);
+                actuator.advance(*voltage, step == 0);
             }
             let displacement = self.free_displacements();
             self.structure.advance(&displacement);
@@ -134,7 +135,7 @@ impl Machine {
     /// d_i: what each leg would have moved without load since rest, m.
     #[must_use]
     pub fn free_displacements(&self) -> Six {
-        self.actuators.each_ref().map(Actuator::from_rest)
+        self.actuators.each_ref().map(Actuator::free_displacement)
     }
 
     /// Voltages of the stacks, V.

@@ -22,6 +22,8 @@ pub fn emit() -> TokenStream {
             pub estimate: Estimate<Real>,
             /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.
             pub requested: Real,
+            /// r: last request less q̂, the feedback and the offset of a change of mode, m.
+            pub residual: Real,
             /// Part of the last request that a limit withheld, m; zero for a leg that was free.
             pub excess: Real,
             /// Converter code now held at the output.
@@ -49,8 +51,6 @@ pub fn emit() -> TokenStream {
             pub innovation_notch: NotchState<Real>,
             /// k_I ∫e.
             pub integral: Integral<Real>,
-            /// p: deflection of each leg under the known load of the interval now running, m.
-            pub load: [Real; LEGS],
             /// Interaction wrench last believed, N and N m.
             pub wrench: [Real; 6],
             /// What is left of the last change of mode.
@@ -73,6 +73,7 @@ pub fn emit() -> TokenStream {
                     memory: Memory::new(),
                     estimate: Estimate::new(),
                     requested: 0.0,
+                    residual: 0.0,
                     excess: 0.0,
                     code: limits::CODES[0],
                 };
@@ -86,7 +87,6 @@ pub fn emit() -> TokenStream {
                     error_notch: NotchState::new(),
                     innovation_notch: NotchState::new(),
                     integral: Integral::new(),
-                    load: [0.0; LEGS],
                     wrench: [0.0; 6],
                     transfer: Transfer::new(),
                     mode: None,
@@ -101,10 +101,11 @@ pub fn emit() -> TokenStream {
                     leg.memory.digest(&mut digest);
                     leg.estimate.digest(&mut digest);
                     digest.real(leg.requested);
+                    digest.real(leg.residual);
                     digest.real(leg.excess);
                     digest.word(leg.code as u32 as u64);
                 }
-                for vector in [&self.pose, &self.error, &self.load, &self.wrench] {
+                for vector in [&self.pose, &self.error, &self.wrench] {
                     for value in vector {
                         digest.real(*value);
                     }

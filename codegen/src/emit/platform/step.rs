@@ -13,7 +13,7 @@ pub fn emit() -> TokenStream {
         #![doc = " ```text"]
         #![doc = " sense      gauges → h                                                      pose from rest"]
         #![doc = " learn      e = N(h_d(t_n) − h) ;  s ← s + T k_I e                          (7), held where it would wind up"]
-        #![doc = "            ν = N(Δl(h) − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                    (AII.3), (AII.5), (AII.6)"]
+        #![doc = "            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6)"]
         #![doc = " setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}"]
         #![doc = " load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)"]
         #![doc = "            + J⁻ᵀ k_v ė/k_a"]
@@ -21,6 +21,10 @@ pub fn emit() -> TokenStream {
         #![doc = " ```"]
         #![doc = " N is the modal notch. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback"]
         #![doc = " is none and does not."]
+        #![doc = ""]
+        #![doc = " Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,"]
+        #![doc = " offset b of a change of mode) the innovation is then r − J e with r = (q − q̂) − f − b: no large numbers are subtracted,"]
+        #![doc = " and what is left out is the error times the change of J over the workspace, a thousandth of it."]
 
         use specgen_runtime::feedback::{force_of, winds_up};
         use specgen_runtime::linear::{difference, transform};
@@ -33,9 +37,9 @@ pub fn emit() -> TokenStream {
         use crate::setpoint::PLAN;
         use crate::task_space::{
             COMPLIANCE, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
-            linear_displacement, linear_drive, notch_error, notch_innovation,
+            linear_displacement, linear_drive, modal_error, notch_error, notch_innovation,
         };
-        use crate::{Config, LEGS, LegState, Real, State, dynamics, kinematics, sensing};
+        use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
 
         /// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
         pub const LEG_LIMITED: u32 = 0x3f;
@@ -119,8 +123,9 @@ pub fn emit() -> TokenStream {
                 if entered {
                     state.transfer.offset[index] = leg.requested - request;
                 }
-                let limited = actuate(config, leg, table, request + state.transfer.offset[index]);
-                state.load[index] = load;
+                let offset = state.transfer.offset[index];
+                let limited = actuate(config, leg, table, request + offset);
+                leg.residual = (request + offset - leg.requested) - feedback[index] - offset;
                 output.load[index] = load;
                 output.voltage[index] = DAC.voltage(leg.code);
                 output.requested[index] = leg.requested;
@@ -179,8 +184,8 @@ pub fn emit() -> TokenStream {
         #[inline]
         pub(crate) fn learn(config: &Config, state: &mut State) {
             let mode = config.mode();
+            let error = modal_error(&difference(&state.target.pose, &state.pose));
             if mode.feeds_back() {
-                let error = difference(&state.target.pose, &state.pose);
                 state.error = notch_error(&mut state.error_notch, &error);
                 let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
                 if !would_wind_up(&state.legs, &growth) {
@@ -188,13 +193,11 @@ pub fn emit() -> TokenStream {
                 }
             }
             if mode.law() != Law::Invhys {
-                let measured = kinematics::leg_displacements(&state.pose);
-                let mut innovation = [0.0; LEGS];
-                for (index, leg) in state.legs.iter().enumerate() {
-                    let model_error = measured[index] - (leg.requested - state.load[index]);
-                    innovation[index] = model_error - leg.estimate.correction();
+                let mut residual = [0.0; LEGS];
+                for (residual, leg) in residual.iter_mut().zip(&state.legs) {
+                    *residual = leg.residual;
                 }
-                let innovation = notch_innovation(&mut state.innovation_notch, &innovation);
+                let innovation = notch_innovation(&mut state.innovation_notch, &error, &residual);
                 for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
                     leg.estimate.correct(mode.law(), config.level_weight(), config.drift_weight(), innovation);
                 }
