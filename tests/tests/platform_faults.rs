@@ -78,7 +78,7 @@ impl Guarded {
     fn check(&mut self, output: &[u64]) {
         let (compiled, _) = emitted();
         let [low, high] = compiled.model.actuator.voltage;
-        let task = compiled.ir.task_space.as_ref().expect("in task space");
+        let setpoints = &compiled.ir.task_space.as_ref().expect("in task space").setpoints;
         let code = self.inner.description().output("dac_code[0]").expect("an output word");
         for k in 0..6 {
             for name in ["voltage", "requested", "demand", "level", "drift", "pose", "target", "load"] {
@@ -94,7 +94,7 @@ impl Guarded {
             let target = self.number(output, "target", k);
             assert!(target.abs() <= compiled.ir.bounds.pose[k], "tick {}: target[{k}] {target}", self.tick);
             let step = (target - self.target[k]).abs();
-            assert!(step <= task.setpoint.stream_step[k], "tick {}: target[{k}] by {step}", self.tick);
+            assert!(step <= setpoints.stream_step[k], "tick {}: target[{k}] by {step}", self.tick);
             self.target[k] = target;
         }
         self.tick += 1;
@@ -415,7 +415,7 @@ fn a_stream_that_leaves_the_workspace_stops_at_its_wall() {
 fn unknown_commands_and_selectors_and_moves_out_of_reach_are_refused_and_held() {
     run(|run| {
         let bias = run.ticks(1, &Request::default())[0].target;
-        let trajectories = emitted().0.ir.task_space.as_ref().expect("in task space").setpoint.trajectories.len();
+        let trajectories = emitted().0.ir.task_space.as_ref().expect("in task space").setpoints.trajectories.len();
         assert_eq!(trajectories, 3);
         for (command, selector) in [(4, 0), (u64::MAX, 0), (1 << 32, 0), (3, 3), (3, u64::from(u32::MAX)), (3, 1 << 32), (3, u64::MAX)] {
             run.force_word("command", command);
