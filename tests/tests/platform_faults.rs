@@ -438,7 +438,7 @@ fn unknown_commands_and_selectors_and_moves_out_of_reach_are_refused_and_held() 
         let mut goal = PoseTarget::default();
         goal.pose[0] = 10e-6;
         let away = Request { command: Command::Move, target: goal, ..Request::default() };
-        let moving = run.ticks(1000, &away);
+        let moving = run.ticks(500, &away);
         assert_eq!(all_status(&moving), [BUSY]);
         run.force_word("command", 9);
         let stopped = run.ticks(2000, &away);
@@ -446,7 +446,7 @@ fn unknown_commands_and_selectors_and_moves_out_of_reach_are_refused_and_held() 
         let resting = stopped.iter().position(|tick| tick.status == REFUSED).expect("it comes to rest");
         assert!(stopped[..resting].iter().all(|tick| tick.status == REFUSED | BUSY));
         assert!(stopped[resting..].iter().all(|tick| tick.status == REFUSED && tick.target == stopped[resting].target));
-        assert!(stopped[resting].target[0] > moving[999].target[0] && stopped[resting].target[0] < 10e-6);
+        assert!(stopped[resting].target[0] > moving[499].target[0] && stopped[resting].target[0] < 10e-6);
         println!("stopped after {resting} ticks, {:.1} nm off at most", worst(&stopped) * 1e9);
         let arrived = run.ticks(4000, &away);
         assert_eq!((arrived[3999].status, arrived[3999].target[0]), (0, 10e-6));

@@ -92,7 +92,7 @@ fn hold(cases: Vec<Case>) {
         match case.at {
             Some(at) => {
                 let (line, column) = place_of(&bad, at);
-                let place = format!("--> platform.toml:{line}:{column}\n");
+                let place = format!("/platform.toml:{line}:{column}\n");
                 assert!(shown.contains(&place), "{what}: no `{place}` in:\n{shown}");
                 assert!(matches!(found.place, Place::Spec(_)), "{what}: {found:?}");
             }
@@ -446,11 +446,12 @@ fn what_can_be_found_is_found_in_one_run() {
         &[
             (CASE_1, "kind   = \"waveform\"\nfile   = \"table.csv\"\nperiod = \"1 ms\"".to_owned()),
             ("mode       = \"pcc\"", "mode       = \"pcc\"\nlevel_bandwidth = \"5000 rad/s\"\ndrift_bandwidth = \"200 rad/s\"".to_owned()),
-            ("records/reference-forc.csv", "records/nothing.csv".to_owned()),
+            ("records/reference-forc.csv", "records/bad.csv".to_owned()),
         ],
     );
+    fs::write(folder.path().join("records/bad.csv"), "seconds,volts\n0,1\n").expect("written");
     let table = table().replace("x_um", "x_V");
     let refused = verdict(folder.path(), &bad, Some(&table)).expect_err("refused");
     let found: Vec<&str> = refused.findings.iter().map(|found| found.code).collect();
-    assert_eq!(found.iter().filter(|code| ["E0306", "E0431", "E0460"].contains(code)).count(), 3, "{found:?}");
+    assert_eq!(found.iter().filter(|code| ["E0504", "E0431", "E0460"].contains(code)).count(), 3, "{found:?}");
 }

@@ -119,9 +119,17 @@ pub fn emit() -> TokenStream {
             };
             for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
                 let load = (force[index] - REST_FORCE[index]) * COMPLIANCE + damping[index];
-                let request = demand[index] + load + feedback[index] - leg.estimate.correction();
+                let mut request = demand[index] + load + feedback[index] - leg.estimate.correction();
                 if entered {
-                    state.transfer.offset[index] = leg.requested - request;
+                    let held = leg.requested - request;
+                    if config.mode().law() == Law::Invhys {
+                        state.transfer.offset[index] = held;
+                    } else {
+                        // What the estimate would come to, at once: an offset that fades would be learned against.
+                        leg.estimate.level -= held;
+                        state.transfer.offset[index] = Real::ZERO;
+                        request = leg.requested;
+                    }
                 }
                 let offset = state.transfer.offset[index];
                 let limited = actuate(config, leg, table, request + offset);
@@ -138,15 +146,27 @@ pub fn emit() -> TokenStream {
             output
         }
 
-        /// Whether this tick is the first of its mode. If so, what the mode does not use is put at rest; the first request then
-        /// defines the offset that keeps the voltages where they are.
+        /// Whether this tick is the first of its mode, or of its source of the interaction force. If so, what the mode does not
+        /// use is put at rest; the first request then defines what keeps the voltages where they are.
         #[inline]
         fn enter_mode(config: &Config, state: &mut State) -> bool {
-            let mode = config.mode();
-            if state.mode == Some(mode) {
+            let (mode, interaction) = (config.mode(), config.interaction());
+            let same_force = state.interaction == interaction
+                && (interaction != Interaction::Modelled || state.environment == *config.environment());
+            if state.mode == Some(mode) && same_force {
                 return false;
             }
+            let adapted = match state.mode {
+                Some(before) => before.law() != Law::Invhys,
+                None => false,
+            };
+            if mode.law() != Law::Invhys && !adapted {
+                // Its correction passes to the estimates.
+                state.integral = Integral::new();
+            }
             state.mode = Some(mode);
+            state.interaction = interaction;
+            state.environment = *config.environment();
             for leg in &mut state.legs {
                 match mode.law() {
                     Law::Invhys => leg.estimate = Estimate::new(),
