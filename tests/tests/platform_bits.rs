@@ -22,7 +22,7 @@ const MODES: [(&str, f64, f64); 7] = [
     ("P/F ewma", 5.0, 0.0),
     ("P/F pcc", 6.0, 1.0),
 ];
-const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 
 fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
     let emitted = Emitted::new(name, "reference.toml", edits);
@@ -96,7 +96,7 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let task = good.compiled.ir.task_space.as_ref().unwrap();
     let notch = task.law.notch.as_ref().unwrap();
     let cases = [
-        ("controller/src/task_space.rs", notch.sections[2].b[0], "voltage"),
+        ("controller/src/task_space.rs", notch.sections[2].depth, "voltage"),
         ("controller/src/task_space.rs", task.law.wrench_to_legs[1][2], "requested"),
         ("controller/src/config.rs", task.defaults.gains.integral[0], "requested"),
     ];

@@ -215,7 +215,7 @@ fn a_geometry_that_does_not_hold_and_gauges_that_do_not_see() {
         case(
             "nothing looks along x",
             &[(LAST, "point     = [\"0 mm\", \"80 mm\", \"180 mm\"]\ndirection = [0, 1, 0]")],
-            ("E0422", "[[gauge]]", "cannot see the motion x +1.000 µm"),
+            ("E0432", "[[gauge]]", "cannot see the motion x +1.000 µm"),
             |help, bad, _| {
                 assert!(help.contains("three look along one axis") && help.contains("one along the third"), "{help}");
                 // The last of the six.
@@ -229,7 +229,7 @@ fn a_geometry_that_does_not_hold_and_gauges_that_do_not_see() {
                 ("[\"-40 mm\", \"69.282 mm\", \"180 mm\"]", "[\"0 mm\", \"0 mm\", \"180 mm\"]"),
                 ("[\"-40 mm\", \"-69.282 mm\", \"180 mm\"]", "[\"-80 mm\", \"0 mm\", \"180 mm\"]"),
             ],
-            ("E0422", "[[gauge]]", "cannot see the motion θx"),
+            ("E0432", "[[gauge]]", "cannot see the motion θx"),
             |help, bad, _| {
                 assert!(help.contains("at the corners of a triangle"), "{help}");
                 put(bad, "[\"0 mm\", \"0 mm\", \"180 mm\"]", "[\"0 mm\", \"80 mm\", \"180 mm\"]")
@@ -244,7 +244,7 @@ fn a_geometry_that_does_not_hold_and_gauges_that_do_not_see() {
         case(
             "gauges too short for the workspace",
             &[("[\"-55 um\", \"55 um\"]", "[\"-25 um\", \"25 um\"]")],
-            ("E0423", "[\"-25 um\", \"25 um\"]", "beyond its range of -25.000 µm to 25.000 µm"),
+            ("E0433", "[\"-25 um\", \"25 um\"]", "beyond its range of -25.000 µm to 25.000 µm"),
             |help, bad, _| {
                 let most = after(help, "takes in ");
                 put(bad, "[\"-25 um\", \"25 um\"]", &format!("[\"-{most} um\", \"{most} um\"]"))
@@ -401,12 +401,12 @@ name      = \"case-1\"";
     let gains = format!("[gains]\n{TABLE}");
     let position_gains = format!("[position_gains]\n{TABLE}");
     hold(vec![
-        case("gains of P/F", &[(FIRST, &gains)], ("E0431", "[\"1e13 N/(m s)\"", "control mode P/F"), offered),
-        case("gains of P", &[(FIRST, &position_gains)], ("E0431", "[\"1e13 N/(m s)\"", "control mode P is unstable"), offered),
+        case("gains of P/F", &[(FIRST, &gains)], ("E0421", "[\"1e13 N/(m s)\"", "control mode P/F"), offered),
+        case("gains of P", &[(FIRST, &position_gains)], ("E0421", "[\"1e13 N/(m s)\"", "control mode P is unstable"), offered),
         case(
             "bandwidths",
             &[("mode       = \"pcc\"", "mode       = \"pcc\"\nlevel_bandwidth = \"5000 rad/s\"\ndrift_bandwidth = \"200 rad/s\"")],
-            ("E0431", "\"5000 rad/s\"", "control mode F pcc"),
+            ("E0421", "\"5000 rad/s\"", "control mode F pcc"),
             |help, bad, _| {
                 let bad = bad.replacen("\"5000 rad/s\"", &format!("\"{} rad/s\"", after(help, "level_bandwidth = \"")), 1);
                 put(&bad, "\"200 rad/s\"", &format!("\"{} rad/s\"", after(help, "drift_bandwidth = \"")))
@@ -421,7 +421,7 @@ name      = \"case-1\"";
                     "[control.environment]\nstiffness = [\"1e9 N/m\", \"1e9 N/m\", \"1e9 N/m\", \"1e6 N m/rad\", \"1e6 N m/rad\", \"1e6 N m/rad\"]\n\n[control.setpoint]",
                 ),
             ],
-            ("E0431", "[\"1e9 N/m\"", "touching the work piece"),
+            ("E0421", "[\"1e9 N/m\"", "touching the work piece"),
             |help, bad, _| {
                 let factor = value(help, "stable up to ");
                 let list = format!("[\"{0:e} N/m\", \"{0:e} N/m\", \"{0:e} N/m\", \"{1:e} N m/rad\", \"{1:e} N m/rad\", \"{1:e} N m/rad\"]", 1e9 * factor, 1e6 * factor);
@@ -453,5 +453,5 @@ fn what_can_be_found_is_found_in_one_run() {
     let table = table().replace("x_um", "x_V");
     let refused = verdict(folder.path(), &bad, Some(&table)).expect_err("refused");
     let found: Vec<&str> = refused.findings.iter().map(|found| found.code).collect();
-    assert_eq!(found.iter().filter(|code| ["E0504", "E0431", "E0460"].contains(code)).count(), 3, "{found:?}");
+    assert_eq!(found.iter().filter(|code| ["E0504", "E0421", "E0460"].contains(code)).count(), 3, "{found:?}");
 }

@@ -279,7 +279,7 @@ fn gauges_that_cannot_see_a_motion_are_refused_and_the_motion_is_named() {
     let mut layout = three_two_one();
     layout[5] = probe([0.0, 0.08, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]);
     let (code, _, message) = refusal(&model(layout));
-    assert_eq!(code, "E0422", "{message}");
+    assert_eq!(code, "E0432", "{message}");
     assert!(message.ends_with("x +1.000 µm"), "{message}");
 
     // Three lines along z in a row along x: a turn about x is unseen.
@@ -288,7 +288,7 @@ fn gauges_that_cannot_see_a_motion_are_refused_and_the_motion_is_named() {
         *probe_k = probe([x, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]);
     }
     let (code, _, message) = refusal(&model(layout));
-    assert_eq!(code, "E0422", "{message}");
+    assert_eq!(code, "E0432", "{message}");
     assert!(message.contains("θx") && !message.contains("θy") && !message.contains(" x "), "{message}");
 
     // A row 10 mm beside P_C: a turn about it lifts P_C.
@@ -305,7 +305,7 @@ fn gauges_that_cannot_see_a_motion_are_refused_and_the_motion_is_named() {
     layout[4] = probe([-0.0005, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]);
     layout[5] = probe([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]);
     let (code, _, message) = refusal(&model(layout));
-    assert_eq!(code, "E0422", "{message}");
+    assert_eq!(code, "E0432", "{message}");
     assert!(message.contains("times less") && message.contains("θz"), "{message}");
 }
 
@@ -316,7 +316,7 @@ fn a_gauge_that_misses_the_platform_is_refused() {
     layout[4].plane_point = [1.0, 2.0, 0.0];
     layout[4].plane_normal = [0.0, 0.8, 0.6];
     let (code, key, message) = refusal(&model(layout));
-    assert_eq!((code.as_str(), key.as_str()), ("E0421", "gauge[4].point"), "{message}");
+    assert_eq!((code.as_str(), key.as_str()), ("E0431", "gauge[4].point"), "{message}");
 }
 
 #[test]
@@ -324,7 +324,7 @@ fn a_workspace_beyond_the_range_of_the_gauges_or_of_their_equations_is_refused()
     let mut small = model(three_two_one());
     small.sensor.range = [-45e-6, 45e-6];
     let (code, key, message) = refusal(&small);
-    assert_eq!((code.as_str(), key.as_str()), ("E0423", "sensor.range"), "{message}");
+    assert_eq!((code.as_str(), key.as_str()), ("E0433", "sensor.range"), "{message}");
     assert!(message.contains("48.000 µm") && message.contains("θ"), "{message}");
     // ±70 µm hold it.
     assert!(lowered(&model(three_two_one())).is_ok());
@@ -334,7 +334,7 @@ fn a_workspace_beyond_the_range_of_the_gauges_or_of_their_equations_is_refused()
     large.workspace.translation = [1e-3; 3];
     large.sensor.range = [-1.0, 1.0];
     let findings = lowered(&large).unwrap_err();
-    assert!(findings.iter().any(|found| found.code == "E0425" || found.code == "E0412"), "{findings:#?}");
+    assert!(findings.iter().any(|found| found.code == "E0435" || found.code == "E0412"), "{findings:#?}");
 }
 
 #[test]
@@ -374,7 +374,7 @@ fn calibrated_gauges_take_volts_and_refuse_those_beyond_their_range() {
     // One that turns within the range.
     task(&mut model).calibration = Some([0; 6].map(|_| vec![0.0, 6e-6, 1e-6]));
     let (code, key, message) = refusal(&model);
-    assert_eq!((code.as_str(), key.as_str()), ("E0424", "gauge[0].calibration"), "{message}");
+    assert_eq!((code.as_str(), key.as_str()), ("E0434", "gauge[0].calibration"), "{message}");
 }
 
 /// Whatever accepted readings come, the pose is finite and near what a linear gauge would say.
