@@ -270,8 +270,13 @@ fn a_gauge_that_fails_holds_the_pose_and_its_return_makes_no_jump() {
             let settled = worst(&after[LAP..]);
             println!(
                 "gauge {gauge} at {reading:e}: {:.0} nm while it fails, {:.0} nm on its return, {:.1} nm settled ({:.1} before); voltage steps {:.1} and {:.1} mV ({:.1} before)",
-                worst(&bad) * 1e9, worst(&after) * 1e9, settled * 1e9, error * 1e9,
-                largest_step(&last, &bad) * 1e3, largest_step(&bad[bad.len() - 1], &after) * 1e3, step * 1e3
+                worst(&bad) * 1e9,
+                worst(&after) * 1e9,
+                settled * 1e9,
+                error * 1e9,
+                largest_step(&last, &bad) * 1e3,
+                largest_step(&bad[bad.len() - 1], &after) * 1e3,
+                step * 1e3
             );
             let _ = number;
         });
@@ -289,8 +294,12 @@ fn a_gauge_stuck_within_its_range_stays_within_limits_and_is_recovered_from() {
             let after = run.stream(2 * LAP);
             println!(
                 "gauge {gauge} stuck: {:.0} nm, {:.0} nm after 50 ms, {:.1} nm settled ({:.1} before), status {:x?} {:x?}",
-                worst(&stuck) * 1e9, worst(&after[500..]) * 1e9, worst(&after[LAP..]) * 1e9, error * 1e9,
-                all_status(&stuck), all_status(&after)
+                worst(&stuck) * 1e9,
+                worst(&after[500..]) * 1e9,
+                worst(&after[LAP..]) * 1e9,
+                error * 1e9,
+                all_status(&stuck),
+                all_status(&after)
             );
         });
     }
@@ -309,7 +318,13 @@ fn a_stream_that_dries_up_is_brought_to_rest_and_taken_up_again() {
         run.now += stale_ticks - 1;
         let (before, bridged) = (gap[gap.len() - 1], run.stream(LAP / 16));
         assert_eq!(all_status(&bridged), [0]);
-        println!("bridged gap: {:.1} nm ({:.1}), step {:.1} mV ({:.1})", worst(&gap) * 1e9, error * 1e9, largest_step(&before, &bridged) * 1e3, step * 1e3);
+        println!(
+            "bridged gap: {:.1} nm ({:.1}), step {:.1} mV ({:.1})",
+            worst(&gap) * 1e9,
+            error * 1e9,
+            largest_step(&before, &bridged) * 1e3,
+            step * 1e3
+        );
 
         let held = Request { fresh: false, ..Request::stream(path(run.now)) };
         let dry = run.ticks(3000, &held);
@@ -324,7 +339,11 @@ fn a_stream_that_dries_up_is_brought_to_rest_and_taken_up_again() {
         let rest = dry[dry.len() - 1];
         run.now += LAP / 4;
         let refused = run.stream(20);
-        assert!(refused.iter().all(|tick| tick.status & REFUSED != 0 && tick.target == rest.target), "{:x?}", all_status(&refused));
+        assert!(
+            refused.iter().all(|tick| tick.status & REFUSED != 0 && tick.target == rest.target),
+            "{:x?}",
+            all_status(&refused)
+        );
         let bias = emitted().0.model.task_space.as_ref().expect("in task space").setpoint.bias;
         let here: [f64; 6] = std::array::from_fn(|k| rest.target[k] - bias[k]);
         let near = Request::stream(PoseTarget { pose: here, ..PoseTarget::default() });
@@ -359,7 +378,8 @@ fn a_set_point_that_jumps_is_no_number_or_lies_outside_is_held() {
             let stopping = run.stream(40);
             let rest = stopping[39];
             let bias = emitted().0.model.task_space.as_ref().expect("in task space").setpoint.bias;
-            let mut here = PoseTarget { pose: std::array::from_fn(|k| rest.target[k] - bias[k]), ..PoseTarget::default() };
+            let mut here =
+                PoseTarget { pose: std::array::from_fn(|k| rest.target[k] - bias[k]), ..PoseTarget::default() };
             // Back to the path at the speed of a stream.
             let there = path(run.now).pose;
             for _ in 0..LAP {
@@ -375,7 +395,14 @@ fn a_set_point_that_jumps_is_no_number_or_lies_outside_is_held() {
             assert_eq!(all_status(&again), [0]);
             let peak = worst(&held).max(worst(&stopping));
             let steps = largest_step(&before, &[&held[..], &stopping[..]].concat());
-            println!("{name} = {bad:e}: {:.0} nm ({:.1}), steps {:.1} mV ({:.1}), at rest: {}", peak * 1e9, error * 1e9, steps * 1e3, step * 1e3, rest.status & BUSY == 0);
+            println!(
+                "{name} = {bad:e}: {:.0} nm ({:.1}), steps {:.1} mV ({:.1}), at rest: {}",
+                peak * 1e9,
+                error * 1e9,
+                steps * 1e3,
+                step * 1e3,
+                rest.status & BUSY == 0
+            );
         }
     });
 }
@@ -417,7 +444,9 @@ fn unknown_commands_and_selectors_and_moves_out_of_reach_are_refused_and_held() 
         let bias = run.ticks(1, &Request::default())[0].target;
         let trajectories = emitted().0.ir.task_space.as_ref().expect("in task space").setpoints.trajectories.len();
         assert_eq!(trajectories, 3);
-        for (command, selector) in [(4, 0), (u64::MAX, 0), (1 << 32, 0), (3, 3), (3, u64::from(u32::MAX)), (3, 1 << 32), (3, u64::MAX)] {
+        for (command, selector) in
+            [(4, 0), (u64::MAX, 0), (1 << 32, 0), (3, 3), (3, u64::from(u32::MAX)), (3, 1 << 32), (3, u64::MAX)]
+        {
             run.force_word("command", command);
             run.force_word("selector", selector);
             let held = run.ticks(50, &Request::default());
@@ -426,7 +455,9 @@ fn unknown_commands_and_selectors_and_moves_out_of_reach_are_refused_and_held() 
             assert!(held.iter().all(|tick| tick.target == bias));
             assert_eq!(all_status(&run.ticks(50, &Request::default())), [0]);
         }
-        for (axis, goal) in [(0, 51e-6), (2, 43e-6), (2, -63e-6), (4, 0.36e-3), (1, f64::NAN), (5, f64::INFINITY), (3, 1e300)] {
+        for (axis, goal) in
+            [(0, 51e-6), (2, 43e-6), (2, -63e-6), (4, 0.36e-3), (1, f64::NAN), (5, f64::INFINITY), (3, 1e300)]
+        {
             run.force_word("command", 2);
             run.force(&format!("setpoint[{axis}]"), goal);
             let held = run.ticks(50, &Request::default());
@@ -465,7 +496,9 @@ fn a_wrench_that_cannot_be_is_not_believed() {
             (0..6).map(|k| run.description.scalar.decode(run.bench.output()[place + k])).collect::<Vec<_>>()
         };
         let before = load(run);
-        for (axis, bad) in [(0, f64::NAN), (2, f64::INFINITY), (5, f64::NEG_INFINITY), (1, 1e300), (2, 3601.0), (3, -361.0)] {
+        for (axis, bad) in
+            [(0, f64::NAN), (2, f64::INFINITY), (5, f64::NEG_INFINITY), (1, 1e300), (2, 3601.0), (3, -361.0)]
+        {
             run.force(&format!("wrench[{axis}]"), bad);
             let faulty = run.ticks(200, &Request { fresh: true, ..Request::stream(path(run.now)) });
             run.release();
@@ -474,7 +507,14 @@ fn a_wrench_that_cannot_be_is_not_believed() {
             let apart = before.iter().zip(&during).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             let after = run.ticks(200, &Request { fresh: true, ..Request::stream(path(run.now)) });
             assert_eq!(all_status(&after), [0]);
-            println!("wrench[{axis}] = {bad:e}: load apart by {:.2} nm, {:.1} nm ({:.1}), steps {:.1} mV ({:.1})", apart * 1e9, worst(&faulty).max(worst(&after)) * 1e9, error * 1e9, largest_step(&last, &[&faulty[..], &after[..]].concat()) * 1e3, step * 1e3);
+            println!(
+                "wrench[{axis}] = {bad:e}: load apart by {:.2} nm, {:.1} nm ({:.1}), steps {:.1} mV ({:.1})",
+                apart * 1e9,
+                worst(&faulty).max(worst(&after)) * 1e9,
+                error * 1e9,
+                largest_step(&last, &[&faulty[..], &after[..]].concat()) * 1e3,
+                step * 1e3
+            );
         }
     });
 }
@@ -499,7 +539,12 @@ fn any_change_of_mode_in_motion_is_without_a_jump() {
                 let jump = largest_step(&last, &change[..1]);
                 println!(
                     "mode {from} to {to}: jump {:.1} mV, steps {:.1} mV; {:.0} nm before, {:.0} nm within 50 ms, {:.0} nm after 0.2 s; {:x?}",
-                    jump * 1e3, largest_step(&last, &change) * 1e3, own * 1e9, worst(&change[..500]) * 1e9, worst(&change[LAP..]) * 1e9, all_status(&change)
+                    jump * 1e3,
+                    largest_step(&last, &change) * 1e3,
+                    own * 1e9,
+                    worst(&change[..500]) * 1e9,
+                    worst(&change[LAP..]) * 1e9,
+                    all_status(&change)
                 );
             }
         }
@@ -515,7 +560,10 @@ fn settings_changed_in_flight_make_no_jump_and_bad_ones_change_nothing() {
         run.stream(LAP / 2);
         let changes: [(&str, &[(&str, f64)]); 9] = [
             ("measured", &[("interaction", 2.0)]),
-            ("modelled", &[("interaction", 1.0), ("environment_stiffness[0]", 2.4e6), ("environment_stiffness[2]", 3e6)]),
+            (
+                "modelled",
+                &[("interaction", 1.0), ("environment_stiffness[0]", 2.4e6), ("environment_stiffness[2]", 3e6)],
+            ),
             ("none", &[("interaction", 0.0)]),
             ("modelled again", &[("interaction", 1.0)]),
             ("softer", &[("environment_stiffness[0]", 1e6), ("environment_stiffness[2]", 1e6)]),
@@ -530,8 +578,12 @@ fn settings_changed_in_flight_make_no_jump_and_bad_ones_change_nothing() {
             let change = run.stream(LAP);
             println!(
                 "{what}: jump {:.1} mV, steps {:.1} mV ({:.1}), {:.0} nm within 50 ms, {:.0} nm after ({:.1})",
-                largest_step(&before[before.len() - 1], &change[..1]) * 1e3, largest_step(&before[before.len() - 1], &change) * 1e3, step * 1e3,
-                worst(&change[..500]) * 1e9, worst(&change[LAP / 2..]) * 1e9, error * 1e9
+                largest_step(&before[before.len() - 1], &change[..1]) * 1e3,
+                largest_step(&before[before.len() - 1], &change) * 1e3,
+                step * 1e3,
+                worst(&change[..500]) * 1e9,
+                worst(&change[LAP / 2..]) * 1e9,
+                error * 1e9
             );
         }
     });
@@ -576,7 +628,12 @@ fn narrower_voltage_limits_are_kept_to_at_the_slew_rate_and_left_without_windup(
         assert!(bits & 0x3f != 0 && bits & !0x3f == 0, "{bits:x}");
         run.set(&[("code_max", emitted().0.ir.actuation.code_max as f64)]);
         let after = run.stream(2 * LAP);
-        println!("limits: {:.0} nm on return, {:.1} nm after 0.2 s ({:.1} before)", worst(&after) * 1e9, worst(&after[LAP..]) * 1e9, error * 1e9);
+        println!(
+            "limits: {:.0} nm on return, {:.1} nm after 0.2 s ({:.1} before)",
+            worst(&after) * 1e9,
+            worst(&after[LAP..]) * 1e9,
+            error * 1e9
+        );
         assert_eq!(all_status(&after[LAP..]), [0]);
         assert!(worst(&after[LAP..]) < 100e-9);
     });

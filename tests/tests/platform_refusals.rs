@@ -105,7 +105,11 @@ fn hold(cases: Vec<Case>) {
         let (mended, table) = (case.mend)(&found.help, &bad, case.table.as_deref().unwrap_or_default());
         assert!(mended != bad || Some(&table) != case.table.as_ref(), "{what}: nothing mended");
         if let Err(refused) = verdict(folder.path(), &mended, case.table.is_some().then_some(&table)) {
-            panic!("{what}: the mend `{}` is refused in its turn:\n{}", found.help, render(&refused.findings, &source, false));
+            panic!(
+                "{what}: the mend `{}` is refused in its turn:\n{}",
+                found.help,
+                render(&refused.findings, &source, false)
+            );
         }
     }
 }
@@ -174,7 +178,10 @@ fn a_bias_a_bound_or_a_path_out_of_reach() {
         ),
         case(
             "a bound of z",
-            &[("\"50 um\", \"52 um\"]", "\"50 um\", \"100 um\"]"), ("[\"-55 um\", \"55 um\"]", "[\"-75 um\", \"75 um\"]")],
+            &[
+                ("\"50 um\", \"52 um\"]", "\"50 um\", \"100 um\"]"),
+                ("[\"-55 um\", \"55 um\"]", "[\"-75 um\", \"75 um\"]"),
+            ],
             ("E0313", "\"100 um\"]", "the stroke is 60 um"),
             |help, bad, _| put(bad, "\"100 um\"]", &format!("\"{} um\"]", after(help, "at most "))),
         ),
@@ -254,7 +261,13 @@ fn a_geometry_that_does_not_hold_and_gauges_that_do_not_see() {
 }
 
 /// The reference with `table.csv` for its first trajectory.
-fn with_table(what: &'static str, table: String, code: &'static str, says: &'static str, mend: fn(&str, &str, &str) -> (String, String)) -> Case {
+fn with_table(
+    what: &'static str,
+    table: String,
+    code: &'static str,
+    says: &'static str,
+    mend: fn(&str, &str, &str) -> (String, String),
+) -> Case {
     let spec = "kind   = \"waveform\"\nfile   = \"table.csv\"\nperiod = \"1 ms\"";
     Case { what, edits: vec![(CASE_1, spec.to_owned())], table: Some(table), code, at: None, says, mend }
 }
@@ -283,10 +296,16 @@ fn tables_of_poses() {
             assert!(help.contains("`x_um`"), "{help}");
             (bad.to_owned(), table.replace("x_V", "x_um"))
         }),
-        with_table("no unit", table().replace("theta_y_urad", "theta_y"), "E0460", "`theta_y` is no column", |help, bad, table| {
-            let name = help.split('`').nth(1).expect("a name").to_owned();
-            (bad.to_owned(), table.replace("theta_y", &name))
-        }),
+        with_table(
+            "no unit",
+            table().replace("theta_y_urad", "theta_y"),
+            "E0460",
+            "`theta_y` is no column",
+            |help, bad, table| {
+                let name = help.split('`').nth(1).expect("a name").to_owned();
+                (bad.to_owned(), table.replace("theta_y", &name))
+            },
+        ),
         with_table("millimetres", table().replace("x_um", "x_mm"), "E0453", "x jumps by", |help, bad, table| {
             assert!(help.contains("check the unit in the column's name"), "{help}");
             (bad.to_owned(), table.replace("x_mm", "x_um"))
@@ -298,10 +317,16 @@ fn tables_of_poses() {
         with_table("one lost sample", spoilt("-90,0"), "E0453", "x jumps by", back),
         with_table("one row", "x_um\n1\n".to_owned(), "E0463", "has 1 rows, expected 2 to", back),
         with_table("empty", String::new(), "E0460", "is empty", back),
-        with_table("times of another period", "time_ms,x_um\n0,0\n2,0\n4,0\n".to_owned(), "E0462", "the spec's period is 1.000000 ms", |help, bad, table| {
-            assert!(help.contains("trajectory.period"), "{help}");
-            (bad.replacen("period = \"1 ms\"", "period = \"2 ms\"", 1), table.to_owned())
-        }),
+        with_table(
+            "times of another period",
+            "time_ms,x_um\n0,0\n2,0\n4,0\n".to_owned(),
+            "E0462",
+            "the spec's period is 1.000000 ms",
+            |help, bad, table| {
+                assert!(help.contains("trajectory.period"), "{help}");
+                (bad.replacen("period = \"1 ms\"", "period = \"2 ms\"", 1), table.to_owned())
+            },
+        ),
         with_table(
             "out of the workspace",
             "z_um\n".to_owned() + &(0..=220).map(|k| format!("{}\n", 0.2 * f64::from(k))).collect::<String>(),
@@ -314,9 +339,15 @@ fn tables_of_poses() {
             },
         ),
     ]);
-    let mut between = with_table("rows between ticks", table(), "E0456", "do not fall on the ticks of 0.1000 ms", |help, bad, table| {
-        (bad.replacen("\"0.25 ms\"", &format!("\"{} ms\"", after(help, "such as \"")), 1), table.to_owned())
-    });
+    let mut between = with_table(
+        "rows between ticks",
+        table(),
+        "E0456",
+        "do not fall on the ticks of 0.1000 ms",
+        |help, bad, table| {
+            (bad.replacen("\"0.25 ms\"", &format!("\"{} ms\"", after(help, "such as \"")), 1), table.to_owned())
+        },
+    );
     between.edits[0].1 = between.edits[0].1.replace("1 ms", "0.25 ms");
     between.at = Some("\"0.25 ms\"");
     let mut unit = with_table("a period in volts", table(), "E0211", "expected a time", |help, bad, table| {
@@ -402,13 +433,22 @@ name      = \"case-1\"";
     let position_gains = format!("[position_gains]\n{TABLE}");
     hold(vec![
         case("gains of P/F", &[(FIRST, &gains)], ("E0421", "[\"1e13 N/(m s)\"", "control mode P/F"), offered),
-        case("gains of P", &[(FIRST, &position_gains)], ("E0421", "[\"1e13 N/(m s)\"", "control mode P is unstable"), offered),
+        case(
+            "gains of P",
+            &[(FIRST, &position_gains)],
+            ("E0421", "[\"1e13 N/(m s)\"", "control mode P is unstable"),
+            offered,
+        ),
         case(
             "bandwidths",
-            &[("mode       = \"pcc\"", "mode       = \"pcc\"\nlevel_bandwidth = \"5000 rad/s\"\ndrift_bandwidth = \"200 rad/s\"")],
+            &[(
+                "mode       = \"pcc\"",
+                "mode       = \"pcc\"\nlevel_bandwidth = \"5000 rad/s\"\ndrift_bandwidth = \"200 rad/s\"",
+            )],
             ("E0421", "\"5000 rad/s\"", "control mode F pcc"),
             |help, bad, _| {
-                let bad = bad.replacen("\"5000 rad/s\"", &format!("\"{} rad/s\"", after(help, "level_bandwidth = \"")), 1);
+                let bad =
+                    bad.replacen("\"5000 rad/s\"", &format!("\"{} rad/s\"", after(help, "level_bandwidth = \"")), 1);
                 put(&bad, "\"200 rad/s\"", &format!("\"{} rad/s\"", after(help, "drift_bandwidth = \"")))
             },
         ),
@@ -424,8 +464,13 @@ name      = \"case-1\"";
             ("E0421", "[\"1e9 N/m\"", "touching the work piece"),
             |help, bad, _| {
                 let factor = value(help, "stable up to ");
-                let list = format!("[\"{0:e} N/m\", \"{0:e} N/m\", \"{0:e} N/m\", \"{1:e} N m/rad\", \"{1:e} N m/rad\", \"{1:e} N m/rad\"]", 1e9 * factor, 1e6 * factor);
-                let (begin, end) = (bad.find("[\"1e9").expect("the list"), bad.find("\n\n[control.setpoint]").expect("its end"));
+                let list = format!(
+                    "[\"{0:e} N/m\", \"{0:e} N/m\", \"{0:e} N/m\", \"{1:e} N m/rad\", \"{1:e} N m/rad\", \"{1:e} N m/rad\"]",
+                    1e9 * factor,
+                    1e6 * factor
+                );
+                let (begin, end) =
+                    (bad.find("[\"1e9").expect("the list"), bad.find("\n\n[control.setpoint]").expect("its end"));
                 (bad[..begin].to_owned() + &list + &bad[end..], String::new())
             },
         ),
@@ -445,7 +490,10 @@ fn what_can_be_found_is_found_in_one_run() {
         &reference(),
         &[
             (CASE_1, "kind   = \"waveform\"\nfile   = \"table.csv\"\nperiod = \"1 ms\"".to_owned()),
-            ("mode       = \"pcc\"", "mode       = \"pcc\"\nlevel_bandwidth = \"5000 rad/s\"\ndrift_bandwidth = \"200 rad/s\"".to_owned()),
+            (
+                "mode       = \"pcc\"",
+                "mode       = \"pcc\"\nlevel_bandwidth = \"5000 rad/s\"\ndrift_bandwidth = \"200 rad/s\"".to_owned(),
+            ),
             ("records/reference-forc.csv", "records/bad.csv".to_owned()),
         ],
     );

@@ -173,6 +173,7 @@ pub fn emit() -> TokenStream {
                     Law::Pcc => {}
                 }
                 leg.requested = requested(mode, leg);
+                leg.residual = 0.0;
                 leg.excess = 0.0;
             }
             if mode.law() == Law::Invhys {
