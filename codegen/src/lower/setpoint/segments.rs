@@ -59,8 +59,7 @@ pub(super) fn lower(
     }
     if let Some((_, message)) = speed {
         let slower = excesses.mend_frequency(frequency).unwrap_or_default();
-        let help =
-            format!("at most {slower} Hz is slow enough; or {}", excesses.mend_speed().unwrap_or_default());
+        let help = format!("at most {slower} Hz is slow enough; or {}", excesses.mend_speed().unwrap_or_default());
         findings.push(refuse(codes::TRAJECTORY_TOO_FAST, message, &help));
     }
     if !findings.is_empty() {
