@@ -63,41 +63,6 @@ fn a_tick_of_six_legs_stays_within_its_instructions_and_its_stack() {
     }
 }
 
-/// Motion to six leg forces on the M7: instructions, and bytes of its code and constants.
-#[test]
-fn six_leg_forces_stay_within_their_instructions_and_their_code() {
-    for (name, edits, mcu, instructions, share) in [
-        ("dynamics M7 f64", &[][..], Mcu::Mps2An500, Some(1500), "shares::<1, 0>"),
-        ("dynamics M7 f32", &[F32][..], Mcu::Mps2An500, Some(1300), "shares::<2, 0>"),
-        // No promise: there is no multiply-add to be used without its hazards.
-        ("dynamics M4F f32", &[F32][..], Mcu::Mps2An386, None, "shares::<2, 0>"),
-    ] {
-        let emitted = Emitted::new(&name.replace(' ', "-"), "reference.toml", edits);
-        let Some(image) = emitted.image(mcu) else { continue };
-        let mut controller = emitted.controller();
-        let host = verify::exercise(&mut controller, &emitted.compiled.model, &emitted.compiled.ir, 200).unwrap();
-        let m = verify::measure(&image, &controller.default_config(), &host).unwrap();
-        let (forces, load) = (m.stage("dynamics").unwrap(), m.stage("load").unwrap());
-        let (own, of_legs) = (
-            image::function_bytes(&image.elf, "specgen_leg_forces").unwrap(),
-            image::function_bytes(&image.elf, share).unwrap(),
-        );
-        // Six legs of fifteen numbers lie beside the code; other constants lie in it.
-        let constants = 6 * 15 * u64::from(emitted.compiled.ir.scalar.bits() / 8);
-        let bytes = own + of_legs + constants;
-        println!(
-            "{name}: {} instructions ({} to {}), with displacements and wrench {}; {bytes} bytes ({own} + {of_legs} + {constants})",
-            forces.mean, forces.min, forces.max, load.mean
-        );
-        assert_eq!(forces.min, forces.max, "no data decides what is computed");
-        if let Some(most) = instructions {
-            assert!(forces.max <= most, "{name}: {} instructions", forces.max);
-        }
-        assert!(own > 1000 && of_legs > 400, "{name}: {own} {of_legs}: are these the functions?");
-        assert!(bytes <= 4096, "{name}: {bytes} bytes");
-    }
-}
-
 /// The hostile record of the bit comparison, and nested loops that overfill the memory of all six legs in the same tick:
 /// no promise, but stated and bounded.
 #[test]

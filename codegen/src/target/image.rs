@@ -76,23 +76,6 @@ fn is_allocator(name: &str) -> bool {
         || matches!(name, "malloc" | "calloc" | "realloc" | "free")
 }
 
-/// Bytes of the functions whose demangled name contains `name`, with the constants that lie between their instructions.
-///
-/// # Errors
-/// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
-pub fn function_bytes(elf: &[u8], name: &str) -> Result<u64, TargetError> {
-    let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
-    let file = object::File::parse(elf).map_err(malformed)?;
-    let mut bytes = 0;
-    for symbol in file.symbols().filter(|symbol| symbol.kind() == object::SymbolKind::Text) {
-        let mangled = symbol.name().map_err(malformed)?;
-        if format!("{:#}", rustc_demangle::demangle(mangled)).contains(name) {
-            bytes += symbol.size();
-        }
-    }
-    Ok(bytes)
-}
-
 /// Functions that a shared library offers, sorted.
 ///
 /// # Errors
