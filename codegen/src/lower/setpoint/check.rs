@@ -56,9 +56,11 @@ impl Excesses {
         Some(format!("raise control.setpoint.stream_speed[{axis}] to {}/s", outwards(axis, value.abs())))
     }
 
-    /// The frequency at which a path of the paper, whose speeds go with it, is within the speed; rounded down.
-    pub fn mend_frequency(&self, frequency: f64) -> Option<f64> {
-        let slower = frequency / self.speed?.excess;
+    /// The frequency at which a path of the paper, whose speeds go with it, is within the speed; rounded down. Seen at
+    /// ticks of `period` (s), the largest speed may be missed by the cosine of half a tick's phase.
+    pub fn mend_frequency(&self, frequency: f64, period: f64) -> Option<f64> {
+        let missed = libm::cos(core::f64::consts::PI * frequency * period);
+        let slower = frequency / self.speed?.excess * missed;
         let scale = libm::pow(10.0, 2.0 - libm::floor(libm::log10(slower)));
         Some(libm::floor(slower * scale) / scale)
     }

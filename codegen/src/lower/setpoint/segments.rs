@@ -58,7 +58,7 @@ pub(super) fn lower(
         findings.push(refuse(codes::TRAJECTORY_OUTSIDE, message, &help));
     }
     if let Some((_, message)) = speed {
-        let slower = excesses.mend_frequency(frequency).unwrap_or_default();
+        let slower = excesses.mend_frequency(frequency, period).unwrap_or_default();
         let help = format!("at most {slower} Hz is slow enough; or {}", excesses.mend_speed().unwrap_or_default());
         findings.push(refuse(codes::TRAJECTORY_TOO_FAST, message, &help));
     }
