@@ -188,7 +188,7 @@ fn a_bias_a_bound_or_a_path_out_of_reach() {
         case(
             "a bias outside the workspace",
             &[(BIAS_Z, "\"53 um\", \"0 urad\"")],
-            ("E0324", "\"53 um\"", "control.setpoint.bias"),
+            ("E0324", "\"53 um\"", "outside the workspace of 52 um"),
             |_, bad, _| put(bad, "\"53 um\"", "\"10 um\""),
         ),
         case(
@@ -397,7 +397,7 @@ fn paths_too_fast_and_paths_that_jump() {
         case(
             "a stream without speed",
             &[("stream_speed = [\"5 mm/s\"", "stream_speed = [\"nan mm/s\"")],
-            ("E0212", "nan", "which is not a finite number"),
+            ("E0212", "nan mm/s", "which is not a finite number"),
             |help, bad, _| put(bad, "nan mm/s", &format!("{} mm/s", after(help, "such as \""))),
         ),
     ]);
