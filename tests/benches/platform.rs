@@ -49,8 +49,7 @@ impl TickController for InProcess {
     }
     fn step(&mut self, input: &[u64], output: &mut [u64]) {
         let input: &[u64; INPUT_WORDS] = input.try_into().expect("a row of input words");
-        let words: [u64; OUTPUT_WORDS] =
-            step(&self.config, &mut self.state, &TickInput::from_words(input)).to_words();
+        let words: [u64; OUTPUT_WORDS] = step(&self.config, &mut self.state, &TickInput::from_words(input)).to_words();
         output.copy_from_slice(&words);
     }
     fn state_digest(&self) -> u64 {
