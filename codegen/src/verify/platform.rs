@@ -38,13 +38,16 @@ pub(super) fn exercise(
     bench.into_trace().ok_or(RunError::Timing { interval: model.timing.period, duration: 0.0 })
 }
 
-/// A motion from rest with a share of the room that the workspace leaves.
+/// Shares of the room that the workspace leaves: mostly a rise, so that no leg comes to the end of its stroke.
+const SHARES: [f64; 6] = [0.03, 0.03, 0.3, 0.02, 0.02, 0.02];
+
+/// A slow motion of all axes from rest.
 fn motion(model: &Model, task: &TaskSpace, time: f64) -> PoseTarget {
     let mut target = PoseTarget::default();
     let [x, y, z] = model.workspace.translation;
     let [tilt_x, tilt_y, tilt_z] = model.workspace.rotation;
     for (axis, bound) in [x, y, z, tilt_x, tilt_y, tilt_z].into_iter().enumerate() {
-        let amplitude = 0.1 * (bound - task.setpoint.bias[axis].abs());
+        let amplitude = SHARES[axis] * (bound - task.setpoint.bias[axis].abs());
         let frequency = TAU * (2.0 + 0.7 * axis as f64);
         let (sine, cosine) = libm::sincos(frequency * time);
         target.pose[axis] = amplitude * (1.0 - cosine);
