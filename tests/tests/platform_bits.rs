@@ -28,7 +28,7 @@ const MODES: [(&str, f64, f64); 7] = [
     ("P/F ewma", 5.0, 0.0),
     ("P/F pcc", 6.0, 1.0),
 ];
-const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 /// On-board trajectories ten times as fast, so that the closed loop sees all of them.
 const FAST: (&str, &str) = ("frequency = \"1 Hz\"", "frequency = \"10 Hz\"");
 
@@ -81,7 +81,12 @@ fn tracks(trace: &Trace, what: &str) {
 fn covers(trace: &Trace, what: &str) {
     let status = integers(trace, "status");
     let faults = [
-        (0x3f, "saturation"),
+        (0x01, "saturation of leg 0"),
+        (0x02, "saturation of leg 1"),
+        (0x04, "saturation of leg 2"),
+        (0x08, "saturation of leg 3"),
+        (0x10, "saturation of leg 4"),
+        (0x20, "saturation of leg 5"),
         (0x3f00, "gauge faults"),
         (0x1_0000, "refused set-points"),
         (0x2_0000, "a stale stream"),
@@ -136,20 +141,21 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let ir = &good.compiled.ir;
     let task = ir.task_space.as_ref().unwrap();
     let notch = task.law.notch.as_ref().unwrap();
+    let legs = &["requested", "load", "voltage", "dac_code", "level", "drift"][..];
     let cases = [
-        ("task_space", notch.sections[2].depth),
-        ("task_space", task.law.wrench_to_legs[1][2]),
-        ("sensing", task.sensing.inverse[0][5]),
-        ("sensing", task.sensing.rate_gain),
-        ("dynamics", ir.dynamics.legs[3].rest[2]),
-        ("dynamics", ir.dynamics.mass),
-        ("setpoint", task.setpoints.jerk_limit[2]),
-        ("setpoint", task.setpoints.stream_step[0]),
-        ("config", task.defaults.gains.integral[0]),
-        ("config", task.defaults.level_weight),
+        ("task_space", notch.sections[2].depth, legs),
+        ("task_space", task.law.wrench_to_legs[1][2], legs),
+        ("sensing", task.sensing.inverse[0][5], &["pose"]),
+        ("sensing", task.sensing.raw_limits[0][1], &["pose", "status"]),
+        ("dynamics", ir.dynamics.legs[3].rest[2], &["demand", "load"]),
+        ("dynamics", ir.dynamics.mass, &["load"]),
+        ("setpoint", task.setpoints.jerk_limit[2], &["demand", "target"]),
+        ("setpoint", task.setpoints.bias[2], &["demand", "target"]),
+        ("config", task.defaults.gains.integral[0], legs),
+        ("config", task.defaults.level_weight, legs),
     ];
     let bad = Emitted::new("platform-ulp-bad", "reference.toml", &[]);
-    for (file, value) in cases {
+    for (file, value, named) in cases {
         let path = bad.dir.join(format!("controller/src/{file}.rs"));
         let text = fs::read_to_string(&path).unwrap();
         let spoilt = with_one_ulp(&text, value).unwrap_or_else(|| panic!("{file} has no {value:?}"));
@@ -161,15 +167,23 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
         let Some(Difference::Word { signal, .. }) = &difference else {
             panic!("{file}, {value:?}: the flipped ulp was not seen: {difference:?}")
         };
-        println!("{file}, {value:?}: {}", difference.as_ref().unwrap());
-        assert!(trace_names(&truth).contains(signal), "{signal}");
+        // The digest of the state is the first to see it; then it comes out.
+        let out =
+            first_output_that_differs(&host, &target).unwrap_or_else(|| panic!("{file}, {value:?}: nothing came out"));
+        println!("{file}, {value:?}: {}; then {out}", difference.as_ref().unwrap());
+        assert!(signal == "state_digest" || out.ends_with(signal.as_str()), "{signal}, {out}");
+        assert!(named.iter().any(|stem| out.contains(stem)), "{file}, {value:?}: {out}, expected one of {named:?}");
     }
 }
 
-/// Names of what is compared.
-fn trace_names(trace: &Trace) -> Vec<String> {
-    let description = trace.description();
-    description.output_names.iter().cloned().chain(["state_digest".to_owned()]).collect()
+/// Tick and name of the first output word that differs.
+fn first_output_that_differs(a: &Trace, b: &Trace) -> Option<String> {
+    let names = &a.description().output_names;
+    let first = a.description().input_names.len();
+    a.rows().zip(b.rows()).enumerate().find_map(|(tick, (a, b))| {
+        let place = (0..names.len()).find(|place| a[first + place] != b[first + place])?;
+        Some(format!("tick {tick} {}", names[place]))
+    })
 }
 
 /// `text` with the first literal of this magnitude one ulp larger.

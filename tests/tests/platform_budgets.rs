@@ -15,7 +15,7 @@ use specgen::target::stack;
 use specgen::verify::{self, Measurement};
 use specgen_tests::{Emitted, host_trace, repository};
 
-const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 /// Way to the bias pose, then tracking of the first on-board trajectory in closed loop, with noise, P/F with PCC.
 const TICKS: u32 = 20_000;
 /// A stage may grow by this share of its committed figure, and by as many instructions, before it is a regression.
@@ -106,7 +106,8 @@ fn a_tick_keeps_its_promises_and_grows_no_stage() {
     let mut broken = Vec::new();
     for budget in &BUDGETS {
         let name = budget.name;
-        let emitted = Emitted::new(&format!("platform-budget-{}", name.replace(' ', "-")), "reference.toml", budget.edits);
+        let emitted =
+            Emitted::new(&format!("platform-budget-{}", name.replace(' ', "-")), "reference.toml", budget.edits);
         let Some(image) = emitted.image(budget.mcu) else { continue };
         let mut controller = emitted.controller();
         let host = verify::exercise(&mut controller, &emitted.compiled.model, &emitted.compiled.ir, TICKS).unwrap();
@@ -119,11 +120,19 @@ fn a_tick_keeps_its_promises_and_grows_no_stage() {
             tick_code: m.tick_code,
             dynamics: code + constants,
             stack: bound.bytes,
-            instructions: m.stages.iter().map(|stage| (stage.name.clone(), (10.0 * stage.mean).round() / 10.0)).collect(),
+            instructions: m
+                .stages
+                .iter()
+                .map(|stage| (stage.name.clone(), (10.0 * stage.mean).round() / 10.0))
+                .collect(),
         };
         print(name, &m, &found);
 
-        let mut check = |kept: bool, what: String| if !kept { broken.push(format!("{name}: {what}")) };
+        let mut check = |kept: bool, what: String| {
+            if !kept {
+                broken.push(format!("{name}: {what}"))
+            }
+        };
         let tick = m.stage("step").unwrap();
         assert_eq!(tick.calls, u64::from(TICKS));
         if let Some(most) = budget.tick {
@@ -134,7 +143,10 @@ fn a_tick_keeps_its_promises_and_grows_no_stage() {
         if let Some(most) = budget.dynamics {
             check(dynamics.max <= most, format!("{} instructions of the dynamics, promised {most}", dynamics.max));
         }
-        check(found.dynamics <= DYNAMICS_BYTES, format!("{} bytes of dynamics, promised {DYNAMICS_BYTES}", found.dynamics));
+        check(
+            found.dynamics <= DYNAMICS_BYTES,
+            format!("{} bytes of dynamics, promised {DYNAMICS_BYTES}", found.dynamics),
+        );
         check(code > 1500, format!("{code} bytes of code can hardly be the dynamics"));
         check(m.forbidden_symbols.is_empty(), format!("{:?}", m.forbidden_symbols));
         check(bound.is_complete(), format!("the stack bound does not hold: {bound:?}"));

@@ -14,7 +14,12 @@ use crate::model::Model;
 ///
 /// # Errors
 /// It lacks a word.
-pub(super) fn exercise(controller: &mut dyn TickController, model: &Model, ir: &Ir, ticks: u32) -> Result<Trace, ControllerError> {
+pub(super) fn exercise(
+    controller: &mut dyn TickController,
+    model: &Model,
+    ir: &Ir,
+    ticks: u32,
+) -> Result<Trace, ControllerError> {
     controller.reset();
     let description = controller.description().clone();
     let mut trace = Trace::new(description.clone());

@@ -5,8 +5,10 @@ use crate::stats::Stage;
 use controller::stages::{STAGE_COUNT, STAGES, prepare};
 use controller::{Config, State, TickInput};
 
-/// The stages are measured on every so-manieth tick: each needs a copy of the state.
-const INTERVAL: u64 = 8;
+/// The stages are measured on every so-manieth tick, for each needs a copy of the state: of the first ticks, and of later ones.
+const INTERVALS: [u64; 2] = [8, 64];
+/// Ticks that count as the first.
+const FIRST: u64 = 20_000;
 
 /// Counts so far.
 pub struct Stages {
@@ -36,7 +38,8 @@ impl Stages {
     #[inline(never)]
     #[allow(unsafe_code)] // Stages are called from assembly that counts them.
     pub fn measure(&mut self, counter: &mut InstructionCounter, config: &Config, state: &State, input: &TickInput) {
-        let due = self.ticks % INTERVAL == 0;
+        let [first, later] = INTERVALS;
+        let due = self.ticks % if self.ticks < FIRST { first } else { later } == 0;
         self.ticks += 1;
         if !due {
             return;
