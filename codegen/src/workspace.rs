@@ -31,6 +31,7 @@ const FIXED: &[(&str, &str)] = &[
     ("runtime/src/feedback.rs", include_str!("../../firmware/runtime/src/feedback.rs")),
     ("runtime/src/linear.rs", include_str!("../../firmware/runtime/src/linear.rs")),
     ("runtime/src/mode.rs", include_str!("../../firmware/runtime/src/mode.rs")),
+    ("runtime/src/motion.rs", include_str!("../../firmware/runtime/src/motion.rs")),
     ("runtime/src/notch.rs", include_str!("../../firmware/runtime/src/notch.rs")),
     ("runtime/src/transfer.rs", include_str!("../../firmware/runtime/src/transfer.rs")),
     ("runtime/src/real.rs", include_str!("../../firmware/runtime/src/real.rs")),

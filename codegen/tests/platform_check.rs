@@ -66,10 +66,10 @@ fn gains_that_are_too_high_are_refused_in_their_line_and_the_offer_is_accepted()
         folder.write("bad.toml", &bad);
         let document = folder.json(&["check", "bad.toml"]);
         assert_eq!(document.code, 1);
-        let finding = document.finding("E0431");
+        let finding = document.finding("E0421");
         assert_eq!(finding["key"], format!("{section}.integral"));
         let line = 1 + bad[..bad.find("1e13").unwrap()].matches('\n').count();
-        folder.run(&["check", "bad.toml"]).says(1, &[&format!("--> bad.toml:{line}:"), "E0431", "spectral radius"]);
+        folder.run(&["check", "bad.toml"]).says(1, &[&format!("--> bad.toml:{line}:"), "E0421", "spectral radius"]);
         let help = finding["help"].as_str().unwrap();
         let mut mended = bad;
         for key in ["proportional", "integral"] {
@@ -87,7 +87,7 @@ fn a_bandwidth_that_is_too_high_is_refused_and_the_offer_is_accepted() {
     let bad = text.replace("\"450 rad/s\"", "\"5000 rad/s\"");
     folder.write("bad.toml", &bad);
     let document = folder.json(&["check", "bad.toml"]);
-    let finding = document.finding("E0431");
+    let finding = document.finding("E0421");
     assert_eq!(finding["key"], "adaptation.level_bandwidth");
     let help = finding["help"].as_str().unwrap();
     let value = |name: &str| help.split_once(&format!("{name} = ")).unwrap().1.split('"').nth(1).unwrap().to_owned();

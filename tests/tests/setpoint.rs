@@ -16,7 +16,7 @@ use specgen_runtime::setpoint as runtime;
 use specgen_runtime::setpoint::{BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Plan, Target};
 use specgen_tests::{Emitted, compile_edited, repository};
 
-const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 const PATHS: [(model::PaperPath, PaperPath); 3] = [
     (model::PaperPath::Case1, PaperPath::Case1),
     (model::PaperPath::Case2, PaperPath::Case2),
@@ -433,4 +433,44 @@ fn a_table_is_part_of_the_digest_and_its_absence_is_reported() {
     fs::write(&path, text).unwrap();
     let refused = specgen::compile::compile(&path).unwrap_err();
     assert!(refused.findings.iter().any(|d| d.code == "E0501" || d.code == "E0306"), "{:#?}", refused.findings);
+}
+
+/// Mean instructions of the stage on the M7 in f64: standing, streaming, moving, playing.
+const BUDGETS: [(&str, f64); 4] = [("hold", 150.0), ("stream", 300.0), ("move", 300.0), ("trajectory", 450.0)];
+
+/// `cargo test -p specgen-tests --test setpoint instructions -- --nocapture` prints the figures.
+#[test]
+fn set_points_stay_within_their_instructions() {
+    let emitted = Emitted::new("setpoint-budget", "reference.toml", &[]);
+    let Some(image) = emitted.image(model::Mcu::Mps2An500) else { return };
+    let mut controller = emitted.controller();
+    let description = controller.description().clone();
+    let at = |name: &str| description.input(name).unwrap();
+    let (command, selector, sequence, x, rate) =
+        (at("command"), at("selector"), at("sequence"), at("setpoint[0]"), at("setpoint_rate[0]"));
+    for (kind, (name, budget)) in [0, 1, 2, 3].into_iter().zip(BUDGETS) {
+        // The bias for a tenth of the ticks, then one thing only. The stage runs after the tick's own generator, with the same
+        // command: of a stream it sees the ticks between fresh set-points.
+        let mut words = Vec::new();
+        for tick in 0..12_000_u64 {
+            let mut row = vec![0; description.input_names.len()];
+            row[command] = kind;
+            // Machining, whose sinusoids turn on five axes.
+            row[selector] = 2;
+            row[sequence] = tick;
+            let time = 1e-4 * tick as f64;
+            let place =
+                if kind == 2 { 30e-6 } else { 5e-6 * (6.0 * (time - 0.13)).sin() * f64::from(u8::from(time > 0.13)) };
+            row[x] = description.scalar.encode(place);
+            row[rate] = description.scalar.encode(if kind == 1 { 30e-6 } else { 0.0 });
+            words.extend(row);
+        }
+        let inputs = host_sim::stimulus::InputRecording { width: description.input_names.len(), words };
+        let (host, config) = specgen_tests::host_trace(&mut controller, &[], &inputs);
+        let m = specgen::verify::measure(&image, &config, &host).unwrap();
+        assert_eq!(m.first_difference, None, "{name}");
+        let stage = m.stage("setpoint").unwrap();
+        println!("{name}: {:.0} mean, {} to {} of {} calls", stage.mean, stage.min, stage.max, stage.calls);
+        assert!(stage.mean <= budget, "{name}: {} instructions", stage.mean);
+    }
 }

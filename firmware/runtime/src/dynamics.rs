@@ -35,42 +35,14 @@ mod balance;
 mod lanes;
 mod leg;
 
+pub use crate::motion::Motion;
 use crate::real::Real;
 use attitude::Attitude;
 use balance::Balance;
 use leg::{Common, Round};
 
-/// Whether two legs are worked on at once in `f64`: they share loads and fill a vector register of a host, but ask for more
-/// registers than the 16 of a Cortex-M. In `f32` there are 32, and it always pays. Results are the same bits.
-const SIDE_BY_SIDE: bool = cfg!(not(target_arch = "arm"));
-
 /// Number of legs.
 const LEGS: usize = 6;
-
-/// Pose with its first and second time derivatives: m and rad, per s, per s².
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion<T> {
-    /// h.
-    pub pose: [T; 6],
-    /// ḣ.
-    pub rate: [T; 6],
-    /// ḧ.
-    pub acceleration: [T; 6],
-}
-
-impl<T: Real> Default for Motion<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<T: Real> Motion<T> {
-    /// Standstill at rest.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { pose: [T::ZERO; 6], rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] }
-    }
-}
 
 /// What the legs must do for a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -315,7 +287,8 @@ impl<T: Real> Platform<T> {
         let heave = [acceleration[0] + g * up_x, acceleration[1] + g * up_y, acceleration[2] + g * up_z];
         let [a, b, c, d, e, f] = &self.legs;
         let mut round = Round { platform: self, common: &common, wrench: self.body(&heave, &tow) };
-        let shares = if SIDE_BY_SIDE || T::SINGLE {
+        // Two at once share loads, but ask for more registers than a Cortex-M has in f64 (16; 32 in f32). The same bits.
+        let shares = if T::SINGLE {
             let ([a, b], [c, d], [e, f]) = (round.shares([a, b]), round.shares([c, d]), round.shares([e, f]));
             [a, b, c, d, e, f]
         } else {

@@ -13,9 +13,7 @@ pub fn emit() -> TokenStream {
         use specgen_runtime::Real as _;
         use specgen_runtime::linear::difference;
 
-        use specgen_runtime::setpoint::Target;
-
-        use crate::dynamics::{Motion, leg_forces};
+        use crate::dynamics::leg_forces;
         use crate::hysteresis::TABLES;
         use crate::limits::DAC;
         use crate::setpoint::PLAN;
@@ -41,10 +39,9 @@ pub fn emit() -> TokenStream {
         /// Brings a copy of the state to where the stages find it, with each leg's request in place of its residual; not measured.
         pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
             crate::step::sense(state, &input.gauge);
-            let (target, _) = state.generator.next(&PLAN, &input.command);
-            let load = known_load(config, state, &target);
+            state.generator.tick(&PLAN, &input.command);
+            let load = known_load(config, state);
             let feedback = feedback(config, state);
-            state.target = target;
             for (index, leg) in state.legs.iter_mut().enumerate() {
                 leg.residual = load.displacement[index] + feedback[index] - leg.estimate.correction();
             }
@@ -57,7 +54,7 @@ pub fn emit() -> TokenStream {
 
         /// The modal notch on the pose error.
         extern "C" fn notch(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            let error = modal_error(&difference(&state.target.pose, &state.pose));
+            let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
             state.error = notch_error(&mut state.error_notch, &error);
         }
 
@@ -68,19 +65,17 @@ pub fn emit() -> TokenStream {
 
         /// The generator of set-points.
         extern "C" fn setpoint(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
-            let (target, _) = state.generator.next(&PLAN, &input.command);
-            state.target = target;
+            state.generator.tick(&PLAN, &input.command);
         }
 
         /// h, ḣ, ḧ to six leg forces.
         extern "C" fn dynamics(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            let Target { pose, rate, acceleration } = state.target;
-            state.error = leg_forces(&Motion { pose, rate, acceleration });
+            state.error = leg_forces(state.generator.target());
         }
 
         /// The same with the interaction force, and with the leg displacements.
         extern "C" fn load(config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            let load = known_load(config, state, &state.target);
+            let load = known_load(config, state);
             state.error = load.displacement;
             state.wrench = load.force;
         }

@@ -7,7 +7,7 @@ pub fn emit() -> TokenStream {
     quote! {
         #![doc = " What the controller remembers from tick to tick. No NaN or infinity is ever stored here."]
 
-        use specgen_runtime::setpoint::{Generator, Target};
+        use specgen_runtime::setpoint::Generator;
         use specgen_runtime::{ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer};
 
         use crate::hysteresis::Memory;
@@ -39,10 +39,8 @@ pub fn emit() -> TokenStream {
             pub pose: [Real; 6],
             /// ḣ: its filtered derivative.
             pub rate: Rate<Real>,
-            /// Where set-points come from.
+            /// Where set-points come from; its target is h_d at the end of the interval now running.
             pub generator: Generator<Real>,
-            /// h_d at the end of the interval now running.
-            pub target: Target<Real>,
             /// N(h_d − h), the pose error behind the notch, m and rad.
             pub error: [Real; 6],
             /// Notch on the pose error.
@@ -82,7 +80,6 @@ pub fn emit() -> TokenStream {
                     pose: [0.0; 6],
                     rate: Rate::new(),
                     generator: Generator::new(),
-                    target: Target::new(),
                     error: [0.0; 6],
                     error_notch: NotchState::new(),
                     innovation_notch: NotchState::new(),
@@ -112,7 +109,6 @@ pub fn emit() -> TokenStream {
                 }
                 self.rate.digest(&mut digest);
                 self.generator.digest(&mut digest);
-                self.target.digest(&mut digest);
                 self.error_notch.digest(&mut digest);
                 self.innovation_notch.digest(&mut digest);
                 self.integral.digest(&mut digest);

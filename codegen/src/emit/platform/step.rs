@@ -28,10 +28,10 @@ pub fn emit() -> TokenStream {
 
         use specgen_runtime::feedback::{force_of, winds_up};
         use specgen_runtime::linear::{difference, transform};
-        use specgen_runtime::setpoint::{Command, Target};
+        use specgen_runtime::setpoint::Command;
         use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _};
 
-        use crate::dynamics::{Load, Motion};
+        use crate::dynamics::Load;
         use crate::hysteresis::{TABLES, Table};
         use crate::limits::DAC;
         use crate::setpoint::PLAN;
@@ -99,8 +99,8 @@ pub fn emit() -> TokenStream {
             }
             let wrench_good = take_wrench(state, &input.wrench);
             let damping = damping(config, state);
-            let (target, setpoint_status) = state.generator.next(&PLAN, &input.command);
-            let Load { displacement: demand, force } = known_load(config, state, &target);
+            let setpoint_status = state.generator.tick(&PLAN, &input.command);
+            let Load { displacement: demand, force } = known_load(config, state);
             let feedback = feedback(config, state);
             if !entered {
                 state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
@@ -113,7 +113,7 @@ pub fn emit() -> TokenStream {
                 drift: [0.0; LEGS],
                 dac_code: [0; LEGS],
                 pose: state.pose,
-                target: target.pose,
+                target: state.generator.target().pose,
                 load: [0.0; LEGS],
                 status: gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
             };
@@ -134,7 +134,6 @@ pub fn emit() -> TokenStream {
                 output.dac_code[index] = leg.code;
                 output.status |= (limited as u32) << index;
             }
-            state.target = target;
             output
         }
 
@@ -184,7 +183,7 @@ pub fn emit() -> TokenStream {
         #[inline]
         pub(crate) fn learn(config: &Config, state: &mut State) {
             let mode = config.mode();
-            let error = modal_error(&difference(&state.target.pose, &state.pose));
+            let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
             if mode.feeds_back() {
                 state.error = notch_error(&mut state.error_notch, &error);
                 let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
@@ -232,13 +231,14 @@ pub fn emit() -> TokenStream {
             if !config.damps() {
                 return [0.0; LEGS];
             }
-            let error = difference(&state.target.rate, state.rate.value());
+            let error = difference(&state.generator.target().rate, state.rate.value());
             transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error))
         }
 
         /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
         #[inline]
-        pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load<Real> {
+        pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
+            let target = state.generator.target();
             let wrench = match config.interaction() {
                 Interaction::Neglected => [0.0; 6],
                 Interaction::Measured => state.wrench,
@@ -248,7 +248,7 @@ pub fn emit() -> TokenStream {
                     force_of(&environment.stiffness, &compressed)
                 }
             };
-            dynamics::load(&Motion { pose: target.pose, rate: target.rate, acceleration: target.acceleration }, &wrench)
+            dynamics::load(target, &wrench)
         }
 
         /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.

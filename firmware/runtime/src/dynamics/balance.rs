@@ -86,9 +86,9 @@ fn factor<T: Real, const E: usize, const J: usize>(
     let mut entries = ordered(&share.column, rows);
     eliminate(&mut entries, before, rows);
     let inverse_pivot = T::ONE / entries[J % 6];
-    for i in 0..6 {
+    for (i, entry) in entries.iter_mut().enumerate() {
         if i > J {
-            entries[i] = entries[i] * inverse_pivot;
+            *entry = *entry * inverse_pivot;
         }
     }
     Column { entries, inverse_pivot }

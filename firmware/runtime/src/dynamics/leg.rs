@@ -160,3 +160,73 @@ fn spun<T: Real, const N: usize>(
     let z = vz + joint[1] * p - joint[0] * q;
     if dimensions == 3 { [x + joint[2] * q, y - joint[2] * p, z] } else { [x, y, z] }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A number for each place, in no order.
+    fn number(k: usize) -> f64 {
+        ((k * 7919 + 13) % 1009) as f64 / 1009.0 - 0.4
+    }
+
+    fn vector(k: usize) -> [f64; 3] {
+        [number(k), number(k + 100), number(k + 200)]
+    }
+
+    fn leg(k: usize) -> Leg<f64> {
+        let rest = [0.1 * number(k), 0.1 * number(k + 1), 0.2];
+        let square = rest[0] * rest[0] + rest[1] * rest[1] + rest[2] * rest[2];
+        Leg {
+            base: vector(k + 2),
+            joint: vector(k + 3),
+            arm: vector(k + 4),
+            rest,
+            length: 0.21,
+            inverse_length: 4.7,
+            half_inverse_square: 0.5 / square,
+        }
+    }
+
+    /// How many are worked on at once is a matter of speed alone.
+    #[test]
+    fn results_do_not_depend_on_how_many_legs_are_side_by_side() {
+        let (first, second) = (leg(5), leg(50));
+        let platform = Platform {
+            legs: [first; 6],
+            places: [0, 1, 2, 3, 4, 5],
+            rows: [0, 1, 2, 3, 4, 5],
+            flat_base: false,
+            flat_platform: false,
+            base_depth: 0.2,
+            pole: vector(7),
+            mass: 1.5,
+            first_moment: vector(8),
+            pole_moment: vector(9),
+            second_moment: [vector(10), vector(11), vector(12)],
+            extensible_moment: 0.0037,
+            leg_inertia: 5.7e-4,
+            leg_weight_moment: -0.008,
+            gravity: 9.81,
+        };
+        let common: Common<f64, 3, 3> = Common {
+            turn: [vector(20), vector(21), vector(22)].map(|row| row.map(|x| 0.01 * x)),
+            shift: vector(23).map(|x| 0.01 * x),
+            omega: vector(24),
+            velocity: vector(25),
+            tow: [vector(26), vector(27), vector(28)],
+            acceleration: vector(29),
+            leg_weight: vector(30),
+        };
+        let round = || Round { platform: &platform, common: &common, wrench: [0.1, 0.2, 0.3, 0.4, 0.5, 0.6] };
+        let (mut one, mut two) = (round(), round());
+        let ([a], [b]) = (one.shares::<1, 1>([&first]), one.shares::<1, 1>([&second]));
+        let [c, d] = two.shares::<2, 1>([&first, &second]);
+        let bits = |share: &Share<f64, 1>| {
+            (share.column.map(f64::to_bits), share.axial.to_bits(), share.displacement.map(f64::to_bits))
+        };
+        assert_eq!((bits(&a), bits(&b)), (bits(&c), bits(&d)));
+        assert_eq!(one.wrench.map(f64::to_bits), two.wrench.map(f64::to_bits));
+        assert_ne!(bits(&a), bits(&b));
+    }
+}
