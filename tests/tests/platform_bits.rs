@@ -150,7 +150,7 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
         ("sensing", task.sensing.inverse[3][1], &["pose"]),
         ("dynamics", ir.dynamics.legs[3].rest[2], &["demand", "load"]),
         ("dynamics", ir.dynamics.mass, &["load"]),
-        ("setpoint", task.setpoints.jerk_limit[2], &["target"]),
+        ("setpoint", task.setpoints.square_rate, &["load"]),
         ("setpoint", task.setpoints.bias[2], &["target"]),
         ("config", task.defaults.gains.integral[0], legs),
         ("config", task.defaults.level_weight, legs),
