@@ -111,11 +111,11 @@ fn the_integral_grows_by_gain_times_error_and_is_held_only_outward() {
 #[test]
 fn a_transfer_fades_to_nothing_without_subnormal_numbers() {
     let mut transfer = Transfer::<f32>::new();
-    transfer.offset = [1e-6, -1e-6, 1e-30, 0.0, 5e-7, -3e-8];
+    transfer.begin([1e-6, -1e-6, 1e-30, 0.0, 5e-7, -3e-8]);
     let mut ticks = 0;
-    while transfer.offset != [0.0; 6] {
+    while *transfer.offset() != [0.0; 6] {
         transfer.fade(0.99, 1e-15);
-        assert!(transfer.offset.iter().all(|offset| *offset == 0.0 || offset.is_normal()));
+        assert!(transfer.offset().iter().all(|offset| *offset == 0.0 || offset.is_normal()));
         ticks += 1;
         assert!(ticks < 3000);
     }

@@ -38,7 +38,7 @@ pub fn emit() -> TokenStream {
 
         /// Brings a copy of the state to where the stages find it, with each leg's request in place of its residual; not measured.
         pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
-            crate::step::sense(state, &input.gauge);
+            crate::step::sense(config, state, &input.gauge);
             state.generator.tick(&PLAN, &input.command);
             let load = known_load(config, state);
             let feedback = feedback(config, state);
@@ -48,8 +48,8 @@ pub fn emit() -> TokenStream {
         }
 
         /// Gauges to pose.
-        extern "C" fn sense(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
-            crate::step::sense(state, &input.gauge);
+        extern "C" fn sense(config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
+            crate::step::sense(config, state, &input.gauge);
         }
 
         /// The modal notch on the pose error.

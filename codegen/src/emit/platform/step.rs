@@ -27,7 +27,7 @@ pub fn emit() -> TokenStream {
         #![doc = " and what is left out is the error times the change of J over the workspace, a thousandth of it."]
 
         use specgen_runtime::feedback::{force_of, winds_up};
-        use specgen_runtime::linear::{difference, transform};
+        use specgen_runtime::linear::{difference, each, transform};
         use specgen_runtime::setpoint::Command;
         use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _};
 
@@ -93,48 +93,45 @@ pub fn emit() -> TokenStream {
         /// One control tick. See the module for the timing.
         pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
             let entered = enter_mode(config, state);
-            let gauge_faults = sense(state, &input.gauge);
+            let gauge_faults = sense(config, state, &input.gauge);
             if gauge_faults == 0 {
                 learn(config, state);
             }
-            let wrench_good = take_wrench(state, &input.wrench);
+            let wrench_good = take_wrench(config, state, &input.wrench);
             let damping = damping(config, state);
             let setpoint_status = state.generator.tick(&PLAN, &input.command);
             let Load { displacement: demand, force } = known_load(config, state);
+            let mut load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE);
+            if let Some(damping) = &damping {
+                load = each(|leg| load[leg] + damping[leg]);
+            }
             let feedback = feedback(config, state);
-            if !entered {
+            let request = each(|leg| demand[leg] + load[leg] + feedback[leg] - state.legs[leg].estimate.correction());
+            if entered {
+                state.transfer.begin(each(|leg| state.legs[leg].requested - request[leg]));
+            } else {
                 state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
             }
-            let mut output = TickOutput {
-                voltage: [0.0; LEGS],
-                requested: [0.0; LEGS],
+            let mut limited = 0;
+            for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
+                let offset = state.transfer.offset()[index];
+                let held_back = actuate(config, leg, table, request[index] + offset);
+                leg.residual = (request[index] + offset - leg.requested) - feedback[index] - offset;
+                limited |= (held_back as u32) << index;
+            }
+            let legs = &state.legs;
+            TickOutput {
+                voltage: each(|leg| DAC.voltage(legs[leg].code)),
+                requested: each(|leg| legs[leg].requested),
                 demand,
-                level: [0.0; LEGS],
-                drift: [0.0; LEGS],
-                dac_code: [0; LEGS],
+                level: each(|leg| legs[leg].estimate.level),
+                drift: each(|leg| legs[leg].estimate.drift),
+                dac_code: each(|leg| legs[leg].code),
                 pose: state.pose,
                 target: state.generator.target().pose,
-                load: [0.0; LEGS],
-                status: gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
-            };
-            for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
-                let load = (force[index] - REST_FORCE[index]) * COMPLIANCE + damping[index];
-                let request = demand[index] + load + feedback[index] - leg.estimate.correction();
-                if entered {
-                    state.transfer.offset[index] = leg.requested - request;
-                }
-                let offset = state.transfer.offset[index];
-                let limited = actuate(config, leg, table, request + offset);
-                leg.residual = (request + offset - leg.requested) - feedback[index] - offset;
-                output.load[index] = load;
-                output.voltage[index] = DAC.voltage(leg.code);
-                output.requested[index] = leg.requested;
-                output.level[index] = leg.estimate.level;
-                output.drift[index] = leg.estimate.drift;
-                output.dac_code[index] = leg.code;
-                output.status |= (limited as u32) << index;
+                load,
+                status: limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
             }
-            output
         }
 
         /// Whether this tick is the first of its mode. If so, what the mode does not use is put at rest; the first request then
@@ -168,10 +165,14 @@ pub fn emit() -> TokenStream {
 
         /// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.
         #[inline]
-        pub(crate) fn sense(state: &mut State, gauge: &[Real; 6]) -> u32 {
+        pub(crate) fn sense(config: &Config, state: &mut State, gauge: &[Real; 6]) -> u32 {
             let faults = sensing::faults(gauge);
             if faults == 0 {
                 state.pose = sensing::pose(gauge);
+            }
+            if !config.damps() {
+                state.rate.rest();
+            } else if faults == 0 {
                 state.rate.update(&sensing::RATE, &state.pose);
             } else {
                 state.rate.coast(&sensing::RATE);
@@ -192,10 +193,7 @@ pub fn emit() -> TokenStream {
                 }
             }
             if mode.law() != Law::Invhys {
-                let mut residual = [0.0; LEGS];
-                for (residual, leg) in residual.iter_mut().zip(&state.legs) {
-                    *residual = leg.residual;
-                }
+                let residual = each(|leg| state.legs[leg].residual);
                 let innovation = notch_innovation(&mut state.innovation_notch, &error, &residual);
                 for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
                     leg.estimate.correct(mode.law(), config.level_weight(), config.drift_weight(), innovation);
@@ -206,18 +204,16 @@ pub fn emit() -> TokenStream {
         /// Whether the integral's growth would push a leg further beyond the limit that holds it back.
         #[inline]
         fn would_wind_up(legs: &[LegState; LEGS], growth: &[Real; 6]) -> bool {
-            let mut excess = [0.0; LEGS];
-            let mut any = false;
-            for (excess, leg) in excess.iter_mut().zip(legs) {
-                *excess = leg.excess;
-                any |= leg.excess != 0.0;
-            }
-            any && winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
+            let excess = each(|leg| legs[leg].excess);
+            excess.iter().any(|excess| *excess != 0.0) && winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
         }
 
-        /// The measured wrench, if it is to be believed.
+        /// Takes the measured wrench if it is to be believed; one that nobody asks for is not looked at.
         #[inline]
-        fn take_wrench(state: &mut State, wrench: &[Real; 6]) -> bool {
+        fn take_wrench(config: &Config, state: &mut State, wrench: &[Real; 6]) -> bool {
+            if config.interaction() != Interaction::Measured {
+                return true;
+            }
             let good = wrench.iter().zip(&WRENCH_LIMIT).all(|(value, limit)| (-*limit..=*limit).contains(value));
             if good {
                 state.wrench = *wrench;
@@ -225,14 +221,14 @@ pub fn emit() -> TokenStream {
             good
         }
 
-        /// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg.
+        /// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg; none without k_v.
         #[inline]
-        fn damping(config: &Config, state: &State) -> [Real; LEGS] {
+        fn damping(config: &Config, state: &State) -> Option<[Real; LEGS]> {
             if !config.damps() {
-                return [0.0; LEGS];
+                return None;
             }
             let error = difference(&state.generator.target().rate, state.rate.value());
-            transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error))
+            Some(transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error)))
         }
 
         /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
