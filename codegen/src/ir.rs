@@ -358,6 +358,8 @@ pub struct Notch {
     pub pose_to_modes: [[f64; 6]; 6],
     /// V.
     pub modes_to_pose: [[f64; 6]; 6],
+    /// V⁻¹ K⁻¹, K = Jᵀ k_a J.
+    pub force_to_modes: [[f64; 6]; 6],
     /// V⁻¹ J⁻¹.
     pub legs_to_modes: [[f64; 6]; 6],
     /// J V.

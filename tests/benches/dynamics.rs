@@ -47,7 +47,7 @@ fn load(bencher: Bencher) {
     let motions = motions();
     bencher.counter(ItemsCount::new(motions.len())).bench_local(|| {
         for motion in &motions {
-            black_box(platform.load(black_box(motion), black_box(&[1.0; 6])));
+            black_box(platform.load(black_box(motion), black_box(Some(&[1.0; 6]))));
         }
     });
 }

@@ -372,7 +372,7 @@ fn a_wrench_on_the_platform_is_taken_off_the_leg_forces() {
         let platform = lower::platform(&model).unwrap();
         for motion in states(seed, 20, 0.01, 0.3) {
             let wrench = [3.0, -5.0, 7.0, 0.2, -0.4, 0.6];
-            let load = platform.load(&motion, &wrench);
+            let load = platform.load(&motion, Some(&wrench));
             let [_, _, _, _, ty, tz] = motion.pose;
             let axes =
                 [[ty.cos() * tz.cos(), ty.cos() * tz.sin(), -ty.sin()], [-tz.sin(), tz.cos(), 0.0], [0.0, 0.0, 1.0]];

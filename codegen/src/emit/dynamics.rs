@@ -65,11 +65,11 @@ pub fn emit(ir: &Ir) -> TokenStream {
             PLATFORM.leg_forces(motion)
         }
 
-        /// Leg displacements (m) and leg forces (N) for a motion under a wrench on the platform: force (N) and torque (N m) about
+        /// Leg displacements (m) and leg forces (N) for a motion, under a wrench on the platform if there is one: force (N) and torque (N m) about
         /// P_C, base axes.
         #[inline]
         #[must_use]
-        pub fn load(motion: &Motion<Real>, wrench: &[Real; 6]) -> Load<Real> {
+        pub fn load(motion: &Motion<Real>, wrench: Option<&[Real; 6]>) -> Load<Real> {
             PLATFORM.load(motion, wrench)
         }
 
@@ -112,7 +112,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
             let number = |k: usize| Real::from_word(words[k]);
             let six = |k: usize| [number(k), number(k + 1), number(k + 2), number(k + 3), number(k + 4), number(k + 5)];
             let motion = Motion { pose: six(0), rate: six(6), acceleration: six(12) };
-            let load = load(&motion, &[0.0; 6]);
+            let load = load(&motion, None);
             let rows = [coriolis(&motion.pose, &motion.rate), gravity(&motion.pose), leg_forces(&motion), load.displacement];
             let (jacobian, mass) = (jacobian(&motion.pose), mass_matrix(&motion.pose));
             let mut out = [0; ANALYSIS_WORDS];

@@ -6,8 +6,8 @@ use crate::model::{self, Model};
 use crate::numerics::{Matrix6, multiply6, transpose6};
 use crate::stability::platform::{self as design, Design, RestDynamics};
 
-/// Offset of a change of mode that is over, m: far below what a gauge sees.
-const TRANSFER_NEGLIGIBLE: f64 = 1e-15;
+/// Offset of a change of mode that is over, m: a hundredth of a converter step, far below what a gauge sees.
+const TRANSFER_NEGLIGIBLE: f64 = 1e-11;
 
 /// Constants of (7) and of the composition of P and F. `rest_force` are the leg forces at rest, N.
 pub(super) fn law(
@@ -27,6 +27,7 @@ pub(super) fn law(
     let notch = design.notch.as_ref().map(|notch| Notch {
         pose_to_modes: round_all(notch.to_modal),
         modes_to_pose: round_all(notch.from_modal),
+        force_to_modes: round_all(multiply6(&multiply6(&notch.to_modal, &legs_to_pose), &wrench_to_legs)),
         legs_to_modes: round_all(multiply6(&notch.to_modal, &legs_to_pose)),
         modes_to_legs: round_all(multiply6(&rest.jacobian, &notch.from_modal)),
         // b₀ = 1 − g, b₁ = a₁, b₂ = a₂ + g.

@@ -1,11 +1,11 @@
-//! The exercise of a controller in task space: closed loop with a simulated machine, on a trajectory of the spec.
+//! The exercise of a controller in task space: closed loop with a simulated machine, on streamed set-points.
 
 use std::f64::consts::{PI, TAU};
 
 use host_sim::closed_loop::RunError;
 use host_sim::controller::TickController;
 use host_sim::plant::{LegParameters, NoiseParameters};
-use host_sim::platform::rig::{BUSY, Bench, Command, Noise, Request, RunOptions};
+use host_sim::platform::rig::{BUSY, Bench, Noise, Request, RunOptions};
 use host_sim::platform::{GaugeSignal, PlatformParameters, PlatformRig, PlatformScenario, Probe, Specimen};
 use host_sim::trace::Trace;
 use host_sim::trajectory::PoseTarget;
@@ -14,7 +14,7 @@ use super::SEED;
 use crate::lower::GRAVITY;
 use crate::model::{Model, TaskSpace};
 
-/// Way to the bias pose, then the first trajectory of the spec again and again; without one a slow motion of all six axes.
+/// Way to the bias pose, then a streamed motion of all six axes.
 pub(super) fn exercise(
     controller: &mut dyn TickController,
     model: &Model,
@@ -25,18 +25,13 @@ pub(super) fn exercise(
     let mut bench = Bench::new(&mut rig, controller, model.timing.period, 0)?;
     bench.record();
     let mut busy = true;
-    let mut request = Request::default();
     let mut streamed = 0;
     for _ in 0..ticks {
-        request = match request.command {
-            // A command is obeyed once: another one in between lets the trajectory begin again.
-            _ if busy => request,
-            Command::Trajectory => Request::default(),
-            _ if task.trajectories.is_empty() => {
-                streamed += 1;
-                Request::stream(motion(model, task, f64::from(streamed) * model.timing.period))
-            }
-            _ => Request { command: Command::Trajectory, ..Request::default() },
+        let request = if busy {
+            Request::default()
+        } else {
+            streamed += 1;
+            Request::stream(motion(model, task, f64::from(streamed) * model.timing.period))
         };
         busy = bench.tick(&request)?.status & BUSY != 0;
     }
@@ -49,7 +44,7 @@ fn motion(model: &Model, task: &TaskSpace, time: f64) -> PoseTarget {
     let [x, y, z] = model.workspace.translation;
     let [tilt_x, tilt_y, tilt_z] = model.workspace.rotation;
     for (axis, bound) in [x, y, z, tilt_x, tilt_y, tilt_z].into_iter().enumerate() {
-        let amplitude = 0.05 * (bound - task.setpoint.bias[axis].abs());
+        let amplitude = 0.1 * (bound - task.setpoint.bias[axis].abs());
         let frequency = TAU * (2.0 + 0.7 * axis as f64);
         let (sine, cosine) = libm::sincos(frequency * time);
         target.pose[axis] = amplitude * (1.0 - cosine);

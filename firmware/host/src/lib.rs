@@ -157,7 +157,8 @@ pub unsafe extern "C" fn specgen_step(config: *const u8, state: *mut u8, input: 
     // SAFETY: the caller's duty.
     let (config, state, input) =
         unsafe { (&*config.cast::<Config>(), &mut *state.cast::<State>(), &*input.cast::<[u64; INPUT_WORDS]>()) };
-    let words = controller::step(config, state, &TickInput::from_words(input)).to_words();
+    let result = controller::step(config, state, &TickInput::from_words(input));
+    let words = controller::output_words(&result, state);
     // SAFETY: the caller's duty.
     unsafe { output.cast::<[u64; OUTPUT_WORDS]>().write(words) }
 }

@@ -14,7 +14,7 @@ mod stack;
 mod stages;
 mod stats;
 
-use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, step};
+use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, output_words, step};
 use core::mem::MaybeUninit;
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use instructions::InstructionCounter;
@@ -69,7 +69,7 @@ fn replay() -> Result<(), Exit> {
             if depth > deepest {
                 deepest = depth;
             }
-            let words = tick_output.to_words();
+            let words = output_words(&tick_output, &state);
             for (slot, word) in result.iter_mut().zip(words) {
                 *slot = word;
             }

@@ -117,20 +117,21 @@ impl<T: Real> Platform<T> {
         self.by_leg(&balance.forces(&self.rows))
     }
 
-    /// Leg displacements and leg forces for a motion under a wrench on the platform: force (N) and torque (N m) about P_C,
-    /// base axes.
+    /// Leg displacements and leg forces for a motion, under a wrench on the platform if there is one: force (N) and torque
+    /// (N m) about P_C, base axes.
     #[inline]
     #[must_use]
-    pub fn load(&self, motion: &Motion<T>, wrench: &[T; 6]) -> Load<T> {
+    pub fn load(&self, motion: &Motion<T>, wrench: Option<&[T; 6]>) -> Load<T> {
         let attitude = Attitude::new(&motion.pose);
         let mut balance = self.balance::<1>(&attitude, motion, T::ONE);
-        let [fx, fy, fz, tx, ty, tz] = *wrench;
-        let force = map(&attitude.to_platform, &[fx, fy, fz]);
-        let torque = map(&attitude.to_platform, &[tx, ty, tz]);
-        let shift = cross(&self.pole, &force);
-        for k in 0..3 {
-            balance.wrench[k] = balance.wrench[k] - force[k];
-            balance.wrench[k + 3] = balance.wrench[k + 3] - (torque[k] - shift[k]);
+        if let Some([fx, fy, fz, tx, ty, tz]) = wrench {
+            let force = map(&attitude.to_platform, &[*fx, *fy, *fz]);
+            let torque = map(&attitude.to_platform, &[*tx, *ty, *tz]);
+            let shift = cross(&self.pole, &force);
+            for k in 0..3 {
+                balance.wrench[k] = balance.wrench[k] - force[k];
+                balance.wrench[k + 3] = balance.wrench[k + 3] - (torque[k] - shift[k]);
+            }
         }
         Load { displacement: self.by_leg(&balance.displacements()), force: self.by_leg(&balance.forces(&self.rows)) }
     }

@@ -39,6 +39,13 @@ impl<T: Real> Transfer<T> {
         &self.offset
     }
 
+    /// Any offset is left.
+    #[inline]
+    #[must_use]
+    pub fn is_active(&self) -> bool {
+        self.active
+    }
+
     /// One tick: `keep` (in [0, 1)) of each offset is left, and none once it is below `negligible` (m, > 0), so that it
     /// ends in zero rather than in subnormal numbers.
     #[inline]

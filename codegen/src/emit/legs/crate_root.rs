@@ -45,7 +45,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub use specgen_runtime::{CodeLimits, Law};
         pub use state::{LegState, State};
         pub use step::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, TickInput, TickOutput, actuate, step};
-        pub use words::{CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS};
+        pub use words::{
+            CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words,
+        };
 
         #identity
     }

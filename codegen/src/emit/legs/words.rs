@@ -30,7 +30,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
 
         use specgen_runtime::{CodeLimits, Law, Real as _};
 
-        use crate::{Config, ConfigError, LEGS, Real, SetpointKind, TickInput, TickOutput};
+        use crate::{Config, ConfigError, LEGS, Real, SetpointKind, State, TickInput, TickOutput};
 
         /// Words of a tick's input.
         pub const INPUT_WORDS: usize = #input_words;
@@ -61,22 +61,20 @@ pub fn emit(ir: &Ir) -> TokenStream {
             }
         }
 
-        impl TickOutput {
-            /// Words in the order of [`OUTPUT_NAMES`].
-            #[must_use]
-            pub fn to_words(&self) -> [u64; OUTPUT_WORDS] {
-                let mut words = [0; OUTPUT_WORDS];
-                for index in 0..LEGS {
-                    words[index] = self.voltage[index].to_word();
-                    words[LEGS + index] = self.requested[index].to_word();
-                    words[2 * LEGS + index] = self.demand[index].to_word();
-                    words[3 * LEGS + index] = self.level[index].to_word();
-                    words[4 * LEGS + index] = self.drift[index].to_word();
-                    words[5 * LEGS + index] = self.dac_code[index] as u32 as u64;
-                }
-                words[6 * LEGS] = self.status as u64;
-                words
+        /// Words in the order of [`OUTPUT_NAMES`], of a tick; nothing of the state is needed.
+        #[must_use]
+        pub fn output_words(output: &TickOutput, _state: &State) -> [u64; OUTPUT_WORDS] {
+            let mut words = [0; OUTPUT_WORDS];
+            for index in 0..LEGS {
+                words[index] = output.voltage[index].to_word();
+                words[LEGS + index] = output.requested[index].to_word();
+                words[2 * LEGS + index] = output.demand[index].to_word();
+                words[3 * LEGS + index] = output.level[index].to_word();
+                words[4 * LEGS + index] = output.drift[index].to_word();
+                words[5 * LEGS + index] = output.dac_code[index] as u32 as u64;
             }
+            words[6 * LEGS] = output.status as u64;
+            words
         }
 
         impl Config {

@@ -55,7 +55,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
             GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE, TickInput, TickOutput, WRENCH_FAULT,
             actuate, step,
         };
-        pub use words::{CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS};
+        pub use words::{
+            CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words,
+        };
 
         #identity
     }

@@ -36,14 +36,14 @@ pub fn emit() -> TokenStream {
             Stage { name: "limits", calls: LEGS, run: limits },
         ];
 
-        /// Brings a copy of the state to where the stages find it, with each leg's request in place of its residual; not measured.
+        /// Brings a copy of the state to where the stages find it, with each leg's request in place of its excess; not measured.
         pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
             crate::step::sense(config, state, &input.gauge);
             state.generator.tick(&PLAN, &input.command);
             let load = known_load(config, state);
             let feedback = feedback(config, state);
             for (index, leg) in state.legs.iter_mut().enumerate() {
-                leg.residual = load.displacement[index] + feedback[index] - leg.estimate.correction();
+                leg.excess = load.displacement[index] + feedback[index] - leg.estimate.correction();
             }
         }
 
@@ -83,14 +83,14 @@ pub fn emit() -> TokenStream {
         /// Γ⁻¹ of one leg: displacement to drive.
         extern "C" fn inverse(_config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
             if let (Some(leg), Some(table)) = (state.legs.get_mut(leg), TABLES.get(leg)) {
-                leg.residual = leg.memory.solve(table, leg.residual);
+                leg.excess = leg.memory.solve(table, leg.excess);
             }
         }
 
         /// One leg from request to code: Γ⁻¹, converter and limits, and the reversal memory brought up to date.
         extern "C" fn leg(config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
             if let (Some(leg), Some(table)) = (state.legs.get_mut(leg), TABLES.get(leg)) {
-                let request = leg.residual;
+                let request = leg.excess;
                 actuate(config, leg, table, request);
             }
         }
@@ -98,10 +98,9 @@ pub fn emit() -> TokenStream {
         /// One leg from drive to code within voltage and slew limits.
         extern "C" fn limits(config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
             if let Some(leg) = state.legs.get_mut(leg) {
-                let (code, held_back) = DAC.code(leg.residual, leg.code, config.code_limits());
+                let (code, held_back) = DAC.code(leg.excess, leg.code, config.code_limits());
                 leg.code = code;
-                leg.excess = if held_back { Real::ONE } else { Real::ZERO };
-                leg.requested = DAC.voltage(code);
+                leg.requested = if held_back { Real::ZERO } else { DAC.voltage(code) };
             }
         }
     }

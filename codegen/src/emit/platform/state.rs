@@ -22,8 +22,6 @@ pub fn emit() -> TokenStream {
             pub estimate: Estimate<Real>,
             /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.
             pub requested: Real,
-            /// r: last request less q̂, the feedback and the offset of a change of mode, m.
-            pub residual: Real,
             /// Part of the last request that a limit withheld, m; zero for a leg that was free.
             pub excess: Real,
             /// Converter code now held at the output.
@@ -49,6 +47,14 @@ pub fn emit() -> TokenStream {
             pub innovation_notch: NotchState<Real>,
             /// k_I ∫e.
             pub integral: Integral<Real>,
+            /// F: generalised force of the feedback over the interval now running, N and N m.
+            pub force: [Real; 6],
+            /// Δl(h_d) of the interval now running, m.
+            pub demand: [Real; LEGS],
+            /// p: deflection of each leg under the known load of the interval now running, m.
+            pub load: [Real; LEGS],
+            /// Some leg was held back by a limit in the last tick.
+            pub limited: bool,
             /// Interaction wrench last believed, N and N m.
             pub wrench: [Real; 6],
             /// What is left of the last change of mode.
@@ -71,7 +77,6 @@ pub fn emit() -> TokenStream {
                     memory: Memory::new(),
                     estimate: Estimate::new(),
                     requested: 0.0,
-                    residual: 0.0,
                     excess: 0.0,
                     code: limits::CODES[0],
                 };
@@ -84,6 +89,10 @@ pub fn emit() -> TokenStream {
                     error_notch: NotchState::new(),
                     innovation_notch: NotchState::new(),
                     integral: Integral::new(),
+                    force: [0.0; 6],
+                    demand: [0.0; LEGS],
+                    load: [0.0; LEGS],
+                    limited: false,
                     wrench: [0.0; 6],
                     transfer: Transfer::new(),
                     mode: None,
@@ -98,11 +107,10 @@ pub fn emit() -> TokenStream {
                     leg.memory.digest(&mut digest);
                     leg.estimate.digest(&mut digest);
                     digest.real(leg.requested);
-                    digest.real(leg.residual);
                     digest.real(leg.excess);
                     digest.word(leg.code as u32 as u64);
                 }
-                for vector in [&self.pose, &self.error, &self.wrench] {
+                for vector in [&self.pose, &self.error, &self.force, &self.demand, &self.load, &self.wrench] {
                     for value in vector {
                         digest.real(*value);
                     }
@@ -113,6 +121,7 @@ pub fn emit() -> TokenStream {
                 self.innovation_notch.digest(&mut digest);
                 self.integral.digest(&mut digest);
                 self.transfer.digest(&mut digest);
+                digest.word(self.limited as u64);
                 digest.word(match self.mode {
                     None => 0,
                     Some(mode) => 1 + mode.word(),

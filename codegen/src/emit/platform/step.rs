@@ -23,8 +23,9 @@ pub fn emit() -> TokenStream {
         #![doc = " is none and does not."]
         #![doc = ""]
         #![doc = " Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,"]
-        #![doc = " offset b of a change of mode) the innovation is then r − J e with r = (q − q̂) − f − b: no large numbers are subtracted,"]
-        #![doc = " and what is left out is the error times the change of J over the workspace, a thousandth of it."]
+        #![doc = " offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large numbers"]
+        #![doc = " are subtracted, and f is small in modal coordinates, too. What is left out is the error times the change of J over the"]
+        #![doc = " workspace, a thousandth of it, and the rounding of the converter on a leg that is free."]
 
         use specgen_runtime::feedback::{force_of, winds_up};
         use specgen_runtime::linear::{difference, each, transform};
@@ -65,27 +66,13 @@ pub fn emit() -> TokenStream {
             pub wrench: [Real; 6],
         }
 
-        /// What a tick yields. Every number is finite.
+        /// What a tick yields. Every number is finite. What else there is to know stands in the [`State`].
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct TickOutput {
             /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
             pub voltage: [Real; LEGS],
-            /// q̂ = ρ̂X: displacement really requested of each leg, after all limits, m.
-            pub requested: [Real; LEGS],
-            /// Δl(h_d): displacement of each leg at the set-point, m.
-            pub demand: [Real; LEGS],
-            /// δ̂ of each leg, m.
-            pub level: [Real; LEGS],
-            /// φ̂ of each leg, m.
-            pub drift: [Real; LEGS],
             /// Converter code of each leg.
             pub dac_code: [i32; LEGS],
-            /// h: measured pose from rest, m and rad.
-            pub pose: [Real; 6],
-            /// h_d at the end of the coming interval, from rest, m and rad.
-            pub target: [Real; 6],
-            /// p: deflection of each leg under the known load, m.
-            pub load: [Real; LEGS],
             /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`], [`SETPOINT_STALE`], [`GENERATOR_BUSY`], [`WRENCH_FAULT`].
             pub status: u32,
         }
@@ -101,12 +88,14 @@ pub fn emit() -> TokenStream {
             let damping = damping(config, state);
             let setpoint_status = state.generator.tick(&PLAN, &input.command);
             let Load { displacement: demand, force } = known_load(config, state);
-            let mut load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE);
-            if let Some(damping) = &damping {
-                load = each(|leg| load[leg] + damping[leg]);
-            }
             let feedback = feedback(config, state);
-            let request = each(|leg| demand[leg] + load[leg] + feedback[leg] - state.legs[leg].estimate.correction());
+            state.demand = demand;
+            state.load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE);
+            if let Some(damping) = &damping {
+                state.load = each(|leg| state.load[leg] + damping[leg]);
+            }
+            let correction = |leg: usize| state.legs[leg].estimate.correction();
+            let request = each(|leg| demand[leg] + state.load[leg] + feedback[leg] - correction(leg));
             if entered {
                 state.transfer.begin(each(|leg| state.legs[leg].requested - request[leg]));
             } else {
@@ -114,22 +103,14 @@ pub fn emit() -> TokenStream {
             }
             let mut limited = 0;
             for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
-                let offset = state.transfer.offset()[index];
-                let held_back = actuate(config, leg, table, request[index] + offset);
-                leg.residual = (request[index] + offset - leg.requested) - feedback[index] - offset;
+                let held_back = actuate(config, leg, table, request[index] + state.transfer.offset()[index]);
                 limited |= (held_back as u32) << index;
             }
+            state.limited = limited != 0;
             let legs = &state.legs;
             TickOutput {
                 voltage: each(|leg| DAC.voltage(legs[leg].code)),
-                requested: each(|leg| legs[leg].requested),
-                demand,
-                level: each(|leg| legs[leg].estimate.level),
-                drift: each(|leg| legs[leg].estimate.drift),
                 dac_code: each(|leg| legs[leg].code),
-                pose: state.pose,
-                target: state.generator.target().pose,
-                load,
                 status: limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
             }
         }
@@ -152,6 +133,7 @@ pub fn emit() -> TokenStream {
                 leg.requested = requested(mode, leg);
                 leg.excess = 0.0;
             }
+            state.limited = false;
             if mode.law() == Law::Invhys {
                 state.innovation_notch = NotchState::new();
             }
@@ -159,6 +141,7 @@ pub fn emit() -> TokenStream {
                 state.integral = Integral::new();
                 state.error_notch = NotchState::new();
                 state.error = [0.0; 6];
+                state.force = [0.0; 6];
             }
             true
         }
@@ -188,13 +171,16 @@ pub fn emit() -> TokenStream {
             if mode.feeds_back() {
                 state.error = notch_error(&mut state.error_notch, &error);
                 let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
-                if !would_wind_up(&state.legs, &growth) {
+                if !(state.limited && would_wind_up(&state.legs, &growth)) {
                     state.integral.grow(&growth);
                 }
             }
             if mode.law() != Law::Invhys {
-                let residual = each(|leg| state.legs[leg].residual);
-                let innovation = notch_innovation(&mut state.innovation_notch, &error, &residual);
+                let disturbed = state.limited || state.transfer.is_active();
+                let offset = state.transfer.offset();
+                let withheld = disturbed.then(|| each(|leg| state.legs[leg].excess - offset[leg]));
+                let innovation =
+                    notch_innovation(&mut state.innovation_notch, &error, &state.force, withheld.as_ref());
                 for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
                     leg.estimate.correct(mode.law(), config.level_weight(), config.drift_weight(), innovation);
                 }
@@ -205,7 +191,7 @@ pub fn emit() -> TokenStream {
         #[inline]
         fn would_wind_up(legs: &[LegState; LEGS], growth: &[Real; 6]) -> bool {
             let excess = each(|leg| legs[leg].excess);
-            excess.iter().any(|excess| *excess != 0.0) && winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
+            winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
         }
 
         /// Takes the measured wrench if it is to be believed; one that nobody asks for is not looked at.
@@ -235,29 +221,27 @@ pub fn emit() -> TokenStream {
         #[inline]
         pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
             let target = state.generator.target();
-            let wrench = match config.interaction() {
-                Interaction::Neglected => [0.0; 6],
-                Interaction::Measured => state.wrench,
+            match config.interaction() {
+                Interaction::Neglected => dynamics::load(target, None),
+                Interaction::Measured => dynamics::load(target, Some(&state.wrench)),
                 Interaction::Modelled => {
                     let environment = config.environment();
                     let compressed = difference(&environment.rest, &target.pose);
-                    force_of(&environment.stiffness, &compressed)
+                    dynamics::load(target, Some(&force_of(&environment.stiffness, &compressed)))
                 }
-            };
-            dynamics::load(target, &wrench)
+            }
         }
 
         /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.
         #[inline]
-        pub(crate) fn feedback(config: &Config, state: &State) -> [Real; LEGS] {
+        pub(crate) fn feedback(config: &Config, state: &mut State) -> [Real; LEGS] {
             if !config.mode().feeds_back() {
                 return [0.0; LEGS];
             }
-            let mut force = force_of(&config.active_gains().proportional, &state.error);
-            for (force, integral) in force.iter_mut().zip(&state.integral.force) {
-                *force += *integral;
-            }
-            transform(&WRENCH_TO_LEGS, &force)
+            let proportional = force_of(&config.active_gains().proportional, &state.error);
+            let integral = &state.integral.force;
+            state.force = each(|axis| proportional[axis] + integral[axis]);
+            transform(&WRENCH_TO_LEGS, &state.force)
         }
 
         /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,

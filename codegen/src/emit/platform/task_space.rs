@@ -27,7 +27,7 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         #![doc = " Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics."]
 
         use specgen_runtime::NotchState;
-        use specgen_runtime::linear::{difference, transform};
+        use specgen_runtime::linear::{each, transform};
 
         use crate::{LEGS, Real};
 
@@ -83,15 +83,18 @@ fn without_notch(jacobian: &TokenStream) -> TokenStream {
             *error
         }
 
-        /// r − J e of each leg, m: the spec declares no notch.
+        /// `withheld` − J⁻ᵀF/k_a − J e of each leg, m: the spec declares no notch.
         #[inline]
         #[must_use]
         pub fn notch_innovation(
             _notch: &mut NotchState<Real>,
             error: &[Real; 6],
-            residual: &[Real; LEGS],
+            force: &[Real; 6],
+            withheld: Option<&[Real; LEGS]>,
         ) -> [Real; LEGS] {
-            difference(residual, &transform(&JACOBIAN, error))
+            let (moved, pushed) = (transform(&JACOBIAN, error), transform(&WRENCH_TO_LEGS, force));
+            let innovation = each(|leg| -moved[leg] - pushed[leg]);
+            withheld.map_or(innovation, |withheld| each(|leg| innovation[leg] + withheld[leg]))
         }
     }
 }
@@ -102,6 +105,7 @@ fn with_notch(ir: &Ir, notch: &Notch, matrix: &dyn Fn(&[[f64; 6]; 6]) -> TokenSt
         quote! { Section { depth: #depth, a: [#a] } }
     });
     let (pose_to_modes, modes_to_pose) = (matrix(&notch.pose_to_modes), matrix(&notch.modes_to_pose));
+    let force_to_modes = matrix(&notch.force_to_modes);
     let (legs_to_modes, modes_to_legs) = (matrix(&notch.legs_to_modes), matrix(&notch.modes_to_legs));
     quote! {
         use specgen_runtime::Section;
@@ -112,6 +116,8 @@ fn with_notch(ir: &Ir, notch: &Notch, matrix: &dyn Fn(&[[f64; 6]; 6]) -> TokenSt
         pub const POSE_TO_MODES: [[Real; 6]; 6] = #pose_to_modes;
         /// V: the modes as poses.
         pub const MODES_TO_POSE: [[Real; 6]; 6] = #modes_to_pose;
+        /// V⁻¹ K⁻¹ with K = Jᵀ k_a J: generalised force to the deflection it makes, in modal coordinates.
+        pub const FORCE_TO_MODES: [[Real; 6]; 6] = #force_to_modes;
         /// V⁻¹ J⁻¹: leg displacements to modal coordinates.
         pub const LEGS_TO_MODES: [[Real; 6]; 6] = #legs_to_modes;
         /// J V: the modes as leg displacements.
@@ -131,15 +137,21 @@ fn with_notch(ir: &Ir, notch: &Notch, matrix: &dyn Fn(&[[f64; 6]; 6]) -> TokenSt
             transform(&MODES_TO_POSE, &notch.filter(&NOTCH, modal_error))
         }
 
-        /// N(r − J e) of each leg, m, for a modal error.
+        /// N(`withheld` − J⁻ᵀF/k_a − J e) of each leg, m, for a modal error.
         #[inline]
         #[must_use]
         pub fn notch_innovation(
             notch: &mut NotchState<Real>,
             modal_error: &[Real; 6],
-            residual: &[Real; LEGS],
+            force: &[Real; 6],
+            withheld: Option<&[Real; LEGS]>,
         ) -> [Real; LEGS] {
-            let innovation = difference(&transform(&LEGS_TO_MODES, residual), modal_error);
+            let pushed = transform(&FORCE_TO_MODES, force);
+            let mut innovation = each(|mode| -modal_error[mode] - pushed[mode]);
+            if let Some(withheld) = withheld {
+                let withheld = transform(&LEGS_TO_MODES, withheld);
+                innovation = each(|mode| innovation[mode] + withheld[mode]);
+            }
             transform(&MODES_TO_LEGS, &notch.filter(&NOTCH, &innovation))
         }
     }
