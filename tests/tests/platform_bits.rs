@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use host_sim::controller::TickController;
+use host_sim::stimulus::InputRecording;
 use host_sim::trace::{Difference, Trace, first_difference};
 use specgen::compile::Compiled;
 use specgen::model::Mcu;
@@ -18,18 +19,21 @@ use specgen_tests::{Emitted, column, host_trace, integers};
 const TICKS: usize = 100_000;
 /// Ticks of each mode in closed loop.
 const TRACKING: u32 = 20_000;
+/// `interaction` of a force sensor, and its status bit.
+const MEASURED: f64 = 2.0;
+const WRENCH_FAULT: u64 = 0x8_0000;
 /// Mode words with their names, and the source of the interaction force that the run exercises.
 const MODES: [(&str, f64, f64); 7] = [
-    ("P", 0.0, 0.0),
+    ("P", 0.0, MEASURED),
     ("F invhys", 1.0, 1.0),
-    ("F ewma", 2.0, 2.0),
+    ("F ewma", 2.0, MEASURED),
     ("F pcc", 3.0, 0.0),
-    ("P/F invhys", 4.0, 2.0),
+    ("P/F invhys", 4.0, MEASURED),
     ("P/F ewma", 5.0, 0.0),
     ("P/F pcc", 6.0, 1.0),
 ];
 const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
-/// On-board trajectories ten times as fast, so that the closed loop sees all of them.
+/// On-board trajectories ten times as fast, so that a stretch of the hostile record sees most of one.
 const FAST: (&str, &str) = ("frequency = \"1 Hz\"", "frequency = \"10 Hz\"");
 
 fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
@@ -41,7 +45,7 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
         let inputs = emitted.platform_stimulus(&description, TICKS, seed);
         let settings = [("mode", mode), ("interaction", interaction), ("environment_stiffness[2]", 3e6)];
         let (hostile, config) = host_trace(&mut controller, &settings, &inputs);
-        covers(&hostile, what);
+        covers(&hostile, what, interaction == MEASURED);
         // The controller keeps these settings.
         let Compiled { model, ir, .. } = &emitted.compiled;
         let tracking = verify::exercise(&mut controller, model, ir, TRACKING).unwrap();
@@ -65,7 +69,7 @@ fn tracks(trace: &Trace, what: &str) {
     assert!(held < status.len() / 100, "{what}: {held} ticks with a limit or a fault");
     let (target, pose) = (column(trace, "target[2]"), column(trace, "pose[2]"));
     let way = target.iter().fold(0.0_f64, |way, z| way.max(*z)) - 10e-6;
-    assert!(way > 30e-6, "{what}: {way} m of way");
+    assert!(way > 10e-6, "{what}: {way} m of way");
     // The pose is that of the tick's beginning, which is the target of the tick before.
     let late = target.len() / 2;
     let error: Vec<f64> = pose[late + 1..].iter().zip(&target[late..]).map(|(pose, target)| pose - target).collect();
@@ -78,17 +82,18 @@ fn tracks(trace: &Trace, what: &str) {
 }
 
 /// The recording really holds what it is meant to hold, and nothing that comes out is beyond its limits.
-fn covers(trace: &Trace, what: &str) {
+fn covers(trace: &Trace, what: &str, measured: bool) {
     let status = integers(trace, "status");
     let faults = [
         (0x3f00, "gauge faults"),
         (0x1_0000, "refused set-points"),
         (0x2_0000, "a stale stream"),
         (0x4_0000, "moves"),
-        (0x8_0000, "force faults"),
+        (WRENCH_FAULT, "force faults"),
     ];
     let count = |mask: u64| status.iter().filter(|word| *word & mask != 0).count();
-    for (mask, name) in faults {
+    // A wrench that nobody asks for is not looked at.
+    for (mask, name) in faults.into_iter().filter(|(mask, _)| measured || *mask != WRENCH_FAULT) {
         let count = count(mask);
         assert!(count > 100, "{what}: only {count} ticks with {name}");
         assert!(status.len() - count > 100, "{what}: only {} ticks without {name}", status.len() - count);
@@ -133,7 +138,12 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let good = Emitted::new("platform-ulp-good", "reference.toml", &[]);
     let Some(image) = good.image(Mcu::Mps2An500) else { return };
     let mut unchanged = good.controller();
-    let inputs = good.platform_stimulus(&unchanged.description().clone(), 5000, 7);
+    // While tracking nothing is held, so that every constant is at work; saturation shows what the converter's codes hide.
+    let tracking = verify::exercise(&mut unchanged, &good.compiled.model, &good.compiled.ir, 5000).unwrap();
+    let hostile = good.platform_stimulus(tracking.description(), 5000, 7);
+    let width = hostile.width;
+    let words = tracking.rows().map(|row| &row[..width]).chain(hostile.rows()).flatten().copied().collect();
+    let inputs = InputRecording { width, words };
     // The target gets the settings of the spec, so that a constant of the settings is compared too.
     let (truth, config) = host_trace(&mut unchanged, &[("mode", 6.0)], &inputs);
     let (target, _) = verify::replay(&image, &config, &truth).unwrap_or_else(|error| panic!("{error}"));
