@@ -96,7 +96,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, sim, identify, forc, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, sim, dynamics, identify, forc, dump-ir) with its own arguments",
         ),
         _ => error,
     };

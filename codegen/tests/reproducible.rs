@@ -15,9 +15,16 @@ use support::{Folder, Run, contents, repository};
 
 type Files = BTreeMap<String, Vec<u8>>;
 
-/// The reference workspace, made in the plainest way.
-fn baseline(folder: &Folder) -> Files {
-    made(folder.command().args(["legs.toml", "-o", "out", "--no-build"]), &folder.path("out"))
+/// Both kinds of controller: task space, legs with their own gauges.
+const KINDS: [&str; 2] = ["reference.toml", "legs.toml"];
+
+/// The workspace of a spec, made in the plainest way into `output`.
+fn plain(folder: &Folder, spec: &str, output: &str) -> Files {
+    made(folder.command().args([spec, "-o", output, "--no-build"]), &folder.path(output))
+}
+
+fn baseline(folder: &Folder, spec: &str) -> Files {
+    plain(folder, spec, &format!("out-{spec}"))
 }
 
 fn made(command: &mut Command, output: &Path) -> Files {
@@ -40,46 +47,74 @@ fn same(left: &Files, right: &Files) {
 #[test]
 fn two_runs_give_the_same_bytes_and_one_changed_constant_does_not() {
     let folder = Folder::new();
-    let first = baseline(&folder);
-    same(&first, &made(folder.command().args(["legs.toml", "-o", "again", "--no-build"]), &folder.path("again")));
-    folder.spec("other.toml", &[("level_weight = 0.252", "level_weight = 0.2520000000000001")]);
-    let other = made(folder.command().args(["other.toml", "-o", "other", "--no-build"]), &folder.path("other"));
-    assert_ne!(first["controller/src/config.rs"], other["controller/src/config.rs"]);
-    assert_ne!(first["ir.json"], other["ir.json"]);
-    // The record is as much a source as the spec: one digit in its last line.
+    let constants = [
+        ("modal_damping   = 0.02 ", "modal_damping   = 0.020000000000000004 "),
+        ("level_weight = 0.252", "level_weight = 0.2520000000000001"),
+    ];
+    for (spec, (old, new)) in KINDS.into_iter().zip(constants) {
+        let first = baseline(&folder, spec);
+        same(&first, &plain(&folder, spec, "again"));
+        let text = folder.read(spec);
+        assert_eq!(text.matches(old).count(), 1, "{spec}: `{old}`");
+        folder.write("other.toml", text.replace(old, new));
+        let other = plain(&folder, "other.toml", "other");
+        assert_ne!(first["controller/src/config.rs"], other["controller/src/config.rs"]);
+        assert_ne!(first["ir.json"], other["ir.json"]);
+    }
+    // A record is as much a source as the spec: one digit in its last line.
+    let first: Vec<Files> = KINDS.map(|spec| baseline(&folder, spec)).into();
     let record = folder.read("records/reference-forc.csv");
     let (head, last) = record.trim_end().rsplit_once('\n').unwrap();
     folder.write("records/reference-forc.csv", format!("{head}\n{last}1\n"));
-    let other = made(folder.command().args(["legs.toml", "-o", "third", "--no-build"]), &folder.path("third"));
-    assert_ne!(first["ir.json"], other["ir.json"]);
+    for (spec, first) in KINDS.into_iter().zip(first) {
+        assert_ne!(first["ir.json"], plain(&folder, spec, "third")["ir.json"], "{spec}");
+    }
+}
+
+/// A table of poses is one too.
+#[test]
+fn a_table_of_poses_is_a_source() {
+    let folder = Folder::new();
+    let text = folder.read("reference.toml");
+    let spec = text.replacen(
+        "kind      = \"case-1\"\nfrequency = \"1 Hz\"",
+        "kind   = \"waveform\"\nfile   = \"table.csv\"\nperiod = \"1 ms\"",
+        1,
+    );
+    assert_ne!(text, spec);
+    folder.write("table.toml", spec);
+    folder.write("table.csv", "x_um\n0\n1\n0\n");
+    let first = plain(&folder, "table.toml", "first");
+    same(&first, &plain(&folder, "table.toml", "again"));
+    folder.write("table.csv", "x_um\n0\n1.0000000000000002\n0\n");
+    let other = plain(&folder, "table.toml", "other");
+    assert_ne!(first["controller/src/setpoint.rs"], other["controller/src/setpoint.rs"]);
 }
 
 #[test]
 fn the_folder_and_the_name_of_the_spec_do_not_matter() {
-    let (folder, other) = (Folder::new(), Folder::new());
-    let first = baseline(&folder);
-    same(&first, &baseline(&other));
+    for spec in KINDS {
+        let (folder, other) = (Folder::new(), Folder::new());
+        let first = baseline(&folder, spec);
+        same(&first, &baseline(&other, spec));
 
-    // From somewhere else, by absolute paths.
-    let mut command = Command::new(support::BINARY);
-    command.current_dir("/").arg(folder.path("legs.toml")).arg("-o").arg(folder.path("far")).arg("--no-build");
-    same(&first, &made(&mut command, &folder.path("far")));
+        // From somewhere else, by absolute paths.
+        let mut command = Command::new(support::BINARY);
+        command.current_dir("/").arg(folder.path(spec)).arg("-o").arg(folder.path("far")).arg("--no-build");
+        same(&first, &made(&mut command, &folder.path("far")));
 
-    fs::create_dir_all(folder.path("deep er/ünïcode")).unwrap();
-    fs::create_dir(folder.path("deep er/ünïcode/records")).unwrap();
-    for (from, to) in [("legs.toml", "my platform.toml"), ("records/reference-forc.csv", "records/reference-forc.csv")]
-    {
-        fs::copy(folder.path(from), folder.path("deep er/ünïcode").join(to)).unwrap();
+        fs::create_dir_all(folder.path("deep er/ünïcode/records")).unwrap();
+        for (from, to) in [(spec, "my platform.toml"), ("records/reference-forc.csv", "records/reference-forc.csv")] {
+            fs::copy(folder.path(from), folder.path("deep er/ünïcode").join(to)).unwrap();
+        }
+        let mut command = folder.command();
+        command.args(["deep er/ünïcode/my platform.toml", "-o", "deep er/out", "--no-build"]);
+        same(&first, &made(&mut command, &folder.path("deep er/out")));
     }
-    let mut command = folder.command();
-    command.args(["deep er/ünïcode/my platform.toml", "-o", "deep er/out", "--no-build"]);
-    same(&first, &made(&mut command, &folder.path("deep er/out")));
 }
 
 #[test]
 fn the_environment_does_not_matter() {
-    let folder = Folder::new();
-    let first = baseline(&folder);
     let odd = [
         ("USER", "somebody-else"),
         ("LOGNAME", "somebody-else"),
@@ -93,39 +128,47 @@ fn the_environment_does_not_matter() {
         ("CLICOLOR_FORCE", "1"),
         ("RAYON_NUM_THREADS", "3"),
     ];
-    let mut command = folder.command();
-    command.envs(odd).args(["legs.toml", "-o", "odd", "--no-build"]);
-    same(&first, &made(&mut command, &folder.path("odd")));
-    let mut command = folder.command();
-    command.env_clear().args(["legs.toml", "-o", "bare", "--no-build"]);
-    same(&first, &made(&mut command, &folder.path("bare")));
+    let folder = Folder::new();
+    for spec in KINDS {
+        let first = baseline(&folder, spec);
+        let mut command = folder.command();
+        command.envs(odd).args([spec, "-o", "odd", "--no-build"]);
+        same(&first, &made(&mut command, &folder.path("odd")));
+        let mut command = folder.command();
+        command.env_clear().args([spec, "-o", "bare", "--no-build"]);
+        same(&first, &made(&mut command, &folder.path("bare")));
+    }
 }
 
 #[test]
 fn line_ends_of_the_spec_do_not_matter() {
     let folder = Folder::new();
-    let first = baseline(&folder);
-    let text = folder.read("legs.toml");
-    assert!(!text.contains('\r'));
-    folder.write("legs.toml", text.replace('\n', "\r\n"));
-    same(&first, &made(folder.command().args(["legs.toml", "-o", "crlf", "--no-build"]), &folder.path("crlf")));
+    for spec in KINDS {
+        let first = baseline(&folder, spec);
+        let text = folder.read(spec);
+        assert!(!text.contains('\r'));
+        folder.write(spec, text.replace('\n', "\r\n"));
+        same(&first, &plain(&folder, spec, "crlf"));
+    }
 }
 
 #[test]
 fn another_user_makes_the_same_bytes() {
     let folder = Folder::new();
-    let first = baseline(&folder);
+    let first = KINDS.map(|spec| baseline(&folder, spec));
     let Some(user) = Unprivileged::owning(&folder) else { return };
-    let mut command = user.command(&folder);
-    command.args(["legs.toml", "-o", "theirs", "--no-build"]);
-    same(&first, &made(&mut command, &folder.path("theirs")));
+    for (spec, first) in KINDS.into_iter().zip(&first) {
+        let mut command = user.command(&folder);
+        command.args([spec, "-o", "theirs", "--no-build"]);
+        same(first, &made(&mut command, &folder.path("theirs")));
+    }
 }
 
 /// The committed controller is what the reference spec gives: else the rest would compare something stale.
 #[test]
 fn the_committed_controller_is_the_reference_output() {
     let folder = Folder::new();
-    let files = baseline(&folder);
+    let files = baseline(&folder, "reference.toml");
     let committed = contents(&repository().join("firmware/controller"));
     let emitted: Files = files
         .into_iter()
@@ -137,9 +180,13 @@ fn the_committed_controller_is_the_reference_output() {
 #[test]
 fn no_clock_path_user_or_host_reaches_the_output() {
     let folder = Folder::new();
-    let mut command = folder.command();
-    command.env("USER", "user-of-this-run").env("LOGNAME", "user-of-this-run");
-    let files = made(command.args(["legs.toml", "-o", "out", "--no-build"]), &folder.path("out"));
+    let mut files = Files::new();
+    for spec in KINDS {
+        let mut command = folder.command();
+        command.env("USER", "user-of-this-run").env("LOGNAME", "user-of-this-run");
+        let of_kind = made(command.args([spec, "-o", "out", "--no-build"]), &folder.path("out"));
+        files.extend(of_kind.into_iter().map(|(path, bytes)| (format!("{spec}: {path}"), bytes)));
+    }
     let mut traces = vec![
         folder.path("").to_string_lossy().trim_end_matches('/').to_owned(),
         repository().to_string_lossy().into_owned(),
@@ -147,6 +194,7 @@ fn no_clock_path_user_or_host_reaches_the_output() {
         "/home/".to_owned(),
         ".cargo/".to_owned(),
         "legs.toml".to_owned(),
+        "reference.toml".to_owned(),
     ];
     traces.extend(std::env::var("HOME").ok().filter(|home| home.len() > 1));
     // A host may be called anything; a short name could be a word of the text.

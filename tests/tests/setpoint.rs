@@ -271,7 +271,7 @@ fn eight() -> String {
     for k in 0..=400 {
         let w = 0.5 - 0.5 * (std::f64::consts::PI * f64::from(k) / 400.0).cos();
         let turn = std::f64::consts::TAU * w;
-        text += &format!("{k},{},{},{}\n", 8.0 * turn.sin(), 4.0 * (2.0 * turn).sin(), 50.0 * (1.0 - turn.cos()));
+        text += &format!("{k},{},{},{}\n", 7.0 * turn.sin(), 3.5 * (2.0 * turn).sin(), 40.0 * (1.0 - turn.cos()));
     }
     text
 }
@@ -319,7 +319,7 @@ fn tables_with_jumps_wrong_units_or_places_out_of_reach_are_refused_by_line() {
         other => panic!("{other:?}"),
     };
     let good = eight();
-    // A sample that fell to 0: 8 µm within a ms are more than 5 mm/s · 1 ms.
+    // A sample that fell to 0: 6.7 µm within a ms are more than 5 mm/s · 1 ms.
     let mut lines: Vec<&str> = good.lines().collect();
     lines[120] = "118,0,0,0";
     let found = refused(&lines.join("\n"), 1e-3, false);

@@ -54,13 +54,13 @@ fn every_value_of_the_reference_is_in_si() {
     assert_eq!((actuator.axial_stiffness, actuator.resonance, actuator.damping_ratio), (1e7, 870.0, 0.1));
     assert_eq!((model.amplifier.lag, model.amplifier.noise), (0.35e-3, 2e-3));
     assert_eq!((model.dac.bits, model.dac.range), (16, [0.0, 150.0]));
-    assert_eq!((model.sensor.range, model.sensor.noise, model.sensor.bits), ([-45e-6, 55e-6], 2.2e-9, 17));
+    assert_eq!((model.sensor.range, model.sensor.noise, model.sensor.bits), ([-55e-6, 55e-6], 2.2e-9, 17));
     assert_eq!((model.hysteresis.grid, model.hysteresis.memory), (32, 64));
     assert_eq!(model.hysteresis.records, ["records/reference-forc.csv"]);
     assert_eq!((model.adaptation.mode, model.adaptation.run_interval), (AdaptationMode::Pcc, 1));
     assert_eq!((model.adaptation.level_weight, model.adaptation.drift_weight), (0.0, 0.0));
     assert_eq!(model.adaptation.gain_ratio, [0.9, 1.1]);
-    assert_eq!(model.workspace.translation, [45e-6, 45e-6, 55e-6]);
+    assert_eq!(model.workspace.translation, [50e-6, 50e-6, 52e-6]);
     assert_eq!(model.workspace.rotation, [0.4e-3, 0.35e-3, 0.5e-3]);
     assert_eq!((model.controller.scalar, model.controller.setpoint), (Scalar::F64, SetpointKind::Pose));
     assert_eq!((model.target.mcu, model.target.instructions), (Mcu::Mps2An500, Some(4500)));
@@ -199,7 +199,7 @@ fn each_feature_changes_what_it_says() {
 
     let frames = task_space("features/platform-frames.toml").frames;
     // 2° to 16 digits, from a calculation with 50.
-    assert_eq!(frames.work, [0.012, -0.005, 0.0, 0.034_906_585_039_886_59, 0.0, FRAC_PI_6]);
+    assert_eq!(frames.work, [4e-6, -5e-6, 0.0, 0.034_906_585_039_886_59, 0.0, FRAC_PI_6]);
     assert_eq!(frames.tool, [0.0, 0.0, 0.04]);
 
     let plain = task_space("features/platform-no-notch.toml");

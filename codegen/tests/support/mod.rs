@@ -29,7 +29,7 @@ impl Folder {
         let folder = Self(tempfile::tempdir().unwrap());
         let specs = repository().join("specs");
         fs::create_dir(folder.path("records")).unwrap();
-        for file in ["legs.toml", "minimal.toml", "records/leg1.csv", "records/reference-forc.csv"] {
+        for file in ["reference.toml", "legs.toml", "minimal.toml", "records/leg1.csv", "records/reference-forc.csv"] {
             fs::copy(specs.join(file), folder.path(file)).unwrap();
         }
         folder
@@ -47,11 +47,11 @@ impl Folder {
         fs::read_to_string(self.path(name)).unwrap()
     }
 
-    /// Writes `name`: the reference spec with each first text replaced by the second.
+    /// Writes `name`: the spec of six legs with each first text replaced by the second.
     pub fn spec(&self, name: &str, edits: &[(&str, &str)]) {
         let mut text = self.read("legs.toml");
         for (old, new) in edits {
-            assert_eq!(text.matches(old).count(), 1, "`{old}` must stand once in the reference spec");
+            assert_eq!(text.matches(old).count(), 1, "`{old}` must stand once in legs.toml");
             text = text.replace(old, new);
         }
         self.write(name, text);

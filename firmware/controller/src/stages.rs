@@ -76,26 +76,21 @@ pub const STAGES: [Stage; STAGE_COUNT] = [
     },
 ];
 
-/// Brings a copy of the state to where the stages find it, with each leg's request in place of its residual; not measured.
+/// Brings a copy of the state to where the stages find it, with each leg's request in place of its excess; not measured.
 pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
-    crate::step::sense(state, &input.gauge);
+    crate::step::sense(config, state, &input.gauge);
     state.generator.tick(&PLAN, &input.command);
     let load = known_load(config, state);
     let feedback = feedback(config, state);
     for (index, leg) in state.legs.iter_mut().enumerate() {
-        leg.residual = load.displacement[index] + feedback[index]
+        leg.excess = load.displacement[index] + feedback[index]
             - leg.estimate.correction();
     }
 }
 
 /// Gauges to pose.
-extern "C" fn sense(
-    _config: &Config,
-    state: &mut State,
-    input: &TickInput,
-    _leg: usize,
-) {
-    crate::step::sense(state, &input.gauge);
+extern "C" fn sense(config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
+    crate::step::sense(config, state, &input.gauge);
 }
 
 /// The modal notch on the pose error.
@@ -154,14 +149,14 @@ extern "C" fn inverse(
     leg: usize,
 ) {
     if let (Some(leg), Some(table)) = (state.legs.get_mut(leg), TABLES.get(leg)) {
-        leg.residual = leg.memory.solve(table, leg.residual);
+        leg.excess = leg.memory.solve(table, leg.excess);
     }
 }
 
 /// One leg from request to code: Γ⁻¹, converter and limits, and the reversal memory brought up to date.
 extern "C" fn leg(config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
     if let (Some(leg), Some(table)) = (state.legs.get_mut(leg), TABLES.get(leg)) {
-        let request = leg.residual;
+        let request = leg.excess;
         actuate(config, leg, table, request);
     }
 }
@@ -174,9 +169,8 @@ extern "C" fn limits(
     leg: usize,
 ) {
     if let Some(leg) = state.legs.get_mut(leg) {
-        let (code, held_back) = DAC.code(leg.residual, leg.code, config.code_limits());
+        let (code, held_back) = DAC.code(leg.excess, leg.code, config.code_limits());
         leg.code = code;
-        leg.excess = if held_back { Real::ONE } else { Real::ZERO };
-        leg.requested = DAC.voltage(code);
+        leg.requested = if held_back { Real::ZERO } else { DAC.voltage(code) };
     }
 }

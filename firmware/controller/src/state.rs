@@ -5,8 +5,9 @@
 
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::{
-    ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer,
+    ControlMode, Digest, Estimate, Integral, Interaction, NotchState, Rate, Transfer,
 };
+use crate::config::Environment;
 use crate::hysteresis::Memory;
 use crate::{LEGS, Real, limits};
 
@@ -19,8 +20,6 @@ pub struct LegState {
     pub estimate: Estimate<Real>,
     /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.
     pub requested: Real,
-    /// r: last request less q̂, the feedback and the offset of a change of mode, m.
-    pub residual: Real,
     /// Part of the last request that a limit withheld, m; zero for a leg that was free.
     pub excess: Real,
     /// Converter code now held at the output.
@@ -46,12 +45,24 @@ pub struct State {
     pub innovation_notch: NotchState<Real>,
     /// k_I ∫e.
     pub integral: Integral<Real>,
+    /// F: generalised force of the feedback over the interval now running, N and N m.
+    pub force: [Real; 6],
+    /// Δl(h_d) of the interval now running, m.
+    pub demand: [Real; LEGS],
+    /// p: deflection of each leg under the known load of the interval now running, m.
+    pub load: [Real; LEGS],
+    /// Some leg was held back by a limit in the last tick.
+    pub limited: bool,
     /// Interaction wrench last believed, N and N m.
     pub wrench: [Real; 6],
     /// What is left of the last change of mode.
     pub transfer: Transfer<Real>,
     /// Mode of the last tick; none before the first.
     pub mode: Option<ControlMode>,
+    /// Where the last tick took the interaction force from.
+    pub interaction: Interaction,
+    /// Its model of the environment.
+    pub environment: Environment,
 }
 
 impl Default for State {
@@ -68,7 +79,6 @@ impl State {
             memory: Memory::new(),
             estimate: Estimate::new(),
             requested: 0.0,
-            residual: 0.0,
             excess: 0.0,
             code: limits::CODES[0],
         };
@@ -81,9 +91,18 @@ impl State {
             error_notch: NotchState::new(),
             innovation_notch: NotchState::new(),
             integral: Integral::new(),
+            force: [0.0; 6],
+            demand: [0.0; LEGS],
+            load: [0.0; LEGS],
+            limited: false,
             wrench: [0.0; 6],
             transfer: Transfer::new(),
             mode: None,
+            interaction: Interaction::Neglected,
+            environment: Environment {
+                stiffness: [0.0; 6],
+                rest: [0.0; 6],
+            },
         }
     }
 
@@ -95,11 +114,21 @@ impl State {
             leg.memory.digest(&mut digest);
             leg.estimate.digest(&mut digest);
             digest.real(leg.requested);
-            digest.real(leg.residual);
             digest.real(leg.excess);
             digest.word(leg.code as u32 as u64);
         }
-        for vector in [&self.pose, &self.error, &self.wrench] {
+        let Environment { stiffness, rest } = &self.environment;
+        let vectors = [
+            &self.pose,
+            &self.error,
+            &self.force,
+            &self.demand,
+            &self.load,
+            &self.wrench,
+            stiffness,
+            rest,
+        ];
+        for vector in vectors {
             for value in vector {
                 digest.real(*value);
             }
@@ -110,6 +139,7 @@ impl State {
         self.innovation_notch.digest(&mut digest);
         self.integral.digest(&mut digest);
         self.transfer.digest(&mut digest);
+        digest.word(self.limited as u64);
         digest
             .word(
                 match self.mode {
@@ -117,6 +147,7 @@ impl State {
                     Some(mode) => 1 + mode.word(),
                 },
             );
+        digest.word(self.interaction.word());
         digest.finish()
     }
 }

@@ -19,11 +19,12 @@
 //! is none and does not.
 //!
 //! Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
-//! offset b of a change of mode) the innovation is then r − J e with r = (q − q̂) − f − b: no large numbers are subtracted,
-//! and what is left out is the error times the change of J over the workspace, a thousandth of it.
+//! offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large numbers
+//! are subtracted, and f is small in modal coordinates, too. What is left out is the error times the change of J over the
+//! workspace, a thousandth of it, and the rounding of the converter on a leg that is free.
 
 use specgen_runtime::feedback::{force_of, winds_up};
-use specgen_runtime::linear::{difference, transform};
+use specgen_runtime::linear::{difference, each, transform};
 use specgen_runtime::setpoint::Command;
 use specgen_runtime::{
     ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _,
@@ -68,27 +69,13 @@ pub struct TickInput {
     pub wrench: [Real; 6],
 }
 
-/// What a tick yields. Every number is finite.
+/// What a tick yields. Every number is finite. What else there is to know stands in the [`State`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TickOutput {
     /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
     pub voltage: [Real; LEGS],
-    /// q̂ = ρ̂X: displacement really requested of each leg, after all limits, m.
-    pub requested: [Real; LEGS],
-    /// Δl(h_d): displacement of each leg at the set-point, m.
-    pub demand: [Real; LEGS],
-    /// δ̂ of each leg, m.
-    pub level: [Real; LEGS],
-    /// φ̂ of each leg, m.
-    pub drift: [Real; LEGS],
     /// Converter code of each leg.
     pub dac_code: [i32; LEGS],
-    /// h: measured pose from rest, m and rad.
-    pub pose: [Real; 6],
-    /// h_d at the end of the coming interval, from rest, m and rad.
-    pub target: [Real; 6],
-    /// p: deflection of each leg under the known load, m.
-    pub load: [Real; LEGS],
     /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`], [`SETPOINT_STALE`], [`GENERATOR_BUSY`], [`WRENCH_FAULT`].
     pub status: u32,
 }
@@ -96,60 +83,79 @@ pub struct TickOutput {
 /// One control tick. See the module for the timing.
 pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
     let entered = enter_mode(config, state);
-    let gauge_faults = sense(state, &input.gauge);
+    let gauge_faults = sense(config, state, &input.gauge);
     if gauge_faults == 0 {
         learn(config, state);
     }
-    let wrench_good = take_wrench(state, &input.wrench);
+    let wrench_good = take_wrench(config, state, &input.wrench);
     let damping = damping(config, state);
     let setpoint_status = state.generator.tick(&PLAN, &input.command);
     let Load { displacement: demand, force } = known_load(config, state);
     let feedback = feedback(config, state);
-    if !entered {
+    state.demand = demand;
+    state.load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE);
+    if let Some(damping) = &damping {
+        state.load = each(|leg| state.load[leg] + damping[leg]);
+    }
+    let correction = |leg: usize| state.legs[leg].estimate.correction();
+    let mut request = each(|leg| {
+        demand[leg] + state.load[leg] + feedback[leg] - correction(leg)
+    });
+    if entered {
+        let held = each(|leg| state.legs[leg].requested - request[leg]);
+        if config.mode().law() == Law::Invhys {
+            state.transfer.begin(held);
+        } else {
+            for (leg, held) in state.legs.iter_mut().zip(held) {
+                leg.estimate.level -= held;
+            }
+            state.transfer.begin([0.0; LEGS]);
+            request = each(|leg| state.legs[leg].requested);
+        }
+    } else {
         state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
     }
-    let mut output = TickOutput {
-        voltage: [0.0; LEGS],
-        requested: [0.0; LEGS],
-        demand,
-        level: [0.0; LEGS],
-        drift: [0.0; LEGS],
-        dac_code: [0; LEGS],
-        pose: state.pose,
-        target: state.generator.target().pose,
-        load: [0.0; LEGS],
-        status: gauge_faults << 8 | setpoint_status
-            | if wrench_good { 0 } else { WRENCH_FAULT },
-    };
+    let mut limited = 0;
     for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
-        let load = (force[index] - REST_FORCE[index]) * COMPLIANCE + damping[index];
-        let request = demand[index] + load + feedback[index] - leg.estimate.correction();
-        if entered {
-            state.transfer.offset[index] = leg.requested - request;
-        }
-        let offset = state.transfer.offset[index];
-        let limited = actuate(config, leg, table, request + offset);
-        leg.residual = (request + offset - leg.requested) - feedback[index] - offset;
-        output.load[index] = load;
-        output.voltage[index] = DAC.voltage(leg.code);
-        output.requested[index] = leg.requested;
-        output.level[index] = leg.estimate.level;
-        output.drift[index] = leg.estimate.drift;
-        output.dac_code[index] = leg.code;
-        output.status |= (limited as u32) << index;
+        let held_back = actuate(
+            config,
+            leg,
+            table,
+            request[index] + state.transfer.offset()[index],
+        );
+        limited |= (held_back as u32) << index;
     }
-    output
+    state.limited = limited != 0;
+    let legs = &state.legs;
+    TickOutput {
+        voltage: each(|leg| DAC.voltage(legs[leg].code)),
+        dac_code: each(|leg| legs[leg].code),
+        status: limited | gauge_faults << 8 | setpoint_status
+            | if wrench_good { 0 } else { WRENCH_FAULT },
+    }
 }
 
-/// Whether this tick is the first of its mode. If so, what the mode does not use is put at rest; the first request then
-/// defines the offset that keeps the voltages where they are.
+/// Whether this tick is the first of its mode, or of its source of the interaction force. If so, what the mode does not
+/// use is put at rest; the first request then defines what keeps the voltages where they are.
 #[inline]
 fn enter_mode(config: &Config, state: &mut State) -> bool {
-    let mode = config.mode();
-    if state.mode == Some(mode) {
+    let (mode, interaction) = (config.mode(), config.interaction());
+    let same_force = state.interaction == interaction
+        && (interaction != Interaction::Modelled
+            || state.environment == *config.environment());
+    if state.mode == Some(mode) && same_force {
         return false;
     }
+    let adapted = match state.mode {
+        Some(before) => before.law() != Law::Invhys,
+        None => false,
+    };
+    if mode.law() != Law::Invhys && !adapted {
+        state.integral = Integral::new();
+    }
     state.mode = Some(mode);
+    state.interaction = interaction;
+    state.environment = *config.environment();
     for leg in &mut state.legs {
         match mode.law() {
             Law::Invhys => leg.estimate = Estimate::new(),
@@ -159,6 +165,7 @@ fn enter_mode(config: &Config, state: &mut State) -> bool {
         leg.requested = requested(mode, leg);
         leg.excess = 0.0;
     }
+    state.limited = false;
     if mode.law() == Law::Invhys {
         state.innovation_notch = NotchState::new();
     }
@@ -166,16 +173,21 @@ fn enter_mode(config: &Config, state: &mut State) -> bool {
         state.integral = Integral::new();
         state.error_notch = NotchState::new();
         state.error = [0.0; 6];
+        state.force = [0.0; 6];
     }
     true
 }
 
 /// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.
 #[inline]
-pub(crate) fn sense(state: &mut State, gauge: &[Real; 6]) -> u32 {
+pub(crate) fn sense(config: &Config, state: &mut State, gauge: &[Real; 6]) -> u32 {
     let faults = sensing::faults(gauge);
     if faults == 0 {
         state.pose = sensing::pose(gauge);
+    }
+    if !config.damps() {
+        state.rate.rest();
+    } else if faults == 0 {
         state.rate.update(&sensing::RATE, &state.pose);
     } else {
         state.rate.coast(&sensing::RATE);
@@ -195,19 +207,20 @@ pub(crate) fn learn(config: &Config, state: &mut State) {
             PERIOD,
             &state.error,
         );
-        if !would_wind_up(&state.legs, &growth) {
+        if !(state.limited && would_wind_up(&state.legs, &growth)) {
             state.integral.grow(&growth);
         }
     }
     if mode.law() != Law::Invhys {
-        let mut residual = [0.0; LEGS];
-        for (residual, leg) in residual.iter_mut().zip(&state.legs) {
-            *residual = leg.residual;
-        }
+        let disturbed = state.limited || state.transfer.is_active();
+        let offset = state.transfer.offset();
+        let withheld = disturbed
+            .then(|| each(|leg| state.legs[leg].excess - offset[leg]));
         let innovation = notch_innovation(
             &mut state.innovation_notch,
             &error,
-            &residual,
+            &state.force,
+            withheld.as_ref(),
         );
         for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
             leg.estimate
@@ -224,18 +237,16 @@ pub(crate) fn learn(config: &Config, state: &mut State) {
 /// Whether the integral's growth would push a leg further beyond the limit that holds it back.
 #[inline]
 fn would_wind_up(legs: &[LegState; LEGS], growth: &[Real; 6]) -> bool {
-    let mut excess = [0.0; LEGS];
-    let mut any = false;
-    for (excess, leg) in excess.iter_mut().zip(legs) {
-        *excess = leg.excess;
-        any |= leg.excess != 0.0;
-    }
-    any && winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
+    let excess = each(|leg| legs[leg].excess);
+    winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
 }
 
-/// The measured wrench, if it is to be believed.
+/// Takes the measured wrench if it is to be believed; one that nobody asks for is not looked at.
 #[inline]
-fn take_wrench(state: &mut State, wrench: &[Real; 6]) -> bool {
+fn take_wrench(config: &Config, state: &mut State, wrench: &[Real; 6]) -> bool {
+    if config.interaction() != Interaction::Measured {
+        return true;
+    }
     let good = wrench
         .iter()
         .zip(&WRENCH_LIMIT)
@@ -246,43 +257,43 @@ fn take_wrench(state: &mut State, wrench: &[Real; 6]) -> bool {
     good
 }
 
-/// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg.
+/// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg; none without k_v.
 #[inline]
-fn damping(config: &Config, state: &State) -> [Real; LEGS] {
+fn damping(config: &Config, state: &State) -> Option<[Real; LEGS]> {
     if !config.damps() {
-        return [0.0; LEGS];
+        return None;
     }
     let error = difference(&state.generator.target().rate, state.rate.value());
-    transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error))
+    Some(
+        transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error)),
+    )
 }
 
 /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
 #[inline]
 pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
     let target = state.generator.target();
-    let wrench = match config.interaction() {
-        Interaction::Neglected => [0.0; 6],
-        Interaction::Measured => state.wrench,
+    match config.interaction() {
+        Interaction::Neglected => dynamics::load(target, None),
+        Interaction::Measured => dynamics::load(target, Some(&state.wrench)),
         Interaction::Modelled => {
             let environment = config.environment();
             let compressed = difference(&environment.rest, &target.pose);
-            force_of(&environment.stiffness, &compressed)
+            dynamics::load(target, Some(&force_of(&environment.stiffness, &compressed)))
         }
-    };
-    dynamics::load(target, &wrench)
+    }
 }
 
 /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.
 #[inline]
-pub(crate) fn feedback(config: &Config, state: &State) -> [Real; LEGS] {
+pub(crate) fn feedback(config: &Config, state: &mut State) -> [Real; LEGS] {
     if !config.mode().feeds_back() {
         return [0.0; LEGS];
     }
-    let mut force = force_of(&config.active_gains().proportional, &state.error);
-    for (force, integral) in force.iter_mut().zip(&state.integral.force) {
-        *force += *integral;
-    }
-    transform(&WRENCH_TO_LEGS, &force)
+    let proportional = force_of(&config.active_gains().proportional, &state.error);
+    let integral = &state.integral.force;
+    state.force = each(|axis| proportional[axis] + integral[axis]);
+    transform(&WRENCH_TO_LEGS, &state.force)
 }
 
 /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,

@@ -4,7 +4,7 @@
 //! Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics.
 
 use specgen_runtime::NotchState;
-use specgen_runtime::linear::{difference, transform};
+use specgen_runtime::linear::{each, transform};
 use crate::{LEGS, Real};
 
 /// T_s, s; from `timing.period`.
@@ -54,7 +54,7 @@ pub const WRENCH_LIMIT: [Real; 6] = [3600.0, 3600.0, 3600.0, 360.0, 360.0, 360.0
 pub const TRANSFER_KEEP: Real = 0.9980019986673331;
 
 /// Offset of a change of mode below which it is over, m.
-pub const TRANSFER_NEGLIGIBLE: Real = 1e-15;
+pub const TRANSFER_NEGLIGIBLE: Real = 1e-11;
 
 /// u = q/ρ̂ for a displacement q (m), as drive in cells of the Everett grid.
 #[inline]
@@ -101,30 +101,12 @@ pub const NOTCH: [Section<Real>; 6] = [
 
 /// V⁻¹: pose to modal coordinates.
 pub const POSE_TO_MODES: [[Real; 6]; 6] = [
-    [
-        -5.590132777420547e-16, -0.6640004857919403, -8.935655885346054e-17, 0.15667848725573305,
-        1.2629626205732543e-17, 1.6114915623741056e-17,
-    ],
-    [
-        0.66400048579194, -4.005713423066761e-16, -2.1825958539273243e-16, 2.7653747752400865e-18,
-        0.15667848725573302, -4.696149965562529e-18,
-    ],
-    [
-        1.0430210635143171, -8.269737907672029e-17, 8.811775899928735e-17, 8.792435181571804e-17,
-        -0.10020515023564563, -4.254003916912497e-17,
-    ],
-    [
-        -2.6383430574438384e-17, 1.0430210635143171, -5.777936368662473e-17, 0.10020515023564566,
-        6.320300390161273e-17, -3.323406068780592e-17,
-    ],
-    [
-        4.2438275464247197e-16, 4.605629948471736e-16, 4.083345279119792e-16, 6.935740570798259e-18,
-        -3.099797148105676e-17, 0.11509340315056575,
-    ],
-    [
-        4.5442946236052586e-17, -3.728415884682033e-18, 1.262079276629897, 3.7844260040416314e-17,
-        1.201385633631455e-17, -3.771491123905805e-17,
-    ],
+    [0.0, -0.6640004857919403, 0.0, 0.15667848725573305, 0.0, 0.0],
+    [0.66400048579194, 0.0, 0.0, 0.0, 0.15667848725573302, 0.0],
+    [1.0430210635143171, 0.0, 0.0, 0.0, -0.10020515023564563, 0.0],
+    [0.0, 1.0430210635143171, 0.0, 0.10020515023564566, 0.0, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.11509340315056575],
+    [0.0, 0.0, 1.262079276629897, 0.0, 0.0, 0.0],
 ];
 
 /// V: the modes as poses.
@@ -135,6 +117,16 @@ pub const MODES_TO_POSE: [[Real; 6]; 6] = [
     [4.535757067549336, 0.0, 0.0, 2.8875206854781257, 0.0, 0.0],
     [0.0, 4.535757067549337, -2.887520685478126, 0.0, 0.0, 0.0],
     [0.0, 0.0, 0.0, 0.0, 8.688595285446508, 0.0],
+];
+
+/// V⁻¹ K⁻¹ with K = Jᵀ k_a J: generalised force to the deflection it makes, in modal coordinates.
+pub const FORCE_TO_MODES: [[Real; 6]; 6] = [
+    [0.0, -8.491052393343682e-8, 0.0, 8.83821487900995e-7, 0.0, 0.0],
+    [8.491052393343678e-8, 0.0, 0.0, 0.0, 8.838214879009948e-7, 0.0],
+    [9.415062807722219e-8, 0.0, 0.0, 0.0, -3.9900859317624167e-7, 0.0],
+    [0.0, 9.415062807722223e-8, 0.0, 3.990085931762419e-7, 0.0, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 0.0, 5.820818380903409e-7],
+    [0.0, 0.0, 3.1767157499454635e-8, 0.0, 0.0, 0.0],
 ];
 
 /// V⁻¹ J⁻¹: leg displacements to modal coordinates.
@@ -207,14 +199,20 @@ pub fn notch_error(notch: &mut NotchState<Real>, modal_error: &[Real; 6]) -> [Re
     transform(&MODES_TO_POSE, &notch.filter(&NOTCH, modal_error))
 }
 
-/// N(r − J e) of each leg, m, for a modal error.
+/// N(`withheld` − J⁻ᵀF/k_a − J e) of each leg, m, for a modal error.
 #[inline]
 #[must_use]
 pub fn notch_innovation(
     notch: &mut NotchState<Real>,
     modal_error: &[Real; 6],
-    residual: &[Real; LEGS],
+    force: &[Real; 6],
+    withheld: Option<&[Real; LEGS]>,
 ) -> [Real; LEGS] {
-    let innovation = difference(&transform(&LEGS_TO_MODES, residual), modal_error);
+    let pushed = transform(&FORCE_TO_MODES, force);
+    let mut innovation = each(|mode| -modal_error[mode] - pushed[mode]);
+    if let Some(withheld) = withheld {
+        let withheld = transform(&LEGS_TO_MODES, withheld);
+        innovation = each(|mode| innovation[mode] + withheld[mode]);
+    }
     transform(&MODES_TO_LEGS, &notch.filter(&NOTCH, &innovation))
 }

@@ -7,7 +7,7 @@
 use specgen_runtime::setpoint::{Command, CommandKind, Target};
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Real as _};
 use crate::config::Environment;
-use crate::{Config, ConfigError, LEGS, Real, TickInput, TickOutput};
+use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput};
 
 /// Words of a tick's input.
 pub const INPUT_WORDS: usize = 33;
@@ -206,25 +206,24 @@ impl TickInput {
     }
 }
 
-impl TickOutput {
-    /// Words in the order of [`OUTPUT_NAMES`].
-    #[must_use]
-    pub fn to_words(&self) -> [u64; OUTPUT_WORDS] {
-        let mut words = [0; OUTPUT_WORDS];
-        for index in 0..LEGS {
-            words[index] = self.voltage[index].to_word();
-            words[LEGS + index] = self.requested[index].to_word();
-            words[2 * LEGS + index] = self.demand[index].to_word();
-            words[3 * LEGS + index] = self.level[index].to_word();
-            words[4 * LEGS + index] = self.drift[index].to_word();
-            words[5 * LEGS + index] = self.dac_code[index] as u32 as u64;
-            words[6 * LEGS + index] = self.pose[index].to_word();
-            words[7 * LEGS + index] = self.target[index].to_word();
-            words[8 * LEGS + index] = self.load[index].to_word();
-        }
-        words[9 * LEGS] = self.status as u64;
-        words
+/// Words in the order of [`OUTPUT_NAMES`], of a tick and of the state that it left.
+#[must_use]
+pub fn output_words(output: &TickOutput, state: &State) -> [u64; OUTPUT_WORDS] {
+    let mut words = [0; OUTPUT_WORDS];
+    let target = state.generator.target();
+    for (index, leg) in state.legs.iter().enumerate() {
+        words[index] = output.voltage[index].to_word();
+        words[LEGS + index] = leg.requested.to_word();
+        words[2 * LEGS + index] = state.demand[index].to_word();
+        words[3 * LEGS + index] = leg.estimate.level.to_word();
+        words[4 * LEGS + index] = leg.estimate.drift.to_word();
+        words[5 * LEGS + index] = output.dac_code[index] as u32 as u64;
+        words[6 * LEGS + index] = state.pose[index].to_word();
+        words[7 * LEGS + index] = target.pose[index].to_word();
+        words[8 * LEGS + index] = state.load[index].to_word();
     }
+    words[9 * LEGS] = output.status as u64;
+    words
 }
 
 impl Config {

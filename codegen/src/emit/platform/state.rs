@@ -8,8 +8,9 @@ pub fn emit() -> TokenStream {
         #![doc = " What the controller remembers from tick to tick. No NaN or infinity is ever stored here."]
 
         use specgen_runtime::setpoint::Generator;
-        use specgen_runtime::{ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer};
+        use specgen_runtime::{ControlMode, Digest, Estimate, Integral, Interaction, NotchState, Rate, Transfer};
 
+        use crate::config::Environment;
         use crate::hysteresis::Memory;
         use crate::{LEGS, Real, limits};
 
@@ -61,6 +62,10 @@ pub fn emit() -> TokenStream {
             pub transfer: Transfer<Real>,
             /// Mode of the last tick; none before the first.
             pub mode: Option<ControlMode>,
+            /// Where the last tick took the interaction force from.
+            pub interaction: Interaction,
+            /// Its model of the environment.
+            pub environment: Environment,
         }
 
         impl Default for State {
@@ -96,6 +101,8 @@ pub fn emit() -> TokenStream {
                     wrench: [0.0; 6],
                     transfer: Transfer::new(),
                     mode: None,
+                    interaction: Interaction::Neglected,
+                    environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
                 }
             }
 
@@ -110,7 +117,10 @@ pub fn emit() -> TokenStream {
                     digest.real(leg.excess);
                     digest.word(leg.code as u32 as u64);
                 }
-                for vector in [&self.pose, &self.error, &self.force, &self.demand, &self.load, &self.wrench] {
+                let Environment { stiffness, rest } = &self.environment;
+                let vectors =
+                    [&self.pose, &self.error, &self.force, &self.demand, &self.load, &self.wrench, stiffness, rest];
+                for vector in vectors {
                     for value in vector {
                         digest.real(*value);
                     }
@@ -126,6 +136,7 @@ pub fn emit() -> TokenStream {
                     None => 0,
                     Some(mode) => 1 + mode.word(),
                 });
+                digest.word(self.interaction.word());
                 digest.finish()
             }
         }

@@ -95,9 +95,19 @@ pub fn emit() -> TokenStream {
                 state.load = each(|leg| state.load[leg] + damping[leg]);
             }
             let correction = |leg: usize| state.legs[leg].estimate.correction();
-            let request = each(|leg| demand[leg] + state.load[leg] + feedback[leg] - correction(leg));
+            let mut request = each(|leg| demand[leg] + state.load[leg] + feedback[leg] - correction(leg));
             if entered {
-                state.transfer.begin(each(|leg| state.legs[leg].requested - request[leg]));
+                let held = each(|leg| state.legs[leg].requested - request[leg]);
+                if config.mode().law() == Law::Invhys {
+                    state.transfer.begin(held);
+                } else {
+                    // What the estimates would come to, at once: an offset that fades would be learned against.
+                    for (leg, held) in state.legs.iter_mut().zip(held) {
+                        leg.estimate.level -= held;
+                    }
+                    state.transfer.begin([0.0; LEGS]);
+                    request = each(|leg| state.legs[leg].requested);
+                }
             } else {
                 state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
             }
@@ -115,15 +125,27 @@ pub fn emit() -> TokenStream {
             }
         }
 
-        /// Whether this tick is the first of its mode. If so, what the mode does not use is put at rest; the first request then
-        /// defines the offset that keeps the voltages where they are.
+        /// Whether this tick is the first of its mode, or of its source of the interaction force. If so, what the mode does not
+        /// use is put at rest; the first request then defines what keeps the voltages where they are.
         #[inline]
         fn enter_mode(config: &Config, state: &mut State) -> bool {
-            let mode = config.mode();
-            if state.mode == Some(mode) {
+            let (mode, interaction) = (config.mode(), config.interaction());
+            let same_force = state.interaction == interaction
+                && (interaction != Interaction::Modelled || state.environment == *config.environment());
+            if state.mode == Some(mode) && same_force {
                 return false;
             }
+            let adapted = match state.mode {
+                Some(before) => before.law() != Law::Invhys,
+                None => false,
+            };
+            if mode.law() != Law::Invhys && !adapted {
+                // Its correction passes to the estimates.
+                state.integral = Integral::new();
+            }
             state.mode = Some(mode);
+            state.interaction = interaction;
+            state.environment = *config.environment();
             for leg in &mut state.legs {
                 match mode.law() {
                     Law::Invhys => leg.estimate = Estimate::new(),

@@ -37,6 +37,34 @@ impl Excesses {
         }
     }
 
+    /// How the place can be mended: numbers that are themselves accepted, as far as the workspace is concerned.
+    pub fn mend_place(&self, user: &User) -> Option<String> {
+        let Worst { axis, value, .. } = self.place?;
+        let bound = user.bound[axis];
+        let beyond = if value > 0.0 { value - bound } else { value + bound };
+        let (table, item) = if axis < 3 { ("translation", axis) } else { ("rotation", axis - 3) };
+        Some(format!(
+            "change control.setpoint.bias[{axis}] by {}, or widen workspace.{table}[{item}] to {}, as far as legs and gauges reach",
+            outwards(axis, -beyond),
+            outwards(axis, value.abs())
+        ))
+    }
+
+    /// Speed that control.setpoint.stream_speed would have to permit on the worst axis, with its key.
+    pub fn mend_speed(&self) -> Option<String> {
+        let Worst { axis, value, .. } = self.speed?;
+        Some(format!("raise control.setpoint.stream_speed[{axis}] to {}/s", outwards(axis, value.abs())))
+    }
+
+    /// The frequency at which a path of the paper, whose speeds go with it, is within the speed; rounded down. Seen at
+    /// ticks of `period` (s), the largest speed may be missed by the cosine of half a tick's phase.
+    pub fn mend_frequency(&self, frequency: f64, period: f64) -> Option<f64> {
+        let missed = libm::cos(core::f64::consts::PI * frequency * period);
+        let slower = frequency / self.speed?.excess * missed;
+        let scale = libm::pow(10.0, 2.0 - libm::floor(libm::log10(slower)));
+        Some(libm::floor(slower * scale) / scale)
+    }
+
     /// What is wrong with place and speed, in words.
     pub fn messages(&self, model: &Model, user: &User, rules: &SetpointRules) -> [Option<(Worst, String)>; 2] {
         let place = self.place.map(|worst| {
@@ -64,6 +92,13 @@ impl Excesses {
         });
         [place, speed]
     }
+}
+
+/// A length in µm or an angle in µrad, rounded away from zero to a hundredth.
+fn outwards(axis: usize, value: f64) -> String {
+    let hundredths = libm::ceil(value.abs() * 1e8);
+    let sign = if value < 0.0 { "-" } else { "" };
+    format!("{sign}{} {}", hundredths / 100.0, if axis < 3 { "um" } else { "urad" })
 }
 
 fn keep(slot: &mut Option<Worst>, worst: Worst) {

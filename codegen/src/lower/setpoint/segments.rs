@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 use super::check::Excesses;
 use super::paper::{Coordinate, Piece};
 use super::{AXES, LONGEST, User, amount, finding};
-use crate::diagnostic::{Diagnostic, Severity, codes};
+use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::ir::{Path, Segment, SegmentAxis};
 use crate::model::{Model, TaskSpace};
 
@@ -44,17 +44,23 @@ pub(super) fn lower(
     for jump in joints.iter().filter(|joint| joint.pose.abs() > NO_JUMP[joint.axis]) {
         let message = format!("{} jumps by {} after {:.6} s", AXES[jump.axis], amount(jump.axis, jump.pose), jump.time);
         let help = "the printed formulas jump: leave as_printed out to use the corrected ones";
-        findings.push(refuse(codes::TRAJECTORY_JUMPS, message, help));
+        let mut found = refuse(codes::TRAJECTORY_JUMPS, message, help);
+        let printed = format!("trajectory[{index}].as_printed");
+        if let Some(span) = model.spans.get(&printed) {
+            (found.key, found.place) = (printed, Place::Spec(span.clone()));
+        }
+        findings.push(found);
     }
     let excesses = excesses(model, task, user, &pieces, &firsts, frequency);
     let [place, speed] = excesses.messages(model, user, &task.setpoint);
     if let Some((_, message)) = place {
-        let help = "change the bias (control.setpoint.bias), or widen the workspace as far as the legs reach";
-        findings.push(refuse(codes::TRAJECTORY_OUTSIDE, message, help));
+        let help = excesses.mend_place(user).unwrap_or_default();
+        findings.push(refuse(codes::TRAJECTORY_OUTSIDE, message, &help));
     }
     if let Some((_, message)) = speed {
-        let help = "lower the frequency, or raise control.setpoint.stream_speed";
-        findings.push(refuse(codes::TRAJECTORY_TOO_FAST, message, help));
+        let slower = excesses.mend_frequency(frequency, period).unwrap_or_default();
+        let help = format!("at most {slower} Hz is slow enough; or {}", excesses.mend_speed().unwrap_or_default());
+        findings.push(refuse(codes::TRAJECTORY_TOO_FAST, message, &help));
     }
     if !findings.is_empty() {
         return Err(findings);

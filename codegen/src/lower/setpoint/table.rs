@@ -139,13 +139,12 @@ fn between(
     };
     let mut findings = Vec::new();
     if let Some((worst, message)) = place {
-        let help =
-            "check the unit in the column's name; or change the bias, or widen the workspace as far as the legs reach";
-        findings.push(in_file(waveform, line(worst.time), codes::TRAJECTORY_OUTSIDE, message, help));
+        let help = format!("check the unit in the column's name; or {}", excesses.mend_place(user).unwrap_or_default());
+        findings.push(in_file(waveform, line(worst.time), codes::TRAJECTORY_OUTSIDE, message, &help));
     }
     if let Some((worst, message)) = speed {
-        let help = "check unit and period, smooth the table, or raise control.setpoint.stream_speed";
-        findings.push(in_file(waveform, line(worst.time), codes::TRAJECTORY_TOO_FAST, message, help));
+        let help = format!("check unit and period, smooth the table, or {}", excesses.mend_speed().unwrap_or_default());
+        findings.push(in_file(waveform, line(worst.time), codes::TRAJECTORY_TOO_FAST, message, &help));
     }
     findings
 }

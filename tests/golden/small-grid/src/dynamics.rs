@@ -99,11 +99,11 @@ pub fn leg_forces(motion: &Motion<Real>) -> [Real; 6] {
     PLATFORM.leg_forces(motion)
 }
 
-/// Leg displacements (m) and leg forces (N) for a motion under a wrench on the platform: force (N) and torque (N m) about
+/// Leg displacements (m) and leg forces (N) for a motion, under a wrench on the platform if there is one: force (N) and torque (N m) about
 /// P_C, base axes.
 #[inline]
 #[must_use]
-pub fn load(motion: &Motion<Real>, wrench: &[Real; 6]) -> Load<Real> {
+pub fn load(motion: &Motion<Real>, wrench: Option<&[Real; 6]>) -> Load<Real> {
     PLATFORM.load(motion, wrench)
 }
 
@@ -158,7 +158,7 @@ pub fn analysis(words: &[u64; MOTION_WORDS]) -> [u64; ANALYSIS_WORDS] {
         rate: six(6),
         acceleration: six(12),
     };
-    let load = load(&motion, &[0.0; 6]);
+    let load = load(&motion, None);
     let rows = [
         coriolis(&motion.pose, &motion.rate),
         gravity(&motion.pose),

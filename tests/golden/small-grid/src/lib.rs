@@ -42,7 +42,7 @@ pub use step::{
 
 pub use words::{
     CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES,
-    OUTPUT_WORDS,
+    OUTPUT_WORDS, output_words,
 };
 
 /// Floating-point type of this controller; from `controller.scalar`.
