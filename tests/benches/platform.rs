@@ -1,144 +1,106 @@
 //! Host time of the controller in task space: `cargo bench -p specgen-tests --bench platform`. Quote ratios: machines are
-//! noisy. The controller is the committed one, under the closed-loop record of the exercise.
+//! noisy. A whole tick is one of the emitted host library, words in and out, under the closed-loop record of the exercise;
+//! its parts are the runtime's kernels with the constants of the reference platform.
 
-use controller::task_space::notch_error;
-use controller::{CONFIG_WORDS, Config, DESCRIPTION, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, step};
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use host_sim::controller::{ControllerError, TickController};
-use host_sim::description::Description;
-use host_sim::trace::Trace;
+use host_sim::controller::{Controller, TickController};
 use nalgebra::{Matrix6, Rotation3, Vector3, Vector6};
-use specgen::compile::compile;
+use specgen::ir;
 use specgen::model::Probe;
 use specgen::verify;
-use specgen_runtime::{ControlMode, Law, Motion, NotchState};
-use specgen_tests::repository;
+use specgen_runtime::linear::transform;
+use specgen_runtime::{Gauges, NotchState, Section};
+use specgen_tests::Emitted;
 
-/// Ticks before those that are timed: the way to the bias pose and into the trajectory.
-const BEFORE: usize = 6000;
-/// Ticks that are timed.
-const TIMED: usize = 4096;
+/// Ticks from reset on that are timed: the way to the bias pose, then tracking.
+const TICKS: u32 = 8192;
 
 fn main() {
     divan::main();
 }
 
-/// The controller of this process.
-struct InProcess {
-    description: Description,
-    config: Config,
-    state: State,
+/// The reference platform's controller in a mode, and the input words of its record in closed loop.
+fn record(name: &str, mode: f64) -> (Emitted, Controller, Vec<Vec<u64>>) {
+    let emitted = Emitted::new(name, "reference.toml", &[]);
+    let mut controller = emitted.controller();
+    let mut words = controller.default_config();
+    controller.description().set_config(&mut words, "mode", mode).expect("a setting of a platform");
+    controller.configure(&words).expect("a permitted mode");
+    let trace = verify::exercise(&mut controller, &emitted.compiled.model, &emitted.compiled.ir, TICKS)
+        .expect("a run in closed loop");
+    let width = trace.description().input_names.len();
+    let rows = trace.rows().map(|row| row[..width].to_vec()).collect();
+    (emitted, controller, rows)
 }
 
-impl TickController for InProcess {
-    fn description(&self) -> &Description {
-        &self.description
-    }
-    fn default_config(&self) -> Vec<u64> {
-        Config::new().to_words().to_vec()
-    }
-    fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
-        let (given, expected) = (words.len(), CONFIG_WORDS);
-        let words = words.try_into().map_err(|_| ControllerError::ConfigLength { given, expected })?;
-        self.config = Config::from_words(words).expect("settings of the spec");
-        Ok(())
-    }
-    fn reset(&mut self) {
-        self.state = State::new();
-    }
-    fn step(&mut self, input: &[u64], output: &mut [u64]) {
-        let input: &[u64; INPUT_WORDS] = input.try_into().expect("a row of input words");
-        let words: [u64; OUTPUT_WORDS] = {
-            let output = step(&self.config, &mut self.state, &TickInput::from_words(input));
-            output_words(&output, &self.state)
-        };
-        output.copy_from_slice(&words);
-    }
-    fn state_digest(&self) -> u64 {
-        self.state.digest()
-    }
-}
-
-/// The record of a mode in closed loop: settings, the state before the timed ticks, their inputs.
-fn record(mode: ControlMode) -> (Config, State, Vec<TickInput>) {
-    let compiled = compile(&repository().join("specs/reference.toml")).expect("the reference spec compiles");
-    let config = Config::new().with_mode(mode);
-    let description = Description::parse(DESCRIPTION).expect("the controller's own description");
-    let mut controller = InProcess { description, config, state: State::new() };
-    let ticks = (BEFORE + TIMED) as u32;
-    let trace: Trace =
-        verify::exercise(&mut controller, &compiled.model, &compiled.ir, ticks).expect("a run in closed loop");
-    let inputs: Vec<TickInput> = trace
-        .rows()
-        .map(|row| TickInput::from_words(row[..INPUT_WORDS].try_into().expect("a row of input words")))
-        .collect();
-    let mut state = State::new();
-    for input in &inputs[..BEFORE] {
-        step(&config, &mut state, input);
-    }
-    (config, state, inputs[BEFORE..].to_vec())
-}
-
-fn ticks(bencher: Bencher, mode: ControlMode) {
-    let (config, state, inputs) = record(mode);
-    bencher.counter(ItemsCount::new(inputs.len())).bench_local(|| {
-        let mut state = state;
-        for input in &inputs {
-            black_box(step(black_box(&config), &mut state, input));
+fn ticks(bencher: Bencher, name: &str, mode: f64) {
+    let (_, mut controller, rows) = record(name, mode);
+    let mut output = vec![0; controller.description().output_names.len()];
+    bencher.counter(ItemsCount::new(rows.len())).bench_local(|| {
+        controller.reset();
+        for row in &rows {
+            controller.step(black_box(row), &mut output);
         }
+        black_box(&output);
     });
 }
 
-/// Six gauges to six voltages under P/F with PCC.
+/// Six gauges to six voltages, P/F with PCC.
 #[divan::bench]
 fn tick_pf_pcc(bencher: Bencher) {
-    ticks(bencher, ControlMode::PF(Law::Pcc));
+    ticks(bencher, "bench-pf", 6.0);
 }
 
 /// The same without feedback.
 #[divan::bench]
 fn tick_f_pcc(bencher: Bencher) {
-    ticks(bencher, ControlMode::F(Law::Pcc));
+    ticks(bencher, "bench-f", 3.0);
 }
 
 /// The same without inverse hysteresis and adaptation.
 #[divan::bench]
 fn tick_p(bencher: Bencher) {
-    ticks(bencher, ControlMode::P);
+    ticks(bencher, "bench-p", 0.0);
 }
 
-/// Motions of the set-point in the record.
-fn motions() -> Vec<Motion<f64>> {
-    let (config, mut state, inputs) = record(ControlMode::PF(Law::Pcc));
-    let mut motions = Vec::new();
-    for input in &inputs {
-        step(&config, &mut state, input);
-        let target = state.target;
-        motions.push(Motion { pose: target.pose, rate: target.rate, acceleration: target.acceleration });
+/// Gauge readings of the record.
+fn readings(name: &str) -> (Emitted, Vec<[f64; 6]>) {
+    let (emitted, controller, rows) = record(name, 6.0);
+    let first = controller.description().input("gauge[0]").expect("gauges");
+    let readings = rows.iter().map(|row| std::array::from_fn(|k| f64::from_bits(row[first + k]))).collect();
+    (emitted, readings)
+}
+
+fn task(emitted: &Emitted) -> &ir::TaskSpace {
+    emitted.compiled.ir.task_space.as_ref().expect("a controller in task space")
+}
+
+fn gauges(sensing: &ir::Sensing) -> Gauges<'_, f64> {
+    Gauges {
+        direction: sensing.direction,
+        normal: sensing.normal,
+        skew: sensing.skew,
+        pierced: sensing.pierced,
+        inverse: sensing.inverse,
+        curvature: sensing.curvature,
+        passes: sensing.passes as usize,
+        arc_sine: &sensing.arc_sine,
+        arc_tangent: &sensing.arc_tangent,
     }
-    motions
 }
 
-/// Set-point to six leg forces with what the tick was emitted with.
-#[divan::bench]
-fn dynamics(bencher: Bencher) {
-    let motions = motions();
-    bencher.counter(ItemsCount::new(motions.len())).bench_local(|| {
-        for motion in &motions {
-            black_box(controller::dynamics::leg_forces(black_box(motion)));
-        }
-    });
-}
-
-/// The modal notch on a pose error.
+/// The modal notch on a pose error: into modes, six sections, and back.
 #[divan::bench]
 fn notch(bencher: Bencher) {
-    let errors: Vec<[f64; 6]> = motions().iter().map(|motion| motion.pose.map(|x| 1e-3 * x)).collect();
-    let mut notch = NotchState::new();
-    bencher.counter(ItemsCount::new(errors.len())).bench_local(|| {
-        for error in &errors {
-            black_box(notch_error(&mut notch, black_box(error)));
+    let (emitted, readings) = readings("bench-notch");
+    let notch = task(&emitted).law.notch.clone().expect("a notch");
+    let sections = notch.sections.map(|ir::Section { depth, a }| Section { depth, a });
+    let mut state = NotchState::new();
+    bencher.counter(ItemsCount::new(readings.len())).bench_local(|| {
+        for error in &readings {
+            let modal = state.filter(&sections, &transform(&notch.pose_to_modes, black_box(error)));
+            black_box(transform(&notch.modes_to_pose, &modal));
         }
     });
 }
@@ -146,49 +108,50 @@ fn notch(bencher: Bencher) {
 /// Six gauges to a pose.
 #[divan::bench]
 fn sensing(bencher: Bencher) {
-    let (_, _, inputs) = record(ControlMode::PF(Law::Pcc));
-    bencher.counter(ItemsCount::new(inputs.len())).bench_local(|| {
-        for input in &inputs {
-            black_box(controller::sensing::pose(black_box(&input.gauge)));
+    let (emitted, readings) = readings("bench-sensing");
+    let gauges = gauges(&task(&emitted).sensing);
+    bencher.counter(ItemsCount::new(readings.len())).bench_local(|| {
+        for readings in &readings {
+            black_box(gauges.pose(black_box(readings)));
         }
     });
 }
 
-/// The same as one writes it first: Newton with the exact Jacobian by central differences and LU, three steps.
+/// The same as one writes it first, with nalgebra: three Newton steps, each with a Jacobian by central differences and LU.
 #[divan::bench]
 fn sensing_by_plain_newton(bencher: Bencher) {
-    let (_, _, inputs) = record(ControlMode::PF(Law::Pcc));
-    let model = compile(&repository().join("specs/reference.toml")).expect("the reference spec compiles").model;
-    let task = model.task_space.expect("a controller in task space");
-    let plain = Plain { probes: task.probes, height: model.geometry.height };
-    for input in &inputs {
-        let difference = plain.pose(&input.gauge) - Vector6::from(controller::sensing::pose(&input.gauge));
+    let (emitted, readings) = readings("bench-newton");
+    let gauges = gauges(&task(&emitted).sensing);
+    let model = &emitted.compiled.model;
+    let probes = &model.task_space.as_ref().expect("a controller in task space").probes;
+    let plain = Plain { probes, height: model.geometry.height };
+    for readings in &readings {
+        let difference = plain.pose(readings) - Vector6::from(gauges.pose(readings));
         assert!(difference.norm() < 1e-12, "both find the same pose: {difference}");
     }
-    bencher.counter(ItemsCount::new(inputs.len())).bench_local(|| {
-        for input in &inputs {
-            black_box(plain.pose(black_box(&input.gauge)));
+    bencher.counter(ItemsCount::new(readings.len())).bench_local(|| {
+        for readings in &readings {
+            black_box(plain.pose(black_box(readings)));
         }
     });
 }
 
-struct Plain {
-    probes: [Probe; 6],
+struct Plain<'a> {
+    probes: &'a [Probe; 6],
     height: f64,
 }
 
-impl Plain {
+impl Plain<'_> {
     fn readings(&self, pose: &Vector6<f64>) -> Vector6<f64> {
         let turn = Rotation3::from_euler_angles(pose[3], pose[4], pose[5]);
-        let place = Vector3::new(pose[0], pose[1], pose[2] + self.height);
+        let rest = Vector3::new(0.0, 0.0, self.height);
+        let place = rest + Vector3::new(pose[0], pose[1], pose[2]);
         Vector6::from_fn(|k, _| {
             let probe = &self.probes[k];
-            let (direction, normal) = (Vector3::from(probe.direction), turn * Vector3::from(probe.plane_normal));
-            let at = |place: Vector3<f64>, turned: Vector3<f64>, normal: Vector3<f64>| {
-                (place + turned - Vector3::from(probe.point)).dot(&normal) / direction.dot(&normal)
-            };
-            let (plane, rest) = (Vector3::from(probe.plane_point), Vector3::new(0.0, 0.0, self.height));
-            at(place, turn * plane, normal) - at(rest, plane, Vector3::from(probe.plane_normal))
+            let (direction, point) = (Vector3::from(probe.direction), Vector3::from(probe.point));
+            let (plane, normal) = (Vector3::from(probe.plane_point), Vector3::from(probe.plane_normal));
+            let distance = |at: Vector3<f64>, normal: Vector3<f64>| (at - point).dot(&normal) / direction.dot(&normal);
+            distance(place + turn * plane, turn * normal) - distance(rest + plane, normal)
         })
     }
 

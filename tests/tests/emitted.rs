@@ -23,7 +23,11 @@ fn specs() -> Vec<String> {
     };
     let mut all = toml(&folder, "");
     all.extend(toml(&folder.join("features"), "features/"));
-    assert!(all.len() >= 9);
+    // Both kinds of controller are among them: six legs, and platforms with every option of `[control]`.
+    let platforms = all
+        .iter()
+        .filter(|name| fs::read_to_string(folder.join(name)).unwrap().lines().any(|line| line.trim() == "[control]"));
+    assert!(platforms.count() >= 9 && all.len() >= 17, "{all:?}");
     all
 }
 
@@ -70,6 +74,10 @@ fn controller_code_keeps_to_the_invariants() {
         "unsafe fn",
         "HashMap",
         "f64::EPSILON",
+        // No literal of an emitted file is one.
+        "NaN",
+        "inf,",
+        "INFINITY",
     ];
     for spec in specs() {
         for (path, text) in controller_code(&spec) {

@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use std::fs;
 
 use host_sim::controller::TickController;
+use host_sim::stimulus::InputRecording;
 use host_sim::trace::{Difference, Trace, first_difference};
 use specgen::compile::Compiled;
 use specgen::model::Mcu;
@@ -18,18 +19,21 @@ use specgen_tests::{Emitted, column, host_trace, integers};
 const TICKS: usize = 100_000;
 /// Ticks of each mode in closed loop.
 const TRACKING: u32 = 20_000;
+/// `interaction` of a force sensor, and its status bit.
+const MEASURED: f64 = 2.0;
+const WRENCH_FAULT: u64 = 0x8_0000;
 /// Mode words with their names, and the source of the interaction force that the run exercises.
 const MODES: [(&str, f64, f64); 7] = [
-    ("P", 0.0, 0.0),
+    ("P", 0.0, MEASURED),
     ("F invhys", 1.0, 1.0),
-    ("F ewma", 2.0, 2.0),
+    ("F ewma", 2.0, MEASURED),
     ("F pcc", 3.0, 0.0),
-    ("P/F invhys", 4.0, 2.0),
+    ("P/F invhys", 4.0, MEASURED),
     ("P/F ewma", 5.0, 0.0),
     ("P/F pcc", 6.0, 1.0),
 ];
-const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
-/// On-board trajectories ten times as fast, so that the closed loop sees all of them.
+const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
+/// On-board trajectories ten times as fast, so that a stretch of the hostile record sees most of one.
 const FAST: (&str, &str) = ("frequency = \"1 Hz\"", "frequency = \"10 Hz\"");
 
 fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
@@ -41,7 +45,7 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
         let inputs = emitted.platform_stimulus(&description, TICKS, seed);
         let settings = [("mode", mode), ("interaction", interaction), ("environment_stiffness[2]", 3e6)];
         let (hostile, config) = host_trace(&mut controller, &settings, &inputs);
-        covers(&hostile, what);
+        covers(&hostile, what, interaction == MEASURED);
         // The controller keeps these settings.
         let Compiled { model, ir, .. } = &emitted.compiled;
         let tracking = verify::exercise(&mut controller, model, ir, TRACKING).unwrap();
@@ -65,7 +69,7 @@ fn tracks(trace: &Trace, what: &str) {
     assert!(held < status.len() / 100, "{what}: {held} ticks with a limit or a fault");
     let (target, pose) = (column(trace, "target[2]"), column(trace, "pose[2]"));
     let way = target.iter().fold(0.0_f64, |way, z| way.max(*z)) - 10e-6;
-    assert!(way > 30e-6, "{what}: {way} m of way");
+    assert!(way > 10e-6, "{what}: {way} m of way");
     // The pose is that of the tick's beginning, which is the target of the tick before.
     let late = target.len() / 2;
     let error: Vec<f64> = pose[late + 1..].iter().zip(&target[late..]).map(|(pose, target)| pose - target).collect();
@@ -78,20 +82,27 @@ fn tracks(trace: &Trace, what: &str) {
 }
 
 /// The recording really holds what it is meant to hold, and nothing that comes out is beyond its limits.
-fn covers(trace: &Trace, what: &str) {
+fn covers(trace: &Trace, what: &str, measured: bool) {
     let status = integers(trace, "status");
     let faults = [
-        (0x3f, "saturation"),
         (0x3f00, "gauge faults"),
         (0x1_0000, "refused set-points"),
         (0x2_0000, "a stale stream"),
         (0x4_0000, "moves"),
-        (0x8_0000, "force faults"),
+        (WRENCH_FAULT, "force faults"),
     ];
-    for (mask, name) in faults {
-        let count = status.iter().filter(|word| *word & mask != 0).count();
+    let count = |mask: u64| status.iter().filter(|word| *word & mask != 0).count();
+    // A wrench that nobody asks for is not looked at.
+    for (mask, name) in faults.into_iter().filter(|(mask, _)| measured || *mask != WRENCH_FAULT) {
+        let count = count(mask);
         assert!(count > 100, "{what}: only {count} ticks with {name}");
         assert!(status.len() - count > 100, "{what}: only {} ticks without {name}", status.len() - count);
+    }
+    // Adaptation to gauges that wander on their own drives most legs into a limit most of the time.
+    assert!(count(0x3f) > 100, "{what}: only {} ticks with saturation", count(0x3f));
+    for leg in 0..6 {
+        let free = status.len() - count(1 << leg);
+        assert!(free > 100, "{what}: only {free} ticks without saturation of leg {leg}");
     }
     let inputs = trace.description().input_names.len();
     let scalar = trace.description().scalar;
@@ -127,7 +138,12 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let good = Emitted::new("platform-ulp-good", "reference.toml", &[]);
     let Some(image) = good.image(Mcu::Mps2An500) else { return };
     let mut unchanged = good.controller();
-    let inputs = good.platform_stimulus(&unchanged.description().clone(), 5000, 7);
+    // While tracking nothing is held, so that every constant is at work; saturation shows what the converter's codes hide.
+    let tracking = verify::exercise(&mut unchanged, &good.compiled.model, &good.compiled.ir, 5000).unwrap();
+    let hostile = good.platform_stimulus(tracking.description(), 5000, 7);
+    let width = hostile.width;
+    let words = tracking.rows().map(|row| &row[..width]).chain(hostile.rows()).flatten().copied().collect();
+    let inputs = InputRecording { width, words };
     // The target gets the settings of the spec, so that a constant of the settings is compared too.
     let (truth, config) = host_trace(&mut unchanged, &[("mode", 6.0)], &inputs);
     let (target, _) = verify::replay(&image, &config, &truth).unwrap_or_else(|error| panic!("{error}"));
@@ -136,20 +152,21 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let ir = &good.compiled.ir;
     let task = ir.task_space.as_ref().unwrap();
     let notch = task.law.notch.as_ref().unwrap();
+    let legs = &["requested", "load", "voltage", "dac_code", "level", "drift"][..];
     let cases = [
-        ("task_space", notch.sections[2].depth),
-        ("task_space", task.law.wrench_to_legs[1][2]),
-        ("sensing", task.sensing.inverse[0][5]),
-        ("sensing", task.sensing.rate_gain),
-        ("dynamics", ir.dynamics.legs[3].rest[2]),
-        ("dynamics", ir.dynamics.mass),
-        ("setpoint", task.setpoints.jerk_limit[2]),
-        ("setpoint", task.setpoints.stream_step[0]),
-        ("config", task.defaults.gains.integral[0]),
-        ("config", task.defaults.level_weight),
+        ("task_space", notch.sections[2].depth, legs),
+        ("task_space", task.law.wrench_to_legs[1][2], legs),
+        ("sensing", task.sensing.inverse[2][0], &["pose"]),
+        ("sensing", task.sensing.inverse[3][1], &["pose"]),
+        ("dynamics", ir.dynamics.legs[3].rest[2], &["demand", "load"]),
+        ("dynamics", ir.dynamics.mass, &["load"]),
+        ("setpoint", task.setpoints.square_rate, &["load"]),
+        ("setpoint", task.setpoints.bias[2], &["target"]),
+        ("config", task.defaults.gains.integral[0], legs),
+        ("config", task.defaults.level_weight, legs),
     ];
     let bad = Emitted::new("platform-ulp-bad", "reference.toml", &[]);
-    for (file, value) in cases {
+    for (file, value, named) in cases {
         let path = bad.dir.join(format!("controller/src/{file}.rs"));
         let text = fs::read_to_string(&path).unwrap();
         let spoilt = with_one_ulp(&text, value).unwrap_or_else(|| panic!("{file} has no {value:?}"));
@@ -161,15 +178,25 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
         let Some(Difference::Word { signal, .. }) = &difference else {
             panic!("{file}, {value:?}: the flipped ulp was not seen: {difference:?}")
         };
-        println!("{file}, {value:?}: {}", difference.as_ref().unwrap());
-        assert!(trace_names(&truth).contains(signal), "{signal}");
+        // The digest of the state is the first to see it; then it comes out, and the part that is wrong among the first.
+        let (tick, words) =
+            outputs_that_differ(&host, &target).unwrap_or_else(|| panic!("{file}, {value:?}: nothing came out"));
+        println!("{file}, {value:?}: {}; in outputs tick {tick} {words:?}", difference.as_ref().unwrap());
+        assert!(signal == "state_digest" || words.contains(signal), "{signal}, {words:?}");
+        let is_named = words.iter().any(|word| named.iter().any(|stem| word.starts_with(stem)));
+        assert!(is_named, "{file}, {value:?}: {words:?}, expected one of {named:?}");
     }
 }
 
-/// Names of what is compared.
-fn trace_names(trace: &Trace) -> Vec<String> {
-    let description = trace.description();
-    description.output_names.iter().cloned().chain(["state_digest".to_owned()]).collect()
+/// The first tick whose output differs, and the names of the words that do.
+fn outputs_that_differ(a: &Trace, b: &Trace) -> Option<(usize, Vec<String>)> {
+    let names = &a.description().output_names;
+    let first = a.description().input_names.len();
+    a.rows().zip(b.rows()).enumerate().find_map(|(tick, (a, b))| {
+        let differ = names.iter().enumerate().filter(|(place, _)| a[first + place] != b[first + place]);
+        let words: Vec<String> = differ.map(|(_, name)| name.clone()).collect();
+        (!words.is_empty()).then_some((tick, words))
+    })
 }
 
 /// `text` with the first literal of this magnitude one ulp larger.

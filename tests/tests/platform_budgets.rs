@@ -15,7 +15,7 @@ use specgen::target::stack;
 use specgen::verify::{self, Measurement};
 use specgen_tests::{Emitted, host_trace, repository};
 
-const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
 /// Way to the bias pose, then tracking of the first on-board trajectory in closed loop, with noise, P/F with PCC.
 const TICKS: u32 = 20_000;
 /// A stage may grow by this share of its committed figure, and by as many instructions, before it is a regression.

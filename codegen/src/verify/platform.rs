@@ -38,16 +38,17 @@ pub(super) fn exercise(
     bench.into_trace().ok_or(RunError::Timing { interval: model.timing.period, duration: 0.0 })
 }
 
-/// Shares of the room that the workspace leaves: mostly a rise, so that no leg comes to the end of its stroke.
-const SHARES: [f64; 6] = [0.03, 0.03, 0.3, 0.02, 0.02, 0.02];
+/// Share of the room that the workspace leaves which a streamed axis swings by: along z, the others. Little where the legs
+/// could come to their lower end.
+const SWING: [f64; 2] = [0.2, 0.03];
 
-/// A slow motion of all axes from rest.
+/// A motion from rest with a share of the room that the workspace leaves.
 fn motion(model: &Model, task: &TaskSpace, time: f64) -> PoseTarget {
     let mut target = PoseTarget::default();
     let [x, y, z] = model.workspace.translation;
     let [tilt_x, tilt_y, tilt_z] = model.workspace.rotation;
     for (axis, bound) in [x, y, z, tilt_x, tilt_y, tilt_z].into_iter().enumerate() {
-        let amplitude = SHARES[axis] * (bound - task.setpoint.bias[axis].abs());
+        let amplitude = SWING[usize::from(axis != 2)] * (bound - task.setpoint.bias[axis].abs());
         let frequency = TAU * (2.0 + 0.7 * axis as f64);
         let (sine, cosine) = libm::sincos(frequency * time);
         target.pose[axis] = amplitude * (1.0 - cosine);

@@ -5,14 +5,10 @@ use crate::stats::Stage;
 use controller::stages::{STAGE_COUNT, STAGES, prepare};
 use controller::{Config, State, TickInput};
 
-/// The stages are measured on every so-manieth tick: each needs a copy of the state.
-const INTERVAL: u64 = 8;
-
 /// Counts so far.
 pub struct Stages {
     /// The whole of `controller::step`, then [`STAGES`].
     counts: [Stage; STAGE_COUNT + 1],
-    ticks: u64,
 }
 
 impl Stages {
@@ -24,7 +20,7 @@ impl Stages {
             counts[index + 1] = Stage::new(STAGES[index].name);
             index += 1;
         }
-        Self { counts, ticks: 0 }
+        Self { counts }
     }
 
     /// Adds one tick of `controller::step`.
@@ -36,22 +32,13 @@ impl Stages {
     #[inline(never)]
     #[allow(unsafe_code)] // Stages are called from assembly that counts them.
     pub fn measure(&mut self, counter: &mut InstructionCounter, config: &Config, state: &State, input: &TickInput) {
-        let due = self.ticks % INTERVAL == 0;
-        self.ticks += 1;
-        if !due {
-            return;
-        }
         let mut prepared = *state;
         prepare(config, &mut prepared, input);
         for (stage, count) in STAGES.iter().zip(self.counts.iter_mut().skip(1)) {
             for leg in 0..stage.calls {
                 let mut copy = prepared;
-                let arguments = [
-                    (&raw const *config) as usize,
-                    (&raw mut copy) as usize,
-                    (&raw const *input) as usize,
-                    leg,
-                ];
+                let arguments =
+                    [(&raw const *config) as usize, (&raw mut copy) as usize, (&raw const *input) as usize, leg];
                 // SAFETY: a stage is a C function of these four words.
                 count.add(unsafe { counter.measure_call(stage.run as *const (), arguments) });
             }

@@ -72,18 +72,21 @@ impl<T: Real> Estimate<T> {
 
     /// The same law with the innovation ν = m − δ̂ − φ̂ in place of m, so that ν may have been filtered on the way (the
     /// modal notch): δ̂ ← δ̂ + ω1 (ν + φ̂), φ̂ ← φ̂ + ω2 ν with the old φ̂ in both. Without a filter it is [`Estimate::update`].
+    ///
+    /// With the filter some of the permitted weights are unstable. Both estimates are held within ±1 m, so that they stay
+    /// finite whatever the weights and come back at once under better ones.
     #[inline]
     pub fn correct(&mut self, law: Law, level_weight: T, drift_weight: T, innovation: T) {
         let old_drift = self.drift;
         match law {
             Law::Invhys => *self = Self::new(),
             Law::Ewma => {
-                self.level = self.level + level_weight * innovation;
+                self.level = bounded(self.level + level_weight * innovation);
                 self.drift = T::ZERO;
             }
             Law::Pcc => {
-                self.level = self.level + level_weight * (innovation + old_drift);
-                self.drift = old_drift + drift_weight * innovation;
+                self.level = bounded(self.level + level_weight * (innovation + old_drift));
+                self.drift = bounded(old_drift + drift_weight * innovation);
             }
         }
     }
@@ -92,5 +95,17 @@ impl<T: Real> Estimate<T> {
     pub fn digest(&self, digest: &mut Digest) {
         digest.real(self.level);
         digest.real(self.drift);
+    }
+}
+
+/// Within ±1 m, far beyond any leg.
+#[inline]
+fn bounded<T: Real>(estimate: T) -> T {
+    if estimate.abs() <= T::ONE {
+        estimate
+    } else if estimate > T::ZERO {
+        T::ONE
+    } else {
+        -T::ONE
     }
 }

@@ -89,3 +89,24 @@ fn invhys_keeps_no_estimate() {
     estimate.update(Law::Invhys, LEVEL, DRIFT, 5e-6);
     assert_eq!(estimate.correction(), 0.0);
 }
+
+/// With a filter that turns the innovation's sign and delays it, no weight is stable: the estimates stay finite all the same,
+/// and find the offset when the filter is taken away.
+#[test]
+fn an_unstable_filter_leaves_the_estimates_finite_and_able_to_recover() {
+    let mut estimate = Estimate::<f32>::new();
+    let mut delayed = [0.0_f32; 3];
+    let mut largest = 0.0_f32;
+    for _ in 0..20_000 {
+        let innovation = 1e-6 - estimate.correction();
+        estimate.correct(Law::Pcc, 1.0, 1.0, delayed[0]);
+        delayed = [delayed[1], delayed[2], -innovation];
+        assert!(estimate.level.is_finite() && estimate.drift.is_finite() && innovation.is_finite());
+        largest = if estimate.level.abs() > largest { estimate.level.abs() } else { largest };
+    }
+    assert!(largest == 1.0, "{largest} m: this filter is not unstable");
+    for _ in 0..200 {
+        estimate.correct(Law::Ewma, 0.25, 0.0, 1e-6 - estimate.correction());
+    }
+    assert!((estimate.level - 1e-6).abs() < 1e-9, "{}", estimate.level);
+}
