@@ -6,11 +6,11 @@
 //! Poses are from rest, [x y z θx θy θz] in m and rad; rates and accelerations are their time derivatives. The model and its range are
 //! in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared workspace only.
 
-use specgen_runtime::dynamics::LegGroup;
 use specgen_runtime::Platform;
+use specgen_runtime::dynamics::LegGroup;
 
-pub use specgen_runtime::{Load, Motion};
 use crate::Real;
+pub use specgen_runtime::{Load, Motion};
 
 /// Constants of the platform; from `geometry`, `platform` and `leg`.
 ///
@@ -18,11 +18,7 @@ use crate::Real;
 pub const PLATFORM: Platform<Real> = Platform {
     groups: [
         LegGroup {
-            base: [
-                [-0.07253819228627427, -0.07253819228627424],
-                [0.1312943664436502, -0.1312943664436502],
-                [0.0, 0.0],
-            ],
+            base: [[-0.07253819228627427, -0.07253819228627424], [0.1312943664436502, -0.1312943664436502], [0.0, 0.0]],
             joint: [
                 [-0.048358794857516214, -0.04835879485751612],
                 [-0.08752957762910013, 0.08752957762910019],
@@ -64,11 +60,7 @@ pub const PLATFORM: Platform<Real> = Platform {
             half_inverse_square: [10.218379389202003, 10.218379389202003],
         },
         LegGroup {
-            base: [
-                [-0.0774351605708471, 0.14997335285712135],
-                [0.12846710048633903, 0.002827265957311232],
-                [0.0, 0.0],
-            ],
+            base: [[-0.0774351605708471, 0.14997335285712135], [0.12846710048633903, 0.002827265957311232], [0.0, 0.0]],
             joint: [
                 [0.0999822352380809, -0.05162344038056477],
                 [-0.0018848439715408176, -0.08564473365755933],
@@ -79,11 +71,7 @@ pub const PLATFORM: Platform<Real> = Platform {
                 [0.08564473365755931, 0.0018848439715408033],
                 [0.0, 0.0],
             ],
-            rest: [
-                [0.02254707466723381, 0.09834991247655658],
-                [0.1265822565147982, -0.0828174677002481],
-                [0.18, 0.18],
-            ],
+            rest: [[0.02254707466723381, 0.09834991247655658], [0.1265822565147982, -0.0828174677002481], [0.18, 0.18]],
             length: [0.2212045167722124, 0.22120451677221237],
             inverse_length: [4.5207033499671265, 4.520703349967127],
             half_inverse_square: [10.218379389202, 10.218379389202003],

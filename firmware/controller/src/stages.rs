@@ -3,9 +3,6 @@
 
 //! Parts of the tick as functions of their own, for measuring what each costs. The tick does not use them.
 
-use specgen_runtime::Real as _;
-use specgen_runtime::linear::difference;
-use specgen_runtime::setpoint::Target;
 use crate::dynamics::{Motion, leg_forces};
 use crate::hysteresis::TABLES;
 use crate::kinematics::leg_displacements;
@@ -14,6 +11,9 @@ use crate::setpoint::PLAN;
 use crate::step::{actuate, feedback, known_load, learn};
 use crate::task_space::notch_error;
 use crate::{Config, LEGS, Real, State, TickInput};
+use specgen_runtime::Real as _;
+use specgen_runtime::linear::difference;
+use specgen_runtime::setpoint::Target;
 
 /// Number of stages.
 pub const STAGE_COUNT: usize = 10;
@@ -31,56 +31,16 @@ pub struct Stage {
 
 /// All stages, in the order of the tick.
 pub const STAGES: [Stage; STAGE_COUNT] = [
-    Stage {
-        name: "sense",
-        calls: 1,
-        run: sense,
-    },
-    Stage {
-        name: "kinematics",
-        calls: 1,
-        run: kinematics,
-    },
-    Stage {
-        name: "notch",
-        calls: 1,
-        run: notch,
-    },
-    Stage {
-        name: "learn",
-        calls: 1,
-        run: learning,
-    },
-    Stage {
-        name: "setpoint",
-        calls: 1,
-        run: setpoint,
-    },
-    Stage {
-        name: "dynamics",
-        calls: 1,
-        run: dynamics,
-    },
-    Stage {
-        name: "load",
-        calls: 1,
-        run: load,
-    },
-    Stage {
-        name: "inverse",
-        calls: LEGS,
-        run: inverse,
-    },
-    Stage {
-        name: "actuate",
-        calls: LEGS,
-        run: leg,
-    },
-    Stage {
-        name: "limits",
-        calls: LEGS,
-        run: limits,
-    },
+    Stage { name: "sense", calls: 1, run: sense },
+    Stage { name: "kinematics", calls: 1, run: kinematics },
+    Stage { name: "notch", calls: 1, run: notch },
+    Stage { name: "learn", calls: 1, run: learning },
+    Stage { name: "setpoint", calls: 1, run: setpoint },
+    Stage { name: "dynamics", calls: 1, run: dynamics },
+    Stage { name: "load", calls: 1, run: load },
+    Stage { name: "inverse", calls: LEGS, run: inverse },
+    Stage { name: "actuate", calls: LEGS, run: leg },
+    Stage { name: "limits", calls: LEGS, run: limits },
 ];
 
 /// Brings a copy of the state to where the stages find it, with each leg's request in place of its load; not measured.
@@ -91,70 +51,39 @@ pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
     let feedback = feedback(config, state);
     state.target = target;
     for (index, leg) in state.legs.iter().enumerate() {
-        state.load[index] = load.displacement[index] + feedback[index]
-            - leg.estimate.correction();
+        state.load[index] = load.displacement[index] + feedback[index] - leg.estimate.correction();
     }
 }
 
 /// Gauges to pose.
-extern "C" fn sense(
-    _config: &Config,
-    state: &mut State,
-    input: &TickInput,
-    _leg: usize,
-) {
+extern "C" fn sense(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
     crate::step::sense(state, &input.gauge);
 }
 
 /// Measured pose to six leg displacements.
-extern "C" fn kinematics(
-    _config: &Config,
-    state: &mut State,
-    _input: &TickInput,
-    _leg: usize,
-) {
+extern "C" fn kinematics(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
     state.load = leg_displacements(&state.pose);
 }
 
 /// The modal notch on the pose error.
-extern "C" fn notch(
-    _config: &Config,
-    state: &mut State,
-    _input: &TickInput,
-    _leg: usize,
-) {
+extern "C" fn notch(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
     let error = difference(&state.target.pose, &state.pose);
     state.error = notch_error(&mut state.error_notch, &error);
 }
 
 /// All that the readings teach: kinematics, both notches, integral and adaptation.
-extern "C" fn learning(
-    config: &Config,
-    state: &mut State,
-    _input: &TickInput,
-    _leg: usize,
-) {
+extern "C" fn learning(config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
     learn(config, state);
 }
 
 /// The generator of set-points.
-extern "C" fn setpoint(
-    _config: &Config,
-    state: &mut State,
-    input: &TickInput,
-    _leg: usize,
-) {
+extern "C" fn setpoint(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
     let (target, _) = state.generator.next(&PLAN, &input.command);
     state.target = target;
 }
 
 /// h, ḣ, ḧ to six leg forces.
-extern "C" fn dynamics(
-    _config: &Config,
-    state: &mut State,
-    _input: &TickInput,
-    _leg: usize,
-) {
+extern "C" fn dynamics(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
     let Target { pose, rate, acceleration } = state.target;
     state.load = leg_forces(&Motion { pose, rate, acceleration });
 }
@@ -167,39 +96,22 @@ extern "C" fn load(config: &Config, state: &mut State, _input: &TickInput, _leg:
 }
 
 /// Γ⁻¹ of one leg: displacement to drive.
-extern "C" fn inverse(
-    _config: &Config,
-    state: &mut State,
-    _input: &TickInput,
-    leg: usize,
-) {
-    if let (Some(leg), Some(table), Some(request)) = (
-        state.legs.get_mut(leg),
-        TABLES.get(leg),
-        state.load.get_mut(leg),
-    ) {
+extern "C" fn inverse(_config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
+    if let (Some(leg), Some(table), Some(request)) = (state.legs.get_mut(leg), TABLES.get(leg), state.load.get_mut(leg))
+    {
         *request = leg.memory.solve(table, *request);
     }
 }
 
 /// One leg from request to code: Γ⁻¹, converter and limits, and the reversal memory brought up to date.
 extern "C" fn leg(config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
-    if let (Some(leg), Some(table), Some(request)) = (
-        state.legs.get_mut(leg),
-        TABLES.get(leg),
-        state.load.get(leg),
-    ) {
+    if let (Some(leg), Some(table), Some(request)) = (state.legs.get_mut(leg), TABLES.get(leg), state.load.get(leg)) {
         actuate(config, leg, table, *request);
     }
 }
 
 /// One leg from drive to code within voltage and slew limits.
-extern "C" fn limits(
-    config: &Config,
-    state: &mut State,
-    _input: &TickInput,
-    leg: usize,
-) {
+extern "C" fn limits(config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
     if let (Some(leg), Some(drive)) = (state.legs.get_mut(leg), state.load.get(leg)) {
         let (code, held_back) = DAC.code(*drive, leg.code, config.code_limits());
         leg.code = code;

@@ -3,12 +3,10 @@
 
 //! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
 
-use specgen_runtime::setpoint::{Generator, Target};
-use specgen_runtime::{
-    ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer,
-};
 use crate::hysteresis::Memory;
 use crate::{LEGS, Real, limits};
+use specgen_runtime::setpoint::{Generator, Target};
+use specgen_runtime::{ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer};
 
 /// State of one leg.
 #[derive(Debug, Clone, Copy)]
@@ -113,13 +111,10 @@ impl State {
         self.innovation_notch.digest(&mut digest);
         self.integral.digest(&mut digest);
         self.transfer.digest(&mut digest);
-        digest
-            .word(
-                match self.mode {
-                    None => 0,
-                    Some(mode) => 1 + mode.word(),
-                },
-            );
+        digest.word(match self.mode {
+            None => 0,
+            Some(mode) => 1 + mode.word(),
+        });
         digest.finish()
     }
 }
