@@ -1,8 +1,8 @@
 //! Simulated machines with the emitted controller that was compiled for them.
 
-#![allow(dead_code)] // Each test file uses its part.
-
 use std::panic::resume_unwind;
+use std::path::PathBuf;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use host_sim::controller::Controller;
@@ -31,17 +31,22 @@ pub fn paper(path: PaperPath, frequency: f64) -> PaperPose {
 pub struct Bench {
     pub specimen: Specimen,
     pub emitted: Emitted,
-    pub controller: Controller,
+    library: PathBuf,
 }
 
 impl Bench {
     /// Compiles the reference spec for `specimen`: its nominal stiffness and damping, and a record of each leg as a user
     /// takes it before assembly, with the gauge's noise. Everything else, gains and notch too, is the compiler's.
     pub fn new(name: &str, specimen: Specimen, edits: &[(&str, &str)]) -> Self {
+        let records = records(&specimen.legs);
+        Self::with_records(name, specimen, &records, edits)
+    }
+
+    /// The same with the records of its legs.
+    pub fn with_records(name: &str, specimen: Specimen, records: &[String; 6], edits: &[(&str, &str)]) -> Self {
         let nominal = &specimen.nominal;
         let stiffness = format!("axial_stiffness = \"{:e} N/m\"", nominal.axial_stiffness_n_per_m);
         let damping = format!("modal_damping   = {}", nominal.modal_damping);
-        let records = records(&specimen.legs);
         let files = ["leg-a", "leg-b", "leg-c", "leg-d", "leg-e", "leg-f"].map(|leg| format!("{leg}.csv"));
         let list = files.each_ref().map(|file| format!("\"records/{file}\"")).join(", ");
         let mut all = vec![
@@ -50,10 +55,15 @@ impl Bench {
             ("\"records/reference-forc.csv\"", list.as_str()),
         ];
         all.extend(edits);
-        let more: Vec<(&str, String)> = files.iter().map(String::as_str).zip(records).collect();
+        let more: Vec<(&str, String)> = files.iter().map(String::as_str).zip(records.clone()).collect();
         let emitted = Emitted::with_records(name, "reference.toml", &all, &more);
-        let controller = emitted.controller();
-        Self { specimen, emitted, controller }
+        let library = emitted.library();
+        Self { specimen, emitted, library }
+    }
+
+    /// The emitted controller.
+    pub fn controller(&self) -> Controller {
+        Controller::load(&self.library).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// What the analysis decided for it.
@@ -73,10 +83,12 @@ pub fn scenario(specimen: &Specimen) -> PlatformScenario {
 }
 
 /// Reversal curves of six legs as built; equal legs share one.
-fn records(legs: &[LegParameters; 6]) -> [String; 6] {
+pub fn records(legs: &[LegParameters; 6]) -> [String; 6] {
     let of = |leg: usize| {
         let mut gauge = Gauge::new(&legs[leg].noise, SEED, leg as u64);
-        ReversalExperiment::reference(32).run(&mut LegPlant::new(&legs[leg]), &mut gauge).to_csv()
+        // Drive values held for 10 mV: below what the plays and the gauge's noise show.
+        let experiment = ReversalExperiment { update: 5e-4, ..ReversalExperiment::reference(32) };
+        experiment.run(&mut LegPlant::new(&legs[leg]), &mut gauge).to_csv()
     };
     let first = of(0);
     std::array::from_fn(|leg| if legs[leg] == legs[0] { first.clone() } else { of(leg) })
@@ -112,4 +124,34 @@ pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
     if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
+}
+
+/// Random machines, each with two controllers: with the notch and without.
+pub struct Pair {
+    pub notched: Bench,
+    pub plain: Bench,
+}
+
+/// How many.
+pub const PLANTS: u32 = 12;
+
+/// Random machines with their controllers; built once.
+pub fn random_machines() -> &'static [Pair] {
+    static MACHINES: OnceLock<Vec<Pair>> = OnceLock::new();
+    MACHINES.get_or_init(|| {
+        in_parallel(PLANTS, |number| {
+            let specimen = Specimen::random(SEED, number);
+            let records = records(&specimen.legs);
+            let of = |what: &str, edits: &[(&str, &str)]| {
+                Bench::with_records(&format!("tables-{what}-{number}"), specimen.clone(), &records, edits)
+            };
+            Pair { notched: of("notch", &[]), plain: of("plain", &[("notch_damping   = 1.0\n", "")]) }
+        })
+    })
+}
+
+/// The reference machine with its controller; built once.
+pub fn reference_machine() -> &'static Bench {
+    static MACHINE: OnceLock<Bench> = OnceLock::new();
+    MACHINE.get_or_init(|| Bench::new("tables-reference", Specimen::reference(), &[]))
 }

@@ -1,0 +1,7 @@
+//! The paper's Tables 5 to 9, limits of stability and behaviour in the large, from the emitted controller on simulated
+//! machines out of tolerance. `cargo test --release -p specgen-tests --test platform_tables -- --nocapture` prints every
+//! figure.
+
+mod bench;
+mod limits;
+mod tables;
