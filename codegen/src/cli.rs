@@ -4,6 +4,7 @@
 
 mod build;
 mod check;
+mod dynamics;
 mod file;
 mod identify;
 mod sim;
@@ -53,6 +54,8 @@ enum Command {
     Check(check::Arguments),
     /// Run the paper's experiments with the emitted controller against a simulated machine.
     Sim(sim::Arguments),
+    /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
+    Dynamics(dynamics::Arguments),
     /// Identify the Everett table of a leg from a reversal-curve record.
     Identify(identify::Arguments),
     /// Simulate the reversal-curve experiment that `identify` needs, on the reference leg or another.
@@ -76,6 +79,7 @@ pub fn run() -> ExitCode {
         None => build::run(&cli.build, &mut ui),
         Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
         Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
+        Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
         Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
         Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),

@@ -10,6 +10,7 @@ use crate::identify;
 use crate::ir::{Ir, Setpoints};
 use crate::lower::{PoseNoise, lower, platform, pose_noise, scalar, setpoint};
 use crate::model::{Model, TrajectoryKind};
+use crate::reach::{self, Reach};
 use crate::spec::{self, SpecSource};
 use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
@@ -32,6 +33,8 @@ pub struct Compiled {
     pub margins: Option<Margins>,
     /// Modes, tuning and margins of a controller in task space.
     pub design: Option<Design>,
+    /// Travel of the platform, and how well its legs hold it, for a controller in task space.
+    pub reach: Option<Reach>,
     /// Noise of the measured pose, with gauges that see the platform.
     pub pose_noise: Option<PoseNoise>,
     /// Every constant of the controller.
@@ -72,6 +75,17 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
     findings.extend(design.iter().flat_map(|design| design.findings.clone()));
     findings.extend(setpoints.warnings);
     identified.texts.extend(setpoints.texts);
+    let reach = match check_reach(&model, setpoints.setpoints.as_ref(), &identified.tables) {
+        Ok(None) => None,
+        Ok(Some((reach, found))) => {
+            findings.extend(found);
+            Some(reach)
+        }
+        Err(found) => {
+            findings.extend(found);
+            return Err(Refused { source: Some(source), findings });
+        }
+    };
     let task = design.as_ref().zip(setpoints.setpoints);
     let lowered = lower(&model, task, &identified.tables, &digest(&source, &identified.texts));
     let (ir, pose_noise) = match lowered.and_then(|ir| Ok((ir, pose_noise(&model)?))) {
@@ -83,7 +97,7 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
     };
     let files = workspace::files(&ir, &emit::emit(&ir));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
-    Ok(Compiled { source, model, records: identified.reports, margins, design, pose_noise, ir, files, findings })
+    Ok(Compiled { source, model, records: identified.reports, margins, design, reach, pose_noise, ir, files, findings })
 }
 
 /// Legs with their own gauges adapt each on its own; a controller in task space closes its loops over the platform's modes.
@@ -94,6 +108,34 @@ fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<Design>), V
             let rest = RestDynamics::of(&platform(model)?);
             stability::platform::design(model, task, &rest).map(|design| (None, Some(design)))
         }
+    }
+}
+
+/// Where the legs reach, and that trajectories stay there: as far as both the data sheet's stroke and every leg's table
+/// allow.
+fn check_reach(
+    model: &Model,
+    setpoints: Option<&Setpoints>,
+    tables: &[EverettTable],
+) -> Result<Option<(Reach, Vec<Diagnostic>)>, Vec<Diagnostic>> {
+    let (Some(task), Some(setpoints)) = (&model.task_space, setpoints) else {
+        return Ok(None);
+    };
+    let largest = tables.iter().map(|table| table.node(table.grid, 0));
+    let stroke = largest.fold(model.actuator.stroke, |a, b| if b < a { b } else { a });
+    let platform = platform(model)?;
+    let mut errors = Vec::new();
+    let reach = reach::check(model, task, &platform, stroke).map_err(|found| errors.extend(found));
+    for (index, poses) in setpoint::poses(model, task, setpoints)?.into_iter().enumerate() {
+        let key = format!("trajectory[{index}].kind");
+        let name = &task.trajectories[index].name;
+        if let Err(found) = reach::check_poses(model, &platform, stroke, [&key, name], poses.into_iter()) {
+            errors.extend(found);
+        }
+    }
+    match reach {
+        Ok(both) if errors.is_empty() => Ok(Some(both)),
+        _ => Err(errors),
     }
 }
 

@@ -5,7 +5,7 @@
 
 use serde::Serialize;
 use specgen_runtime::Platform;
-use specgen_runtime::dynamics::{LANES, LegGroup};
+use specgen_runtime::dynamics::Leg;
 
 /// Number of legs.
 pub const LEGS: usize = 6;
@@ -105,8 +105,8 @@ pub struct Kinematics {
 pub struct Dynamics {
     /// The legs in the order of elimination.
     pub legs: [DynamicsLeg; LEGS],
-    /// Leg at each place of that order.
-    pub order: [usize; LEGS],
+    /// Place of each leg in that order.
+    pub places: [usize; LEGS],
     /// Equation that each place is solved from.
     pub rows: [usize; LEGS],
     /// Base joints in one plane.
@@ -160,23 +160,17 @@ impl Dynamics {
     /// As the runtime takes it.
     #[must_use]
     pub fn platform(&self) -> Platform<f64> {
-        let lanes = |group: usize, value: &dyn Fn(&DynamicsLeg) -> f64| {
-            std::array::from_fn(|lane| value(&self.legs[group * LANES + lane]))
-        };
-        let vectors = |group: usize, value: &dyn Fn(&DynamicsLeg) -> [f64; 3]| {
-            std::array::from_fn(|axis| lanes(group, &|leg| value(leg)[axis]))
-        };
         Platform {
-            groups: std::array::from_fn(|group| LegGroup {
-                base: vectors(group, &|leg| leg.base),
-                joint: vectors(group, &|leg| leg.joint),
-                arm: vectors(group, &|leg| leg.arm),
-                rest: vectors(group, &|leg| leg.rest),
-                length: lanes(group, &|leg| leg.length),
-                inverse_length: lanes(group, &|leg| leg.inverse_length),
-                half_inverse_square: lanes(group, &|leg| leg.half_inverse_square),
+            legs: self.legs.each_ref().map(|leg| Leg {
+                base: leg.base,
+                joint: leg.joint,
+                arm: leg.arm,
+                rest: leg.rest,
+                length: leg.length,
+                inverse_length: leg.inverse_length,
+                half_inverse_square: leg.half_inverse_square,
             }),
-            order: self.order,
+            places: self.places,
             rows: self.rows,
             flat_base: self.flat_base,
             flat_platform: self.flat_platform,
@@ -208,7 +202,7 @@ impl Dynamics {
                 inverse_length: number(leg.inverse_length),
                 half_inverse_square: number(leg.half_inverse_square),
             }),
-            order: self.order,
+            places: self.places,
             rows: self.rows,
             flat_base: self.flat_base,
             flat_platform: self.flat_platform,
@@ -335,6 +329,8 @@ pub struct ControlLaw {
     pub period: f64,
     /// 1/k_a, m/N.
     pub compliance: f64,
+    /// J, m/m and m/rad.
+    pub jacobian: [[f64; 6]; LEGS],
     /// J⁻ᵀ/k_a, m/N and 1/N.
     pub wrench_to_legs: [[f64; 6]; LEGS],
     /// Leg forces at rest, N.
@@ -370,11 +366,11 @@ pub struct Notch {
     pub sections: [Section; 6],
 }
 
-/// A biquad with a₀ = 1.
+/// 1 − g (1 − z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Section {
-    /// b₀, b₁, b₂.
-    pub b: [f64; 3],
+    /// g.
+    pub depth: f64,
     /// a₁, a₂.
     pub a: [f64; 2],
 }

@@ -71,7 +71,8 @@ pub struct PathReach {
 /// Checks bias and workspace of `model`, whose `[control]` is `task`. `stroke`: what every leg can do, m.
 ///
 /// # Errors
-/// A bias out of reach, a bound that its axis cannot reach, a workspace in which the legs hardly hold the platform.
+/// A bias out of reach, a bound that its axis cannot reach. (A workspace in which the legs hardly hold the platform has
+/// no `platform`: [`crate::lower::platform`] refuses it.)
 pub fn check(
     model: &Model,
     task: &TaskSpace,
@@ -120,12 +121,12 @@ pub fn check_poses(
     stroke: f64,
     [key, name]: [&str; 2],
     poses: impl Iterator<Item = Pose>,
-) -> Result<PathReach, Diagnostic> {
+) -> Result<PathReach, Vec<Diagnostic>> {
     let legs = travel::Legs { platform, stroke };
     let path = legs.shift(poses);
     match findings::of_path(model, stroke, [key, name], &path) {
         None => Ok(path),
-        Some(found) => Err(found),
+        Some(found) => Err(vec![found]),
     }
 }
 

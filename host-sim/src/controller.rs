@@ -1,7 +1,7 @@
 //! Runs an emitted controller's host shared library; the only module with unsafe code.
 //!
 //! The library's C interface, version 1: `specgen_abi_version`, `_describe`, `_config_default`, `_config_check`,
-//! `_config_load`, `_state_reset`, `_step`, `_state_digest`.
+//! `_config_load`, `_state_reset`, `_step`, `_state_digest`, and for analysis `_dynamics`.
 #![allow(unsafe_code)]
 
 use std::alloc::{Layout, alloc_zeroed, dealloc, handle_alloc_error};
@@ -148,14 +148,38 @@ struct Functions {
     state_digest: unsafe extern "C" fn(*const u8) -> u64,
 }
 
+/// Words of a motion: pose, rate, acceleration.
+const MOTION_WORDS: usize = 18;
+/// Words of an analysis: J, M, C ḣ, G, leg forces, leg displacements.
+const ANALYSIS_WORDS: usize = 96;
+
+/// The emitted controller's dynamics at a motion, in its own arithmetic.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dynamics {
+    /// ∂l/∂h, a row per leg: m/m, m/rad.
+    pub jacobian: [[f64; 6]; 6],
+    /// M(h).
+    pub mass: [[f64; 6]; 6],
+    /// C(h, ḣ) ḣ: N, N m.
+    pub coriolis: [f64; 6],
+    /// G(h): N, N m.
+    pub gravity: [f64; 6],
+    /// N, > 0 pushes the platform.
+    pub leg_forces: [f64; 6],
+    /// Δl from rest, m.
+    pub displacements: [f64; 6],
+}
+
 /// An emitted controller with one configuration and one state.
 pub struct Controller {
     description: Description,
     functions: Functions,
     config: Buffer,
     state: Buffer,
+    /// Where it came from.
+    path: PathBuf,
     /// Last, so that it is unloaded after everything else.
-    _library: Library,
+    library: Library,
 }
 
 impl Controller {
@@ -203,11 +227,48 @@ impl Controller {
         let state = Buffer::new(layout(&text, "state_bytes", "state_align")?);
         let config = Buffer::new(layout(&text, "config_bytes", "config_align")?);
 
-        let mut controller = Self { description, functions, config, state, _library: library };
+        let path = path.to_owned();
+        let mut controller = Self { description, functions, config, state, path, library };
         let words = controller.default_config();
         controller.configure(&words)?;
         controller.reset();
         Ok(controller)
+    }
+
+    /// The dynamics of the platform at a pose from rest (m, rad) with its first and second time derivatives, rounded to the
+    /// controller's arithmetic.
+    ///
+    /// # Errors
+    /// If the library does not offer them.
+    pub fn dynamics(
+        &self,
+        pose: &[f64; 6],
+        rate: &[f64; 6],
+        acceleration: &[f64; 6],
+    ) -> Result<Dynamics, ControllerError> {
+        let scalar = self.description.scalar;
+        let motion: Vec<u64> =
+            [pose, rate, acceleration].into_iter().flatten().map(|value| scalar.encode(*value)).collect();
+        debug_assert_eq!(motion.len(), MOTION_WORDS);
+        let mut analysis = [0; ANALYSIS_WORDS];
+        // SAFETY: the function reads and writes as many words as there are here.
+        unsafe {
+            let function: libloading::Symbol<'_, unsafe extern "C" fn(*const u64, *mut u64)> = self
+                .library
+                .get(b"specgen_dynamics\0")
+                .map_err(|cause| ControllerError::Load { path: self.path.clone(), cause })?;
+            function(motion.as_ptr(), analysis.as_mut_ptr());
+        }
+        let mut values = analysis.iter().map(|word| scalar.decode(*word));
+        let mut six = || std::array::from_fn(|_| values.next().unwrap_or(f64::NAN));
+        Ok(Dynamics {
+            jacobian: [six(), six(), six(), six(), six(), six()],
+            mass: [six(), six(), six(), six(), six(), six()],
+            coriolis: six(),
+            gravity: six(),
+            leg_forces: six(),
+            displacements: six(),
+        })
     }
 }
 

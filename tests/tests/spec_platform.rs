@@ -60,7 +60,7 @@ fn every_value_of_the_reference_is_in_si() {
     assert_eq!((model.adaptation.mode, model.adaptation.run_interval), (AdaptationMode::Pcc, 1));
     assert_eq!((model.adaptation.level_weight, model.adaptation.drift_weight), (0.0, 0.0));
     assert_eq!(model.adaptation.gain_ratio, [0.9, 1.1]);
-    assert_eq!(model.workspace.translation, [50e-6, 50e-6, 60e-6]);
+    assert_eq!(model.workspace.translation, [45e-6, 45e-6, 55e-6]);
     assert_eq!(model.workspace.rotation, [0.4e-3, 0.35e-3, 0.5e-3]);
     assert_eq!((model.controller.scalar, model.controller.setpoint), (Scalar::F64, SetpointKind::Pose));
     assert_eq!((model.target.mcu, model.target.instructions), (Mcu::Mps2An500, Some(4500)));

@@ -99,7 +99,8 @@ fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> 
     summary.host_library = Some(library.display().to_string());
     let sim = |error: host_sim::controller::ControllerError| Failure::Environment(error.to_string());
     let mut controller = Controller::load(&library).map_err(sim)?;
-    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS).map_err(sim)?;
+    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS)
+        .map_err(|error| Failure::Environment(error.to_string()))?;
 
     target::available()?;
     let mcu = compiled.model.target.mcu;

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled};
-use crate::stability;
+use crate::{reach, stability};
 
 /// Arguments of `check`.
 #[derive(Args, Debug)]
@@ -21,7 +21,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = compile::compile(&arguments.spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     let text = format!("{} is good\n{}", compiled.source.display_name, describe(&compiled));
-    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "pose_noise": compiled.pose_noise, "records": compiled.records }));
+    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "reach": compiled.reach, "pose_noise": compiled.pose_noise, "records": compiled.records }));
     Ok(())
 }
 
@@ -45,6 +45,9 @@ pub fn describe(compiled: &Compiled) -> String {
     }
     if let Some(design) = &compiled.design {
         text.push_str(&stability::platform::describe(design));
+    }
+    if let Some(reach) = &compiled.reach {
+        text.push_str(&reach::describe(reach));
     }
     if let (Some(noise), Some(task)) = (&compiled.pose_noise, &compiled.ir.task_space) {
         let list = |values: &[f64]| values.iter().map(|v| format!("{:.1}", v * 1e9)).collect::<Vec<_>>().join("/");

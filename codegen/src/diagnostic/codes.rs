@@ -119,15 +119,15 @@ codes! {
         "With these weights and the declared gain_ratio the loop grows even on a leg without dynamics (Appendix B). The help names the largest weight that would do.";
     UNSTABLE_SAMPLED = "E0402", "adaptation unstable on this leg",
         "The sampled loop of amplifier lag, resonance and adaptation has a spectral radius of 1 or more. The help names the largest weight that would do; a longer run helps as well.";
-    NO_MODES = "E0430", "the platform has no six modes on its legs",
+    NO_MODES = "E0420", "the platform has no six modes on its legs",
         "Mass matrix and leg stiffness at rest must be positive definite: every motion has a mass and a stiffness. Check geometry, masses and actuator.axial_stiffness.";
-    UNSTABLE_PLATFORM = "E0431", "a control mode unstable on this platform",
+    UNSTABLE_PLATFORM = "E0421", "a control mode unstable on this platform",
         "One tick of the closed loop (amplifier lag, modes of the platform on its legs, notch, gains, adaptation) has a spectral radius of 1 or more somewhere in gain_ratio, free or touching the declared work piece. Every mode that a running controller can be switched to is checked. The help names the largest factor or bandwidth that would do.";
-    NO_TUNING = "E0432", "no start values hold",
+    NO_TUNING = "E0422", "no start values hold",
         "The spec leaves gains or bandwidths to the compiler, and its rule found none that are stable. A higher tick rate, a notch (control.notch_damping), more damping or a narrower gain_ratio helps.";
-    THIN_MARGIN = "W0433", "stable, but not by much",
+    THIN_MARGIN = "W0423", "stable, but not by much",
         "A gain margin below 1.5 or a delay margin below half a tick: a platform a little softer, less damped or later than the spec says may be unstable.";
-    MODE_NOT_NOTCHED = "W0434", "a mode too fast for the notch",
+    MODE_NOT_NOTCHED = "W0424", "a mode too fast for the notch",
         "The mode lies above nine tenths of half the tick rate, where a sampled notch cannot sit on it. The stability check includes it.";
     BIAS_UNREACHABLE = "E0440", "bias out of reach",
         "At the pose control.setpoint.bias a leg would be shorter than at zero volts or longer than its stroke.";
@@ -135,8 +135,6 @@ codes! {
         "Moving along this axis alone from the middle of the strokes, the legs end before the bound does.";
     TRAJECTORY_UNREACHABLE = "E0442", "trajectory out of reach",
         "Somewhere on the declared trajectory a leg would be shorter than at zero volts or longer than its stroke. The help names the bias in z that would make it fit, if there is one.";
-    NEAR_SINGULAR = "E0443", "geometry nearly singular inside the workspace",
-        "Somewhere in the declared workspace the legs hardly hold the platform: the condition number of their Jacobian, angles taken at the joint radius, exceeds 10000.";
     NO_ROOM = "W0444", "bias without room for corrections",
         "A leg stands within a hundredth of its stroke of an end, so that feedback and adaptation can move it one way only. Corners of the declared workspace beyond reach are usual for a hexapod and not a finding; `specgen check` shows how much of it is reached.";
     TOO_FEW_CODES = "E0410", "converter too coarse for the grid",
@@ -145,8 +143,6 @@ codes! {
         "The kinematics counts its Newton steps for leg displacements up to a quarter of the leg length; no piezo leg comes near that.";
     ILL_CONDITIONED = "E0413", "leg forces not determined in the workspace",
         "The equations for the leg forces come close to singular at some pose of the declared workspace, and digits would be lost there. Change the geometry so that the legs point in more different directions, or reduce the workspace.";
-    PROBE_ALONG_PLANE = "E0430", "gauge along its target plane",
-        "A gauge sees its target move along its line; if the line lies in the plane, or nearly so, it sees nothing of that.";
     PROBE_MISSES = "E0431", "gauge that misses the platform",
         "The line of the gauge meets its target plane far from the platform: most likely a frame is mistaken. The line is in {B}, the plane in {P}, whose origin is P_C.";
     GAUGES_BLIND = "E0432", "gauges that leave a motion unseen",

@@ -3,7 +3,6 @@
 
 use proc_macro2::TokenStream;
 use quote::quote;
-use specgen_runtime::dynamics::LANES;
 
 use super::literal;
 use crate::ir::{DynamicsLeg, Ir};
@@ -12,8 +11,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let d = &ir.dynamics;
     let real = |value| literal::real(ir.scalar, value);
     let reals = |values: &[f64]| literal::reals(ir.scalar, values);
-    let groups = d.legs.chunks(LANES).map(|legs| group(ir, legs));
-    let order = d.order.map(literal::count);
+    let legs = d.legs.iter().map(|of| leg(ir, of));
+    let places = d.places.map(literal::count);
     let rows = d.rows.map(literal::count);
     let (flat_base, flat_platform) = (d.flat_base, d.flat_platform);
     let (base_depth, mass, gravity) = (real(d.base_depth), real(d.mass), real(d.gravity));
@@ -31,8 +30,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " Poses are from rest, [x y z θx θy θz] in m and rad; rates and accelerations are their time derivatives. The model and its range are"]
         #![doc = " in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared workspace only."]
 
-        use specgen_runtime::dynamics::LegGroup;
-        use specgen_runtime::Platform;
+        use specgen_runtime::dynamics::Leg;
+        use specgen_runtime::{Platform, Real as _};
 
         pub use specgen_runtime::{Load, Motion};
 
@@ -42,8 +41,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
         ///
         #[doc = #pivots_doc]
         pub const PLATFORM: Platform<Real> = Platform {
-            groups: [#(#groups),*],
-            order: [#(#order),*],
+            legs: [#(#legs),*],
+            places: [#(#places),*],
             rows: [#(#rows),*],
             flat_base: #flat_base,
             flat_platform: #flat_platform,
@@ -101,30 +100,43 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub fn jacobian(pose: &[Real; 6]) -> [[Real; 6]; 6] {
             PLATFORM.jacobian(pose)
         }
+
+        /// Words of a motion: pose, rate, acceleration.
+        pub const MOTION_WORDS: usize = 18;
+        /// Words of an analysis: J and M row by row, C ḣ, G, leg forces, leg displacements.
+        pub const ANALYSIS_WORDS: usize = 96;
+
+        /// All of the above for one motion, as words, for tools on a host.
+        #[must_use]
+        pub fn analysis(words: &[u64; MOTION_WORDS]) -> [u64; ANALYSIS_WORDS] {
+            let number = |k: usize| Real::from_word(words[k]);
+            let six = |k: usize| [number(k), number(k + 1), number(k + 2), number(k + 3), number(k + 4), number(k + 5)];
+            let motion = Motion { pose: six(0), rate: six(6), acceleration: six(12) };
+            let load = load(&motion, &[0.0; 6]);
+            let rows = [coriolis(&motion.pose, &motion.rate), gravity(&motion.pose), leg_forces(&motion), load.displacement];
+            let (jacobian, mass) = (jacobian(&motion.pose), mass_matrix(&motion.pose));
+            let mut out = [0; ANALYSIS_WORDS];
+            let values = jacobian.iter().chain(&mass).chain(&rows).flatten();
+            for (word, value) in out.iter_mut().zip(values) {
+                *word = value.to_word();
+            }
+            out
+        }
     }
 }
 
-/// Legs side by side: each number of the group holds one of every leg.
-fn group(ir: &Ir, legs: &[DynamicsLeg]) -> TokenStream {
-    let numbers = |value: &dyn Fn(&DynamicsLeg) -> f64| {
-        let values: Vec<f64> = legs.iter().map(value).collect();
-        let values = literal::reals(ir.scalar, &values);
-        quote! { [#values] }
-    };
-    let vectors = |value: &dyn Fn(&DynamicsLeg) -> [f64; 3]| {
-        let axes = [0, 1, 2].map(|axis| numbers(&|leg| value(leg)[axis]));
-        quote! { [#(#axes),*] }
-    };
-    let (base, joint) = (vectors(&|leg| leg.base), vectors(&|leg| leg.joint));
-    let (arm, rest) = (vectors(&|leg| leg.arm), vectors(&|leg| leg.rest));
-    let (length, inverse_length) = (numbers(&|leg| leg.length), numbers(&|leg| leg.inverse_length));
-    let half_inverse_square = numbers(&|leg| leg.half_inverse_square);
+fn leg(ir: &Ir, leg: &DynamicsLeg) -> TokenStream {
+    let real = |value| literal::real(ir.scalar, value);
+    let vector = |value: &[f64; 3]| literal::reals(ir.scalar, value);
+    let (base, joint, arm, rest) = (vector(&leg.base), vector(&leg.joint), vector(&leg.arm), vector(&leg.rest));
+    let (length, inverse_length) = (real(leg.length), real(leg.inverse_length));
+    let half_inverse_square = real(leg.half_inverse_square);
     quote! {
-        LegGroup {
-            base: #base,
-            joint: #joint,
-            arm: #arm,
-            rest: #rest,
+        Leg {
+            base: [#base],
+            joint: [#joint],
+            arm: [#arm],
+            rest: [#rest],
             length: #length,
             inverse_length: #inverse_length,
             half_inverse_square: #half_inverse_square,

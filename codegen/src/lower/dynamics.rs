@@ -18,6 +18,9 @@ const SMALLEST_PIVOT_RATIO: f64 = 1e-3;
 /// Interior poses that are looked at beside rest and the 64 corners.
 const INTERIOR_POSES: u32 = 128;
 
+/// Relative size of what rounding leaves of a sum that is zero.
+const ROUNDING: f64 = 1e-14;
+
 type Vector = [f64; 3];
 type Matrix = [[f64; 3]; 3];
 
@@ -76,6 +79,10 @@ fn assemble(model: &Model, order: [usize; LEGS], rows: [usize; LEGS]) -> Dynamic
         }
     });
 
+    let mut places = [0; LEGS];
+    for (place, leg) in order.into_iter().enumerate() {
+        places[leg] = place;
+    }
     let leg = &model.leg;
     let body = &model.platform;
     let [xx, yy, zz] = body.inertia;
@@ -104,10 +111,17 @@ fn assemble(model: &Model, order: [usize; LEGS], rows: [usize; LEGS]) -> Dynamic
         }
     }
 
+    // What is zero by symmetry is zero, so that the controller leaves it out.
+    let reach = model.geometry.joint_radius();
+    let clean = |value: f64, size: f64| if value.abs() <= ROUNDING * size { 0.0 } else { value };
+    let first_moment = first_moment.map(|moment| clean(moment, mass * reach));
+    let pole_moment = difference(first_moment, pole.map(|p| mass * p)).map(|moment| clean(moment, mass * reach));
+    let about_pole = about_pole.map(|row| row.map(|entry| clean(entry, mass * reach * reach)));
+
     let extensible_moment = leg.extensible_mass * leg.extensible_center;
     Dynamics {
         legs,
-        order,
+        places,
         rows,
         flat_base,
         flat_platform: joint.iter().all(|p| p[2] == 0.0),
@@ -115,7 +129,7 @@ fn assemble(model: &Model, order: [usize; LEGS], rows: [usize; LEGS]) -> Dynamic
         pole,
         mass,
         first_moment,
-        pole_moment: difference(first_moment, pole.map(|p| mass * p)),
+        pole_moment,
         second_moment: about_pole,
         extensible_moment,
         leg_inertia: leg.fixed_inertia

@@ -24,7 +24,7 @@ const SOUND_AT_RANGE: f64 = 1e-3;
 /// The constants of the gauges.
 ///
 /// # Errors
-/// A gauge that measures nothing, gauges that leave a motion unseen, a range that does not hold the workspace, a calibration that
+/// A gauge that misses the platform, gauges that leave a motion unseen, a range that does not hold the workspace, a calibration that
 /// cannot be inverted, a workspace too large.
 pub(super) fn lower(model: &Model, task: &TaskSpace, scalar: Scalar) -> Result<Sensing, Vec<Diagnostic>> {
     let layout = layout::check(model, &task.probes)?;

@@ -3,9 +3,12 @@
 
 mod check;
 mod paper;
+mod poses;
 mod segments;
 mod spline;
 mod table;
+
+pub use poses::poses;
 
 use specgen_runtime::setpoint::{Frames as _, MoveLimits, Profile, Target, Tool, Work};
 

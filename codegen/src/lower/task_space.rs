@@ -19,7 +19,7 @@ pub(super) fn law(
     design: &Design,
 ) -> ControlLaw {
     let round = |value: f64| scalar.round(value);
-    let round_all = |matrix: Matrix6| matrix.map(|row| row.map(round));
+    let round_all = |matrix: Matrix6| without_dust(matrix).map(|row| row.map(round));
     let compliance = 1.0 / model.actuator.axial_stiffness;
     // Lowering of the dynamics has refused a singular geometry.
     let legs_to_pose = linear::inverse(&rest.jacobian).unwrap_or([[0.0; 6]; 6]);
@@ -29,13 +29,15 @@ pub(super) fn law(
         modes_to_pose: round_all(notch.from_modal),
         legs_to_modes: round_all(multiply6(&notch.to_modal, &legs_to_pose)),
         modes_to_legs: round_all(multiply6(&rest.jacobian, &notch.from_modal)),
-        sections: notch.sections.map(|section| Section { b: section.b.map(round), a: section.a.map(round) }),
+        // b₀ = 1 − g, b₁ = a₁, b₂ = a₂ + g.
+        sections: notch.sections.map(|section| Section { depth: round(1.0 - section.b[0]), a: section.a.map(round) }),
     });
     let volts_per_cell = (model.actuator.voltage[1] - model.actuator.voltage[0]) / model.hysteresis.grid as f64;
     let metres_per_cell = model.actuator.leg_gain() * volts_per_cell;
     ControlLaw {
         period: round(model.timing.period),
         compliance: round(compliance),
+        jacobian: round_all(rest.jacobian),
         wrench_to_legs: round_all(wrench_to_legs),
         rest_force: rest_force.map(round),
         wrench_limit: largest_wrench(model).map(round),
@@ -46,6 +48,26 @@ pub(super) fn law(
         bias: task.setpoint.bias,
         notch,
     }
+}
+
+/// The matrix with what rounding left of a zero made one: entries below 10⁻¹² of the largest in their column. A symmetric
+/// platform has many, and a zero costs no instruction.
+fn without_dust(matrix: Matrix6) -> Matrix6 {
+    let mut largest = [0.0; 6];
+    for row in &matrix {
+        for (most, value) in largest.iter_mut().zip(row) {
+            if value.abs() > *most {
+                *most = value.abs();
+            }
+        }
+    }
+    matrix.map(|row| {
+        let mut clean = row;
+        for (value, most) in clean.iter_mut().zip(largest) {
+            *value = linear::dusted(*value, 10.0 * most);
+        }
+        clean
+    })
 }
 
 /// What six blocked legs can exert: a sensor that reads more is wrong. N and N m about P_C.

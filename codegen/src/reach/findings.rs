@@ -6,8 +6,6 @@ use super::{PathReach, ROOM, Reach};
 use crate::diagnostic::{Diagnostic, Severity, codes};
 use crate::model::Model;
 
-/// A condition number above this is refused.
-const LARGEST_CONDITION: f64 = 1e4;
 const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 /// Unit and factor of an axis in messages.
 const fn unit(axis: usize) -> (&'static str, f64) {
@@ -20,23 +18,6 @@ pub(super) fn of(model: &Model, reach: &Reach, bias: &PathReach) -> Vec<Diagnost
     findings.extend(of_bias(model, reach, bias));
     for axis in 0..6 {
         findings.extend(of_axis(model, reach, axis));
-    }
-    let conditioning = &reach.conditioning;
-    if conditioning.worst > LARGEST_CONDITION {
-        findings.push(finding(
-            model,
-            Severity::Error,
-            codes::NEAR_SINGULAR,
-            &["workspace.rotation", "workspace"],
-            format!(
-                "inside the declared workspace the legs hardly hold the platform: the condition number of their Jacobian \
-                 rises from {:.1} at rest to {:.3e} at {}",
-                conditioning.at_rest,
-                conditioning.worst,
-                pose(&conditioning.worst_pose)
-            ),
-            "reduce the workspace, or change the geometry: height comparable to the radii, joint pairs close".to_owned(),
-        ));
     }
     findings
 }
@@ -134,15 +115,6 @@ fn advice(path: &PathReach, what: &str) -> String {
         ),
         None => format!("no z of {what} makes it fit: it is too large for this stroke; check its units, or reduce it"),
     }
-}
-
-fn pose(pose: &[f64; 6]) -> String {
-    let parts: Vec<String> = pose
-        .iter()
-        .enumerate()
-        .map(|(axis, value)| format!("{} {:.1} {}", AXES[axis], value * unit(axis).1, unit(axis).0))
-        .collect();
-    parts.join(", ")
 }
 
 /// The reach as text for `specgen check`.

@@ -116,7 +116,9 @@ impl Legs<'_> {
         for pose in poses {
             path.poses += 1;
             for (x, slope) in self.platform.displacements(&pose).iter().zip(slopes) {
-                path.displacement = wider(path.displacement, [*x, *x]);
+                // What is no number is beyond every stroke, and stays so.
+                path.displacement =
+                    if x.is_nan() { [f64::NEG_INFINITY, f64::INFINITY] } else { wider(path.displacement, [*x, *x]) };
                 let (mut from, mut to) = (-x / slope, (self.stroke - x) / slope);
                 if slope < 0.0 {
                     (from, to) = (to, from);

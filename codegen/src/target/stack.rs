@@ -42,13 +42,14 @@ impl StackBound {
     }
 }
 
-/// The bound for everything that `root` (a symbol as it stands in the image) can reach.
+/// The bound for everything that `root` (a symbol as it stands in the image, or demangled) can reach.
 ///
 /// # Errors
 /// [`TargetError::MalformedImage`] if the file is damaged or has no such function.
 pub fn bound(elf: &[u8], root: &str) -> Result<StackBound, TargetError> {
     let graph = CallGraph::read(elf)?;
-    let &start = graph.symbols.get(root).ok_or_else(|| TargetError::MalformedImage {
+    let demangled = || graph.functions.iter().find(|(_, function)| function.name == root).map(|(address, _)| *address);
+    let start = graph.symbols.get(root).copied().or_else(demangled).ok_or_else(|| TargetError::MalformedImage {
         text: format!("it has no function `{root}`; was it stripped, or made by another specgen?"),
     })?;
     let mut walk = Walk { graph: &graph, deepest: BTreeMap::new(), open: Vec::new(), cycles: BTreeSet::new() };

@@ -9,7 +9,7 @@
 //! ```text
 //! sense      gauges → h                                                      pose from rest
 //! learn      e = N(h_d(t_n) − h) ;  s ← s + T k_I e                          (7), held where it would wind up
-//!            ν = N(Δl(h) − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                    (AII.3), (AII.5), (AII.6)
+//!            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6)
 //! setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}
 //! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)
 //!            + J⁻ᵀ k_v ė/k_a
@@ -17,12 +17,27 @@
 //! ```
 //! N is the modal notch. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback
 //! is none and does not.
+//!
+//! Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
+//! offset b of a change of mode) the innovation is then r − J e with r = (q − q̂) − f − b: no large numbers are subtracted,
+//! and what is left out is the error times the change of J over the workspace, a thousandth of it.
 
+<<<<<<< HEAD
 use crate::dynamics::{Load, Motion};
+=======
+use specgen_runtime::feedback::{force_of, winds_up};
+use specgen_runtime::linear::{difference, transform};
+use specgen_runtime::setpoint::Command;
+use specgen_runtime::{
+    ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _,
+};
+use crate::dynamics::Load;
+>>>>>>> main
 use crate::hysteresis::{TABLES, Table};
 use crate::limits::DAC;
 use crate::setpoint::PLAN;
 use crate::task_space::{
+<<<<<<< HEAD
     COMPLIANCE, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
     linear_displacement, linear_drive, notch_error, notch_innovation,
 };
@@ -31,6 +46,13 @@ use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, transform};
 use specgen_runtime::setpoint::{Command, Target};
 use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _};
+=======
+    COMPLIANCE, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT,
+    WRENCH_TO_LEGS, linear_displacement, linear_drive, modal_error, notch_error,
+    notch_innovation,
+};
+use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
+>>>>>>> main
 
 /// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
 pub const LEG_LIMITED: u32 = 0x3f;
@@ -95,8 +117,8 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
     }
     let wrench_good = take_wrench(state, &input.wrench);
     let damping = damping(config, state);
-    let (target, setpoint_status) = state.generator.next(&PLAN, &input.command);
-    let Load { displacement: demand, force } = known_load(config, state, &target);
+    let setpoint_status = state.generator.tick(&PLAN, &input.command);
+    let Load { displacement: demand, force } = known_load(config, state);
     let feedback = feedback(config, state);
     if !entered {
         state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
@@ -109,7 +131,7 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
         drift: [0.0; LEGS],
         dac_code: [0; LEGS],
         pose: state.pose,
-        target: target.pose,
+        target: state.generator.target().pose,
         load: [0.0; LEGS],
         status: gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
     };
@@ -119,8 +141,14 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
         if entered {
             state.transfer.offset[index] = leg.requested - request;
         }
+<<<<<<< HEAD
         let limited = actuate(config, leg, table, request + state.transfer.offset[index]);
         state.load[index] = load;
+=======
+        let offset = state.transfer.offset[index];
+        let limited = actuate(config, leg, table, request + offset);
+        leg.residual = (request + offset - leg.requested) - feedback[index] - offset;
+>>>>>>> main
         output.load[index] = load;
         output.voltage[index] = DAC.voltage(leg.code);
         output.requested[index] = leg.requested;
@@ -129,7 +157,6 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
         output.dac_code[index] = leg.code;
         output.status |= (limited as u32) << index;
     }
-    state.target = target;
     output
 }
 
@@ -179,8 +206,8 @@ pub(crate) fn sense(state: &mut State, gauge: &[Real; 6]) -> u32 {
 #[inline]
 pub(crate) fn learn(config: &Config, state: &mut State) {
     let mode = config.mode();
+    let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
     if mode.feeds_back() {
-        let error = difference(&state.target.pose, &state.pose);
         state.error = notch_error(&mut state.error_notch, &error);
         let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
         if !would_wind_up(&state.legs, &growth) {
@@ -188,13 +215,15 @@ pub(crate) fn learn(config: &Config, state: &mut State) {
         }
     }
     if mode.law() != Law::Invhys {
-        let measured = kinematics::leg_displacements(&state.pose);
-        let mut innovation = [0.0; LEGS];
-        for (index, leg) in state.legs.iter().enumerate() {
-            let model_error = measured[index] - (leg.requested - state.load[index]);
-            innovation[index] = model_error - leg.estimate.correction();
+        let mut residual = [0.0; LEGS];
+        for (residual, leg) in residual.iter_mut().zip(&state.legs) {
+            *residual = leg.residual;
         }
-        let innovation = notch_innovation(&mut state.innovation_notch, &innovation);
+        let innovation = notch_innovation(
+            &mut state.innovation_notch,
+            &error,
+            &residual,
+        );
         for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
             leg.estimate.correct(mode.law(), config.level_weight(), config.drift_weight(), innovation);
         }
@@ -229,13 +258,18 @@ fn damping(config: &Config, state: &State) -> [Real; LEGS] {
     if !config.damps() {
         return [0.0; LEGS];
     }
-    let error = difference(&state.target.rate, state.rate.value());
+    let error = difference(&state.generator.target().rate, state.rate.value());
     transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error))
 }
 
 /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
 #[inline]
+<<<<<<< HEAD
 pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load<Real> {
+=======
+pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
+    let target = state.generator.target();
+>>>>>>> main
     let wrench = match config.interaction() {
         Interaction::Neglected => [0.0; 6],
         Interaction::Measured => state.wrench,
@@ -245,7 +279,11 @@ pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) 
             force_of(&environment.stiffness, &compressed)
         }
     };
+<<<<<<< HEAD
     dynamics::load(&Motion { pose: target.pose, rate: target.rate, acceleration: target.acceleration }, &wrench)
+=======
+    dynamics::load(target, &wrench)
+>>>>>>> main
 }
 
 /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.

@@ -11,6 +11,7 @@
 
 use core::mem::{align_of, size_of};
 
+use controller::dynamics::{ANALYSIS_WORDS, MOTION_WORDS};
 use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput};
 
 /// Version of this interface.
@@ -169,4 +170,16 @@ pub unsafe extern "C" fn specgen_step(config: *const u8, state: *mut u8, input: 
 pub unsafe extern "C" fn specgen_state_digest(state: *const u8) -> u64 {
     // SAFETY: the caller's duty.
     unsafe { (*state.cast::<State>()).digest() }
+}
+
+/// The dynamics at a motion, see `controller::dynamics::analysis`.
+///
+/// # Safety
+/// `motion` points to `MOTION_WORDS` words, `analysis` to `ANALYSIS_WORDS` writable words.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_dynamics(motion: *const u64, analysis: *mut u64) {
+    // SAFETY: the caller's duty.
+    let words = controller::dynamics::analysis(unsafe { &*motion.cast::<[u64; MOTION_WORDS]>() });
+    // SAFETY: the caller's duty.
+    unsafe { analysis.cast::<[u64; ANALYSIS_WORDS]>().write(words) }
 }

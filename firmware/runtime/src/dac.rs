@@ -33,13 +33,14 @@ pub struct CodeLimits {
 
 impl<T: Real> Dac<T> {
     /// The permitted code nearest to `drive` (cells) when the present code is `previous`, and whether a limit held it back.
+    /// The step counts most: after a change of limits, a code outside of them comes back no faster than it may.
     #[inline]
     #[must_use]
     pub fn code(&self, drive: T, previous: i32, limits: CodeLimits) -> (i32, bool) {
         let wanted = ((drive - self.cells_at_zero) * self.codes_per_cell + T::HALF).truncate();
-        let stepped =
-            within(wanted, previous.saturating_sub(limits.max_step), previous.saturating_add(limits.max_step));
-        let code = within(stepped, limits.min, limits.max);
+        let permitted = within(wanted, limits.min, limits.max);
+        let code =
+            within(permitted, previous.saturating_sub(limits.max_step), previous.saturating_add(limits.max_step));
         (code, code != wanted)
     }
 

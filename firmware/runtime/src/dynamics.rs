@@ -20,6 +20,8 @@
 //! leg forces. Moments are taken about the joint of the leg that is eliminated first (its moment column is zero); which
 //! equation is solved for which leg is a constant of the platform.
 //!
+//! A flat base or platform (joints in one plane) saves a fifth: the components that are zero are left out.
+//!
 //! Vectors are in platform axes unless said otherwise: there joints and inertia are constant.
 //!
 //! # Range
@@ -28,43 +30,19 @@
 //! pivot near zero: results are then wrong, and for absurd arguments not finite. Callers accept poses of the declared
 //! workspace only, over which the compiler checks lengths and pivots.
 
-use core::ops::{Add, Mul, Sub};
+mod attitude;
+mod balance;
+mod lanes;
+mod leg;
 
+pub use crate::motion::Motion;
 use crate::real::Real;
-use crate::trig::sine_versine;
+use attitude::Attitude;
+use balance::Balance;
+use leg::{Common, Round};
 
 /// Number of legs.
 const LEGS: usize = 6;
-/// Legs that are worked on side by side: they share the loads of what is common, and two `f64` fill a vector register of a
-/// host.
-pub const LANES: usize = 2;
-/// Rounds over the legs.
-pub const GROUPS: usize = LEGS / LANES;
-
-/// Pose with its first and second time derivatives: m and rad, per s, per s².
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion<T> {
-    /// h.
-    pub pose: [T; 6],
-    /// ḣ.
-    pub rate: [T; 6],
-    /// ḧ.
-    pub acceleration: [T; 6],
-}
-
-impl<T: Real> Default for Motion<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<T: Real> Motion<T> {
-    /// Standstill at rest.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { pose: [T::ZERO; 6], rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] }
-    }
-}
 
 /// What the legs must do for a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,32 +53,32 @@ pub struct Load<T> {
     pub force: [T; 6],
 }
 
-/// Joints and lengths of [`LANES`] legs: `vector[axis][lane]`.
+/// Joints and length of a leg.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LegGroup<T> {
-    /// From the base joint to [0, 0, `base_depth`] below P_C at rest, base axes, m: −B_i but for z.
-    pub base: [[T; LANES]; 3],
+pub struct Leg<T> {
+    /// From the base joint to the point `base_depth` below P_C at rest, base axes, m: −B_i, with z from the plane of the base.
+    pub base: [T; 3],
     /// P_i, platform axes, m.
-    pub joint: [[T; LANES]; 3],
+    pub joint: [T; 3],
     /// P_i from the pole, platform axes, m.
-    pub arm: [[T; LANES]; 3],
+    pub arm: [T; 3],
     /// r₀, leg vector at rest, m.
-    pub rest: [[T; LANES]; 3],
+    pub rest: [T; 3],
     /// l₀ = |r₀|, m.
-    pub length: [T; LANES],
+    pub length: T,
     /// 1/l₀, 1/m.
-    pub inverse_length: [T; LANES],
+    pub inverse_length: T,
     /// 1/(2 l₀²), 1/m².
-    pub half_inverse_square: [T; LANES],
+    pub half_inverse_square: T,
 }
 
 /// Constants of a platform. The compiler computes them (specgen, `lower/dynamics.rs`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Platform<T> {
     /// The legs in the order of elimination.
-    pub groups: [LegGroup<T>; GROUPS],
-    /// Leg (0 to 5) at each place of that order.
-    pub order: [usize; LEGS],
+    pub legs: [Leg<T>; LEGS],
+    /// Place (0 to 5) of each leg in that order.
+    pub places: [usize; LEGS],
     /// Equation (0 to 2 force, 3 to 5 moment about the pole) that each place is solved from; the first is a force.
     pub rows: [usize; LEGS],
     /// All third components of `base` are zero: they are left out.
@@ -129,110 +107,277 @@ pub struct Platform<T> {
     pub gravity: T,
 }
 
-/// [`LANES`] numbers, worked on element by element.
-#[derive(Clone, Copy)]
-struct Lanes<T>([T; LANES]);
-
-impl<T: Real> Lanes<T> {
-    #[inline(always)]
-    fn splat(value: T) -> Self {
-        Self([value; LANES])
+impl<T: Real> Platform<T> {
+    /// Six leg forces for a motion, N, f > 0 pushes: J⁻ᵀ (M ḧ + C ḣ + G).
+    #[inline]
+    #[must_use]
+    pub fn leg_forces(&self, motion: &Motion<T>) -> [T; 6] {
+        let attitude = Attitude::new(&motion.pose);
+        let balance = self.balance::<0>(&attitude, motion, T::ONE);
+        self.by_leg(&balance.forces(&self.rows))
     }
 
-    #[inline(always)]
-    fn zip(self, other: Self, f: impl Fn(T, T) -> T) -> Self {
-        let mut out = self;
-        for (out, other) in out.0.iter_mut().zip(other.0) {
-            *out = f(*out, other);
+    /// Leg displacements and leg forces for a motion under a wrench on the platform: force (N) and torque (N m) about P_C,
+    /// base axes.
+    #[inline]
+    #[must_use]
+    pub fn load(&self, motion: &Motion<T>, wrench: &[T; 6]) -> Load<T> {
+        let attitude = Attitude::new(&motion.pose);
+        let mut balance = self.balance::<1>(&attitude, motion, T::ONE);
+        let [fx, fy, fz, tx, ty, tz] = *wrench;
+        let force = map(&attitude.to_platform, &[fx, fy, fz]);
+        let torque = map(&attitude.to_platform, &[tx, ty, tz]);
+        let shift = cross(&self.pole, &force);
+        for k in 0..3 {
+            balance.wrench[k] = balance.wrench[k] - force[k];
+            balance.wrench[k + 3] = balance.wrench[k + 3] - (torque[k] - shift[k]);
         }
-        out
+        Load { displacement: self.by_leg(&balance.displacements()), force: self.by_leg(&balance.forces(&self.rows)) }
     }
 
-    /// Sum over the lanes, in order.
-    #[inline(always)]
-    fn total(self) -> T {
-        let [first, rest @ ..] = self.0;
-        let mut sum = first;
-        for value in rest {
-            sum = sum + value;
+    /// Leg displacements Δl from rest, m, for a pose.
+    #[inline]
+    #[must_use]
+    pub fn displacements(&self, pose: &[T; 6]) -> [T; 6] {
+        self.by_leg(&self.balance::<1>(&Attitude::new(pose), &at_rest(pose), T::ZERO).displacements())
+    }
+
+    /// Leg lengths l₀ at rest, m.
+    #[inline]
+    #[must_use]
+    pub fn rest_lengths(&self) -> [T; 6] {
+        let [a, b, c, d, e, f] = &self.legs;
+        self.by_leg(&[a.length, b.length, c.length, d.length, e.length, f.length])
+    }
+
+    /// J = ∂l/∂h, row by leg: m/m and m/rad.
+    #[inline]
+    #[must_use]
+    pub fn jacobian(&self, pose: &[T; 6]) -> [[T; 6]; 6] {
+        let attitude = Attitude::new(pose);
+        let balance = self.balance::<0>(&attitude, &at_rest(pose), T::ZERO);
+        self.by_leg(&balance.shares.map(|share| {
+            let [sx, sy, sz, mx, my, mz] = share.column;
+            let direction = [sx, sy, sz];
+            let moment = sum(&[mx, my, mz], &cross(&self.pole, &direction));
+            let [x, y, z] = map_transposed(&attitude.to_platform, &direction);
+            let [a, b, c] = attitude.angular_transposed(&moment);
+            [x, y, z, a, b, c]
+        }))
+    }
+
+    /// M(h), symmetric: generalised force per acceleration of a coordinate. Formed for analysis, never on the tick.
+    #[inline]
+    #[must_use]
+    pub fn mass_matrix(&self, pose: &[T; 6]) -> [[T; 6]; 6] {
+        let mut rows = [[T::ZERO; 6]; 6];
+        for k in 0..6 {
+            let mut motion = at_rest(pose);
+            motion.acceleration[k] = T::ONE;
+            for (row, force) in rows.iter_mut().zip(self.generalised_force(&motion, T::ZERO)) {
+                row[k] = force;
+            }
         }
-        sum
+        rows
     }
-}
 
-impl<T: Real> Add for Lanes<T> {
-    type Output = Self;
+    /// C(h, ḣ) ḣ, N and N m.
+    #[inline]
+    #[must_use]
+    pub fn coriolis(&self, pose: &[T; 6], rate: &[T; 6]) -> [T; 6] {
+        self.generalised_force(&Motion { rate: *rate, ..at_rest(pose) }, T::ZERO)
+    }
+
+    /// G(h), N and N m.
+    #[inline]
+    #[must_use]
+    pub fn gravity(&self, pose: &[T; 6]) -> [T; 6] {
+        self.generalised_force(&at_rest(pose), T::ONE)
+    }
+
+    /// M ḧ + C ḣ + G times `gravity`, in coordinates h: N and N m.
+    #[must_use]
+    pub fn generalised_force(&self, motion: &Motion<T>, gravity: T) -> [T; 6] {
+        let attitude = Attitude::new(&motion.pose);
+        let balance = self.balance::<0>(&attitude, motion, gravity);
+        let mut total = balance.wrench;
+        for share in &balance.shares {
+            for (total, entry) in total.iter_mut().zip(&share.column) {
+                *total = *total + *entry * share.axial;
+            }
+        }
+        let [fx, fy, fz, tx, ty, tz] = total;
+        let force = [fx, fy, fz];
+        let torque = sum(&[tx, ty, tz], &cross(&self.pole, &force));
+        let [x, y, z] = map_transposed(&attitude.to_platform, &force);
+        let [a, b, c] = attitude.angular_transposed(&torque);
+        [x, y, z, a, b, c]
+    }
+
+    /// Ratio of the smallest to the largest pivot of the elimination at a pose, moments in units of `reach` (m): how
+    /// near the fixed order comes to dividing by zero. 0 if a pivot vanishes.
+    #[must_use]
+    pub fn pivot_ratio(&self, pose: &[T; 6], reach: T) -> T {
+        let mut balance = self.balance::<0>(&Attitude::new(pose), &at_rest(pose), T::ZERO);
+        let scale = T::ONE / reach;
+        for share in &mut balance.shares {
+            for moment in share.column.iter_mut().skip(3) {
+                *moment = *moment * scale;
+            }
+        }
+        let pivots = balance.pivots(&self.rows);
+        let (mut low, mut high) = (pivots[0].abs(), pivots[0].abs());
+        for pivot in pivots {
+            let size = pivot.abs();
+            low = if size < low { size } else { low };
+            high = if size > high { size } else { high };
+        }
+        // What a division by a pivot of zero leaves behind is not finite.
+        if low > T::ZERO && high.is_finite() { low / high } else { T::ZERO }
+    }
+
+    /// The equilibrium equations for a motion; `gravity` scales g. With displacements if `E` is 1.
     #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self.zip(other, |a, b| a + b)
+    fn balance<const E: usize>(&self, attitude: &Attitude<T>, motion: &Motion<T>, gravity: T) -> Balance<T, E> {
+        match (self.flat_base, self.flat_platform) {
+            (true, true) => self.balance_in::<2, 2, E>(attitude, motion, gravity),
+            (true, false) => self.balance_in::<2, 3, E>(attitude, motion, gravity),
+            (false, true) => self.balance_in::<3, 2, E>(attitude, motion, gravity),
+            (false, false) => self.balance_in::<3, 3, E>(attitude, motion, gravity),
+        }
     }
-}
 
-impl<T: Real> Sub for Lanes<T> {
-    type Output = Self;
+    /// The same with base and platform joints of `B` and `P` dimensions.
+    #[inline]
+    fn balance_in<const B: usize, const P: usize, const E: usize>(
+        &self,
+        attitude: &Attitude<T>,
+        motion: &Motion<T>,
+        gravity: T,
+    ) -> Balance<T, E> {
+        let [x, y, z, ..] = motion.pose;
+        let [vx, vy, vz, rx, ry, rz] = motion.rate;
+        let [ax, ay, az, bx, by, bz] = motion.acceleration;
+        let Attitude { turn, to_platform, .. } = attitude;
+        let [[_, _, up_x], [_, _, up_y], [_, _, up_z]] = *to_platform;
+        // Three vectors turned row by row: so a microcontroller needs each row once.
+        let turned = |k: usize| {
+            let (e, r) = (&turn[k], &to_platform[k]);
+            let shift = e[0] * x + e[1] * y + e[2] * (z + self.base_depth);
+            (shift, r[0] * vx + r[1] * vy + r[2] * vz, r[0] * ax + r[1] * ay + r[2] * az)
+        };
+        let (first, second, third) = (turned(0), turned(1), turned(2));
+        let shift = [x + first.0, y + second.0, z + third.0];
+        let velocity = [first.1, second.1, third.1];
+        let acceleration = [first.2, second.2, third.2];
+        let omega = attitude.angular([rx, ry, rz]);
+        let alpha = attitude.angular_acceleration([rx, ry, rz], [bx, by, bz], &omega);
+        let tow = tow(&omega, &alpha);
+        let weight = self.leg_weight_moment * gravity;
+        let common: Common<T, B, P> = Common {
+            turn: first_columns(turn),
+            shift,
+            omega,
+            velocity,
+            tow: first_columns(&tow),
+            acceleration,
+            leg_weight: [weight * up_x, weight * up_y, weight * up_z],
+        };
+        let g = self.gravity * gravity;
+        let heave = [acceleration[0] + g * up_x, acceleration[1] + g * up_y, acceleration[2] + g * up_z];
+        let [a, b, c, d, e, f] = &self.legs;
+        let mut round = Round { platform: self, common: &common, wrench: self.body(&heave, &tow) };
+        // Two at once share loads, but ask for more registers than a Cortex-M has in f64 (16; 32 in f32). The same bits.
+        let shares = if T::SINGLE {
+            let ([a, b], [c, d], [e, f]) = (round.shares([a, b]), round.shares([c, d]), round.shares([e, f]));
+            [a, b, c, d, e, f]
+        } else {
+            let ([a], [b], [c]) = (round.shares([a]), round.shares([b]), round.shares([c]));
+            let ([d], [e], [f]) = (round.shares([d]), round.shares([e]), round.shares([f]));
+            [a, b, c, d, e, f]
+        };
+        Balance { shares, wrench: round.wrench }
+    }
+
+    /// Force and moment about the pole that accelerate platform and joint masses; `heave` is r̈ of P_C plus gravity.
     #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.zip(other, |a, b| a - b)
+    fn body(&self, heave: &[T; 3], tow: &[[T; 3]; 3]) -> [T; 6] {
+        let n = &self.second_moment;
+        let [cx, cy, cz] = self.first_moment;
+        let [px, py, pz] = self.pole_moment;
+        // Ω c: what the mass centre accelerates with beside P_C.
+        let swept = |k: usize| taken_up(taken_up(taken_up(T::ZERO, tow[k][0], cx), tow[k][1], cy), tow[k][2], cz);
+        // (Ω N)_jk − (Ω N)_kj: what the torque is made of.
+        let torque = |j: usize, k: usize, mut sum: T| {
+            for i in 0..3 {
+                sum = taken_up(sum, tow[j][i], n[i][k]);
+            }
+            for i in 0..3 {
+                sum = taken_off(sum, tow[k][i], n[i][j]);
+            }
+            sum
+        };
+        [
+            swept(0) + self.mass * heave[0],
+            swept(1) + self.mass * heave[1],
+            swept(2) + self.mass * heave[2],
+            torque(2, 1, taken_off(taken_up(T::ZERO, heave[2], py), heave[1], pz)),
+            torque(0, 2, taken_off(taken_up(T::ZERO, heave[0], pz), heave[2], px)),
+            torque(1, 0, taken_off(taken_up(T::ZERO, heave[1], px), heave[0], py)),
+        ]
     }
-}
 
-impl<T: Real> Mul for Lanes<T> {
-    type Output = Self;
+    /// From the order of elimination to that of the legs.
     #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.zip(other, |a, b| a * b)
+    fn by_leg<V: Copy>(&self, values: &[V; LEGS]) -> [V; LEGS] {
+        // The bound is for the compiler, which then sees no panic path.
+        self.places.map(|place| values[if place < LEGS { place } else { 0 }])
     }
 }
 
-impl<T: Real> Mul<T> for Lanes<T> {
-    type Output = Self;
-    #[inline(always)]
-    fn mul(self, other: T) -> Self {
-        self * Self::splat(other)
-    }
+/// `sum` + value · constant. A constant of zero is left out, at no cost where it is known when compiling: a centred and
+/// symmetric platform has many.
+#[inline(always)]
+fn taken_up<T: Real>(sum: T, value: T, constant: T) -> T {
+    if constant == T::ZERO { sum } else { sum + value * constant }
 }
 
-impl<T: Real> Add<T> for Lanes<T> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, other: T) -> Self {
-        self + Self::splat(other)
-    }
+/// `sum` − value · constant, likewise.
+#[inline(always)]
+fn taken_off<T: Real>(sum: T, value: T, constant: T) -> T {
+    if constant == T::ZERO { sum } else { sum - value * constant }
 }
 
-/// A vector per lane.
-type Vectors<T> = [Lanes<T>; 3];
+/// A pose held.
+#[inline(always)]
+fn at_rest<T: Real>(pose: &[T; 6]) -> Motion<T> {
+    Motion { pose: *pose, rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] }
+}
+
+/// ω̇× + ω×ω×: acceleration of a point of the platform per distance from P_C, 1/s².
+#[inline(always)]
+fn tow<T: Real>([p, q, r]: &[T; 3], alpha: &[T; 3]) -> [[T; 3]; 3] {
+    let (pq, pr, qr) = (*p * *q, *p * *r, *q * *r);
+    [
+        [-(*q * *q) - *r * *r, pq - alpha[2], pr + alpha[1]],
+        [pq + alpha[2], -(*p * *p) - *r * *r, qr - alpha[0]],
+        [pr - alpha[1], qr + alpha[0], -(*p * *p) - *q * *q],
+    ]
+}
 
 #[inline(always)]
-fn dot<T: Real>(a: &Vectors<T>, b: &Vectors<T>) -> Lanes<T> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// offset + matrix · v; without v's third component where it is known to be zero.
-#[inline(always)]
-fn affine<T: Real>(matrix: &[[T; 3]; 3], v: &Vectors<T>, offset: &[T; 3], flat: bool) -> Vectors<T> {
-    let mut out = *v;
-    for ((out, row), offset) in out.iter_mut().zip(matrix).zip(offset) {
-        let plane = v[0] * row[0] + v[1] * row[1] + *offset;
-        *out = if flat { plane } else { plane + v[2] * row[2] };
+fn first_columns<T: Real, const N: usize>(m: &[[T; 3]; 3]) -> [[T; N]; 3] {
+    let mut out = [[T::ZERO; N]; 3];
+    for (out, row) in out.iter_mut().zip(m) {
+        for (out, value) in out.iter_mut().zip(row) {
+            *out = *value;
+        }
     }
     out
 }
 
-/// a × b; without a's third component where it is known to be zero.
 #[inline(always)]
-fn cross<T: Real>(a: &Vectors<T>, b: &Vectors<T>, flat: bool) -> Vectors<T> {
-    let last = a[0] * b[1] - a[1] * b[0];
-    if flat {
-        // The sign stays with the operand, so that nothing is subtracted from zero.
-        [a[1] * b[2], Lanes::splat(-T::ONE) * a[0] * b[2], last]
-    } else {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], last]
-    }
-}
-
-#[inline(always)]
-fn cross3<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
+fn cross<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
@@ -249,402 +394,6 @@ fn map_transposed<T: Real>(m: &[[T; 3]; 3], v: &[T; 3]) -> [T; 3] {
 }
 
 #[inline(always)]
-fn sum3<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
+fn sum<T: Real>(a: &[T; 3], b: &[T; 3]) -> [T; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-/// Attitude of the platform.
-struct Attitude<T> {
-    /// Rᵀ − I: from base axes to platform axes.
-    turn: [[T; 3]; 3],
-    /// Rᵀ.
-    to_platform: [[T; 3]; 3],
-    sine_x: T,
-    cosine_x: T,
-    sine_y: T,
-    cosine_y: T,
-}
-
-impl<T: Real> Attitude<T> {
-    /// (AI.1) from sine and 1 − cosine, so that nothing cancels for small angles.
-    #[inline(always)]
-    fn new(pose: &[T; 6]) -> Self {
-        let ((sx, vx), (sy, vy), (sz, vz)) = (sine_versine(pose[3]), sine_versine(pose[4]), sine_versine(pose[5]));
-        let (cx, cy, cz) = (T::ONE - vx, T::ONE - vy, T::ONE - vz);
-        let (sxsy, cxsy) = (sx * sy, cx * sy);
-        let turn = [
-            [vy * vz - vy - vz, cy * sz, -sy],
-            [sxsy * cz - cx * sz, sxsy * sz + (vx * vz - vx - vz), sx * cy],
-            [cxsy * cz + sx * sz, cxsy * sz - sx * cz, vx * vy - vx - vy],
-        ];
-        let mut to_platform = turn;
-        to_platform[0][0] = cy * cz;
-        to_platform[1][1] = T::ONE + turn[1][1];
-        to_platform[2][2] = cx * cy;
-        Self { turn, to_platform, sine_x: sx, cosine_x: cx, sine_y: sy, cosine_y: cy }
-    }
-
-    /// ω in platform axes for the rates of the angles.
-    #[inline(always)]
-    fn angular(&self, [x, y, z]: [T; 3]) -> [T; 3] {
-        let [[_, _, zx], [_, _, zy], [_, _, zz]] = self.to_platform;
-        [x + zx * z, self.cosine_x * y + zy * z, zz * z - self.sine_x * y]
-    }
-
-    /// dω/dt in platform axes but for the term in θ̈, which is `angular(θ̈)`.
-    #[inline(always)]
-    fn angular_drift(&self, [x, y, z]: [T; 3], omega: &[T; 3]) -> [T; 3] {
-        let yz = y * z;
-        let tilt = self.sine_y * yz;
-        [-(self.cosine_y * yz), x * omega[2] - self.sine_x * tilt, -(x * omega[1]) - self.cosine_x * tilt]
-    }
-
-    /// Generalised force of the angles for a torque about P_C in platform axes: the transpose of [`Self::angular`].
-    #[inline(always)]
-    fn angular_transposed(&self, torque: &[T; 3]) -> [T; 3] {
-        let [[_, _, zx], [_, _, zy], [_, _, zz]] = self.to_platform;
-        [
-            torque[0],
-            self.cosine_x * torque[1] - self.sine_x * torque[2],
-            zx * torque[0] + zy * torque[1] + zz * torque[2],
-        ]
-    }
-}
-
-/// One over the length of a leg whose squared length is `ratio` times 2 l₀², as a multiple of 1/l₀: ratio^−½/√2 by Newton
-/// from a cubic, multiplications only. Relative error below 2e-16 (f64) and 1e-8 (f32) plus rounding for lengths
-/// within ±30 %.
-#[inline(always)]
-fn inverse_root<T: Real>(half: Lanes<T>) -> Lanes<T> {
-    let c = T::from_f64;
-    // Through 1 at rest, so that small motions converge at once; 0.7 % off at worst.
-    let mut y = half * c(-2.427_454_611_221_644) + c(5.478_193_507_198_157);
-    y = half * y + c(-4.681_659_876_000_378);
-    y = half * y + c(2.274_713_387_603_355_6);
-    for _ in 0..if T::SINGLE { 2 } else { 3 } {
-        y = y * (Lanes::splat(c(1.5)) - half * y * y);
-    }
-    y
-}
-
-/// A motion, resolved into what each leg and the platform ask for.
-struct Resolved<T> {
-    /// Equilibrium equations: force rows 0–2, moment rows 3–5 about the pole; a column per leg in order of elimination.
-    columns: [[T; LEGS]; 6],
-    /// What goes straight into the leg's force, N; likewise ordered.
-    axial: [T; LEGS],
-    /// Force and moment about the pole that the legs must balance, besides.
-    wrench: [T; 6],
-    /// Δl, likewise ordered.
-    displacement: [T; LEGS],
-}
-
-impl<T: Real> Platform<T> {
-    /// Six leg forces for a motion, N, f > 0 pushes: J⁻ᵀ (M ḧ + C ḣ + G).
-    #[inline]
-    #[must_use]
-    pub fn leg_forces(&self, motion: &Motion<T>) -> [T; 6] {
-        let attitude = Attitude::new(&motion.pose);
-        self.solve(&self.resolve(&attitude, motion, T::ONE))
-    }
-
-    /// Leg displacements and leg forces for a motion under a wrench on the platform: force (N) and torque (N m) about P_C,
-    /// base axes.
-    #[inline]
-    #[must_use]
-    pub fn load(&self, motion: &Motion<T>, wrench: &[T; 6]) -> Load<T> {
-        let attitude = Attitude::new(&motion.pose);
-        let mut resolved = self.resolve(&attitude, motion, T::ONE);
-        let [fx, fy, fz, tx, ty, tz] = *wrench;
-        let force = map(&attitude.to_platform, &[fx, fy, fz]);
-        let torque = map(&attitude.to_platform, &[tx, ty, tz]);
-        let shift = cross3(&self.pole, &force);
-        for k in 0..3 {
-            resolved.wrench[k] = resolved.wrench[k] - force[k];
-            resolved.wrench[k + 3] = resolved.wrench[k + 3] - (torque[k] - shift[k]);
-        }
-        Load { displacement: self.by_leg(&resolved.displacement), force: self.solve(&resolved) }
-    }
-
-    /// Leg displacements Δl from rest, m, for a pose.
-    #[inline]
-    #[must_use]
-    pub fn displacements(&self, pose: &[T; 6]) -> [T; 6] {
-        let motion = Motion { pose: *pose, rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] };
-        self.by_leg(&self.resolve(&Attitude::new(pose), &motion, T::ZERO).displacement)
-    }
-
-    /// J = ∂l/∂h, row by leg: m/m and m/rad.
-    #[inline]
-    #[must_use]
-    pub fn jacobian(&self, pose: &[T; 6]) -> [[T; 6]; 6] {
-        let attitude = Attitude::new(pose);
-        let motion = Motion { pose: *pose, rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] };
-        let c = self.resolve(&attitude, &motion, T::ZERO).columns;
-        let mut rows = [[T::ZERO; 6]; LEGS];
-        for k in 0..LEGS {
-            let direction = [c[0][k], c[1][k], c[2][k]];
-            let moment = sum3(&[c[3][k], c[4][k], c[5][k]], &cross3(&self.pole, &direction));
-            let [x, y, z] = map_transposed(&attitude.to_platform, &direction);
-            let [a, b, c] = attitude.angular_transposed(&moment);
-            rows[self.leg(k)] = [x, y, z, a, b, c];
-        }
-        rows
-    }
-
-    /// M(h), symmetric: generalised force per acceleration of a coordinate. Formed for analysis, never on the tick.
-    #[inline]
-    #[must_use]
-    pub fn mass_matrix(&self, pose: &[T; 6]) -> [[T; 6]; 6] {
-        let mut rows = [[T::ZERO; 6]; 6];
-        for k in 0..6 {
-            let mut motion = Motion { pose: *pose, rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] };
-            motion.acceleration[k] = T::ONE;
-            for (row, force) in rows.iter_mut().zip(self.generalised_force(&motion, T::ZERO)) {
-                row[k] = force;
-            }
-        }
-        rows
-    }
-
-    /// C(h, ḣ) ḣ, N and N m.
-    #[inline]
-    #[must_use]
-    pub fn coriolis(&self, pose: &[T; 6], rate: &[T; 6]) -> [T; 6] {
-        self.generalised_force(&Motion { pose: *pose, rate: *rate, acceleration: [T::ZERO; 6] }, T::ZERO)
-    }
-
-    /// G(h), N and N m.
-    #[inline]
-    #[must_use]
-    pub fn gravity(&self, pose: &[T; 6]) -> [T; 6] {
-        self.generalised_force(&Motion { pose: *pose, rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] }, T::ONE)
-    }
-
-    /// M ḧ + C ḣ + G times `gravity`, in coordinates h: N and N m.
-    #[inline]
-    #[must_use]
-    pub fn generalised_force(&self, motion: &Motion<T>, gravity: T) -> [T; 6] {
-        let attitude = Attitude::new(&motion.pose);
-        let Resolved { columns, axial, wrench, .. } = self.resolve(&attitude, motion, gravity);
-        let mut total = wrench;
-        for (total, row) in total.iter_mut().zip(&columns) {
-            for (entry, axial) in row.iter().zip(&axial) {
-                *total = *total + *entry * *axial;
-            }
-        }
-        let [fx, fy, fz, tx, ty, tz] = total;
-        let force = [fx, fy, fz];
-        let torque = sum3(&[tx, ty, tz], &cross3(&self.pole, &force));
-        let [x, y, z] = map_transposed(&attitude.to_platform, &force);
-        let [a, b, c] = attitude.angular_transposed(&torque);
-        [x, y, z, a, b, c]
-    }
-
-    /// Ratio of the smallest to the largest pivot of the elimination at a pose, moments in units of `reach` (m): how
-    /// near the fixed order comes to dividing by zero. 0 if a pivot vanishes.
-    #[must_use]
-    pub fn pivot_ratio(&self, pose: &[T; 6], reach: T) -> T {
-        let motion = Motion { pose: *pose, rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] };
-        let mut columns = self.resolve(&Attitude::new(pose), &motion, T::ZERO).columns;
-        for row in columns.iter_mut().skip(3) {
-            for entry in row.iter_mut() {
-                *entry = *entry / reach;
-            }
-        }
-        let (_, _, pivots) = self.eliminate(&columns, &[T::ZERO; 6]);
-        let (mut low, mut high) = (pivots[0].abs(), pivots[0].abs());
-        for pivot in pivots {
-            let size = pivot.abs();
-            low = if size < low { size } else { low };
-            high = if size > high { size } else { high };
-        }
-        // A NaN, from a division by a pivot of zero, fails the comparison.
-        if low > T::ZERO && high.is_finite() { low / high } else { T::ZERO }
-    }
-
-    /// All that depends on the motion but the solution for the leg forces. `gravity` scales g.
-    #[inline(always)]
-    fn resolve(&self, attitude: &Attitude<T>, motion: &Motion<T>, gravity: T) -> Resolved<T> {
-        let [x, y, z, ..] = motion.pose;
-        let [vx, vy, vz, rx, ry, rz] = motion.rate;
-        let [ax, ay, az, bx, by, bz] = motion.acceleration;
-        let to_platform = &attitude.to_platform;
-        let shift = sum3(&[x, y, z], &map(&attitude.turn, &[x, y, z + self.base_depth]));
-        let velocity = map(to_platform, &[vx, vy, vz]);
-        let acceleration = map(to_platform, &[ax, ay, az]);
-        let omega = attitude.angular([rx, ry, rz]);
-        let alpha = sum3(&attitude.angular([bx, by, bz]), &attitude.angular_drift([rx, ry, rz], &omega));
-        let [[_, _, up_x], [_, _, up_y], [_, _, up_z]] = *to_platform;
-        let g = self.gravity * gravity;
-        let weight = self.leg_weight_moment * gravity;
-        let leg_weight = [weight * up_x, weight * up_y, weight * up_z];
-
-        // ω× and ω̇× + ω×ω×.
-        let [p, q, r] = omega;
-        let spin = [[T::ZERO, -r, q], [r, T::ZERO, -p], [-q, p, T::ZERO]];
-        let (pp, qq, rr, pq, pr, qr) = (p * p, q * q, r * r, p * q, p * r, q * r);
-        let tow = [
-            [-(qq + rr), pq - alpha[2], pr + alpha[1]],
-            [pq + alpha[2], -(pp + rr), qr - alpha[0]],
-            [pr - alpha[1], qr + alpha[0], -(pp + qq)],
-        ];
-
-        let heave = [acceleration[0] + g * up_x, acceleration[1] + g * up_y, acceleration[2] + g * up_z];
-        let mut wrench = self.body(&heave, &tow);
-        let mut columns = [[T::ZERO; LEGS]; 6];
-        let mut axial = [T::ZERO; LEGS];
-        let mut displacement = [T::ZERO; LEGS];
-        for (group, legs) in self.groups.iter().enumerate() {
-            let base = legs.base.map(Lanes);
-            let joint = legs.joint.map(Lanes);
-            let arm = legs.arm.map(Lanes);
-            let rest = legs.rest.map(Lanes);
-
-            // r₀ + d with the difference in one piece: l² − l₀² = (2 r₀ + d)·d loses nothing for small d.
-            let moved = affine(&attitude.turn, &base, &shift, self.flat_base);
-            let leg = [rest[0] + moved[0], rest[1] + moved[1], rest[2] + moved[2]];
-            let doubled = [rest[0] + leg[0], rest[1] + leg[1], rest[2] + leg[2]];
-            let square = dot(&doubled, &moved);
-            let half = square * Lanes(legs.half_inverse_square) + T::HALF;
-            let root = inverse_root(half);
-            let w = root * Lanes(legs.inverse_length);
-            let direction = [leg[0] * w, leg[1] * w, leg[2] * w];
-
-            let v = spun(&spin, &joint, &velocity, self.flat_platform);
-            let lengthening = dot(&direction, &v);
-            let turning = w * lengthening;
-            // |ṙ⊥|² / l
-            let across = dot(&v, &v) * w - lengthening * turning;
-
-            let swing = w * self.leg_inertia;
-            let inertial = Lanes::splat(self.extensible_moment + self.extensible_moment) - swing;
-            let coriolis = (inertial - swing) * turning;
-            let a = affine(&tow, &joint, &acceleration, self.flat_platform);
-            let mut y = a;
-            for k in 0..3 {
-                y[k] = inertial * a[k] - coriolis * v[k] + leg_weight[k];
-            }
-            let along = w * (across * self.extensible_moment + dot(&direction, &y));
-            let y = [y[0] * w, y[1] * w, y[2] * w];
-            let moment = cross(&arm, &y, self.flat_platform);
-            let column = cross(&arm, &direction, self.flat_platform);
-            for k in 0..3 {
-                wrench[k] = wrench[k] - y[k].total();
-                wrench[k + 3] = wrench[k + 3] - moment[k].total();
-            }
-            let length = Lanes(legs.length);
-            for lane in 0..LANES {
-                let place = group * LANES + lane;
-                for k in 0..3 {
-                    columns[k][place] = direction[k].0[lane];
-                    columns[k + 3][place] = column[k].0[lane];
-                }
-                axial[place] = along.0[lane];
-                // l = l² · 1/l; Δl = (l² − l₀²) / (l + l₀).
-                let l0 = length.0[lane];
-                let l = (half.0[lane] + half.0[lane]) * root.0[lane] * l0;
-                displacement[place] = square.0[lane] / (l + l0);
-            }
-        }
-        Resolved { columns, axial, wrench, displacement }
-    }
-
-    /// Force and moment about the pole that accelerate platform and joint masses; `heave` is r̈ of P_C plus gravity.
-    #[inline(always)]
-    fn body(&self, heave: &[T; 3], tow: &[[T; 3]; 3]) -> [T; 6] {
-        let swept = map(tow, &self.first_moment);
-        let lifted = cross3(&self.pole_moment, heave);
-        let n = &self.second_moment;
-        // (Ω N)_jk: what the torque is the axial vector of.
-        let entry = |j: usize, k: usize| tow[j][0] * n[0][k] + tow[j][1] * n[1][k] + tow[j][2] * n[2][k];
-        [
-            self.mass * heave[0] + swept[0],
-            self.mass * heave[1] + swept[1],
-            self.mass * heave[2] + swept[2],
-            lifted[0] + (entry(2, 1) - entry(1, 2)),
-            lifted[1] + (entry(0, 2) - entry(2, 0)),
-            lifted[2] + (entry(1, 0) - entry(0, 1)),
-        ]
-    }
-
-    /// Leg forces that balance the wrench, each with its own axial part.
-    #[inline(always)]
-    fn solve(&self, resolved: &Resolved<T>) -> [T; 6] {
-        let (upper, right, pivots) = self.eliminate(&resolved.columns, &resolved.wrench);
-        let mut force = right;
-        for k in (0..LEGS).rev() {
-            let mut rest = right[k];
-            for j in k + 1..LEGS {
-                rest = rest - upper[k][j] * force[j];
-            }
-            force[k] = rest / pivots[k];
-        }
-        for (force, axial) in force.iter_mut().zip(resolved.axial) {
-            *force = *force + axial;
-        }
-        self.by_leg(&force)
-    }
-
-    /// Gaussian elimination in the fixed order: the upper triangle, the right side, and the pivots.
-    #[inline(always)]
-    fn eliminate(&self, columns: &[[T; LEGS]; 6], wrench: &[T; 6]) -> ([[T; LEGS]; 6], [T; 6], [T; 6]) {
-        let mut m = *columns;
-        let mut right = *wrench;
-        for k in 0..6 {
-            m[k] = columns[self.row(k)];
-            right[k] = wrench[self.row(k)];
-        }
-        for k in 0..LEGS {
-            let inverse = T::ONE / m[k][k];
-            for i in k + 1..6 {
-                // The first leg has no moment about the pole.
-                if k > 0 || self.row(i) < 3 {
-                    let factor = m[i][k] * inverse;
-                    for j in k + 1..LEGS {
-                        m[i][j] = m[i][j] - factor * m[k][j];
-                    }
-                    right[i] = right[i] - factor * right[k];
-                }
-            }
-        }
-        let mut pivots = right;
-        for k in 0..LEGS {
-            pivots[k] = m[k][k];
-        }
-        (m, right, pivots)
-    }
-
-    /// From the order of elimination to that of the legs.
-    #[inline(always)]
-    fn by_leg(&self, values: &[T; LEGS]) -> [T; LEGS] {
-        let mut out = [T::ZERO; LEGS];
-        for k in 0..LEGS {
-            out[self.leg(k)] = values[k];
-        }
-        out
-    }
-
-    /// `order[place]`; the bound is for the compiler, which then sees no panic path.
-    #[inline(always)]
-    fn leg(&self, place: usize) -> usize {
-        let leg = self.order[place];
-        if leg < LEGS { leg } else { 0 }
-    }
-
-    /// `rows[place]`, likewise.
-    #[inline(always)]
-    fn row(&self, place: usize) -> usize {
-        let row = self.rows[place];
-        if row < 6 { row } else { 0 }
-    }
-}
-
-/// `velocity` + ω × P, by the matrix of ω, whose diagonal is left out.
-#[inline(always)]
-fn spun<T: Real>(spin: &[[T; 3]; 3], joint: &Vectors<T>, velocity: &[T; 3], flat: bool) -> Vectors<T> {
-    let x = joint[1] * spin[0][1] + velocity[0];
-    let y = joint[0] * spin[1][0] + velocity[1];
-    let z = joint[0] * spin[2][0] + joint[1] * spin[2][1] + velocity[2];
-    if flat { [x, y, z] } else { [x + joint[2] * spin[0][2], y + joint[2] * spin[1][2], z] }
 }

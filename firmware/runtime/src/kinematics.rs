@@ -36,30 +36,15 @@ impl<T: Real> Legs<'_, T> {
         let turn = self.series.attitude([tilt_x, tilt_y, tilt_z]).rotation_less_identity();
         let mut displacements = [T::ZERO; 6];
         for (leg, displacement) in displacements.iter_mut().enumerate() {
-            let p = self.platform_joint[leg];
+            let p = &self.platform_joint[leg];
             let moved = [
                 x + turn[0][0] * p[0] + turn[0][1] * p[1] + turn[0][2] * p[2],
                 y + turn[1][0] * p[0] + turn[1][1] * p[1] + turn[1][2] * p[2],
                 z + turn[2][0] * p[0] + turn[2][1] * p[1] + turn[2][2] * p[2],
             ];
-            *displacement = self.extension(leg, &moved);
+            *displacement = extension(&self.rest_leg[leg], self.rest_length[leg], self.newton_steps, &moved);
         }
         displacements
-    }
-
-    /// |r₀ + d| − l₀ for a joint that moved by d: the root Δl of Δl² + 2 l₀ Δl = s with s = (2 r₀ + d)·d.
-    #[inline]
-    fn extension(&self, leg: usize, moved: &[T; 3]) -> T {
-        let (rest, length) = (&self.rest_leg[leg], self.rest_length[leg]);
-        let two = T::ONE + T::ONE;
-        let s = (two * rest[0] + moved[0]) * moved[0]
-            + (two * rest[1] + moved[1]) * moved[1]
-            + (two * rest[2] + moved[2]) * moved[2];
-        let mut root = s / (two * length);
-        for _ in 0..self.newton_steps {
-            root = (s + root * root) / (two * (length + root));
-        }
-        root
     }
 
     /// The pose at which the legs have these displacements (m): forward kinematics.
@@ -94,4 +79,18 @@ pub fn times<T: Real>(matrix: &[[T; 6]; 6], x: &[T; 6]) -> [T; 6] {
         product[row] = m[0] * x[0] + m[1] * x[1] + m[2] * x[2] + m[3] * x[3] + m[4] * x[4] + m[5] * x[5];
     }
     product
+}
+
+/// |r₀ + d| − l₀ for a joint that moved by d: the root Δl of Δl² + 2 l₀ Δl = s with s = (2 r₀ + d)·d.
+#[inline]
+fn extension<T: Real>(rest: &[T; 3], length: T, newton_steps: usize, moved: &[T; 3]) -> T {
+    let two = T::ONE + T::ONE;
+    let s = (two * rest[0] + moved[0]) * moved[0]
+        + (two * rest[1] + moved[1]) * moved[1]
+        + (two * rest[2] + moved[2]) * moved[2];
+    let mut root = s / (two * length);
+    for _ in 0..newton_steps {
+        root = (s + root * root) / (two * (length + root));
+    }
+    root
 }

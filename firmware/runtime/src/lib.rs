@@ -13,6 +13,7 @@
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
 //! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
 //! | [`feedback`] | position feedback with anti-windup | (7) |
+//! | [`motion`] | pose, rate and acceleration | |
 //! | [`notch`] | modal notch of the feedback | |
 //! | [`transfer`] | bumpless change of mode | |
 //! | [`setpoint`] | bias, moves, trajectories, streams; user frames | section 4, trajectories |
@@ -41,6 +42,7 @@ pub mod kinematics;
 pub mod linear;
 pub mod memory;
 pub mod mode;
+pub mod motion;
 pub mod notch;
 pub mod real;
 pub mod sensing;
@@ -53,12 +55,13 @@ pub use adaptation::{Estimate, Law};
 pub use attitude::{Attitude, Series};
 pub use dac::{CodeLimits, Dac};
 pub use digest::Digest;
-pub use dynamics::{Load, Motion, Platform};
+pub use dynamics::{Load, Platform};
 pub use everett::Everett;
 pub use feedback::{Gains, Integral};
 pub use kinematics::Legs;
 pub use memory::ReversalMemory;
 pub use mode::{ControlMode, Interaction};
+pub use motion::Motion;
 pub use notch::{NotchState, Section};
 pub use real::Real;
 pub use sensing::{Calibration, Gauges};

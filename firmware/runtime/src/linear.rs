@@ -2,29 +2,33 @@
 
 use crate::real::Real;
 
-/// `matrix · vector`; every sum from the first column to the last.
-#[inline]
+/// [f(0), …, f(5)], spelled out so that constants at a known index are known.
+#[inline(always)]
+pub fn each<T>(f: impl Fn(usize) -> T) -> [T; 6] {
+    [f(0), f(1), f(2), f(3), f(4), f(5)]
+}
+
+/// `matrix · vector`; every sum from the first column to the last. Entries that are zero are left out, so that with a matrix
+/// known to the compiler they cost nothing.
+#[inline(always)]
 #[must_use]
 pub fn transform<T: Real>(matrix: &[[T; 6]; 6], vector: &[T; 6]) -> [T; 6] {
-    let mut result = [T::ZERO; 6];
-    for (value, row) in result.iter_mut().zip(matrix) {
-        *value = row[0] * vector[0]
-            + row[1] * vector[1]
-            + row[2] * vector[2]
-            + row[3] * vector[3]
-            + row[4] * vector[4]
-            + row[5] * vector[5];
-    }
-    result
+    each(|row| {
+        let [a, b, c, d, e, f] = matrix[row];
+        // −0 is what a sum begins with that adds nothing to its first term.
+        let half = plus(plus(plus(-T::ZERO, a, vector[0]), b, vector[1]), c, vector[2]);
+        plus(plus(plus(half, d, vector[3]), e, vector[4]), f, vector[5])
+    })
+}
+
+#[inline(always)]
+fn plus<T: Real>(sum: T, factor: T, value: T) -> T {
+    if factor == T::ZERO { sum } else { sum + factor * value }
 }
 
 /// `left − right`, component by component.
 #[inline]
 #[must_use]
 pub fn difference<T: Real>(left: &[T; 6], right: &[T; 6]) -> [T; 6] {
-    let mut result = *left;
-    for (value, right) in result.iter_mut().zip(right) {
-        *value = *value - *right;
-    }
-    result
+    each(|axis| left[axis] - right[axis])
 }

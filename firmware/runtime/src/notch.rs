@@ -1,4 +1,4 @@
-//! Modal notch: six biquads, one for each mode of the platform, in modal coordinates.
+//! Modal notch: six second-order sections, one for each mode of the platform, in modal coordinates.
 //!
 //! With V from K v = ω² M v (V⁻¹ takes a pose apart into modes), section i is the discrete form of
 //!
@@ -9,19 +9,19 @@
 //! unchanged (DC gain 1). It stands in the feedback only, never in the set-point. It does not damp the platform.
 
 use crate::digest::Digest;
-use crate::linear::transform;
 use crate::real::Real;
 
-/// Coefficients of H(z) = (b₀ + b₁z⁻¹ + b₂z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²).
+/// H(z) = 1 − g (1 − z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²): what the bilinear transformation makes of the notch. At z = 1 it is 1
+/// whatever the rounding of g, a₁ and a₂.
 #[derive(Debug, Clone, Copy)]
 pub struct Section<T> {
-    /// b₀, b₁, b₂.
-    pub b: [T; 3],
+    /// g: 1 less the gain above all frequencies; 0 lets everything pass.
+    pub depth: T,
     /// a₁, a₂.
     pub a: [T; 2],
 }
 
-/// What the six sections remember: transposed direct form II. Zero at reset.
+/// What the six sections remember. Zero at reset.
 #[derive(Debug, Clone, Copy)]
 pub struct NotchState<T> {
     delays: [[T; 2]; 6],
@@ -40,27 +40,20 @@ impl<T: Real> NotchState<T> {
         Self { delays: [[T::ZERO; 2]; 6] }
     }
 
-    /// One tick: `into` · sections · `from` applied to `signal`.
-    ///
-    /// `from` takes the signal to modal coordinates (V⁻¹ for a pose, V⁻¹J⁻¹ for leg displacements), `into` brings it back.
+    /// One tick of a signal in modal coordinates.
     #[inline]
     #[must_use]
-    pub fn filter(
-        &mut self,
-        sections: &[Section<T>; 6],
-        from: &[[T; 6]; 6],
-        into: &[[T; 6]; 6],
-        signal: &[T; 6],
-    ) -> [T; 6] {
-        let mut modal = transform(from, signal);
-        for ((value, section), [first, second]) in modal.iter_mut().zip(sections).zip(&mut self.delays) {
-            let input = *value;
-            let output = section.b[0] * input + *first;
-            *first = section.b[1] * input - section.a[0] * output + *second;
-            *second = section.b[2] * input - section.a[1] * output;
-            *value = output;
+    pub fn filter(&mut self, sections: &[Section<T>; 6], modal: &[T; 6]) -> [T; 6] {
+        let mut filtered = *modal;
+        for ((value, section), [first, second]) in filtered.iter_mut().zip(sections).zip(&mut self.delays) {
+            // The part that is taken out: a band-pass about the mode, transposed direct form II.
+            let driven = section.depth * *value;
+            let resonant = driven + *first;
+            *value = *value - resonant;
+            *first = *second - section.a[0] * resonant;
+            *second = -driven - section.a[1] * resonant;
         }
-        transform(into, &modal)
+        filtered
     }
 
     /// Adds what is remembered to a digest.

@@ -18,54 +18,14 @@ mod profile;
 mod stop;
 mod trajectory;
 
-use crate::digest::Digest;
 use crate::real::Real;
 
+pub use crate::motion::Motion as Target;
 pub use frames::{Frames, Parallel, Tool, Work};
 pub use generator::{BUSY, Generator, REFUSED, STALE};
 pub use profile::{LONGEST, MoveLimits, Profile};
 pub use stop::Stop;
 pub use trajectory::{Axis, Row, Segment, Table, Trajectory};
-
-/// Six coordinates with their first and second time derivatives.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Target<T> {
-    /// m and rad.
-    pub pose: [T; 6],
-    /// m/s and rad/s.
-    pub rate: [T; 6],
-    /// m/s² and rad/s².
-    pub acceleration: [T; 6],
-}
-
-impl<T: Real> Default for Target<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<T: Real> Target<T> {
-    /// Standstill at rest.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self::at([T::ZERO; 6])
-    }
-
-    /// Standstill at `pose` (m and rad).
-    #[must_use]
-    pub const fn at(pose: [T; 6]) -> Self {
-        Self { pose, rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] }
-    }
-
-    /// Adds the numbers to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        for numbers in [&self.pose, &self.rate, &self.acceleration] {
-            for number in numbers {
-                digest.real(*number);
-            }
-        }
-    }
-}
 
 /// What the user wants done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,21 +102,16 @@ pub struct Plan<T: Real, F> {
 }
 
 impl<T: Real, F: Frames<T>> Plan<T, F> {
-    /// The user's set-point as one of the platform, if it lies within the workspace and is finite.
+    /// Puts the user's set-point as one of the platform into `target`, if it is finite and within the workspace.
     #[inline]
-    #[must_use]
-    pub fn accepted(&self, user: &Target<T>) -> Option<Target<T>> {
-        let mut target = self.frames.to_platform(user)?;
-        for (value, bias) in target.pose.iter_mut().zip(&self.bias) {
-            *value = *value + *bias;
-        }
-        self.is_inside(&target.pose).then_some(target)
+    pub fn admit(&self, user: &Target<T>, target: &mut Target<T>) -> bool {
+        self.frames.admit(user, &self.bias, &self.bound, target)
     }
 
-    /// Every component finite and within the workspace.
-    #[inline]
+    /// The user's pose as one of the platform, if it is finite and within the workspace.
     #[must_use]
-    pub fn is_inside(&self, pose: &[T; 6]) -> bool {
-        pose.iter().zip(&self.bound).all(|(value, bound)| value.abs() <= *bound)
+    pub fn admitted(&self, user: &[T; 6]) -> Option<[T; 6]> {
+        let mut target = Target::new();
+        self.admit(&Target::at(*user), &mut target).then_some(target.pose)
     }
 }

@@ -7,7 +7,9 @@ use crate::real::Real;
 #[derive(Debug, Clone, Copy)]
 pub struct Transfer<T> {
     /// Offset of each leg, m.
-    pub offset: [T; 6],
+    offset: [T; 6],
+    /// Any of them is left.
+    active: bool,
 }
 
 impl<T: Real> Default for Transfer<T> {
@@ -20,16 +22,36 @@ impl<T: Real> Transfer<T> {
     /// Nothing to fade.
     #[must_use]
     pub const fn new() -> Self {
-        Self { offset: [T::ZERO; 6] }
+        Self { offset: [T::ZERO; 6], active: false }
+    }
+
+    /// Begins to fade `offset` (m).
+    #[inline]
+    pub fn begin(&mut self, offset: [T; 6]) {
+        self.offset = offset;
+        self.active = true;
+    }
+
+    /// Offset of each leg, m.
+    #[inline]
+    #[must_use]
+    pub fn offset(&self) -> &[T; 6] {
+        &self.offset
     }
 
     /// One tick: `keep` (in [0, 1)) of each offset is left, and none once it is below `negligible` (m, > 0), so that it
     /// ends in zero rather than in subnormal numbers.
     #[inline]
     pub fn fade(&mut self, keep: T, negligible: T) {
+        if !self.active {
+            return;
+        }
+        self.active = false;
         for offset in &mut self.offset {
             let faded = keep * *offset;
-            *offset = if faded.abs() > negligible { faded } else { T::ZERO };
+            let left = faded.abs() > negligible;
+            *offset = if left { faded } else { T::ZERO };
+            self.active |= left;
         }
     }
 
@@ -38,5 +60,6 @@ impl<T: Real> Transfer<T> {
         for value in &self.offset {
             digest.real(*value);
         }
+        digest.word(u64::from(self.active));
     }
 }

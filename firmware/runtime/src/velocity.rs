@@ -72,6 +72,14 @@ impl<T: Real> Rate<T> {
         self.primed = false;
     }
 
+    /// Back to reset: nobody asks for the rate. Costs next to nothing once done.
+    #[inline]
+    pub fn rest(&mut self) {
+        if self.primed {
+            *self = Self::new();
+        }
+    }
+
     /// Adds what is remembered to a digest.
     pub fn digest(&self, digest: &mut Digest) {
         for value in self.previous.iter().chain(&self.value) {

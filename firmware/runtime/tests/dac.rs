@@ -40,3 +40,23 @@ fn the_nearest_code_is_chosen() {
     assert_eq!(DAC.code(DAC.drive(43_691), 43_690, LIMITS), (43_690, true));
     assert_eq!(DAC.code(DAC.drive(10_000), 9000, LIMITS), (9500, true));
 }
+
+#[test]
+fn limits_that_move_past_the_present_code_are_come_back_to_at_the_slew_rate() {
+    for (limits, wanted) in [
+        (CodeLimits { min: 10_000, max: 43_690, max_step: 500 }, 10_000),
+        (CodeLimits { min: 0, max: 1000, max_step: 500 }, 1000),
+    ] {
+        for drive in [f64::MIN, 0.0, 8.0, f64::MAX, f64::NAN] {
+            let mut previous = 5_000;
+            for _ in 0..10 {
+                let (code, held_back) = DAC.code(drive, previous, limits);
+                assert!((code - previous).abs() <= limits.max_step, "{drive}: {previous} to {code}");
+                assert!((code - wanted).abs() < (previous - wanted).abs() || (limits.min..=limits.max).contains(&code));
+                assert!(held_back || (limits.min..=limits.max).contains(&code));
+                previous = code;
+            }
+            assert!((limits.min..=limits.max).contains(&previous), "{drive}: {previous}");
+        }
+    }
+}

@@ -31,17 +31,22 @@ impl PlayBank {
         self.states.fill(0.0);
     }
 
-    /// Moves to voltage `v` (V) at filtered rate `rate` (V/s); returns the weighted sum (V).
-    pub fn advance(&mut self, v: f64, rate: f64) -> f64 {
-        let widening = 1.0 + self.rate_sensitivity * libm::log(1.0 + rate.abs() / self.rate_scale);
-        let mut sum = 0.0;
-        for ((state, threshold), weight) in self.states.iter_mut().zip(&self.thresholds).zip(&self.weights) {
+    /// Factor on the thresholds at filtered rate `rate` (V/s).
+    #[must_use]
+    pub fn widening(&self, rate: f64) -> f64 {
+        1.0 + self.rate_sensitivity * libm::log(1.0 + rate.abs() / self.rate_scale)
+    }
+
+    /// Moves to voltage `v` (V) with thresholds widened by a factor ≥ 1; returns the weighted sum (V).
+    pub fn advance(&mut self, v: f64, widening: f64) -> f64 {
+        for (state, threshold) in self.states.iter_mut().zip(&self.thresholds) {
             let r = threshold * widening;
-            if *state < v - r {
-                *state = v - r;
-            } else if *state > v + r {
-                *state = v + r;
-            }
+            let (low, high) = (v - r, v + r);
+            let raised = if *state < low { low } else { *state };
+            *state = if raised > high { high } else { raised };
+        }
+        let mut sum = 0.0;
+        for (state, weight) in self.states.iter().zip(&self.weights) {
             sum += weight * *state;
         }
         sum
@@ -55,10 +60,10 @@ mod tests {
     #[test]
     fn a_play_moves_only_beyond_its_threshold_and_keeps_its_place_inside() {
         let mut bank = PlayBank::new(&[2.0], &[0.5], 0.0, 20.0);
-        assert_eq!(bank.advance(1.5, 0.0), 0.0);
-        assert_eq!(bank.advance(10.0, 0.0), 4.0);
-        assert_eq!(bank.advance(6.5, 0.0), 4.0);
-        assert_eq!(bank.advance(5.0, 0.0), 3.5);
+        assert_eq!(bank.advance(1.5, 1.0), 0.0);
+        assert_eq!(bank.advance(10.0, 1.0), 4.0);
+        assert_eq!(bank.advance(6.5, 1.0), 4.0);
+        assert_eq!(bank.advance(5.0, 1.0), 3.5);
     }
 
     #[test]
@@ -66,6 +71,7 @@ mod tests {
         let mut bank = PlayBank::new(&[2.0], &[1.0], 0.5, 20.0);
         // 1 + 0.5 ln(1 + 20(e − 1)/20) = 1.5
         let rate = 20.0 * (core::f64::consts::E - 1.0);
-        assert!((bank.advance(10.0, -rate) - 7.0).abs() < 1e-12);
+        let widening = bank.widening(-rate);
+        assert!((bank.advance(10.0, widening) - 7.0).abs() < 1e-12);
     }
 }

@@ -15,6 +15,7 @@ pub struct Stack {
     drive_max: f64,
     gain: f64,
     step: f64,
+    widening: f64,
 }
 
 impl Stack {
@@ -30,12 +31,14 @@ impl Stack {
             drive_max: p.u_max,
             gain: p.gain_um_per_v,
             step: 0.0,
+            widening: 1.0,
         }
     }
 
     /// As built: never driven.
     pub fn reset(&mut self) {
         self.rate.reset();
+        self.widening = 1.0;
         self.plays.reset();
         self.creep.reset();
     }
@@ -50,7 +53,19 @@ impl Stack {
     /// Moves the voltage from `before` to `v` (V) within one step; returns the free displacement at its end, µm.
     pub fn advance(&mut self, before: f64, v: f64) -> f64 {
         let rate = self.rate.advance((v - before) / self.step);
-        let x = self.plays.advance(v, rate);
+        self.widening = self.plays.widening(rate);
+        self.displacement(v)
+    }
+
+    /// As [`Stack::advance`], with the thresholds as wide as they were last: the rate that widens them is filtered over
+    /// milliseconds, so that steps in between need not work them out anew.
+    pub fn advance_on(&mut self, before: f64, v: f64) -> f64 {
+        self.rate.advance((v - before) / self.step);
+        self.displacement(v)
+    }
+
+    fn displacement(&mut self, v: f64) -> f64 {
+        let x = self.plays.advance(v, self.widening);
         let c = self.creep.advance(v);
         let bent = x + self.asymmetry * x * (1.0 - x / self.drive_max);
         self.gain * (bent + c)

@@ -139,6 +139,11 @@ impl Geometry {
     /// Δl and J together.
     #[must_use]
     pub fn extensions_and_jacobian(&self, pose: &Six) -> (Six, Matrix6) {
+        self.extensions_and_jacobian_from(&self.rest_lengths(), pose)
+    }
+
+    /// The same with the leg lengths at rest at hand.
+    pub(crate) fn extensions_and_jacobian_from(&self, rest_lengths: &Six, pose: &Six) -> (Six, Matrix6) {
         let (turn, rates) = attitude(angles(pose));
         let mut extensions = [0.0; 6];
         let mut jacobian = [[0.0; 6]; 6];
@@ -149,10 +154,10 @@ impl Geometry {
             let shift = [pose[0] + (arm[0] - joint[0]), pose[1] + (arm[1] - joint[1]), pose[2] + (arm[2] - joint[2])];
             // l² − l0², without the large squares.
             let growth = 2.0 * dot(&rest, &shift) + dot(&shift, &shift);
-            let rest_square = dot(&rest, &rest);
-            let length = libm::sqrt(rest_square + growth);
-            extensions[leg] = growth / (length + libm::sqrt(rest_square));
-            let direction = [0, 1, 2].map(|k| (rest[k] + shift[k]) / length);
+            let length = libm::sqrt(dot(&rest, &rest) + growth);
+            extensions[leg] = growth / (length + rest_lengths[leg]);
+            let inverse = 1.0 / length;
+            let direction = [0, 1, 2].map(|k| (rest[k] + shift[k]) * inverse);
             let moment = cross(arm, direction);
             for k in 0..3 {
                 jacobian[leg][k] = direction[k];

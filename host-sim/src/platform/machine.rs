@@ -26,11 +26,12 @@ impl Actuator {
         self.stack.set_step(step);
     }
 
-    /// Holds `voltage` for one step.
-    fn advance(&mut self, voltage: f64) {
+    /// Holds `voltage` for one step, the `first` of an interval or a later one.
+    fn advance(&mut self, voltage: f64, first: bool) {
         let before = self.amplifier.voltage();
         let after = self.amplifier.advance(voltage);
-        self.displacement = self.stack.advance(before, after);
+        self.displacement =
+            if first { self.stack.advance(before, after) } else { self.stack.advance_on(before, after) };
     }
 
     /// Free displacement from rest, m.
@@ -83,13 +84,13 @@ impl Machine {
             let steps = steps_within(peak / rate, update);
             actuator.set_step(peak / rate / f64::from(steps));
             for step in (1..=steps).chain((0..steps).rev()) {
-                actuator.advance(peak * f64::from(step) / f64::from(steps));
+                actuator.advance(peak * f64::from(step) / f64::from(steps), true);
             }
             if settle > 0.0 {
                 let steps = steps_within(settle, update);
                 actuator.set_step(settle / f64::from(steps));
                 for _ in 0..steps {
-                    actuator.advance(0.0);
+                    actuator.advance(0.0, true);
                 }
             }
             actuator.rest = actuator.displacement;
@@ -110,9 +111,9 @@ impl Machine {
                 actuator.set_step(step);
             }
         }
-        for _ in 0..steps {
+        for step in 0..steps {
             for (actuator, voltage) in self.actuators.iter_mut().zip(voltages) {
-                actuator.advance(*voltage);
+                actuator.advance(*voltage, step == 0);
             }
             let displacement = self.free_displacements();
             self.structure.advance(&displacement);

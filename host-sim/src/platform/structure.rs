@@ -145,6 +145,7 @@ impl Propagator {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Structure {
     parameters: StructureParameters,
+    rest_lengths: Six,
     mass: Matrix6,
     /// At rest: J, and stiffness and damping without contact.
     jacobian: Matrix6,
@@ -176,6 +177,7 @@ impl Structure {
         let damping = congruent(&jacobian, &parameters.damping);
         let free = Propagator::new(&mass, &damping, &stiffness, step);
         Self {
+            rest_lengths: parameters.geometry.rest_lengths(),
             parameters,
             mass,
             jacobian,
@@ -277,7 +279,7 @@ impl Structure {
 
     fn forces_on_legs(&self) -> (Six, Matrix6) {
         let p = &self.parameters;
-        let (extensions, jacobian) = p.geometry.extensions_and_jacobian(&self.pose());
+        let (extensions, jacobian) = p.geometry.extensions_and_jacobian_from(&self.rest_lengths, &self.pose());
         let speeds = apply(&jacobian, &self.rate());
         let force = std::array::from_fn(|leg| {
             p.stiffness[leg] * (self.displacement[leg] - extensions[leg]) - p.damping[leg] * speeds[leg]

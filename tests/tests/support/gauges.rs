@@ -6,9 +6,10 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::compile::compile;
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
-use specgen::ir::Ir;
+use specgen::ir::{Ir, Sensing};
 use specgen::lower::lower;
 use specgen::model::{ControlMode, Environment, Frames, Interaction, Model, Probe, Scalar, SetpointRules, TaskSpace};
+use specgen_runtime::{Gauges, Legs, Real, Series};
 use specgen_tests::repository;
 
 pub const HEIGHT: f64 = 0.18;
@@ -138,4 +139,59 @@ impl Random {
             probe(self.vector(0.1), direction, normal)
         })
     }
+}
+
+pub fn sensing(ir: &Ir) -> &Sensing {
+    &ir.task_space.as_ref().unwrap().sensing
+}
+
+pub fn real<T: Real>(value: f64) -> T {
+    // IR constants are rounded to the scalar already.
+    if size_of::<T>() == 4 { T::from_word(u64::from((value as f32).to_bits())) } else { T::from_word(value.to_bits()) }
+}
+
+pub fn double<T: Real>(value: T) -> f64 {
+    if size_of::<T>() == 4 {
+        f64::from(f32::from_bits(value.to_word() as u32))
+    } else {
+        f64::from_bits(value.to_word())
+    }
+}
+
+pub fn leak<T: Real>(values: &[f64]) -> &'static [T] {
+    values.iter().map(|v| real(*v)).collect::<Vec<T>>().leak()
+}
+
+/// The runtime's gauges with the constants of the IR.
+pub fn runtime<T: Real>(ir: &Ir) -> Gauges<'static, T> {
+    let s = sensing(ir);
+    let vectors = |rows: [[f64; 3]; 6]| rows.map(|row| row.map(real));
+    let matrix = |rows: [[f64; 6]; 6]| rows.map(|row| row.map(real));
+    Gauges {
+        direction: vectors(s.direction),
+        normal: vectors(s.normal),
+        skew: vectors(s.skew),
+        pierced: vectors(s.pierced),
+        inverse: matrix(s.inverse),
+        curvature: matrix(s.curvature),
+        passes: s.passes as usize,
+        arc_sine: leak(&s.arc_sine),
+        arc_tangent: leak(&s.arc_tangent),
+    }
+}
+
+pub fn series<T: Real>(ir: &Ir) -> Series<'static, T> {
+    Series { sine: leak(&ir.kinematics.sine), versine: leak(&ir.kinematics.versine) }
+}
+
+pub fn legs<T: Real>(ir: &Ir) -> (Legs<'static, T>, [[T; 6]; 6]) {
+    let k = &ir.kinematics;
+    let legs = Legs {
+        rest_leg: k.rest_leg.map(|row| row.map(real)),
+        platform_joint: k.platform_joint.map(|row| row.map(real)),
+        rest_length: k.rest_length.map(real),
+        series: series(ir),
+        newton_steps: k.newton_steps as usize,
+    };
+    (legs, k.inverse_jacobian.map(|row| row.map(real)))
 }

@@ -6,22 +6,19 @@ use quote::quote;
 use crate::emit::stage_type;
 
 pub fn emit() -> TokenStream {
-    let stage = stage_type::emit(10);
+    let stage = stage_type::emit(9);
     quote! {
         #![doc = " Parts of the tick as functions of their own, for measuring what each costs. The tick does not use them."]
 
         use specgen_runtime::Real as _;
         use specgen_runtime::linear::difference;
 
-        use specgen_runtime::setpoint::Target;
-
-        use crate::dynamics::{Motion, leg_forces};
+        use crate::dynamics::leg_forces;
         use crate::hysteresis::TABLES;
-        use crate::kinematics::leg_displacements;
         use crate::limits::DAC;
         use crate::setpoint::PLAN;
         use crate::step::{actuate, feedback, known_load, learn};
-        use crate::task_space::notch_error;
+        use crate::task_space::{modal_error, notch_error};
         use crate::{Config, LEGS, Real, State, TickInput};
 
         #stage
@@ -29,7 +26,6 @@ pub fn emit() -> TokenStream {
         /// All stages, in the order of the tick.
         pub const STAGES: [Stage; STAGE_COUNT] = [
             Stage { name: "sense", calls: 1, run: sense },
-            Stage { name: "kinematics", calls: 1, run: kinematics },
             Stage { name: "notch", calls: 1, run: notch },
             Stage { name: "learn", calls: 1, run: learning },
             Stage { name: "setpoint", calls: 1, run: setpoint },
@@ -40,80 +36,69 @@ pub fn emit() -> TokenStream {
             Stage { name: "limits", calls: LEGS, run: limits },
         ];
 
-        /// Brings a copy of the state to where the stages find it, with each leg's request in place of its load; not measured.
+        /// Brings a copy of the state to where the stages find it, with each leg's request in place of its residual; not measured.
         pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
-            crate::step::sense(state, &input.gauge);
-            let (target, _) = state.generator.next(&PLAN, &input.command);
-            let load = known_load(config, state, &target);
+            crate::step::sense(config, state, &input.gauge);
+            state.generator.tick(&PLAN, &input.command);
+            let load = known_load(config, state);
             let feedback = feedback(config, state);
-            state.target = target;
-            for (index, leg) in state.legs.iter().enumerate() {
-                state.load[index] = load.displacement[index] + feedback[index] - leg.estimate.correction();
+            for (index, leg) in state.legs.iter_mut().enumerate() {
+                leg.residual = load.displacement[index] + feedback[index] - leg.estimate.correction();
             }
         }
 
         /// Gauges to pose.
-        extern "C" fn sense(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
-            crate::step::sense(state, &input.gauge);
-        }
-
-        /// Measured pose to six leg displacements.
-        extern "C" fn kinematics(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            state.load = leg_displacements(&state.pose);
+        extern "C" fn sense(config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
+            crate::step::sense(config, state, &input.gauge);
         }
 
         /// The modal notch on the pose error.
         extern "C" fn notch(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            let error = difference(&state.target.pose, &state.pose);
+            let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
             state.error = notch_error(&mut state.error_notch, &error);
         }
 
-        /// All that the readings teach: kinematics, both notches, integral and adaptation.
+        /// All that the readings teach: both notches, integral and adaptation.
         extern "C" fn learning(config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
             learn(config, state);
         }
 
         /// The generator of set-points.
         extern "C" fn setpoint(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
-            let (target, _) = state.generator.next(&PLAN, &input.command);
-            state.target = target;
+            state.generator.tick(&PLAN, &input.command);
         }
 
         /// h, ḣ, ḧ to six leg forces.
         extern "C" fn dynamics(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            let Target { pose, rate, acceleration } = state.target;
-            state.load = leg_forces(&Motion { pose, rate, acceleration });
+            state.error = leg_forces(state.generator.target());
         }
 
         /// The same with the interaction force, and with the leg displacements.
         extern "C" fn load(config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-            let load = known_load(config, state, &state.target);
-            state.load = load.displacement;
+            let load = known_load(config, state);
+            state.error = load.displacement;
             state.wrench = load.force;
         }
 
         /// Γ⁻¹ of one leg: displacement to drive.
         extern "C" fn inverse(_config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
-            if let (Some(leg), Some(table), Some(request)) =
-                (state.legs.get_mut(leg), TABLES.get(leg), state.load.get_mut(leg))
-            {
-                *request = leg.memory.solve(table, *request);
+            if let (Some(leg), Some(table)) = (state.legs.get_mut(leg), TABLES.get(leg)) {
+                leg.residual = leg.memory.solve(table, leg.residual);
             }
         }
 
         /// One leg from request to code: Γ⁻¹, converter and limits, and the reversal memory brought up to date.
         extern "C" fn leg(config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
-            if let (Some(leg), Some(table), Some(request)) =
-                (state.legs.get_mut(leg), TABLES.get(leg), state.load.get(leg))
-            {
-                actuate(config, leg, table, *request);
+            if let (Some(leg), Some(table)) = (state.legs.get_mut(leg), TABLES.get(leg)) {
+                let request = leg.residual;
+                actuate(config, leg, table, request);
             }
         }
 
         /// One leg from drive to code within voltage and slew limits.
         extern "C" fn limits(config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
-            if let (Some(leg), Some(drive)) = (state.legs.get_mut(leg), state.load.get(leg)) {
-                let (code, held_back) = DAC.code(*drive, leg.code, config.code_limits());
+            if let Some(leg) = state.legs.get_mut(leg) {
+                let (code, held_back) = DAC.code(leg.residual, leg.code, config.code_limits());
                 leg.code = code;
                 leg.excess = if held_back { Real::ONE } else { Real::ZERO };
                 leg.requested = DAC.voltage(code);

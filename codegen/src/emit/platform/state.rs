@@ -7,7 +7,7 @@ pub fn emit() -> TokenStream {
     quote! {
         #![doc = " What the controller remembers from tick to tick. No NaN or infinity is ever stored here."]
 
-        use specgen_runtime::setpoint::{Generator, Target};
+        use specgen_runtime::setpoint::Generator;
         use specgen_runtime::{ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer};
 
         use crate::hysteresis::Memory;
@@ -22,6 +22,8 @@ pub fn emit() -> TokenStream {
             pub estimate: Estimate<Real>,
             /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.
             pub requested: Real,
+            /// r: last request less q̂, the feedback and the offset of a change of mode, m.
+            pub residual: Real,
             /// Part of the last request that a limit withheld, m; zero for a leg that was free.
             pub excess: Real,
             /// Converter code now held at the output.
@@ -37,10 +39,8 @@ pub fn emit() -> TokenStream {
             pub pose: [Real; 6],
             /// ḣ: its filtered derivative.
             pub rate: Rate<Real>,
-            /// Where set-points come from.
+            /// Where set-points come from; its target is h_d at the end of the interval now running.
             pub generator: Generator<Real>,
-            /// h_d at the end of the interval now running.
-            pub target: Target<Real>,
             /// N(h_d − h), the pose error behind the notch, m and rad.
             pub error: [Real; 6],
             /// Notch on the pose error.
@@ -49,8 +49,6 @@ pub fn emit() -> TokenStream {
             pub innovation_notch: NotchState<Real>,
             /// k_I ∫e.
             pub integral: Integral<Real>,
-            /// p: deflection of each leg under the known load of the interval now running, m.
-            pub load: [Real; LEGS],
             /// Interaction wrench last believed, N and N m.
             pub wrench: [Real; 6],
             /// What is left of the last change of mode.
@@ -73,6 +71,7 @@ pub fn emit() -> TokenStream {
                     memory: Memory::new(),
                     estimate: Estimate::new(),
                     requested: 0.0,
+                    residual: 0.0,
                     excess: 0.0,
                     code: limits::CODES[0],
                 };
@@ -81,12 +80,10 @@ pub fn emit() -> TokenStream {
                     pose: [0.0; 6],
                     rate: Rate::new(),
                     generator: Generator::new(),
-                    target: Target::new(),
                     error: [0.0; 6],
                     error_notch: NotchState::new(),
                     innovation_notch: NotchState::new(),
                     integral: Integral::new(),
-                    load: [0.0; LEGS],
                     wrench: [0.0; 6],
                     transfer: Transfer::new(),
                     mode: None,
@@ -101,17 +98,17 @@ pub fn emit() -> TokenStream {
                     leg.memory.digest(&mut digest);
                     leg.estimate.digest(&mut digest);
                     digest.real(leg.requested);
+                    digest.real(leg.residual);
                     digest.real(leg.excess);
                     digest.word(leg.code as u32 as u64);
                 }
-                for vector in [&self.pose, &self.error, &self.load, &self.wrench] {
+                for vector in [&self.pose, &self.error, &self.wrench] {
                     for value in vector {
                         digest.real(*value);
                     }
                 }
                 self.rate.digest(&mut digest);
                 self.generator.digest(&mut digest);
-                self.target.digest(&mut digest);
                 self.error_notch.digest(&mut digest);
                 self.innovation_notch.digest(&mut digest);
                 self.integral.digest(&mut digest);

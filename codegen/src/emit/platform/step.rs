@@ -13,7 +13,7 @@ pub fn emit() -> TokenStream {
         #![doc = " ```text"]
         #![doc = " sense      gauges → h                                                      pose from rest"]
         #![doc = " learn      e = N(h_d(t_n) − h) ;  s ← s + T k_I e                          (7), held where it would wind up"]
-        #![doc = "            ν = N(Δl(h) − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                    (AII.3), (AII.5), (AII.6)"]
+        #![doc = "            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6)"]
         #![doc = " setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}"]
         #![doc = " load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)"]
         #![doc = "            + J⁻ᵀ k_v ė/k_a"]
@@ -21,21 +21,25 @@ pub fn emit() -> TokenStream {
         #![doc = " ```"]
         #![doc = " N is the modal notch. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback"]
         #![doc = " is none and does not."]
+        #![doc = ""]
+        #![doc = " Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,"]
+        #![doc = " offset b of a change of mode) the innovation is then r − J e with r = (q − q̂) − f − b: no large numbers are subtracted,"]
+        #![doc = " and what is left out is the error times the change of J over the workspace, a thousandth of it."]
 
         use specgen_runtime::feedback::{force_of, winds_up};
-        use specgen_runtime::linear::{difference, transform};
-        use specgen_runtime::setpoint::{Command, Target};
+        use specgen_runtime::linear::{difference, each, transform};
+        use specgen_runtime::setpoint::Command;
         use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _};
 
-        use crate::dynamics::{Load, Motion};
+        use crate::dynamics::Load;
         use crate::hysteresis::{TABLES, Table};
         use crate::limits::DAC;
         use crate::setpoint::PLAN;
         use crate::task_space::{
             COMPLIANCE, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
-            linear_displacement, linear_drive, notch_error, notch_innovation,
+            linear_displacement, linear_drive, modal_error, notch_error, notch_innovation,
         };
-        use crate::{Config, LEGS, LegState, Real, State, dynamics, kinematics, sensing};
+        use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
 
         /// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
         pub const LEG_LIMITED: u32 = 0x3f;
@@ -89,48 +93,45 @@ pub fn emit() -> TokenStream {
         /// One control tick. See the module for the timing.
         pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
             let entered = enter_mode(config, state);
-            let gauge_faults = sense(state, &input.gauge);
+            let gauge_faults = sense(config, state, &input.gauge);
             if gauge_faults == 0 {
                 learn(config, state);
             }
-            let wrench_good = take_wrench(state, &input.wrench);
+            let wrench_good = take_wrench(config, state, &input.wrench);
             let damping = damping(config, state);
-            let (target, setpoint_status) = state.generator.next(&PLAN, &input.command);
-            let Load { displacement: demand, force } = known_load(config, state, &target);
+            let setpoint_status = state.generator.tick(&PLAN, &input.command);
+            let Load { displacement: demand, force } = known_load(config, state);
+            let mut load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE);
+            if let Some(damping) = &damping {
+                load = each(|leg| load[leg] + damping[leg]);
+            }
             let feedback = feedback(config, state);
-            if !entered {
+            let request = each(|leg| demand[leg] + load[leg] + feedback[leg] - state.legs[leg].estimate.correction());
+            if entered {
+                state.transfer.begin(each(|leg| state.legs[leg].requested - request[leg]));
+            } else {
                 state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
             }
-            let mut output = TickOutput {
-                voltage: [0.0; LEGS],
-                requested: [0.0; LEGS],
-                demand,
-                level: [0.0; LEGS],
-                drift: [0.0; LEGS],
-                dac_code: [0; LEGS],
-                pose: state.pose,
-                target: target.pose,
-                load: [0.0; LEGS],
-                status: gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
-            };
+            let mut limited = 0;
             for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
-                let load = (force[index] - REST_FORCE[index]) * COMPLIANCE + damping[index];
-                let request = demand[index] + load + feedback[index] - leg.estimate.correction();
-                if entered {
-                    state.transfer.offset[index] = leg.requested - request;
-                }
-                let limited = actuate(config, leg, table, request + state.transfer.offset[index]);
-                state.load[index] = load;
-                output.load[index] = load;
-                output.voltage[index] = DAC.voltage(leg.code);
-                output.requested[index] = leg.requested;
-                output.level[index] = leg.estimate.level;
-                output.drift[index] = leg.estimate.drift;
-                output.dac_code[index] = leg.code;
-                output.status |= (limited as u32) << index;
+                let offset = state.transfer.offset()[index];
+                let held_back = actuate(config, leg, table, request[index] + offset);
+                leg.residual = (request[index] + offset - leg.requested) - feedback[index] - offset;
+                limited |= (held_back as u32) << index;
             }
-            state.target = target;
-            output
+            let legs = &state.legs;
+            TickOutput {
+                voltage: each(|leg| DAC.voltage(legs[leg].code)),
+                requested: each(|leg| legs[leg].requested),
+                demand,
+                level: each(|leg| legs[leg].estimate.level),
+                drift: each(|leg| legs[leg].estimate.drift),
+                dac_code: each(|leg| legs[leg].code),
+                pose: state.pose,
+                target: state.generator.target().pose,
+                load,
+                status: limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
+            }
         }
 
         /// Whether this tick is the first of its mode. If so, what the mode does not use is put at rest; the first request then
@@ -164,10 +165,14 @@ pub fn emit() -> TokenStream {
 
         /// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.
         #[inline]
-        pub(crate) fn sense(state: &mut State, gauge: &[Real; 6]) -> u32 {
+        pub(crate) fn sense(config: &Config, state: &mut State, gauge: &[Real; 6]) -> u32 {
             let faults = sensing::faults(gauge);
             if faults == 0 {
                 state.pose = sensing::pose(gauge);
+            }
+            if !config.damps() {
+                state.rate.rest();
+            } else if faults == 0 {
                 state.rate.update(&sensing::RATE, &state.pose);
             } else {
                 state.rate.coast(&sensing::RATE);
@@ -179,8 +184,8 @@ pub fn emit() -> TokenStream {
         #[inline]
         pub(crate) fn learn(config: &Config, state: &mut State) {
             let mode = config.mode();
+            let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
             if mode.feeds_back() {
-                let error = difference(&state.target.pose, &state.pose);
                 state.error = notch_error(&mut state.error_notch, &error);
                 let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
                 if !would_wind_up(&state.legs, &growth) {
@@ -188,13 +193,8 @@ pub fn emit() -> TokenStream {
                 }
             }
             if mode.law() != Law::Invhys {
-                let measured = kinematics::leg_displacements(&state.pose);
-                let mut innovation = [0.0; LEGS];
-                for (index, leg) in state.legs.iter().enumerate() {
-                    let model_error = measured[index] - (leg.requested - state.load[index]);
-                    innovation[index] = model_error - leg.estimate.correction();
-                }
-                let innovation = notch_innovation(&mut state.innovation_notch, &innovation);
+                let residual = each(|leg| state.legs[leg].residual);
+                let innovation = notch_innovation(&mut state.innovation_notch, &error, &residual);
                 for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
                     leg.estimate.correct(mode.law(), config.level_weight(), config.drift_weight(), innovation);
                 }
@@ -204,18 +204,16 @@ pub fn emit() -> TokenStream {
         /// Whether the integral's growth would push a leg further beyond the limit that holds it back.
         #[inline]
         fn would_wind_up(legs: &[LegState; LEGS], growth: &[Real; 6]) -> bool {
-            let mut excess = [0.0; LEGS];
-            let mut any = false;
-            for (excess, leg) in excess.iter_mut().zip(legs) {
-                *excess = leg.excess;
-                any |= leg.excess != 0.0;
-            }
-            any && winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
+            let excess = each(|leg| legs[leg].excess);
+            excess.iter().any(|excess| *excess != 0.0) && winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
         }
 
-        /// The measured wrench, if it is to be believed.
+        /// Takes the measured wrench if it is to be believed; one that nobody asks for is not looked at.
         #[inline]
-        fn take_wrench(state: &mut State, wrench: &[Real; 6]) -> bool {
+        fn take_wrench(config: &Config, state: &mut State, wrench: &[Real; 6]) -> bool {
+            if config.interaction() != Interaction::Measured {
+                return true;
+            }
             let good = wrench.iter().zip(&WRENCH_LIMIT).all(|(value, limit)| (-*limit..=*limit).contains(value));
             if good {
                 state.wrench = *wrench;
@@ -223,19 +221,20 @@ pub fn emit() -> TokenStream {
             good
         }
 
-        /// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg.
+        /// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg; none without k_v.
         #[inline]
-        fn damping(config: &Config, state: &State) -> [Real; LEGS] {
+        fn damping(config: &Config, state: &State) -> Option<[Real; LEGS]> {
             if !config.damps() {
-                return [0.0; LEGS];
+                return None;
             }
-            let error = difference(&state.target.rate, state.rate.value());
-            transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error))
+            let error = difference(&state.generator.target().rate, state.rate.value());
+            Some(transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error)))
         }
 
         /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
         #[inline]
-        pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load<Real> {
+        pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
+            let target = state.generator.target();
             let wrench = match config.interaction() {
                 Interaction::Neglected => [0.0; 6],
                 Interaction::Measured => state.wrench,
@@ -245,7 +244,7 @@ pub fn emit() -> TokenStream {
                     force_of(&environment.stiffness, &compressed)
                 }
             };
-            dynamics::load(&Motion { pose: target.pose, rate: target.rate, acceleration: target.acceleration }, &wrench)
+            dynamics::load(target, &wrench)
         }
 
         /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.

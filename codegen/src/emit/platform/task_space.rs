@@ -20,13 +20,14 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let (keep, negligible) = (real(law.transfer_keep), real(law.transfer_negligible));
     let (cells_per_metre, metres_per_cell) = (real(law.cells_per_metre), real(law.metres_per_cell));
     let notch = match &law.notch {
-        None => without_notch(),
+        None => without_notch(&matrix(&law.jacobian)),
         Some(notch) => with_notch(ir, notch, &matrix),
     };
     quote! {
         #![doc = " Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics."]
 
         use specgen_runtime::NotchState;
+        use specgen_runtime::linear::{difference, transform};
 
         use crate::{LEGS, Real};
 
@@ -63,28 +64,42 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     }
 }
 
-fn without_notch() -> TokenStream {
+fn without_notch(jacobian: &TokenStream) -> TokenStream {
     quote! {
-        /// The pose error as it is: the spec declares no notch.
+        /// J at rest: pose to leg displacements, m/m and m/rad; from the dynamics.
+        pub const JACOBIAN: [[Real; 6]; LEGS] = #jacobian;
+
+        /// The error as it is: the spec declares no notch.
+        #[inline]
+        #[must_use]
+        pub fn modal_error(error: &[Real; 6]) -> [Real; 6] {
+            *error
+        }
+
+        /// The error as it is: the spec declares no notch.
         #[inline]
         #[must_use]
         pub fn notch_error(_notch: &mut NotchState<Real>, error: &[Real; 6]) -> [Real; 6] {
             *error
         }
 
-        /// The innovations as they are: the spec declares no notch.
+        /// r − J e of each leg, m: the spec declares no notch.
         #[inline]
         #[must_use]
-        pub fn notch_innovation(_notch: &mut NotchState<Real>, innovation: &[Real; LEGS]) -> [Real; LEGS] {
-            *innovation
+        pub fn notch_innovation(
+            _notch: &mut NotchState<Real>,
+            error: &[Real; 6],
+            residual: &[Real; LEGS],
+        ) -> [Real; LEGS] {
+            difference(residual, &transform(&JACOBIAN, error))
         }
     }
 }
 
 fn with_notch(ir: &Ir, notch: &Notch, matrix: &dyn Fn(&[[f64; 6]; 6]) -> TokenStream) -> TokenStream {
     let sections = notch.sections.iter().map(|section| {
-        let (b, a) = (literal::reals(ir.scalar, &section.b), literal::reals(ir.scalar, &section.a));
-        quote! { Section { b: [#b], a: [#a] } }
+        let (depth, a) = (literal::real(ir.scalar, section.depth), literal::reals(ir.scalar, &section.a));
+        quote! { Section { depth: #depth, a: [#a] } }
     });
     let (pose_to_modes, modes_to_pose) = (matrix(&notch.pose_to_modes), matrix(&notch.modes_to_pose));
     let (legs_to_modes, modes_to_legs) = (matrix(&notch.legs_to_modes), matrix(&notch.modes_to_legs));
@@ -102,18 +117,30 @@ fn with_notch(ir: &Ir, notch: &Notch, matrix: &dyn Fn(&[[f64; 6]; 6]) -> TokenSt
         /// J V: the modes as leg displacements.
         pub const MODES_TO_LEGS: [[Real; 6]; 6] = #modes_to_legs;
 
-        /// N on the pose error.
+        /// V⁻¹ e: the pose error in modal coordinates.
         #[inline]
         #[must_use]
-        pub fn notch_error(notch: &mut NotchState<Real>, error: &[Real; 6]) -> [Real; 6] {
-            notch.filter(&NOTCH, &POSE_TO_MODES, &MODES_TO_POSE, error)
+        pub fn modal_error(error: &[Real; 6]) -> [Real; 6] {
+            transform(&POSE_TO_MODES, error)
         }
 
-        /// N on the innovations of the legs.
+        /// N(e) of a modal error, m and rad.
         #[inline]
         #[must_use]
-        pub fn notch_innovation(notch: &mut NotchState<Real>, innovation: &[Real; LEGS]) -> [Real; LEGS] {
-            notch.filter(&NOTCH, &LEGS_TO_MODES, &MODES_TO_LEGS, innovation)
+        pub fn notch_error(notch: &mut NotchState<Real>, modal_error: &[Real; 6]) -> [Real; 6] {
+            transform(&MODES_TO_POSE, &notch.filter(&NOTCH, modal_error))
+        }
+
+        /// N(r − J e) of each leg, m, for a modal error.
+        #[inline]
+        #[must_use]
+        pub fn notch_innovation(
+            notch: &mut NotchState<Real>,
+            modal_error: &[Real; 6],
+            residual: &[Real; LEGS],
+        ) -> [Real; LEGS] {
+            let innovation = difference(&transform(&LEGS_TO_MODES, residual), modal_error);
+            transform(&MODES_TO_LEGS, &notch.filter(&NOTCH, &innovation))
         }
     }
 }

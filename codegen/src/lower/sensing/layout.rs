@@ -8,8 +8,6 @@ use crate::diagnostic::{Diagnostic, codes};
 use crate::lower::linear::{self, Matrix, cross, dot, dusted, norm};
 use crate::model::{Model, Probe};
 
-/// Smallest sine of the angle between a line and its plane: below, noise and vibration along the plane swamp the reading.
-const STEEPEST: f64 = 0.1;
 /// A line that meets its plane this many joint radii away from P_C cannot meet the platform.
 const FARTHEST: f64 = 10.0;
 /// Largest ratio of the best seen motion to the worst seen one, turns counted by the way they move the targets.
@@ -101,32 +99,24 @@ type Target = ([f64; 3], [f64; 3], [f64; 3], [f64; 3]);
 fn target(model: &Model, k: usize, probe: &Probe) -> Result<Target, Vec<Diagnostic>> {
     let (n, m) = (probe.direction, probe.plane_normal);
     let across = dot(m, n);
-    if across.abs() < STEEPEST {
-        let degrees = libm::asin(across.abs()) * (180.0 / core::f64::consts::PI);
-        return Err(vec![finding(
-            model,
-            codes::PROBE_ALONG_PLANE,
-            &format!("gauge[{k}].direction"),
-            format!("gauge {k} measures along its target plane: the angle between the two is {degrees:.2} deg"),
-            "its direction and its plane's normal must not be at right angles; best is along the normal".to_owned(),
-        )]);
-    }
     // In {P} the point of the line is `point` − P₀.
     let start = [probe.point[0], probe.point[1], probe.point[2] - model.geometry.height];
     let way = dot(m, [0, 1, 2].map(|j| probe.plane_point[j] - start[j])) / across;
     let c = [0, 1, 2].map(|j| start[j] + way * n[j]);
     let radius = model.geometry.joint_radius();
-    if norm(c) > FARTHEST * radius {
+    // A line along its plane was refused in the spec; here it would pierce at infinity.
+    let far = norm(c);
+    if far.is_nan() || far > FARTHEST * radius {
         return Err(vec![finding(
             model,
             codes::PROBE_MISSES,
             &format!("gauge[{k}].point"),
             format!(
                 "the line of gauge {k} meets its target plane {:.1} mm from the middle of a platform whose joints are {:.1} mm from it",
-                norm(c) * 1e3,
+                far * 1e3,
                 radius * 1e3
             ),
-            "check `point`, `direction` ({B}) and `plane_point`, `plane_normal` ({P}, from P_C) of the gauge"
+            "check `point`, `direction` ({B}) and `target_point`, `target_normal` ({P}, from P_C) of the gauge"
                 .to_owned(),
         )]);
     }

@@ -102,7 +102,7 @@ impl Coordinate {
 
 impl Piece {
     /// Pose and rate at `time` (s).
-    fn at(&self, time: f64, frequency: f64) -> ([f64; 6], [f64; 6]) {
+    pub(super) fn at(&self, time: f64, frequency: f64) -> ([f64; 6], [f64; 6]) {
         let both = self.coordinates.map(|coordinate| coordinate.at(time, frequency));
         (both.map(|(value, _)| value), both.map(|(_, rate)| rate))
     }

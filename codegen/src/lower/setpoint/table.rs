@@ -151,7 +151,7 @@ fn between(
 }
 
 /// Pose and rate of the spline at b = 0..1 between two rows.
-fn at(row: &Row, following: &Row, b: f64, period: f64) -> ([f64; 6], [f64; 6]) {
+pub(super) fn at(row: &Row, following: &Row, b: f64, period: f64) -> ([f64; 6], [f64; 6]) {
     let a = 1.0 - b;
     let of = |axis: usize| {
         let (y, m, n) = (row.pose[axis], row.bend[axis], following.bend[axis]);

@@ -20,6 +20,31 @@ use crate::trig::sine_cosine;
 pub trait Frames<T: Real> {
     /// `user` as pose of P_C from rest, without the bias; none if an angle is beyond what is meant.
     fn to_platform(&self, user: &Target<T>) -> Option<Target<T>>;
+
+    /// Puts `user` with `bias` into `target`, if the pose is then finite and within ±`bound`; else leaves it.
+    #[inline]
+    fn admit(&self, user: &Target<T>, bias: &[T; 6], bound: &[T; 6], target: &mut Target<T>) -> bool {
+        let Some(mut platform) = self.to_platform(user) else {
+            return false;
+        };
+        let Some(pose) = shifted(&platform.pose, bias, bound) else {
+            return false;
+        };
+        platform.pose = pose;
+        *target = platform;
+        true
+    }
+}
+
+/// `pose` + `bias`, if every component is finite and within ±`bound`.
+#[inline]
+fn shifted<T: Real>(pose: &[T; 6], bias: &[T; 6], bound: &[T; 6]) -> Option<[T; 6]> {
+    let mut shifted = *pose;
+    for (value, bias) in shifted.iter_mut().zip(bias) {
+        *value = *value + *bias;
+    }
+    // A NaN fails the comparison.
+    shifted.iter().zip(bound).all(|(value, bound)| value.abs() <= *bound).then_some(shifted)
 }
 
 /// Axes parallel to the base, rotations about P_C: the same coordinates. Costs nothing.
@@ -30,6 +55,15 @@ impl<T: Real> Frames<T> for Parallel {
     #[inline]
     fn to_platform(&self, user: &Target<T>) -> Option<Target<T>> {
         Some(*user)
+    }
+
+    #[inline]
+    fn admit(&self, user: &Target<T>, bias: &[T; 6], bound: &[T; 6], target: &mut Target<T>) -> bool {
+        let Some(pose) = shifted(&user.pose, bias, bound) else {
+            return false;
+        };
+        *target = Target { pose, ..*user };
+        true
     }
 }
 

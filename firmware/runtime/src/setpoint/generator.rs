@@ -51,8 +51,9 @@ enum Phase {
 #[derive(Debug, Clone, Copy)]
 pub struct Generator<T> {
     phase: Phase,
-    /// Where it is in the user's frames; where the bias leads, until it is reached.
-    user: Target<T>,
+    /// Where it is in the user's frames, and how it moves; where the bias leads, until it is reached.
+    place: [T; 6],
+    rate: [T; 6],
     /// What was given out last.
     target: Target<T>,
     /// Straight motion under way: start, end, end − start, course, tick.
@@ -82,7 +83,8 @@ impl<T: Real> Generator<T> {
     pub const fn new() -> Self {
         Self {
             phase: Phase::Reset,
-            user: Target::new(),
+            place: [T::ZERO; 6],
+            rate: [T::ZERO; 6],
             target: Target::new(),
             start: [T::ZERO; 6],
             goal: [T::ZERO; 6],
@@ -97,9 +99,23 @@ impl<T: Real> Generator<T> {
         }
     }
 
-    /// Set-point at the end of the coming interval, from rest and with the bias, and [`REFUSED`], [`STALE`], [`BUSY`].
+    /// Set-point at the end of the interval before the last [`Generator::tick`], or after it: from rest and with the bias.
+    #[inline]
+    #[must_use]
+    pub fn target(&self) -> &Target<T> {
+        &self.target
+    }
+
+    /// As [`Generator::tick`], with a copy of the set-point.
     #[inline]
     pub fn next<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>) -> (Target<T>, u32) {
+        let status = self.tick(plan, command);
+        (self.target, status)
+    }
+
+    /// Brings [`Generator::target`] to the end of the coming interval; returns [`REFUSED`], [`STALE`], [`BUSY`].
+    #[inline]
+    pub fn tick<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>) -> u32 {
         let fresh = command.sequence != self.sequence;
         self.sequence = command.sequence;
         let streams = command.kind == CommandKind::Stream;
@@ -113,16 +129,16 @@ impl<T: Real> Generator<T> {
 
     /// One tick under the command to stream.
     #[inline]
-    fn stream<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>, fresh: bool) -> (Target<T>, u32) {
+    fn stream<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>, fresh: bool) -> u32 {
         self.finished = None;
         let mut status = 0;
         if fresh {
-            if let Some(target) = self.believed(plan, &command.target) {
+            if self.is_believed(plan, &command.target) && plan.admit(&command.target, &mut self.target) {
                 self.phase = Phase::Stream;
                 self.age = 0;
-                self.user = command.target;
-                self.target = target;
-                return (target, 0);
+                self.place = command.target.pose;
+                self.rate = command.target.rate;
+                return 0;
             }
             status = REFUSED;
         }
@@ -137,19 +153,15 @@ impl<T: Real> Generator<T> {
         self.advance(plan, status)
     }
 
-    /// The streamed set-point for the platform, if it is to be followed from where the platform is.
+    /// Whether a streamed set-point is no jump from where the platform is and states no impossible motion.
     #[inline]
-    fn believed<F: Frames<T>>(&self, plan: &Plan<T, F>, user: &Target<T>) -> Option<Target<T>> {
-        for axis in 0..6 {
-            // A NaN fails every comparison.
-            let good = (user.pose[axis] - self.user.pose[axis]).abs() <= plan.stream_step[axis]
+    fn is_believed<F>(&self, plan: &Plan<T, F>, user: &Target<T>) -> bool {
+        // A NaN fails every comparison.
+        (0..6).all(|axis| {
+            (user.pose[axis] - self.place[axis]).abs() <= plan.stream_step[axis]
                 && user.rate[axis].abs() <= plan.stream_rate[axis]
-                && user.acceleration[axis].abs() <= plan.stream_acceleration[axis];
-            if !good {
-                return None;
-            }
-        }
-        plan.accepted(user)
+                && user.acceleration[axis].abs() <= plan.stream_acceleration[axis]
+        })
     }
 
     /// Begins and ends motions as the command wants; returns the status of a refusal.
@@ -187,9 +199,9 @@ impl<T: Real> Generator<T> {
     /// The bias is a move of the platform itself, for the user's frames may bend the way. Without it nothing moves.
     #[inline(never)]
     fn begin_bias<F: Frames<T>>(&mut self, plan: &Plan<T, F>) -> bool {
-        self.user = Target::at(plan.home);
-        match plan.accepted(&self.user) {
-            Some(goal) => self.begin_straight(plan, &[T::ZERO; 6], &goal.pose, Phase::Bias),
+        self.place = plan.home;
+        match plan.admitted(&plan.home) {
+            Some(goal) => self.begin_straight(plan, &[T::ZERO; 6], &goal, Phase::Bias),
             None => false,
         }
     }
@@ -197,11 +209,11 @@ impl<T: Real> Generator<T> {
     /// Whether the goal is one; begins no motion if it is reached.
     #[inline(never)]
     fn begin_move<F: Frames<T>>(&mut self, plan: &Plan<T, F>, goal: &[T; 6], phase: Phase) -> bool {
-        if *goal == self.user.pose {
+        if *goal == self.place {
             return true;
         }
-        let from = self.user.pose;
-        plan.accepted(&Target::at(*goal)).is_some() && self.begin_straight(plan, &from, goal, phase)
+        let from = self.place;
+        plan.admitted(goal).is_some() && self.begin_straight(plan, &from, goal, phase)
     }
 
     fn begin_straight<F: Frames<T>>(&mut self, plan: &Plan<T, F>, from: &[T; 6], to: &[T; 6], phase: Phase) -> bool {
@@ -230,7 +242,7 @@ impl<T: Real> Generator<T> {
             return false;
         };
         let start = trajectory.start();
-        if start == self.user.pose {
+        if start == self.place {
             self.phase = Phase::Play(selector);
             self.cursor = Cursor::new();
             return true;
@@ -239,10 +251,10 @@ impl<T: Real> Generator<T> {
     }
 
     fn begin_stop<F: Frames<T>>(&mut self, plan: &Plan<T, F>) {
-        if self.user.rate == [T::ZERO; 6] {
+        if self.rate == [T::ZERO; 6] {
             self.rest();
         } else {
-            self.stop = Stop::plan(plan, &self.user);
+            self.stop = Stop::plan(plan, &self.place, &self.rate);
             self.phase = Phase::Stop;
         }
     }
@@ -250,46 +262,46 @@ impl<T: Real> Generator<T> {
     /// Stands still where it is.
     fn rest(&mut self) {
         self.phase = Phase::Hold;
-        self.user = Target::at(self.user.pose);
+        self.rate = [T::ZERO; 6];
         self.target = Target::at(self.target.pose);
     }
 
     /// One tick of the motion under way.
     #[inline]
-    fn advance<F: Frames<T>>(&mut self, plan: &Plan<T, F>, status: u32) -> (Target<T>, u32) {
+    fn advance<F: Frames<T>>(&mut self, plan: &Plan<T, F>, status: u32) -> u32 {
         let busy = status | BUSY;
         match self.phase {
-            Phase::Hold | Phase::Reset => (self.target, status),
+            Phase::Hold | Phase::Reset => status,
             Phase::Bias => {
                 let (target, ended) = self.straight(plan);
                 self.target = target;
                 self.arrive(ended);
-                (target, if ended { status } else { busy })
+                if ended { status } else { busy }
             }
             Phase::Stream => {
-                let mut user = Target { acceleration: [T::ZERO; 6], ..self.user };
+                let mut user = Target { rate: self.rate, ..Target::at(self.place) };
                 for (value, rate) in user.pose.iter_mut().zip(&user.rate) {
                     *value = *value + *rate * plan.period;
                 }
-                self.commit(plan, user, false, status, status)
+                self.commit(plan, &user, false, status, status)
             }
             Phase::Move | Phase::Approach(_) => {
                 let (user, ended) = self.straight(plan);
-                self.commit(plan, user, ended, busy, status)
+                self.commit(plan, &user, ended, busy, status)
             }
             Phase::Stop => {
                 let (user, ended) = self.stop.next(plan);
-                self.commit(plan, user, ended, busy, status)
+                self.commit(plan, &user, ended, busy, status)
             }
             Phase::Play(index) => {
                 let (user, ended) = match plan.trajectories.get(index as usize) {
                     Some(trajectory) => trajectory.next(&mut self.cursor),
-                    None => (self.user, true),
+                    None => (Target::at(self.place), true),
                 };
                 if ended {
                     self.finished = Some(index);
                 }
-                self.commit(plan, user, ended, busy, status)
+                self.commit(plan, &user, ended, busy, status)
             }
         }
     }
@@ -320,23 +332,19 @@ impl<T: Real> Generator<T> {
     fn commit<F: Frames<T>>(
         &mut self,
         plan: &Plan<T, F>,
-        user: Target<T>,
+        user: &Target<T>,
         ended: bool,
         moving: u32,
         standing: u32,
-    ) -> (Target<T>, u32) {
-        match plan.accepted(&user) {
-            Some(target) => {
-                self.user = user;
-                self.target = target;
-                self.arrive(ended);
-                (target, if ended { standing } else { moving })
-            }
-            None => {
-                self.rest();
-                (self.target, standing | REFUSED)
-            }
+    ) -> u32 {
+        if !plan.admit(user, &mut self.target) {
+            self.rest();
+            return standing | REFUSED;
         }
+        self.place = user.pose;
+        self.rate = user.rate;
+        self.arrive(ended);
+        if ended { standing } else { moving }
     }
 
     #[inline]
@@ -359,9 +367,8 @@ impl<T: Real> Generator<T> {
             Phase::Stop => (7, 0),
         };
         digest.word(phase << 32 | index as u64);
-        self.user.digest(digest);
         self.target.digest(digest);
-        for number in self.start.iter().chain(&self.goal).chain(&self.way) {
+        for number in self.place.iter().chain(&self.rate).chain(&self.start).chain(&self.goal).chain(&self.way) {
             digest.real(*number);
         }
         digest.word((self.tick as u32 as u64) << 32 | self.profile.ticks() as u32 as u64);

@@ -39,10 +39,10 @@ impl<T: Real> Stop<T> {
         Self { start: [T::ZERO; 6], rate: [T::ZERO; 6], ticks: 1, tick: 0 }
     }
 
-    /// The stop from `user`, which is where the platform is and how it moves, in the user's frames.
+    /// The stop from `pose` (m, rad) at `rate` (per s), in the user's frames.
     #[must_use]
-    pub fn plan<F: Frames<T>>(plan: &Plan<T, F>, user: &Target<T>) -> Self {
-        let mut stop = Self { start: user.pose, rate: user.rate, ticks: LONGEST, tick: 0 };
+    pub fn plan<F: Frames<T>>(plan: &Plan<T, F>, pose: &[T; 6], rate: &[T; 6]) -> Self {
+        let mut stop = Self { start: *pose, rate: *rate, ticks: LONGEST, tick: 0 };
         for rate in &mut stop.rate {
             *rate = *rate * plan.period;
         }
@@ -53,7 +53,7 @@ impl<T: Real> Stop<T> {
             stop.ticks = ticks;
         }
         for _ in 0..HALVINGS {
-            if stop.ticks == 1 || plan.accepted(&Target::at(stop.end())).is_some() {
+            if stop.ticks == 1 || plan.admitted(&stop.end()).is_some() {
                 break;
             }
             stop.ticks = (stop.ticks + 1) / 2;

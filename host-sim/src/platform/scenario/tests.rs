@@ -2,7 +2,7 @@
 //! equal legs; `examples/platform_figures.rs` has all of them, with tolerances and random machines.
 
 use super::*;
-use crate::oracle::design::Gains;
+use crate::oracle::design::{Deviation, Gains, Rule};
 use crate::oracle::{PlatformOracle, Settings};
 use crate::plant::LegParameters;
 use crate::platform::PlatformParameters;
@@ -121,4 +121,40 @@ fn measured_forces_do_what_a_known_stiffness_does() {
     let (blind, seeing) = (run(0.0), run(2.0));
     println!("F+PCC on glass: {blind:.2} nm without, {seeing:.2} nm with measured forces");
     assert!(seeing < 0.7 * blind, "{blind} {seeing}");
+}
+
+/// A small step of x.
+struct Nudge;
+
+impl PoseTrajectory for Nudge {
+    fn duration(&self) -> f64 {
+        0.6
+    }
+    fn target(&self, time: f64) -> PoseTarget {
+        let x = if time > 0.01 { 0.2e-6 } else { 0.0 };
+        PoseTarget { pose: [x, 0.0, 0.0, 0.0, 0.0, 0.0], ..PoseTarget::default() }
+    }
+}
+
+#[test]
+fn the_linear_limit_divides_settling_from_ringing() {
+    let (specimen, settings) = base_n();
+    for notch in [None, Some(1.0)] {
+        let rule = Rule::new(settings.plant.clone(), notch);
+        let alone = Gains { proportional: 0.0, integral: 0.0, level: 100.0, drift: 0.0 };
+        let limit = rule.margin(alone, Deviation::NONE);
+        let ringing = |factor: f64| {
+            let combined = alone.scaled(factor * limit);
+            let settings = Settings { notch_damping: notch, combined, ..settings.clone() };
+            let mut scenario = scenario(&specimen, &settings, &Noise::NONE);
+            scenario.options.record = Record::Samples;
+            let mut controller = PlatformOracle::new(&settings).unwrap();
+            select(&mut controller, PLATFORM_MODES[2].1).unwrap();
+            let samples = scenario.run(&mut controller, &Nudge).unwrap().samples;
+            samples[5000..].iter().map(|s| (s.tick.pose[0] - s.target[0]).abs()).fold(0.0, f64::max)
+        };
+        let (below, above) = (ringing(0.92), ringing(1.08));
+        println!("notch {notch:?}: {:.1} nm at 0.92 of the limit, {:.1} nm at 1.08", below * 1e9, above * 1e9);
+        assert!(below < 60e-9 && above > 10.0 * below, "{notch:?}: {below} {above}");
+    }
 }

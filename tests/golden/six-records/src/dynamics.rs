@@ -6,8 +6,8 @@
 //! Poses are from rest, [x y z θx θy θz] in m and rad; rates and accelerations are their time derivatives. The model and its range are
 //! in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared workspace only.
 
-use specgen_runtime::dynamics::LegGroup;
-use specgen_runtime::Platform;
+use specgen_runtime::dynamics::Leg;
+use specgen_runtime::{Platform, Real as _};
 
 pub use specgen_runtime::{Load, Motion};
 use crate::Real;
@@ -16,49 +16,72 @@ use crate::Real;
 ///
 /// Over the declared workspace the smallest pivot of the elimination is 0.470 of the largest or more.
 pub const PLATFORM: Platform<Real> = Platform {
-    groups: [
-        LegGroup {
-            base: [[-0.07253819, -0.07253819], [0.13129437, -0.13129437], [0.0, 0.0]],
-            joint: [[-0.048358794, -0.048358794], [-0.08752958, 0.08752958], [0.0, 0.0]],
-            arm: [[0.0, 9.7144515e-17], [0.0, 0.17505915], [0.0, 0.0]],
-            rest: [[-0.12089699, -0.12089699], [0.04376479, -0.04376479], [0.18, 0.18]],
-            length: [0.22120452, 0.22120452],
-            inverse_length: [4.5207033, 4.5207033],
-            half_inverse_square: [10.218379, 10.218379],
+    legs: [
+        Leg {
+            base: [-0.07253819, 0.13129437, 0.0],
+            joint: [-0.048358794, -0.08752958, 0.0],
+            arm: [0.0, 0.0, 0.0],
+            rest: [-0.12089699, 0.04376479, 0.18],
+            length: 0.22120452,
+            inverse_length: 4.5207033,
+            half_inverse_square: 10.218379,
         },
-        LegGroup {
-            base: [[0.14997335, -0.07743516], [-0.002827266, -0.1284671], [0.0, 0.0]],
-            joint: [[-0.05162344, 0.09998223], [0.08564474, 0.0018848439], [0.0, 0.0]],
-            arm: [[-0.0032646456, 0.14834103], [0.1731743, 0.089414425], [0.0, 0.0]],
-            rest: [[0.098349914, 0.022547076], [0.082817465, -0.12658225], [0.18, 0.18]],
-            length: [0.22120452, 0.22120452],
-            inverse_length: [4.5207033, 4.5207033],
-            half_inverse_square: [10.218379, 10.218379],
+        Leg {
+            base: [-0.07253819, -0.13129437, 0.0],
+            joint: [-0.048358794, 0.08752958, 0.0],
+            arm: [9.7144515e-17, 0.17505915, 0.0],
+            rest: [-0.12089699, -0.04376479, 0.18],
+            length: 0.22120452,
+            inverse_length: 4.5207033,
+            half_inverse_square: 10.218379,
         },
-        LegGroup {
-            base: [[-0.07743516, 0.14997335], [0.1284671, 0.002827266], [0.0, 0.0]],
-            joint: [[0.09998223, -0.05162344], [-0.0018848439, -0.08564474], [0.0, 0.0]],
-            arm: [[0.14834103, -0.0032646456], [0.08564474, 0.0018848439], [0.0, 0.0]],
-            rest: [[0.022547076, 0.098349914], [0.12658225, -0.082817465], [0.18, 0.18]],
-            length: [0.22120452, 0.22120452],
-            inverse_length: [4.5207033, 4.5207033],
-            half_inverse_square: [10.218379, 10.218379],
+        Leg {
+            base: [0.14997335, -0.002827266, 0.0],
+            joint: [-0.05162344, 0.08564474, 0.0],
+            arm: [-0.0032646456, 0.1731743, 0.0],
+            rest: [0.098349914, 0.082817465, 0.18],
+            length: 0.22120452,
+            inverse_length: 4.5207033,
+            half_inverse_square: 10.218379,
+        },
+        Leg {
+            base: [-0.07743516, -0.1284671, 0.0],
+            joint: [0.09998223, 0.0018848439, 0.0],
+            arm: [0.14834103, 0.089414425, 0.0],
+            rest: [0.022547076, -0.12658225, 0.18],
+            length: 0.22120452,
+            inverse_length: 4.5207033,
+            half_inverse_square: 10.218379,
+        },
+        Leg {
+            base: [-0.07743516, 0.1284671, 0.0],
+            joint: [0.09998223, -0.0018848439, 0.0],
+            arm: [0.14834103, 0.08564474, 0.0],
+            rest: [0.022547076, 0.12658225, 0.18],
+            length: 0.22120452,
+            inverse_length: 4.5207033,
+            half_inverse_square: 10.218379,
+        },
+        Leg {
+            base: [0.14997335, 0.002827266, 0.0],
+            joint: [-0.05162344, -0.08564474, 0.0],
+            arm: [-0.0032646456, 0.0018848439, 0.0],
+            rest: [0.098349914, -0.082817465, 0.18],
+            length: 0.22120452,
+            inverse_length: 4.5207033,
+            half_inverse_square: 10.218379,
         },
     ],
-    order: [4, 1, 2, 0, 5, 3],
+    places: [3, 1, 2, 5, 0, 4],
     rows: [2, 3, 5, 4, 1, 0],
     flat_base: true,
     flat_platform: true,
     base_depth: 0.18,
     pole: [-0.048358794, -0.08752958, 0.0],
     mass: 1.63672,
-    first_moment: [-3.469447e-18, 4.3097036e-18, 0.0],
+    first_moment: [0.0, 0.0, 0.0],
     pole_moment: [0.079149805, 0.14326142, 0.0],
-    second_moment: [
-        [0.0070586, 2.9940823e-19, 0.0],
-        [8.098055e-19, 0.0070586, 0.0],
-        [0.0, 0.0, 0.02775],
-    ],
+    second_moment: [[0.0070586, 0.0, 0.0], [0.0, 0.0070586, 0.0], [0.0, 0.0, 0.02775]],
     extensible_moment: 0.003681,
     leg_inertia: 0.0005694,
     leg_weight_moment: -0.00816192,
@@ -106,4 +129,43 @@ pub fn gravity(pose: &[Real; 6]) -> [Real; 6] {
 #[must_use]
 pub fn jacobian(pose: &[Real; 6]) -> [[Real; 6]; 6] {
     PLATFORM.jacobian(pose)
+}
+
+/// Words of a motion: pose, rate, acceleration.
+pub const MOTION_WORDS: usize = 18;
+
+/// Words of an analysis: J and M row by row, C ḣ, G, leg forces, leg displacements.
+pub const ANALYSIS_WORDS: usize = 96;
+
+/// All of the above for one motion, as words, for tools on a host.
+#[must_use]
+pub fn analysis(words: &[u64; MOTION_WORDS]) -> [u64; ANALYSIS_WORDS] {
+    let number = |k: usize| Real::from_word(words[k]);
+    let six = |k: usize| [
+        number(k),
+        number(k + 1),
+        number(k + 2),
+        number(k + 3),
+        number(k + 4),
+        number(k + 5),
+    ];
+    let motion = Motion {
+        pose: six(0),
+        rate: six(6),
+        acceleration: six(12),
+    };
+    let load = load(&motion, &[0.0; 6]);
+    let rows = [
+        coriolis(&motion.pose, &motion.rate),
+        gravity(&motion.pose),
+        leg_forces(&motion),
+        load.displacement,
+    ];
+    let (jacobian, mass) = (jacobian(&motion.pose), mass_matrix(&motion.pose));
+    let mut out = [0; ANALYSIS_WORDS];
+    let values = jacobian.iter().chain(&mass).chain(&rows).flatten();
+    for (word, value) in out.iter_mut().zip(values) {
+        *word = value.to_word();
+    }
+    out
 }

@@ -6,8 +6,8 @@
 //! Poses are from rest, [x y z θx θy θz] in m and rad; rates and accelerations are their time derivatives. The model and its range are
 //! in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared workspace only.
 
-use specgen_runtime::dynamics::LegGroup;
-use specgen_runtime::Platform;
+use specgen_runtime::dynamics::Leg;
+use specgen_runtime::{Platform, Real as _};
 
 pub use specgen_runtime::{Load, Motion};
 use crate::Real;
@@ -16,91 +16,74 @@ use crate::Real;
 ///
 /// Over the declared workspace the smallest pivot of the elimination is 0.470 of the largest or more.
 pub const PLATFORM: Platform<Real> = Platform {
-    groups: [
-        LegGroup {
-            base: [
-                [-0.07253819228627427, -0.07253819228627424],
-                [0.1312943664436502, -0.1312943664436502],
-                [0.0, 0.0],
-            ],
-            joint: [
-                [-0.048358794857516214, -0.04835879485751612],
-                [-0.08752957762910013, 0.08752957762910019],
-                [0.0, 0.0],
-            ],
-            arm: [[0.0, 9.71445146547012e-17], [0.0, 0.17505915525820032], [0.0, 0.0]],
-            rest: [
-                [-0.12089698714379049, -0.12089698714379035],
-                [0.043764788814550065, -0.04376478881455001],
-                [0.18, 0.18],
-            ],
-            length: [0.22120451677221242, 0.22120451677221234],
-            inverse_length: [4.520703349967126, 4.520703349967127],
-            half_inverse_square: [10.218379389201997, 10.218379389202005],
+    legs: [
+        Leg {
+            base: [-0.07253819228627427, 0.1312943664436502, 0.0],
+            joint: [-0.048358794857516214, -0.08752957762910013, 0.0],
+            arm: [0.0, 0.0, 0.0],
+            rest: [-0.12089698714379049, 0.043764788814550065, 0.18],
+            length: 0.22120451677221242,
+            inverse_length: 4.520703349967126,
+            half_inverse_square: 10.218379389201997,
         },
-        LegGroup {
-            base: [
-                [0.14997335285712135, -0.07743516057084714],
-                [-0.0028272659573112687, -0.128467100486339],
-                [0.0, 0.0],
-            ],
-            joint: [
-                [-0.051623440380564746, 0.0999822352380809],
-                [0.08564473365755934, 0.0018848439715408176],
-                [0.0, 0.0],
-            ],
-            arm: [
-                [-0.0032646455230485316, 0.14834103009559713],
-                [0.17317431128665947, 0.08941442160064095],
-                [0.0, 0.0],
-            ],
-            rest: [
-                [0.09834991247655661, 0.02254707466723377],
-                [0.08281746770024807, -0.12658225651479818],
-                [0.18, 0.18],
-            ],
-            length: [0.22120451677221237, 0.22120451677221237],
-            inverse_length: [4.520703349967127, 4.520703349967127],
-            half_inverse_square: [10.218379389202003, 10.218379389202003],
+        Leg {
+            base: [-0.07253819228627424, -0.1312943664436502, 0.0],
+            joint: [-0.04835879485751612, 0.08752957762910019, 0.0],
+            arm: [9.71445146547012e-17, 0.17505915525820032, 0.0],
+            rest: [-0.12089698714379035, -0.04376478881455001, 0.18],
+            length: 0.22120451677221234,
+            inverse_length: 4.520703349967127,
+            half_inverse_square: 10.218379389202005,
         },
-        LegGroup {
-            base: [
-                [-0.0774351605708471, 0.14997335285712135],
-                [0.12846710048633903, 0.002827265957311232],
-                [0.0, 0.0],
-            ],
-            joint: [
-                [0.0999822352380809, -0.05162344038056477],
-                [-0.0018848439715408176, -0.08564473365755933],
-                [0.0, 0.0],
-            ],
-            arm: [
-                [0.14834103009559713, -0.0032646455230485524],
-                [0.08564473365755931, 0.0018848439715408033],
-                [0.0, 0.0],
-            ],
-            rest: [
-                [0.02254707466723381, 0.09834991247655658],
-                [0.1265822565147982, -0.0828174677002481],
-                [0.18, 0.18],
-            ],
-            length: [0.2212045167722124, 0.22120451677221237],
-            inverse_length: [4.5207033499671265, 4.520703349967127],
-            half_inverse_square: [10.218379389202, 10.218379389202003],
+        Leg {
+            base: [0.14997335285712135, -0.0028272659573112687, 0.0],
+            joint: [-0.051623440380564746, 0.08564473365755934, 0.0],
+            arm: [-0.0032646455230485316, 0.17317431128665947, 0.0],
+            rest: [0.09834991247655661, 0.08281746770024807, 0.18],
+            length: 0.22120451677221237,
+            inverse_length: 4.520703349967127,
+            half_inverse_square: 10.218379389202003,
+        },
+        Leg {
+            base: [-0.07743516057084714, -0.128467100486339, 0.0],
+            joint: [0.0999822352380809, 0.0018848439715408176, 0.0],
+            arm: [0.14834103009559713, 0.08941442160064095, 0.0],
+            rest: [0.02254707466723377, -0.12658225651479818, 0.18],
+            length: 0.22120451677221237,
+            inverse_length: 4.520703349967127,
+            half_inverse_square: 10.218379389202003,
+        },
+        Leg {
+            base: [-0.0774351605708471, 0.12846710048633903, 0.0],
+            joint: [0.0999822352380809, -0.0018848439715408176, 0.0],
+            arm: [0.14834103009559713, 0.08564473365755931, 0.0],
+            rest: [0.02254707466723381, 0.1265822565147982, 0.18],
+            length: 0.2212045167722124,
+            inverse_length: 4.5207033499671265,
+            half_inverse_square: 10.218379389202,
+        },
+        Leg {
+            base: [0.14997335285712135, 0.002827265957311232, 0.0],
+            joint: [-0.05162344038056477, -0.08564473365755933, 0.0],
+            arm: [-0.0032646455230485524, 0.0018848439715408033, 0.0],
+            rest: [0.09834991247655658, -0.0828174677002481, 0.18],
+            length: 0.22120451677221237,
+            inverse_length: 4.520703349967127,
+            half_inverse_square: 10.218379389202003,
         },
     ],
-    order: [4, 1, 2, 0, 5, 3],
+    places: [3, 1, 2, 5, 0, 4],
     rows: [2, 3, 5, 4, 1, 0],
     flat_base: true,
     flat_platform: true,
     base_depth: 0.18,
     pole: [-0.048358794857516214, -0.08752957762910013, 0.0],
     mass: 1.6367200000000002,
-    first_moment: [-3.469446951953614e-18, 4.30970363562988e-18, 0.0],
+    first_moment: [0.0, 0.0, 0.0],
     pole_moment: [0.07914980671919394, 0.1432614102971008, 0.0],
     second_moment: [
-        [0.007058600000000001, 2.9940823213399314e-19, 0.0],
-        [8.098054665626704e-19, 0.007058600000000001, 0.0],
+        [0.007058600000000001, 0.0, 0.0],
+        [0.0, 0.007058600000000001, 0.0],
         [0.0, 0.0, 0.027749999999999997],
     ],
     extensible_moment: 0.0036810000000000002,
@@ -150,4 +133,43 @@ pub fn gravity(pose: &[Real; 6]) -> [Real; 6] {
 #[must_use]
 pub fn jacobian(pose: &[Real; 6]) -> [[Real; 6]; 6] {
     PLATFORM.jacobian(pose)
+}
+
+/// Words of a motion: pose, rate, acceleration.
+pub const MOTION_WORDS: usize = 18;
+
+/// Words of an analysis: J and M row by row, C ḣ, G, leg forces, leg displacements.
+pub const ANALYSIS_WORDS: usize = 96;
+
+/// All of the above for one motion, as words, for tools on a host.
+#[must_use]
+pub fn analysis(words: &[u64; MOTION_WORDS]) -> [u64; ANALYSIS_WORDS] {
+    let number = |k: usize| Real::from_word(words[k]);
+    let six = |k: usize| [
+        number(k),
+        number(k + 1),
+        number(k + 2),
+        number(k + 3),
+        number(k + 4),
+        number(k + 5),
+    ];
+    let motion = Motion {
+        pose: six(0),
+        rate: six(6),
+        acceleration: six(12),
+    };
+    let load = load(&motion, &[0.0; 6]);
+    let rows = [
+        coriolis(&motion.pose, &motion.rate),
+        gravity(&motion.pose),
+        leg_forces(&motion),
+        load.displacement,
+    ];
+    let (jacobian, mass) = (jacobian(&motion.pose), mass_matrix(&motion.pose));
+    let mut out = [0; ANALYSIS_WORDS];
+    let values = jacobian.iter().chain(&mass).chain(&rows).flatten();
+    for (word, value) in out.iter_mut().zip(values) {
+        *word = value.to_word();
+    }
+    out
 }

@@ -1,0 +1,132 @@
+//! `specgen check` on a platform: what is reported, and that what a refusal offers is accepted when put into the file.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+mod support;
+
+use std::fs;
+
+use support::{Folder, repository};
+
+/// The folder, with `name` beside the records; its paths to them are mended.
+fn folder(name: &str) -> (Folder, String) {
+    let folder = Folder::new();
+    let text = fs::read_to_string(repository().join("specs").join(name)).unwrap();
+    (folder, text.replace("../records/", "records/"))
+}
+
+#[test]
+fn modes_margins_and_reach_are_reported() {
+    let (folder, text) = folder("reference.toml");
+    folder.write("platform.toml", text);
+    let run = folder.run(&["check", "platform.toml"]);
+    assert_eq!(run.code, 0, "{run:?}");
+    for words in ["platform modes: 360.5, 360.5, 428.1, 428.1, 614.9, 794.9 Hz", "P/F pcc", "condition of J", "θz"] {
+        assert!(run.stdout.contains(words), "no `{words}` in:\n{}", run.stdout);
+    }
+    let document = folder.json(&["check", "platform.toml"]);
+    assert_eq!(document.code, 0);
+    let design = &document.value["result"]["design"];
+    let laws: Vec<&str> =
+        design["margins"].as_array().unwrap().iter().map(|one| one["law"].as_str().unwrap()).collect();
+    assert_eq!(laws, ["P", "F invhys", "F ewma", "F pcc", "P/F invhys", "P/F ewma", "P/F pcc"]);
+    for one in design["margins"].as_array().unwrap() {
+        assert!(one["spectral_radius"].as_f64().unwrap() < 1.0, "{one}");
+    }
+    assert_eq!(design["modes"].as_array().unwrap().len(), 6);
+    assert!(document.value["result"]["reach"]["share"].as_f64().unwrap() > 0.0);
+}
+
+/// The numbers of `name [a, b, …]` in a help.
+fn offered(help: &str, name: &str) -> Vec<String> {
+    let list = help.split_once(&format!("{name} [")).unwrap().1.split_once(']').unwrap().0;
+    list.split(", ").map(str::to_owned).collect()
+}
+
+/// `line` of `section` with its numbers replaced, units kept.
+fn with_numbers(text: &str, section: &str, key: &str, numbers: &[String]) -> String {
+    let begin = text.find(&format!("\n[{section}]\n")).unwrap();
+    let start = begin + text[begin..].find(&format!("\n{key} ")).unwrap() + 1;
+    let end = start + text[start..].find('\n').unwrap();
+    let units: Vec<&str> =
+        text[start..end].split('"').skip(1).step_by(2).map(|value| value.split_once(' ').unwrap().1).collect();
+    assert_eq!(units.len(), numbers.len());
+    let values: Vec<String> = numbers.iter().zip(units).map(|(number, unit)| format!("\"{number} {unit}\"")).collect();
+    format!("{}{key} = [{}]{}", &text[..start], values.join(", "), &text[end..])
+}
+
+#[test]
+fn gains_that_are_too_high_are_refused_in_their_line_and_the_offer_is_accepted() {
+    let (folder, text) = folder("features/platform-gains.toml");
+    folder.write("good.toml", &text);
+    assert_eq!(folder.run(&["check", "good.toml"]).code, 0);
+    for section in ["gains", "position_gains"] {
+        let strong = ["1e13", "1e13", "1e13", "1e11", "1e11", "1e11"].map(str::to_owned);
+        let bad = with_numbers(&text, section, "integral", &strong);
+        folder.write("bad.toml", &bad);
+        let document = folder.json(&["check", "bad.toml"]);
+        assert_eq!(document.code, 1);
+        let finding = document.finding("E0421");
+        assert_eq!(finding["key"], format!("{section}.integral"));
+        let line = 1 + bad[..bad.find("1e13").unwrap()].matches('\n').count();
+        folder.run(&["check", "bad.toml"]).says(1, &[&format!("--> bad.toml:{line}:"), "E0421", "spectral radius"]);
+        let help = finding["help"].as_str().unwrap();
+        let mut mended = bad;
+        for key in ["proportional", "integral"] {
+            mended = with_numbers(&mended, section, key, &offered(help, key));
+        }
+        folder.write("mended.toml", &mended);
+        let run = folder.run(&["check", "mended.toml"]);
+        assert_eq!(run.code, 0, "{}", run.stderr);
+    }
+}
+
+#[test]
+fn a_bandwidth_that_is_too_high_is_refused_and_the_offer_is_accepted() {
+    let (folder, text) = folder("features/platform-gains.toml");
+    let bad = text.replace("\"450 rad/s\"", "\"5000 rad/s\"");
+    folder.write("bad.toml", &bad);
+    let document = folder.json(&["check", "bad.toml"]);
+    let finding = document.finding("E0421");
+    assert_eq!(finding["key"], "adaptation.level_bandwidth");
+    let help = finding["help"].as_str().unwrap();
+    let value = |name: &str| help.split_once(&format!("{name} = ")).unwrap().1.split('"').nth(1).unwrap().to_owned();
+    let mended = bad.replace("5000 rad/s", &value("level_bandwidth")).replace("19.6 rad/s", &value("drift_bandwidth"));
+    folder.write("mended.toml", &mended);
+    let found = folder.json(&["check", "mended.toml"]);
+    // The gains of this spec were chosen beside a slower estimate: they may be refused in their turn, the bandwidth not.
+    let keys: Vec<&str> = found.findings().iter().map(|one| one["key"].as_str().unwrap()).collect();
+    assert!(!keys.contains(&"adaptation.level_bandwidth") || found.code == 0, "{keys:?}");
+}
+
+#[test]
+fn a_bound_and_a_bias_beyond_the_strokes_are_refused() {
+    let (folder, text) = folder("reference.toml");
+    let edit = |old: &str, new: &str| {
+        assert_eq!(text.matches(old).count(), 1, "{old}");
+        folder.write("bad.toml", text.replace(old, new));
+        folder.json(&["check", "bad.toml"])
+    };
+    let found = edit("bias         = [\"0 um\", \"0 um\", \"10 um\"", "bias         = [\"0 um\", \"0 um\", \"-3 um\"");
+    assert_eq!(found.finding("E0440")["key"], "control.setpoint.bias[2]");
+    let found = edit("translation = [\"50 um\"", "translation = [\"56 um\"");
+    assert_eq!(found.finding("E0441")["key"], "workspace.translation[0]");
+}
+
+#[test]
+fn a_declared_trajectory_beyond_the_strokes_is_refused_at_its_place() {
+    let (folder, text) = folder("reference.toml");
+    // From the middle of the strokes case 1, which climbs by 40 um, leaves them at the top.
+    let lifted = text
+        .replace("bias         = [\"0 um\", \"0 um\", \"10 um\"", "bias         = [\"0 um\", \"0 um\", \"30 um\"")
+        .replace("translation = [\"50 um\", \"50 um\", ", "translation = [\"50 um\", \"50 um\", \"72 um\"] # ");
+    folder.write("bad.toml", &lifted);
+    let found = folder.json(&["check", "bad.toml"]);
+    assert_eq!(found.code, 1, "{:#}", found.value);
+    if let Some(finding) = found.findings().iter().find(|one| one["code"] == "E0442") {
+        assert_eq!(finding["key"], "trajectory[0].kind");
+        assert!(finding["message"].as_str().unwrap().contains("case-1"), "{finding}");
+    } else {
+        panic!("{:#}", found.value);
+    }
+}
