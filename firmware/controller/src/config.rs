@@ -3,9 +3,9 @@
 
 //! What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build.
 
+use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
 use crate::words::{CONFIG_CODES, CONFIG_GAINS, CONFIG_WEIGHTS};
 use crate::{Real, limits};
-use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
 
 /// ρ̂ of a leg, m/V; from `actuator`. Mode P takes the leg as linear: u = q/ρ̂.
 pub const LEG_GAIN: Real = 6.31e-7;
@@ -59,39 +59,23 @@ impl Config {
     pub const fn new() -> Self {
         let gains = Gains {
             proportional: [
-                506773.52336956555,
-                506773.52336956526,
-                1986452.9532608693,
-                9932.264766304346,
-                9932.264766304348,
-                9886.35923843263,
+                506773.52336956555, 506773.52336956526, 1986452.9532608693, 9932.264766304346,
+                9932.264766304348, 9886.35923843263,
             ],
             integral: [
-                1836209458.057596,
-                1836209458.0575948,
-                7197581429.494045,
-                35987907.14747023,
-                35987907.147470236,
-                35821576.11285991,
+                1836209458.057596, 1836209458.0575948, 7197581429.494045, 35987907.14747023,
+                35987907.147470236, 35821576.11285991,
             ],
             derivative: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         };
         let position_gains = Gains {
             proportional: [
-                366143.87063451105,
-                366143.8706345109,
-                1435212.2587309778,
-                7176.06129365489,
-                7176.0612936548905,
-                7142.894549767574,
+                366143.87063451105, 366143.8706345109, 1435212.2587309778, 7176.06129365489,
+                7176.0612936548905, 7142.894549767574,
             ],
             integral: [
-                7959968000.679677,
-                7959968000.679673,
-                31201515496.85669,
-                156007577.48428345,
-                156007577.48428345,
-                155286532.44924772,
+                7959968000.679677, 7959968000.679673, 31201515496.85669, 156007577.48428345,
+                156007577.48428345, 155286532.44924772,
             ],
             derivative: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         };
@@ -100,7 +84,11 @@ impl Config {
             interaction: Interaction::Neglected,
             level_weight: 0.04831111264715217,
             drift_weight: 0.002125688956474695,
-            code_limits: CodeLimits { min: limits::CODES[0], max: limits::CODES[1], max_step: 1747 },
+            code_limits: CodeLimits {
+                min: limits::CODES[0],
+                max: limits::CODES[1],
+                max_step: 1747,
+            },
             gains,
             position_gains,
             environment: Environment {
@@ -205,29 +193,48 @@ impl Config {
     /// # Errors
     /// A weight outside [0, 1]. That they are stable on the platform is for the
     /// compiler to check, not for this function.
-    pub fn with_weights(self, level_weight: Real, drift_weight: Real) -> Result<Self, ConfigError> {
+    pub fn with_weights(
+        self,
+        level_weight: Real,
+        drift_weight: Real,
+    ) -> Result<Self, ConfigError> {
         if !(0.0..=1.0).contains(&level_weight) {
-            return Err(ConfigError { word: CONFIG_WEIGHTS });
+            return Err(ConfigError {
+                word: CONFIG_WEIGHTS,
+            });
         }
         if !(0.0..=1.0).contains(&drift_weight) {
-            return Err(ConfigError { word: CONFIG_WEIGHTS + 1 });
+            return Err(ConfigError {
+                word: CONFIG_WEIGHTS + 1,
+            });
         }
-        Ok(Self { level_weight, drift_weight, ..self })
+        Ok(Self {
+            level_weight,
+            drift_weight,
+            ..self
+        })
     }
 
     /// The same with other code limits.
     ///
     /// # Errors
     /// A step below one code, or limits that leave the spec's voltage limits or are empty.
-    pub const fn with_code_limits(self, code_limits: CodeLimits) -> Result<Self, ConfigError> {
+    pub const fn with_code_limits(
+        self,
+        code_limits: CodeLimits,
+    ) -> Result<Self, ConfigError> {
         if code_limits.max_step < 1 {
             return Err(ConfigError { word: CONFIG_CODES });
         }
         if code_limits.min < limits::CODES[0] || code_limits.min > limits::CODES[1] {
-            return Err(ConfigError { word: CONFIG_CODES + 1 });
+            return Err(ConfigError {
+                word: CONFIG_CODES + 1,
+            });
         }
         if code_limits.max < code_limits.min || code_limits.max > limits::CODES[1] {
-            return Err(ConfigError { word: CONFIG_CODES + 2 });
+            return Err(ConfigError {
+                word: CONFIG_CODES + 2,
+            });
         }
         Ok(Self { code_limits, ..self })
     }
@@ -237,7 +244,11 @@ impl Config {
     /// # Errors
     /// A gain that is negative, not finite or above [`LARGEST_GAIN`]. That they are stable on the platform is for
     /// the compiler to check, not for this function.
-    pub fn with_gains(self, gains: Gains<Real>, position_gains: Gains<Real>) -> Result<Self, ConfigError> {
+    pub fn with_gains(
+        self,
+        gains: Gains<Real>,
+        position_gains: Gains<Real>,
+    ) -> Result<Self, ConfigError> {
         let mut word = CONFIG_GAINS;
         for set in [&gains, &position_gains] {
             for gain in [&set.proportional, &set.integral, &set.derivative] {
@@ -246,14 +257,22 @@ impl Config {
             }
         }
         let damps = [damps(&gains), damps(&position_gains)];
-        Ok(Self { gains, position_gains, damps, ..self })
+        Ok(Self {
+            gains,
+            position_gains,
+            damps,
+            ..self
+        })
     }
 
     /// The same with another environment.
     ///
     /// # Errors
     /// A stiffness that is negative, not finite or above [`LARGEST_GAIN`], or a pose beyond [`LARGEST_REST`].
-    pub fn with_environment(self, environment: Environment) -> Result<Self, ConfigError> {
+    pub fn with_environment(
+        self,
+        environment: Environment,
+    ) -> Result<Self, ConfigError> {
         within(&environment.stiffness, 0.0, LARGEST_GAIN, CONFIG_GAINS + 36)?;
         within(&environment.rest, -LARGEST_REST, LARGEST_REST, CONFIG_GAINS + 42)?;
         Ok(Self { environment, ..self })
@@ -261,10 +280,17 @@ impl Config {
 }
 
 /// Every value is within the range, or the word of the first that is not.
-fn within(values: &[Real; 6], low: Real, high: Real, first_word: usize) -> Result<(), ConfigError> {
+fn within(
+    values: &[Real; 6],
+    low: Real,
+    high: Real,
+    first_word: usize,
+) -> Result<(), ConfigError> {
     for (axis, value) in values.iter().enumerate() {
         if !(low..=high).contains(value) {
-            return Err(ConfigError { word: first_word + axis });
+            return Err(ConfigError {
+                word: first_word + axis,
+            });
         }
     }
     Ok(())

@@ -6,40 +6,16 @@
 //! Poses are from rest, [x y z θx θy θz] in m and rad; rates and accelerations are their time derivatives. The model and its range are
 //! in `specgen_runtime::dynamics`: angles up to π/4 and leg lengths within ±30 %; the controller accepts poses of the declared workspace only.
 
-<<<<<<< HEAD
-use specgen_runtime::Platform;
-use specgen_runtime::dynamics::LegGroup;
-=======
 use specgen_runtime::dynamics::Leg;
 use specgen_runtime::{Platform, Real as _};
->>>>>>> main
 
-use crate::Real;
 pub use specgen_runtime::{Load, Motion};
+use crate::Real;
 
 /// Constants of the platform; from `geometry`, `platform` and `leg`.
 ///
 /// Over the declared workspace the smallest pivot of the elimination is 0.470 of the largest or more.
 pub const PLATFORM: Platform<Real> = Platform {
-<<<<<<< HEAD
-    groups: [
-        LegGroup {
-            base: [[-0.07253819228627427, -0.07253819228627424], [0.1312943664436502, -0.1312943664436502], [0.0, 0.0]],
-            joint: [
-                [-0.048358794857516214, -0.04835879485751612],
-                [-0.08752957762910013, 0.08752957762910019],
-                [0.0, 0.0],
-            ],
-            arm: [[0.0, 9.71445146547012e-17], [0.0, 0.17505915525820032], [0.0, 0.0]],
-            rest: [
-                [-0.12089698714379049, -0.12089698714379035],
-                [0.043764788814550065, -0.04376478881455001],
-                [0.18, 0.18],
-            ],
-            length: [0.22120451677221242, 0.22120451677221234],
-            inverse_length: [4.520703349967126, 4.520703349967127],
-            half_inverse_square: [10.218379389201997, 10.218379389202005],
-=======
     legs: [
         Leg {
             base: [-0.07253819228627427, 0.1312943664436502, 0.0],
@@ -49,7 +25,6 @@ pub const PLATFORM: Platform<Real> = Platform {
             length: 0.22120451677221242,
             inverse_length: 4.520703349967126,
             half_inverse_square: 10.218379389201997,
->>>>>>> main
         },
         Leg {
             base: [-0.07253819228627424, -0.1312943664436502, 0.0],
@@ -60,24 +35,6 @@ pub const PLATFORM: Platform<Real> = Platform {
             inverse_length: 4.520703349967127,
             half_inverse_square: 10.218379389202005,
         },
-<<<<<<< HEAD
-        LegGroup {
-            base: [[-0.0774351605708471, 0.14997335285712135], [0.12846710048633903, 0.002827265957311232], [0.0, 0.0]],
-            joint: [
-                [0.0999822352380809, -0.05162344038056477],
-                [-0.0018848439715408176, -0.08564473365755933],
-                [0.0, 0.0],
-            ],
-            arm: [
-                [0.14834103009559713, -0.0032646455230485524],
-                [0.08564473365755931, 0.0018848439715408033],
-                [0.0, 0.0],
-            ],
-            rest: [[0.02254707466723381, 0.09834991247655658], [0.1265822565147982, -0.0828174677002481], [0.18, 0.18]],
-            length: [0.2212045167722124, 0.22120451677221237],
-            inverse_length: [4.5207033499671265, 4.520703349967127],
-            half_inverse_square: [10.218379389202, 10.218379389202003],
-=======
         Leg {
             base: [0.14997335285712135, -0.0028272659573112687, 0.0],
             joint: [-0.051623440380564746, 0.08564473365755934, 0.0],
@@ -113,7 +70,6 @@ pub const PLATFORM: Platform<Real> = Platform {
             length: 0.22120451677221237,
             inverse_length: 4.520703349967127,
             half_inverse_square: 10.218379389202003,
->>>>>>> main
         },
     ],
     places: [3, 1, 2, 5, 0, 4],

@@ -3,14 +3,35 @@
 
 //! Pose from six gauges that see the platform, and the filter of its rate.
 
-use crate::Real;
 use specgen_runtime::{Gauges, RateFilter, sensing};
+use crate::Real;
 
 /// Lines and planes at rest; the passes leave 1.5e-15 m and 1.0e-14 rad over the declared workspace. From `gauge` and `workspace`.
 pub const GAUGES: Gauges<'static, Real> = Gauges {
-    direction: [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
-    normal: [[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
-    skew: [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
+    direction: [
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+    ],
+    normal: [
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [1.0, 0.0, 0.0],
+    ],
+    skew: [
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+    ],
     pierced: [
         [0.08, 0.0, 0.0],
         [-0.04, 0.069282, 0.0],
@@ -41,11 +62,20 @@ pub const GAUGES: Gauges<'static, Real> = Gauges {
 };
 
 /// Lowest and highest word of each gauge that is believed, m: readings within `sensor.range`, where the gauge means one reading by one word.
-pub const RAW_LIMITS: [[Real; 2]; 6] =
-    [[-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5], [-5.5e-5, 5.5e-5]];
+pub const RAW_LIMITS: [[Real; 2]; 6] = [
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+    [-5.5e-5, 5.5e-5],
+];
 
 /// First-order filter of the pose's rate; from `velocity_cutoff` and `timing.period`.
-pub const RATE: RateFilter<Real> = RateFilter { keep: 0.14956861922263504, gain: 8504.31380777365 };
+pub const RATE: RateFilter<Real> = RateFilter {
+    keep: 0.14956861922263504,
+    gain: 8504.31380777365,
+};
 
 /// Gauges whose word is not finite or out of [`RAW_LIMITS`]: bit k for gauge k.
 #[inline]

@@ -3,22 +3,15 @@
 
 //! Parts of the tick as functions of their own, for measuring what each costs. The tick does not use them.
 
-<<<<<<< HEAD
-use crate::dynamics::{Motion, leg_forces};
-=======
 use specgen_runtime::Real as _;
 use specgen_runtime::linear::difference;
 use crate::dynamics::leg_forces;
->>>>>>> main
 use crate::hysteresis::TABLES;
 use crate::limits::DAC;
 use crate::setpoint::PLAN;
 use crate::step::{actuate, feedback, known_load, learn};
 use crate::task_space::{modal_error, notch_error};
 use crate::{Config, LEGS, Real, State, TickInput};
-use specgen_runtime::Real as _;
-use specgen_runtime::linear::difference;
-use specgen_runtime::setpoint::Target;
 
 /// Number of stages.
 pub const STAGE_COUNT: usize = 9;
@@ -36,18 +29,6 @@ pub struct Stage {
 
 /// All stages, in the order of the tick.
 pub const STAGES: [Stage; STAGE_COUNT] = [
-<<<<<<< HEAD
-    Stage { name: "sense", calls: 1, run: sense },
-    Stage { name: "kinematics", calls: 1, run: kinematics },
-    Stage { name: "notch", calls: 1, run: notch },
-    Stage { name: "learn", calls: 1, run: learning },
-    Stage { name: "setpoint", calls: 1, run: setpoint },
-    Stage { name: "dynamics", calls: 1, run: dynamics },
-    Stage { name: "load", calls: 1, run: load },
-    Stage { name: "inverse", calls: LEGS, run: inverse },
-    Stage { name: "actuate", calls: LEGS, run: leg },
-    Stage { name: "limits", calls: LEGS, run: limits },
-=======
     Stage {
         name: "sense",
         calls: 1,
@@ -93,7 +74,6 @@ pub const STAGES: [Stage; STAGE_COUNT] = [
         calls: LEGS,
         run: limits,
     },
->>>>>>> main
 ];
 
 /// Brings a copy of the state to where the stages find it, with each leg's request in place of its residual; not measured.
@@ -102,38 +82,22 @@ pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
     state.generator.tick(&PLAN, &input.command);
     let load = known_load(config, state);
     let feedback = feedback(config, state);
-<<<<<<< HEAD
-    state.target = target;
-    for (index, leg) in state.legs.iter().enumerate() {
-        state.load[index] = load.displacement[index] + feedback[index] - leg.estimate.correction();
-=======
     for (index, leg) in state.legs.iter_mut().enumerate() {
         leg.residual = load.displacement[index] + feedback[index]
             - leg.estimate.correction();
->>>>>>> main
     }
 }
 
 /// Gauges to pose.
-extern "C" fn sense(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
+extern "C" fn sense(
+    _config: &Config,
+    state: &mut State,
+    input: &TickInput,
+    _leg: usize,
+) {
     crate::step::sense(state, &input.gauge);
 }
 
-<<<<<<< HEAD
-/// Measured pose to six leg displacements.
-extern "C" fn kinematics(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-    state.load = leg_displacements(&state.pose);
-}
-
-/// The modal notch on the pose error.
-extern "C" fn notch(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-    let error = difference(&state.target.pose, &state.pose);
-    state.error = notch_error(&mut state.error_notch, &error);
-}
-
-/// All that the readings teach: kinematics, both notches, integral and adaptation.
-extern "C" fn learning(config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-=======
 /// The modal notch on the pose error.
 extern "C" fn notch(
     _config: &Config,
@@ -152,22 +116,10 @@ extern "C" fn learning(
     _input: &TickInput,
     _leg: usize,
 ) {
->>>>>>> main
     learn(config, state);
 }
 
 /// The generator of set-points.
-<<<<<<< HEAD
-extern "C" fn setpoint(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
-    let (target, _) = state.generator.next(&PLAN, &input.command);
-    state.target = target;
-}
-
-/// h, ḣ, ḧ to six leg forces.
-extern "C" fn dynamics(_config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-    let Target { pose, rate, acceleration } = state.target;
-    state.load = leg_forces(&Motion { pose, rate, acceleration });
-=======
 extern "C" fn setpoint(
     _config: &Config,
     state: &mut State,
@@ -185,7 +137,6 @@ extern "C" fn dynamics(
     _leg: usize,
 ) {
     state.error = leg_forces(state.generator.target());
->>>>>>> main
 }
 
 /// The same with the interaction force, and with the leg displacements.
@@ -196,12 +147,6 @@ extern "C" fn load(config: &Config, state: &mut State, _input: &TickInput, _leg:
 }
 
 /// Γ⁻¹ of one leg: displacement to drive.
-<<<<<<< HEAD
-extern "C" fn inverse(_config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
-    if let (Some(leg), Some(table), Some(request)) = (state.legs.get_mut(leg), TABLES.get(leg), state.load.get_mut(leg))
-    {
-        *request = leg.memory.solve(table, *request);
-=======
 extern "C" fn inverse(
     _config: &Config,
     state: &mut State,
@@ -210,29 +155,18 @@ extern "C" fn inverse(
 ) {
     if let (Some(leg), Some(table)) = (state.legs.get_mut(leg), TABLES.get(leg)) {
         leg.residual = leg.memory.solve(table, leg.residual);
->>>>>>> main
     }
 }
 
 /// One leg from request to code: Γ⁻¹, converter and limits, and the reversal memory brought up to date.
 extern "C" fn leg(config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
-<<<<<<< HEAD
-    if let (Some(leg), Some(table), Some(request)) = (state.legs.get_mut(leg), TABLES.get(leg), state.load.get(leg)) {
-        actuate(config, leg, table, *request);
-=======
     if let (Some(leg), Some(table)) = (state.legs.get_mut(leg), TABLES.get(leg)) {
         let request = leg.residual;
         actuate(config, leg, table, request);
->>>>>>> main
     }
 }
 
 /// One leg from drive to code within voltage and slew limits.
-<<<<<<< HEAD
-extern "C" fn limits(config: &Config, state: &mut State, _input: &TickInput, leg: usize) {
-    if let (Some(leg), Some(drive)) = (state.legs.get_mut(leg), state.load.get(leg)) {
-        let (code, held_back) = DAC.code(*drive, leg.code, config.code_limits());
-=======
 extern "C" fn limits(
     config: &Config,
     state: &mut State,
@@ -241,7 +175,6 @@ extern "C" fn limits(
 ) {
     if let Some(leg) = state.legs.get_mut(leg) {
         let (code, held_back) = DAC.code(leg.residual, leg.code, config.code_limits());
->>>>>>> main
         leg.code = code;
         leg.excess = if held_back { Real::ONE } else { Real::ZERO };
         leg.requested = DAC.voltage(code);

@@ -3,17 +3,12 @@
 
 //! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
 
-<<<<<<< HEAD
-=======
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::{
     ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer,
 };
->>>>>>> main
 use crate::hysteresis::Memory;
 use crate::{LEGS, Real, limits};
-use specgen_runtime::setpoint::{Generator, Target};
-use specgen_runtime::{ControlMode, Digest, Estimate, Integral, NotchState, Rate, Transfer};
 
 /// State of one leg.
 #[derive(Debug, Clone, Copy)]
@@ -115,10 +110,13 @@ impl State {
         self.innovation_notch.digest(&mut digest);
         self.integral.digest(&mut digest);
         self.transfer.digest(&mut digest);
-        digest.word(match self.mode {
-            None => 0,
-            Some(mode) => 1 + mode.word(),
-        });
+        digest
+            .word(
+                match self.mode {
+                    None => 0,
+                    Some(mode) => 1 + mode.word(),
+                },
+            );
         digest.finish()
     }
 }

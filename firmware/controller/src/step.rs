@@ -22,9 +22,6 @@
 //! offset b of a change of mode) the innovation is then r − J e with r = (q − q̂) − f − b: no large numbers are subtracted,
 //! and what is left out is the error times the change of J over the workspace, a thousandth of it.
 
-<<<<<<< HEAD
-use crate::dynamics::{Load, Motion};
-=======
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, transform};
 use specgen_runtime::setpoint::Command;
@@ -32,27 +29,15 @@ use specgen_runtime::{
     ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _,
 };
 use crate::dynamics::Load;
->>>>>>> main
 use crate::hysteresis::{TABLES, Table};
 use crate::limits::DAC;
 use crate::setpoint::PLAN;
 use crate::task_space::{
-<<<<<<< HEAD
-    COMPLIANCE, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
-    linear_displacement, linear_drive, notch_error, notch_innovation,
-};
-use crate::{Config, LEGS, LegState, Real, State, dynamics, kinematics, sensing};
-use specgen_runtime::feedback::{force_of, winds_up};
-use specgen_runtime::linear::{difference, transform};
-use specgen_runtime::setpoint::{Command, Target};
-use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _};
-=======
     COMPLIANCE, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT,
     WRENCH_TO_LEGS, linear_displacement, linear_drive, modal_error, notch_error,
     notch_innovation,
 };
 use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
->>>>>>> main
 
 /// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
 pub const LEG_LIMITED: u32 = 0x3f;
@@ -133,7 +118,8 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
         pose: state.pose,
         target: state.generator.target().pose,
         load: [0.0; LEGS],
-        status: gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
+        status: gauge_faults << 8 | setpoint_status
+            | if wrench_good { 0 } else { WRENCH_FAULT },
     };
     for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
         let load = (force[index] - REST_FORCE[index]) * COMPLIANCE + damping[index];
@@ -141,14 +127,9 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
         if entered {
             state.transfer.offset[index] = leg.requested - request;
         }
-<<<<<<< HEAD
-        let limited = actuate(config, leg, table, request + state.transfer.offset[index]);
-        state.load[index] = load;
-=======
         let offset = state.transfer.offset[index];
         let limited = actuate(config, leg, table, request + offset);
         leg.residual = (request + offset - leg.requested) - feedback[index] - offset;
->>>>>>> main
         output.load[index] = load;
         output.voltage[index] = DAC.voltage(leg.code);
         output.requested[index] = leg.requested;
@@ -209,7 +190,11 @@ pub(crate) fn learn(config: &Config, state: &mut State) {
     let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
     if mode.feeds_back() {
         state.error = notch_error(&mut state.error_notch, &error);
-        let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
+        let growth = Integral::growth(
+            &config.active_gains().integral,
+            PERIOD,
+            &state.error,
+        );
         if !would_wind_up(&state.legs, &growth) {
             state.integral.grow(&growth);
         }
@@ -225,7 +210,13 @@ pub(crate) fn learn(config: &Config, state: &mut State) {
             &residual,
         );
         for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
-            leg.estimate.correct(mode.law(), config.level_weight(), config.drift_weight(), innovation);
+            leg.estimate
+                .correct(
+                    mode.law(),
+                    config.level_weight(),
+                    config.drift_weight(),
+                    innovation,
+                );
         }
     }
 }
@@ -245,7 +236,10 @@ fn would_wind_up(legs: &[LegState; LEGS], growth: &[Real; 6]) -> bool {
 /// The measured wrench, if it is to be believed.
 #[inline]
 fn take_wrench(state: &mut State, wrench: &[Real; 6]) -> bool {
-    let good = wrench.iter().zip(&WRENCH_LIMIT).all(|(value, limit)| (-*limit..=*limit).contains(value));
+    let good = wrench
+        .iter()
+        .zip(&WRENCH_LIMIT)
+        .all(|(value, limit)| (-*limit..=*limit).contains(value));
     if good {
         state.wrench = *wrench;
     }
@@ -264,12 +258,8 @@ fn damping(config: &Config, state: &State) -> [Real; LEGS] {
 
 /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
 #[inline]
-<<<<<<< HEAD
-pub(crate) fn known_load(config: &Config, state: &State, target: &Target<Real>) -> Load<Real> {
-=======
 pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
     let target = state.generator.target();
->>>>>>> main
     let wrench = match config.interaction() {
         Interaction::Neglected => [0.0; 6],
         Interaction::Measured => state.wrench,
@@ -279,11 +269,7 @@ pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
             force_of(&environment.stiffness, &compressed)
         }
     };
-<<<<<<< HEAD
-    dynamics::load(&Motion { pose: target.pose, rate: target.rate, acceleration: target.acceleration }, &wrench)
-=======
     dynamics::load(target, &wrench)
->>>>>>> main
 }
 
 /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.
@@ -302,10 +288,16 @@ pub(crate) fn feedback(config: &Config, state: &State) -> [Real; LEGS] {
 /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,
 /// voltage or slew rate held the leg back.
 #[inline]
-pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
+pub fn actuate(
+    config: &Config,
+    leg: &mut LegState,
+    table: &Table,
+    request: Real,
+) -> bool {
     let mode = config.mode();
     let (drive, out_of_reach) = if mode.inverts() {
-        let out_of_reach = !(request >= Real::ZERO && request <= table.full_displacement());
+        let out_of_reach = !(request >= Real::ZERO
+            && request <= table.full_displacement());
         (leg.memory.solve(table, request), out_of_reach)
     } else {
         (linear_drive(request), false)
@@ -322,5 +314,9 @@ pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real
 /// What the code that is held means in the leg model of a mode, m.
 #[inline]
 fn requested(mode: ControlMode, leg: &LegState) -> Real {
-    if mode.inverts() { leg.memory.displacement() } else { linear_displacement(DAC.drive(leg.code)) }
+    if mode.inverts() {
+        leg.memory.displacement()
+    } else {
+        linear_displacement(DAC.drive(leg.code))
+    }
 }

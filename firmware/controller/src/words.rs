@@ -4,10 +4,10 @@
 //! Inputs, outputs and settings as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target
 //! reads and writes these, so that two of them can be compared bit for bit.
 
-use crate::config::Environment;
-use crate::{Config, ConfigError, LEGS, Real, TickInput, TickOutput};
 use specgen_runtime::setpoint::{Command, CommandKind, Target};
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Real as _};
+use crate::config::Environment;
+use crate::{Config, ConfigError, LEGS, Real, TickInput, TickOutput};
 
 /// Words of a tick's input.
 pub const INPUT_WORDS: usize = 33;
@@ -194,7 +194,11 @@ impl TickInput {
                 kind: CommandKind::from_word(words[0]),
                 selector: saturated(words[1]),
                 sequence: saturated(words[2]),
-                target: Target { pose: six(words, 3), rate: six(words, 9), acceleration: six(words, 15) },
+                target: Target {
+                    pose: six(words, 3),
+                    rate: six(words, 9),
+                    acceleration: six(words, 15),
+                },
             },
             gauge: six(words, INPUT_MEASURED),
             wrench: six(words, INPUT_MEASURED + 6),
@@ -245,11 +249,17 @@ impl Config {
             integral: six(words, first + 6),
             derivative: six(words, first + 12),
         };
-        let environment = Environment { stiffness: six(words, CONFIG_GAINS + 36), rest: six(words, CONFIG_GAINS + 42) };
+        let environment = Environment {
+            stiffness: six(words, CONFIG_GAINS + 36),
+            rest: six(words, CONFIG_GAINS + 42),
+        };
         Self::new()
             .with_mode(mode)
             .with_interaction(interaction)
-            .with_weights(Real::from_word(words[CONFIG_WEIGHTS]), Real::from_word(words[CONFIG_WEIGHTS + 1]))?
+            .with_weights(
+                Real::from_word(words[CONFIG_WEIGHTS]),
+                Real::from_word(words[CONFIG_WEIGHTS + 1]),
+            )?
             .with_code_limits(limits)?
             .with_gains(gains(CONFIG_GAINS), gains(CONFIG_GAINS + 18))?
             .with_environment(environment)

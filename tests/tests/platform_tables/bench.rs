@@ -145,7 +145,10 @@ pub fn random_machines() -> &'static [Pair] {
             let of = |what: &str, edits: &[(&str, &str)]| {
                 Bench::with_records(&format!("tables-{what}-{number}"), specimen.clone(), &records, edits)
             };
-            Pair { notched: of("notch", &[]), plain: of("plain", &[("notch_damping   = 1.0", "notch           = false")]) }
+            Pair {
+                notched: of("notch", &[]),
+                plain: of("plain", &[("notch_damping   = 1.0", "notch           = false")]),
+            }
         })
     })
 }

@@ -2,6 +2,8 @@
 //! machines out of tolerance. `cargo test --release -p specgen-tests --test platform_tables -- --nocapture` prints every
 //! figure.
 
+mod behaviour;
 mod bench;
 mod limits;
+mod oracle;
 mod tables;
