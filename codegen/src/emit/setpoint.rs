@@ -44,6 +44,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
     let imports = imports.into_iter().map(|name| format_ident!("{name}"));
     quote! {
         #![doc = " Set-points: limits of bias, moves and streams, user frames, trajectories."]
+        #![allow(clippy::approx_constant)] // A frequency of 1 Hz is τ rad/s.
 
         use specgen_runtime::setpoint::{#(#imports),*};
 

@@ -197,6 +197,7 @@ impl<'a> Generator<'a> {
     /// Pose, rate and acceleration of the smooth stream, one period on.
     fn smooth(&mut self) -> [[f64; 6]; 3] {
         let mut out = [[0.0; 6]; 3];
+        #[allow(clippy::needless_range_loop)] // Four arrays by one index.
         for axis in 0..6 {
             let (amplitude, frequency) = (self.amplitude[axis], self.frequency[axis]);
             self.phase[axis] += frequency * self.inputs.period;
