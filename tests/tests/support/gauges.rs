@@ -7,8 +7,9 @@ use specgen::compile::compile;
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
 use specgen::ir::{Ir, Sensing};
-use specgen::lower::lower;
+use specgen::lower;
 use specgen::model::{ControlMode, Environment, Frames, Interaction, Model, Probe, Scalar, SetpointRules, TaskSpace};
+use specgen::stability::platform::{self, RestDynamics};
 use specgen_runtime::{Gauges, Legs, Real, Series};
 use specgen_tests::repository;
 
@@ -64,7 +65,10 @@ fn table(model: &Model) -> EverettTable {
 }
 
 pub fn lowered(model: &Model) -> Result<Ir, Vec<Diagnostic>> {
-    lower(model, &[table(model)], &"0".repeat(64))
+    let task = model.task_space.as_ref().unwrap();
+    let design = platform::design(model, task, &RestDynamics::of(&lower::platform(model)?))?;
+    let (setpoints, _) = lower::setpoint::lower(model, task, &[], lower::scalar(model))?;
+    lower::lower(model, Some((&design, setpoints)), &[table(model)], &"0".repeat(64))
 }
 
 pub fn with_scalar(mut model: Model, scalar: Scalar) -> Model {
