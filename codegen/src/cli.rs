@@ -27,7 +27,7 @@ use ui::{Failure, Ui};
     override_usage = "specgen [OPTIONS] <SPEC>\n       specgen <COMMAND>",
     after_help = "Examples:\n  specgen platform.toml -o controller    compile, write a workspace, build and measure it\n  \
                   specgen check platform.toml            every finding, nothing written\n  \
-                  specgen sim platform.toml              the paper's leg experiment with the emitted controller\n  \
+                  specgen sim platform.toml              the paper's experiments with the emitted controller\n  \
                   specgen identify record.csv --drive -90:90 --grid 32\n\n\
                   Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment."
 )]
@@ -52,7 +52,7 @@ struct Common {
 enum Command {
     /// Report every finding about a spec; write nothing.
     Check(check::Arguments),
-    /// Run the paper's leg experiment with the emitted controller against a simulated plant.
+    /// Run the paper's experiments with the emitted controller against a simulated machine.
     Sim(sim::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),

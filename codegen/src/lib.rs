@@ -13,6 +13,7 @@ pub mod everett;
 pub mod identify;
 pub mod ir;
 pub mod lower;
+pub mod machine;
 pub mod model;
 pub mod numerics;
 pub mod reach;

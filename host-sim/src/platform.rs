@@ -12,6 +12,7 @@
 
 mod amplifier;
 mod contact;
+mod frames;
 mod gauge;
 mod geometry;
 mod inertia;
@@ -27,6 +28,7 @@ pub mod table;
 
 pub use amplifier::Amplifier;
 pub use contact::{Contact, WorkPart, Wrench};
+pub use frames::UserFrames;
 pub use gauge::{GaugeSignal, Probe};
 pub use geometry::{Geometry, angles, rate_matrix, rotation};
 pub use inertia::Masses;
@@ -34,7 +36,7 @@ pub use inertia::Masses;
 pub(crate) use linear::exponential;
 pub use linear::{Matrix3, Matrix6, Six, Three};
 pub use machine::Machine;
-pub use parameters::{PlatformParameters, REFERENCE_PLATFORM};
+pub use parameters::{Joints, PlatformParameters, REFERENCE_PLATFORM};
 pub use rig::PlatformRig;
 pub use scenario::PlatformScenario;
 pub use sensor::ForceSensor;

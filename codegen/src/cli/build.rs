@@ -16,7 +16,7 @@ use crate::verify::{self, Measurement};
 use crate::workspace;
 
 /// Ticks of the exercise that is run on host and emulated machine.
-const TICKS: u32 = 5000;
+const TICKS: u32 = 20_000;
 
 /// Arguments of the main job.
 #[derive(Args, Debug)]

@@ -1,7 +1,10 @@
-//! `specgen sim`: the paper's leg experiment with the emitted controller; `specgen forc`: the experiment that records
-//! reversal curves. Both on simulated legs that are not of the controller's model class.
+//! `specgen sim`: the paper's experiments with the emitted controller; `specgen forc`: the experiment that records reversal
+//! curves. Both on simulated machines that are not of the controller's model class.
 
-use std::fmt::Write as _;
+mod legs;
+mod platform;
+
+use std::fmt::Display;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -10,22 +13,13 @@ use host_sim::controller::Controller;
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
-use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, TRACKING_FREQUENCIES, select};
-use host_sim::table::{LinearityTable, TrackingTable};
 use serde_json::json;
 
 use super::file::write_file;
 use super::ui::{Failure, Ui};
 use crate::compile;
-use crate::model::Adaptation;
 use crate::target;
 use crate::workspace;
-
-/// The paper's Table 2, nm, by mode and frequency (0.1, 1, 10 Hz).
-const PAPER_TABLE_2: [(&str, [f64; 3]); 3] =
-    [("invhys", [127.039, 232.143, 504.539]), ("ewma", [103.086, 117.305, 191.409]), ("pcc", [80.5, 81.783, 156.25])];
-/// The paper's Table 1: slope at each frequency as a ratio to that at 0.1 Hz.
-const PAPER_TABLE_1: [f64; 6] = [1.0, 0.9844, 0.9797, 0.9774, 0.9735, 0.9704];
 
 /// Arguments of `sim`.
 #[derive(Args, Debug)]
@@ -37,120 +31,82 @@ pub struct Arguments {
     output: Option<PathBuf>,
     #[command(flatten)]
     plant: PlantArguments,
-    /// Control ticks per period of the trajectory.
-    #[arg(long, default_value_t = 500, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    samples: u32,
+    /// Without [control]: control ticks per period of the trajectory, 500 if not given.
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    samples: Option<u32>,
+    /// With [control]: operating frequencies of cases 1 and 2, Hz; 1 and 10 if not given. 0.1 takes ten times as long as 1.
+    #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = frequency, allow_negative_numbers = true)]
+    frequency: Option<Vec<f64>>,
+    /// With [control]: play this trajectory of the spec on board, instead of the paper's experiments.
+    #[arg(long, value_name = "NAME")]
+    trajectory: Option<String>,
+    /// With [control]: control intervals by which voltages reach the amplifiers late.
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=100))]
+    latency: u32,
+}
+
+/// A frequency at which a trajectory has a sensible length.
+fn frequency(text: &str) -> Result<f64, String> {
+    let expected = || format!("expected a frequency from 0.001 to 1000 Hz, found `{text}`");
+    let hertz: f64 = text.trim().trim_end_matches("Hz").trim().parse().map_err(|_| expected())?;
+    if (1e-3..=1e3).contains(&hertz) { Ok(hertz) } else { Err(expected()) }
 }
 
 /// Which leg is simulated.
 #[derive(Args, Debug)]
 pub struct PlantArguments {
-    /// Leg parameters (JSON); the reference leg if not given.
+    /// Leg parameters (JSON); the reference leg if not given. With [control]: the shape of the legs' hysteresis, scaled to
+    /// what the spec says of them.
     #[arg(long, value_name = "FILE")]
     plant: Option<PathBuf>,
     /// Without noise and quantisation of gauge and amplifier.
     #[arg(long)]
     no_noise: bool,
-    /// Seed of the noise.
+    /// Seed of the noise, and with [control] of the tolerances of the machine.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
     seed: u64,
 }
 
 impl PlantArguments {
+    fn leg(&self) -> Result<LegParameters, Failure> {
+        match &self.plant {
+            Some(path) => LegParameters::load(path).map_err(|error| Failure::Gate(error.to_string())),
+            None => Ok(LegParameters::reference()),
+        }
+    }
+
     fn read(&self) -> Result<(LegParameters, NoiseParameters), Failure> {
-        let parameters = match &self.plant {
-            Some(path) => LegParameters::load(path).map_err(|error| Failure::Gate(error.to_string()))?,
-            None => LegParameters::reference(),
-        };
+        let parameters = self.leg()?;
         let noise = if self.no_noise { NoiseParameters::NONE } else { parameters.noise };
         Ok((parameters, noise))
     }
 }
 
+fn environment(error: impl Display) -> Failure {
+    Failure::Environment(error.to_string())
+}
+
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let environment = |error: &dyn std::fmt::Display| Failure::Environment(error.to_string());
-    let (parameters, noise) = arguments.plant.read()?;
+    // A bad plant file is told before the minutes of the rest.
+    arguments.plant.read()?;
     let compiled = compile::compile(&arguments.spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
+    let task = compiled.model.task_space.as_ref();
+    match task {
+        Some(task) => platform::check(arguments, task)?,
+        None => legs::check(arguments)?,
+    }
     // The controller that runs is the emitted one, built from the same files that the main job writes.
-    let scratch = tempfile::tempdir().map_err(|error| environment(&error))?;
+    let scratch = tempfile::tempdir().map_err(environment)?;
     let workspace = scratch.path().join("controller");
     workspace::write(&workspace, &compiled.files)?;
     ui.progress("building the emitted controller for this host");
     let library = target::host::build_library(&workspace, &scratch.path().join("target"))?;
-    let mut controller = Controller::load(&library).map_err(|error| environment(&error))?;
-
-    ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
-    let legs = std::array::from_fn(|_| parameters.clone());
-    let scenario = LegScenario::new(&legs, &noise, arguments.plant.seed, arguments.samples);
-    let modes = modes(&compiled.model.adaptation);
-    ui.progress("Table 2: every law that the spec gives weights for, at three frequencies");
-    let tracking =
-        scenario.tracking(&mut controller, &modes, &TRACKING_FREQUENCIES).map_err(|error| environment(&error))?;
-    ui.progress("Table 1: inverse model alone at six frequencies");
-    let linearity = scenario.linearity(&mut controller, &LINEARITY_FREQUENCIES).map_err(|error| environment(&error))?;
-
-    if let Some(output) = &arguments.output {
-        let mut files = vec![
-            ("tracking.csv".to_owned(), tracking.to_csv().into_bytes()),
-            ("linearity.csv".to_owned(), linearity.to_csv().into_bytes()),
-            (
-                "tables.json".to_owned(),
-                format!("{:#}\n", json!({ "tracking": tracking, "linearity": linearity })).into_bytes(),
-            ),
-        ];
-        for &(mode, word) in &modes {
-            select(&mut controller, word).map_err(|error| environment(&error))?;
-            for frequency in TRACKING_FREQUENCIES {
-                let run = scenario.run(&mut controller, frequency).map_err(|error| environment(&error))?;
-                let stem = format!("trace-{mode}-{frequency}hz");
-                files.push((format!("{stem}.csv"), run.trace.to_csv().into_bytes()));
-                files.push((format!("{stem}.trace"), run.trace.to_bytes()));
-            }
-        }
-        write_folder(output, &files)?;
-        ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
+    let mut controller = Controller::load(&library).map_err(environment)?;
+    match task {
+        Some(task) => platform::run(arguments, &compiled, task, &mut controller, ui),
+        None => legs::run(arguments, &compiled, &mut controller, ui),
     }
-    let text = text(&compiled.ir.name, &tracking, &linearity);
-    ui.result(&text, json!({ "digest": compiled.ir.digest, "tracking": tracking, "linearity": linearity }));
-    Ok(())
-}
-
-/// The laws that the spec gives weights for: with a weight of zero a law adapts nothing, and its row would say nothing.
-fn modes(adaptation: &Adaptation) -> Vec<(&'static str, u32)> {
-    let given = |mode: &str| match mode {
-        "ewma" => adaptation.level_weight > 0.0,
-        "pcc" => adaptation.level_weight > 0.0 && adaptation.drift_weight > 0.0,
-        _ => true,
-    };
-    MODES.into_iter().filter(|(mode, _)| given(mode)).collect()
-}
-
-fn text(name: &str, tracking: &TrackingTable, linearity: &LinearityTable) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = writeln!(out, "{name}: tracking error of the leg trajectory, nm rms of T − Y (paper's Table 2)");
-    let _ = writeln!(out, "  {:<8}{:>22}{:>22}{:>22}", "", "0.1 Hz", "1 Hz", "10 Hz");
-    for (mode, paper) in PAPER_TABLE_2 {
-        let _ = write!(out, "  {mode:<8}");
-        for (frequency, paper) in TRACKING_FREQUENCIES.iter().zip(paper) {
-            let ours = tracking.rmse_nm(mode, *frequency).map_or("-".to_owned(), |nm| format!("{nm:.2}"));
-            let _ = write!(out, "{:>22}", format!("{ours} ({paper:.1})"));
-        }
-        out.push('\n');
-    }
-    let _ = writeln!(out, "{name}: slope of Y on q̂, as a ratio to that at 0.1 Hz (paper's Table 1)");
-    for (row, paper) in linearity.rows.iter().zip(PAPER_TABLE_1) {
-        let _ = writeln!(
-            out,
-            "  {:>5} Hz  λ {:.4}  offset {:>8.1} nm  ratio {:.4} ({paper:.4})",
-            row.frequency_hz,
-            row.gain_ratio,
-            row.offset_um * 1e3,
-            row.relative_slope
-        );
-    }
-    out
 }
 
 /// Arguments of `forc`.

@@ -11,6 +11,18 @@ use super::inertia::Masses;
 use super::linear::{Matrix3, Six, Three, dot};
 use crate::plant::{Bound, ParameterError};
 
+/// Places of the joints.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Joints {
+    /// B_i in {B}, m.
+    #[serde(rename = "base_m")]
+    pub base: [Three; 6],
+    /// P_i in {P}, m.
+    #[serde(rename = "platform_m")]
+    pub platform: [Three; 6],
+}
+
 /// Parameters of a platform, field for field as in the file.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -21,13 +33,20 @@ pub struct PlatformParameters {
     /// Must be `"SI"`.
     pub units: String,
     /// r_B, m.
+    #[serde(default)]
     pub base_radius_m: f64,
     /// r_P, m.
+    #[serde(default)]
     pub platform_radius_m: f64,
     /// α_B in half turns.
+    #[serde(default)]
     pub base_angle_over_pi: f64,
     /// α_P in half turns.
+    #[serde(default)]
     pub platform_angle_over_pi: f64,
+    /// Joints one by one, in place of the four numbers above.
+    #[serde(default)]
+    pub joints: Option<Joints>,
     /// z of P_C at rest, m.
     pub height_m: f64,
     /// Platform, kg.
@@ -58,6 +77,9 @@ pub struct PlatformParameters {
     pub stack_capacitance_f: f64,
     /// Largest current of an amplifier, A: the stack voltage changes by no more than this over the capacitance.
     pub amplifier_current_a: f64,
+    /// Voltage at which the legs rest, V: their own drive counts from there.
+    #[serde(default)]
+    pub rest_voltage_v: f64,
     /// The six gauges.
     pub probes: [Probe; 6],
     /// Lowest and highest reading of a gauge, m.
@@ -113,6 +135,9 @@ impl PlatformParameters {
     /// Joints.
     #[must_use]
     pub fn geometry(&self) -> Geometry {
+        if let Some(Joints { base, platform }) = self.joints {
+            return Geometry { base_joints: base, platform_joints: platform, height: self.height_m };
+        }
         let angle = |over_pi: f64| over_pi * core::f64::consts::PI;
         Geometry::hexagonal(
             [self.base_radius_m, self.platform_radius_m],
@@ -146,8 +171,6 @@ impl PlatformParameters {
         }
         let mut expect = |field: &str, value: f64, low: Bound, high: Bound| out.extend(low.and(high, field, value));
         for (field, value, high) in [
-            ("base_radius_m", self.base_radius_m, 100.0),
-            ("platform_radius_m", self.platform_radius_m, 100.0),
             ("height_m", self.height_m, 100.0),
             ("platform_mass_kg", self.platform_mass_kg, 1e6),
             ("axial_stiffness_n_per_m", self.axial_stiffness_n_per_m, 1e12),
@@ -167,11 +190,19 @@ impl PlatformParameters {
         ] {
             expect(field, value, AtLeast(0.0), AtMost(high));
         }
-        for (field, value) in
-            [("base_angle_over_pi", self.base_angle_over_pi), ("platform_angle_over_pi", self.platform_angle_over_pi)]
-        {
-            expect(field, value, AtLeast(0.0), Below(2.0 / 3.0));
+        if let Some(Joints { base, platform }) = &self.joints {
+            for (field, joints) in [("base_m", base), ("platform_m", platform)] {
+                for (k, value) in joints.as_flattened().iter().enumerate() {
+                    expect(&format!("joints.{field}[{}][{}]", k / 3, k % 3), *value, AtLeast(-100.0), AtMost(100.0));
+                }
+            }
+        } else {
+            expect("base_radius_m", self.base_radius_m, Above(0.0), AtMost(100.0));
+            expect("platform_radius_m", self.platform_radius_m, Above(0.0), AtMost(100.0));
+            expect("base_angle_over_pi", self.base_angle_over_pi, AtLeast(0.0), Below(2.0 / 3.0));
+            expect("platform_angle_over_pi", self.platform_angle_over_pi, AtLeast(0.0), Below(2.0 / 3.0));
         }
+        expect("rest_voltage_v", self.rest_voltage_v, AtLeast(-1e4), AtMost(1e4));
         expect("modal_damping", self.modal_damping, AtLeast(0.0), Below(0.5));
         expect("step_s", self.step_s, AtLeast(1e-7), AtMost(2e-5));
         expect("gauge_range_m[0]", self.gauge_range_m[0], AtLeast(-1.0), Below(0.0));
@@ -223,6 +254,21 @@ mod tests {
     #[test]
     fn the_shipped_file_is_good() {
         assert_eq!(PlatformParameters::reference().platform_mass_kg, 1.195);
+    }
+
+    #[test]
+    fn joints_one_by_one_are_those_of_the_circles_they_lie_on() {
+        let circles = PlatformParameters::reference();
+        let Geometry { base_joints, platform_joints, .. } = circles.geometry();
+        let list = format!("\"joints\": {{\"base_m\": {base_joints:?}, \"platform_m\": {platform_joints:?}}}");
+        let from = REFERENCE_PLATFORM.find("\"base_radius_m\"").unwrap();
+        let to = REFERENCE_PLATFORM.find("\"height_m\"").unwrap();
+        let text = format!("{}{list},\n  {}", &REFERENCE_PLATFORM[..from], &REFERENCE_PLATFORM[to..]);
+        let explicit = PlatformParameters::from_json(&text, "platform.json").unwrap();
+        assert_eq!(explicit.geometry(), circles.geometry());
+        let neither = format!("{}{}", &REFERENCE_PLATFORM[..from], &REFERENCE_PLATFORM[to..]);
+        let refusal = PlatformParameters::from_json(&neither, "platform.json").unwrap_err().to_string();
+        assert!(refusal.contains("`base_radius_m` is 0; expected a number > 0"), "{refusal}");
     }
 
     #[test]

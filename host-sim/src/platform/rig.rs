@@ -5,8 +5,10 @@
 //! intervals later.
 
 use std::collections::VecDeque;
+use std::fmt::Write as _;
 
 use super::contact::{WorkPart, Wrench};
+use super::frames::UserFrames;
 use super::gauge::{GaugeSignal, Probe};
 use super::linear::Six;
 use super::machine::Machine;
@@ -59,6 +61,8 @@ pub enum GaugeFault {
 pub struct PlatformRig {
     machine: Machine,
     height: f64,
+    /// Voltage at which the legs rest, V.
+    rest_voltage: f64,
     probes: [Probe; 6],
     gauges: [Gauge; 6],
     range: [f64; 2],
@@ -77,6 +81,7 @@ impl PlatformRig {
         Self {
             machine: Machine::new(specimen),
             height: nominal.height_m,
+            rest_voltage: nominal.rest_voltage_v,
             probes: nominal.probes,
             gauges: std::array::from_fn(|k| Gauge::new(&noise.channels, seed, k as u64)),
             range: nominal.gauge_range_m,
@@ -158,7 +163,7 @@ impl PlatformRig {
     pub fn hold(&mut self, voltages: &Six, interval: f64) {
         let mut inputs = *voltages;
         for (input, noise) in inputs.iter_mut().zip(&mut self.amplifiers) {
-            *input += noise.draw();
+            *input += noise.draw() - self.rest_voltage;
         }
         self.machine.hold(&inputs, interval);
     }
@@ -257,6 +262,7 @@ impl<'a> Bench<'a> {
         latency: usize,
     ) -> Result<Self, RunError> {
         let wiring = Wiring::of(controller)?;
+        let rest = rig.rest_voltage;
         controller.reset();
         let description = controller.description();
         Ok(Self {
@@ -269,7 +275,7 @@ impl<'a> Bench<'a> {
             interval,
             sequence: 0,
             ticks: 0,
-            underway: VecDeque::from(vec![[0.0; 6]; latency]),
+            underway: VecDeque::from(vec![[rest; 6]; latency]),
             trace: None,
         })
     }
@@ -294,6 +300,14 @@ impl<'a> Bench<'a> {
     #[must_use]
     pub fn output(&self) -> &[u64] {
         &self.output
+    }
+
+    /// Changes the settings, from the next tick on.
+    ///
+    /// # Errors
+    /// If the controller refuses them.
+    pub fn configure(&mut self, words: &[u64]) -> Result<(), RunError> {
+        Ok(self.controller.configure(words)?)
     }
 
     /// Runs one tick.
@@ -376,6 +390,8 @@ pub struct RunOptions {
     pub interval: f64,
     /// Bias pose of the controller: true poses are scored against this plus the trajectory.
     pub bias: Six,
+    /// Frames of the controller, in which the trajectory is given; none: parallel to {B}, about P_C.
+    pub frames: Option<UserFrames>,
     /// How long the controller may take to its bias pose, s.
     pub arming: f64,
     /// Rest between that and the trajectory, s.
@@ -397,6 +413,7 @@ impl RunOptions {
         Self {
             interval,
             bias,
+            frames: None,
             arming: 60.0,
             settle: 0.2,
             latency: 0,
@@ -447,19 +464,7 @@ impl PlatformRig {
     ) -> Result<PlatformRun, RunError> {
         let interval = options.interval;
         let ticks = ticks_within(trajectory.duration(), interval)?;
-        let mut bench = Bench::new(self, controller, interval, options.latency)?;
-        if options.record == Record::Trace {
-            bench.record();
-        }
-        let arming = bench.arm(options.arming)?;
-        if options.settle >= interval {
-            for _ in 0..ticks_within(options.settle, interval)? {
-                bench.tick(&Request::default())?;
-            }
-        }
-        if let Some(part) = options.part {
-            bench.rig.machine.touch(part);
-        }
+        let (mut bench, arming) = self.ready(controller, options)?;
         let mut errors = PoseErrors::default();
         let mut samples = Vec::new();
         let mut seen = 0;
@@ -471,7 +476,8 @@ impl PlatformRig {
             let time = (tick + 1) as f64 * interval;
             let wanted = trajectory.target(time);
             let tick = bench.tick(&Request::stream(wanted))?;
-            let target = std::array::from_fn(|k| options.bias[k] + wanted.pose[k]);
+            let moved = options.frames.map_or(wanted.pose, |frames| frames.pose(&wanted.pose));
+            let target = std::array::from_fn(|k| options.bias[k] + moved[k]);
             errors.add(&std::array::from_fn(|k| target[k] - tick.pose[k]));
             seen |= tick.status;
             if options.record != Record::Errors {
@@ -479,6 +485,87 @@ impl PlatformRig {
             }
         }
         Ok(PlatformRun { errors, samples, trace: bench.into_trace(), status: seen, arming })
+    }
+
+    /// Runs `controller` likewise, but lets it play its own trajectory `selector`, move to the start included, until it
+    /// stands or for `limit` (s). True poses are scored against its own targets.
+    ///
+    /// # Errors
+    /// As [`PlatformRig::run`].
+    pub fn play(
+        &mut self,
+        controller: &mut dyn TickController,
+        selector: u32,
+        options: &RunOptions,
+        limit: f64,
+    ) -> Result<PlatformRun, RunError> {
+        let interval = options.interval;
+        let ticks = ticks_within(limit, interval)?;
+        let (mut bench, arming) = self.ready(controller, options)?;
+        let request = Request { command: Command::Trajectory, selector, ..Request::default() };
+        let mut errors = PoseErrors::default();
+        let mut samples = Vec::new();
+        let mut seen = 0;
+        for tick in 0..ticks {
+            let time = (tick + 1) as f64 * interval;
+            let tick = bench.tick(&request)?;
+            seen |= tick.status & !BUSY;
+            if tick.status & BUSY == 0 {
+                break;
+            }
+            errors.add(&std::array::from_fn(|k| tick.target[k] - tick.pose[k]));
+            if options.record != Record::Errors {
+                samples.push(PoseSample { time, target: tick.target, tick });
+            }
+        }
+        Ok(PlatformRun { errors, samples, trace: bench.into_trace(), status: seen, arming })
+    }
+
+    /// A bench with the controller at its bias pose, rested, in contact; and how long the way took, s.
+    fn ready<'a>(
+        &'a mut self,
+        controller: &'a mut dyn TickController,
+        options: &RunOptions,
+    ) -> Result<(Bench<'a>, f64), RunError> {
+        let mut bench = Bench::new(self, controller, options.interval, options.latency)?;
+        if options.record == Record::Trace {
+            bench.record();
+        }
+        let arming = bench.arm(options.arming)?;
+        if options.settle >= options.interval {
+            for _ in 0..ticks_within(options.settle, options.interval)? {
+                bench.tick(&Request::default())?;
+            }
+        }
+        if let Some(part) = options.part {
+            bench.rig.machine.touch(part);
+        }
+        Ok((bench, arming))
+    }
+}
+
+impl PlatformRun {
+    /// CSV, one line per tick that was kept: what was wanted, where it was, what the controller saw and did. SI units.
+    #[must_use]
+    pub fn to_csv(&self) -> String {
+        let six = |stem: &str| (0..6).map(|k| format!(",{stem}[{k}]")).collect::<String>();
+        let mut out = String::from("time_s");
+        for stem in ["target", "pose", "measured", "voltage"] {
+            out.push_str(&six(stem));
+        }
+        out.push_str(",status\n");
+        for PoseSample { time, target, tick } in &self.samples {
+            // Writing to a String cannot fail, here and below.
+            let _ = write!(out, "{time:.6}");
+            for value in [target, &tick.pose, &tick.measured].into_iter().flatten() {
+                let _ = write!(out, ",{value:.4e}");
+            }
+            for value in tick.voltage {
+                let _ = write!(out, ",{value:.4}");
+            }
+            let _ = writeln!(out, ",{}", tick.status);
+        }
+        out
     }
 }
 

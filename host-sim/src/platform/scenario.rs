@@ -75,6 +75,19 @@ impl PlatformScenario {
         self.prepared.clone().run(controller, trajectory, &self.options)
     }
 
+    /// Lets the controller play one of its own trajectories, see [`PlatformRig::play`].
+    ///
+    /// # Errors
+    /// As [`PlatformRig::run`].
+    pub fn play(
+        &self,
+        controller: &mut dyn TickController,
+        selector: u32,
+        limit: f64,
+    ) -> Result<PlatformRun, RunError> {
+        self.prepared.clone().play(controller, selector, &self.options, limit)
+    }
+
     /// Runs a trajectory against a work part.
     ///
     /// # Errors

@@ -1,0 +1,162 @@
+//! Simulated machines with the emitted controller that was compiled for them.
+
+use std::panic::resume_unwind;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use host_sim::controller::Controller;
+use host_sim::forc::ReversalExperiment;
+use host_sim::noise::Gauge;
+use host_sim::plant::{LegParameters, LegPlant};
+use host_sim::platform::rig::{Noise, RunOptions};
+use host_sim::platform::{PlatformScenario, Specimen};
+use host_sim::trajectory::{PaperPath, PaperPose, Reading};
+use specgen::stability::platform::Design;
+use specgen_tests::Emitted;
+
+/// Control period of the reference spec, s.
+pub const PERIOD: f64 = 1e-4;
+/// Its bias pose.
+pub const BIAS: [f64; 6] = [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0];
+/// Seed of gauge and amplifier noise.
+pub const SEED: u64 = 1;
+
+/// A corrected path of the paper.
+pub fn paper(path: PaperPath, frequency: f64) -> PaperPose {
+    PaperPose { path, reading: Reading::Corrected, frequency }
+}
+
+/// A machine with its controller.
+pub struct Bench {
+    pub specimen: Specimen,
+    pub emitted: Emitted,
+    library: PathBuf,
+}
+
+impl Bench {
+    /// Compiles the reference spec for `specimen`: its nominal stiffness and damping, and a record of each leg as a user
+    /// takes it before assembly, with the gauge's noise. Everything else, gains and notch too, is the compiler's.
+    pub fn new(name: &str, specimen: Specimen, edits: &[(&str, &str)]) -> Self {
+        let records = records(&specimen.legs);
+        Self::with_records(name, specimen, &records, edits)
+    }
+
+    /// The same with the records of its legs.
+    pub fn with_records(name: &str, specimen: Specimen, records: &[String; 6], edits: &[(&str, &str)]) -> Self {
+        let nominal = &specimen.nominal;
+        let stiffness = format!("axial_stiffness = \"{:e} N/m\"", nominal.axial_stiffness_n_per_m);
+        let damping = format!("modal_damping   = {}", nominal.modal_damping);
+        let files = ["leg-a", "leg-b", "leg-c", "leg-d", "leg-e", "leg-f"].map(|leg| format!("{leg}.csv"));
+        let list = files.each_ref().map(|file| format!("\"records/{file}\"")).join(", ");
+        let mut all = vec![
+            ("axial_stiffness = \"1e7 N/m\"", stiffness.as_str()),
+            ("modal_damping   = 0.02", damping.as_str()),
+            ("\"records/reference-forc.csv\"", list.as_str()),
+            // Legs of less gain than the reference leg turn the platform less far.
+            ("\"0.5 mrad\"]", "\"0.4 mrad\"]"),
+        ];
+        all.extend(edits);
+        let more: Vec<(&str, String)> = files.iter().map(String::as_str).zip(records.clone()).collect();
+        let emitted = Emitted::with_records(name, "reference.toml", &all, &more);
+        let library = emitted.library();
+        Self { specimen, emitted, library }
+    }
+
+    /// The emitted controller.
+    pub fn controller(&self) -> Controller {
+        Controller::load(&self.library).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// What the analysis decided for it.
+    pub fn design(&self) -> &Design {
+        self.emitted.compiled.design.as_ref().expect("a controller in task space")
+    }
+
+    /// The machine, prepared, with its noise.
+    pub fn scenario(&self) -> PlatformScenario {
+        scenario(&self.specimen)
+    }
+}
+
+/// A machine, prepared, with the noise of its parameter files.
+pub fn scenario(specimen: &Specimen) -> PlatformScenario {
+    PlatformScenario::new(specimen, &Noise::of(specimen), SEED, RunOptions::new(PERIOD, BIAS))
+}
+
+/// Reversal curves of six legs as built; equal legs share one.
+pub fn records(legs: &[LegParameters; 6]) -> [String; 6] {
+    let of = |leg: usize| {
+        let mut gauge = Gauge::new(&legs[leg].noise, SEED, leg as u64);
+        // Drive values held for 10 mV: below what the plays and the gauge's noise show.
+        let experiment = ReversalExperiment { update: 5e-4, ..ReversalExperiment::reference(32) };
+        experiment.run(&mut LegPlant::new(&legs[leg]), &mut gauge).to_csv()
+    };
+    let first = of(0);
+    std::array::from_fn(|leg| if legs[leg] == legs[0] { first.clone() } else { of(leg) })
+}
+
+/// Applies `each` to 0..`count` on as many threads as the machine has; the results are in order.
+pub fn in_parallel<R: Send>(count: u32, each: impl Fn(u32) -> R + Sync) -> Vec<R> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicU32::new(0);
+    let mut results: Vec<(u32, R)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads)
+            .map(|_| {
+                scope.spawn(|| {
+                    let mut done = Vec::new();
+                    loop {
+                        let number = next.fetch_add(1, Ordering::Relaxed);
+                        if number >= count {
+                            return done;
+                        }
+                        done.push((number, each(number)));
+                    }
+                })
+            })
+            .collect();
+        workers.into_iter().flat_map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
+    });
+    results.sort_by_key(|(number, _)| *number);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+/// The middle of some numbers.
+pub fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { 0.5 * (values[middle - 1] + values[middle]) }
+}
+
+/// Random machines, each with two controllers: with the notch and without.
+pub struct Pair {
+    pub notched: Bench,
+    pub plain: Bench,
+}
+
+/// How many.
+pub const PLANTS: u32 = 12;
+
+/// Random machines with their controllers; built once.
+pub fn random_machines() -> &'static [Pair] {
+    static MACHINES: OnceLock<Vec<Pair>> = OnceLock::new();
+    MACHINES.get_or_init(|| {
+        in_parallel(PLANTS, |number| {
+            let specimen = Specimen::random(SEED, number);
+            let records = records(&specimen.legs);
+            let of = |what: &str, edits: &[(&str, &str)]| {
+                Bench::with_records(&format!("tables-{what}-{number}"), specimen.clone(), &records, edits)
+            };
+            Pair {
+                notched: of("notch", &[]),
+                plain: of("plain", &[("notch_damping   = 1.0", "notch           = false")]),
+            }
+        })
+    })
+}
+
+/// The reference machine with its controller; built once.
+pub fn reference_machine() -> &'static Bench {
+    static MACHINE: OnceLock<Bench> = OnceLock::new();
+    MACHINE.get_or_init(|| Bench::new("tables-reference", Specimen::reference(), &[]))
+}

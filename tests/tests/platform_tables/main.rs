@@ -1,0 +1,9 @@
+//! The paper's Tables 5 to 9, limits of stability and behaviour in the large, from the emitted controller on simulated
+//! machines out of tolerance. `cargo test --release -p specgen-tests --test platform_tables -- --nocapture` prints every
+//! figure.
+
+mod behaviour;
+mod bench;
+mod limits;
+mod oracle;
+mod tables;
