@@ -196,18 +196,14 @@ impl<'a> Generator<'a> {
 
     /// Pose, rate and acceleration of the smooth stream, one period on.
     fn smooth(&mut self) -> [[f64; 6]; 3] {
-        let mut out = [[0.0; 6]; 3];
-        #[allow(clippy::needless_range_loop)] // Four arrays by one index.
-        for axis in 0..6 {
+        let axes: [[f64; 3]; 6] = std::array::from_fn(|axis| {
             let (amplitude, frequency) = (self.amplitude[axis], self.frequency[axis]);
             self.phase[axis] += frequency * self.inputs.period;
             // 1 − cos begins without a jump in pose and rate.
             let (sine, cosine) = (libm::sin(self.phase[axis]), libm::cos(self.phase[axis]));
-            out[0][axis] = amplitude * (1.0 - cosine);
-            out[1][axis] = amplitude * frequency * sine;
-            out[2][axis] = amplitude * frequency * frequency * cosine;
-        }
-        out
+            [amplitude * (1.0 - cosine), amplitude * frequency * sine, amplitude * frequency * frequency * cosine]
+        });
+        std::array::from_fn(|order| axes.map(|of_axis| of_axis[order]))
     }
 
     /// Readings that change by a thousandth of the range and are now and then beyond its ends.
