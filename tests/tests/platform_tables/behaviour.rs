@@ -54,7 +54,7 @@ const LOWERED: f64 = 60.0;
 fn an_over_range_demand_leaves_nothing_behind() {
     // Workspace and gauges that let the demand through to the legs.
     let edits = [
-        ("[\"50 um\", \"50 um\", \"52 um\"]", "[\"50 um\", \"50 um\", \"72 um\"]"),
+        ("\"52 um\"]", "\"72 um\"]"),
         ("[\"-55 um\", \"55 um\"]", "[\"-110 um\", \"110 um\"]"),
         ("bits  = 17", "bits  = 18"),
     ];

@@ -53,8 +53,9 @@ impl Bench {
             ("axial_stiffness = \"1e7 N/m\"", stiffness.as_str()),
             ("modal_damping   = 0.02", damping.as_str()),
             ("\"records/reference-forc.csv\"", list.as_str()),
-            // Legs of less gain than the reference leg turn the platform less far.
+            // Legs of less gain than the reference leg move the platform less far.
             ("\"0.5 mrad\"]", "\"0.4 mrad\"]"),
+            ("[\"50 um\", \"50 um\", \"52 um\"]", "[\"45 um\", \"45 um\", \"52 um\"]"),
         ];
         all.extend(edits);
         let more: Vec<(&str, String)> = files.iter().map(String::as_str).zip(records.clone()).collect();
