@@ -1,4 +1,5 @@
 //! `specgen dynamics` as a user runs it.
+#![allow(clippy::unwrap_used)] // A test.
 
 mod support;
 

@@ -301,6 +301,7 @@ fn the_jacobian_is_the_derivative_of_the_leg_displacements() {
         let platform = lower::platform(&model).unwrap();
         for motion in states(seed, 20, 0.01, 0.3) {
             let jacobian = platform.jacobian(&motion.pose);
+            #[allow(clippy::needless_range_loop)] // Two arrays by one index.
             for k in 0..6 {
                 let step = 1e-5;
                 let ahead = platform.displacements(&along(&motion.pose, &unit(k), step));

@@ -8,6 +8,7 @@ use host_sim::trajectory::PaperPath;
 use crate::bench::{Bench, PLANTS, in_parallel, median, paper, random_machines, reference_machine};
 
 const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)];
+#[allow(clippy::type_complexity)] // A table of two.
 const PARTS: [(&str, fn() -> WorkPart); 2] = [("glass", WorkPart::glass), ("aluminium", WorkPart::aluminium)];
 
 /// Cases 1 and 2 at some frequencies with P and F, and case 1 with F alone.
