@@ -7,7 +7,7 @@ use serde_json::Value;
 use support::{Folder, repository};
 
 fn reference() -> (String, Value) {
-    let path = repository().join("../shared/reference/dynamics-vectors.json");
+    let path = repository().join("tests/oracle/dynamics-reference.json");
     let text = std::fs::read_to_string(&path).unwrap();
     let document = serde_json::from_str(&text).unwrap();
     (text, document)

@@ -60,7 +60,7 @@ fn vectors(document: &Value, height: &str) -> Vec<Vector> {
 }
 
 fn reference_vectors() -> Vec<Vector> {
-    vectors(&read("../shared/reference/dynamics-vectors.json"), "z_nominal")
+    vectors(&read("tests/oracle/dynamics-reference.json"), "z_nominal")
 }
 
 /// Joints in three dimensions and in no order, mass centre off the joints, products of inertia.
