@@ -105,15 +105,15 @@ const STAGES: &str = r#"
 use crate::instructions::InstructionCounter;
 use crate::stats::Stage;
 use controller::{Config, State, TickInput};
-pub struct Stages { step: Stage, setpoint: Stage }
+pub struct Stages { counts: [Stage; 2] }
 impl Stages {
-    pub const fn new() -> Self { Self { step: Stage::new("step"), setpoint: Stage::new("setpoint") } }
-    pub fn add_step(&mut self, instructions: u32) { self.step.add(instructions); }
+    pub const fn new() -> Self { Self { counts: [Stage::new("step"), Stage::new("setpoint")] } }
+    pub fn add_step(&mut self, instructions: u32) { self.counts[0].add(instructions); }
     pub fn measure(&mut self, counter: &mut InstructionCounter, _: &Config, _: &State, input: &TickInput) {
         let (_, instructions) = counter.measure(|| input.setpoint.map(|x| x + 1.0));
-        self.setpoint.add(instructions);
+        self.counts[1].add(instructions);
     }
-    pub fn all(&self) -> [Stage; 2] { [self.step, self.setpoint] }
+    pub fn all(&self) -> &[Stage] { &self.counts }
 }
 "#;
 
@@ -143,7 +143,8 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_step(c: *const controller::Config, s: *mut controller::State, i: *const u64, o: *mut u64) {
     let input = controller::TickInput::from_words(unsafe { &*i.cast() });
-    let words = controller::step(unsafe { &*c }, unsafe { &mut *s }, &input).to_words();
+    let state = unsafe { &mut *s };
+    let words = controller::output_words(&controller::step(unsafe { &*c }, state, &input), state);
     unsafe { o.cast::<[u64; controller::OUTPUT_WORDS]>().write(words) }
 }
 "#;
@@ -175,13 +176,11 @@ impl TickInput {
     }
 }
 pub struct TickOutput { voltage: [f64; 6], status: u64 }
-impl TickOutput {
-    pub fn to_words(&self) -> [u64; OUTPUT_WORDS] {
-        let mut words = [0; OUTPUT_WORDS];
-        for leg in 0..6 { words[leg] = self.voltage[leg].to_bits(); }
-        words[6] = self.status;
-        words
-    }
+pub fn output_words(output: &TickOutput, _state: &State) -> [u64; OUTPUT_WORDS] {
+    let mut words = [0; OUTPUT_WORDS];
+    for leg in 0..6 { words[leg] = output.voltage[leg].to_bits(); }
+    words[6] = output.status;
+    words
 }
 pub struct State { level: [f64; 6], count: u64 }
 impl State {
