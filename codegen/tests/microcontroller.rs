@@ -81,7 +81,8 @@ fn instructions_are_counted_exactly() {
         assert_eq!((step.calls, step.smallest), (40, step.largest), "nothing in it depends on the data");
         assert_eq!(step.sum, 40 * step.smallest);
         let other = result.stats.stage("setpoint").unwrap();
-        assert_eq!((other.calls, other.smallest), (40, other.largest));
+        // Parts are measured on some of the ticks.
+        assert!((1..=40).contains(&other.calls) && other.smallest == other.largest, "{other:?}");
         assert!((8..30).contains(&other.smallest), "6 additions, loads and stores of several at once: {other:?}");
         step.smallest
     };

@@ -20,6 +20,7 @@ pub fn emit(ir: &Ir, d: &PlatformDefaults) -> TokenStream {
         Mode::F => quote! { ControlMode::F(#law) },
         Mode::PF => quote! { ControlMode::PF(#law) },
     };
+    let import_law = (d.mode != Mode::P).then(|| quote! { , Law });
     let interaction = match d.interaction {
         Interaction::Neglected => quote! { Interaction::Neglected },
         Interaction::Modelled => quote! { Interaction::Modelled },
@@ -40,7 +41,7 @@ pub fn emit(ir: &Ir, d: &PlatformDefaults) -> TokenStream {
     quote! {
         #![doc = " What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build."]
 
-        use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
+        use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction #import_law};
 
         use crate::words::{CONFIG_CODES, CONFIG_GAINS, CONFIG_WEIGHTS};
         use crate::{Real, limits};
