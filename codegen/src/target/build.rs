@@ -84,12 +84,10 @@ impl Mcu {
         }
     }
 
-    /// For the M4F the target's own default: with `cortex-m4` the compiler keeps multiply and add apart, which is no faster
-    /// where one waits for the other and takes more instructions. The bits are the same.
     fn target_cpu(self) -> &'static str {
         match self {
             Self::Mps2An500 => "-Ctarget-cpu=cortex-m7",
-            Self::Mps2An386 => "-Ctarget-cpu=generic",
+            Self::Mps2An386 => "-Ctarget-cpu=cortex-m4",
         }
     }
 }
