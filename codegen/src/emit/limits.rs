@@ -20,12 +20,40 @@ pub fn emit(ir: &Ir) -> TokenStream {
     );
     let [leg_min, leg_max] = ir.bounds.leg.map(real);
     let [gauge_min, gauge_max] = ir.bounds.sensor.map(real);
+    // A controller in task space has its own checks, in `sensing` and `setpoint`.
+    let imports = if ir.task_space.is_none() {
+        quote! { {LEGS, Real} }
+    } else {
+        quote! { Real }
+    };
+    let of_legs = ir.task_space.is_none().then(|| {
+        quote! {
+            /// Leg set-points outside this range are faults, m; from `actuator.stroke`.
+            pub const LEG_SETPOINT: [Real; 2] = [#leg_min, #leg_max];
+            /// Gauge readings outside this range are faults, m; from `sensor.range`.
+            pub const GAUGE: [Real; 2] = [#gauge_min, #gauge_max];
+
+            /// Every leg set-point is finite and within [`LEG_SETPOINT`].
+            #[inline]
+            #[must_use]
+            pub fn leg_setpoint_is_accepted(displacements: &[Real; LEGS]) -> bool {
+                displacements.iter().all(|value| (LEG_SETPOINT[0]..=LEG_SETPOINT[1]).contains(value))
+            }
+
+            /// A gauge reading is finite and within [`GAUGE`].
+            #[inline]
+            #[must_use]
+            pub fn gauge_is_accepted(displacement: Real) -> bool {
+                (GAUGE[0]..=GAUGE[1]).contains(&displacement)
+            }
+        }
+    });
     quote! {
         #![doc = " What may go out and what is believed of what comes in."]
 
         use specgen_runtime::Dac;
 
-        use crate::{LEGS, Real};
+        use crate::#imports;
 
         /// Converter codes in volts and in cells of the Everett grid; from `dac` and `actuator.voltage`.
         pub const DAC: Dac<Real> = Dac {
@@ -37,23 +65,6 @@ pub fn emit(ir: &Ir) -> TokenStream {
         };
         #[doc = #codes_doc]
         pub const CODES: [i32; 2] = [#code_min, #code_max];
-        /// Leg set-points outside this range are faults, m; from `actuator.stroke`.
-        pub const LEG_SETPOINT: [Real; 2] = [#leg_min, #leg_max];
-        /// Gauge readings outside this range are faults, m; from `sensor.range`.
-        pub const GAUGE: [Real; 2] = [#gauge_min, #gauge_max];
-
-        /// Every leg set-point is finite and within [`LEG_SETPOINT`].
-        #[inline]
-        #[must_use]
-        pub fn leg_setpoint_is_accepted(displacements: &[Real; LEGS]) -> bool {
-            displacements.iter().all(|value| (LEG_SETPOINT[0]..=LEG_SETPOINT[1]).contains(value))
-        }
-
-        /// A gauge reading is finite and within [`GAUGE`].
-        #[inline]
-        #[must_use]
-        pub fn gauge_is_accepted(displacement: Real) -> bool {
-            (GAUGE[0]..=GAUGE[1]).contains(&displacement)
-        }
+        #of_legs
     }
 }

@@ -1,7 +1,6 @@
 //! 6×6 matrices in plain loops: the same bits on every machine.
 
-/// Rows of a 6×6 matrix.
-pub(super) type Matrix = [[f64; 6]; 6];
+pub(super) use crate::numerics::Matrix6 as Matrix;
 
 /// The inverse by Gauss-Jordan elimination with complete pivoting; none if a pivot vanishes.
 pub(super) fn inverse(matrix: &Matrix) -> Option<Matrix> {
@@ -48,19 +47,6 @@ pub(super) fn inverse(matrix: &Matrix) -> Option<Matrix> {
         inverse[j] = b[i];
     }
     Some(inverse)
-}
-
-/// A B, each entry summed from the left.
-pub(super) fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    a.map(|row| {
-        let mut out = [0.0; 6];
-        for (value, column) in row.iter().zip(b) {
-            for (out, b) in out.iter_mut().zip(column) {
-                *out += value * b;
-            }
-        }
-        out
-    })
 }
 
 /// The matrix with what rounding left of a zero made one: entries below 10⁻¹³ of the size that their row may have.
@@ -123,7 +109,7 @@ mod tests {
         matrices.push(cyclic);
         for matrix in &matrices {
             let inverse = inverse(matrix).unwrap();
-            let one = product(&inverse, matrix);
+            let one = crate::numerics::multiply6(&inverse, matrix);
             for (i, row) in one.iter().enumerate() {
                 for (j, value) in row.iter().enumerate() {
                     assert!((value - f64::from(u8::from(i == j))).abs() < 1e-11, "{i} {j}: {value}");

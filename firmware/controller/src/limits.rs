@@ -4,7 +4,7 @@
 //! What may go out and what is believed of what comes in.
 
 use specgen_runtime::Dac;
-use crate::{LEGS, Real};
+use crate::Real;
 
 /// Converter codes in volts and in cells of the Everett grid; from `dac` and `actuator.voltage`.
 pub const DAC: Dac<Real> = Dac {
@@ -17,23 +17,3 @@ pub const DAC: Dac<Real> = Dac {
 
 /// Lowest and highest code whose voltage lies within 0 V … 100 V; from `actuator.voltage` and `dac`.
 pub const CODES: [i32; 2] = [0, 43690];
-
-/// Leg set-points outside this range are faults, m; from `actuator.stroke`.
-pub const LEG_SETPOINT: [Real; 2] = [-6e-5, 0.00012];
-
-/// Gauge readings outside this range are faults, m; from `sensor.range`.
-pub const GAUGE: [Real; 2] = [-5.5e-5, 5.5e-5];
-
-/// Every leg set-point is finite and within [`LEG_SETPOINT`].
-#[inline]
-#[must_use]
-pub fn leg_setpoint_is_accepted(displacements: &[Real; LEGS]) -> bool {
-    displacements.iter().all(|value| (LEG_SETPOINT[0]..=LEG_SETPOINT[1]).contains(value))
-}
-
-/// A gauge reading is finite and within [`GAUGE`].
-#[inline]
-#[must_use]
-pub fn gauge_is_accepted(displacement: Real) -> bool {
-    (GAUGE[0]..=GAUGE[1]).contains(&displacement)
-}

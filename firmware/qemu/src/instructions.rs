@@ -10,7 +10,6 @@
 #![allow(unsafe_code)] // Assembly, and calls from it.
 
 use core::arch::{asm, naked_asm};
-use core::mem::MaybeUninit;
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 
 /// 24 bits.
@@ -31,12 +30,6 @@ pub struct InstructionCounter {
     overhead: u32,
     /// Measurements that did not fit into the 24 bits.
     overflows: u64,
-}
-
-/// What a closure needs, and room for what it yields.
-struct Slot<F, T> {
-    closure: MaybeUninit<F>,
-    value: MaybeUninit<T>,
 }
 
 impl InstructionCounter {
@@ -86,18 +79,6 @@ impl InstructionCounter {
         instructions.saturating_sub(self.overhead)
     }
 
-    /// Calls `f` and counts its instructions. What carries its captures in and its value out is counted too,
-    /// about ten.
-    #[inline(always)]
-    pub fn measure<T, F: FnOnce() -> T>(&mut self, f: F) -> (T, u32) {
-        let mut slot = Slot { closure: MaybeUninit::new(f), value: MaybeUninit::uninit() };
-        // SAFETY: `run` gets the slot it expects, takes the closure once and leaves a value.
-        unsafe {
-            let instructions = self.measure_call(run::<T, F> as *const (), [(&raw mut slot) as usize, 0, 0, 0]);
-            (slot.value.assume_init(), instructions)
-        }
-    }
-
     /// What measuring an empty function costs and every other one is relieved of, instructions.
     pub fn overhead(&self) -> u32 {
         self.overhead
@@ -115,14 +96,6 @@ impl InstructionCounter {
             u64::from(unsafe { self.measure_call(function as *const (), [0; 4]) })
         };
         [count(no_nops), count(one_nop), count(hundred_nops), count(thousand_nops)]
-    }
-}
-
-/// Calls the closure of a slot and puts its value there.
-unsafe extern "C" fn run<T, F: FnOnce() -> T>(slot: &mut Slot<F, T>) {
-    // SAFETY: `measure` passes a slot with the closure in it.
-    unsafe {
-        slot.value.write(slot.closure.assume_init_read()());
     }
 }
 

@@ -7,6 +7,7 @@
 //! ```
 
 use crate::attitude::Series;
+use crate::linear::{difference, each, transform};
 use crate::real::Real;
 
 /// The legs of a platform.
@@ -54,31 +55,14 @@ impl<T: Real> Legs<'_, T> {
     #[inline]
     #[must_use]
     pub fn pose(&self, inverse: &[[T; 6]; 6], corrections: usize, displacements: &[T; 6]) -> [T; 6] {
-        let mut pose = times(inverse, displacements);
+        let mut pose = transform(inverse, displacements);
         for _ in 0..corrections {
             let reached = self.displacements(&pose);
-            let mut missing = [T::ZERO; 6];
-            for leg in 0..6 {
-                missing[leg] = displacements[leg] - reached[leg];
-            }
-            let correction = times(inverse, &missing);
-            for axis in 0..6 {
-                pose[axis] = pose[axis] + correction[axis];
-            }
+            let correction = transform(inverse, &difference(displacements, &reached));
+            pose = each(|axis| pose[axis] + correction[axis]);
         }
         pose
     }
-}
-
-/// M x, each row summed from the left.
-#[inline]
-pub fn times<T: Real>(matrix: &[[T; 6]; 6], x: &[T; 6]) -> [T; 6] {
-    let mut product = [T::ZERO; 6];
-    for row in 0..6 {
-        let m = &matrix[row];
-        product[row] = m[0] * x[0] + m[1] * x[1] + m[2] * x[2] + m[3] * x[3] + m[4] * x[4] + m[5] * x[5];
-    }
-    product
 }
 
 /// |r₀ + d| − l₀ for a joint that moved by d: the root Δl of Δl² + 2 l₀ Δl = s with s = (2 r₀ + d)·d.

@@ -22,6 +22,7 @@
 //! the constants known to the compiler they cost nothing: an axis-aligned layout takes less than half of what a skew one does.
 
 use crate::attitude::{Series, horner, odd_series};
+use crate::linear::each;
 use crate::real::Real;
 
 /// Six gauges. Every constant belongs to the rest pose.
@@ -169,12 +170,6 @@ pub fn faults<T: Real>(raw: &[T; 6], limits: &[[T; 2]; 6]) -> u32 {
         bits |= u32::from(!good) << k;
     }
     bits
-}
-
-/// [f(0), …, f(5)], spelled out so that constants at a known index are known.
-#[inline(always)]
-fn each<T>(f: impl Fn(usize) -> T) -> [T; 6] {
-    [f(0), f(1), f(2), f(3), f(4), f(5)]
 }
 
 /// sum + constant·x; a constant zero has no term.

@@ -7,6 +7,7 @@ use super::finding;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::lower::linear::{self, Matrix, cross, dot, dusted, norm};
 use crate::model::{Model, Probe};
+use crate::numerics::multiply6;
 
 /// A line that meets its plane this many joint radii away from P_C cannot meet the platform.
 const FARTHEST: f64 = 10.0;
@@ -78,7 +79,7 @@ pub(super) fn check(model: &Model, probes: &[Probe; 6]) -> Result<Layout, Vec<Di
             0.5 * (m[1] * c[2] + m[2] * c[1]),
         ];
     }
-    let curvature = linear::product(&inverse, &second);
+    let curvature = multiply6(&inverse, &second);
     let rows = |of_translation: f64, of_rotation: f64| {
         [of_translation, of_translation, of_translation, of_rotation, of_rotation, of_rotation]
     };

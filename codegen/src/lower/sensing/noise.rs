@@ -3,8 +3,8 @@
 use super::layout;
 use crate::diagnostic::Diagnostic;
 use crate::lower::kinematics::leg_jacobian;
-use crate::lower::linear;
 use crate::model::Model;
+use crate::numerics::multiply6;
 
 /// Noise of one gauge reading and what it becomes, rms. Gauges are independent of each other, and the converter's error is spread
 /// evenly over its step.
@@ -34,7 +34,7 @@ pub fn pose_noise(model: &Model) -> Result<Option<PoseNoise>, Vec<Diagnostic>> {
     let quantisation = step / libm::sqrt(12.0);
     let reading = libm::sqrt(model.sensor.noise * model.sensor.noise + quantisation * quantisation);
     let norm = |row: [f64; 6]| libm::sqrt(row.iter().fold(0.0, |sum, part| sum + part * part));
-    let of_legs = leg_jacobian(&model.geometry).map(|legs| linear::product(&legs, &layout.inverse));
+    let of_legs = leg_jacobian(&model.geometry).map(|legs| multiply6(&legs, &layout.inverse));
     Ok(Some(PoseNoise {
         reading,
         quantisation,

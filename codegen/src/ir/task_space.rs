@@ -1,0 +1,349 @@
+//! What a controller in task space has beyond one of six legs.
+
+use serde::Serialize;
+
+use super::{LEGS, Law, Scalar};
+
+/// Control in task space.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TaskSpace {
+    /// Gauges to pose and its rate.
+    pub sensing: Sensing,
+    /// Set-points: limits, user frames, trajectories.
+    pub setpoints: Setpoints,
+    /// Constants of the control law.
+    pub law: ControlLaw,
+    /// Config at start-up.
+    pub defaults: PlatformDefaults,
+}
+
+/// Constants of (7), at rest.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ControlLaw {
+    /// T_s, s.
+    pub period: f64,
+    /// 1/k_a, m/N.
+    pub compliance: f64,
+    /// J, m/m and m/rad.
+    pub jacobian: [[f64; 6]; LEGS],
+    /// J⁻ᵀ/k_a, m/N and 1/N.
+    pub wrench_to_legs: [[f64; 6]; LEGS],
+    /// Leg forces at rest, N.
+    pub rest_force: [f64; LEGS],
+    /// Largest component of a measured wrench, N and N m.
+    pub wrench_limit: [f64; 6],
+    /// Part of the transfer offset left after a tick.
+    pub transfer_keep: f64,
+    /// Transfer offset that is as good as none, m.
+    pub transfer_negligible: f64,
+    /// Drive of mode P, cells of the Everett grid per metre.
+    pub cells_per_metre: f64,
+    /// Its inverse.
+    pub metres_per_cell: f64,
+    /// Pose that user set-points are measured from, m and rad.
+    pub bias: [f64; 6],
+    /// Modal notch, if declared.
+    pub notch: Option<Notch>,
+}
+
+/// Six biquads in modal coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Notch {
+    /// V⁻¹.
+    pub pose_to_modes: [[f64; 6]; 6],
+    /// V.
+    pub modes_to_pose: [[f64; 6]; 6],
+    /// V⁻¹ K⁻¹, K = Jᵀ k_a J.
+    pub force_to_modes: [[f64; 6]; 6],
+    /// V⁻¹ J⁻¹.
+    pub legs_to_modes: [[f64; 6]; 6],
+    /// J V.
+    pub modes_to_legs: [[f64; 6]; 6],
+    /// One for each mode.
+    pub sections: [Section; 6],
+}
+
+/// 1 − g (1 − z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Section {
+    /// g.
+    pub depth: f64,
+    /// a₁, a₂.
+    pub a: [f64; 2],
+}
+
+/// Control mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// Position feedback alone.
+    P,
+    /// Feed-forward alone.
+    F,
+    /// Both.
+    PF,
+}
+
+/// Where the interaction force comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Interaction {
+    /// Left to the feedback.
+    Neglected,
+    /// K_e (h_d − h_e).
+    Modelled,
+    /// Force/torque sensor.
+    Measured,
+}
+
+/// Diagonal gains of (7).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gains {
+    /// k_p.
+    pub proportional: [f64; 6],
+    /// k_I.
+    pub integral: [f64; 6],
+    /// k_v.
+    pub derivative: [f64; 6],
+}
+
+/// Config of a platform at start-up; code limits are in [`Defaults`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlatformDefaults {
+    /// P, F or P/F.
+    pub mode: Mode,
+    /// Run-to-run law of F and P/F.
+    pub law: Law,
+    /// Where the interaction force comes from.
+    pub interaction: Interaction,
+    /// ω or ω1 per tick.
+    pub level_weight: f64,
+    /// ω2 per tick.
+    pub drift_weight: f64,
+    /// Gains of P/F.
+    pub gains: Gains,
+    /// Gains of P alone.
+    pub position_gains: Gains,
+    /// K_e.
+    pub environment_stiffness: [f64; 6],
+    /// h_e.
+    pub environment_rest: [f64; 6],
+}
+
+/// Gauges to pose and its rate. The constants are those of `specgen_runtime::sensing::Gauges`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Sensing {
+    /// n of each gauge, unit, {B}.
+    pub direction: [[f64; 3]; 6],
+    /// m of each gauge: normal of its plane over n·normal, {P}.
+    pub normal: [[f64; 3]; 6],
+    /// m × n of each gauge.
+    pub skew: [[f64; 3]; 6],
+    /// c of each gauge: where its line pierces the plane at rest, {P}, m.
+    pub pierced: [[f64; 3]; 6],
+    /// J⁻¹ at rest: pose coordinates (rows) per reading (columns), m/m and rad/m.
+    pub inverse: [[f64; 6]; 6],
+    /// J⁻¹ of the second-degree terms: pose coordinates (rows) per product of two turns (columns).
+    pub curvature: [[f64; 6]; 6],
+    /// Passes after the first guess.
+    pub passes: u32,
+    /// What the passes leave over the accepted poses, in exact arithmetic: m, rad.
+    pub remainder: [f64; 2],
+    /// Coefficients of asin x / x in x² after the leading 1.
+    pub arc_sine: Vec<f64>,
+    /// Coefficients of atan x / x in x² after the leading 1.
+    pub arc_tangent: Vec<f64>,
+    /// Polynomial of each gauge from its raw word to m, lowest power first, all of one length; none: the words are m.
+    pub calibration: Option<[Vec<f64>; 6]>,
+    /// Raw words that are believed, per gauge, in the unit of the word.
+    pub raw_limits: [[f64; 2]; 6],
+    /// exp(−ω_c T) of the rate filter.
+    pub rate_keep: f64,
+    /// (1 − exp(−ω_c T))/T of the rate filter, 1/s.
+    pub rate_gain: f64,
+}
+
+/// Constants of `specgen_runtime::setpoint::Plan`; the workspace is in [`Bounds`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Setpoints {
+    /// T_s, s.
+    pub period: f64,
+    /// 1/T_s, 1/s.
+    pub rate: f64,
+    /// 1/T_s², 1/s².
+    pub square_rate: f64,
+    /// Bias and offset of the work frame, m and rad.
+    pub bias: [f64; 6],
+    /// The user's coordinates of the bias, m and rad.
+    pub home: [f64; 6],
+    /// 1/(V T_s) of moves, 1/m and 1/rad.
+    pub speed_limit: [f64; 6],
+    /// 1/(A T_s²).
+    pub acceleration_limit: [f64; 6],
+    /// 1/(J T_s³).
+    pub jerk_limit: [f64; 6],
+    /// Largest streamed step, m and rad.
+    pub stream_step: [f64; 6],
+    /// Largest streamed rate, per s.
+    pub stream_rate: [f64; 6],
+    /// Largest streamed acceleration, per s².
+    pub stream_acceleration: [f64; 6],
+    /// Ticks after which a stream is stale.
+    pub stale_ticks: u32,
+    /// Coordinates of the user.
+    pub frames: Frames,
+    /// By the word `selector`.
+    pub trajectories: Vec<Trajectory>,
+}
+
+/// Coordinates of the user.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Frames {
+    /// Those of the platform.
+    Parallel,
+    /// Rotations about a tool point.
+    Tool {
+        /// In {P}, m.
+        point: [f64; 3],
+        /// Largest angle that is meant, rad.
+        largest_angle: f64,
+    },
+    /// Rotations about a tool point, along axes of its own.
+    Work {
+        /// Columns are the axes in {B}.
+        axes: [[f64; 3]; 3],
+        /// In {P}, m.
+        point: [f64; 3],
+        /// Largest angle that is meant, rad.
+        largest_angle: f64,
+    },
+}
+
+/// A trajectory that the controller can play.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trajectory {
+    /// Its name in the spec.
+    pub name: String,
+    /// What it is.
+    pub path: Path,
+}
+
+/// Poses over time.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Path {
+    /// Analytic pieces.
+    Segments {
+        /// First pose, m and rad.
+        start: [f64; 6],
+        /// In the order of time.
+        segments: Vec<Segment>,
+        /// First tick not before the end.
+        ticks: u32,
+        /// Last pose, m and rad.
+        end: [f64; 6],
+    },
+    /// Rows joined by a cubic spline.
+    Table {
+        /// Nodes; the first again at the end if it repeats.
+        rows: Vec<Row>,
+        /// Ticks from row to row.
+        row_ticks: u32,
+        /// 1/row_ticks.
+        per_tick: f64,
+        /// Rows per s.
+        per_second: f64,
+        /// 6 · (rows per s)².
+        bend_rate: f64,
+        /// Begins again after the last row.
+        repeat: bool,
+    },
+}
+
+/// Line and growing sinusoid on every axis; w = 0..1 over the segment.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Segment {
+    /// Tick at which it begins.
+    pub first: u32,
+    /// w per tick.
+    pub per_tick: f64,
+    /// w per s.
+    pub per_second: f64,
+    /// Phase at `first`, turn/2⁶⁴.
+    pub phase: u64,
+    /// Phase per tick, turn/2⁶⁴.
+    pub phase_step: u64,
+    /// rad/s.
+    pub angular: f64,
+    /// By coordinate.
+    pub axes: [SegmentAxis; 6],
+}
+
+/// place + slope w + (a + b w) sin + (c + d w) cos, m or rad.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SegmentAxis {
+    /// At w = 0.
+    pub place: f64,
+    /// Over w = 0..1.
+    pub slope: f64,
+    /// a, b.
+    pub sine: [f64; 2],
+    /// c, d.
+    pub cosine: [f64; 2],
+}
+
+/// Node of a spline.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Row {
+    /// m and rad.
+    pub pose: [f64; 6],
+    /// Second derivative · (row time)²/6.
+    pub bend: [f64; 6],
+}
+
+impl Frames {
+    /// With every constant rounded to `scalar`.
+    #[must_use]
+    pub fn rounded(&self, scalar: Scalar) -> Self {
+        let round = |value: f64| scalar.round(value);
+        match *self {
+            Self::Parallel => Self::Parallel,
+            Self::Tool { point, largest_angle } => {
+                Self::Tool { point: point.map(round), largest_angle: round(largest_angle) }
+            }
+            Self::Work { axes, point, largest_angle } => Self::Work {
+                axes: axes.map(|row| row.map(round)),
+                point: point.map(round),
+                largest_angle: round(largest_angle),
+            },
+        }
+    }
+}
+
+impl Path {
+    /// With every constant rounded to `scalar`.
+    #[must_use]
+    pub fn rounded(mut self, scalar: Scalar) -> Self {
+        let round = |value: &mut f64| *value = scalar.round(*value);
+        match &mut self {
+            Self::Segments { start, segments, end, .. } => {
+                start.iter_mut().chain(end).for_each(round);
+                for segment in segments {
+                    [&mut segment.per_tick, &mut segment.per_second, &mut segment.angular].into_iter().for_each(round);
+                    for axis in &mut segment.axes {
+                        [&mut axis.place, &mut axis.slope].into_iter().for_each(round);
+                        axis.sine.iter_mut().chain(&mut axis.cosine).for_each(round);
+                    }
+                }
+            }
+            Self::Table { rows, per_tick, per_second, bend_rate, .. } => {
+                [per_tick, per_second, bend_rate].into_iter().for_each(round);
+                for row in rows {
+                    row.pose.iter_mut().chain(&mut row.bend).for_each(round);
+                }
+            }
+        }
+        self
+    }
+}
