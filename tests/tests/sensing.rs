@@ -333,6 +333,8 @@ fn a_workspace_beyond_the_range_of_the_gauges_or_of_their_equations_is_refused()
     large.workspace.rotation = [0.5; 3];
     large.workspace.translation = [1e-3; 3];
     large.sensor.range = [-1.0, 1.0];
+    let rules = &mut large.task_space.as_mut().expect("a spec with [control]").setpoint;
+    (rules.speed, rules.acceleration, rules.jerk) = ([1.0; 6], [100.0; 6], [1e4; 6]);
     let findings = lowered(&large).unwrap_err();
     assert!(findings.iter().any(|found| found.code == "E0435" || found.code == "E0412"), "{findings:#?}");
 }

@@ -152,6 +152,7 @@ fn enter_mode(config: &Config, state: &mut State) -> bool {
     };
     if mode.law() != Law::Invhys && !adapted {
         state.integral = Integral::new();
+        state.force = [0.0; 6];
     }
     state.mode = Some(mode);
     state.interaction = interaction;

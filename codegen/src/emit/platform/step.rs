@@ -140,8 +140,9 @@ pub fn emit() -> TokenStream {
                 None => false,
             };
             if mode.law() != Law::Invhys && !adapted {
-                // Its correction passes to the estimates.
+                // Its correction passes to the estimates, and what it pushed under the mode before is no innovation of theirs.
                 state.integral = Integral::new();
+                state.force = [0.0; 6];
             }
             state.mode = Some(mode);
             state.interaction = interaction;
