@@ -4,6 +4,7 @@
 //! readings Y_n; its voltages are held until t_{n+1}, where Y_{n+1} is read.
 
 use std::fmt;
+use std::ops::ControlFlow;
 
 use crate::controller::{ControllerError, TickController};
 use crate::description::DescriptionError;
@@ -65,6 +66,23 @@ pub struct TrackingSample {
     pub requested: [f64; LEGS],
     /// Y_n, m.
     pub measured: [f64; LEGS],
+}
+
+/// The words of one tick.
+pub struct Words<'a> {
+    /// Into the controller.
+    pub input: &'a [u64],
+    /// Out of it.
+    pub output: &'a [u64],
+    controller: &'a dyn TickController,
+}
+
+impl Words<'_> {
+    /// Digest of the controller's state after the tick.
+    #[must_use]
+    pub fn digest(&self) -> u64 {
+        self.controller.state_digest()
+    }
 }
 
 /// A closed-loop run.
@@ -182,10 +200,38 @@ impl<P: Plant> Rig<P> {
         interval: f64,
     ) -> Result<Run, RunError> {
         let ticks = ticks_within(trajectory.duration(), interval)?;
-
-        let wiring = Wiring::of(controller)?;
         let mut trace = Trace::new(controller.description().clone());
         let mut samples = Vec::with_capacity(ticks);
+        self.follow(controller, trajectory, interval, |sample, words| {
+            trace.push(words.input, words.output, words.digest());
+            samples.push(*sample);
+            ControlFlow::Continue(())
+        })?;
+        Ok(Run { trace, tracking: Tracking { interval, samples } })
+    }
+
+    /// Draws the noise of the next `ticks` ticks and the reading before them now: clones made after this share it. The bits
+    /// of a run stay as they are.
+    pub fn draw_ahead(&mut self, ticks: usize) {
+        for channel in &mut self.channels {
+            channel.gauge.draw_ahead(ticks + 1);
+            channel.amplifier.draw_ahead(ticks);
+        }
+    }
+
+    /// As [`Rig::run`], but keeps nothing: `watch` sees the end of every tick with its words and may end the run.
+    ///
+    /// # Errors
+    /// As [`Rig::run`].
+    pub fn follow(
+        &mut self,
+        controller: &mut dyn TickController,
+        trajectory: &dyn LegTrajectory,
+        interval: f64,
+        mut watch: impl FnMut(&TrackingSample, &Words) -> ControlFlow<()>,
+    ) -> Result<(), RunError> {
+        let ticks = ticks_within(trajectory.duration(), interval)?;
+        let wiring = Wiring::of(controller)?;
         let scalar = controller.description().scalar;
         let mut input = vec![0; controller.description().input_names.len()];
         let mut output = vec![0; controller.description().output_names.len()];
@@ -199,8 +245,8 @@ impl<P: Plant> Rig<P> {
                 input[wiring.displacement[leg]] = scalar.encode(measured[leg]);
             }
             controller.step(&input, &mut output);
-            trace.push(&input, &output, controller.state_digest());
-
+            // Of the tick, before anything moves: costs nothing unless it is asked for.
+            let words = Words { input: &input, output: &output, controller: &*controller };
             let mut requested = [0.0; LEGS];
             for (leg, channel) in self.channels.iter_mut().enumerate() {
                 let voltage = scalar.decode(output[wiring.voltage[leg]]);
@@ -211,9 +257,11 @@ impl<P: Plant> Rig<P> {
                 channel.leg.hold(voltage + channel.amplifier.draw(), interval);
             }
             measured = self.read();
-            samples.push(TrackingSample { time, target, requested, measured });
+            if watch(&TrackingSample { time, target, requested, measured }, &words).is_break() {
+                break;
+            }
         }
-        Ok(Run { trace, tracking: Tracking { interval, samples } })
+        Ok(())
     }
 
     fn read(&mut self) -> [f64; LEGS] {

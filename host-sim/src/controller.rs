@@ -1,4 +1,4 @@
-//! Runs an emitted controller's host shared library; the only module with unsafe code.
+//! Runs an emitted controller's host shared library; the only module with unsafe code but for one that picks instructions.
 //!
 //! The library's C interface, version 1: `specgen_abi_version`, `_describe`, `_config_default`, `_config_check`,
 //! `_config_load`, `_state_reset`, `_step`, `_state_digest`, and for analysis `_dynamics`.
@@ -8,6 +8,7 @@ use std::alloc::{Layout, alloc_zeroed, dealloc, handle_alloc_error};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::ptr::NonNull;
+use std::sync::Arc;
 
 use libloading::Library;
 
@@ -139,6 +140,7 @@ impl From<DescriptionError> for ControllerError {
 }
 
 /// The library's functions. Valid while the library is loaded.
+#[derive(Clone, Copy)]
 struct Functions {
     config_default: unsafe extern "C" fn(*mut u64),
     config_check: unsafe extern "C" fn(*const u64) -> i32,
@@ -179,8 +181,14 @@ pub struct Controller {
     /// Where it came from.
     path: PathBuf,
     /// Last, so that it is unloaded after everything else.
-    library: Library,
+    library: Arc<Library>,
 }
+
+// SAFETY: the buffers belong to one controller each and hold plain values without pointers (`Config` and `State` of an
+// emitted crate are `Copy`); the library's functions touch nothing but what they are given, and the library has no state.
+unsafe impl Send for Controller {}
+// SAFETY: what takes a shared reference only reads configuration and state.
+unsafe impl Sync for Controller {}
 
 impl Controller {
     /// Loads a controller's host library, with the spec's configuration and the power-up state.
@@ -228,11 +236,35 @@ impl Controller {
         let config = Buffer::new(layout(&text, "config_bytes", "config_align")?);
 
         let path = path.to_owned();
-        let mut controller = Self { description, functions, config, state, path, library };
+        let mut controller = Self { description, functions, config, state, path, library: Arc::new(library) };
         let words = controller.default_config();
         controller.configure(&words)?;
         controller.reset();
         Ok(controller)
+    }
+
+    /// Another controller of the same library, with the same configuration and in the same state: to continue from here
+    /// more than once, or in another thread.
+    #[must_use]
+    pub fn fork(&self) -> Self {
+        Self {
+            description: self.description.clone(),
+            functions: self.functions,
+            config: self.config.copy(),
+            state: self.state.copy(),
+            path: self.path.clone(),
+            library: Arc::clone(&self.library),
+        }
+    }
+
+    /// Takes the configuration and the state of another controller of the same library.
+    ///
+    /// # Panics
+    /// If `other` is of another library.
+    pub fn take_over(&mut self, other: &Self) {
+        assert!(Arc::ptr_eq(&self.library, &other.library), "controllers of one library");
+        self.config.overwrite(&other.config);
+        self.state.overwrite(&other.state);
     }
 
     /// The dynamics of the platform at a pose from rest (m, rad) with its first and second time derivatives, rounded to the
@@ -345,6 +377,19 @@ impl Buffer {
 
     fn start(&self) -> *mut u8 {
         self.start.as_ptr()
+    }
+
+    fn copy(&self) -> Self {
+        let copy = Self::new(self.layout);
+        copy.overwrite(self);
+        copy
+    }
+
+    /// `other` has the same layout.
+    fn overwrite(&self, other: &Self) {
+        assert_eq!(self.layout, other.layout, "buffers of one library");
+        // SAFETY: both have as many bytes, and are two allocations.
+        unsafe { std::ptr::copy_nonoverlapping(other.start(), self.start(), self.layout.size()) };
     }
 }
 

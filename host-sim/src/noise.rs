@@ -2,6 +2,8 @@
 //!
 //! The drive converter is the controller's: its voltages are exact codes already.
 
+use std::sync::Arc;
+
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -14,6 +16,9 @@ pub struct Gaussian {
     deviation: f64,
     /// The second number of a Box–Muller pair.
     spare: Option<f64>,
+    /// Numbers drawn ahead, shared by clones, and how many of them were given out.
+    ahead: Arc<[f64]>,
+    given: usize,
 }
 
 impl Gaussian {
@@ -22,7 +27,17 @@ impl Gaussian {
     pub fn new(deviation: f64, seed: u64, stream: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);
-        Self { rng, deviation, spare: None }
+        Self { rng, deviation, spare: None, ahead: Arc::from([]), given: 0 }
+    }
+
+    /// Draws the next `count` numbers now: clones made after this share them, so that runs under the same noise pay for it
+    /// once. The numbers are those that [`Gaussian::draw`] would have given.
+    pub fn draw_ahead(&mut self, count: usize) {
+        if self.deviation != 0.0 {
+            let numbers = (0..count).map(|_| self.draw()).collect();
+            self.ahead = numbers;
+            self.given = 0;
+        }
     }
 
     /// The next number. Draws nothing when the deviation is 0.
@@ -32,6 +47,10 @@ impl Gaussian {
     pub fn draw(&mut self) -> f64 {
         if self.deviation == 0.0 {
             return 0.0;
+        }
+        if let Some(number) = self.ahead.get(self.given) {
+            self.given += 1;
+            return *number;
         }
         if let Some(spare) = self.spare.take() {
             return self.deviation * spare;
@@ -66,6 +85,11 @@ impl Gauge {
             lsb: noise.adc_lsb_nm * 1e-9,
             zero: 0.0,
         }
+    }
+
+    /// See [`Gaussian::draw_ahead`].
+    pub fn draw_ahead(&mut self, count: usize) {
+        self.noise.draw_ahead(count);
     }
 
     /// Makes `displacement` (m) read 0. Exact: zeroing averages many readings, so that it adds no noise.
@@ -105,6 +129,24 @@ mod tests {
         assert!((square.sqrt() - 2.0).abs() < 0.02, "{square}");
         // A normal distribution has 4.55 % beyond two deviations; a uniform one has none.
         assert!((beyond - 0.0455).abs() < 0.003, "{beyond}");
+    }
+
+    #[test]
+    fn numbers_drawn_ahead_are_the_numbers_that_would_have_come() {
+        let mut plain = Gaussian::new(2.0, 5, 1);
+        let mut ahead = plain.clone();
+        plain.draw();
+        ahead.draw();
+        ahead.draw_ahead(7);
+        let mut clone = ahead.clone();
+        for k in 0..20 {
+            let expected = plain.draw().to_bits();
+            assert_eq!(ahead.draw().to_bits(), expected, "{k}");
+            assert_eq!(clone.draw().to_bits(), expected, "{k}");
+            if k == 9 {
+                ahead.draw_ahead(4);
+            }
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod creep;
 mod filter;
+pub(crate) mod lanes;
 mod leg;
 mod parameters;
 mod play;

@@ -24,7 +24,9 @@ pub mod scenario;
 mod sensor;
 mod specimen;
 mod structure;
+pub mod study;
 pub mod table;
+mod whole_tick;
 
 pub use amplifier::Amplifier;
 pub use contact::{Contact, WorkPart, Wrench};

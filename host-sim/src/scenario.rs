@@ -43,6 +43,17 @@ impl LegScenario {
         Self { prepared, samples_per_period: samples_per_period.max(1) }
     }
 
+    /// The prepared rig.
+    #[must_use]
+    pub fn rig(&self) -> &Rig<LegPlant> {
+        &self.prepared
+    }
+
+    /// The prepared rig, to change it for all runs.
+    pub fn rig_mut(&mut self) -> &mut Rig<LegPlant> {
+        &mut self.prepared
+    }
+
     /// Runs the paper's leg trajectory at `frequency` (Hz) with the controller as configured.
     ///
     /// # Errors

@@ -1,8 +1,10 @@
 //! Set-points over time.
 
 mod jet;
+mod multisine;
 mod paper;
 
+pub use multisine::Multisine;
 pub use paper::{Jump, PaperPath, PaperPose, Reading};
 
 /// A motion of the six legs from time 0.

@@ -29,6 +29,31 @@ impl CreepBank {
         }
     }
 
+    /// a_j, 1/s.
+    pub(super) fn rates(&self) -> &[f64] {
+        &self.rates
+    }
+
+    /// w_j.
+    pub(super) fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// r_k, V.
+    pub(super) fn thresholds(&self) -> &[f64] {
+        &self.thresholds
+    }
+
+    /// c_jk, V: a row per rate.
+    pub(super) fn states(&self) -> &[f64] {
+        &self.states
+    }
+
+    /// Puts operator `k` to a state (V).
+    pub(super) fn set_state(&mut self, k: usize, state: f64) {
+        self.states[k] = state;
+    }
+
     /// All operators back to 0.
     pub fn reset(&mut self) {
         self.states.fill(0.0);

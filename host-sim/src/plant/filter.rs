@@ -22,13 +22,23 @@ impl Lag {
 
     /// Fixes the length of the steps that follow, s.
     pub fn set_step(&mut self, step: f64) {
-        self.decay = if self.time_constant > 0.0 { libm::exp(-step / self.time_constant) } else { 0.0 };
+        self.decay = self.decay_over(step);
     }
 
     /// Output now.
     #[must_use]
     pub fn output(&self) -> f64 {
         self.output
+    }
+
+    /// e^(−step/τ).
+    pub(super) fn decay_over(&self, step: f64) -> f64 {
+        if self.time_constant > 0.0 { libm::exp(-step / self.time_constant) } else { 0.0 }
+    }
+
+    /// Puts the output to a value.
+    pub(super) fn set_output(&mut self, output: f64) {
+        self.output = output;
     }
 
     /// Holds `input` for one step.

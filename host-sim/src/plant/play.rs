@@ -26,6 +26,26 @@ impl PlayBank {
         }
     }
 
+    /// Number of operators.
+    pub(super) fn len(&self) -> usize {
+        self.states.len()
+    }
+
+    /// Threshold (V), weight and state (V) of operator `k`.
+    pub(super) fn operator(&self, k: usize) -> [f64; 3] {
+        [self.thresholds[k], self.weights[k], self.states[k]]
+    }
+
+    /// κ and v0 (V/s).
+    pub(super) fn rate(&self) -> (f64, f64) {
+        (self.rate_sensitivity, self.rate_scale)
+    }
+
+    /// Puts operator `k` to a state (V).
+    pub(super) fn set_state(&mut self, k: usize, state: f64) {
+        self.states[k] = state;
+    }
+
     /// All operators back to 0.
     pub fn reset(&mut self) {
         self.states.fill(0.0);

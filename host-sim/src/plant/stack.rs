@@ -8,14 +8,14 @@ use super::play::PlayBank;
 /// Plays, creep and asymmetry of a leg: the equations of the reference leg between amplifier and structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stack {
-    rate: Lag,
-    plays: PlayBank,
-    creep: CreepBank,
-    asymmetry: f64,
-    drive_max: f64,
-    gain: f64,
-    step: f64,
-    widening: f64,
+    pub(super) rate: Lag,
+    pub(super) plays: PlayBank,
+    pub(super) creep: CreepBank,
+    pub(super) asymmetry: f64,
+    pub(super) drive_max: f64,
+    pub(super) gain: f64,
+    pub(super) step: f64,
+    pub(super) widening: f64,
 }
 
 impl Stack {

@@ -26,6 +26,26 @@ impl Amplifier {
         self.decay = if self.time_constant > 0.0 { libm::exp(-step / self.time_constant) } else { 0.0 };
     }
 
+    /// τ, s.
+    pub(super) fn time_constant(&self) -> f64 {
+        self.time_constant
+    }
+
+    /// Largest |u − v| of the lag alone, V.
+    pub(super) fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// I/C, V/s.
+    pub(super) fn slew(&self) -> f64 {
+        self.slew
+    }
+
+    /// Puts the stack to a voltage, V.
+    pub(super) fn set_voltage(&mut self, voltage: f64) {
+        self.voltage = voltage;
+    }
+
     /// Stack voltage now, V.
     #[must_use]
     pub fn voltage(&self) -> f64 {

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::geometry::{angles, rotation};
-use super::linear::{Six, Three, apply, dot};
+use super::linear::{Matrix3, Six, Three, apply, dot};
 
 /// A gauge fixed to the base that measures along its line to a plane on the platform.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -23,10 +23,14 @@ pub struct Probe {
 
 impl Probe {
     /// Distance along the line to the plane, m.
-    fn distance(&self, height: f64, pose: &Six) -> f64 {
-        let turn = rotation(angles(pose));
-        let at = apply(&turn, &self.plane_point);
-        let normal = apply(&turn, &self.plane_normal);
+    pub(super) fn distance(&self, height: f64, pose: &Six) -> f64 {
+        self.distance_turned(height, pose, &rotation(angles(pose)))
+    }
+
+    /// The same with the rotation of the pose at hand.
+    pub(super) fn distance_turned(&self, height: f64, pose: &Six, turn: &Matrix3) -> f64 {
+        let at = apply(turn, &self.plane_point);
+        let normal = apply(turn, &self.plane_normal);
         let to_plane = [
             pose[0] + at[0] - self.point[0],
             pose[1] + at[1] - self.point[1],

@@ -19,6 +19,7 @@ pub struct Geometry {
 }
 
 /// sin and cos. Piezo platforms turn by less than a milliradian, where a short series is exact to the last bit or so.
+#[inline]
 fn sincos(angle: f64) -> (f64, f64) {
     if angle.abs() > 1e-2 {
         return libm::sincos(angle);
@@ -30,7 +31,8 @@ fn sincos(angle: f64) -> (f64, f64) {
 }
 
 /// R and T(θ) of the angles [θx, θy, θz], rad.
-fn attitude(angles: Three) -> (Matrix3, Matrix3) {
+#[inline]
+pub(super) fn attitude(angles: Three) -> (Matrix3, Matrix3) {
     let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(sincos);
     (
         [

@@ -10,10 +10,12 @@ use std::fmt::Write as _;
 use super::contact::{WorkPart, Wrench};
 use super::frames::UserFrames;
 use super::gauge::{GaugeSignal, Probe};
+use super::geometry::{angles, rotation};
 use super::linear::Six;
 use super::machine::Machine;
 use super::sensor::ForceSensor;
 use super::specimen::Specimen;
+use super::study::pose_of;
 use super::table::PoseErrors;
 use crate::closed_loop::{Preparation, RunError, ticks_within};
 use crate::controller::TickController;
@@ -64,6 +66,8 @@ pub struct PlatformRig {
     /// Voltage at which the legs rest, V.
     rest_voltage: f64,
     probes: [Probe; 6],
+    /// Distance of each probe from its plane at rest, m.
+    rest_distances: Six,
     gauges: [Gauge; 6],
     range: [f64; 2],
     signal: GaugeSignal,
@@ -83,6 +87,7 @@ impl PlatformRig {
             height: nominal.height_m,
             rest_voltage: nominal.rest_voltage_v,
             probes: nominal.probes,
+            rest_distances: nominal.probes.map(|probe| probe.distance(nominal.height_m, &[0.0; 6])),
             gauges: std::array::from_fn(|k| Gauge::new(&noise.channels, seed, k as u64)),
             range: nominal.gauge_range_m,
             signal: GaugeSignal::Metres,
@@ -104,12 +109,20 @@ impl PlatformRig {
     #[must_use]
     pub fn with_probes(mut self, probes: [Probe; 6]) -> Self {
         self.probes = probes;
+        self.rest_distances = probes.map(|probe| probe.distance(self.height, &[0.0; 6]));
         self
     }
 
     /// Pre-cycle, rest and zero of the gauges, see [`Machine::prepare`].
     pub fn prepare(&mut self, preparation: &Preparation) {
         self.machine.prepare(preparation);
+    }
+
+    /// Draws the noise of the next `ticks` ticks now: clones made after this share it. The bits of a run stay as they are.
+    pub fn draw_ahead(&mut self, ticks: usize) {
+        self.gauges.iter_mut().for_each(|gauge| gauge.draw_ahead(ticks));
+        self.amplifiers.iter_mut().for_each(|noise| noise.draw_ahead(ticks));
+        self.force_sensor.draw_ahead(ticks);
     }
 
     /// The machine.
@@ -133,10 +146,12 @@ impl PlatformRig {
     /// Reads the six gauges, in m or V.
     pub fn read_gauges(&mut self) -> Six {
         let pose = self.machine.pose();
+        let turn = rotation(angles(&pose));
         let [low, high] = self.range;
         for k in 0..6 {
             // Drawn whatever the fault, so that a fault does not shift the noise of a run.
-            let reading = self.gauges[k].read(self.probes[k].reading(self.height, &pose));
+            let moved = self.probes[k].distance_turned(self.height, &pose, &turn) - self.rest_distances[k];
+            let reading = self.gauges[k].read(moved);
             let held = if reading > high {
                 high
             } else if reading < low {
@@ -234,6 +249,14 @@ pub struct Tick {
     pub wrench: Wrench,
 }
 
+/// Where a bench stopped: what [`Bench::resume`] needs besides rig and controller.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Paused {
+    sequence: u64,
+    ticks: usize,
+    underway: VecDeque<Six>,
+}
+
 /// A rig and a controller that run together.
 pub struct Bench<'a> {
     rig: &'a mut PlatformRig,
@@ -261,9 +284,19 @@ impl<'a> Bench<'a> {
         interval: f64,
         latency: usize,
     ) -> Result<Self, RunError> {
-        let wiring = Wiring::of(controller)?;
-        let rest = rig.rest_voltage;
         controller.reset();
+        let underway = VecDeque::from(vec![[rig.rest_voltage; 6]; latency]);
+        Self::resume(rig, controller, interval, &Paused { sequence: 0, ticks: 0, underway })
+    }
+
+    /// Goes on from where a bench stopped, with clones of its rig and controller.
+    pub(super) fn resume(
+        rig: &'a mut PlatformRig,
+        controller: &'a mut dyn TickController,
+        interval: f64,
+        paused: &Paused,
+    ) -> Result<Self, RunError> {
+        let wiring = Wiring::of(controller)?;
         let description = controller.description();
         Ok(Self {
             wiring,
@@ -273,11 +306,16 @@ impl<'a> Bench<'a> {
             rig,
             controller,
             interval,
-            sequence: 0,
-            ticks: 0,
-            underway: VecDeque::from(vec![[rest; 6]; latency]),
+            sequence: paused.sequence,
+            ticks: paused.ticks,
+            underway: paused.underway.clone(),
             trace: None,
         })
+    }
+
+    /// Where it stands.
+    pub(super) fn pause(self) -> Paused {
+        Paused { sequence: self.sequence, ticks: self.ticks, underway: self.underway }
     }
 
     /// Keeps every word from here on.
@@ -476,8 +514,7 @@ impl PlatformRig {
             let time = (tick + 1) as f64 * interval;
             let wanted = trajectory.target(time);
             let tick = bench.tick(&Request::stream(wanted))?;
-            let moved = options.frames.map_or(wanted.pose, |frames| frames.pose(&wanted.pose));
-            let target = std::array::from_fn(|k| options.bias[k] + moved[k]);
+            let target = pose_of(options, &wanted);
             errors.add(&std::array::from_fn(|k| target[k] - tick.pose[k]));
             seen |= tick.status;
             if options.record != Record::Errors {
@@ -522,7 +559,7 @@ impl PlatformRig {
     }
 
     /// A bench with the controller at its bias pose, rested, in contact; and how long the way took, s.
-    fn ready<'a>(
+    pub(super) fn ready<'a>(
         &'a mut self,
         controller: &'a mut dyn TickController,
         options: &RunOptions,

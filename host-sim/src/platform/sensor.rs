@@ -21,6 +21,11 @@ impl ForceSensor {
         Self { noise: std::array::from_fn(|k| Gaussian::new(noise[k], seed, FIRST_STREAM + k as u64)), range: *range }
     }
 
+    /// See [`Gaussian::draw_ahead`].
+    pub fn draw_ahead(&mut self, count: usize) {
+        self.noise.iter_mut().for_each(|noise| noise.draw_ahead(count));
+    }
+
     /// Reading of `wrench`: force, torque; held at the range.
     pub fn read(&mut self, wrench: &Wrench) -> Six {
         let truth = wrench.numbers();

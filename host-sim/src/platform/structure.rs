@@ -17,6 +17,10 @@ use super::geometry::{Geometry, angles, rate_matrix};
 use super::inertia::Masses;
 use super::linear::{Matrix6, Six, apply, apply_transposed, exponential, generalised_eigen, inverse, product};
 
+mod lanes;
+
+pub(super) use lanes::StructureLanes;
+
 /// Coordinates and rates.
 const STATES: usize = 12;
 

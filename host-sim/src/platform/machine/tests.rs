@@ -115,3 +115,87 @@ fn the_same_voltages_give_the_same_bits() {
     };
     assert_eq!(run(), run());
 }
+
+/// 10 Hz on all legs from rest, slower than the current limit, as a controller would drive them.
+fn voltages(tick: u32) -> Six {
+    let rise = 40.0 - 40.0 * libm::cos(2.0 * core::f64::consts::PI * 10.0 * f64::from(tick) * 1e-4);
+    std::array::from_fn(|leg| rise * (1.0 - 0.1 * leg as f64))
+}
+
+fn driven(machine: &mut Machine, ticks: u32) -> Vec<Six> {
+    let mut poses = Vec::new();
+    for tick in 0..ticks {
+        machine.hold(&voltages(tick), 1e-4);
+        poses.push(machine.pose());
+    }
+    poses
+}
+
+fn worst(run: &[Six], other: &[Six]) -> f64 {
+    let one = |a: &Six, b: &Six| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max);
+    run.iter().zip(other).map(|(a, b)| one(a, b)).fold(0.0, f64::max)
+}
+
+#[test]
+fn whole_ticks_are_of_second_order_and_half_a_nanometre_from_the_finest_steps() {
+    let specimen = Specimen::reference();
+    let mut finest = prepared(&specimen);
+    let [mut whole, mut half] = [finest.clone(), finest.clone()];
+    finest.set_longest_step(2.5e-6);
+    whole.step_whole_ticks(1e-4);
+    half.step_whole_ticks(0.5e-4);
+    let reference = driven(&mut finest, 1000);
+    // Two intervals of half the length under the same voltage.
+    let halves = |machine: &mut Machine| {
+        (0..1000)
+            .map(|tick| {
+                let volts = voltages(tick);
+                machine.hold(&volts, 0.5e-4);
+                machine.hold(&volts, 0.5e-4);
+                machine.pose()
+            })
+            .collect::<Vec<Six>>()
+    };
+    let by_whole = worst(&driven(&mut whole, 1000), &reference);
+    let by_half = worst(&halves(&mut half), &reference);
+    println!("10 Hz, 56 µm, from 2.5 µs: {:.1} pm in whole ticks, {:.1} pm in halves", by_whole * 1e12, by_half * 1e12);
+    assert!(by_whole < 0.5e-9 && by_half < 0.5 * by_whole, "{by_whole:e} {by_half:e}");
+}
+
+#[test]
+fn a_kick_rings_alike_in_whole_ticks_and_at_the_current_limit() {
+    let specimen = Specimen::reference();
+    let mut usual = prepared(&specimen);
+    usual.set_longest_step(2.5e-6);
+    let mut whole = usual.clone();
+    whole.step_whole_ticks(1e-4);
+    for (volts, bound) in [(10.0, 3e-9), (80.0, 100e-9)] {
+        let kick = |machine: &mut Machine| -> Vec<Six> {
+            (0..300).map(|_| { machine.hold(&[volts, 0.0, volts, 0.0, 0.0, 0.5 * volts], 1e-4); machine.pose() }).collect()
+        };
+        let (a, b) = (kick(&mut usual), kick(&mut whole));
+        println!("{volts} V: {:.1} pm of {:.1} µm", worst(&a, &b) * 1e12, a[299][2] * 1e6);
+        assert!(worst(&a, &b) < bound, "{volts} V: {:e}", worst(&a, &b));
+    }
+}
+
+#[test]
+fn whole_ticks_have_the_same_bits_on_every_processor_and_end_where_they_must() {
+    let specimen = Specimen::reference();
+    let mut machine = prepared(&specimen);
+    machine.step_whole_ticks(1e-4);
+    let mut plain = machine.clone();
+    for tick in 0..500 {
+        let volts = std::array::from_fn(|leg| f64::from(tick % (50 + 7 * leg as u32)));
+        machine.hold(&volts, 1e-4);
+        plain.whole_tick.as_mut().unwrap().hold_plainly(&volts);
+        assert_eq!(machine.pose().map(f64::to_bits), plain.pose().map(f64::to_bits), "tick {tick}");
+    }
+    let (pose, voltages, free) = (machine.pose(), machine.stack_voltages(), machine.free_displacements());
+    machine.touch(WorkPart::glass());
+    assert!(machine.whole_tick.is_none());
+    assert_eq!((machine.pose(), machine.stack_voltages()), (pose, voltages));
+    for (after, before) in machine.free_displacements().iter().zip(free) {
+        assert!((after - before).abs() < 1e-18);
+    }
+}

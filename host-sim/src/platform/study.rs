@@ -1,0 +1,116 @@
+//! Many runs of one platform from one state: armed and settled once, then cloned, with the noise of the runs drawn once.
+//!
+//! A run takes other settings over while the controller stands at its bias pose, which it does without a bump, and then
+//! follows the trajectory as a stream. The machine takes whole ticks, see [`super::Machine::step_whole_ticks`].
+
+use std::ops::ControlFlow;
+
+use super::linear::Six;
+use super::rig::{Bench, Paused, PlatformRig, Request, RunOptions, Tick};
+use super::scenario::PlatformScenario;
+use crate::closed_loop::{RunError, ticks_within};
+use crate::controller::{Controller, TickController};
+use crate::trajectory::{PoseTarget, PoseTrajectory};
+
+/// A platform at its bias pose with a trajectory before it.
+pub struct PlatformStudy {
+    rig: PlatformRig,
+    controller: Controller,
+    paused: Paused,
+    interval: f64,
+    /// Set-points of each tick with the true pose that they ask for.
+    targets: Vec<(PoseTarget, Six)>,
+}
+
+/// The end of one tick of a run.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<'a> {
+    /// Since the start of the trajectory, s.
+    pub time: f64,
+    /// Bias and trajectory, m and rad from rest.
+    pub target: &'a Six,
+    /// The tick.
+    pub tick: &'a Tick,
+}
+
+impl PlatformStudy {
+    /// Arms a fork of `controller`, configured as it is, on a machine of `scenario` in steps of whole ticks or the usual
+    /// ones, and settles it. Runs follow `trajectory` from there.
+    ///
+    /// # Errors
+    /// As [`PlatformRig::run`].
+    pub fn new(
+        scenario: &PlatformScenario,
+        controller: &Controller,
+        trajectory: &dyn PoseTrajectory,
+        whole_ticks: bool,
+    ) -> Result<Self, RunError> {
+        let options = &scenario.options;
+        let interval = options.interval;
+        let ticks = ticks_within(trajectory.duration(), interval)?;
+        let targets = (1..=ticks).map(|tick| {
+            let wanted = trajectory.target(tick as f64 * interval);
+            (wanted, pose_of(options, &wanted))
+        });
+        let mut rig = scenario.rig().clone();
+        if whole_ticks {
+            rig.machine_mut().step_whole_ticks(interval);
+        }
+        let mut controller = controller.fork();
+        let (bench, _) = rig.ready(&mut controller, options)?;
+        let paused = bench.pause();
+        rig.draw_ahead(ticks);
+        Ok(Self { rig, controller, paused, interval, targets: targets.collect() })
+    }
+
+    /// Ticks of a run.
+    #[must_use]
+    pub fn ticks(&self) -> usize {
+        self.targets.len()
+    }
+
+    /// Length of a run, s.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.targets.len() as f64 * self.interval
+    }
+
+    /// A controller for [`PlatformStudy::run`], one for each thread.
+    #[must_use]
+    pub fn controller(&self) -> Controller {
+        self.controller.fork()
+    }
+
+    /// Runs the trajectory with the settings `words`. `watch` sees the end of every tick and may end the run.
+    ///
+    /// # Errors
+    /// If the controller refuses the settings or gives a voltage that is not finite.
+    ///
+    /// # Panics
+    /// If `controller` is not from [`PlatformStudy::controller`].
+    pub fn run(
+        &self,
+        controller: &mut Controller,
+        words: &[u64],
+        mut watch: impl FnMut(&Moment) -> ControlFlow<()>,
+    ) -> Result<(), RunError> {
+        controller.take_over(&self.controller);
+        controller.configure(words)?;
+        let mut rig = self.rig.clone();
+        let mut bench = Bench::resume(&mut rig, controller, self.interval, &self.paused)?;
+        for (index, (wanted, target)) in self.targets.iter().enumerate() {
+            let tick = bench.tick(&Request::stream(*wanted))?;
+            let time = (index + 1) as f64 * self.interval;
+            if watch(&Moment { time, target, tick: &tick }).is_break() {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The true pose that a set-point asks for, from rest.
+pub(super) fn pose_of(options: &RunOptions, wanted: &PoseTarget) -> Six {
+    let moved = options.frames.map_or(wanted.pose, |frames| frames.pose(&wanted.pose));
+    std::array::from_fn(|k| options.bias[k] + moved[k])
+}

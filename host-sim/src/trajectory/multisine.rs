@@ -1,0 +1,122 @@
+//! A smooth motion that looks like no case of the paper: what a controller is tuned on, so that it can be scored on those.
+
+use core::f64::consts::{PI, TAU};
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use super::{LegTrajectory, PoseTarget, PoseTrajectory};
+use crate::noise::unit;
+
+/// Frequencies against the highest; no two are in a small whole ratio, so that nothing repeats within a run.
+const RATIOS: [f64; 5] = [0.083, 0.217, 0.393, 0.641, 1.0];
+/// Part of the run over which the motion fades in.
+const FADE: f64 = 0.1;
+/// Stream of the phases.
+const PHASES: u64 = 3 << 32;
+
+/// Six coordinates, each a sum of five sines with phases of its own, faded in from rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Multisine {
+    duration: f64,
+    /// What each coordinate swings about after the fade, in its unit.
+    center: [f64; 6],
+    /// Angular frequency (rad/s), amplitude and phase of each sine.
+    sines: [[[f64; 3]; 5]; 6],
+}
+
+impl Multisine {
+    /// `duration` in s; the fastest sine has `frequency` (Hz); each coordinate stays within `center` ± `reach` (m or rad)
+    /// once it is faded in. Amplitudes fall with frequency; phases come from `seed`.
+    #[must_use]
+    pub fn new(duration: f64, frequency: f64, center: [f64; 6], reach: [f64; 6], seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(PHASES);
+        // 1, 1/2 … of the slowest would be a drift; half of it to the slow ones, half to the fast ones.
+        let shares = [0.3, 0.2, 0.15, 0.15, 0.2];
+        let sines = reach.map(|reach| {
+            core::array::from_fn(|k| [TAU * frequency * RATIOS[k], reach * shares[k], TAU * unit(&mut rng)])
+        });
+        Self { duration, center, sines }
+    }
+
+    /// Value, rate and acceleration of a coordinate.
+    fn coordinate(&self, axis: usize, time: f64) -> [f64; 3] {
+        let mut sum = [self.center[axis], 0.0, 0.0];
+        for [speed, amplitude, phase] in self.sines[axis] {
+            let (sin, cos) = libm::sincos(speed * time + phase);
+            sum[0] += amplitude * sin;
+            sum[1] += amplitude * speed * cos;
+            sum[2] -= amplitude * speed * speed * sin;
+        }
+        let fade = FADE * self.duration;
+        if time >= fade {
+            return sum;
+        }
+        // s − sin(2πs)/2π: at rest, and not accelerated, at both ends.
+        let s = time / fade;
+        let (sin, cos) = libm::sincos(TAU * s);
+        let w = [s - sin / TAU, (1.0 - cos) / fade, 2.0 * PI * sin / (fade * fade)];
+        [w[0] * sum[0], w[1] * sum[0] + w[0] * sum[1], w[2] * sum[0] + 2.0 * w[1] * sum[1] + w[0] * sum[2]]
+    }
+}
+
+impl PoseTrajectory for Multisine {
+    fn duration(&self) -> f64 {
+        self.duration
+    }
+
+    fn target(&self, time: f64) -> PoseTarget {
+        let mut target = PoseTarget::default();
+        for axis in 0..6 {
+            [target.pose[axis], target.rate[axis], target.acceleration[axis]] = self.coordinate(axis, time);
+        }
+        target
+    }
+}
+
+impl LegTrajectory for Multisine {
+    fn duration(&self) -> f64 {
+        self.duration
+    }
+
+    fn displacements(&self, time: f64) -> [f64; 6] {
+        core::array::from_fn(|leg| self.coordinate(leg, time)[0])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> Multisine {
+        let center = [0.0, 1e-6, 5e-6, 0.0, 0.0, 1e-5];
+        Multisine::new(2.0, 10.0, center, [1e-5, 1e-5, 1e-5, 3e-5, 3e-5, 3e-5], 4)
+    }
+
+    #[test]
+    fn it_starts_at_rest_stays_in_reach_and_its_derivatives_are_its_own() {
+        let motion = sample();
+        assert_eq!(motion.target(0.0), PoseTarget::default());
+        let h = 1e-6;
+        for k in 1..4000 {
+            let time = f64::from(k) * 5e-4 - 1.3e-4;
+            let [before, here, after] = [time - h, time, time + h].map(|t| motion.target(t));
+            for axis in 0..6 {
+                let (center, reach) = (motion.center[axis], motion.sines[axis].iter().map(|s| s[1]).sum::<f64>());
+                assert!(here.pose[axis] <= center + reach && here.pose[axis] >= (center - reach).min(-reach));
+                let rate = (after.pose[axis] - before.pose[axis]) / (2.0 * h);
+                let acceleration = (after.rate[axis] - before.rate[axis]) / (2.0 * h);
+                assert!((here.rate[axis] - rate).abs() < 1e-4 * reach * 100.0, "{axis} {time}");
+                assert!((here.acceleration[axis] - acceleration).abs() < 1e-4 * reach * 1e4, "{axis} {time}");
+            }
+        }
+    }
+
+    #[test]
+    fn another_seed_is_another_motion_and_the_same_seed_the_same() {
+        let motion = |seed| Multisine::new(2.0, 10.0, [0.0; 6], [1e-5; 6], seed);
+        assert_eq!(motion(1), motion(1));
+        assert_ne!(motion(1), motion(2));
+    }
+}
