@@ -1,6 +1,7 @@
 //! The command line: arguments in, text or JSON out, exit code.
 //!
-//! Exit codes: 0 good, 1 the spec, a record or a budget fails, 2 usage, 3 environment (a missing tool, a full disk).
+//! Exit codes: 0 good, 1 the spec, a record or a budget fails, 2 usage, 3 environment (a missing tool, a full disk),
+//! 130 ended by Ctrl-C with the best so far.
 
 mod build;
 mod check;
@@ -8,6 +9,7 @@ mod dynamics;
 mod file;
 mod identify;
 mod sim;
+mod tune;
 mod ui;
 
 use std::path::PathBuf;
@@ -29,7 +31,7 @@ use ui::{Failure, Ui};
                   specgen check platform.toml            every finding, nothing written\n  \
                   specgen sim platform.toml              the paper's experiments with the emitted controller\n  \
                   specgen identify record.csv --drive -90:90 --grid 32\n\n\
-                  Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment."
+                  Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment, 130 interrupted with a result."
 )]
 struct Cli {
     #[command(subcommand)]
@@ -54,6 +56,8 @@ enum Command {
     Check(check::Arguments),
     /// Run the paper's experiments with the emitted controller against a simulated machine.
     Sim(sim::Arguments),
+    /// Tune gains and weights on the simulated loop with the emitted controller.
+    Tune(tune::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
     /// Identify the Everett table of a leg from a reversal-curve record.
@@ -79,6 +83,7 @@ pub fn run() -> ExitCode {
         None => build::run(&cli.build, &mut ui),
         Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
         Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
+        Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
         Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
@@ -96,7 +101,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, sim, dynamics, identify, forc, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, sim, tune, dynamics, identify, forc, dump-ir) with its own arguments",
         ),
         _ => error,
     };

@@ -59,7 +59,14 @@ pub struct Refused {
 /// # Errors
 /// The spec or a record is refused. Later phases run only on what earlier ones accepted, so a second run may find more.
 pub fn compile(path: &Path) -> Result<Compiled, Refused> {
-    let source = SpecSource::read(path).map_err(|finding| Refused { source: None, findings: vec![finding] })?;
+    compile_source(SpecSource::read(path).map_err(|finding| Refused { source: None, findings: vec![finding] })?)
+}
+
+/// The same for a text at hand.
+///
+/// # Errors
+/// As [`compile`].
+pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
     let (model, mut findings) = spec::load(&source);
     let Some(model) = model else {
         return Err(Refused { source: Some(source), findings });

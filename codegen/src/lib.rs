@@ -20,6 +20,7 @@ pub mod reach;
 pub mod spec;
 pub mod stability;
 pub mod target;
+pub mod tuning;
 pub mod verify;
 pub mod waveform;
 pub mod workspace;

@@ -9,6 +9,7 @@
 //!    the integrator meets the resonance.
 
 mod jury;
+mod phase;
 pub mod platform;
 mod sampled;
 
@@ -16,7 +17,8 @@ use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::model::{Adaptation, Model};
 
 pub use jury::{ewma_limit, pcc_limit};
-pub use sampled::{LegDynamics, spectral_radius};
+pub use phase::phase_margin;
+pub use sampled::{LegDynamics, spectral_radius, transition};
 
 /// A radius above this is refused. The limit is 1; a small weight rightly has a radius just below it, so what is kept
 /// off here is rounding, not slowness.

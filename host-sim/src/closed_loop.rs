@@ -270,7 +270,10 @@ impl<P: Plant> Rig<P> {
 }
 
 /// Number of ticks of `interval` (s) in `duration` (s).
-pub(crate) fn ticks_within(duration: f64, interval: f64) -> Result<usize, RunError> {
+///
+/// # Errors
+/// If there would be none, or more than 100 million.
+pub fn ticks_within(duration: f64, interval: f64) -> Result<usize, RunError> {
     // The slack keeps the last tick when the ratio is whole but for rounding.
     let ticks = libm::floor(duration / interval + 1e-6);
     if interval > 0.0 && interval <= LONGEST_INTERVAL && (1.0..=1e8).contains(&ticks) {

@@ -46,7 +46,7 @@ pub struct Arguments {
 }
 
 /// A frequency at which a trajectory has a sensible length.
-fn frequency(text: &str) -> Result<f64, String> {
+pub(super) fn frequency(text: &str) -> Result<f64, String> {
     let expected = || format!("expected a frequency from 0.001 to 1000 Hz, found `{text}`");
     let hertz: f64 = text.trim().trim_end_matches("Hz").trim().parse().map_err(|_| expected())?;
     if (1e-3..=1e3).contains(&hertz) { Ok(hertz) } else { Err(expected()) }
@@ -58,17 +58,17 @@ pub struct PlantArguments {
     /// Leg parameters (JSON); the reference leg if not given. With [control]: the shape of the legs' hysteresis, scaled to
     /// what the spec says of them.
     #[arg(long, value_name = "FILE")]
-    plant: Option<PathBuf>,
+    pub(super) plant: Option<PathBuf>,
     /// Without noise and quantisation of gauge and amplifier.
     #[arg(long)]
-    no_noise: bool,
+    pub(super) no_noise: bool,
     /// Seed of the noise, and with [control] of the tolerances of the machine.
     #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
-    seed: u64,
+    pub(super) seed: u64,
 }
 
 impl PlantArguments {
-    fn leg(&self) -> Result<LegParameters, Failure> {
+    pub(super) fn leg(&self) -> Result<LegParameters, Failure> {
         match &self.plant {
             Some(path) => LegParameters::load(path).map_err(|error| Failure::Gate(error.to_string())),
             None => Ok(LegParameters::reference()),
@@ -82,7 +82,7 @@ impl PlantArguments {
     }
 }
 
-fn environment(error: impl Display) -> Failure {
+pub(super) fn environment(error: impl Display) -> Failure {
     Failure::Environment(error.to_string())
 }
 
@@ -96,17 +96,22 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(task) => platform::check(arguments, task)?,
         None => legs::check(arguments)?,
     }
-    // The controller that runs is the emitted one, built from the same files that the main job writes.
+    let mut controller = emitted(&compiled, ui)?;
+    match task {
+        Some(task) => platform::run(arguments, &compiled, task, &mut controller, ui),
+        None => legs::run(arguments, &compiled, &mut controller, ui),
+    }
+}
+
+/// The emitted controller, built for this host from the same files that the main job writes. What it was built in is gone
+/// when this returns; the library stays loaded.
+pub(super) fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
     let scratch = tempfile::tempdir().map_err(environment)?;
     let workspace = scratch.path().join("controller");
     workspace::write(&workspace, &compiled.files)?;
     ui.progress("building the emitted controller for this host");
     let library = target::host::build_library(&workspace, &scratch.path().join("target"))?;
-    let mut controller = Controller::load(&library).map_err(environment)?;
-    match task {
-        Some(task) => platform::run(arguments, &compiled, task, &mut controller, ui),
-        None => legs::run(arguments, &compiled, &mut controller, ui),
-    }
+    Controller::load(&library).map_err(environment)
 }
 
 /// Arguments of `forc`.
@@ -135,7 +140,7 @@ pub fn run_forc(arguments: &ForcArguments, ui: &mut Ui) -> Result<(), Failure> {
 }
 
 /// Writes all files into a new or existing folder; each is replaced whole.
-fn write_folder(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
+pub(super) fn write_folder(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
     fs::create_dir_all(folder)
         .map_err(|error| Failure::Environment(format!("could not create `{}`: {error}", folder.display())))?;
     for (name, bytes) in files {

@@ -11,6 +11,9 @@ use crate::spec::SpecSource;
 use crate::target::TargetError;
 use crate::workspace::WriteError;
 
+/// Exit code of a command that was ended by Ctrl-C, as shells have it.
+const INTERRUPTED: u8 = 130;
+
 /// Why a command did not succeed, by exit code.
 #[derive(Debug)]
 pub enum Failure {
@@ -26,6 +29,13 @@ pub enum Failure {
     Target(TargetError),
     /// The file system or the simulator said no.
     Environment(String),
+    /// Ended from outside with a result: what was found so far.
+    Interrupted {
+        /// What is left undone.
+        message: String,
+        /// For programs; the text is out already.
+        result: Value,
+    },
 }
 
 impl From<Refused> for Failure {
@@ -92,6 +102,25 @@ impl Ui {
         }
     }
 
+    /// Shows how far something is, in place of the line before where the eyes are at a terminal.
+    pub fn rate(&self, line: &str) {
+        if !self.json {
+            if std::io::stderr().is_terminal() { anstream::eprint!("\r\x1b[2K{line}") } else { anstream::eprintln!("{line}") }
+        }
+    }
+
+    /// Ends the line of [`Ui::rate`].
+    pub fn rate_done(&self) {
+        if !self.json && std::io::stderr().is_terminal() {
+            anstream::eprintln!();
+        }
+    }
+
+    /// Whether the result is for programs.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
     /// Plain text on standard output. A closed pipe is the reader's business, not an error of ours.
     pub fn out(&self, text: &str) {
         let _ = std::io::stdout().write_all(text.as_bytes());
@@ -112,9 +141,14 @@ impl Ui {
             Failure::Write(error) => (3, error.to_string()),
             Failure::Target(error) => (3, error.to_string()),
             Failure::Environment(text) => (3, text.clone()),
+            Failure::Interrupted { message, .. } => (INTERRUPTED, message.clone()),
         };
         if self.json {
-            self.document(code, Value::Null, Some(&message));
+            let result = match failure {
+                Failure::Interrupted { result, .. } => result.clone(),
+                _ => Value::Null,
+            };
+            self.document(code, result, Some(&message));
         } else {
             anstream::eprintln!("error: {message}");
         }

@@ -1,7 +1,7 @@
 //! The registry of finding codes. A code never changes its meaning; a retired one is not used again.
 //!
 //! `docs/diagnostics.md` is generated from here, see [`super::reference_markdown`]. E01: file and syntax, E02: keys and
-//! values, E03: ranges and consistency, E04: stability and lowering, E05: records, E06: identification.
+//! values, E03: ranges and consistency, E04: stability and lowering, E05: records, E06: identification, E07: tuning.
 
 /// What a code stands for.
 #[derive(Debug, Clone, Copy)]
@@ -239,6 +239,16 @@ codes! {
         "A table named in hysteresis.records must have the cells of hysteresis.grid over the range of actuator.voltage: identify the record again with both.";
     RECORD_SCALE = "E0615", "a record that the actuator cannot have made",
         "Its displacement is more than five times, or less than a fifth, of stacks x stack_gain x voltage: most likely it is not in micrometres.";
+    TUNE_NOTHING = "E0701", "nothing to tune",
+        "The spec's mode uses none of the numbers that `--what` names. The help says which modes use which.";
+    TUNE_BOUNDS = "E0702", "bounds that hold nothing",
+        "The smaller bound comes first and is above zero, and bounds are for numbers that are tuned.";
+    TUNE_NO_START = "E0703", "no start within the margins",
+        "Neither the spec's own numbers nor the rule's, made smaller forty times, are stable with the margins that are asked for, within the bounds. Ask for smaller margins, widen the bounds downward, or see what `specgen check` says of the loop.";
+    TUNE_REFUSED = "E0704", "a result that does not compile",
+        "The spec with the tuned numbers is refused by the compiler, which looks at more conditions than the search does; nothing was written. Ask for larger margins.";
+    TUNE_LIMITED = "E0705", "a start at its limits",
+        "With the first numbers that are stable the run meets a limit of voltage or stroke, or the controller refuses the trajectory: another trajectory or frequency is needed.";
     STROKE_MISMATCH = "W0301", "stroke, gain and voltage do not fit",
         "stacks x stack_gain x voltage range is far from the stroke: one of the four is probably wrong, or the stroke is never used.";
     RESONANCE_ALIASED = "W0302", "resonance above half the tick rate",

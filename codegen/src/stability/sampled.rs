@@ -13,6 +13,7 @@ use core::f64::consts::TAU;
 use nalgebra::{DMatrix, SMatrix, SVector};
 
 use crate::model::Model;
+use crate::numerics::Matrix;
 
 /// Linear dynamics of a leg as the adaptation sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -72,6 +73,24 @@ impl LegDynamics {
 /// Spectral radius of the loop from run to run; `drift_weight` none for EWMA.
 #[must_use]
 pub fn spectral_radius(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> f64 {
+    let one_run = one_run(dynamics, level_weight, drift_weight, gain_ratio);
+    one_run.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
+}
+
+/// The loop from run to run as a matrix over [p, y, v, δ̂, φ̂], φ̂ left out for EWMA.
+#[must_use]
+pub fn transition(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> Matrix {
+    let one_run = one_run(dynamics, level_weight, drift_weight, gain_ratio);
+    let mut matrix = Matrix::zeros(one_run.nrows());
+    for row in 0..one_run.nrows() {
+        for column in 0..one_run.ncols() {
+            matrix[(row, column)] = one_run[(row, column)];
+        }
+    }
+    matrix
+}
+
+fn one_run(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> DMatrix<f64> {
     let (transition, input) = dynamics.discretise();
     let states = if drift_weight.is_some() { 5 } else { 4 };
     let mut one_run = DMatrix::zeros(states, states);
@@ -92,7 +111,7 @@ pub fn spectral_radius(dynamics: &LegDynamics, level_weight: f64, drift_weight: 
             one_run[(row, column)] = own + gain_ratio * input[row] * request_row[column];
         }
     }
-    one_run.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
+    one_run
 }
 
 /// Row of an estimate over [p, y, v, δ̂, φ̂]: its factors of y, δ̂ and φ̂.

@@ -1,0 +1,26 @@
+//! Gains and weights from the simulated loop with the emitted controller.
+//!
+//! ```text
+//! spec → space (what may change) → relay test → start ─┐
+//!                genetic | cma: ask ─→ feasible (margins) ─→ evaluate (simulation) ─→ tell
+//!                                      └ archive: history, best, front ─→ write (spec), report, plot
+//! ```
+//! Settings are words of the controller's `Config`: nothing is built per candidate. What breaks a margin is rejected
+//! before it is simulated, what meets a limit of voltage or stroke while it is; neither is scored.
+
+pub mod cma;
+pub mod evaluate;
+pub mod feasible;
+pub mod front;
+pub mod genetic;
+pub mod plot;
+pub mod relay;
+pub mod search;
+pub mod setting;
+pub mod space;
+pub mod write;
+
+pub use evaluate::{Case, Conditions, Evaluation, Score, TrajectoryChoice};
+pub use search::{Candidate, Optimiser, Search, SearchOptions};
+pub use setting::Setting;
+pub use space::{Space, What};

@@ -1,0 +1,274 @@
+//! The loop of every optimiser: ask, reject, evaluate in parallel, tell; and what is kept of it.
+//!
+//! Candidates of a generation are independent, and results are taken in the order in which they were asked for: the same
+//! seed gives the same bytes whatever the number of threads. A setting that was seen before is not simulated again.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use host_sim::closed_loop::RunError;
+use host_sim::controller::Controller;
+use serde::Serialize;
+
+use super::{Case, Evaluation, Score, Setting, Space};
+use crate::tuning::feasible::Feasibility;
+
+/// Something that proposes numbers in [0, 1] and learns from their costs.
+pub trait Optimiser {
+    /// The next generation.
+    fn ask(&mut self) -> Vec<Vec<f64>>;
+
+    /// Costs of that generation in its order; none for what was rejected.
+    fn tell(&mut self, costs: &[Option<f64>]);
+}
+
+/// Indices by rising cost, what was rejected last; ties in the order of the list.
+pub(super) fn ranked(costs: &[Option<f64>]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..costs.len()).collect();
+    let key = |index: &usize| costs[*index].unwrap_or(f64::INFINITY);
+    order.sort_by(|a, b| key(a).total_cmp(&key(b)));
+    order
+}
+
+/// How a search is run.
+pub struct SearchOptions<'a> {
+    /// Candidates that may be asked for.
+    pub evaluations: usize,
+    /// Worker threads, at least 1.
+    pub threads: usize,
+    /// Set from outside to end the search with what it has.
+    pub stop: &'a AtomicBool,
+    /// Told after every generation.
+    pub progress: &'a dyn Fn(&Progress),
+}
+
+/// How far a search is.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress {
+    /// Candidates so far, and in all.
+    pub done: usize,
+    /// See `done`.
+    pub all: usize,
+    /// Cost of the best.
+    pub best: Option<f64>,
+    /// Simulated seconds per second.
+    pub speed: f64,
+    /// Time left at this rate.
+    pub left: Duration,
+}
+
+/// What became of a candidate.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub enum Verdict {
+    /// Stability with the margins: not simulated.
+    Unstable,
+    /// Simulated.
+    Run(Evaluation),
+}
+
+/// A setting with its score.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Number among all that were asked for.
+    pub number: usize,
+    /// The numbers.
+    pub setting: Setting,
+    /// Their score.
+    pub score: Score,
+}
+
+/// Costs of a generation.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Generation {
+    /// Candidates asked for so far.
+    pub evaluations: usize,
+    /// Best cost so far.
+    pub best: Option<f64>,
+    /// Median of the generation's costs.
+    pub median: Option<f64>,
+    /// Rejected for stability, and at a limit.
+    pub unstable: usize,
+    /// See `unstable`.
+    pub limited: usize,
+}
+
+/// What a search found.
+#[derive(Debug, Clone, Default)]
+pub struct Search {
+    /// Every scored candidate, each setting once, in the order asked for.
+    pub scored: Vec<Candidate>,
+    /// Costs by generation.
+    pub history: Vec<Generation>,
+    /// Candidates asked for.
+    pub evaluations: usize,
+    /// Runs that were simulated.
+    pub runs: usize,
+    /// Whether it was ended from outside.
+    pub interrupted: bool,
+}
+
+impl Search {
+    /// The candidate of least cost, the first of equals.
+    #[must_use]
+    pub fn best(&self) -> Option<&Candidate> {
+        let mut best: Option<&Candidate> = None;
+        for candidate in &self.scored {
+            if best.is_none_or(|found| candidate.score.cost < found.score.cost) {
+                best = Some(candidate);
+            }
+        }
+        best
+    }
+
+    /// Runs `optimiser` on a case.
+    ///
+    /// # Errors
+    /// If a run fails for another reason than a limit: a defect, with the settings that show it.
+    pub fn run(
+        optimiser: &mut dyn Optimiser,
+        space: &Space,
+        feasibility: &Feasibility,
+        case: &Case,
+        options: &SearchOptions,
+    ) -> Result<Self, RunError> {
+        let mut search = Self::default();
+        let mut seen: BTreeMap<Vec<u64>, Verdict> = BTreeMap::new();
+        let mut workers: Vec<Controller> = (0..options.threads.max(1)).map(|_| case.worker()).collect();
+        let begun = Instant::now();
+        while search.evaluations < options.evaluations && !options.stop.load(Ordering::Relaxed) {
+            let mut asked = optimiser.ask();
+            asked.truncate(options.evaluations - search.evaluations);
+            let settings: Vec<Setting> = asked.iter().map(|genes| space.setting(genes)).collect();
+            let keys: Vec<Vec<u64>> = settings.iter().map(|setting| setting.words(&workers[0])).collect();
+            // The first of equal candidates is evaluated, and each only once in all.
+            let mut fresh: Vec<usize> = Vec::new();
+            for (index, key) in keys.iter().enumerate() {
+                if !seen.contains_key(key) && !fresh.iter().any(|&other| keys[other] == *key) {
+                    fresh.push(index);
+                }
+            }
+            let wanted: Vec<&Setting> = fresh.iter().map(|&index| &settings[index]).collect();
+            let verdicts = evaluate(&wanted, feasibility, case, &mut workers, options.stop);
+            let mut whole = true;
+            for (&index, verdict) in fresh.iter().zip(verdicts) {
+                let Some(verdict) = verdict else {
+                    whole = false;
+                    continue;
+                };
+                let verdict = verdict?;
+                if let Verdict::Run(evaluation) = verdict {
+                    search.runs += 1;
+                    if let Evaluation::Scored(score) = evaluation {
+                        let number = search.evaluations + index;
+                        search.scored.push(Candidate { number, setting: settings[index], score });
+                    }
+                }
+                seen.insert(keys[index].clone(), verdict);
+            }
+            if !whole {
+                // A generation that was cut short is not learned from, but what it found is kept.
+                search.interrupted = true;
+                break;
+            }
+            let verdicts: Vec<Verdict> =
+                keys.iter().map(|key| seen.get(key).copied().unwrap_or(Verdict::Unstable)).collect();
+            search.account(&verdicts);
+            if verdicts.len() == settings.len() {
+                let costs: Vec<Option<f64>> = verdicts.iter().map(cost).collect();
+                optimiser.tell(&costs);
+            }
+            let elapsed = begun.elapsed();
+            let left = elapsed.mul_f64((options.evaluations - search.evaluations) as f64 / search.evaluations.max(1) as f64);
+            (options.progress)(&Progress {
+                done: search.evaluations,
+                all: options.evaluations,
+                best: search.best().map(|candidate| candidate.score.cost),
+                speed: search.runs as f64 * case.seconds() / elapsed.as_secs_f64().max(1e-9),
+                left,
+            });
+        }
+        search.interrupted |= search.evaluations < options.evaluations;
+        Ok(search)
+    }
+
+    fn account(&mut self, verdicts: &[Verdict]) {
+        self.evaluations += verdicts.len();
+        let mut costs: Vec<f64> = verdicts.iter().filter_map(cost).collect();
+        costs.sort_by(f64::total_cmp);
+        let unstable = verdicts.iter().filter(|verdict| **verdict == Verdict::Unstable).count();
+        self.history.push(Generation {
+            evaluations: self.evaluations,
+            best: self.best().map(|candidate| candidate.score.cost),
+            median: costs.get(costs.len() / 2).copied(),
+            unstable,
+            limited: verdicts.len() - costs.len() - unstable,
+        });
+    }
+}
+
+fn cost(verdict: &Verdict) -> Option<f64> {
+    match verdict {
+        Verdict::Run(Evaluation::Scored(score)) => Some(score.cost),
+        _ => None,
+    }
+}
+
+type Outcome = Option<Result<Verdict, RunError>>;
+
+/// Verdicts in the order of `settings`; none for what was not begun when `stop` was set.
+pub fn evaluate(
+    settings: &[&Setting],
+    feasibility: &Feasibility,
+    case: &Case,
+    workers: &mut [Controller],
+    stop: &AtomicBool,
+) -> Vec<Outcome> {
+    let next = AtomicUsize::new(0);
+    let work = |worker: &mut Controller| {
+        let mut done = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(setting) = settings.get(index) else { return done };
+            if stop.load(Ordering::Relaxed) {
+                return done;
+            }
+            let verdict = if feasibility.holds(setting) {
+                case.run(worker, setting).map(Verdict::Run)
+            } else {
+                Ok(Verdict::Unstable)
+            };
+            done.push((index, verdict));
+        }
+    };
+    let mut outcomes: Vec<Outcome> = settings.iter().map(|_| None).collect();
+    let mut place = |done: Vec<(usize, Result<Verdict, RunError>)>| {
+        for (index, verdict) in done {
+            outcomes[index] = Some(verdict);
+        }
+    };
+    if let [worker] = workers {
+        place(work(worker));
+        return outcomes;
+    }
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = workers.iter_mut().map(|worker| scope.spawn(|| work(worker))).collect();
+        for thread in threads {
+            match thread.join() {
+                Ok(done) => place(done),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        }
+    });
+    outcomes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_rejected_ranks_last_and_ties_keep_their_order() {
+        assert_eq!(ranked(&[Some(2.0), None, Some(1.0), Some(2.0), None]), [2, 0, 3, 1, 4]);
+    }
+}
