@@ -11,7 +11,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 6] = ["check", "sim", "dynamics", "identify", "forc", "dump-ir"];
+const COMMANDS: [&str; 7] = ["check", "sim", "tune", "dynamics", "identify", "forc", "dump-ir"];
 
 #[test]
 fn arguments_that_make_no_sense_are_usage_errors() {
@@ -26,7 +26,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "-o", ""], "--output"),
         (&["legs.toml", "minimal.toml"], "one spec file is expected"),
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
-        (&["chek", "legs.toml"], "check, sim, dynamics, identify, forc, dump-ir"),
+        (&["chek", "legs.toml"], "check, sim, tune, dynamics, identify, forc, dump-ir"),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
         (&["sim"], "<SPEC>"),
@@ -44,6 +44,12 @@ fn arguments_that_make_no_sense_are_usage_errors() {
             &["sim", "reference.toml", "--trajectory", "case-1", "--frequency", "2"],
             "--frequency is for the paper's cases",
         ),
+        (&["tune"], "<SPEC>"),
+        (&["tune", "legs.toml", "--bounds", "level"], "expected GROUP=LOW:HIGH such as ki=10:1000, found `level`"),
+        (&["tune", "legs.toml", "--gain-margin", "0.5"], "expected a factor from 1 to 20, found `0.5`"),
+        (&["tune", "legs.toml", "--seconds", "nan"], "expected a time from 0.01 to 1000 s, found `nan`"),
+        (&["tune", "legs.toml", "--trajectory", "case-1"], "--trajectory leg is for six legs"),
+        (&["tune", "legs.toml", "--latency", "1"], "--latency is for a spec with [control]"),
         (&["forc"], "--output"),
         (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),
         (&["identify", record], "--drive"),

@@ -6,9 +6,9 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use host_sim::controller::TickController;
-use host_sim::platform::rig::{Bench, Noise, Request};
-use host_sim::platform::PlatformScenario;
 use host_sim::plant::LegParameters;
+use host_sim::platform::PlatformScenario;
+use host_sim::platform::rig::{Bench, Noise, Request};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory, Reading};
 use specgen::machine;
 use specgen_tests::Emitted;

@@ -25,8 +25,8 @@ use crate::tuning::genetic::{Genetic, Settings};
 use crate::tuning::search::Progress;
 use crate::tuning::space::GivenBounds;
 use crate::tuning::{
-    Candidate, Case, Conditions, Optimiser, Score, Search, SearchOptions, Setting, Space, TrajectoryChoice, What, front,
-    plot, write,
+    Candidate, Case, Conditions, Optimiser, Score, Search, SearchOptions, Setting, Space, TrajectoryChoice, What,
+    front, plot, write,
 };
 
 /// Set by Ctrl-C.
@@ -52,7 +52,7 @@ pub struct Arguments {
     /// Candidates of a generation; 100 (Table 3) for the genetic algorithm, 20 for CMA-ES if not given.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(4..=100_000))]
     population: Option<u32>,
-    /// What is followed while tuning. The result is scored on another: on the paper's, or on the multisine.
+    /// What is followed while tuning. The result is scored on another: case 1 or the leg's, or the multisine for these.
     #[arg(long, value_enum, default_value = "multisine")]
     trajectory: TrajectoryArgument,
     /// Highest frequency of the multisine, or operating frequency of the paper's trajectory, Hz.
@@ -133,7 +133,10 @@ fn ticks(text: &str) -> Result<f64, String> {
 fn bounds(text: &str) -> Result<GivenBounds, String> {
     let parsed = text.split_once('=').and_then(|(group, range)| {
         let (low, high) = range.split_once(':')?;
-        Some(GivenBounds { group: group.trim().to_owned(), bounds: [low.trim().parse().ok()?, high.trim().parse().ok()?] })
+        Some(GivenBounds {
+            group: group.trim().to_owned(),
+            bounds: [low.trim().parse().ok()?, high.trim().parse().ok()?],
+        })
     });
     parsed.ok_or_else(|| format!("expected GROUP=LOW:HIGH such as ki=10:1000, found `{text}`"))
 }
@@ -249,14 +252,6 @@ impl Job<'_> {
         Case::new(&self.compiled, &self.controller, &self.leg, start, conditions).map_err(environment)
     }
 
-    fn path(&self) -> PaperPath {
-        match self.arguments.trajectory {
-            TrajectoryArgument::Case2 => PaperPath::Case2,
-            TrajectoryArgument::Machining => PaperPath::Machining,
-            _ => PaperPath::Case1,
-        }
-    }
-
     fn conditions(&self, trajectory: TrajectoryChoice, seed: u64, whole_ticks: bool) -> Conditions {
         Conditions {
             trajectory,
@@ -271,8 +266,13 @@ impl Job<'_> {
         let Arguments { frequency, seconds, plant, .. } = self.arguments;
         let (frequency, seconds) = (*frequency, *seconds);
         let sines = TrajectoryChoice::Multisine { frequency, seconds, seed: plant.seed };
-        let paper = TrajectoryChoice::Paper { path: self.path(), frequency };
-        if self.arguments.trajectory == TrajectoryArgument::Multisine { [sines, paper] } else { [paper, sines] }
+        let paper = |path| TrajectoryChoice::Paper { path, frequency };
+        match self.arguments.trajectory {
+            TrajectoryArgument::Multisine => [sines, paper(PaperPath::Case1)],
+            TrajectoryArgument::Leg | TrajectoryArgument::Case1 => [paper(PaperPath::Case1), sines],
+            TrajectoryArgument::Case2 => [paper(PaperPath::Case2), paper(PaperPath::Case1)],
+            TrajectoryArgument::Machining => [paper(PaperPath::Machining), paper(PaperPath::Case1)],
+        }
     }
 
     /// What candidates are run on.

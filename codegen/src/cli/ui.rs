@@ -105,7 +105,11 @@ impl Ui {
     /// Shows how far something is, in place of the line before where the eyes are at a terminal.
     pub fn rate(&self, line: &str) {
         if !self.json {
-            if std::io::stderr().is_terminal() { anstream::eprint!("\r\x1b[2K{line}") } else { anstream::eprintln!("{line}") }
+            if std::io::stderr().is_terminal() {
+                anstream::eprint!("\r\x1b[2K{line}")
+            } else {
+                anstream::eprintln!("{line}")
+            }
         }
     }
 

@@ -63,7 +63,8 @@ impl Cma {
 
     fn begin(&mut self) {
         let n = self.mean.len();
-        let identity: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
+        let identity: Vec<Vec<f64>> =
+            (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
         self.step = STEP;
         self.covariance.clone_from(&identity);
         self.axes.clone_from(&identity);
@@ -93,7 +94,18 @@ impl Cma {
                 return point;
             }
         }
-        point.into_iter().map(|x| if x > 1.0 { 1.0 } else if x > 0.0 { x } else { 0.0 }).collect()
+        point
+            .into_iter()
+            .map(|x| {
+                if x > 1.0 {
+                    1.0
+                } else if x > 0.0 {
+                    x
+                } else {
+                    0.0
+                }
+            })
+            .collect()
     }
 }
 

@@ -3,7 +3,9 @@
 use crate::compile::Compiled;
 use crate::lower::platform;
 use crate::model::{Adaptation, AdaptationMode, ControlMode};
-use crate::stability::platform::{Adapting, ClosedLoop, Conditions, LARGEST_RADIUS, Law, RestDynamics, Tuning, closed_loop_of};
+use crate::stability::platform::{
+    Adapting, ClosedLoop, Conditions, LARGEST_RADIUS, Law, RestDynamics, Tuning, closed_loop_of,
+};
 use crate::stability::{LegDynamics, ewma_limit, pcc_limit, spectral_radius};
 
 use super::Setting;
@@ -51,11 +53,7 @@ impl Feasibility {
     #[must_use]
     pub fn of(compiled: &Compiled, required: Required) -> Self {
         let model = &compiled.model;
-        let legs = || Self::Legs {
-            dynamics: LegDynamics::of(model),
-            adaptation: model.adaptation.clone(),
-            required,
-        };
+        let legs = || Self::Legs { dynamics: LegDynamics::of(model), adaptation: model.adaptation.clone(), required };
         let Some(task) = &model.task_space else { return legs() };
         // Compiling found both: neither can be missing here.
         let rest = platform(model).map(|platform| RestDynamics::of(&platform));
@@ -89,12 +87,13 @@ impl Feasibility {
             (Self::Legs { dynamics, adaptation, required }, Setting::Legs { level, drift }) => {
                 leg_holds(dynamics, adaptation, required, *level, *drift)
             }
-            (Self::Platform { closed_loop, laws, ratios, required }, Setting::Platform { combined, position, period }) => {
-                laws.iter().all(|law| {
-                    let tuning = if *law == Law::Position { position } else { combined };
-                    platform_holds(closed_loop, *law, tuning, *ratios, required, *period)
-                })
-            }
+            (
+                Self::Platform { closed_loop, laws, ratios, required },
+                Setting::Platform { combined, position, period },
+            ) => laws.iter().all(|law| {
+                let tuning = if *law == Law::Position { position } else { combined };
+                platform_holds(closed_loop, *law, tuning, *ratios, required, *period)
+            }),
             _ => false,
         }
     }
@@ -118,7 +117,7 @@ fn leg_holds(dynamics: &LegDynamics, adaptation: &Adaptation, required: &Require
     level > 0.0
         && (0..ENDS).all(|end| stable(1.0, if end == 0 { high } else { low }))
         && stable(1.0, 0.5 * (low + high))
-        && stable(required.gain, 1.0)
+        && stable(required.gain, high)
 }
 
 fn platform_holds(
@@ -129,7 +128,8 @@ fn platform_holds(
     required: &Required,
     period: f64,
 ) -> bool {
-    let most = if tuning.level_bandwidth > tuning.drift_bandwidth { tuning.level_bandwidth } else { tuning.drift_bandwidth };
+    let most =
+        if tuning.level_bandwidth > tuning.drift_bandwidth { tuning.level_bandwidth } else { tuning.drift_bandwidth };
     if most * period > 1.0 {
         return false;
     }

@@ -34,14 +34,8 @@ pub fn to_csv(front: &[Candidate], space: &Space) -> String {
     }
     out.push('\n');
     for Candidate { number, setting, score } in front {
-        let figures = [
-            score.error_nm,
-            score.effort_nm,
-            score.peak_nm,
-            score.translation_nm,
-            score.orientation_nrad,
-            score.cost,
-        ];
+        let figures =
+            [score.error_nm, score.effort_nm, score.peak_nm, score.translation_nm, score.orientation_nrad, score.cost];
         // Writing to a String cannot fail, here and above.
         let _ = write!(out, "{number}");
         for figure in figures {

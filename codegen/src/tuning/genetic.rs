@@ -53,7 +53,8 @@ impl Genetic {
     pub fn new(settings: Settings, dimension: usize, starts: &[Vec<f64>], seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(STREAM);
-        let mut population: Vec<Vec<bool>> = starts.iter().take(settings.population).map(|start| encode(start)).collect();
+        let mut population: Vec<Vec<bool>> =
+            starts.iter().take(settings.population).map(|start| encode(start)).collect();
         while population.len() < settings.population {
             population.push((0..dimension * BITS).map(|_| rng.next_u64() & 1 == 1).collect());
         }
@@ -99,7 +100,13 @@ impl Optimiser for Genetic {
             fitness.fill(1.0);
         }
         let mut sum = 0.0;
-        let wheel: Vec<f64> = fitness.iter().map(|f| { sum += f; sum }).collect();
+        let wheel: Vec<f64> = fitness
+            .iter()
+            .map(|f| {
+                sum += f;
+                sum
+            })
+            .collect();
         let mut next: Vec<Vec<bool>> = order.iter().take(ELITE).map(|&index| self.population[index].clone()).collect();
         let children = self.settings.population.saturating_sub(next.len());
         let crossed = libm::round(self.settings.crossover * children as f64) as usize;
@@ -132,7 +139,10 @@ fn encode(genes: &[f64]) -> Vec<bool> {
 
 fn decode(string: &[bool]) -> Vec<f64> {
     let most = ((1_u32 << BITS) - 1) as f64;
-    string.chunks(BITS).map(|bits| f64::from(bits.iter().fold(0_u32, |code, bit| code << 1 | u32::from(*bit))) / most).collect()
+    string
+        .chunks(BITS)
+        .map(|bits| f64::from(bits.iter().fold(0_u32, |code, bit| code << 1 | u32::from(*bit))) / most)
+        .collect()
 }
 
 #[cfg(test)]
@@ -172,6 +182,10 @@ mod tests {
         genetic.population = vec![vec![true; 10], vec![false; 10], vec![true; 10], vec![true; 10]];
         genetic.settings.mutation = 0.0;
         genetic.tell(&[Some(1.0), None, Some(2.0), Some(3.0)]);
-        assert!(genetic.population.iter().skip(ELITE).all(|string| string.iter().all(|bit| *bit)), "{:?}", genetic.population);
+        assert!(
+            genetic.population.iter().skip(ELITE).all(|string| string.iter().all(|bit| *bit)),
+            "{:?}",
+            genetic.population
+        );
     }
 }

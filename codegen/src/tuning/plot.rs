@@ -40,7 +40,8 @@ impl Axis {
 
     /// 1, 2, 5 times powers of ten within the axis; with every digit where the axis is short.
     fn ticks(&self) -> Vec<f64> {
-        let digits: &[f64] = if self.high / self.low > 20.0 { &[1.0, 2.0, 5.0] } else { &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0] };
+        let digits: &[f64] =
+            if self.high / self.low > 20.0 { &[1.0, 2.0, 5.0] } else { &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0] };
         let digits = if self.high / self.low > 1e4 { &digits[..1] } else { digits };
         let mut ticks = Vec::new();
         let first = libm::floor(libm::log10(self.low)) as i32;
@@ -78,13 +79,22 @@ pub fn svg(title: &str, axes: [&str; 2], all: &[Candidate], front: &[Candidate],
     let _ = writeln!(out, "<text x=\"{}\" y=\"24\" font-size=\"15\">{}</text>", MARGIN[0], escaped(title));
     for tick in x.ticks() {
         let at = x.at(tick);
-        let _ = writeln!(out, "<line x1=\"{at:.1}\" y1=\"{}\" x2=\"{at:.1}\" y2=\"{}\" stroke=\"#e4e4e4\"/>", y.to, y.from);
-        let _ = writeln!(out, "<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>", y.from + 18.0, label(tick));
+        let _ =
+            writeln!(out, "<line x1=\"{at:.1}\" y1=\"{}\" x2=\"{at:.1}\" y2=\"{}\" stroke=\"#e4e4e4\"/>", y.to, y.from);
+        let _ =
+            writeln!(out, "<text x=\"{at:.1}\" y=\"{}\" text-anchor=\"middle\">{}</text>", y.from + 18.0, label(tick));
     }
     for tick in y.ticks() {
         let at = y.at(tick);
-        let _ = writeln!(out, "<line x1=\"{}\" y1=\"{at:.1}\" x2=\"{}\" y2=\"{at:.1}\" stroke=\"#e4e4e4\"/>", x.from, x.to);
-        let _ = writeln!(out, "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>", x.from - 6.0, at + 4.5, label(tick));
+        let _ =
+            writeln!(out, "<line x1=\"{}\" y1=\"{at:.1}\" x2=\"{}\" y2=\"{at:.1}\" stroke=\"#e4e4e4\"/>", x.from, x.to);
+        let _ = writeln!(
+            out,
+            "<text x=\"{}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+            x.from - 6.0,
+            at + 4.5,
+            label(tick)
+        );
     }
     let _ = writeln!(
         out,
@@ -120,17 +130,30 @@ pub fn svg(title: &str, axes: [&str; 2], all: &[Candidate], front: &[Candidate],
         .filter(|c| c.score.error_nm <= worst)
         .map(|c| format!("{:.1},{:.1}", x.at(c.score.effort_nm), y.at(c.score.error_nm)))
         .collect();
-    let _ = writeln!(out, "<polyline points=\"{}\" fill=\"none\" stroke=\"#b03030\" stroke-width=\"1.6\"/>", line.join(" "));
+    let _ = writeln!(
+        out,
+        "<polyline points=\"{}\" fill=\"none\" stroke=\"#b03030\" stroke-width=\"1.6\"/>",
+        line.join(" ")
+    );
     // Names in a list of their own: marks may lie on one another.
     let colours = ["#1a1a1a", "#1f6f3f", "#7a3fa0", "#c07000"];
     for (k, (name, score)) in marks.iter().enumerate() {
         let colour = colours[k % colours.len()];
         if score.error_nm <= worst {
             let (cx, cy) = (x.at(score.effort_nm), y.at(score.error_nm));
-            let _ = writeln!(out, "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.2\"/>", 5 + 2 * k);
+            let _ = writeln!(
+                out,
+                "<circle cx=\"{cx:.1}\" cy=\"{cy:.1}\" r=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.2\"/>",
+                5 + 2 * k
+            );
         }
         let at = MARGIN[1] + 18.0 + 19.0 * k as f64;
-        let _ = writeln!(out, "<circle cx=\"{}\" cy=\"{}\" r=\"5\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.2\"/>", x.to - 214.0, at - 4.5);
+        let _ = writeln!(
+            out,
+            "<circle cx=\"{}\" cy=\"{}\" r=\"5\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2.2\"/>",
+            x.to - 214.0,
+            at - 4.5
+        );
         let _ = writeln!(
             out,
             "<text x=\"{}\" y=\"{at}\" fill=\"{colour}\">{}: {:.2} nm</text>",

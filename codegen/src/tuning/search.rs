@@ -179,7 +179,8 @@ impl Search {
                 optimiser.tell(&costs);
             }
             let elapsed = begun.elapsed();
-            let left = elapsed.mul_f64((options.evaluations - search.evaluations) as f64 / search.evaluations.max(1) as f64);
+            let left =
+                elapsed.mul_f64((options.evaluations - search.evaluations) as f64 / search.evaluations.max(1) as f64);
             (options.progress)(&Progress {
                 done: search.evaluations,
                 all: options.evaluations,

@@ -37,11 +37,9 @@ impl Setting {
     pub fn of(compiled: &Compiled) -> Self {
         let model = &compiled.model;
         match &compiled.design {
-            Some(design) => Self::Platform {
-                combined: design.combined,
-                position: design.position,
-                period: model.timing.period,
-            },
+            Some(design) => {
+                Self::Platform { combined: design.combined, position: design.position, period: model.timing.period }
+            }
             None => Self::Legs {
                 level: model.adaptation.level_weight,
                 drift: if model.adaptation.mode == AdaptationMode::Pcc { model.adaptation.drift_weight } else { 0.0 },
@@ -69,8 +67,7 @@ impl Setting {
                 set("level_weight", combined.level_bandwidth * period);
                 set("drift_weight", combined.drift_bandwidth * period);
                 for (prefix, tuning) in [("", combined), ("position_", position)] {
-                    let groups =
-                        [("kp", &tuning.proportional), ("ki", &tuning.integral), ("kv", &tuning.derivative)];
+                    let groups = [("kp", &tuning.proportional), ("ki", &tuning.integral), ("kv", &tuning.derivative)];
                     for (stem, gains) in groups {
                         for (axis, gain) in gains.iter().enumerate() {
                             set(&format!("{prefix}{stem}[{axis}]"), *gain);
@@ -87,7 +84,13 @@ impl Setting {
     pub fn tuning(&self, alone: bool) -> Tuning {
         match self {
             Self::Legs { .. } => Tuning::NONE,
-            Self::Platform { combined, position, .. } => if alone { *position } else { *combined },
+            Self::Platform { combined, position, .. } => {
+                if alone {
+                    *position
+                } else {
+                    *combined
+                }
+            }
         }
     }
 }

@@ -141,7 +141,8 @@ impl Space {
             vec![Diagnostic::at(&model.spans, &keys, (Severity::Error, code), message, help.to_owned())]
         };
         if parameters.is_empty() {
-            let kind = if mode.is_some() { "this mode of the platform controller" } else { "this spec without [control]" };
+            let kind =
+                if mode.is_some() { "this mode of the platform controller" } else { "this spec without [control]" };
             return Err(refuse(
                 codes::TUNE_NOTHING,
                 format!("{kind} uses none of the numbers that are asked for ({what:?})"),
@@ -182,7 +183,13 @@ impl Space {
         let mut setting = self.base;
         for (parameter, gene) in self.parameters.iter().zip(genes) {
             let [low, high] = parameter.bounds;
-            let gene = if *gene > 1.0 { 1.0 } else if *gene > 0.0 { *gene } else { 0.0 };
+            let gene = if *gene > 1.0 {
+                1.0
+            } else if *gene > 0.0 {
+                *gene
+            } else {
+                0.0
+            };
             let value = low * libm::exp(gene * libm::log(high / low));
             self.put(&mut setting, parameter.role, value);
         }
@@ -198,7 +205,13 @@ impl Space {
                 let [low, high] = parameter.bounds;
                 let value = self.value(setting, parameter.role);
                 let gene = if value > 0.0 { libm::log(value / low) / libm::log(high / low) } else { 0.0 };
-                if gene > 1.0 { 1.0 } else if gene > 0.0 { gene } else { 0.0 }
+                if gene > 1.0 {
+                    1.0
+                } else if gene > 0.0 {
+                    gene
+                } else {
+                    0.0
+                }
             })
             .collect()
     }

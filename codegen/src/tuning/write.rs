@@ -58,9 +58,6 @@ pub fn edited(compiled: &Compiled, space: &Space, setting: &Setting, note: &str)
                 let table = section(&mut document, name, note)?;
                 let groups = [&gains.proportional, &gains.integral, &gains.derivative];
                 for ((key, units), values) in UNITS.iter().zip(groups) {
-                    if *key == "derivative" && *values == [0.0; 6] && !table.contains_key(key) {
-                        continue;
-                    }
                     let mut list = Array::new();
                     for (axis, value) in values.iter().enumerate() {
                         list.push(format!("{} {}", plain(*value), units[axis / 3]));
@@ -120,7 +117,8 @@ mod tests {
 
     #[test]
     fn a_value_keeps_its_comment_and_its_place() {
-        let text = "# head\n[adaptation]\nmode         = \"pcc\"\nlevel_weight = 0.252              # omega_1\n\n[timing]\n";
+        let text =
+            "# head\n[adaptation]\nmode         = \"pcc\"\nlevel_weight = 0.252              # omega_1\n\n[timing]\n";
         let mut document: DocumentMut = text.parse().unwrap();
         set(section(&mut document, "adaptation", "x").unwrap(), "level_weight", 0.15.into());
         assert_eq!(document.to_string(), text.replace("0.252", "0.15"));

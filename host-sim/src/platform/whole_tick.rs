@@ -41,7 +41,8 @@ impl WholeTick {
         structure: &Structure,
         interval: f64,
     ) -> Option<Self> {
-        let lane = |of: &dyn Fn(usize) -> f64| -> Lane { std::array::from_fn(|leg| if leg < 6 { of(leg) } else { 0.0 }) };
+        let lane =
+            |of: &dyn Fn(usize) -> f64| -> Lane { std::array::from_fn(|leg| if leg < 6 { of(leg) } else { 0.0 }) };
         let lag: Six = std::array::from_fn(|leg| amplifiers[leg].time_constant());
         let decay = |leg: usize| if lag[leg] > 0.0 { libm::exp(-interval / lag[leg]) } else { 0.0 };
         Some(Self {

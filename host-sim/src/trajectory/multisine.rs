@@ -23,6 +23,8 @@ pub struct Multisine {
     center: [f64; 6],
     /// Angular frequency (rad/s), amplitude and phase of each sine.
     sines: [[[f64; 3]; 5]; 6],
+    /// Whether the fastest is a zigzag.
+    corners: bool,
 }
 
 impl Multisine {
@@ -37,13 +39,38 @@ impl Multisine {
         let sines = reach.map(|reach| {
             core::array::from_fn(|k| [TAU * frequency * RATIOS[k], reach * shares[k], TAU * unit(&mut rng)])
         });
-        Self { duration, center, sines }
+        Self { duration, center, sines, corners: false }
+    }
+
+    /// The same with a zigzag in place of the fastest sine, of the same frequency and half of the whole amplitude: its slope
+    /// jumps, as that of the paper's platform trajectories does.
+    #[must_use]
+    pub fn with_corners(mut self) -> Self {
+        for sines in &mut self.sines {
+            let whole: f64 = sines.iter().map(|[_, amplitude, _]| amplitude).sum();
+            let [.., fastest] = sines;
+            let others = whole - fastest[1];
+            fastest[1] = 0.5 * whole;
+            for [_, amplitude, _] in &mut sines[..4] {
+                *amplitude *= 0.5 * whole / others;
+            }
+        }
+        self.corners = true;
+        self
     }
 
     /// Value, rate and acceleration of a coordinate.
     fn coordinate(&self, axis: usize, time: f64) -> [f64; 3] {
         let mut sum = [self.center[axis], 0.0, 0.0];
-        for [speed, amplitude, phase] in self.sines[axis] {
+        for (k, [speed, amplitude, phase]) in self.sines[axis].into_iter().enumerate() {
+            if self.corners && k == 4 {
+                let turns = (speed * time + phase) / TAU;
+                let turn = turns - libm::floor(turns);
+                let slope = if turn < 0.5 { 4.0 } else { -4.0 };
+                sum[0] += amplitude * if turn < 0.5 { 4.0 * turn - 1.0 } else { 3.0 - 4.0 * turn };
+                sum[1] += amplitude * slope * speed / TAU;
+                continue;
+            }
             let (sin, cos) = libm::sincos(speed * time + phase);
             sum[0] += amplitude * sin;
             sum[1] += amplitude * speed * cos;
@@ -111,6 +138,22 @@ mod tests {
                 assert!((here.acceleration[axis] - acceleration).abs() < 1e-4 * reach * 1e4, "{axis} {time}");
             }
         }
+    }
+
+    #[test]
+    fn a_zigzag_keeps_the_reach_and_its_slope_jumps_but_not_its_place() {
+        let (smooth, motion) = (sample(), sample().with_corners());
+        let whole = |motion: &Multisine| motion.sines[0].iter().map(|s| s[1]).sum::<f64>();
+        assert!((whole(&motion) / whole(&smooth) - 1.0).abs() < 1e-12);
+        let (mut last, mut jumps) = (motion.target(0.3), 0);
+        for k in 1..17_000 {
+            let next = motion.target(0.3 + f64::from(k) * 1e-4);
+            assert!((next.pose[0] - last.pose[0]).abs() < 1.01e-4 * last.rate[0].abs().max(next.rate[0].abs()) + 1e-12);
+            // 2 × 4 × 5 µm × 10 Hz.
+            jumps += i32::from((next.rate[0] - last.rate[0]).abs() > 350e-6);
+            last = next;
+        }
+        assert!((33..=35).contains(&jumps), "{jumps}");
     }
 
     #[test]

@@ -92,7 +92,8 @@ fn shrunk(job: &Job, start: Setting) -> Option<Setting> {
 }
 
 fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failure> {
-    let (Some(task), Feasibility::Platform { closed_loop, .. }) = (&job.compiled.model.task_space, &job.feasibility) else {
+    let (Some(task), Feasibility::Platform { closed_loop, .. }) = (&job.compiled.model.task_space, &job.feasibility)
+    else {
         return Ok(None);
     };
     ui.progress("relay feedback test, axis by axis, with the notch in");

@@ -171,7 +171,12 @@ fn a_kick_rings_alike_in_whole_ticks_and_at_the_current_limit() {
     whole.step_whole_ticks(1e-4);
     for (volts, bound) in [(10.0, 3e-9), (80.0, 100e-9)] {
         let kick = |machine: &mut Machine| -> Vec<Six> {
-            (0..300).map(|_| { machine.hold(&[volts, 0.0, volts, 0.0, 0.0, 0.5 * volts], 1e-4); machine.pose() }).collect()
+            (0..300)
+                .map(|_| {
+                    machine.hold(&[volts, 0.0, volts, 0.0, 0.0, 0.5 * volts], 1e-4);
+                    machine.pose()
+                })
+                .collect()
         };
         let (a, b) = (kick(&mut usual), kick(&mut whole));
         println!("{volts} V: {:.1} pm of {:.1} µm", worst(&a, &b) * 1e12, a[299][2] * 1e6);

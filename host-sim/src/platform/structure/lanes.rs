@@ -51,8 +51,7 @@ impl StructureLanes {
             std::array::from_fn(|leg| structure.jacobian[leg][axis] * parameters.stiffness[leg])
         });
         let driven = product(&flexibility, &forces);
-        let (spring, damper) =
-            (product(&flexibility, &structure.stiffness), product(&flexibility, &structure.damping));
+        let (spring, damper) = (product(&flexibility, &structure.stiffness), product(&flexibility, &structure.damping));
         // [h, ḣ] and per column of inputs a pair [u, u̇] with u̇ held, or one decaying input, in units of one step.
         let respond = |input: &Matrix6, decay: Option<&Six>| {
             let n = STATES + 12;
@@ -72,7 +71,8 @@ impl StructureLanes {
             exponential(&rates)
         };
         let column = |out: &[Vec<f64>], k: usize| -> Column { std::array::from_fn(|row| out[row][k]) };
-        let columns = |out: &[Vec<f64>], first: usize| -> [Column; 6] { std::array::from_fn(|k| column(out, first + k)) };
+        let columns =
+            |out: &[Vec<f64>], first: usize| -> [Column; 6] { std::array::from_fn(|k| column(out, first + k)) };
         let by_force = respond(&flexibility, None);
         let by_leg = respond(&driven, None);
         // Faster than a ten-thousandth of the step is at once.
@@ -96,7 +96,9 @@ impl StructureLanes {
             from_force_change: columns(&by_force, STATES + 6),
             rest,
             joint: std::array::from_fn(|k| lane(|leg| geometry.platform_joints[leg][k])),
-            rest_square: std::array::from_fn(|k| rest[0][k] * rest[0][k] + rest[1][k] * rest[1][k] + rest[2][k] * rest[2][k]),
+            rest_square: std::array::from_fn(|k| {
+                rest[0][k] * rest[0][k] + rest[1][k] * rest[1][k] + rest[2][k] * rest[2][k]
+            }),
             rest_length: lane(|leg| structure.rest_lengths[leg]),
             stiffness: std::array::from_fn(|leg| if leg < 6 { parameters.stiffness[leg] } else { 0.0 }),
             damping: std::array::from_fn(|leg| if leg < 6 { parameters.damping[leg] } else { 0.0 }),
@@ -150,7 +152,8 @@ impl StructureLanes {
         for k in 0..6 {
             let change = self.difference[k] - self.before[k];
             for row in 0..STATES {
-                of_forces[row] += self.from_force[k][row] * self.difference[k] + self.from_force_change[k][row] * change;
+                of_forces[row] +=
+                    self.from_force[k][row] * self.difference[k] + self.from_force_change[k][row] * change;
             }
         }
         for row in 0..STATES {
@@ -183,7 +186,8 @@ impl StructureLanes {
             let length = (self.rest_square[k] + growth).sqrt();
             let extension = growth / (length + self.rest_length[k]);
             let inverse = 1.0 / length;
-            let direction = [(rest[0] + shift[0]) * inverse, (rest[1] + shift[1]) * inverse, (rest[2] + shift[2]) * inverse];
+            let direction =
+                [(rest[0] + shift[0]) * inverse, (rest[1] + shift[1]) * inverse, (rest[2] + shift[2]) * inverse];
             let moment = [
                 arm[1] * direction[2] - arm[2] * direction[1],
                 arm[2] * direction[0] - arm[0] * direction[2],
@@ -238,9 +242,13 @@ mod tests {
         let lanes = StructureLanes::of(&structure, 1e-4, &[0.35e-3; 6]);
         let largest = structure.difference.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
         for (found, expected) in lanes.difference.iter().zip(&structure.difference) {
-            assert!((found - expected).abs() < 1e-9 * largest.max(1.0), "{:?} {:?}", lanes.difference, structure.difference);
+            assert!(
+                (found - expected).abs() < 1e-9 * largest.max(1.0),
+                "{:?} {:?}",
+                lanes.difference,
+                structure.difference
+            );
         }
         assert!(largest > 1e-3, "{largest}");
-
     }
 }

@@ -1,0 +1,199 @@
+//! `specgen tune` as a user runs it: the figure it reaches, the bytes it gives, what it refuses, what it writes.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+mod support;
+
+use std::process::Stdio;
+use std::time::Duration;
+
+use serde_json::Value;
+use specgen::compile::compile;
+use support::{Folder, Run, contents};
+
+/// The row of a setting in a report.
+fn row<'a>(report: &'a Value, name: &str) -> &'a Value {
+    let rows = report["settings"].as_array().unwrap();
+    rows.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("no {name} in {report:#}"))
+}
+
+fn error_nm(row: &Value, on: &str) -> f64 {
+    row[on]["Scored"]["error_nm"].as_f64().unwrap_or_else(|| panic!("not scored: {row:#}"))
+}
+
+#[test]
+fn a_leg_at_10_hz_is_within_12_nm_on_a_trajectory_and_a_seed_it_was_not_tuned_on() {
+    let folder = Folder::new();
+    let document = folder.json(&["tune", "legs.toml", "--evaluations", "400", "--write"]);
+    assert_eq!(document.code, 0, "{:#}", document.value);
+    let report = &document.value["result"];
+    let (before, after) = (row(report, "spec"), row(report, "tuned"));
+    let (printed, tuned) = (error_nm(before, "scored_on"), error_nm(after, "scored_on"));
+    println!("paper's trajectory at 10 Hz, N_s 500: {printed:.2} nm with the printed weights, {tuned:.2} nm tuned");
+    // The paper's own machine: 156 nm; the study with the printed weights: 16.4.
+    assert!((15.0..18.5).contains(&printed), "{printed}");
+    assert!(tuned <= 12.0, "{tuned}");
+    assert!(report["margins"]["gain"].as_f64().unwrap() >= 1.99, "{:#}", report["margins"]);
+
+    // Two values changed, everything else of the spec as it was; and it compiles.
+    let (old, new) =
+        (std::fs::read_to_string(support::repository().join("specs/legs.toml")).unwrap(), folder.read("legs.toml"));
+    let changed: Vec<(&str, &str)> = old.lines().zip(new.lines()).filter(|(a, b)| a != b).collect();
+    assert_eq!(old.lines().count(), new.lines().count());
+    assert_eq!(changed.len(), 2, "{changed:?}");
+    for (before, after) in changed {
+        assert_eq!(before.split('#').nth(1), after.split('#').nth(1), "the comment stays");
+    }
+    let weights = &after["setting"]["Legs"];
+    let model = compile(&folder.path("legs.toml")).unwrap().model;
+    assert_eq!(Some(model.adaptation.level_weight), weights["level"].as_f64());
+    assert_eq!(Some(model.adaptation.drift_weight), weights["drift"].as_f64());
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads() {
+    for (spec, optimiser) in [("legs.toml", "cma"), ("reference.toml", "genetic")] {
+        let folder = Folder::new();
+        let run = |threads: &str, output: &str, seed: &str| {
+            let arguments = [
+                "tune",
+                spec,
+                "--evaluations",
+                "24",
+                "--population",
+                "8",
+                "--seconds",
+                "0.3",
+                "--optimiser",
+                optimiser,
+                "--threads",
+                threads,
+                "-o",
+                output,
+                "--seed",
+                seed,
+            ];
+            let run = folder.run(&arguments);
+            assert_eq!(run.code, 0, "{run:#?}");
+            (run.stdout, contents(&folder.path(output)))
+        };
+        let (first, files) = run("1", "a", "5");
+        assert!(files.len() >= 5 && !first.is_empty());
+        for (threads, output) in [("2", "b"), ("2", "c"), ("1", "d"), ("3", "e")] {
+            assert_eq!(run(threads, output, "5"), (first.clone(), files.clone()), "{spec}, {threads} threads");
+        }
+        // The comparison can fail.
+        assert_ne!(run("1", "f", "6").1, files, "{spec}");
+    }
+}
+
+#[test]
+fn tuned_gains_of_a_platform_hold_their_margins_and_are_those_that_the_spec_then_gives() {
+    let folder = Folder::new();
+    let spec = folder.read("reference.toml");
+    let document = folder.json(&["tune", "reference.toml", "--evaluations", "150", "--seconds", "0.5", "--write"]);
+    assert_eq!(document.code, 0, "{:#}", document.value);
+    let report = &document.value["result"];
+    let tuned = row(report, "tuned");
+    assert_eq!(tuned["holds_margins"], true);
+    for (on, start) in [("tuned_on", "spec"), ("tuned_on", "Ziegler-Nichols")] {
+        let better = tuned[on]["Scored"]["cost"].as_f64().unwrap();
+        // Ziegler and Nichols may be without the margins, but never better under the paper's cost and unstable.
+        assert!(
+            row(report, start)["holds_margins"] == false
+                || better <= row(report, start)[on]["Scored"]["cost"].as_f64().unwrap()
+        );
+    }
+    assert!(report["margins"]["gain"].as_f64().is_none_or(|gain| gain >= 1.99));
+    assert!(report["margins"]["delay_ticks"].as_f64().is_none_or(|ticks| ticks >= 0.49));
+    assert!(report["margins"]["phase_degrees"].as_f64().unwrap() > 5.0);
+    // The relay with the notch in: some five times the stiffness above 500 Hz, as in the study; on the bare loop it is 0.1
+    // at the first mode.
+    for axis in report["relay"].as_array().unwrap() {
+        let (gain, hertz) = (axis["gain"].as_f64().unwrap(), 1.0 / axis["period"].as_f64().unwrap());
+        assert!((2.0..12.0).contains(&gain) && (400.0..1200.0).contains(&hertz), "{axis:#}");
+    }
+    let text = folder.read("reference.toml");
+    for line in spec.lines().filter(|line| line.contains('#')) {
+        assert!(text.contains(line), "the comment `{line}` is gone");
+    }
+    let design = compile(&folder.path("reference.toml")).unwrap().design.unwrap();
+    let combined = &tuned["setting"]["Platform"]["combined"];
+    for axis in 0..6 {
+        assert_eq!(Some(design.combined.proportional[axis]), combined["proportional"][axis].as_f64());
+        assert_eq!(Some(design.combined.integral[axis]), combined["integral"][axis].as_f64());
+    }
+    assert_eq!(Some(design.combined.level_bandwidth), combined["level_bandwidth"].as_f64());
+    assert_eq!(Some(design.combined.drift_bandwidth), combined["drift_bandwidth"].as_f64());
+}
+
+#[test]
+fn without_write_the_spec_stays_and_the_patch_makes_it() {
+    let folder = Folder::new();
+    let before = folder.read("legs.toml");
+    let run = folder.run(&["tune", "legs.toml", "--evaluations", "20", "--seconds", "0.2"]);
+    assert_eq!(run.code, 0, "{run:#?}");
+    assert_eq!(folder.read("legs.toml"), before);
+    let patch = run.stdout.split_once("--- legs.toml").map(|(_, rest)| rest).unwrap();
+    let (removed, added): (Vec<&str>, Vec<&str>) = (
+        patch.lines().filter(|line| line.starts_with('-')).collect(),
+        patch.lines().filter(|line| line.starts_with('+') && !line.starts_with("+++")).collect(),
+    );
+    assert_eq!((removed.len(), added.len()), (2, 2), "{patch}");
+    for line in removed {
+        assert!(before.contains(&line[1..]), "{line}");
+    }
+}
+
+#[test]
+fn what_cannot_be_tuned_is_refused_with_a_mend() {
+    let folder = Folder::new();
+    let cases: &[(&str, &[&str], &str, &str)] = &[
+        ("minimal.toml", &[], "E0701", "adaptation.mode"),
+        ("legs.toml", &["--what", "gains"], "E0701", "--what all"),
+        ("legs.toml", &["--bounds", "level=0.5:0.1"], "E0702", "the smaller one first"),
+        ("legs.toml", &["--bounds", "level=0:1"], "E0702", "the smaller one first"),
+        ("legs.toml", &["--bounds", "ki=1:2"], "E0702", "as far as --what"),
+        ("legs.toml", &["--bounds", "level=0.8:0.9"], "E0703", "--gain-margin 1.5"),
+        ("legs.toml", &["--frequency", "400", "--seconds", "0.1"], "E0705", "lower --frequency"),
+    ];
+    let before = folder.listing();
+    for (spec, more, code, mend) in cases {
+        let mut arguments = vec!["tune", spec, "--evaluations", "8"];
+        arguments.extend(*more);
+        let document = folder.json(&arguments);
+        assert_eq!(document.code, 1, "{arguments:?}: {:#}", document.value);
+        let help = document.finding(code)["help"].as_str().unwrap();
+        assert!(help.contains(mend), "{arguments:?}: {help}");
+    }
+    assert_eq!(folder.listing(), before, "nothing is written");
+}
+
+/// An interrupt as the terminal sends it.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_the_best_so_far_and_says_so() {
+    let folder = Folder::new();
+    let child = folder
+        .command()
+        .args(["tune", "legs.toml", "--evaluations", "1000000", "--threads", "1"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let process = child.id().to_string();
+    let killer = std::thread::spawn(move || {
+        // Long enough to build and to begin; a run of a million candidates is not over by then.
+        std::thread::sleep(Duration::from_secs(40));
+        std::process::Command::new("kill").args(["-INT", &process]).status().unwrap()
+    });
+    let output = child.wait_with_output().unwrap();
+    assert!(killer.join().unwrap().success());
+    let run = Run {
+        code: output.status.code().unwrap_or_default(),
+        stdout: String::from_utf8(output.stdout).unwrap(),
+        stderr: String::from_utf8(output.stderr).unwrap(),
+    };
+    run.says(130, &["interrupted: this is the best of"]);
+    assert!(run.stdout.contains("tuned") && run.stdout.contains("+++ legs.toml"), "{}", run.stdout);
+}
