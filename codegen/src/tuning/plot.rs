@@ -62,11 +62,15 @@ impl Axis {
 #[must_use]
 pub fn svg(title: &str, axes: [&str; 2], all: &[Candidate], front: &[Candidate], marks: &[(&str, Score)]) -> String {
     let scores = || all.iter().map(|c| &c.score).chain(marks.iter().map(|(_, score)| score));
-    // What is ten times worse than the median would press everything else into a corner.
-    let mut errors: Vec<f64> = scores().map(|score| score.error_nm).collect();
-    errors.sort_by(f64::total_cmp);
-    let worst = errors.get(errors.len() / 2).map_or(f64::INFINITY, |median| 10.0 * median);
-    let shown = || scores().filter(|score| score.error_nm <= worst);
+    // A few that are far worse than the rest would press everything else into a corner.
+    let limit = |value: fn(&Score) -> f64, part: f64, factor: f64| {
+        let mut values: Vec<f64> = scores().map(value).collect();
+        values.sort_by(f64::total_cmp);
+        values.get((part * values.len() as f64) as usize).map_or(f64::INFINITY, |value| factor * value)
+    };
+    let worst = [limit(|score| score.error_nm, 0.5, 10.0), limit(|score| score.effort_nm, 0.97, 1.5)];
+    let seen = |score: &Score| score.error_nm <= worst[0] && score.effort_nm <= worst[1];
+    let shown = || scores().filter(|score| seen(score));
     let x = Axis::of(shown().map(|score| score.effort_nm), MARGIN[0], WIDTH - MARGIN[2]);
     let y = Axis::of(shown().map(|score| score.error_nm), HEIGHT - MARGIN[3], MARGIN[1]);
     let mut out = String::new();
@@ -117,7 +121,7 @@ pub fn svg(title: &str, axes: [&str; 2], all: &[Candidate], front: &[Candidate],
         "<text x=\"20\" y=\"{middle}\" text-anchor=\"middle\" transform=\"rotate(-90 20 {middle})\">{}</text>",
         escaped(axes[1])
     );
-    for Candidate { score, .. } in all.iter().filter(|candidate| candidate.score.error_nm <= worst) {
+    for Candidate { score, .. } in all.iter().filter(|candidate| seen(&candidate.score)) {
         let _ = writeln!(
             out,
             "<circle cx=\"{:.1}\" cy=\"{:.1}\" r=\"2\" fill=\"#9db4c8\"/>",
@@ -127,7 +131,7 @@ pub fn svg(title: &str, axes: [&str; 2], all: &[Candidate], front: &[Candidate],
     }
     let line: Vec<String> = front
         .iter()
-        .filter(|c| c.score.error_nm <= worst)
+        .filter(|c| seen(&c.score))
         .map(|c| format!("{:.1},{:.1}", x.at(c.score.effort_nm), y.at(c.score.error_nm)))
         .collect();
     let _ = writeln!(
@@ -139,7 +143,7 @@ pub fn svg(title: &str, axes: [&str; 2], all: &[Candidate], front: &[Candidate],
     let colours = ["#1a1a1a", "#1f6f3f", "#7a3fa0", "#c07000"];
     for (k, (name, score)) in marks.iter().enumerate() {
         let colour = colours[k % colours.len()];
-        if score.error_nm <= worst {
+        if seen(score) {
             let (cx, cy) = (x.at(score.effort_nm), y.at(score.error_nm));
             let _ = writeln!(
                 out,

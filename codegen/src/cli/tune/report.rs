@@ -93,18 +93,25 @@ impl Report {
             head.push('\n');
         }
         let or = |value: Option<f64>, none: &str| value.map_or(none.to_owned(), |value| format!("{value:.2}"));
+        let delay = if job.compiled.model.task_space.is_some() {
+            format!("{} ticks", or(margins.delay_ticks, "> 5"))
+        } else {
+            "not looked at".to_owned()
+        };
         let mut tail = format!(
-            "margins of the result: gain × {}, phase {}°, delay {} ticks\n",
+            "margins of the result: gain × {}, phase {}°, delay {delay}\n",
             or(margins.gain, "> 30 or up to a weight of 1"),
-            margins.phase_degrees.map_or("> 180".to_owned(), |degrees| format!("{degrees:.1}")),
-            or(margins.delay_ticks, "> 5 or not looked at")
+            margins.phase_degrees.map_or("> 180".to_owned(), |degrees| format!("{degrees:.1}"))
         );
         for parameter in &job.space.parameters {
             if let Some(row) = rows.last() {
                 let _ = write!(tail, "  {} {:.4e}", parameter.role, job.space.value(&row.setting, parameter.role));
             }
         }
-        tail.push_str("\n(kp, ki, kv over the stiffness of their axis)\n");
+        tail.push('\n');
+        if job.compiled.model.task_space.is_some() {
+            tail.push_str("(kp, ki, kv over the stiffness of their axis)\n");
+        }
         let value = json!({
             "name": job.compiled.ir.name,
             "seed": job.arguments.plant.seed,
