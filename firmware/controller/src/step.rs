@@ -9,7 +9,7 @@
 //! ```text
 //! sense      gauges → h                                                      pose from rest
 //! learn      e = N(h_d(t_n) − h) ;  s ← s + T k_I e                          (7), held where it would wind up
-//!            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6)
+//!            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6), in modal coordinates
 //! setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}
 //! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)
 //!            + J⁻ᵀ k_v ė/k_a
@@ -22,6 +22,9 @@
 //! offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large numbers
 //! are subtracted, and f is small in modal coordinates, too. What is left out is the error times the change of J over the
 //! workspace, a thousandth of it, and the rounding of the converter on a leg that is free.
+//!
+//! δ̂ and φ̂ are kept in modal coordinates, where N works: with the same weights on every leg the law commutes with the map
+//! between them, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
 
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, transform};
@@ -34,9 +37,9 @@ use crate::hysteresis::{TABLES, Table};
 use crate::limits::DAC;
 use crate::setpoint::PLAN;
 use crate::task_space::{
-    COMPLIANCE, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT,
-    WRENCH_TO_LEGS, linear_displacement, linear_drive, modal_error, notch_error,
-    notch_innovation,
+    COMPLIANCE, FORCE_TO_MODES, LEGS_TO_MODES, MODES_TO_LEGS, PERIOD, REST_FORCE,
+    TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
+    linear_displacement, linear_drive, modal_error, notch_error, notch_innovation,
 };
 use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
 
@@ -91,23 +94,24 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
     let damping = damping(config, state);
     let setpoint_status = state.generator.tick(&PLAN, &input.command);
     let Load { displacement: demand, force } = known_load(config, state);
-    let feedback = feedback(config, state);
+    let correction = correction(config, state);
     state.demand = demand;
     state.load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE);
     if let Some(damping) = &damping {
         state.load = each(|leg| state.load[leg] + damping[leg]);
     }
-    let correction = |leg: usize| state.legs[leg].estimate.correction();
-    let mut request = each(|leg| {
-        demand[leg] + state.load[leg] + feedback[leg] - correction(leg)
-    });
+    let mut request = each(|leg| demand[leg] + state.load[leg] + correction[leg]);
     if entered {
         let held = each(|leg| state.legs[leg].requested - request[leg]);
         if config.mode().law() == Law::Invhys {
             state.transfer.begin(held);
         } else {
-            for (leg, held) in state.legs.iter_mut().zip(held) {
-                leg.estimate.level -= held;
+            for (estimate, held) in state
+                .estimates
+                .iter_mut()
+                .zip(transform(&LEGS_TO_MODES, &held))
+            {
+                estimate.level -= held;
             }
             state.transfer.begin([0.0; LEGS]);
             request = each(|leg| state.legs[leg].requested);
@@ -115,14 +119,13 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
     } else {
         state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
     }
+    if state.transfer.is_active() {
+        let offset = state.transfer.offset();
+        request = each(|leg| request[leg] + offset[leg]);
+    }
     let mut limited = 0;
     for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
-        let held_back = actuate(
-            config,
-            leg,
-            table,
-            request[index] + state.transfer.offset()[index],
-        );
+        let held_back = actuate(config, leg, table, request[index]);
         limited |= (held_back as u32) << index;
     }
     state.limited = limited != 0;
@@ -152,17 +155,19 @@ fn enter_mode(config: &Config, state: &mut State) -> bool {
     };
     if mode.law() != Law::Invhys && !adapted {
         state.integral = Integral::new();
-        state.force = [0.0; 6];
+        state.deflection = [0.0; 6];
     }
     state.mode = Some(mode);
     state.interaction = interaction;
     state.environment = *config.environment();
-    for leg in &mut state.legs {
+    for estimate in &mut state.estimates {
         match mode.law() {
-            Law::Invhys => leg.estimate = Estimate::new(),
-            Law::Ewma => leg.estimate.drift = 0.0,
+            Law::Invhys => *estimate = Estimate::new(),
+            Law::Ewma => estimate.drift = 0.0,
             Law::Pcc => {}
         }
+    }
+    for leg in &mut state.legs {
         leg.requested = requested(mode, leg);
         leg.excess = 0.0;
     }
@@ -174,7 +179,7 @@ fn enter_mode(config: &Config, state: &mut State) -> bool {
         state.integral = Integral::new();
         state.error_notch = NotchState::new();
         state.error = [0.0; 6];
-        state.force = [0.0; 6];
+        state.deflection = [0.0; 6];
     }
     true
 }
@@ -214,24 +219,16 @@ pub(crate) fn learn(config: &Config, state: &mut State) {
     }
     if mode.law() != Law::Invhys {
         let disturbed = state.limited || state.transfer.is_active();
-        let offset = state.transfer.offset();
-        let withheld = disturbed
-            .then(|| each(|leg| state.legs[leg].excess - offset[leg]));
-        let innovation = notch_innovation(
-            &mut state.innovation_notch,
-            &error,
-            &state.force,
-            withheld.as_ref(),
-        );
-        for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
-            leg.estimate
-                .correct(
-                    mode.law(),
-                    config.level_weight(),
-                    config.drift_weight(),
-                    innovation,
-                );
+        let mut innovation = each(|mode| -error[mode] - state.deflection[mode]);
+        if disturbed {
+            let offset = state.transfer.offset();
+            let withheld = each(|leg| state.legs[leg].excess - offset[leg]);
+            let withheld = transform(&LEGS_TO_MODES, &withheld);
+            innovation = each(|mode| innovation[mode] + withheld[mode]);
         }
+        let innovation = notch_innovation(&mut state.innovation_notch, &innovation);
+        let (level, drift) = (config.level_weight(), config.drift_weight());
+        Estimate::correct(&mut state.estimates, mode.law(), level, drift, &innovation);
     }
 }
 
@@ -285,16 +282,19 @@ pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
     }
 }
 
-/// J⁻ᵀ(k_p e + s)/k_a: m of each leg.
+/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂: m of each leg.
 #[inline]
-pub(crate) fn feedback(config: &Config, state: &mut State) -> [Real; LEGS] {
-    if !config.mode().feeds_back() {
-        return [0.0; LEGS];
+pub(crate) fn correction(config: &Config, state: &mut State) -> [Real; LEGS] {
+    if config.mode().feeds_back() {
+        let proportional = force_of(&config.active_gains().proportional, &state.error);
+        let integral = &state.integral.force;
+        let force = each(|axis| proportional[axis] + integral[axis]);
+        state.deflection = transform(&FORCE_TO_MODES, &force);
     }
-    let proportional = force_of(&config.active_gains().proportional, &state.error);
-    let integral = &state.integral.force;
-    state.force = each(|axis| proportional[axis] + integral[axis]);
-    transform(&WRENCH_TO_LEGS, &state.force)
+    let wanted = each(|mode| {
+        state.deflection[mode] - state.estimates[mode].correction()
+    });
+    transform(&MODES_TO_LEGS, &wanted)
 }
 
 /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,
@@ -306,19 +306,24 @@ pub fn actuate(
     table: &Table,
     request: Real,
 ) -> bool {
-    let mode = config.mode();
-    let (drive, out_of_reach) = if mode.inverts() {
-        let out_of_reach = !(request >= Real::ZERO
-            && request <= table.full_displacement());
-        (leg.memory.solve(table, request), out_of_reach)
-    } else {
-        (linear_drive(request), false)
+    let LegState { memory, code, .. } = leg;
+    let mut limited = false;
+    let mut permitted = |drive: Real| {
+        let (permitted, held_back) = DAC.code(drive, *code, config.code_limits());
+        *code = permitted;
+        limited |= held_back;
+        DAC.drive(permitted)
     };
-    let (code, held_back) = DAC.code(drive, leg.code, config.code_limits());
-    leg.code = code;
-    leg.memory.apply(table, DAC.drive(code));
-    leg.requested = requested(mode, leg);
-    let limited = out_of_reach || held_back;
+    if config.mode().inverts() {
+        let within = table.within_reach(request);
+        memory.follow(table, within, &mut permitted);
+        limited |= within != request;
+        leg.requested = leg.memory.displacement();
+    } else {
+        let drive = permitted(linear_drive(request));
+        memory.apply(table, drive);
+        leg.requested = linear_displacement(drive);
+    }
     leg.excess = if limited { request - leg.requested } else { 0.0 };
     limited
 }
