@@ -69,7 +69,7 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
         ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
         ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),
-        ("src/step.rs", platform::step::emit()),
+        ("src/step.rs", platform::step::emit(ir)),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),
         ("src/words.rs", platform::words::emit(ir, task)),
     ]

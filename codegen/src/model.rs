@@ -291,6 +291,8 @@ pub struct TaskSpace {
     pub interaction: Interaction,
     /// The work piece of [`Interaction::Modelled`]; zero if the spec gives none.
     pub environment: Environment,
+    /// Time by which the leg displacements of the set-point are asked for early, s; not negative.
+    pub lead: f64,
     /// Time constant with which the offset of a bumpless change of mode fades, s.
     pub transfer_time: f64,
     /// What set-points are believed and how fast moves are.

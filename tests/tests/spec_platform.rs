@@ -89,6 +89,7 @@ fn every_value_of_the_reference_is_in_si() {
         velocity_cutoff: 1.9e4,
         interaction: Interaction::None,
         environment: Environment { stiffness: [0.0; 6], rest: NO_POSE },
+        lead: 1e-4,
         transfer_time: 0.05,
         setpoint: SetpointRules {
             bias: [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0],

@@ -36,6 +36,8 @@ pub struct ControlLaw {
     pub rest_force: [f64; LEGS],
     /// Largest component of a measured wrench, N and N m.
     pub wrench_limit: [f64; 6],
+    /// Lead of the leg displacements, in periods; zero if there is none.
+    pub lead: f64,
     /// Part of the transfer offset left after a tick.
     pub transfer_keep: f64,
     /// Transfer offset that is as good as none, m.

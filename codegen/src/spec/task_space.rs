@@ -44,6 +44,7 @@ pub(super) fn task_space(f: &Fields) -> Option<Option<TaskSpace>> {
             _ => Interaction::None,
         },
         environment,
+        lead: f.number("control.lead")?,
         transfer_time: f.number("control.transfer_time")?,
         setpoint: SetpointRules {
             bias: f.list("control.setpoint.bias")?,

@@ -75,6 +75,7 @@ pub fn model() -> (Model, TaskSpace) {
         velocity_cutoff: std::f64::consts::TAU * 3500.0,
         interaction: Interaction::None,
         environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
+        lead: 0.0,
         transfer_time: 0.05,
         setpoint: SetpointRules {
             bias: [0.0, 0.0, 1e-5, 0.0, 0.0, 0.0],

@@ -86,6 +86,8 @@ pub struct Settings {
     pub velocity: Six,
     /// Cut-off of the filter of the pose's derivative, rad/s.
     pub velocity_cutoff: f64,
+    /// Lead of the leg displacements, s.
+    pub lead: f64,
     /// The gauges; their words are metres.
     pub probes: [Probe; 6],
     /// Everett tables of the legs.
@@ -112,6 +114,7 @@ impl Settings {
             position: design.position,
             velocity: [0.0; 6],
             velocity_cutoff: 3e3,
+            lead: 0.0,
             probes: specimen.nominal.probes,
             tables: tables(&specimen.legs),
             drive: Drive::reference(period),
@@ -220,6 +223,8 @@ struct State {
     target: PoseTarget,
     /// p of the interval that just ended, m.
     load: Vector,
+    /// Δl at the last set-point, m.
+    demand: Vector,
     level: Vector,
     drift: Vector,
     integral: Vector,
@@ -240,6 +245,7 @@ impl State {
             velocity: zero,
             target: PoseTarget::default(),
             load: zero,
+            demand: zero,
             level: zero,
             drift: zero,
             integral: zero,
@@ -261,6 +267,8 @@ pub struct PlatformOracle {
     drive: Drive,
     period: f64,
     velocity_pole: f64,
+    /// Lead of the leg displacements, s.
+    lead: f64,
     /// k_a of each leg, N/m.
     stiffness: Vector,
     jacobian: Matrix,
@@ -316,6 +324,7 @@ impl PlatformOracle {
             tables: settings.tables.clone(),
             drive: settings.drive,
             period: plant.period,
+            lead: settings.lead,
             velocity_pole: libm::exp(-settings.velocity_cutoff * plant.period),
             stiffness: vector(&structure.stiffness),
             jacobian,
@@ -550,8 +559,9 @@ impl TickController for PlatformOracle {
         if has_feedback {
             push += kv.component_mul(&(vector(&self.state.target.rate) - self.state.velocity));
         }
-        let load = self.load(&target, &push);
         let demand = vector(&self.geometry.extensions(&target.pose));
+        let lead = (demand - self.state.demand) * (self.lead / self.period);
+        let load = self.load(&target, &push) + lead;
         let state = &mut self.state;
         let feedback = (self.inverse_jacobian.transpose() * effort).component_div(&self.stiffness);
         let request = demand + load + feedback - state.level - state.drift;
@@ -586,6 +596,7 @@ impl TickController for PlatformOracle {
         state.pose = pose;
         state.target = target;
         state.load = load;
+        state.demand = demand;
         state.started = true;
     }
 

@@ -32,6 +32,7 @@ pub fn model(probes: [Probe; 6]) -> Model {
         velocity_cutoff: 2000.0,
         interaction: Interaction::None,
         environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
+        lead: 0.0,
         transfer_time: 0.1,
         setpoint: SetpointRules {
             bias: [0.0; 6],

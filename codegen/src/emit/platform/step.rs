@@ -3,7 +3,14 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-pub fn emit() -> TokenStream {
+use crate::ir::Ir;
+
+pub fn emit(ir: &Ir) -> TokenStream {
+    let has_lead = ir.task_space.as_ref().is_some_and(|task| task.law.lead != 0.0);
+    let (lead, lead_import) = match has_lead {
+        true => (quote! { + (demand[leg] - state.demand[leg]) * LEAD }, quote! { LEAD, }),
+        false => (quote! {}, quote! {}),
+    };
     quote! {
         #![doc = " One control tick."]
         #![doc = ""]
@@ -16,7 +23,7 @@ pub fn emit() -> TokenStream {
         #![doc = "            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6), in modal coordinates"]
         #![doc = " setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}"]
         #![doc = " load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)"]
-        #![doc = "            + J⁻ᵀ k_v ė/k_a"]
+        #![doc = "            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T                  damping, lead"]
         #![doc = " legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is what was really requested"]
         #![doc = " ```"]
         #![doc = " N is the modal notch. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback"]
@@ -40,7 +47,7 @@ pub fn emit() -> TokenStream {
         use crate::limits::DAC;
         use crate::setpoint::PLAN;
         use crate::task_space::{
-            COMPLIANCE, FORCE_TO_MODES, LEGS_TO_MODES, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP,
+            COMPLIANCE, FORCE_TO_MODES, #lead_import LEGS_TO_MODES, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP,
             TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS, linear_displacement, linear_drive, modal_error, notch_error,
             notch_innovation,
         };
@@ -93,8 +100,8 @@ pub fn emit() -> TokenStream {
             let setpoint_status = state.generator.tick(&PLAN, &input.command);
             let Load { displacement: demand, force } = known_load(config, state);
             let correction = correction(config, state);
+            state.load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE #lead);
             state.demand = demand;
-            state.load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE);
             if let Some(damping) = &damping {
                 state.load = each(|leg| state.load[leg] + damping[leg]);
             }

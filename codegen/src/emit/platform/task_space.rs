@@ -20,6 +20,13 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let (rest_force, wrench_limit) = (six(&law.rest_force), six(&law.wrench_limit));
     let (keep, negligible) = (real(law.transfer_keep), real(law.transfer_negligible));
     let (cells_per_metre, metres_per_cell) = (real(law.cells_per_metre), real(law.metres_per_cell));
+    let lead = (law.lead != 0.0).then(|| {
+        let lead = real(law.lead);
+        quote! {
+            /// Lead of the leg displacements, in periods; from `control.lead`.
+            pub const LEAD: Real = #lead;
+        }
+    });
     let notch = match &law.notch {
         None => without_notch(),
         Some(notch) => with_notch(ir, notch, &matrix),
@@ -55,6 +62,7 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const REST_FORCE: [Real; LEGS] = [#rest_force];
         /// Largest |component| of the measured wrench that is believed, N and N m; from `control.interaction`.
         pub const WRENCH_LIMIT: [Real; 6] = [#wrench_limit];
+        #lead
         /// Part of the offset of a change of mode that is left after a tick; from `control.transfer_time`.
         pub const TRANSFER_KEEP: Real = #keep;
         /// Offset of a change of mode below which it is over, m.
