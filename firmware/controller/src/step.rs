@@ -29,9 +29,7 @@
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, transform};
 use specgen_runtime::setpoint::Command;
-use specgen_runtime::{
-    ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _,
-};
+use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState};
 use crate::dynamics::Load;
 use crate::hysteresis::{TABLES, Table};
 use crate::limits::DAC;

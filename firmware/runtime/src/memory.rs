@@ -7,7 +7,8 @@
 //! rising  from a minimum p_k:  f(x) = f_k + E(x, p_k)     until x ≥ p_{k−1}, which wipes p_{k−1} and p_k out
 //! falling from a maximum p_k:  f(x) = f_k − E(p_k, x)     until x ≤ p_{k−1}, likewise
 //! ```
-//! The inverse walks the same staircase by displacement, then solves one branch ([`Everett::rise`], [`Everett::fall`]).
+//! The inverse walks the same staircase by displacement, then solves one branch ([`Everett::rise`], [`Everett::fall`]). Within
+//! a cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
 
 use crate::digest::Digest;
 use crate::everett::{Everett, Line};
@@ -138,11 +139,15 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         if wanted == self.displacement {
             return self.drive;
         }
-        if wanted > self.displacement { self.find::<true, N, NODES>(table, wanted).0 } else { self.find::<false, N, NODES>(table, wanted).0 }
+        if wanted > self.displacement {
+            self.find::<true, N, NODES>(table, wanted).0
+        } else {
+            self.find::<false, N, NODES>(table, wanted).0
+        }
     }
 
     /// Γ⁻¹ and Γ in one: solves for `displacement`, which must be within the reach of the table, and applies the drive that
-    /// `permitted` makes of the solution (finite).
+    /// `permitted` makes of the solution (finite). `permitted` is called once.
     ///
     /// The same to the bit as [`ReversalMemory::solve`] and [`ReversalMemory::apply`]. A drive that is permitted differs from
     /// the solution by a fraction of a cell: mostly it lies on the stretch of the branch that the solution was found on, and
@@ -152,7 +157,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         &mut self,
         table: &Everett<T, N, NODES>,
         displacement: T,
-        mut permitted: impl FnMut(T) -> T,
+        permitted: impl FnOnce(T) -> T,
     ) {
         let drive = if displacement > self.displacement {
             let (solution, branch) = self.find::<true, N, NODES>(table, displacement);

@@ -281,7 +281,9 @@ fn follows_as_its_halves_do<const CAP: usize>(table: &Table, seed: u64, tick_of_
         };
         let displacement = table.within_reach(reach);
         let (codes, step) = if tick % 1000 < 900 { (2048.0, 200.0) } else { (1.0, 1.0) };
-        let permitted = |drive: f64| ((drive * codes).round().clamp(code * codes - step, code * codes + step) / codes).clamp(0.0, 32.0);
+        let permitted = |drive: f64| {
+            ((drive * codes).round().clamp(code * codes - step, code * codes + step) / codes).clamp(0.0, 32.0)
+        };
         let drive = permitted(halves.solve(table, displacement));
         halves.apply(table, drive);
         whole.follow(table, displacement, permitted);
