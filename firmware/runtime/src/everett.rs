@@ -49,10 +49,7 @@ impl<T: Real> Line<T> {
     /// Where E is `value`; the origin if the stretch is flat.
     #[inline(always)]
     fn solve<const RISING: bool>(&self, value: T) -> T {
-        if !(self.slope > T::ZERO) {
-            return self.origin;
-        }
-        let length = (value - self.base) / self.slope;
+        let length = if self.slope > T::ZERO { (value - self.base) / self.slope } else { T::ZERO };
         if RISING { self.origin + length } else { self.origin - length }
     }
 }
