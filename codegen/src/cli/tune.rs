@@ -104,7 +104,10 @@ enum OptimiserArgument {
 
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 enum TrajectoryArgument {
+    /// Smooth.
     Multisine,
+    /// The multisine with a zigzag in place of its fastest sine: corners, where the platform rings.
+    Zigzag,
     Leg,
     #[value(name = "case-1")]
     Case1,
@@ -178,7 +181,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 fn check(arguments: &Arguments, compiled: &Compiled) -> Result<(), Failure> {
     let platform = compiled.model.task_space.is_some();
     let fits = match arguments.trajectory {
-        TrajectoryArgument::Multisine => true,
+        TrajectoryArgument::Multisine | TrajectoryArgument::Zigzag => true,
         TrajectoryArgument::Leg => !platform,
         TrajectoryArgument::Case1 | TrajectoryArgument::Case2 | TrajectoryArgument::Machining => platform,
     };
@@ -265,10 +268,11 @@ impl Job<'_> {
     fn trajectories(&self) -> [TrajectoryChoice; 2] {
         let Arguments { frequency, seconds, plant, .. } = self.arguments;
         let (frequency, seconds) = (*frequency, *seconds);
-        let sines = TrajectoryChoice::Multisine { frequency, seconds, seed: plant.seed };
+        let corners = self.arguments.trajectory == TrajectoryArgument::Zigzag;
+        let sines = TrajectoryChoice::Multisine { frequency, seconds, seed: plant.seed, corners };
         let paper = |path| TrajectoryChoice::Paper { path, frequency };
         match self.arguments.trajectory {
-            TrajectoryArgument::Multisine => [sines, paper(PaperPath::Case1)],
+            TrajectoryArgument::Multisine | TrajectoryArgument::Zigzag => [sines, paper(PaperPath::Case1)],
             TrajectoryArgument::Leg | TrajectoryArgument::Case1 => [paper(PaperPath::Case1), sines],
             TrajectoryArgument::Case2 => [paper(PaperPath::Case2), paper(PaperPath::Case1)],
             TrajectoryArgument::Machining => [paper(PaperPath::Machining), paper(PaperPath::Case1)],

@@ -19,6 +19,7 @@ use host_sim::trajectory::{LegTrajectory, Multisine, PaperLeg, PaperPath, PaperP
 use serde::Serialize;
 
 use super::Setting;
+use super::space::axis_stiffness;
 use crate::compile::Compiled;
 use crate::machine;
 use crate::model::{Model, TaskSpace};
@@ -37,8 +38,7 @@ const REACH: f64 = 0.3;
 /// What is followed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum TrajectoryChoice {
-    /// Five sines on every coordinate, the fastest of this frequency (Hz) and on a platform a zigzag, for this long (s),
-    /// phases from a seed.
+    /// Five sines on every coordinate, the fastest of this frequency (Hz), for this long (s), phases from a seed.
     Multisine {
         /// Hz.
         frequency: f64,
@@ -46,6 +46,8 @@ pub enum TrajectoryChoice {
         seconds: f64,
         /// Of the phases.
         seed: u64,
+        /// A zigzag in place of the fastest sine.
+        corners: bool,
     },
     /// The paper's: of section 3 for legs, a path of section 4 for a platform, at an operating frequency (Hz).
     Paper {
@@ -173,9 +175,10 @@ impl Case {
         let mut scenario = LegScenario::new(legs, &noise, conditions.noise.unwrap_or_default(), 1);
         let trajectory: Box<dyn LegTrajectory + Sync + Send> = match conditions.trajectory {
             TrajectoryChoice::Paper { frequency, .. } => Box::new(PaperLeg { frequency }),
-            TrajectoryChoice::Multisine { frequency, seconds, seed } => {
+            TrajectoryChoice::Multisine { frequency, seconds, seed, corners } => {
                 let stroke = model.actuator.stroke;
-                Box::new(Multisine::new(seconds, frequency, [0.4 * stroke; 6], [REACH * stroke; 6], seed))
+                let sines = Multisine::new(seconds, frequency, [0.4 * stroke; 6], [REACH * stroke; 6], seed);
+                Box::new(if corners { sines.with_corners() } else { sines })
             }
         };
         let period = model.timing.period;
@@ -207,22 +210,15 @@ impl Case {
             TrajectoryChoice::Paper { path, frequency } => {
                 Box::new(PaperPose { path, reading: Reading::Corrected, frequency })
             }
-            TrajectoryChoice::Multisine { frequency, seconds, seed } => {
-                Box::new(Multisine::new(seconds, frequency, [0.0; 6], reach(model, task), seed).with_corners())
+            TrajectoryChoice::Multisine { frequency, seconds, seed, corners } => {
+                let sines = Multisine::new(seconds, frequency, [0.0; 6], reach(model, task), seed);
+                Box::new(if corners { sines.with_corners() } else { sines })
             }
         };
         let mut armed = controller.fork();
         armed.configure(&start.words(&armed))?;
         let study = PlatformStudy::new(&scenario, &armed, trajectory.as_ref(), conditions.whole_ticks)?;
-        let stiffness = compiled.ir.task_space.as_ref().map_or([1.0; 6], |ir| {
-            let mut diagonal = [0.0; 6];
-            for row in &ir.law.jacobian {
-                for axis in 0..6 {
-                    diagonal[axis] += row[axis] * row[axis] * model.actuator.axial_stiffness;
-                }
-            }
-            diagonal
-        });
+        let stiffness = axis_stiffness(model);
         let alone = task.mode == crate::model::ControlMode::P;
         Ok(Self {
             kind: Kind::Platform { study, radius: model.geometry.joint_radius(), stiffness, alone },

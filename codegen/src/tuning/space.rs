@@ -10,7 +10,9 @@ use serde::Serialize;
 use super::Setting;
 use crate::compile::Compiled;
 use crate::diagnostic::{Diagnostic, Severity, codes};
-use crate::model::{AdaptationMode, ControlMode};
+use crate::lower::platform;
+use crate::model::{AdaptationMode, ControlMode, Model};
+use crate::stability::platform::RestDynamics;
 
 /// Which numbers are tuned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -109,11 +111,8 @@ impl Space {
         let mut add = |role: Role, bounds: [f64; 2]| parameters.push(Parameter { role, bounds });
         let mut stiffness = [1.0; 6];
         let alone = mode == Some(ControlMode::P);
-        if let (Some(design), Some(ir)) = (&compiled.design, &compiled.ir.task_space) {
-            for (axis, value) in stiffness.iter_mut().enumerate() {
-                let squares: f64 = ir.law.jacobian.iter().map(|row| row[axis] * row[axis]).sum();
-                *value = squares * model.actuator.axial_stiffness;
-            }
+        if let Some(design) = &compiled.design {
+            stiffness = axis_stiffness(model);
             if what != What::Weights && mode != Some(ControlMode::F) {
                 let damped = if alone { design.position } else { design.combined }.derivative != [0.0; 6];
                 (0..6).for_each(|axis| add(Role::Proportional(axis), PROPORTIONAL));
@@ -263,6 +262,17 @@ impl Space {
             }
         }
     }
+}
+
+/// K_ii = (Jᵀ k_a J)_ii at rest of a model that compiled, N/m and N m/rad.
+#[must_use]
+pub fn axis_stiffness(model: &Model) -> [f64; 6] {
+    // Compiling found it: ones are never seen.
+    let Ok(platform) = platform(model) else { return [1.0; 6] };
+    let jacobian = RestDynamics::of(&platform).jacobian;
+    std::array::from_fn(|axis| {
+        jacobian.iter().map(|row| row[axis] * row[axis]).sum::<f64>() * model.actuator.axial_stiffness
+    })
 }
 
 /// To four significant digits, by way of the decimal text that the spec will show: the double nearest to that text.
