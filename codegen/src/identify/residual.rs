@@ -3,6 +3,7 @@
 use super::branches::Branch;
 use super::record::Record;
 use super::regressor::{self, Plane};
+use super::cause::{self, Cause};
 use super::selection::Used;
 use super::{normal, sanity, trend};
 use crate::everett::EverettTable;
@@ -11,7 +12,7 @@ use crate::everett::EverettTable;
 pub(crate) struct Residual {
     /// As it is, m.
     plain: Vec<f64>,
-    /// Without `line`, m.
+    /// Without `line`, of the samples that have weight, m.
     pub(crate) detrended: Vec<f64>,
     /// Offset (m) and linear drift (m/s) of `plain`.
     pub(crate) line: trend::Line,
@@ -26,11 +27,26 @@ impl Residual {
         normal::each_row(plane, &record.drive, used.first, |k, row| {
             plain.push(displacement[k] - regressor::evaluate(row, &table.nodes));
         });
-        let time = &record.time[used.first..];
-        let line = trend::Line::fit(time, &plain);
-        let detrended = plain.iter().zip(time).map(|(r, t)| r - line.at(*t)).collect();
-        let (low, high) = sanity::extent(&displacement[used.first..]);
+        let believed = |values: &[f64]| -> Vec<f64> {
+            let paired = values.iter().zip(&record.weightless[used.first..]);
+            paired.filter(|(_, weightless)| !**weightless).map(|(v, _)| *v).collect()
+        };
+        let (time, kept) = (believed(&record.time[used.first..]), believed(&plain));
+        let line = trend::Line::fit(&time, &kept);
+        let detrended = kept.iter().zip(&time).map(|(r, t)| r - line.at(*t)).collect();
+        let (low, high) = sanity::extent(&believed(&displacement[used.first..]));
         Self { plain, detrended, line, range: high - low }
+    }
+
+    /// What it consists of, given white noise `noise` (m) and the gain (m/V).
+    pub(crate) fn cause(&self, record: &Record, first: usize, noise: f64, gain: f64) -> Cause {
+        let keep: Vec<bool> = record.weightless[first..].iter().map(|w| !w).collect();
+        cause::explain(&record.time[first..], &record.drive[first..], &self.plain, noise, gain, &keep)
+    }
+
+    /// As it is, from the first used sample on, m.
+    pub(crate) fn plain(&self) -> &[f64] {
+        &self.plain
     }
 
     /// Root mean square over `branches` with the mean of each branch removed, m.
