@@ -15,6 +15,7 @@ mod columns;
 mod coverage;
 mod dead_time;
 mod distrust;
+pub mod draw;
 mod export;
 pub(crate) mod findings;
 pub mod gauge;
@@ -36,6 +37,7 @@ mod signals;
 mod staircase;
 pub mod stiffness;
 mod sweep;
+mod trace;
 mod trend;
 mod validate;
 
@@ -53,6 +55,7 @@ pub use grid_choice::{GridChoice, Score, choose_grid};
 pub use record::{MAX_FILE_BYTES, Record, parse_record, read_file, read_record};
 pub use report::{Branches, Report};
 pub use staircase::Staircase;
+pub use trace::Trace;
 pub use validate::{Start, StartResult, Validation, validate};
 
 /// What to identify.
@@ -93,6 +96,8 @@ pub struct Identified {
     pub table: EverettTable,
     /// Figures.
     pub report: Report,
+    /// Samples and residual behind the first usable one.
+    pub trace: Trace,
     /// Findings that refuse nothing, those of the record included.
     pub warnings: Vec<Diagnostic>,
 }
@@ -112,12 +117,12 @@ pub fn identify(record: &Record, options: &Options) -> Result<Identified, Vec<Di
     let mut all = record.warnings.clone();
     all.extend(findings.into_diagnostics());
     match found {
-        Some((table, report)) if !refused => Ok(Identified { table, report, warnings: all }),
+        Some((table, report, trace)) if !refused => Ok(Identified { table, report, trace, warnings: all }),
         _ => Err(all),
     }
 }
 
-fn identify_checked(record: &Record, options: &Options, findings: &mut Findings) -> Option<(EverettTable, Report)> {
+fn identify_checked(record: &Record, options: &Options, findings: &mut Findings) -> Option<(EverettTable, Report, Trace)> {
     let plane = coverage::plane(options, findings)?;
     coverage::check_range(record, &plane, findings);
     if findings.any_error() {
@@ -196,7 +201,8 @@ fn identify_checked(record: &Record, options: &Options, findings: &mut Findings)
             "is the record one actuator at one load, without steps or lost samples?",
         );
     }
-    Some((table, report))
+    let trace = residual.trace(record, used.first, &displacement);
+    Some((table, report, trace))
 }
 
 /// Non-negative weights in units of the target.

@@ -5,6 +5,7 @@ use super::record::Record;
 use super::regressor::{self, Plane};
 use super::cause::{self, Cause};
 use super::selection::Used;
+use super::trace::Trace;
 use super::{normal, sanity, trend};
 use crate::everett::EverettTable;
 
@@ -44,9 +45,12 @@ impl Residual {
         cause::explain(&record.time[first..], &record.drive[first..], &self.plain, noise, gain, &keep)
     }
 
-    /// As it is, from the first used sample on, m.
-    pub(crate) fn plain(&self) -> &[f64] {
-        &self.plain
+    /// The samples from the first used one on, for drawing; `displacement` as given to [`Residual::of`].
+    pub(crate) fn trace(&self, record: &Record, first: usize, displacement: &[f64]) -> Trace {
+        let time = record.time[first..].to_vec();
+        let off = |k: usize| if record.weightless[first + k] { f64::NAN } else { self.plain[k] - self.line.at(time[k]) };
+        let residual = (0..time.len()).map(off).collect();
+        Trace { time, drive: record.drive[first..].to_vec(), measured: displacement[first..].to_vec(), residual }
     }
 
     /// Root mean square over `branches` with the mean of each branch removed, m.

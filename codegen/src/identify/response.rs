@@ -19,6 +19,7 @@ use super::signals::{self, Signals, Wanted};
 use crate::diagnostic::Diagnostic;
 
 pub use fit::{Estimate, Fitted};
+pub(crate) use fit::response;
 pub use welch::Bin;
 
 /// A response and what was fitted to it.

@@ -10,6 +10,7 @@ use super::normal;
 use super::record::Record;
 use super::regressor::{self, Plane};
 use super::staircase::Staircase;
+use super::trace::Trace;
 use super::trend::{Line, noise_floor, rms_and_max};
 use super::{dead_time, sanity};
 use crate::diagnostic::Diagnostic;
@@ -61,6 +62,9 @@ pub struct Validation {
     pub best: StartResult,
     /// What the residual under that start consists of.
     pub cause: Cause,
+    /// Samples compared and their errors, for drawing.
+    #[serde(skip)]
+    pub trace: Trace,
     /// Every start that was tried, in the order of [`Start`].
     pub starts: Vec<StartResult>,
 }
@@ -132,7 +136,15 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
     compared.iter().for_each(|&k| keep[k - first] = true);
     let noise = noise_floor(&record.displacement[first..]);
     let gain = table.node(table.grid, 0) / (plane.range[1] - plane.range[0]);
-    let cause = cause::explain(&record.time[first..], &record.drive[first..], &errors_of(best.start), noise, gain, &keep);
+    let errors = errors_of(best.start);
+    let cause = cause::explain(&record.time[first..], &record.drive[first..], &errors, noise, gain, &keep);
+    let line = Line::fit(&time, &compared.iter().map(|&k| errors[k - first]).collect::<Vec<_>>());
+    let trace = Trace {
+        drive: compared.iter().map(|&k| record.drive[k]).collect(),
+        measured: compared.iter().map(|&k| displacement[k]).collect(),
+        residual: compared.iter().zip(&time).map(|(&k, t)| errors[k - first] - line.at(*t)).collect(),
+        time,
+    };
     Ok(Validation {
         record: record.shown_as.clone(),
         samples_skipped: first,
@@ -142,6 +154,7 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
         dead_time,
         best,
         cause,
+        trace,
         starts: starts.to_vec(),
     })
 }

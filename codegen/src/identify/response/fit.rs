@@ -92,7 +92,7 @@ fn model(p: &[f64; N], unit: f64, f: f64) -> (f64, f64) {
 }
 
 /// Complex response of `fitted` at `f` (Hz): magnitude in m/V, phase in rad.
-pub(in crate::identify) fn response(fitted: &Fitted, f: f64) -> (f64, f64) {
+pub(crate) fn response(fitted: &Fitted, f: f64) -> (f64, f64) {
     let p = [
         libm::log(fitted.gain.value),
         libm::log(fitted.resonance.value),
