@@ -29,7 +29,7 @@ pub struct Arguments {
     #[command(subcommand)]
     kind: Option<Kind>,
     #[command(flatten)]
-    everett: Option<everett::Arguments>,
+    everett: everett::EverettArguments,
 }
 
 #[derive(Subcommand, Debug)]
@@ -45,13 +45,12 @@ enum Kind {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    match (&arguments.kind, &arguments.everett) {
-        (Some(Kind::Linear(arguments)), _) => linear::run(arguments, ui),
-        (Some(Kind::Response(arguments)), _) => response::run(arguments, ui),
-        (Some(Kind::Gauge(arguments)), _) => gauge::run(arguments, ui),
-        (Some(Kind::Stiffness(arguments)), _) => stiffness::run(arguments, ui),
-        (None, Some(arguments)) => everett::run(arguments, ui),
-        (None, None) => Err(Failure::Usage("a record is expected, or one of linear, response, gauge, stiffness".to_owned())),
+    match &arguments.kind {
+        Some(Kind::Linear(arguments)) => linear::run(arguments, ui),
+        Some(Kind::Response(arguments)) => response::run(arguments, ui),
+        Some(Kind::Gauge(arguments)) => gauge::run(arguments, ui),
+        Some(Kind::Stiffness(arguments)) => stiffness::run(arguments, ui),
+        None => everett::run(&arguments.everett, ui),
     }
 }
 

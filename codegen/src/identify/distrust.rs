@@ -9,6 +9,8 @@ use super::trend::noise_floor;
 const GLITCH: f64 = 0.02;
 /// Noise floors that a glitch exceeds.
 const ABOVE_NOISE: f64 = 12.0;
+/// Spreads of its neighbours that it exceeds.
+const ALONE: f64 = 3.0;
 /// Half width of the neighbourhood, samples.
 const NEAR: usize = 2;
 /// A step between two samples by this share of the drive's range is a jump: no rate-independent model follows it.
@@ -54,7 +56,9 @@ fn glitches(
             continue;
         }
         let (near_low, near_high) = extent(&drive[around]);
-        if off <= GLITCH * (high - low) + 3.0 * gain * (near_high - near_low) {
+        // Ringing moves the neighbours too: what stands out of them alone is a glitch.
+        let (least, most) = extent(&[k - 2, k - 1, k + 1, k + 2].map(|i| displacement[i]));
+        if off <= GLITCH * (high - low) + 3.0 * gain * (near_high - near_low) || off <= ALONE * (most - least) {
             continue;
         }
         weightless[k] = true;

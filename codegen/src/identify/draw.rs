@@ -160,7 +160,7 @@ pub fn response(report: &ResponseReport) -> String {
     let shown: Vec<_> = report
         .bins
         .iter()
-        .filter(|b| b.frequency > 0.0 && b.frequency >= 0.5 * report.band[0] && b.frequency <= 2.0 * report.band[1])
+        .filter(|b| b.frequency > 0.0 && b.frequency >= 0.5 * report.band[0] && b.frequency <= 1.1 * report.band[1])
         .collect();
     let inside = |f: f64| f >= report.band[0] && f <= report.band[1];
     let modelled: Vec<(f64, f64, f64)> = shown
@@ -201,7 +201,7 @@ pub fn response(report: &ResponseReport) -> String {
     coherence.y_limits = Some([0.0, 1.05]);
     let f = &report.fitted;
     let subtitle = format!(
-        "resonance {:.2} ± {:.2} Hz; ζ {:.4} ± {:.4}; lag {:.4} ± {:.4} ms; dead time {:.4} ± {:.4} ms; gain {:.5} µm/V; {} segments of {}",
+        "resonance {:.2} ± {:.1e} Hz; ζ {:.4} ± {:.1e}; lag {:.4} ± {:.1e} ms; dead time {:.4} ± {:.1e} ms; gain {:.5} µm/V; {} segments of {}",
         f.resonance.value,
         f.resonance.error,
         f.damping_ratio.value,

@@ -168,7 +168,7 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
         samples: volts.len(),
         degree,
         held_out_rms: held_out.iter().map(|folds| root_mean(folds)).collect(),
-        rule: "lowest degree within one standard error of the best",
+        rule: "lowest degree within one standard error, or one per cent, of the best",
         coefficients,
         errors,
         volts: [low, high],
@@ -317,7 +317,10 @@ fn root_mean(squares: &[f64]) -> f64 {
     (squares.iter().fold(0.0, |sum, s| sum + s) / squares.len() as f64).sqrt()
 }
 
-/// Lowest degree whose error exceeds the best one's by at most one standard error of the paired difference.
+/// A gain in error below this share of the best one is not worth a degree.
+const WORTHWHILE: f64 = 0.01;
+
+/// Lowest degree whose error exceeds the best one's by at most one standard error of the paired difference, or one per cent.
 fn choose(scores: &[Vec<f64>]) -> usize {
     let best = (0..scores.len()).fold(0, |best, k| if root_mean(&scores[k]) < root_mean(&scores[best]) { k } else { best });
     for (k, folds) in scores.iter().enumerate().take(best) {
@@ -325,7 +328,7 @@ fn choose(scores: &[Vec<f64>]) -> usize {
         let count = worse.len() as f64;
         let mean = worse.iter().fold(0.0, |sum, d| sum + d) / count;
         let spread = worse.iter().fold(0.0, |sum, d| sum + (d - mean) * (d - mean)) / (count - 1.0);
-        if mean <= (spread / count).sqrt() {
+        if mean <= (spread / count).sqrt() || mean <= WORTHWHILE * root_mean(&scores[best]) {
             return k + 1;
         }
     }

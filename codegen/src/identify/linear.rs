@@ -170,7 +170,7 @@ fn line(record: &Record, frequency: f64, detected: bool, starts: &[usize], findi
     let spread_y = y.iter().fold(0.0, |sum, v| sum + (v - mean_y) * (v - mean_y)) / count;
     let unexplained = square / spread_y;
     let (bottom, top) = extent(&y);
-    let loop_width = widest(record, first, end);
+    let loop_width = widest(record, first, end, found.coefficients[1]);
     Some(Relation {
         record: record.shown_as.clone(),
         frequency,
@@ -187,8 +187,9 @@ fn line(record: &Record, frequency: f64, detected: bool, starts: &[usize], findi
     })
 }
 
-/// Largest difference of the mean displacement in falls and in rises at the same voltage, m.
-fn widest(record: &Record, first: usize, end: usize) -> f64 {
+/// Largest difference of the mean displacement in falls and in rises at the same voltage, m. `gain` (m/V) takes out what
+/// the samples of a bin differ in voltage.
+fn widest(record: &Record, first: usize, end: usize, gain: f64) -> f64 {
     let drive = &record.drive;
     let (low, high) = extent(&drive[first..end]);
     let mut sums = vec![[(0.0, 0.0); 2]; WIDTHS];
@@ -207,9 +208,8 @@ fn widest(record: &Record, first: usize, end: usize) -> f64 {
         }
         let position = (drive[k] - low) / (high - low) * WIDTHS as f64;
         let bin = (position as usize).min(WIDTHS - 1);
-        // Displacement relative to the line's slope within a bin would be finer; rise and fall fill a bin alike.
         let (sum, count) = &mut sums[bin][usize::from(rising)];
-        *sum += record.displacement[k];
+        *sum += record.displacement[k] - gain * drive[k];
         *count += 1.0;
     }
     let both = sums.iter().filter(|[fall, rise]| fall.1 > 0.0 && rise.1 > 0.0);

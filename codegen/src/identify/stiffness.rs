@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::cause::lagging;
 use super::findings::Findings;
-use super::least_squares::{fit, independent_samples, mean_square};
+use super::least_squares::{Fit, fit, independent_samples, mean_square};
 use super::sanity::extent;
 use super::signals::{self, Signals, Wanted};
 use crate::diagnostic::Diagnostic;
@@ -58,6 +58,8 @@ const COLUMNS: [Wanted; 4] = [
 ];
 /// Creep time constants tried per decade from ten samples to the record's length.
 const PER_DECADE: usize = 6;
+/// Halvings of the step in ln τ around the best of them.
+const REFINED: usize = 12;
 /// The residual's mean square must fall by this share for creep to be believed.
 const WORTHWHILE: f64 = 0.05;
 /// The drive may move by this much, V: more adds displacement that is not the force's.
@@ -66,6 +68,14 @@ const CONSTANT: f64 = 0.05;
 const PLAUSIBLE: [f64; 2] = [1e4, 1e10];
 /// The uncertainty above which a warning says that the record does not tell, %.
 const UNCERTAIN: f64 = 10.0;
+
+/// A fit with creep of time constant `tau` (s).
+struct Creep {
+    tau: f64,
+    square: f64,
+    found: Fit,
+    state: Vec<f64>,
+}
 
 /// Measures from the columns `time_s`, `force_N`, `displacement_um` and, if there is one, `drive_V`.
 ///
@@ -120,24 +130,41 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
         return None;
     };
     let base = mean_square(&straight.residual);
-    let mut best: Option<(f64, super::least_squares::Fit, Vec<f64>)> = None;
+    let mut best: Option<Creep> = None;
     let shortest = 10.0 * duration / (time.len() - 1) as f64;
     let steps = ((duration / shortest).log10() * PER_DECADE as f64).ceil().max(1.0) as usize;
-    for k in 0..=steps {
-        let tau = shortest * (duration / shortest).powf(k as f64 / steps as f64);
+    let at = |tau: f64| -> Option<Creep> {
         let state = lagging(time, force, tau);
-        let Some(found) = fit(&[&one, &ramp, force, &state], &y) else { continue };
-        if best.as_ref().is_none_or(|(_, b, _)| mean_square(&found.residual) < mean_square(&b.residual)) {
-            best = Some((tau, found, state));
+        let found = fit(&[&one, &ramp, force, &state], &y)?;
+        Some(Creep { tau, square: mean_square(&found.residual), found, state })
+    };
+    let better = |best: &Option<Creep>, tried: &Creep| best.as_ref().is_none_or(|b| tried.square < b.square);
+    let ratio = (duration / shortest).powf(1.0 / steps as f64);
+    for k in 0..=steps {
+        best = at(shortest * ratio.powi(k as i32)).filter(|tried| better(&best, tried)).or(best);
+    }
+    // Between the neighbours of the best one, ever closer.
+    let mut width = ratio.sqrt();
+    for _ in 0..REFINED {
+        let Some(middle) = best.as_ref().map(|b| b.tau) else { break };
+        for tau in [middle / width, middle * width] {
+            best = at(tau).filter(|tried| better(&best, tried)).or(best);
         }
+        width = width.sqrt();
     }
     // Creep goes the way of the force; a negative one would be an artefact.
-    let best = best.filter(|(_, found, _)| {
-        mean_square(&found.residual) < (1.0 - WORTHWHILE) * base && found.coefficients[3] * found.coefficients[2] > 0.0
+    let best = best.filter(|b| {
+        b.square < (1.0 - WORTHWHILE) * base && b.found.coefficients[3] * b.found.coefficients[2] > 0.0
     });
     let (chosen, creep_time, creep_share, state) = match best {
-        Some((tau, found, state)) => {
+        Some(Creep { tau, mut found, state, .. }) => {
             let share = found.coefficients[3] / found.coefficients[2];
+            // The time constant is estimated too: its column widens the error of k.
+            let near = lagging(time, force, tau * 1.001);
+            let turn: Vec<f64> = near.iter().zip(&state).map(|(a, b)| a - b).collect();
+            if let Some(wider) = fit(&[&one, &ramp, force, &state, &turn], &y) {
+                found.covariance = wider.covariance;
+            }
             (found, Some(tau), share, Some(state))
         }
         None => (straight, None, 0.0, None),

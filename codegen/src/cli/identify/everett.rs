@@ -15,12 +15,13 @@ use crate::identify::{self, Cause, DeadTime, GridChoice, Options, Report, Valida
 
 /// Arguments of `identify RECORD`.
 #[derive(Args, Debug)]
-pub struct Arguments {
+pub struct EverettArguments {
     /// Reversal-curve record: CSV with columns time_s, drive_V, displacement_um.
-    record: PathBuf,
+    #[arg(required = true)]
+    record: Option<PathBuf>,
     /// Voltage range of the table, V, such as 0:100 or -90:90.
-    #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
-    drive: [f64; 2],
+    #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true, required = true)]
+    drive: Option<[f64; 2]>,
     /// Cells per axis of the Preisach grid; chosen by cross-validation over whole curves if not given.
     #[arg(long, value_name = "N", value_parser = grid, allow_negative_numbers = true)]
     grid: Option<usize>,
@@ -56,15 +57,19 @@ fn grid(text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| format!("expected a whole number such as 32, found `{text}`"))
 }
 
-pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let shown = arguments.record.display().to_string();
-    let record = identify::read_record(&arguments.record, &shown).map_err(refused)?;
+pub fn run(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
+    // Both are required unless a command is named: the option is for clap's sake.
+    let (Some(path), Some(drive)) = (&arguments.record, arguments.drive) else {
+        return Err(Failure::Usage("a record and --drive are expected, or one of linear, response, gauge, stiffness".to_owned()));
+    };
+    let shown = path.display().to_string();
+    let record = identify::read_record(path, &shown).map_err(refused)?;
     let choice = match arguments.grid {
         Some(_) => None,
-        None => Some(identify::choose_grid(&record, arguments.drive, DeadTime::Estimate).map_err(refused)?),
+        None => Some(identify::choose_grid(&record, drive, DeadTime::Estimate).map_err(refused)?),
     };
     let grid = arguments.grid.or(choice.as_ref().map(|c| c.chosen)).unwrap_or_default();
-    let identified = identify::identify(&record, &Options::new(grid, arguments.drive)).map_err(refused)?;
+    let identified = identify::identify(&record, &Options::new(grid, drive)).map_err(refused)?;
     ui.findings(None, &identified.warnings);
     let validation = match &arguments.validate {
         Some(path) => Some(validate(path, &identified).map_err(refused)?),

@@ -29,7 +29,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let report = response::respond(&arguments.record, &shown, arguments.segment).map_err(refused)?;
     ui.findings(None, &report.warnings);
     let f = &report.fitted;
-    let shown_in = |e: Estimate, scale: f64| format!("{:.4} ± {:.4}", e.value * scale, e.error * scale);
+    let shown_in = |e: Estimate, scale: f64| format!("{:.4} ± {:.1e}", e.value * scale, e.error * scale);
     let mut text = format!(
         "{shown}: {} segments of {} samples at {:.1} Hz, bins of {:.3} Hz, used {:.3} to {:.1} Hz, coherence {:.4} in the middle, misfit {:.2} %\n",
         report.segments,
@@ -51,7 +51,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         shown_in(f.dead_time, 1e3),
         shown_in(f.lag_and_dead_time, 1e3),
         f.lag_dead_time_correlation,
-        format_args!("{:.6} ± {:.6}", f.gain.value * 1e6, f.gain.error * 1e6),
+        format_args!("{:.6} ± {:.1e}", f.gain.value * 1e6, f.gain.error * 1e6),
     );
     let _ = write!(
         text,
