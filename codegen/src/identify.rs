@@ -122,7 +122,11 @@ pub fn identify(record: &Record, options: &Options) -> Result<Identified, Vec<Di
     }
 }
 
-fn identify_checked(record: &Record, options: &Options, findings: &mut Findings) -> Option<(EverettTable, Report, Trace)> {
+fn identify_checked(
+    record: &Record,
+    options: &Options,
+    findings: &mut Findings,
+) -> Option<(EverettTable, Report, Trace)> {
     let plane = coverage::plane(options, findings)?;
     coverage::check_range(record, &plane, findings);
     if findings.any_error() {

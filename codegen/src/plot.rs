@@ -5,8 +5,8 @@ mod svg;
 
 use std::fmt::Write as _;
 
-pub use axis::Scale;
 use axis::Axis;
+pub use axis::Scale;
 use svg::{Canvas, Hatch};
 
 /// Colours, dark enough on white and distinct without red and green side by side.

@@ -9,7 +9,9 @@ use identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
 use specgen::identify::regressor::{Plane, evaluate};
-use specgen::identify::{DeadTime, Identified, Options, Record, Source, Staircase, choose_grid, draw, identify, validate};
+use specgen::identify::{
+    DeadTime, Identified, Options, Record, Source, Staircase, choose_grid, draw, identify, validate,
+};
 
 const RANGE: [f64; 2] = [0.0, 100.0];
 const RATE: f64 = 1000.0;
@@ -110,20 +112,20 @@ fn a_stuck_gauge_is_named_with_the_time() {
 fn units_and_swapped_columns_are_named_with_times() {
     let all = with(|c| c.displacement.iter_mut().for_each(|y| *y *= 1e3)).unwrap_err();
     expect(&all, "E0623", "is it in nm?");
-    expect(&all, "E0623", "at 16 s");
+    expect(&all, "E0623", "at 16.008 s");
     let all = with(|c| c.displacement.iter_mut().for_each(|y| *y *= 1e-3 / 2.0)).unwrap_err();
     expect(&all, "E0623", "is it in mm or m?");
     let all = with(|c| c.drive.iter_mut().for_each(|u| *u *= 1e3)).unwrap_err();
-    expect(&all, "E0603", "100000 V (at 16 s)");
+    expect(&all, "E0603", "100000 V (at 16.008 s)");
     let all = with(|c| {
         let drive = c.drive.clone();
         c.drive = c.displacement.iter().map(|y| y * 1e6).collect();
         c.displacement = drive.iter().map(|u| u * 1e-6).collect();
     })
     .unwrap_err();
-    expect(&all, "E0604", "(at 16 s)");
+    expect(&all, "E0604", "(at 16.008 s)");
     let all = with(|c| c.displacement.iter_mut().for_each(|y| *y = -*y)).unwrap_err();
-    expect(&all, "E0514", "between 0 s and 16 s the drive goes from 0 V to 100 V");
+    expect(&all, "E0514", "between 0 s and 16.008 s the drive goes from 0 V to 100 V");
 }
 
 #[test]
@@ -176,7 +178,7 @@ fn what_follows_a_jump_of_the_drive_gets_no_weight() {
         }
     })
     .unwrap();
-    expect(&found.warnings, "W0518", "at 17.001 s the drive jumps from 0 V to 60 V");
+    expect(&found.warnings, "W0518", "at 17.009 s the drive jumps from 0 V to 60 V");
     assert!(found.report.weightless >= 400, "{}", found.report.weightless);
 }
 
@@ -236,7 +238,11 @@ fn a_random_drive_is_cross_validated_too() {
     let record = Record::from_columns("r.csv", drive.time(), drive.samples.clone(), y).unwrap();
     let choice = choose_grid(&record, RANGE, DeadTime::Fixed(0.0)).unwrap();
     println!("{:#?}", choice.scores);
-    assert!(choice.chosen == 8 || choice.chosen == 16 || choice.chosen == 24, "a multiple of the truth's 8: {}", choice.chosen);
+    assert!(
+        choice.chosen == 8 || choice.chosen == 16 || choice.chosen == 24,
+        "a multiple of the truth's 8: {}",
+        choice.chosen
+    );
 }
 
 #[test]
@@ -251,7 +257,13 @@ fn the_cause_of_the_residual_is_named() {
     .unwrap();
     assert!(late.report.cause.shares.iter().any(|(s, share)| *s == Source::DeadTime && *share >= 0.0));
     // On another record at twice the rate the table errs by what the dead time adds.
-    let fast = Drive::at(0.0, RATE).ramp(100.0, 800.0).ramp(0.0, 800.0).ramp(60.0, 800.0).ramp(20.0, 800.0).ramp(100.0, 800.0).ramp(0.0, 800.0);
+    let fast = Drive::at(0.0, RATE)
+        .ramp(100.0, 800.0)
+        .ramp(0.0, 800.0)
+        .ramp(60.0, 800.0)
+        .ramp(20.0, 800.0)
+        .ramp(100.0, 800.0)
+        .ramp(0.0, 800.0);
     let y = response(&random_table(8, RANGE, 40e-6, 0.3, 7), &fast.samples);
     let mut moved = y.clone();
     for k in 5..y.len() {
@@ -272,7 +284,8 @@ fn the_cause_of_the_residual_is_named() {
 #[test]
 fn a_sweep_that_cannot_tell_says_so() {
     // 40 kV/s at 1 kHz: one sample is 40 V.
-    let fast = (1..=16).fold(Drive::at(0.0, RATE), |d, k| d.ramp(6.25 * f64::from(k), 4000.0).ramp(0.0, 4000.0).hold(0.02));
+    let fast =
+        (1..=16).fold(Drive::at(0.0, RATE), |d, k| d.ramp(6.25 * f64::from(k), 4000.0).ramp(0.0, 4000.0).hold(0.02));
     let y = response(&random_table(8, RANGE, 40e-6, 0.3, 7), &fast.samples);
     let record = Record::from_columns("fast.csv", fast.time(), fast.samples.clone(), y).unwrap();
     let found = identify(&record, &Options::new(8, RANGE)).unwrap();

@@ -110,7 +110,8 @@ fn the_weights_said_to_be_stable_are_and_a_little_more_is_not() {
 fn records_without_a_cycle_or_of_two_frequencies_are_refused_with_the_time() {
     let one = cycles(1.0, 0.1, 0.0, 1);
     let cut = |n: usize| {
-        Record::from_columns("r", one.time[..n].to_vec(), one.drive[..n].to_vec(), one.displacement[..n].to_vec()).unwrap()
+        Record::from_columns("r", one.time[..n].to_vec(), one.drive[..n].to_vec(), one.displacement[..n].to_vec())
+            .unwrap()
     };
     expect(&linear::relation(&cut(700), None).unwrap_err(), "E0625", "from 0 s to");
     // Exactly one cycle, told so.
@@ -129,7 +130,12 @@ fn records_without_a_cycle_or_of_two_frequencies_are_refused_with_the_time() {
     let all = linear::relation(&mixed, None).unwrap_err();
     let message = &expect(&all, "E0626", "the record has no one frequency").message;
     // The first cycle that differs is named: three of the slow ones are the minority.
-    assert!(message.starts_with("the cycle from 0.25") || message.starts_with("the cycle from 4.") || message.starts_with("the cycle from 3."), "{message}");
+    assert!(
+        message.starts_with("the cycle from 0.25")
+            || message.starts_with("the cycle from 4.")
+            || message.starts_with("the cycle from 3."),
+        "{message}"
+    );
 }
 
 // ---- frequency response
@@ -192,9 +198,8 @@ fn sweep(top: f64, seconds: f64) -> impl Fn(f64) -> f64 {
 fn multisine(top: f64) -> impl Fn(f64) -> f64 {
     let count = (top / 10.0) as usize;
     move |t: f64| {
-        let sum: f64 = (1..=count)
-            .map(|k| (TAU * 10.0 * k as f64 * t - PI * (k * k) as f64 / count as f64).sin())
-            .sum();
+        let sum: f64 =
+            (1..=count).map(|k| (TAU * 10.0 * k as f64 * t - PI * (k * k) as f64 / count as f64).sin()).sum();
         if t < 0.0 { 0.0 } else { 2.0 * sum / (count as f64).sqrt() }
     }
 }
@@ -202,16 +207,17 @@ fn multisine(top: f64) -> impl Fn(f64) -> f64 {
 fn record(leg: &Leg, drive: impl Fn(f64) -> f64, samples: usize, noise: f64) -> String {
     let mut random = generator(17);
     let y = leg.run(&drive, samples);
-    let rows: Vec<[f64; 3]> = (0..samples)
-        .map(|k| [k as f64 / RATE, drive(k as f64 / RATE), y[k] + noise * normal(&mut random)])
-        .collect();
+    let rows: Vec<[f64; 3]> =
+        (0..samples).map(|k| [k as f64 / RATE, drive(k as f64 / RATE), y[k] + noise * normal(&mut random)]).collect();
     csv("time_s,drive_V,displacement_um", &rows)
 }
 
 fn agrees(report: &ResponseReport, leg: &Leg, loose: f64) {
     let f = &report.fitted;
     println!("{f:?} misfit {:.3} %", report.misfit_percent);
-    let near = |found: f64, true_: f64, share: f64| assert!((found / true_ - 1.0).abs() < loose * share, "{found} for {true_}: {f:?}");
+    let near = |found: f64, true_: f64, share: f64| {
+        assert!((found / true_ - 1.0).abs() < loose * share, "{found} for {true_}: {f:?}")
+    };
     near(f.resonance.value, leg.resonance, 0.005);
     near(f.damping_ratio.value, leg.damping, 0.05);
     near(f.gain.value * 1e6, leg.gain, 0.01);
@@ -356,7 +362,8 @@ fn gauges_that_cannot_be_calibrated_are_refused_with_the_time() {
     let few = with(&|rows| rows.truncate(20)).unwrap_err();
     expect(&few, "E0636", "has 20 samples");
     // A gauge whose reading folds: 5 V is reached twice on the way up.
-    let folded = with(&|rows| rows.iter_mut().for_each(|r| r[1] = 2.0 - 0.08 * (r[2] - 30.0) * (r[2] - 30.0) / 50.0)).unwrap_err();
+    let folded = with(&|rows| rows.iter_mut().for_each(|r| r[1] = 2.0 - 0.08 * (r[2] - 30.0) * (r[2] - 30.0) / 50.0))
+        .unwrap_err();
     assert!(folded.iter().any(|d| d.code == "E0635" && d.message.contains(" s)")), "{folded:?}");
     let warned = with(&|rows| rows[333][2] += 5.0).unwrap();
     expect(&warned.warnings, "W0638", "at 33.3");
@@ -405,7 +412,15 @@ fn forces_that_give_no_stiffness_are_refused_with_the_time() {
         stiffness::measure_text(&csv(FORCE, &rows), "k.csv").unwrap_err()
     };
     expect(&with(&|r| r[1] = -r[1]), "E0640", "displacement falls when the force rises");
-    expect(&with(&|r| if r[0] >= 12.0 { r[3] = 51.0 }), "E0641", "at 12 s the drive is 51 V");
+    expect(
+        &with(&|r| {
+            if r[0] >= 12.0 {
+                r[3] = 51.0
+            }
+        }),
+        "E0641",
+        "at 12 s the drive is 51 V",
+    );
     expect(&with(&|r| r[2] *= 1e-6), "E0642", "none of a piezo actuator");
     expect(&with(&|r| r[1] *= 1e6), "E0642", "none of a piezo actuator");
     expect(&with(&|r| r[2] = r[2].min(7.0)), "E0513", "`displacement_um` is limited at 7");

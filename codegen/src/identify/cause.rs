@@ -79,7 +79,8 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
     }
     let after_rate = mean_square(&left);
     let duration = t.last().copied().unwrap_or(0.0) - t.first().copied().unwrap_or(0.0);
-    let states: Vec<Vec<f64>> = CREEP.iter().map(|share| centred(pick(&lagging(time, drive, share * duration)))).collect();
+    let states: Vec<Vec<f64>> =
+        CREEP.iter().map(|share| centred(pick(&lagging(time, drive, share * duration)))).collect();
     // Beside the drive itself, so that a wrong gain is not taken for creep; one after the other keeps every fit solvable.
     let level = centred(pick(drive));
     let mut columns: Vec<&[f64]> = Vec::new();
@@ -149,7 +150,12 @@ mod tests {
 
     fn triangle(n: usize) -> (Vec<f64>, Vec<f64>) {
         let time: Vec<f64> = (0..n).map(|k| k as f64 * 1e-3).collect();
-        let drive = (0..n).map(|k| { let p = (k % 200) as f64; if p < 100.0 { p } else { 200.0 - p } }).collect();
+        let drive = (0..n)
+            .map(|k| {
+                let p = (k % 200) as f64;
+                if p < 100.0 { p } else { 200.0 - p }
+            })
+            .collect();
         (time, drive)
     }
 

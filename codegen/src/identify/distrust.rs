@@ -88,7 +88,12 @@ fn jumps(lines: &[usize], time: &[f64], drive: &[f64], weightless: &mut [bool], 
             drive[k],
             end - k
         );
-        findings.warning("W0518", Some(lines[k]), message, "drive by ramps or sines: a jump excites the resonance, which hides the hysteresis");
+        findings.warning(
+            "W0518",
+            Some(lines[k]),
+            message,
+            "drive by ramps or sines: a jump excites the resonance, which hides the hysteresis",
+        );
         k += 1;
         // Further jumps in the settling time belong to it.
         while k < end {

@@ -31,7 +31,10 @@ pub fn everett(identified: &Identified, choice: Option<&GridChoice>, validation:
         .with("model", ORANGE, Mark::Line(0.9), micrometres(trace, true));
     let mut panels = vec![
         loops,
-        residual(&format!("Residual of the fit: {:.2} nm rms, mainly {}", report.fit_rms * 1e9, report.cause.main.name()), trace),
+        residual(
+            &format!("Residual of the fit: {:.2} nm rms, mainly {}", report.fit_rms * 1e9, report.cause.main.name()),
+            trace,
+        ),
         plane(identified),
     ];
     if let Some(choice) = choice {
@@ -80,14 +83,19 @@ fn plane(identified: &Identified) -> Panel {
         for down in 0..up {
             // The diagonal holds the reversible part, many times heavier.
             let share = if down + 1 == up || largest <= 0.0 { 1.0 } else { table.weight(up, down) / largest };
-            panel.patches.push(cell(up, down, Some(share.sqrt())));
+            // A weight of zero may come out of the nodes a rounding below it.
+            panel.patches.push(cell(up, down, Some(if share > 0.0 { share.sqrt() } else { 0.0 })));
         }
     }
     for (up, down) in identified.report.unexcited.iter().flat_map(|r| &r.members) {
         panel.patches.push(cell(*up, *down, None));
     }
     let share = 100.0 * (1.0 - identified.report.excited_share);
-    panel.hatched = Some(if share > 0.0 { format!("not excited: {share:.1} % of the cells") } else { "not excited: none".to_owned() });
+    panel.hatched = Some(if share > 0.0 {
+        format!("not excited: {share:.1} % of the cells")
+    } else {
+        "not excited: none".to_owned()
+    });
     let ends = [[table.drive_min; 2], [table.drive_max; 2]];
     panel.with("up = down", GREY, Mark::Line(1.0), ends.to_vec())
 }
@@ -123,7 +131,8 @@ pub fn linear(report: &LinearReport, records: &[Record]) -> String {
         let points = inside.iter().map(|&i| [record.drive[i], record.displacement[i] * 1e6]).collect();
         loops = loops.with(&name, color, Mark::Line(1.2), points);
         let off = |i: usize| record.displacement[i] - relation.gain * record.drive[i] - relation.offset;
-        rest = rest.with(&name, color, Mark::Line(1.0), inside.iter().map(|&i| [record.drive[i], off(i) * 1e9]).collect());
+        rest =
+            rest.with(&name, color, Mark::Line(1.0), inside.iter().map(|&i| [record.drive[i], off(i) * 1e9]).collect());
         let (low, high) = super::sanity::extent(&inside.iter().map(|&i| record.drive[i]).collect::<Vec<_>>());
         let at = |u: f64| [u, (relation.gain * u + relation.offset) * 1e6];
         loops = loops.with("", color, Mark::Dashed(1.0), vec![at(low), at(high)]);
@@ -142,7 +151,8 @@ pub fn linear(report: &LinearReport, records: &[Record]) -> String {
         .with("reference ρ̂", ORANGE, Mark::Dots(5.0), reference);
     gain.x_scale = Scale::Log;
     let widths: Vec<[f64; 2]> = report.relations.iter().map(|r| [r.frequency, r.loop_percent]).collect();
-    let mut width = Panel::new("Loop width", "frequency (Hz)", "width (% of range)").with("", BLUE, Mark::Dots(3.5), widths);
+    let mut width =
+        Panel::new("Loop width", "frequency (Hz)", "width (% of range)").with("", BLUE, Mark::Dots(3.5), widths);
     width.x_scale = Scale::Log;
     let subtitle = format!(
         "reference gain {:.5} µm/V at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4}",
@@ -179,7 +189,8 @@ pub fn response(report: &ResponseReport) -> String {
         panel
     };
     let size = |h: [f64; 2]| libm::hypot(h[0], h[1]) * 1e6;
-    let sizes: Vec<f64> = shown.iter().filter(|b| inside(b.frequency)).map(|b| size(b.h)).filter(|s| *s > 0.0).collect();
+    let sizes: Vec<f64> =
+        shown.iter().filter(|b| inside(b.frequency)).map(|b| size(b.h)).filter(|s| *s > 0.0).collect();
     let range = super::sanity::extent(&sizes);
     let mut magnitude = logarithmic(Panel::new("Magnitude", "frequency (Hz)", "|H| (µm/V)"), [range.0, range.1])
         .with("measured H1", BLUE, Mark::Dots(1.6), shown.iter().map(|b| [b.frequency, size(b.h)]).collect())
@@ -196,8 +207,12 @@ pub fn response(report: &ResponseReport) -> String {
     let phase = logarithmic(Panel::new("Phase", "frequency (Hz)", "phase (°)"), [lowest, 0.0])
         .with("measured H1", BLUE, Mark::Dots(1.6), shown.iter().filter(|b| inside(b.frequency)).map(turn).collect())
         .with("model", ORANGE, Mark::Line(1.6), modelled.iter().map(|m| [m.0, m.2.to_degrees()]).collect());
-    let mut coherence = logarithmic(Panel::new("Coherence", "frequency (Hz)", "γ²"), [0.0, 1.05])
-        .with("", PURPLE, Mark::Line(1.0), shown.iter().map(|b| [b.frequency, b.coherence]).collect());
+    let mut coherence = logarithmic(Panel::new("Coherence", "frequency (Hz)", "γ²"), [0.0, 1.05]).with(
+        "",
+        PURPLE,
+        Mark::Line(1.0),
+        shown.iter().map(|b| [b.frequency, b.coherence]).collect(),
+    );
     coherence.y_limits = Some([0.0, 1.05]);
     let f = &report.fitted;
     let subtitle = format!(
@@ -214,7 +229,12 @@ pub fn response(report: &ResponseReport) -> String {
         report.segments,
         report.segment
     );
-    figure(&format!("Frequency response of {}", shortened(&report.record)), &subtitle, &[magnitude, phase, coherence], 2)
+    figure(
+        &format!("Frequency response of {}", shortened(&report.record)),
+        &subtitle,
+        &[magnitude, phase, coherence],
+        2,
+    )
 }
 
 /// Calibration and its residual.

@@ -122,7 +122,12 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
     let scaled: Vec<f64> = volts.iter().map(|v| (2.0 * v - low - high) / (high - low)).collect();
     let held_out = held_out(&scaled, &reference);
     if held_out.is_empty() {
-        findings.error("E0636", None, "the voltages are too few to hold some out".to_owned(), "record more positions of the reference");
+        findings.error(
+            "E0636",
+            None,
+            "the voltages are too few to hold some out".to_owned(),
+            "record more positions of the reference",
+        );
         return None;
     }
     let degree = match degree {
@@ -130,7 +135,12 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
         None => choose(&held_out),
     };
     let Some(found) = polynomial(&scaled, &reference, degree) else {
-        findings.error("E0636", None, format!("a polynomial of degree {degree} is not determined"), "record more positions of the reference");
+        findings.error(
+            "E0636",
+            None,
+            format!("a polynomial of degree {degree} is not determined"),
+            "record more positions of the reference",
+        );
         return None;
     };
     let square = mean_square(&found.residual) * volts.len() as f64 / (volts.len() - degree - 1) as f64;
@@ -153,14 +163,24 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
             least.1,
             signals.place(near)
         );
-        findings.error("E0635", Some(signals.lines[near]), message, "use the gauge where its voltage rises or falls all the way, or look for a fault there");
+        findings.error(
+            "E0635",
+            Some(signals.lines[near]),
+            message,
+            "use the gauge where its voltage rises or falls all the way, or look for a fault there",
+        );
     }
     let worst = (0..volts.len()).fold(0, |w, k| if found.residual[k].abs() > found.residual[w].abs() { k } else { w });
     let residual_rms = mean_square(&found.residual).sqrt();
     let hysteresis = hysteresis(&reference, &scaled, &found.residual);
     if let Some(width) = hysteresis.filter(|width| *width > HYSTERESIS * residual_rms.max(noise_of(&found.residual))) {
         let message = format!("the gauge reads up to {:.2} nm differently on the way back", width * 1e9);
-        findings.warning("W0637", None, message, "no calibration removes that: look for play or friction in the mount, or a delay between the columns");
+        findings.warning(
+            "W0637",
+            None,
+            message,
+            "no calibration removes that: look for play or friction in the mount, or a delay between the columns",
+        );
     }
     glitches(signals, &found.residual, findings);
     Some(GaugeReport {
@@ -186,9 +206,8 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
 
 fn check_units(signals: &Signals, volts: [f64; 2], reference: [f64; 2], findings: &mut Findings) {
     let range = reference[1] - reference[0];
-    let at = |column: usize, value: f64| {
-        signals.place(signals.column(column).iter().position(|v| *v == value).unwrap_or(0))
-    };
+    let at =
+        |column: usize, value: f64| signals.place(signals.column(column).iter().position(|v| *v == value).unwrap_or(0));
     if !(PLAUSIBLE[0]..=PLAUSIBLE[1]).contains(&range) {
         let message = format!(
             "the reference covers {:e} um (highest at {}): is it in another unit?",
@@ -269,7 +288,8 @@ fn to_volts(found: &Fit, square: f64, low: f64, high: f64) -> (Vec<f64>, Vec<f64
     }
     // Matrix from Legendre coefficients to powers of the voltage.
     let to = |k: usize, n: usize| (0..=degree).fold(0.0, |sum, p| sum + rows[n][p] * powers[p][k]);
-    let values = (0..=degree).map(|k| (0..=degree).fold(0.0, |sum, n| sum + to(k, n) * found.coefficients[n])).collect();
+    let values =
+        (0..=degree).map(|k| (0..=degree).fold(0.0, |sum, n| sum + to(k, n) * found.coefficients[n])).collect();
     let errors = (0..=degree)
         .map(|k| {
             let mut variance = 0.0;
@@ -322,7 +342,8 @@ const WORTHWHILE: f64 = 0.01;
 
 /// Lowest degree whose error exceeds the best one's by at most one standard error of the paired difference, or one per cent.
 fn choose(scores: &[Vec<f64>]) -> usize {
-    let best = (0..scores.len()).fold(0, |best, k| if root_mean(&scores[k]) < root_mean(&scores[best]) { k } else { best });
+    let best =
+        (0..scores.len()).fold(0, |best, k| if root_mean(&scores[k]) < root_mean(&scores[best]) { k } else { best });
     for (k, folds) in scores.iter().enumerate().take(best) {
         let worse: Vec<f64> = folds.iter().zip(&scores[best]).map(|(a, b)| a.sqrt() - b.sqrt()).collect();
         let count = worse.len() as f64;
@@ -377,8 +398,18 @@ fn noise_of(residual: &[f64]) -> f64 {
 fn glitches(signals: &Signals, residual: &[f64], findings: &mut Findings) {
     let usual = noise_of(residual);
     for (k, r) in residual.iter().enumerate().filter(|(_, r)| r.abs() > 12.0 * usual && r.abs() > 0.0) {
-        let message = format!("at {} the residual is {:.2} nm, {:.0} times the usual one", signals.place(k), r * 1e9, (r / usual).abs());
-        findings.warning("W0638", Some(signals.lines[k]), message, "delete the point if the reading was disturbed, or record again");
+        let message = format!(
+            "at {} the residual is {:.2} nm, {:.0} times the usual one",
+            signals.place(k),
+            r * 1e9,
+            (r / usual).abs()
+        );
+        findings.warning(
+            "W0638",
+            Some(signals.lines[k]),
+            message,
+            "delete the point if the reading was disturbed, or record again",
+        );
     }
 }
 

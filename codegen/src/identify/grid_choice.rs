@@ -111,7 +111,12 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
             "the curves turn back at {levels} different voltages; cross-validation of the grid needs at least {}",
             FEWEST_FOLDS + 1
         );
-        findings.error("E0622", None, message, "give the grid with --grid, or record curves that turn back at more voltages");
+        findings.error(
+            "E0622",
+            None,
+            message,
+            "give the grid with --grid, or record curves that turn back at more voltages",
+        );
         return None;
     }
     let branches_of = |fold: Option<usize>| -> Vec<Branch> {
@@ -152,10 +157,16 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
         }
     }
     if errors.is_empty() {
-        findings.error("E0610", None, "no grid could be fitted with curves held out".to_owned(), "give the grid with --grid, or record more reversal curves");
+        findings.error(
+            "E0610",
+            None,
+            "no grid could be fitted with curves held out".to_owned(),
+            "give the grid with --grid, or record more reversal curves",
+        );
         return None;
     }
-    Some(decide(&errors, folds, levels, 1.0 / scale))
+    let (bottom, top) = super::sanity::extent(&record.displacement[used.first..]);
+    Some(decide(&errors, folds, levels, 1.0 / scale, top - bottom))
 }
 
 /// Mean square of the held-out samples, each branch with its own offset, in units of the target squared.
@@ -198,8 +209,9 @@ fn deal(record: &Record, branches: &[Branch], drive: [f64; 2]) -> (Vec<Option<us
     (fold_of, folds, levels.len())
 }
 
-/// Applies the rule to the mean squares of each grid and fold; `unit` is the unit of the target, m.
-fn decide(errors: &[(usize, Vec<f64>)], folds: usize, levels: usize, unit: f64) -> GridChoice {
+/// Applies the rule to the mean squares of each grid and fold; `unit` is the unit of the target, `range` that of the
+/// displacement behind the skipped samples, m.
+fn decide(errors: &[(usize, Vec<f64>)], folds: usize, levels: usize, unit: f64, range: f64) -> GridChoice {
     let count = folds as f64;
     let mean = |values: &[f64]| values.iter().fold(0.0, |sum, v| sum + v) / count;
     let best = errors.iter().fold(&errors[0], |best, e| if mean(&e.1) < mean(&best.1) { e } else { best });
@@ -217,7 +229,7 @@ fn decide(errors: &[(usize, Vec<f64>)], folds: usize, levels: usize, unit: f64) 
         scores.push(Score {
             grid: *grid,
             held_out_rms: rms * unit,
-            held_out_percent: rms * 100.0,
+            held_out_percent: 100.0 * rms * unit / range,
             standard_error: standard_error * unit,
         });
     }
@@ -237,16 +249,12 @@ mod tests {
 
     #[test]
     fn the_rule_takes_the_coarsest_grid_that_is_not_worse_by_more_than_one_standard_error() {
-        let errors = [
-            (8, vec![9.0, 9.0, 9.0]),
-            (16, vec![1.1, 1.3, 1.0]),
-            (32, vec![1.0, 1.0, 1.2]),
-            (40, vec![1.4, 1.5, 1.6]),
-        ];
-        let choice = decide(&errors, 3, 10, 1.0);
+        let errors =
+            [(8, vec![9.0, 9.0, 9.0]), (16, vec![1.1, 1.3, 1.0]), (32, vec![1.0, 1.0, 1.2]), (40, vec![1.4, 1.5, 1.6])];
+        let choice = decide(&errors, 3, 10, 1.0, 1.0);
         assert_eq!((choice.chosen, choice.best), (16, 32));
         // The same excess in every fold is no chance.
         let steady = [(16, vec![1.21, 1.21, 1.21]), (32, vec![1.0, 1.0, 1.0])];
-        assert_eq!(decide(&steady, 3, 10, 1.0).chosen, 32);
+        assert_eq!(decide(&steady, 3, 10, 1.0, 1.0).chosen, 32);
     }
 }

@@ -90,7 +90,12 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
                 record.time[record.time.len() - 1],
                 starts.len()
             );
-            findings.error("E0625", None, message, "record two cycles or more, or give --frequency for a record of exactly one cycle");
+            findings.error(
+                "E0625",
+                None,
+                message,
+                "record two cycles or more, or give --frequency for a record of exactly one cycle",
+            );
             return None;
         };
         let end = record.time.iter().rposition(|t| *t <= record.time[0] + 1.0001 / frequency)?;
@@ -114,7 +119,12 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
             "the drive has {found:.4} Hz (cycle from {} s to {} s), but {given} Hz was given",
             crossings[0], crossings[1]
         );
-        findings.error("E0626", None, message, "give the frequencies in the order of the records, or leave --frequency out");
+        findings.error(
+            "E0626",
+            None,
+            message,
+            "give the frequencies in the order of the records, or leave --frequency out",
+        );
         return None;
     }
     // The first cycle settles, if others can be spared.
@@ -140,7 +150,13 @@ fn cycle_starts(drive: &[f64]) -> Vec<usize> {
     starts
 }
 
-fn line(record: &Record, frequency: f64, detected: bool, starts: &[usize], findings: &mut Findings) -> Option<Relation> {
+fn line(
+    record: &Record,
+    frequency: f64,
+    detected: bool,
+    starts: &[usize],
+    findings: &mut Findings,
+) -> Option<Relation> {
     let (first, end) = (*starts.first()?, *starts.last()?);
     let straight = |from: usize, to: usize| {
         let kept: Vec<usize> = (from..to).filter(|&k| !record.weightless[k]).collect();
@@ -225,7 +241,9 @@ pub fn together(mut relations: Vec<Relation>, reference: Option<f64>) -> Result<
     let apart = |f: f64, wanted: f64| (f / wanted).ln().abs();
     let chosen = match reference {
         None => relations.first(),
-        Some(wanted) => relations.iter().min_by(|a, b| apart(a.frequency, wanted).total_cmp(&apart(b.frequency, wanted))),
+        Some(wanted) => {
+            relations.iter().min_by(|a, b| apart(a.frequency, wanted).total_cmp(&apart(b.frequency, wanted)))
+        }
     };
     let Some(chosen) = chosen else { return Err(Vec::new()) };
     if let Some(bad) = relations.iter().find(|r| r.gain.is_nan() || r.gain <= 0.0) {

@@ -1,9 +1,9 @@
 //! What a fitted table leaves of its own record.
 
 use super::branches::Branch;
+use super::cause::{self, Cause};
 use super::record::Record;
 use super::regressor::{self, Plane};
-use super::cause::{self, Cause};
 use super::selection::Used;
 use super::trace::Trace;
 use super::{normal, sanity, trend};
@@ -48,7 +48,8 @@ impl Residual {
     /// The samples from the first used one on, for drawing; `displacement` as given to [`Residual::of`].
     pub(crate) fn trace(&self, record: &Record, first: usize, displacement: &[f64]) -> Trace {
         let time = record.time[first..].to_vec();
-        let off = |k: usize| if record.weightless[first + k] { f64::NAN } else { self.plain[k] - self.line.at(time[k]) };
+        let off =
+            |k: usize| if record.weightless[first + k] { f64::NAN } else { self.plain[k] - self.line.at(time[k]) };
         let residual = (0..time.len()).map(off).collect();
         Trace { time, drive: record.drive[first..].to_vec(), measured: displacement[first..].to_vec(), residual }
     }

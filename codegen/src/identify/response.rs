@@ -18,8 +18,8 @@ use super::sanity::{extent, median};
 use super::signals::{self, Signals, Wanted};
 use crate::diagnostic::Diagnostic;
 
-pub use fit::{Estimate, Fitted};
 pub(crate) use fit::response;
+pub use fit::{Estimate, Fitted};
 pub use welch::Bin;
 
 /// A response and what was fitted to it.
@@ -173,7 +173,12 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
     let misfit_percent = 100.0 * fit::misfit(&fitted, &used, averages);
     if misfit_percent > POOR {
         let message = format!("the fitted model misses the response by {misfit_percent:.0} % rms");
-        findings.warning("W0634", None, message, "is there more than one resonance in the band? Limit the sweep to the first one");
+        findings.warning(
+            "W0634",
+            None,
+            message,
+            "is there more than one resonance in the band? Limit the sweep to the first one",
+        );
     }
     let mut coherence: Vec<f64> = used.iter().map(|b| b.coherence).collect();
     Some(ResponseReport {
@@ -212,7 +217,12 @@ fn sampling_rate(signals: &Signals, findings: &mut Findings) -> Option<f64> {
             time[worst],
             off(worst) / even
         );
-        findings.error("E0630", Some(signals.lines[worst]), message, "record with a fixed sampling interval, without lost samples");
+        findings.error(
+            "E0630",
+            Some(signals.lines[worst]),
+            message,
+            "record with a fixed sampling interval, without lost samples",
+        );
         return None;
     }
     Some(1.0 / even)
@@ -224,7 +234,11 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
         let values = signals.column(column);
         let (low, high) = extent(values);
         if low >= high {
-            let message = format!("`{name}` is {low} in every sample, from {} to {}", signals.place(0), signals.place(values.len() - 1));
+            let message = format!(
+                "`{name}` is {low} in every sample, from {} to {}",
+                signals.place(0),
+                signals.place(values.len() - 1)
+            );
             findings.error("E0512", None, message, "is the channel connected?");
             return;
         }
@@ -232,10 +246,18 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
             // Two neighbours at the limit: a peak touches it once, a clipped one stays.
             let stays = values.windows(2).filter(|w| w[0] == limit && w[1] == limit).count();
             // A drive of two levels (a random binary signal) is at its limits by intent.
-            if column == 2 && stays as f64 > AT_LIMIT * values.len() as f64 {
+            if column == 2 && stays > 10 && stays as f64 > AT_LIMIT * values.len() as f64 {
                 let first = values.windows(2).position(|w| w[0] == limit && w[1] == limit).unwrap_or(0);
-                let message = format!("from {} on `{name}` is again and again exactly at its {word} limit {limit} ({stays} samples)", signals.place(first));
-                findings.error("E0513", Some(signals.lines[first]), message, "the gauge or its converter is at the end of its range: drive less, or shift the range");
+                let message = format!(
+                    "from {} on `{name}` is again and again exactly at its {word} limit {limit} ({stays} samples)",
+                    signals.place(first)
+                );
+                findings.error(
+                    "E0513",
+                    Some(signals.lines[first]),
+                    message,
+                    "the gauge or its converter is at the end of its range: drive less, or shift the range",
+                );
                 return;
             }
         }
@@ -254,7 +276,12 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
                 signals.place(first + run - 1),
                 values[first]
             );
-            findings.error("E0513", Some(signals.lines[first]), message, "check the connection of the gauge and record again");
+            findings.error(
+                "E0513",
+                Some(signals.lines[first]),
+                message,
+                "check the connection of the gauge and record again",
+            );
         }
         first += run;
     }
@@ -312,14 +339,18 @@ fn check_resonance(
     let around: Vec<&Bin> = bins.iter().filter(|b| b.frequency >= 0.7 * f0 && b.frequency <= 1.3 * f0).collect();
     let seen = around.iter().filter(|b| usable(b)).count();
     if f0 > band[1] || f0 < band[0] || around.is_empty() || (seen as f64) < AROUND * around.len() as f64 {
-        let near: Vec<Band> =
-            bands.iter().copied().filter(|b| b.high >= 0.7 * f0 && b.low <= 1.3 * f0).collect();
+        let near: Vec<Band> = bands.iter().copied().filter(|b| b.high >= 0.7 * f0 && b.low <= 1.3 * f0).collect();
         let gap = if near.is_empty() { String::new() } else { format!("; too low: {}", named(&near)) };
         let message = format!(
             "the record does not show the resonance: the fit puts it at {f0:.1} Hz, coherent are {:.1} to {:.1} Hz{gap}",
             band[0], band[1]
         );
-        findings.error("E0631", None, message, "excite the actuator through its resonance, and record long enough for coherence there");
+        findings.error(
+            "E0631",
+            None,
+            message,
+            "excite the actuator through its resonance, and record long enough for coherence there",
+        );
         return None;
     }
     Some(())

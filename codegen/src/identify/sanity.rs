@@ -156,7 +156,8 @@ fn check_displacement_unit(time: &[f64], displacement: &[f64], findings: &mut Fi
     let at = |value: f64| displacement.iter().position(|y| *y == value).map_or(0.0, |k| time[k]);
     let times = format!("least at {} s, most at {} s", at(low), at(high));
     if range > PLAUSIBLE_RANGE[1] {
-        let message = format!("the displacement covers {um:.0} um ({times}), too much for a piezo actuator: is it in nm?");
+        let message =
+            format!("the displacement covers {um:.0} um ({times}), too much for a piezo actuator: is it in nm?");
         findings.warning("W0515", None, message, "convert the column to micrometres");
     } else if range < PLAUSIBLE_RANGE[0] {
         let message = format!("the displacement covers only {um:.2e} um ({times}): is it in mm or m?");

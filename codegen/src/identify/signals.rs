@@ -56,7 +56,8 @@ fn parse_into(text: &str, shown_as: &str, wanted: &[Wanted], findings: &mut Find
         }
     };
     let header_line = header.position().map_or(1, |p| p.line() as usize);
-    let places: Vec<Option<usize>> = wanted.iter().map(|w| locate(&header, *w, wanted, header_line, findings)).collect();
+    let places: Vec<Option<usize>> =
+        wanted.iter().map(|w| locate(&header, *w, wanted, header_line, findings)).collect();
     if findings.any_error() {
         return None;
     }
@@ -82,7 +83,8 @@ fn parse_into(text: &str, shown_as: &str, wanted: &[Wanted], findings: &mut Find
     if lines.len() < MIN_SAMPLES {
         let message = format!("has {} samples; at least {MIN_SAMPLES} are needed", lines.len());
         findings.error("E0509", None, message, "record more samples");
-    } else if let (Some(Some(time)), true, false) = (columns.first(), wanted[0].name == "time_s", findings.any_error()) {
+    } else if let (Some(Some(time)), true, false) = (columns.first(), wanted[0].name == "time_s", findings.any_error())
+    {
         sanity::check_time(&lines, time, findings);
     }
     Some(Signals { shown_as: shown_as.to_owned(), lines, columns })
@@ -100,7 +102,8 @@ fn locate(
     match matching[..] {
         [only] => return Some(only),
         [first, second, ..] => {
-            let message = format!("column `{}` appears twice, as columns {} and {}", wanted.name, first + 1, second + 1);
+            let message =
+                format!("column `{}` appears twice, as columns {} and {}", wanted.name, first + 1, second + 1);
             findings.error("E0505", Some(line), message, "keep one of them");
             return None;
         }
@@ -140,7 +143,12 @@ impl Signals {
                     self.place(0),
                     self.place(self.lines.len() - 1)
                 );
-                findings.error("E0512", None, message, "record while it runs through its range; is the channel connected?");
+                findings.error(
+                    "E0512",
+                    None,
+                    message,
+                    "record while it runs through its range; is the channel connected?",
+                );
                 return;
             }
         }
@@ -161,7 +169,12 @@ impl Signals {
                     y[first],
                     names[0]
                 );
-                findings.error("E0513", Some(self.lines[first]), message, "check the range and the connection of that channel; record again within its range");
+                findings.error(
+                    "E0513",
+                    Some(self.lines[first]),
+                    message,
+                    "check the range and the connection of that channel; record again within its range",
+                );
             }
             first += run;
         }

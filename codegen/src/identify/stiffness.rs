@@ -110,7 +110,16 @@ fn of_signals(signals: &Signals) -> Result<StiffnessReport, Vec<Diagnostic>> {
 fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessReport> {
     let (time, force) = (signals.column(0), signals.column(1));
     if time.len() < 30 {
-        findings.error("E0509", None, format!("has {} samples and ends at {} s; at least 30 are needed", time.len(), signals.place(time.len() - 1)), "record at least one rise and fall of the force");
+        findings.error(
+            "E0509",
+            None,
+            format!(
+                "has {} samples and ends at {} s; at least 30 are needed",
+                time.len(),
+                signals.place(time.len() - 1)
+            ),
+            "record at least one rise and fall of the force",
+        );
         return None;
     }
     signals.check_moves(1, 2, ["force_N", "displacement_um"], findings);
@@ -125,7 +134,11 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
     let ramp: Vec<f64> = time.iter().map(|t| (t - middle) / duration).collect();
     let plain = fit(&[&one, force], &y)?;
     let Some(straight) = fit(&[&one, &ramp, force], &y) else {
-        let message = format!("from {} to {} the force only drifts in one direction: its effect cannot be told from creep", signals.place(0), signals.place(time.len() - 1));
+        let message = format!(
+            "from {} to {} the force only drifts in one direction: its effect cannot be told from creep",
+            signals.place(0),
+            signals.place(time.len() - 1)
+        );
         findings.error("E0642", None, message, "raise and lower the force at least once");
         return None;
     };
@@ -153,9 +166,8 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
         width = width.sqrt();
     }
     // Creep goes the way of the force; a negative one would be an artefact.
-    let best = best.filter(|b| {
-        b.square < (1.0 - WORTHWHILE) * base && b.found.coefficients[3] * b.found.coefficients[2] > 0.0
-    });
+    let best = best
+        .filter(|b| b.square < (1.0 - WORTHWHILE) * base && b.found.coefficients[3] * b.found.coefficients[2] > 0.0);
     let (chosen, creep_time, creep_share, state) = match best {
         Some(Creep { tau, mut found, state, .. }) => {
             let share = found.coefficients[3] / found.coefficients[2];
@@ -180,8 +192,16 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
     if !(PLAUSIBLE[0]..=PLAUSIBLE[1]).contains(&stiffness) {
         let (low, high) = extent(force);
         let at = force.iter().position(|f| *f == high).unwrap_or(0);
-        let message = format!("a stiffness of {stiffness:.3e} N/m is none of a piezo actuator (force {low} to {high} N, highest at {})", signals.place(at));
-        findings.error("E0642", None, message, "write the force in newtons and the displacement in micrometres; are the columns swapped?");
+        let message = format!(
+            "a stiffness of {stiffness:.3e} N/m is none of a piezo actuator (force {low} to {high} N, highest at {})",
+            signals.place(at)
+        );
+        findings.error(
+            "E0642",
+            None,
+            message,
+            "write the force in newtons and the displacement in micrometres; are the columns swapped?",
+        );
     }
     let error = compliance_error * stiffness * stiffness;
     if error > 0.01 * UNCERTAIN * stiffness {
@@ -228,13 +248,24 @@ fn check_sign(signals: &Signals, force: &[f64], compliance: f64, error: f64, fin
     let (low, high) = extent(force);
     let at = |value: f64| signals.place(force.iter().position(|f| *f == value).unwrap_or(0));
     if compliance.abs() <= 2.0 * error {
-        let message = format!("the displacement does not follow the force (lowest at {}, highest at {})", at(low), at(high));
+        let message =
+            format!("the displacement does not follow the force (lowest at {}, highest at {})", at(low), at(high));
         findings.error("E0642", None, message, "use more force, or a gauge of less noise");
         return None;
     }
     if compliance < 0.0 {
-        let message = format!("the displacement falls when the force rises (force lowest at {}, highest at {}): the stiffness would be {:.3e} N/m", at(low), at(high), 1.0 / compliance);
-        findings.error("E0640", None, message, "count force positive where it pushes the displacement up: change the sign of one column");
+        let message = format!(
+            "the displacement falls when the force rises (force lowest at {}, highest at {}): the stiffness would be {:.3e} N/m",
+            at(low),
+            at(high),
+            1.0 / compliance
+        );
+        findings.error(
+            "E0640",
+            None,
+            message,
+            "count force positive where it pushes the displacement up: change the sign of one column",
+        );
         return None;
     }
     Some(())

@@ -23,7 +23,12 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
     let mut fastest = (0.0, 0);
     for branch in &used.branches {
         let last = branch.end - 1;
-        let rate = ((record.drive[last] - record.drive[branch.first]) / (record.time[last] - record.time[branch.first])).abs();
+        // A jump is no sweep; its samples have no weight.
+        if record.weightless[branch.first + 1..branch.end].iter().all(|w| *w) {
+            continue;
+        }
+        let rate =
+            ((record.drive[last] - record.drive[branch.first]) / (record.time[last] - record.time[branch.first])).abs();
         if rate > fastest.0 {
             fastest = (rate, branch.first);
         }
@@ -45,7 +50,12 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
             2.0 * rate * interval * gain * 1e9,
             report.dead_time_basis
         );
-        findings.warning("W0620", None, message, "sweep more slowly, or record branches of at least two rates so that the dead time can be told");
+        findings.warning(
+            "W0620",
+            None,
+            message,
+            "sweep more slowly, or record branches of at least two rates so that the dead time can be told",
+        );
     }
     let mut turns: Vec<f64> = used.branches.iter().filter(|b| !b.rising).map(|b| record.drive[b.first]).collect();
     turns.sort_unstable_by(f64::total_cmp);
@@ -57,6 +67,11 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
             between * gain * 1e9,
             report.noise_floor * 1e9
         );
-        findings.warning("W0621", None, message, "record fewer curves with more samples each, or average several sweeps");
+        findings.warning(
+            "W0621",
+            None,
+            message,
+            "record fewer curves with more samples each, or average several sweeps",
+        );
     }
 }

@@ -25,11 +25,16 @@ pub(super) struct Tick {
 
 impl Axis {
     /// Over all finite `values`, with a little room, or over `limits`.
-    pub(super) fn over(values: impl Iterator<Item = f64>, scale: Scale, limits: Option<[f64; 2]>, pixels: [f64; 2]) -> Self {
+    pub(super) fn over(
+        values: impl Iterator<Item = f64>,
+        scale: Scale,
+        limits: Option<[f64; 2]>,
+        pixels: [f64; 2],
+    ) -> Self {
         let fits = |v: &f64| v.is_finite() && (scale == Scale::Linear || *v > 0.0);
-        let (mut low, mut high) = values
-            .filter(fits)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (if v < a { v } else { a }, if v > b { v } else { b }));
+        let (mut low, mut high) = values.filter(fits).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+            (if v < a { v } else { a }, if v > b { v } else { b })
+        });
         if let Some([a, b]) = limits {
             (low, high) = (a, b);
         }
@@ -76,7 +81,11 @@ fn linear(low: f64, high: f64) -> Vec<Tick> {
     (first..=last.min(first + 20))
         .map(|k| {
             let value = k as f64 * step;
-            let label = if value != 0.0 && (step >= 1e5 || digits > 5) { format!("{value:.1e}") } else { format!("{value:.digits$}") };
+            let label = if value != 0.0 && (step >= 1e5 || digits > 5) {
+                format!("{value:.1e}")
+            } else {
+                format!("{value:.digits$}")
+            };
             Tick { value, label }
         })
         .collect()
@@ -95,7 +104,11 @@ fn logarithmic(low: f64, high: f64) -> Vec<Tick> {
         for factor in factors {
             let value = factor * 10f64.powi(decade);
             if value.log10() >= low && value.log10() <= high {
-                let label = if (-3..5).contains(&decade) { format!("{}", (value * 1e6).round() / 1e6) } else { format!("{factor}e{decade}") };
+                let label = if (-3..5).contains(&decade) {
+                    format!("{}", (value * 1e6).round() / 1e6)
+                } else {
+                    format!("{factor}e{decade}")
+                };
                 ticks.push(Tick { value, label });
             }
         }

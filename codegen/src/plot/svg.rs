@@ -124,10 +124,8 @@ impl Canvas {
                 format!("rgb({},{},{})", part(224.0), part(160.0), part(87.0))
             }
         };
-        let _ = writeln!(
-            self.text,
-            "<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"{fill}\"/>"
-        );
+        let _ =
+            writeln!(self.text, "<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"{fill}\"/>");
     }
 
     pub(super) fn finish(mut self) -> String {

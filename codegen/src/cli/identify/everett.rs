@@ -60,7 +60,9 @@ fn grid(text: &str) -> Result<usize, String> {
 pub fn run(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
     // Both are required unless a command is named: the option is for clap's sake.
     let (Some(path), Some(drive)) = (&arguments.record, arguments.drive) else {
-        return Err(Failure::Usage("a record and --drive are expected, or one of linear, response, gauge, stiffness".to_owned()));
+        return Err(Failure::Usage(
+            "a record and --drive are expected, or one of linear, response, gauge, stiffness".to_owned(),
+        ));
     };
     let shown = path.display().to_string();
     let record = identify::read_record(path, &shown).map_err(refused)?;
@@ -161,7 +163,8 @@ fn details(report: &Report, text: &mut String) {
 }
 
 fn account(cause: &Cause) -> String {
-    let shares: Vec<String> = cause.shares.iter().map(|(s, share)| format!("{} {:.0} %", short(*s), share * 100.0)).collect();
+    let shares: Vec<String> =
+        cause.shares.iter().map(|(s, share)| format!("{} {:.0} %", short(*s), share * 100.0)).collect();
     format!(
         "mainly {} (of its mean square: {}); linear drift taken out: {:.2} nm rms",
         cause.main.name(),

@@ -91,7 +91,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 }
 
 fn table(report: &LinearReport) -> String {
-    let mut text = "Y = ρX + δ\n  frequency Hz      ρ µm/V   ± std err        δ µm   loop µm     %  correlation  cycles  record\n".to_owned();
+    let mut text =
+        "Y = ρX + δ\n  frequency Hz      ρ µm/V   ± std err        δ µm   loop µm     %  correlation  cycles  record\n"
+            .to_owned();
     for r in &report.relations {
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(
@@ -134,7 +136,9 @@ fn static_verdict(report: &LinearReport, text: &mut String) {
         PAPER[1],
         yes(report.pcc_is_stable(PAPER[0], PAPER[1]))
     );
-    text.push_str("the resonance and lag of the leg lower these limits: --spec judges the sampled loop of a platform\n");
+    text.push_str(
+        "the resonance and lag of the leg lower these limits: --spec judges the sampled loop of a platform\n",
+    );
 }
 
 /// Stability of the spec's own weights over the λ found.
@@ -150,7 +154,9 @@ fn judge(path: &Path, report: &LinearReport, text: &mut String) -> Result<Value,
     let verdict = match compile::check_stability(&model) {
         Ok((margins, design)) => {
             if let (Some(margins), Some(level)) = (&margins, level(&model)) {
-                let largest = margins.largest_level_weight.map_or_else(String::new, |w| format!("; stable up to level weight {w:.4}"));
+                let largest = margins
+                    .largest_level_weight
+                    .map_or_else(String::new, |w| format!("; stable up to level weight {w:.4}"));
                 let _ = writeln!(
                     text,
                     "{name}: its weights (level {level}, drift {}) are stable over this λ; spectral radius {:.4}{largest}",

@@ -18,7 +18,11 @@ pub struct Plot {
 
 fn drawable(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
-    if kind(&path).is_some() { Ok(path) } else { Err(format!("expected a file that ends in .svg or .html, found `{text}`")) }
+    if kind(&path).is_some() {
+        Ok(path)
+    } else {
+        Err(format!("expected a file that ends in .svg or .html, found `{text}`"))
+    }
 }
 
 /// Whether it is a page; none for neither.

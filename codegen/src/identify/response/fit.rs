@@ -139,7 +139,9 @@ pub(super) fn fit(bins: &[Bin], averages: usize) -> Result<Fitted, String> {
             best = Some((cost, p));
         }
     }
-    let Some((_, mut p)) = best else { return Err("the fit of resonance, lag and dead time does not converge".to_owned()) };
+    let Some((_, mut p)) = best else {
+        return Err("the fit of resonance, lag and dead time does not converge".to_owned());
+    };
     // Neither lag nor dead time can be negative: what comes out so is held at zero, the worse one first.
     let mut free = vec![0, 1, 2, 3, 4];
     for _ in 0..2 {

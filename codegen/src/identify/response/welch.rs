@@ -19,9 +19,8 @@ pub struct Bin {
 /// H1 of `y` against `x` at `rate` (Hz) over half-overlapped Hann segments, bins 0 to the last below half the rate.
 pub(super) fn h1(x: &[f64], y: &[f64], rate: f64, segment: usize) -> Vec<Bin> {
     let half = segment / 2;
-    let window: Vec<f64> = (0..segment)
-        .map(|k| 0.5 - 0.5 * libm::cos(std::f64::consts::TAU * k as f64 / segment as f64))
-        .collect();
+    let window: Vec<f64> =
+        (0..segment).map(|k| 0.5 - 0.5 * libm::cos(std::f64::consts::TAU * k as f64 / segment as f64)).collect();
     // Without the `avx`, `sse` features the planner has one kernel for every machine.
     let fft = FftPlanner::<f64>::new().plan_fft_forward(segment);
     let (mut xx, mut yy, mut xy) = (vec![0.0; half], vec![0.0; half], vec![Complex::new(0.0, 0.0); half]);
@@ -46,7 +45,8 @@ pub(super) fn h1(x: &[f64], y: &[f64], rate: f64, segment: usize) -> Vec<Bin> {
     (0..half)
         .map(|k| {
             let power = xx[k] * yy[k];
-            let (h, coherence) = if power > 0.0 { (xy[k] / xx[k], xy[k].norm_sqr() / power) } else { (Complex::new(0.0, 0.0), 0.0) };
+            let (h, coherence) =
+                if power > 0.0 { (xy[k] / xx[k], xy[k].norm_sqr() / power) } else { (Complex::new(0.0, 0.0), 0.0) };
             Bin {
                 frequency: k as f64 * rate / segment as f64,
                 h: [h.re, h.im],
