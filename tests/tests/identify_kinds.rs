@@ -411,18 +411,18 @@ fn forces_that_give_no_stiffness_are_refused_with_the_time() {
         rows.iter_mut().for_each(change);
         stiffness::measure_text(&csv(FORCE, &rows), "k.csv").unwrap_err()
     };
-    expect(&with(&|r| r[1] = -r[1]), "E0640", "displacement falls when the force rises");
+    expect(&with(&|r| r[1] = -r[1]), "E0644", "displacement falls when the force rises");
     expect(
         &with(&|r| {
             if r[0] >= 12.0 {
                 r[3] = 51.0
             }
         }),
-        "E0641",
+        "E0645",
         "at 12 s the drive is 51 V",
     );
-    expect(&with(&|r| r[2] *= 1e-6), "E0642", "none of a piezo actuator");
-    expect(&with(&|r| r[1] *= 1e6), "E0642", "none of a piezo actuator");
+    expect(&with(&|r| r[2] *= 1e-6), "E0646", "none of a piezo actuator");
+    expect(&with(&|r| r[1] *= 1e6), "E0646", "none of a piezo actuator");
     expect(&with(&|r| r[2] = r[2].min(7.0)), "E0513", "`displacement_um` is limited at 7");
     expect(&with(&|r| r[1] = 5.0), "E0512", "`force_N` is 5 in every sample, from 0 s to 39.99 s");
 }

@@ -275,13 +275,13 @@ codes! {
         "A calibration cannot remove that.";
     GAUGE_GLITCH = "W0638", "a point far off the calibration",
         "Was the reading disturbed?";
-    STIFFNESS_SIGN = "E0640", "negative stiffness",
+    STIFFNESS_SIGN = "E0644", "negative stiffness",
         "Force counts positive where it pushes the displacement up.";
-    STIFFNESS_DRIVE = "E0641", "drive that moves while the stiffness is measured",
+    STIFFNESS_DRIVE = "E0645", "drive that moves while the stiffness is measured",
         "The drive's own displacement would be taken for the force's.";
-    STIFFNESS_RECORD = "E0642", "record that gives no stiffness",
+    STIFFNESS_RECORD = "E0646", "record that gives no stiffness",
         "The force must rise and fall, move the actuator beyond the noise, and be in newtons.";
-    STIFFNESS_UNCERTAIN = "W0643", "stiffness uncertain",
+    STIFFNESS_UNCERTAIN = "W0647", "stiffness uncertain",
         "The standard error is more than a tenth of the value.";
     STROKE_MISMATCH = "W0301", "stroke, gain and voltage do not fit",
         "stacks x stack_gain x voltage range is far from the stroke: one of the four is probably wrong, or the stroke is never used.";

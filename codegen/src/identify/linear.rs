@@ -210,22 +210,22 @@ fn widest(record: &Record, first: usize, end: usize, gain: f64) -> f64 {
     let (low, high) = extent(&drive[first..end]);
     let mut sums = vec![[(0.0, 0.0); 2]; WIDTHS];
     let (mut rising, mut turn) = (true, drive[first]);
-    for k in first..end {
+    for (k, &u) in drive.iter().enumerate().take(end).skip(first) {
         // A turn counts from a fiftieth of the range on: noise of the drive column is no reversal.
-        let back = if rising { turn - drive[k] } else { drive[k] - turn };
+        let back = if rising { turn - u } else { u - turn };
         if back > 0.02 * (high - low) {
             rising = !rising;
-            turn = drive[k];
+            turn = u;
         } else if back < 0.0 {
-            turn = drive[k];
+            turn = u;
         }
         if record.weightless[k] || back > 0.0 {
             continue;
         }
-        let position = (drive[k] - low) / (high - low) * WIDTHS as f64;
+        let position = (u - low) / (high - low) * WIDTHS as f64;
         let bin = (position as usize).min(WIDTHS - 1);
         let (sum, count) = &mut sums[bin][usize::from(rising)];
-        *sum += record.displacement[k] - gain * drive[k];
+        *sum += record.displacement[k] - gain * u;
         *count += 1.0;
     }
     let both = sums.iter().filter(|[fall, rise]| fall.1 > 0.0 && rise.1 > 0.0);

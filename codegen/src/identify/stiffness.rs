@@ -80,7 +80,7 @@ struct Creep {
 /// Measures from the columns `time_s`, `force_N`, `displacement_um` and, if there is one, `drive_V`.
 ///
 /// # Errors
-/// E0640 if displacement falls with force, E0641 if the drive moves, E0642 if the force does not move the actuator or the
+/// E0644 if displacement falls with force, E0645 if the drive moves, E0646 if the force does not move the actuator or the
 /// unit is wrong, and those of reading.
 pub fn measure(path: &Path, shown_as: &str) -> Result<StiffnessReport, Vec<Diagnostic>> {
     of_signals(&signals::read(path, shown_as, &COLUMNS)?)
@@ -139,7 +139,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
             signals.place(0),
             signals.place(time.len() - 1)
         );
-        findings.error("E0642", None, message, "raise and lower the force at least once");
+        findings.error("E0646", None, message, "raise and lower the force at least once");
         return None;
     };
     let base = mean_square(&straight.residual);
@@ -197,7 +197,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
             signals.place(at)
         );
         findings.error(
-            "E0642",
+            "E0646",
             None,
             message,
             "write the force in newtons and the displacement in micrometres; are the columns swapped?",
@@ -206,7 +206,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
     let error = compliance_error * stiffness * stiffness;
     if error > 0.01 * UNCERTAIN * stiffness {
         let message = format!("the stiffness is uncertain by {:.0} %", 100.0 * error / stiffness);
-        findings.warning("W0643", None, message, "use more force, or average several rises and falls");
+        findings.warning("W0647", None, message, "use more force, or average several rises and falls");
     }
     let points = (0..y.len())
         .map(|k| {
@@ -240,7 +240,7 @@ fn check_drive(signals: &Signals, findings: &mut Findings) {
     let start = drive[0];
     if let Some(k) = drive.iter().position(|u| (u - start).abs() > CONSTANT) {
         let message = format!("at {} the drive is {} V, while it began with {start} V", signals.place(k), drive[k]);
-        findings.error("E0641", Some(signals.lines[k]), message, "hold the drive constant while the force changes");
+        findings.error("E0645", Some(signals.lines[k]), message, "hold the drive constant while the force changes");
     }
 }
 
@@ -250,7 +250,7 @@ fn check_sign(signals: &Signals, force: &[f64], compliance: f64, error: f64, fin
     if compliance.abs() <= 2.0 * error {
         let message =
             format!("the displacement does not follow the force (lowest at {}, highest at {})", at(low), at(high));
-        findings.error("E0642", None, message, "use more force, or a gauge of less noise");
+        findings.error("E0646", None, message, "use more force, or a gauge of less noise");
         return None;
     }
     if compliance < 0.0 {
@@ -261,7 +261,7 @@ fn check_sign(signals: &Signals, force: &[f64], compliance: f64, error: f64, fin
             1.0 / compliance
         );
         findings.error(
-            "E0640",
+            "E0644",
             None,
             message,
             "count force positive where it pushes the displacement up: change the sign of one column",

@@ -38,7 +38,7 @@ pub struct EverettArguments {
 /// Voltages that make sense; `actuator.voltage` of a spec has the same range.
 const VOLTS: std::ops::RangeInclusive<f64> = -1e4..=1e4;
 
-fn range(text: &str) -> Result<[f64; 2], String> {
+pub(in crate::cli) fn range(text: &str) -> Result<[f64; 2], String> {
     let expected = || format!("expected two voltages such as 0:100, found `{text}`");
     let (low, high) = text.split_once(':').ok_or_else(expected)?;
     let number = |part: &str| part.trim().trim_end_matches('V').trim().parse::<f64>().map_err(|_| expected());
@@ -53,7 +53,7 @@ fn range(text: &str) -> Result<[f64; 2], String> {
 }
 
 /// Any whole number: which sizes can be identified is for identification to say.
-fn grid(text: &str) -> Result<usize, String> {
+pub(in crate::cli) fn grid(text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| format!("expected a whole number such as 32, found `{text}`"))
 }
 
