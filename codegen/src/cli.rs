@@ -7,6 +7,7 @@ mod check;
 mod dynamics;
 mod file;
 mod identify;
+mod identify_rate;
 mod sim;
 mod ui;
 

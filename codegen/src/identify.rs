@@ -19,6 +19,7 @@ pub mod nnls;
 mod normal;
 mod prior;
 mod record;
+pub mod rate;
 pub mod regressor;
 mod report;
 mod residual;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use serde_json::json;
 
 use super::file::write_file;
@@ -14,7 +14,28 @@ use crate::identify::{self, Options, Report, Validation};
 
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    override_usage = "specgen identify [OPTIONS] --drive <MIN:MAX> <RECORD>\n       specgen identify rate [OPTIONS] --drive <MIN:MAX> <RECORD>..."
+)]
 pub struct Arguments {
+    #[command(subcommand)]
+    kind: Option<Kind>,
+    #[command(flatten)]
+    table: Option<Table>,
+}
+
+/// What else can be identified.
+#[derive(Subcommand, Debug)]
+enum Kind {
+    /// Compare rate-dependent models on records of one leg at several rates.
+    Rate(super::identify_rate::Arguments),
+}
+
+/// Arguments of the identification of a table.
+#[derive(Args, Debug)]
+struct Table {
     /// Reversal-curve record: CSV with columns time_s, drive_V, displacement_um.
     record: PathBuf,
     /// Voltage range of the table, V, such as 0:100 or -90:90.
@@ -34,7 +55,7 @@ pub struct Arguments {
 /// Voltages that make sense; `actuator.voltage` of a spec has the same range.
 const VOLTS: std::ops::RangeInclusive<f64> = -1e4..=1e4;
 
-fn range(text: &str) -> Result<[f64; 2], String> {
+pub(super) fn range(text: &str) -> Result<[f64; 2], String> {
     let expected = || format!("expected two voltages such as 0:100, found `{text}`");
     let (low, high) = text.split_once(':').ok_or_else(expected)?;
     let number = |part: &str| part.trim().trim_end_matches('V').trim().parse::<f64>().map_err(|_| expected());
@@ -49,11 +70,19 @@ fn range(text: &str) -> Result<[f64; 2], String> {
 }
 
 /// Any whole number: which sizes can be identified is for identification to say.
-fn grid(text: &str) -> Result<usize, String> {
+pub(super) fn grid(text: &str) -> Result<usize, String> {
     text.parse().map_err(|_| format!("expected a whole number such as 32, found `{text}`"))
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    match (&arguments.kind, &arguments.table) {
+        (Some(Kind::Rate(arguments)), _) => super::identify_rate::run(arguments, ui),
+        (None, Some(arguments)) => run_table(arguments, ui),
+        (None, None) => Err(Failure::Usage("name a record, or a kind of identification such as `rate`".to_owned())),
+    }
+}
+
+fn run_table(arguments: &Table, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.record.display().to_string();
     let options = Options::new(arguments.grid, arguments.drive);
     let identified = identify::read_record(&arguments.record, &shown)

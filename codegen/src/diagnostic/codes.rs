@@ -239,6 +239,10 @@ codes! {
         "A table named in hysteresis.records must have the cells of hysteresis.grid over the range of actuator.voltage: identify the record again with both.";
     RECORD_SCALE = "E0615", "a record that the actuator cannot have made",
         "Its displacement is more than five times, or less than a fifth, of stacks x stack_gain x voltage: most likely it is not in micrometres.";
+    ONE_RATE = "E0640", "records of one rate only",
+        "Rate dependence shows between records of one leg at different rates: record the same sweep at two rates or more.";
+    RATE_TABLE_FILE = "E0641", "not a table of the second weight",
+        "A table named in hysteresis.rate_tables is as `identify rate -o NAME` writes it to NAME-mu1.csv: the nodes of a triangle of rising thresholds, of either sign.";
     STROKE_MISMATCH = "W0301", "stroke, gain and voltage do not fit",
         "stacks x stack_gain x voltage range is far from the stroke: one of the four is probably wrong, or the stroke is never used.";
     RESONANCE_ALIASED = "W0302", "resonance above half the tick rate",
