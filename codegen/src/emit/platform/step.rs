@@ -3,13 +3,33 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::ir::Ir;
+use crate::ir::{Ir, RateModel};
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let has_lead = ir.task_space.as_ref().is_some_and(|task| task.law.lead != 0.0);
     let (lead, lead_import) = match has_lead {
         true => (quote! { + (demand[leg] - state.demand[leg]) * LEAD }, quote! { LEAD, }),
         false => (quote! {}, quote! {}),
+    };
+    let (status_bit, find_static, status) = match &ir.hysteresis.rate {
+        Some(RateModel::DynamicPreisach { .. }) => (
+            quote! {
+                /// Bits 24 to 29: the rate-dependent inverse of the leg was not safe to use; the static one stood in for it.
+                pub const STATIC_INVERSE: u32 = 0x3f00_0000;
+            },
+            quote! {
+                let mut static_inverse = 0;
+                for (index, leg) in state.legs.iter().enumerate() {
+                    static_inverse |= ((config.mode().inverts() && leg.memory.fell_back()) as u32) << (24 + index);
+                }
+            },
+            quote! { static_inverse | },
+        ),
+        _ => (quote! {}, quote! {}, quote! {}),
+    };
+    let out_of_reach = match &ir.hysteresis.rate {
+        None => quote! { !(request >= Real::ZERO && request <= table.full_displacement()) },
+        Some(_) => quote! { !leg.memory.reaches(table, request) },
     };
     quote! {
         #![doc = " One control tick."]
@@ -61,6 +81,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const GENERATOR_BUSY: u32 = 0x4_0000;
         /// Bit 19: measured wrench not finite or out of range; the last one believed was kept.
         pub const WRENCH_FAULT: u32 = 0x8_0000;
+        #status_bit
 
         /// What a tick reads.
         #[derive(Debug, Clone, Copy, PartialEq)]
@@ -124,11 +145,12 @@ pub fn emit(ir: &Ir) -> TokenStream {
                 limited |= (held_back as u32) << index;
             }
             state.limited = limited != 0;
+            #find_static
             let legs = &state.legs;
             TickOutput {
                 voltage: each(|leg| DAC.voltage(legs[leg].code)),
                 dac_code: each(|leg| legs[leg].code),
-                status: limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
+                status: #status limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
             }
         }
 
@@ -280,7 +302,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
             let mode = config.mode();
             let (drive, out_of_reach) = if mode.inverts() {
-                let out_of_reach = !(request >= Real::ZERO && request <= table.full_displacement());
+                let out_of_reach = #out_of_reach;
                 (leg.memory.solve(table, request), out_of_reach)
             } else {
                 (linear_drive(request), false)

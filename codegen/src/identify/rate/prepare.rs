@@ -17,7 +17,7 @@ pub(super) struct Prepared<'a> {
     pub(super) branches: Vec<Branch>,
     /// Median |u̇| within the branches, V/s.
     pub(super) speed: f64,
-    /// Rises per second, Hz.
+    /// Curves (falls) per second, Hz.
     pub(super) frequency: f64,
     /// Median sampling interval, s.
     pub(super) interval: f64,
@@ -70,8 +70,8 @@ pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Find
         slope,
         branches: used.branches,
     };
-    let rises = prepared.branches.iter().filter(|b| b.rising).count();
-    prepared.frequency = rises as f64 / prepared.duration();
+    let falls = prepared.branches.iter().filter(|b| !b.rising).count();
+    prepared.frequency = falls as f64 / prepared.duration();
     Some(prepared)
 }
 
