@@ -13,9 +13,9 @@ use crate::identify::nnls::Failure;
 use crate::identify::regressor::Plane;
 use crate::identify::trend::Line;
 
-/// Creep operators.
-const TERMS: usize = 3;
-/// Shortest time constant, sampling intervals: anything faster is part of the dead time.
+/// Fewest and most creep operators; between them, one a decade of the time constants.
+const TERMS: [f64; 2] = [3.0, 6.0];
+/// Shortest time constant, sampling intervals of the record sampled fastest: anything faster is part of the dead time.
 const SHORTEST: f64 = 20.0;
 /// Longest time constant, share of the longest record: anything slower is a line.
 const LONGEST: f64 = 1.0 / 3.0;
@@ -60,9 +60,12 @@ pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Re
 /// Evenly spaced in their logarithm, slowest first, s.
 fn time_constants(records: &[&Prepared]) -> Vec<f64> {
     let longest = records.iter().map(|p| p.duration()).fold(0.0, |a, b| if b > a { b } else { a }) * LONGEST;
-    let shortest = records.iter().map(|p| p.interval).fold(0.0, |a, b| if b > a { b } else { a }) * SHORTEST;
-    let ratio = libm::log(shortest / longest) / (TERMS - 1) as f64;
-    (0..TERMS).map(|k| rounded(longest * libm::exp(ratio * k as f64))).collect()
+    let shortest = records.iter().map(|p| p.interval).fold(longest, |a, b| if b < a { b } else { a }) * SHORTEST;
+    let shortest = if shortest < longest { shortest } else { 0.1 * longest };
+    let wanted = libm::ceil(libm::log10(longest / shortest)) + 1.0;
+    let terms = crate::identify::staircase::saturate(wanted, TERMS) as usize;
+    let ratio = libm::log(shortest / longest) / (terms - 1) as f64;
+    (0..terms).map(|k| rounded(longest * libm::exp(ratio * k as f64))).collect()
 }
 
 /// To three digits: a time constant is chosen, not measured.
@@ -85,7 +88,8 @@ struct Linear {
 /// `signals`: f and the creep states of each record.
 fn linear_part(records: &[&Prepared], signals: &[Vec<Vec<f64>>], dead_time: f64) -> Result<Linear, Failure> {
     // Unknowns: w_j ≥ 0, then s and −δτ.
-    let unknowns = TERMS + 2;
+    let terms = signals.first().map_or(0, |signals| signals.len() - 1);
+    let unknowns = terms + 2;
     let mut gram = DMatrix::zeros(unknowns, unknowns);
     let mut rhs = vec![0.0; unknowns];
     let mut energy = 0.0;
@@ -121,13 +125,13 @@ fn linear_part(records: &[&Prepared], signals: &[Vec<Vec<f64>>], dead_time: f64)
     }
     let target_size = energy.sqrt();
     let scaled: Vec<f64> = rhs.iter().map(|b| b / target_size).collect();
-    let solution = mixed::solve(&gram, &scaled, TERMS)?;
+    let solution = mixed::solve(&gram, &scaled, terms)?;
     let explained = solution.iter().zip(&scaled).fold(0.0, |sum, (w, b)| sum + w * b);
     let value = |k: usize| solution[k] * target_size / scale_of[k].sqrt();
     Ok(Linear {
-        scale: value(TERMS),
-        weights: (0..TERMS).map(value).collect(),
-        later: -value(TERMS + 1),
+        scale: value(terms),
+        weights: (0..terms).map(value).collect(),
+        later: -value(terms + 1),
         residual: energy * (1.0 - explained),
     })
 }

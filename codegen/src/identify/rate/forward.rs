@@ -34,23 +34,22 @@ pub(super) fn predict(
     sum
 }
 
-/// x of one creep operator behind `f`: each value is held from one sample to the next and x is that at its end, as in the
-/// controller. It starts at rest.
+/// x of one creep operator behind `f`, exact for an f that is straight between samples. It starts at rest.
 pub(super) fn creep(time_constant: f64, time: &[f64], f: &[f64]) -> Vec<f64> {
     let mut x = f.first().copied().unwrap_or(0.0);
+    let mut before = x;
     let mut all = Vec::with_capacity(f.len());
     for (k, &f) in f.iter().enumerate() {
         if k > 0 {
-            x += gain(time_constant, time[k] - time[k - 1]) * (f - x);
+            let step = time[k] - time[k - 1];
+            // Behind a ramp x lags by τ times its slope.
+            let behind = (f - before) / step * time_constant;
+            x = f - behind + (x - before + behind) * libm::exp(-step / time_constant);
         }
+        before = f;
         all.push(x);
     }
     all
-}
-
-/// 1 − e^(−`step`/`time_constant`).
-pub(super) fn gain(time_constant: f64, step: f64) -> f64 {
-    -libm::expm1(-step / time_constant)
 }
 
 /// Static displacement and every creep state of `times` over the used part, m.
