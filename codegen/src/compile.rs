@@ -187,14 +187,13 @@ struct IdentifiedRecords {
 }
 
 fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedRecords, Vec<Diagnostic>> {
-    let mut result =
-        IdentifiedRecords {
-            tables: Vec::new(),
-            rate_tables: Vec::new(),
-            reports: Vec::new(),
-            findings: Vec::new(),
-            texts: Vec::new(),
-        };
+    let mut result = IdentifiedRecords {
+        tables: Vec::new(),
+        rate_tables: Vec::new(),
+        reports: Vec::new(),
+        findings: Vec::new(),
+        texts: Vec::new(),
+    };
     let mut errors = Vec::new();
     for name in &model.hysteresis.records {
         let text = match identify::read_file(&source.dir.join(name), name) {

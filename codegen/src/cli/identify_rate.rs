@@ -114,9 +114,9 @@ fn table(report: &RateReport) -> String {
     for record in &report.records {
         let _ = writeln!(
             text,
-            "{}: {:.1} curves/s, median {:.0} V/s, {} samples, range {:.3} µm, noise {:.3} % of it",
+            "{}: {} curves, median {:.0} V/s, {} samples, range {:.3} µm, noise {:.3} % of it",
             record.record,
-            record.frequency,
+            record.frequency_text(),
             record.speed,
             record.samples,
             record.range * 1e6,
@@ -126,7 +126,7 @@ fn table(report: &RateReport) -> String {
     if let Some(held) = &report.hold_out {
         let _ = writeln!(text, "{}: held out of every fit", held.record);
     }
-    let heads: Vec<String> = report.records.iter().map(|r| format!("{:>9}", format!("{:.0} Hz", r.frequency))).collect();
+    let heads: Vec<String> = report.records.iter().map(|r| format!("{:>9}", r.frequency_text())).collect();
     let heads = heads.concat();
     let _ = writeln!(text, "\nrms error in % of the range, grid {}", report.grid);
     let held = if report.hold_out.is_some() { "  held out" } else { "" };
@@ -136,13 +136,8 @@ fn table(report: &RateReport) -> String {
     for option in &report.options {
         let cells = |values: &[f64]| values.iter().map(|v| format!("{v:>9.3}")).collect::<String>();
         let held = option.hold_out.map(|v| format!("{v:>10.3}")).unwrap_or_default();
-        let _ = writeln!(
-            text,
-            "{:<20}{}   {}{held}",
-            option.option.name(),
-            cells(&option.fitted),
-            cells(&option.left_out)
-        );
+        let _ =
+            writeln!(text, "{:<20}{}   {}{held}", option.option.name(), cells(&option.fitted), cells(&option.left_out));
     }
     text.push('\n');
     for option in report.options.iter().filter(|o| o.dead_time > 0.0 || !o.creep.is_empty()) {

@@ -135,7 +135,8 @@ pub fn run_forc(arguments: &ForcArguments, ui: &mut Ui) -> Result<(), Failure> {
     let (parameters, noise) = arguments.plant.read()?;
     let mut leg = LegPlant::new(&parameters);
     let mut gauge = Gauge::new(&noise, arguments.plant.seed, 0);
-    let record = ReversalExperiment { rate: arguments.rate, ..ReversalExperiment::reference(arguments.grid) }.run(&mut leg, &mut gauge);
+    let record = ReversalExperiment { rate: arguments.rate, ..ReversalExperiment::reference(arguments.grid) }
+        .run(&mut leg, &mut gauge);
     let rows = record.rows.len();
     write_file(&arguments.output, record.to_csv().as_bytes())?;
     let text = format!("wrote {rows} rows to {}\n", arguments.output.display());

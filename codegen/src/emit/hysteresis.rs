@@ -137,8 +137,11 @@ fn statics(
 ) -> (Vec<TokenStream>, Vec<Ident>) {
     let names: Vec<Ident> = (0..tables.len()).map(|k| format_ident!("{prefix}_{k}")).collect();
     let statics = tables.iter().zip(&names).enumerate().map(|(k, (nodes, name))| {
-        let legs: Vec<String> =
-            (0..).zip(table_of_leg).filter(|(_, table)| **table == k).map(|(leg, _): (usize, _)| leg.to_string()).collect();
+        let legs: Vec<String> = (0..)
+            .zip(table_of_leg)
+            .filter(|(_, table)| **table == k)
+            .map(|(leg, _): (usize, _)| leg.to_string())
+            .collect();
         let doc = format!(" {}", doc.replace("{}", &legs.join(", ")));
         let nodes = literal::reals(scalar, nodes);
         quote! {

@@ -40,7 +40,10 @@ pub(super) fn lower(
             let volts_per_cell = (max - min) / model.hysteresis.grid as f64;
             let (distinct, table_of_leg) = distinct(rate_tables, volts_per_cell / period, scalar);
             let volts_per_code = (model.dac.range[1] - model.dac.range[0]) / f64::from((1_i32 << model.dac.bits) - 1);
-            let least = tables.iter().map(|table| table.node(table.grid, 0)).fold(f64::INFINITY, |a, b| if b < a { b } else { a });
+            let least = tables
+                .iter()
+                .map(|table| table.node(table.grid, 0))
+                .fold(f64::INFINITY, |a, b| if b < a { b } else { a });
             let tolerance = round(SHARE_OF_CODE * least * volts_per_code / (max - min));
             Some(RateModel::DynamicPreisach { tables: distinct, table_of_leg, tolerance })
         }

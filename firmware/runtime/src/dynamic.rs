@@ -82,7 +82,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         self.memory.drive()
     }
 
-    /// h of the last tick, m.
+    /// What the last tick requested, see [`DynamicMemory::apply`], m.
     #[inline]
     #[must_use]
     pub fn displacement(&self) -> T {
@@ -107,7 +107,9 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         displacement >= T::ZERO && displacement <= table.still.full_displacement()
     }
 
-    /// One tick that ends at `drive` (cells, finite, held within 0..=N); returns h, m.
+    /// One tick that ends at `drive` (cells, finite, held within 0..=N); returns what was requested by it, m: h, or Γ₀ if the
+    /// last inverse was the static one. Whoever compares a gauge with it must see the model that was inverted: a rate term too
+    /// large to be inverted would come back through the adaptation.
     #[inline]
     pub fn apply<const N: usize, const NODES: usize>(&mut self, table: &DynamicEverett<T, N, NODES>, drive: T) -> T {
         let drive = saturate(drive, T::ZERO, table.still.full_scale());
@@ -126,7 +128,8 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
                 self.rate = along(&table.rate, branch.start, at_start, drive);
             }
         }
-        self.displacement = self.memory.displacement() + (drive - last) * self.rate;
+        let still = self.memory.displacement();
+        self.displacement = if self.fell_back { still } else { still + (drive - last) * self.rate };
         self.displacement
     }
 
@@ -209,8 +212,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         }
         let root = root?;
         // The rate term against the gain: both in the direction of travel.
-        let (gain, rate_term) =
-            if rising { (root.gain, root.rate_term) } else { (-root.gain, -root.rate_term) };
+        let (gain, rate_term) = if rising { (root.gain, root.rate_term) } else { (-root.gain, -root.rate_term) };
         (rate_term >= -(gain * T::HALF)).then_some(root.drive)
     }
 
@@ -260,6 +262,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         self.memory.digest(digest);
         digest.real(self.rate);
         digest.real(self.displacement);
+        digest.word(u64::from(self.fell_back));
         for rate in self.rate_at.iter().take(self.memory.depth()) {
             digest.real(*rate);
         }

@@ -50,9 +50,7 @@ pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Re
             .collect();
         model.still = fit::table(plane, records, &targets)?;
         let terms = times.iter().zip(&linear.weights);
-        model.creep = kept(
-            terms.map(|(tau, w)| CreepTerm { time_constant: *tau, weight: w / linear.scale }).collect(),
-        );
+        model.creep = kept(terms.map(|(tau, w)| CreepTerm { time_constant: *tau, weight: w / linear.scale }).collect());
     }
     Ok(model)
 }

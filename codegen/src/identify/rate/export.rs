@@ -92,7 +92,8 @@ pub fn spec_lines(option: RateOption, model: &RateModel, table: &str, rate_table
         }
         RateOption::Creep if model.creep.is_empty() => Ok(()),
         RateOption::Creep => {
-            let times: Vec<String> = model.creep.iter().map(|c| format!("\"{} ms\"", shown(c.time_constant * 1e3))).collect();
+            let times: Vec<String> =
+                model.creep.iter().map(|c| format!("\"{} ms\"", shown(c.time_constant * 1e3))).collect();
             let weights: Vec<String> = model.creep.iter().map(|c| shown(c.weight)).collect();
             writeln!(
                 text,

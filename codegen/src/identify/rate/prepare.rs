@@ -58,8 +58,7 @@ pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Find
     }
     let used = selection::usable(record, plane, findings)?;
     let slope = slope(record, plane.range);
-    let mut speeds: Vec<f64> =
-        used.branches.iter().flat_map(|b| &slope[b.first + 1..b.end]).map(|s| s.abs()).collect();
+    let mut speeds: Vec<f64> = used.branches.iter().flat_map(|b| &slope[b.first + 1..b.end]).map(|s| s.abs()).collect();
     let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
     let mut prepared = Prepared {
         record,

@@ -30,6 +30,15 @@ pub struct Measured {
     pub noise_percent: f64,
 }
 
+impl Measured {
+    /// The frequency to two digits, with its unit.
+    #[must_use]
+    pub fn frequency_text(&self) -> String {
+        let decimals = if self.frequency < 1.0 { 2 } else { usize::from(self.frequency < 9.95) };
+        format!("{:.decimals$} Hz", self.frequency)
+    }
+}
+
 /// One option. Errors are rms in % of each record's range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OptionReport {
@@ -135,10 +144,14 @@ fn verdict(records: &[Measured], options: &[OptionReport], hold_out: Option<&Rec
             best = option;
         }
         let beaten = |ours: f64, theirs: f64| ours < theirs * (1.0 - BEATS);
-        let cases = option.left_out.iter().zip(&plain.left_out).zip(records).map(|((ours, theirs), record)| {
-            (format!("{:.0} Hz", record.frequency), *ours, *theirs)
-        });
-        let held = option.hold_out.zip(plain.hold_out).map(|(ours, theirs)| ("the held-out record".to_owned(), ours, theirs));
+        let cases = option
+            .left_out
+            .iter()
+            .zip(&plain.left_out)
+            .zip(records)
+            .map(|((ours, theirs), record)| (record.frequency_text(), *ours, *theirs));
+        let held =
+            option.hold_out.zip(plain.hold_out).map(|(ours, theirs)| ("the held-out record".to_owned(), ours, theirs));
         let cases: Vec<(String, f64, f64)> = cases.chain(held).collect();
         let say = |won: bool| -> Vec<String> {
             let kept = cases.iter().filter(|(_, ours, theirs)| beaten(*ours, *theirs) == won);

@@ -9,7 +9,11 @@ use crate::spec::text::number;
 /// Option, its keys, and how they are written.
 const OPTIONS: [(&str, &[&str], &str); 2] = [
     ("dynamic-preisach", &["rate_tables"], "rate_tables = [\"records/leg-mu1.csv\"]"),
-    ("creep", &["creep_times", "creep_weights"], "creep_times = [\"0.8 s\", \"40 ms\"] and creep_weights = [0.03, 0.09]"),
+    (
+        "creep",
+        &["creep_times", "creep_weights"],
+        "creep_times = [\"0.8 s\", \"40 ms\"] and creep_weights = [0.03, 0.09]",
+    ),
 ];
 
 pub(super) fn keys_of_option(f: &Fields, findings: &mut Findings) -> Option<()> {
