@@ -116,7 +116,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         let last = self.memory.drive();
         if drive != last {
             let (dropped, depth) = (self.memory.dropped(), self.memory.depth());
-            let branch = self.memory.branch(drive);
+            let branch = self.memory.origin(drive);
             let at_start = if branch.place < depth { self.rate_at(branch.place) } else { self.rate };
             self.memory.apply(&table.still, drive);
             if self.memory.dropped() != dropped {
@@ -225,7 +225,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         if drive <= T::ZERO {
             return Point { drive: T::ZERO, gain: -self.memory.displacement(), rate_term: T::ZERO };
         }
-        let branch = self.memory.branch(drive);
+        let branch = self.memory.origin(drive);
         let still = along(&table.still, branch.start, branch.at_start, drive);
         let at_start = if branch.place < self.memory.depth() { self.rate_at(branch.place) } else { self.rate };
         let rate = along(&table.rate, branch.start, at_start, drive);

@@ -31,9 +31,9 @@ pub struct ReversalMemory<T, const CAP: usize> {
     dropped: u32,
 }
 
-/// A branch between an extremum and a drive.
+/// Where a branch starts.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Branch<T> {
+pub(crate) struct Origin<T> {
     /// Which extremum it starts at; [`ReversalMemory::depth`] if that is the present point, which would become one.
     pub(crate) place: usize,
     /// Drive there, cells.
@@ -164,9 +164,9 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         }
     }
 
-    /// The branch that [`ReversalMemory::apply`] of `drive` would end on. Does not change the memory.
+    /// Where the branch starts that [`ReversalMemory::apply`] of `drive` would end on. Does not change the memory.
     #[inline]
-    pub(crate) fn branch(&self, drive: T) -> Branch<T> {
+    pub(crate) fn origin(&self, drive: T) -> Origin<T> {
         let rising = drive > self.drive;
         let (mut start, mut at_start, mut place) = if rising == self.is_rising() {
             let top = self.len - 1;
@@ -184,7 +184,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
             start = self.extremum(place);
             at_start = self.displacement_at(place);
         }
-        Branch { place, start, at_start }
+        Origin { place, start, at_start }
     }
 
     /// Extremum `k`, cells.

@@ -20,9 +20,9 @@ const SHORTEST: f64 = 20.0;
 /// Longest time constant, share of the longest record: anything slower is a line.
 const LONGEST: f64 = 1.0 / 3.0;
 /// Most turns.
-const TURNS: usize = 12;
+const TURNS: usize = 60;
 /// A turn that lowers the residual by less than this share is the last.
-const WORTHWHILE: f64 = 1e-3;
+const WORTHWHILE: f64 = 2e-4;
 
 /// Fits creep behind the table and dead time of `start`.
 pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Result<RateModel, Failure> {
