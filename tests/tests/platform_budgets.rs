@@ -38,9 +38,9 @@ struct Budget {
 }
 
 const BUDGETS: [Budget; 3] = [
-    Budget { name: "M7 f64", edits: &[], mcu: Mcu::Mps2An500, tick: Some(4760.0), dynamics: Some(1500) }, // Asked: 4,500.
+    Budget { name: "M7 f64", edits: &[], mcu: Mcu::Mps2An500, tick: Some(4500.0), dynamics: Some(1500) },
     Budget { name: "M7 f32", edits: &[F32], mcu: Mcu::Mps2An500, tick: None, dynamics: Some(1300) },
-    Budget { name: "M4F f32", edits: &[F32], mcu: Mcu::Mps2An386, tick: Some(4760.0), dynamics: None }, // Asked: 4,500.
+    Budget { name: "M4F f32", edits: &[F32], mcu: Mcu::Mps2An386, tick: Some(4500.0), dynamics: None },
 ];
 
 /// The committed figures of one machine and one compiler.

@@ -24,10 +24,14 @@ pub struct ControlLaw {
     pub period: f64,
     /// 1/k_a, m/N.
     pub compliance: f64,
-    /// J, m/m and m/rad.
-    pub jacobian: [[f64; 6]; LEGS],
     /// J⁻ᵀ/k_a, m/N and 1/N.
     pub wrench_to_legs: [[f64; 6]; LEGS],
+    /// V⁻¹ K⁻¹, K = Jᵀ k_a J. V are the modes if a notch is declared, else the axes of the pose.
+    pub force_to_modes: [[f64; 6]; 6],
+    /// V⁻¹ J⁻¹.
+    pub legs_to_modes: [[f64; 6]; 6],
+    /// J V.
+    pub modes_to_legs: [[f64; 6]; 6],
     /// Leg forces at rest, N.
     pub rest_force: [f64; LEGS],
     /// Largest component of a measured wrench, N and N m.
@@ -55,12 +59,6 @@ pub struct Notch {
     pub pose_to_modes: [[f64; 6]; 6],
     /// V.
     pub modes_to_pose: [[f64; 6]; 6],
-    /// V⁻¹ K⁻¹, K = Jᵀ k_a J.
-    pub force_to_modes: [[f64; 6]; 6],
-    /// V⁻¹ J⁻¹.
-    pub legs_to_modes: [[f64; 6]; 6],
-    /// J V.
-    pub modes_to_legs: [[f64; 6]; 6],
     /// One for each mode.
     pub sections: [Section; 6],
 }

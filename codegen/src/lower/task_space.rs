@@ -6,6 +6,15 @@ use crate::model::{self, Model};
 use crate::numerics::{Matrix6, multiply6, transpose6};
 use crate::stability::platform::{self as design, Design, RestDynamics};
 
+const IDENTITY: Matrix6 = {
+    let mut matrix = [[0.0; 6]; 6];
+    let mut k = 0;
+    while k < 6 {
+        matrix[k][k] = 1.0;
+        k += 1;
+    }
+    matrix
+};
 /// Offset of a change of mode that is over, m: a hundredth of a converter step, far below what a gauge sees.
 const TRANSFER_NEGLIGIBLE: f64 = 1e-11;
 
@@ -24,12 +33,13 @@ pub(super) fn law(
     // Lowering of the dynamics has refused a singular geometry.
     let legs_to_pose = linear::inverse(&rest.jacobian).unwrap_or([[0.0; 6]; 6]);
     let wrench_to_legs = transpose6(&legs_to_pose).map(|row| row.map(|value| value * compliance));
+    // Without a notch the axes of the pose do as well as the modes: the run-to-run law is the same in all coordinates.
+    let (to_modal, from_modal) =
+        design.notch.as_ref().map_or((IDENTITY, IDENTITY), |notch| (notch.to_modal, notch.from_modal));
+    let legs_to_modes = multiply6(&to_modal, &legs_to_pose);
     let notch = design.notch.as_ref().map(|notch| Notch {
         pose_to_modes: round_all(notch.to_modal),
         modes_to_pose: round_all(notch.from_modal),
-        force_to_modes: round_all(multiply6(&multiply6(&notch.to_modal, &legs_to_pose), &wrench_to_legs)),
-        legs_to_modes: round_all(multiply6(&notch.to_modal, &legs_to_pose)),
-        modes_to_legs: round_all(multiply6(&rest.jacobian, &notch.from_modal)),
         // b₀ = 1 − g, b₁ = a₁, b₂ = a₂ + g.
         sections: notch.sections.map(|section| Section { depth: round(1.0 - section.b[0]), a: section.a.map(round) }),
     });
@@ -38,8 +48,10 @@ pub(super) fn law(
     ControlLaw {
         period: round(model.timing.period),
         compliance: round(compliance),
-        jacobian: round_all(rest.jacobian),
         wrench_to_legs: round_all(wrench_to_legs),
+        force_to_modes: round_all(multiply6(&legs_to_modes, &wrench_to_legs)),
+        legs_to_modes: round_all(legs_to_modes),
+        modes_to_legs: round_all(multiply6(&rest.jacobian, &from_modal)),
         rest_force: rest_force.map(round),
         wrench_limit: largest_wrench(model).map(round),
         lead: round(task.lead / model.timing.period),

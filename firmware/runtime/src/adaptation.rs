@@ -70,24 +70,39 @@ impl<T: Real> Estimate<T> {
         }
     }
 
-    /// The same law with the innovation ν = m − δ̂ − φ̂ in place of m, so that ν may have been filtered on the way (the
-    /// modal notch): δ̂ ← δ̂ + ω1 (ν + φ̂), φ̂ ← φ̂ + ω2 ν with the old φ̂ in both. Without a filter it is [`Estimate::update`].
+    /// The same law for six, with the innovation ν = m − δ̂ − φ̂ in place of m, so that ν may have been filtered on the way
+    /// (the modal notch): δ̂ ← δ̂ + ω1 (ν + φ̂), φ̂ ← φ̂ + ω2 ν with the old φ̂ in both. Without a filter it is
+    /// [`Estimate::update`]. The six may be those of the legs, or of other coordinates linear in them.
     ///
-    /// With the filter some of the permitted weights are unstable. Both estimates are held within ±1 m, so that they stay
+    /// With the filter some of the permitted weights are unstable. Both estimates are held within ±1, so that they stay
     /// finite whatever the weights and come back at once under better ones.
     #[inline]
-    pub fn correct(&mut self, law: Law, level_weight: T, drift_weight: T, innovation: T) {
-        let old_drift = self.drift;
+    pub fn correct(estimates: &mut [Self; 6], law: Law, level_weight: T, drift_weight: T, innovation: &[T; 6]) {
+        let mut size = T::ZERO;
         match law {
-            Law::Invhys => *self = Self::new(),
+            Law::Invhys => *estimates = [Self::new(); 6],
             Law::Ewma => {
-                self.level = bounded(self.level + level_weight * innovation);
-                self.drift = T::ZERO;
+                for (estimate, innovation) in estimates.iter_mut().zip(innovation) {
+                    let level = estimate.level + level_weight * *innovation;
+                    *estimate = Self { level, drift: T::ZERO };
+                    size = size + level.abs();
+                }
             }
             Law::Pcc => {
-                self.level = bounded(self.level + level_weight * (innovation + old_drift));
-                self.drift = bounded(old_drift + drift_weight * innovation);
+                for (estimate, innovation) in estimates.iter_mut().zip(innovation) {
+                    let level = estimate.level + level_weight * (*innovation + estimate.drift);
+                    let drift = estimate.drift + drift_weight * *innovation;
+                    *estimate = Self { level, drift };
+                    size = size + level.abs() + drift.abs();
+                }
             }
+        }
+        // Where the sum is within the bound so is each, and one comparison does for all.
+        if size <= T::ONE {
+            return;
+        }
+        for estimate in estimates {
+            *estimate = Self { level: bounded(estimate.level), drift: bounded(estimate.drift) };
         }
     }
 
@@ -98,7 +113,7 @@ impl<T: Real> Estimate<T> {
     }
 }
 
-/// Within ±1 m, far beyond any leg.
+/// Within ±1, far beyond any leg in m or in modal coordinates.
 #[inline]
 fn bounded<T: Real>(estimate: T) -> T {
     if estimate.abs() <= T::ONE {

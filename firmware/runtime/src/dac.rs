@@ -48,15 +48,21 @@ impl<T: Real> Dac<T> {
     #[inline]
     #[must_use]
     pub fn drive(&self, code: i32) -> T {
-        self.cells_at_zero + T::from_i32(code) * self.cells_per_code
+        from(self.cells_at_zero, T::from_i32(code) * self.cells_per_code)
     }
 
     /// Voltage of `code`, V.
     #[inline]
     #[must_use]
     pub fn voltage(&self, code: i32) -> T {
-        self.volts_at_zero + T::from_i32(code) * self.volts_per_code
+        from(self.volts_at_zero, T::from_i32(code) * self.volts_per_code)
     }
+}
+
+/// `start` + `way`, without the sum where a converter known to the compiler starts at zero. (No code gives −0.)
+#[inline(always)]
+fn from<T: Real>(start: T, way: T) -> T {
+    if start == T::ZERO { way } else { start + way }
 }
 
 #[inline]

@@ -7,7 +7,7 @@
 //! Drives are counted in *cells* above the lowest threshold: 0 ≤ x ≤ N. Between nodes E is bilinear in square cells
 //! (uniform weight) and linear in the triangles on the diagonal (their weight is reversible).
 
-use crate::real::Real;
+use crate::real::{Real, saturate};
 
 /// Everett function of one leg: `N` × `N` cells, `NODES` = (N+1)(N+2)/2 nodes.
 ///
@@ -17,6 +17,41 @@ use crate::real::Real;
 pub struct Everett<T: 'static, const N: usize, const NODES: usize> {
     /// See the type.
     pub nodes: &'static [T; NODES],
+}
+
+/// A stretch of a branch within one cell, where E is linear in the drive x: E = `base` + `slope` |x − `origin`|.
+#[derive(Debug, Clone, Copy)]
+pub struct Line<T> {
+    cell: usize,
+    origin: T,
+    base: T,
+    slope: T,
+}
+
+impl<T: Real> Line<T> {
+    /// Of a branch that has come to the end of the table: no drive lies on it.
+    const END: Self = Self { cell: usize::MAX, origin: T::ZERO, base: T::ZERO, slope: T::ZERO };
+
+    /// E at a drive in the cell, above the origin on a branch that rises, below it on one that falls; m.
+    #[inline(always)]
+    #[must_use]
+    pub fn at<const RISING: bool>(&self, drive: T) -> T {
+        self.base + self.slope * if RISING { drive - self.origin } else { self.origin - drive }
+    }
+
+    /// Whether a drive ≥ 0 lies in the cell.
+    #[inline(always)]
+    #[must_use]
+    pub fn holds(&self, drive: T) -> bool {
+        drive.truncate() as usize == self.cell
+    }
+
+    /// Where E is `value`; the origin if the stretch is flat.
+    #[inline(always)]
+    fn solve<const RISING: bool>(&self, value: T) -> T {
+        let length = if self.slope > T::ZERO { (value - self.base) / self.slope } else { T::ZERO };
+        if RISING { self.origin + length } else { self.origin - length }
+    }
 }
 
 /// A drive, taken apart: cell number 0..N and the place in it, 0..=1.
@@ -44,130 +79,167 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
         self.node(N, 0)
     }
 
+    /// A displacement held within 0..=E(N, 0), m.
+    #[inline]
+    #[must_use]
+    pub fn within_reach(&self, displacement: T) -> T {
+        saturate(displacement, T::ZERO, self.full_displacement())
+    }
+
     /// E(`up`, `down`) in m, for 0 ≤ `down` ≤ `up` ≤ N cells.
     #[inline]
     #[must_use]
     pub fn value(&self, up: T, down: T) -> T {
-        let (u, d) = (Self::place(up), Self::place(down));
-        if u.cell == d.cell {
-            return self.node(u.cell + 1, u.cell) * (up - down);
-        }
-        let below = self.along_row(u.cell, d);
-        let above = self.along_row(u.cell + 1, d);
-        below + u.part * (above - below)
+        self.rising(down, Self::cell(up)).at::<true>(up)
     }
 
-    /// The drive above `down` at which a rise from `down` has added `gain` (m): solves E(x, `down`) = `gain`.
+    /// The branch that rises from a reversal at `down`, within `cell`, not below that of `down`: E(x, `down`).
+    #[inline(always)]
+    #[must_use]
+    pub fn rising(&self, down: T, cell: usize) -> Line<T> {
+        let d = Self::place(down);
+        if cell == d.cell {
+            return Line { cell, origin: down, base: T::ZERO, slope: self.node(cell + 1, cell) };
+        }
+        let [below, above] = self.corners(cell, d.cell);
+        let (low, high) = (between(below, d.part), between(above, d.part));
+        Line { cell, origin: T::from_i32(cell as i32), base: low, slope: high - low }
+    }
+
+    /// The branch that falls from a reversal at `up`, within `cell`, not above that of `up`: E(`up`, x).
+    #[inline(always)]
+    #[must_use]
+    pub fn falling(&self, up: T, cell: usize) -> Line<T> {
+        let u = Self::place(up);
+        if cell == u.cell {
+            return Line { cell, origin: up, base: T::ZERO, slope: self.node(cell + 1, cell) };
+        }
+        let [below, above] = self.corners(u.cell, cell);
+        let (low, high) = (between([below[0], above[0]], u.part), between([below[1], above[1]], u.part));
+        Line { cell, origin: T::from_i32(cell as i32 + 1), base: high, slope: low - high }
+    }
+
+    /// The drive above `down` at which a rise from `down` has added `gain` (m): solves E(x, `down`) = `gain`. With it the
+    /// stretch of the branch that it lies on.
     ///
     /// `least` is a drive that the solution is known not to lie below, `down` at the least: the search begins in its cell,
     /// where a tracking leg finds it. `gain` beyond what full drive gives yields N. Where the table is flat, the smallest
     /// solution not below the cell of `least`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn rise(&self, down: T, least: T, gain: T) -> T {
-        let d = Self::place(down);
-        let first = Self::place(least).cell;
-        // E at the lower node of the cell, zero where the cell is the diagonal one and holds `down` itself.
-        let mut low = first;
-        let mut at_low = if first > d.cell { self.along_row(first, d) } else { T::ZERO };
-        let mut high = first + 1;
-        let mut at_high = self.along_row(high, d);
-        if gain > at_high {
-            (low, at_low) = (high, at_high);
-            high = N;
-            at_high = self.along_row(high, d);
-            if gain >= at_high {
-                return self.full_scale();
-            }
-            // E(low, down) < gain < E(high, down) holds from here on.
-            for _ in 0..Self::SEARCH_STEPS {
-                if high - low <= 1 {
-                    break;
-                }
-                let middle = (low + high) / 2;
-                let at_middle = self.along_row(middle, d);
-                if at_middle < gain {
-                    (low, at_low) = (middle, at_middle);
-                } else {
-                    (high, at_high) = (middle, at_middle);
-                }
-            }
-        } else if low <= d.cell {
-            return Self::step_from(down, gain, self.node(high, d.cell), T::ONE);
-        }
-        Self::step_from(T::from_i32(low as i32), gain - at_low, at_high - at_low, T::ONE)
+    pub fn rise(&self, down: T, least: T, gain: T) -> (T, Line<T>) {
+        let line = self.rising(down, Self::cell(least));
+        let drive = line.solve::<true>(gain);
+        if line.slope > T::ZERO && line.holds(drive) { (drive, line) } else { self.rise_beyond(down, line, gain) }
     }
 
-    /// The drive below `up` at which a fall from `up` has taken away `loss` (m): solves E(`up`, x) = `loss`.
+    /// The same where the solution is no drive within the cell of `first`: at the end of a stretch, flat, or beyond.
+    #[cold]
+    #[inline(never)]
+    fn rise_beyond(&self, down: T, first: Line<T>, gain: T) -> (T, Line<T>) {
+        if gain - first.base <= first.slope * (T::from_i32(first.cell as i32 + 1) - first.origin) {
+            return (first.solve::<true>(gain), first);
+        }
+        let d = Self::place(down);
+        let (mut low, mut high) = (first.cell + 1, N);
+        let at_full = self.along_row(N, d);
+        if gain >= at_full || low >= N {
+            return (self.full_scale(), Line::END);
+        }
+        // The solution lies between these nodes.
+        for _ in 0..Self::SEARCH_STEPS {
+            if high - low <= 1 {
+                break;
+            }
+            let middle = (low + high) / 2;
+            if self.along_row(middle, d) < gain {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let line = self.rising(down, low);
+        (line.solve::<true>(gain), line)
+    }
+
+    /// The drive below `up` at which a fall from `up` has taken away `loss` (m): solves E(`up`, x) = `loss`. With it the
+    /// stretch of the branch that it lies on.
     ///
     /// `most` is a drive that the solution is known not to lie above, `up` at the most: the search begins in its cell.
     /// `loss` beyond what zero drive takes yields 0. Where the table is flat, the largest solution not above the cell of
     /// `most`.
-    #[inline]
+    #[inline(always)]
     #[must_use]
-    pub fn fall(&self, up: T, most: T, loss: T) -> T {
-        let u = Self::place(up);
-        let first = Self::place(most).cell;
-        let mut high = first + 1;
-        let mut at_high = if first < u.cell { self.along_column(u, high) } else { T::ZERO };
-        let mut low = first;
-        let mut at_low = self.along_column(u, low);
-        if loss > at_low {
-            (high, at_high) = (low, at_low);
-            low = 0;
-            at_low = self.along_column(u, low);
-            if loss >= at_low {
-                return T::ZERO;
-            }
-            // E(up, high) < loss < E(up, low) holds from here on.
-            for _ in 0..Self::SEARCH_STEPS {
-                if high - low <= 1 {
-                    break;
-                }
-                let middle = (low + high) / 2;
-                let at_middle = self.along_column(u, middle);
-                if at_middle < loss {
-                    (high, at_high) = (middle, at_middle);
-                } else {
-                    (low, at_low) = (middle, at_middle);
-                }
-            }
-        } else if high > u.cell {
-            return Self::step_from(up, loss, self.node(high, u.cell), -T::ONE);
-        }
-        Self::step_from(T::from_i32(high as i32), loss - at_high, at_low - at_high, -T::ONE)
+    pub fn fall(&self, up: T, most: T, loss: T) -> (T, Line<T>) {
+        let line = self.falling(up, Self::cell(most));
+        let drive = line.solve::<false>(loss);
+        if line.slope > T::ZERO && line.holds(drive) { (drive, line) } else { self.fall_beyond(up, line, loss) }
     }
 
-    /// Within a cell E is linear along a branch: `change` / `slope` cells from `start`. Where it is flat, `start`.
-    #[inline]
-    fn step_from(start: T, change: T, slope: T, direction: T) -> T {
-        if slope > T::ZERO { start + direction * (change / slope) } else { start }
+    /// The same where the solution is no drive within the cell of `first`.
+    #[cold]
+    #[inline(never)]
+    fn fall_beyond(&self, up: T, first: Line<T>, loss: T) -> (T, Line<T>) {
+        if loss - first.base <= first.slope * (first.origin - T::from_i32(first.cell as i32)) {
+            return (first.solve::<false>(loss), first);
+        }
+        let u = Self::place(up);
+        let (mut low, mut high) = (0, first.cell);
+        if loss >= self.along_column(u, 0) || high == 0 {
+            return (T::ZERO, Line::END);
+        }
+        for _ in 0..Self::SEARCH_STEPS {
+            if high - low <= 1 {
+                break;
+            }
+            let middle = (low + high) / 2;
+            if self.along_column(u, middle) < loss {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        let line = self.falling(up, low);
+        (line.solve::<false>(loss), line)
     }
 
     /// E at `up` node `row` and any `down`.
     #[inline]
     fn along_row(&self, row: usize, down: Place<T>) -> T {
-        // Neighbours in a row: one bound, for the compiler, serves both.
-        let index = row * (row + 1) / 2 + down.cell;
-        let index = if index < NODES - 1 { index } else { NODES - 2 };
-        let at_cell = self.nodes[index];
-        at_cell + down.part * (self.nodes[index + 1] - at_cell)
+        between([self.node(row, down.cell), self.node(row, down.cell + 1)], down.part)
     }
 
     /// E at any `up` and `down` node `column`.
     #[inline]
     fn along_column(&self, up: Place<T>, column: usize) -> T {
-        let at_cell = self.node(up.cell, column);
-        at_cell + up.part * (self.node(up.cell + 1, column) - at_cell)
+        between([self.node(up.cell, column), self.node(up.cell + 1, column)], up.part)
+    }
+
+    /// The nodes about a cell off the diagonal: those at its lower `up` threshold and those at its upper one, each from the
+    /// lower `down` threshold.
+    #[inline(always)]
+    fn corners(&self, up: usize, down: usize) -> [[T; 2]; 2] {
+        // Neighbours in a row: one bound, for the compiler, serves both.
+        let bounded = |index: usize| if index < NODES - 1 { index } else { NODES - 2 };
+        let low = up * (up + 1) / 2 + down;
+        let (low, high) = (bounded(low), bounded(low + up + 1));
+        [[self.nodes[low], self.nodes[low + 1]], [self.nodes[high], self.nodes[high + 1]]]
     }
 
     #[inline]
     fn place(drive: T) -> Place<T> {
+        let cell = Self::cell(drive);
+        Place { cell, part: drive - T::from_i32(cell as i32) }
+    }
+
+    /// The cell that a drive lies in, 0..N; full drive in the last.
+    #[inline]
+    pub(crate) fn cell(drive: T) -> usize {
         let whole = drive.truncate();
         let last = N as i32 - 1;
         let whole = if whole > last { last } else { whole };
         let whole = if whole < 0 { 0 } else { whole };
-        Place { cell: whole as usize, part: drive - T::from_i32(whole) }
+        whole as usize
     }
 
     #[inline]
@@ -176,4 +248,10 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
         let index = up * (up + 1) / 2 + down;
         self.nodes[if index < NODES { index } else { NODES - 1 }]
     }
+}
+
+/// Between two values, the first at `part` 0.
+#[inline(always)]
+fn between<T: Real>(values: [T; 2], part: T) -> T {
+    values[0] + part * (values[1] - values[0])
 }

@@ -7,10 +7,11 @@
 //! rising  from a minimum p_k:  f(x) = f_k + E(x, p_k)     until x ≥ p_{k−1}, which wipes p_{k−1} and p_k out
 //! falling from a maximum p_k:  f(x) = f_k − E(p_k, x)     until x ≤ p_{k−1}, likewise
 //! ```
-//! The inverse walks the same staircase by displacement, then solves one branch ([`Everett::rise`], [`Everett::fall`]).
+//! The inverse walks the same staircase by displacement, then solves one branch ([`Everett::rise`], [`Everett::fall`]). Within
+//! a cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
 
 use crate::digest::Digest;
-use crate::everett::Everett;
+use crate::everett::{Everett, Line};
 use crate::real::{Real, saturate};
 
 /// Staircase of at most `CAP` ≥ 4 extrema. Drives in cells of the Everett grid, displacements in m.
@@ -40,6 +41,16 @@ pub(crate) struct Origin<T> {
     pub(crate) start: T,
     /// Displacement there, m.
     pub(crate) at_start: T,
+}
+
+/// A branch that a drive may be on: what a look-up found, for the drive that is then applied.
+#[derive(Clone, Copy)]
+struct Branch<T> {
+    /// Index of the extremum that it starts from; `len` if it starts at the present point.
+    top: usize,
+    /// Displacement there.
+    at_start: T,
+    line: Line<T>,
 }
 
 impl<T: Real, const CAP: usize> Default for ReversalMemory<T, CAP> {
@@ -109,7 +120,8 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
                 self.len -= 2;
             }
             let top = self.len - 1;
-            self.displacement_at(top) + table.value(drive, self.extremum(top))
+            let line = table.rising(self.extremum(top), Everett::<T, N, NODES>::cell(drive));
+            self.displacement_at(top) + line.at::<true>(drive)
         } else {
             while self.len >= 4 && drive <= self.extremum(self.len - 2) {
                 self.len -= 2;
@@ -119,7 +131,8 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
                 self.len = 1;
                 T::ZERO
             } else {
-                self.displacement_at(top) - table.value(self.extremum(top), drive)
+                let line = table.falling(self.extremum(top), Everett::<T, N, NODES>::cell(drive));
+                self.displacement_at(top) - line.at::<false>(drive)
             }
         };
         self.drive = drive;
@@ -133,35 +146,111 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     #[inline]
     #[must_use]
     pub fn solve<const N: usize, const NODES: usize>(&self, table: &Everett<T, N, NODES>, displacement: T) -> T {
-        let wanted = saturate(displacement, T::ZERO, table.full_displacement());
+        let wanted = table.within_reach(displacement);
         if wanted == self.displacement {
             return self.drive;
         }
-        let rising = wanted > self.displacement;
-        // The branch starts at the last extremum if the direction stays, else where the drive is now; `next` is the
+        if wanted > self.displacement {
+            self.find::<true, N, NODES>(table, wanted).0
+        } else {
+            self.find::<false, N, NODES>(table, wanted).0
+        }
+    }
+
+    /// Γ⁻¹ and Γ in one: solves for `displacement`, which must be within the reach of the table, and applies the drive that
+    /// `permitted` makes of the solution (finite). `permitted` is called once.
+    ///
+    /// The same to the bit as [`ReversalMemory::solve`] and [`ReversalMemory::apply`]. A drive that is permitted differs from
+    /// the solution by a fraction of a cell: mostly it lies on the stretch of the branch that the solution was found on, and
+    /// then nothing is looked up twice.
+    #[inline]
+    pub fn follow<const N: usize, const NODES: usize>(
+        &mut self,
+        table: &Everett<T, N, NODES>,
+        displacement: T,
+        permitted: impl FnOnce(T) -> T,
+    ) {
+        let drive = if displacement > self.displacement {
+            let (solution, branch) = self.find::<true, N, NODES>(table, displacement);
+            let drive = permitted(solution);
+            if self.take::<true>(&branch, drive) {
+                return;
+            }
+            drive
+        } else if displacement < self.displacement {
+            let (solution, branch) = self.find::<false, N, NODES>(table, displacement);
+            let drive = permitted(solution);
+            if self.take::<false>(&branch, drive) {
+                return;
+            }
+            drive
+        } else {
+            permitted(self.drive)
+        };
+        self.apply(table, drive);
+    }
+
+    /// Applies a drive if it lies on the stretch of a branch that [`ReversalMemory::find`] gave, and wipes nothing out;
+    /// returns whether it does.
+    #[inline(always)]
+    fn take<const RISING: bool>(&mut self, branch: &Branch<T>, drive: T) -> bool {
+        let Branch { top, at_start, line } = *branch;
+        let onward = if RISING { drive > self.drive } else { drive < self.drive };
+        // Full, a new extremum may cost another.
+        if !onward || !line.holds(drive) || top + 1 < self.len || self.len >= CAP {
+            return drive == self.drive;
+        }
+        // Falling from the first maximum ends at p₀, which wipes everything out.
+        if top >= if RISING { 2 } else { 1 } {
+            let bound = self.extremum(top - 1);
+            if if RISING { drive >= bound } else { drive <= bound } {
+                return false;
+            }
+        }
+        if top == self.len {
+            let k = if top < CAP { top } else { CAP - 1 };
+            self.extrema[k] = self.drive;
+            self.displacements[k] = self.displacement;
+            self.len = top + 1;
+        }
+        self.drive = drive;
+        let moved = line.at::<RISING>(drive);
+        self.displacement = if RISING { at_start + moved } else { at_start - moved };
+        true
+    }
+
+    /// The drive for a displacement above the present one, or below it, and the branch that leads there.
+    #[inline(always)]
+    fn find<const RISING: bool, const N: usize, const NODES: usize>(
+        &self,
+        table: &Everett<T, N, NODES>,
+        wanted: T,
+    ) -> (T, Branch<T>) {
+        // The branch starts at the last extremum if the direction stays, else where the drive is now; `top` is the
         // number of extrema below that start.
-        let (mut start, mut at_start, mut next) = if rising == self.is_rising() {
+        let (mut start, mut at_start, mut top) = if RISING == self.is_rising() {
             let top = self.len - 1;
             (self.extremum(top), self.displacement_at(top), top)
         } else {
             (self.drive, self.displacement, self.len)
         };
         // Walk outwards: each pair whose inner loop the wanted displacement leaves is (would be) wiped out.
-        while next >= 2 {
-            let bound = self.displacement_at(next - 1);
-            let leaves = if rising { wanted >= bound } else { wanted <= bound };
+        while top >= 2 {
+            let bound = self.displacement_at(top - 1);
+            let leaves = if RISING { wanted >= bound } else { wanted <= bound };
             if !leaves {
                 break;
             }
-            next -= 2;
-            start = self.extremum(next);
-            at_start = self.displacement_at(next);
+            top -= 2;
+            start = self.extremum(top);
+            at_start = self.displacement_at(top);
         }
-        if rising {
+        let (drive, line) = if RISING {
             table.rise(start, self.drive, wanted - at_start)
         } else {
             table.fall(start, self.drive, at_start - wanted)
-        }
+        };
+        (drive, Branch { top, at_start, line })
     }
 
     /// Where the branch starts that [`ReversalMemory::apply`] of `drive` would end on. Does not change the memory.

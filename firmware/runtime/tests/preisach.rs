@@ -263,3 +263,52 @@ fn one_ulp_in_one_node_changes_the_digest() {
     }
     assert_ne!(digest(&a), digest(&b));
 }
+
+/// [`ReversalMemory::follow`] against its two halves, bit by bit: smooth motion, noise about a reversal, jumps, the ends of
+/// the table and its nodes, through a converter that rounds and limits the step.
+fn follows_as_its_halves_do<const CAP: usize>(table: &Table, seed: u64, tick_of_jumps: u32) -> u32 {
+    let mut random = Random(seed);
+    let (mut whole, mut halves) = (ReversalMemory::<f64, CAP>::new(), ReversalMemory::<f64, CAP>::new());
+    let mut code = 0.0_f64;
+    for tick in 0..40_000_u32 {
+        let full = table.full_displacement();
+        let reach = match tick % tick_of_jumps {
+            0 => full * random.unit(),
+            1 if tick % 3 == 0 => full * random.below(2) as f64,
+            2..=40 => whole.displacement() + 2e-9 * (random.unit() - 0.5),
+            41..=60 => table.value(random.below(N + 1) as f64, 0.0),
+            _ => whole.displacement() + 3e-7 * (random.unit() - 0.5) + 1e-7 * (f64::from(tick) * 0.003).sin(),
+        };
+        let displacement = table.within_reach(reach);
+        let (codes, step) = if tick % 1000 < 900 { (2048.0, 200.0) } else { (1.0, 1.0) };
+        let permitted = |drive: f64| {
+            ((drive * codes).round().clamp(code * codes - step, code * codes + step) / codes).clamp(0.0, 32.0)
+        };
+        let drive = permitted(halves.solve(table, displacement));
+        halves.apply(table, drive);
+        whole.follow(table, displacement, permitted);
+        code = drive;
+        assert_eq!(digest(&whole), digest(&halves), "capacity {CAP}, seed {seed}, tick {tick}");
+    }
+    whole.dropped()
+}
+
+#[test]
+fn following_is_solving_and_applying_to_the_bit() {
+    for seed in 0..4 {
+        let full = table(&random_weights(seed, N));
+        assert_eq!(follows_as_its_halves_do::<64>(&full, seed, 400), 0);
+        let dropped = follows_as_its_halves_do::<4>(&full, seed, 37) + follows_as_its_halves_do::<6>(&full, seed, 4000);
+        assert!(dropped > 100, "{dropped}");
+    }
+    // A table with flat cells, and one without any displacement.
+    let mut weights = random_weights(7, N);
+    for row in weights.iter_mut().step_by(2) {
+        row.fill(0.0);
+    }
+    follows_as_its_halves_do::<64>(&table(&weights), 11, 400);
+    for row in &mut weights {
+        row.fill(0.0);
+    }
+    follows_as_its_halves_do::<64>(&table(&weights), 12, 400);
+}

@@ -17,7 +17,7 @@ pub fn emit() -> TokenStream {
         use crate::hysteresis::TABLES;
         use crate::limits::DAC;
         use crate::setpoint::PLAN;
-        use crate::step::{actuate, feedback, known_load, learn};
+        use crate::step::{actuate, correction, known_load, learn};
         use crate::task_space::{modal_error, notch_error};
         use crate::{Config, LEGS, Real, State, TickInput};
 
@@ -41,9 +41,9 @@ pub fn emit() -> TokenStream {
             crate::step::sense(config, state, &input.gauge);
             state.generator.tick(&PLAN, &input.command);
             let load = known_load(config, state);
-            let feedback = feedback(config, state);
+            let correction = correction(config, state);
             for (index, leg) in state.legs.iter_mut().enumerate() {
-                leg.excess = load.displacement[index] + feedback[index] - leg.estimate.correction();
+                leg.excess = load.displacement[index] + correction[index];
             }
         }
 

@@ -19,8 +19,6 @@ pub fn emit() -> TokenStream {
         pub struct LegState {
             /// Reversal memory of the drive that was really applied.
             pub memory: Memory,
-            /// δ̂ and φ̂, m.
-            pub estimate: Estimate<Real>,
             /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.
             pub requested: Real,
             /// Part of the last request that a limit withheld, m; zero for a leg that was free.
@@ -44,12 +42,14 @@ pub fn emit() -> TokenStream {
             pub error: [Real; 6],
             /// Notch on the pose error.
             pub error_notch: NotchState<Real>,
-            /// Notch on the innovations of the legs.
+            /// Notch on the innovation.
             pub innovation_notch: NotchState<Real>,
             /// k_I ∫e.
             pub integral: Integral<Real>,
-            /// F: generalised force of the feedback over the interval now running, N and N m.
-            pub force: [Real; 6],
+            /// δ̂ and φ̂ of each mode.
+            pub estimates: [Estimate<Real>; 6],
+            /// K⁻¹F in modal coordinates: what the feedback takes the platform to deflect by, over the interval now running.
+            pub deflection: [Real; 6],
             /// Δl(h_d) of the interval now running, m.
             pub demand: [Real; LEGS],
             /// p: deflection of each leg under the known load of the interval now running, m.
@@ -80,7 +80,6 @@ pub fn emit() -> TokenStream {
             pub const fn new() -> Self {
                 let leg = LegState {
                     memory: Memory::new(),
-                    estimate: Estimate::new(),
                     requested: 0.0,
                     excess: 0.0,
                     code: limits::CODES[0],
@@ -94,7 +93,8 @@ pub fn emit() -> TokenStream {
                     error_notch: NotchState::new(),
                     innovation_notch: NotchState::new(),
                     integral: Integral::new(),
-                    force: [0.0; 6],
+                    estimates: [Estimate::new(); 6],
+                    deflection: [0.0; 6],
                     demand: [0.0; LEGS],
                     load: [0.0; LEGS],
                     limited: false,
@@ -112,14 +112,16 @@ pub fn emit() -> TokenStream {
                 let mut digest = Digest::new();
                 for leg in &self.legs {
                     leg.memory.digest(&mut digest);
-                    leg.estimate.digest(&mut digest);
                     digest.real(leg.requested);
                     digest.real(leg.excess);
                     digest.word(leg.code as u32 as u64);
                 }
+                for estimate in &self.estimates {
+                    estimate.digest(&mut digest);
+                }
                 let Environment { stiffness, rest } = &self.environment;
                 let vectors =
-                    [&self.pose, &self.error, &self.force, &self.demand, &self.load, &self.wrench, stiffness, rest];
+                    [&self.pose, &self.error, &self.deflection, &self.demand, &self.load, &self.wrench, stiffness, rest];
                 for vector in vectors {
                     for value in vector {
                         digest.real(*value);

@@ -27,9 +27,18 @@ pub fn emit(ir: &Ir) -> TokenStream {
         ),
         _ => (quote! {}, quote! {}, quote! {}),
     };
-    let out_of_reach = match &ir.hysteresis.rate {
-        None => quote! { !(request >= Real::ZERO && request <= table.full_displacement()) },
-        Some(_) => quote! { !leg.memory.reaches(table, request) },
+    let follow = match &ir.hysteresis.rate {
+        None => quote! {
+            let within = table.within_reach(request);
+            memory.follow(table, within, &mut permitted);
+            limited |= within != request;
+        },
+        Some(_) => quote! {
+            let within = memory.reaches(table, request);
+            let drive = permitted(memory.solve(table, request));
+            memory.apply(table, drive);
+            limited |= !within;
+        },
     };
     quote! {
         #![doc = " One control tick."]
@@ -40,7 +49,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " ```text"]
         #![doc = " sense      gauges → h                                                      pose from rest"]
         #![doc = " learn      e = N(h_d(t_n) − h) ;  s ← s + T k_I e                          (7), held where it would wind up"]
-        #![doc = "            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6)"]
+        #![doc = "            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6), in modal coordinates"]
         #![doc = " setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}"]
         #![doc = " load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)"]
         #![doc = "            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T                  damping, lead"]
@@ -53,19 +62,23 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large numbers"]
         #![doc = " are subtracted, and f is small in modal coordinates, too. What is left out is the error times the change of J over the"]
         #![doc = " workspace, a thousandth of it, and the rounding of the converter on a leg that is free."]
+        #![doc = ""]
+        #![doc = " δ̂ and φ̂ are kept in modal coordinates, where N works: with the same weights on every leg the law commutes with the map"]
+        #![doc = " between them, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂)."]
 
         use specgen_runtime::feedback::{force_of, winds_up};
         use specgen_runtime::linear::{difference, each, transform};
         use specgen_runtime::setpoint::Command;
-        use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState, Real as _};
+        use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState};
 
         use crate::dynamics::Load;
         use crate::hysteresis::{TABLES, Table};
         use crate::limits::DAC;
         use crate::setpoint::PLAN;
         use crate::task_space::{
-            COMPLIANCE, #lead_import PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
-            linear_displacement, linear_drive, modal_error, notch_error, notch_innovation,
+            COMPLIANCE, FORCE_TO_MODES, #lead_import LEGS_TO_MODES, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP,
+            TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS, linear_displacement, linear_drive, modal_error, notch_error,
+            notch_innovation,
         };
         use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
 
@@ -116,22 +129,21 @@ pub fn emit(ir: &Ir) -> TokenStream {
             let damping = damping(config, state);
             let setpoint_status = state.generator.tick(&PLAN, &input.command);
             let Load { displacement: demand, force } = known_load(config, state);
-            let feedback = feedback(config, state);
+            let correction = correction(config, state);
             state.load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE #lead);
             state.demand = demand;
             if let Some(damping) = &damping {
                 state.load = each(|leg| state.load[leg] + damping[leg]);
             }
-            let correction = |leg: usize| state.legs[leg].estimate.correction();
-            let mut request = each(|leg| demand[leg] + state.load[leg] + feedback[leg] - correction(leg));
+            let mut request = each(|leg| demand[leg] + state.load[leg] + correction[leg]);
             if entered {
                 let held = each(|leg| state.legs[leg].requested - request[leg]);
                 if config.mode().law() == Law::Invhys {
                     state.transfer.begin(held);
                 } else {
                     // What the estimates would come to, at once: an offset that fades would be learned against.
-                    for (leg, held) in state.legs.iter_mut().zip(held) {
-                        leg.estimate.level -= held;
+                    for (estimate, held) in state.estimates.iter_mut().zip(transform(&LEGS_TO_MODES, &held)) {
+                        estimate.level -= held;
                     }
                     state.transfer.begin([0.0; LEGS]);
                     request = each(|leg| state.legs[leg].requested);
@@ -139,9 +151,13 @@ pub fn emit(ir: &Ir) -> TokenStream {
             } else {
                 state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
             }
+            if state.transfer.is_active() {
+                let offset = state.transfer.offset();
+                request = each(|leg| request[leg] + offset[leg]);
+            }
             let mut limited = 0;
             for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
-                let held_back = actuate(config, leg, table, request[index] + state.transfer.offset()[index]);
+                let held_back = actuate(config, leg, table, request[index]);
                 limited |= (held_back as u32) << index;
             }
             state.limited = limited != 0;
@@ -171,17 +187,19 @@ pub fn emit(ir: &Ir) -> TokenStream {
             if mode.law() != Law::Invhys && !adapted {
                 // Its correction passes to the estimates, and what it pushed under the mode before is no innovation of theirs.
                 state.integral = Integral::new();
-                state.force = [0.0; 6];
+                state.deflection = [0.0; 6];
             }
             state.mode = Some(mode);
             state.interaction = interaction;
             state.environment = *config.environment();
-            for leg in &mut state.legs {
+            for estimate in &mut state.estimates {
                 match mode.law() {
-                    Law::Invhys => leg.estimate = Estimate::new(),
-                    Law::Ewma => leg.estimate.drift = 0.0,
+                    Law::Invhys => *estimate = Estimate::new(),
+                    Law::Ewma => estimate.drift = 0.0,
                     Law::Pcc => {}
                 }
+            }
+            for leg in &mut state.legs {
                 leg.requested = requested(mode, leg);
                 leg.excess = 0.0;
             }
@@ -193,7 +211,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
                 state.integral = Integral::new();
                 state.error_notch = NotchState::new();
                 state.error = [0.0; 6];
-                state.force = [0.0; 6];
+                state.deflection = [0.0; 6];
             }
             true
         }
@@ -229,13 +247,16 @@ pub fn emit(ir: &Ir) -> TokenStream {
             }
             if mode.law() != Law::Invhys {
                 let disturbed = state.limited || state.transfer.is_active();
-                let offset = state.transfer.offset();
-                let withheld = disturbed.then(|| each(|leg| state.legs[leg].excess - offset[leg]));
-                let innovation =
-                    notch_innovation(&mut state.innovation_notch, &error, &state.force, withheld.as_ref());
-                for (leg, innovation) in state.legs.iter_mut().zip(innovation) {
-                    leg.estimate.correct(mode.law(), config.level_weight(), config.drift_weight(), innovation);
+                let mut innovation = each(|mode| -error[mode] - state.deflection[mode]);
+                if disturbed {
+                    let offset = state.transfer.offset();
+                    let withheld = each(|leg| state.legs[leg].excess - offset[leg]);
+                    let withheld = transform(&LEGS_TO_MODES, &withheld);
+                    innovation = each(|mode| innovation[mode] + withheld[mode]);
                 }
+                let innovation = notch_innovation(&mut state.innovation_notch, &innovation);
+                let (level, drift) = (config.level_weight(), config.drift_weight());
+                Estimate::correct(&mut state.estimates, mode.law(), level, drift, &innovation);
             }
         }
 
@@ -284,34 +305,39 @@ pub fn emit(ir: &Ir) -> TokenStream {
             }
         }
 
-        /// J⁻ᵀ(k_p e + s)/k_a: m of each leg.
+        /// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂: m of each leg.
         #[inline]
-        pub(crate) fn feedback(config: &Config, state: &mut State) -> [Real; LEGS] {
-            if !config.mode().feeds_back() {
-                return [0.0; LEGS];
+        pub(crate) fn correction(config: &Config, state: &mut State) -> [Real; LEGS] {
+            if config.mode().feeds_back() {
+                let proportional = force_of(&config.active_gains().proportional, &state.error);
+                let integral = &state.integral.force;
+                let force = each(|axis| proportional[axis] + integral[axis]);
+                state.deflection = transform(&FORCE_TO_MODES, &force);
             }
-            let proportional = force_of(&config.active_gains().proportional, &state.error);
-            let integral = &state.integral.force;
-            state.force = each(|axis| proportional[axis] + integral[axis]);
-            transform(&WRENCH_TO_LEGS, &state.force)
+            let wanted = each(|mode| state.deflection[mode] - state.estimates[mode].correction());
+            transform(&MODES_TO_LEGS, &wanted)
         }
 
         /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,
         /// voltage or slew rate held the leg back.
         #[inline]
         pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
-            let mode = config.mode();
-            let (drive, out_of_reach) = if mode.inverts() {
-                let out_of_reach = #out_of_reach;
-                (leg.memory.solve(table, request), out_of_reach)
-            } else {
-                (linear_drive(request), false)
+            let LegState { memory, code, .. } = leg;
+            let mut limited = false;
+            let mut permitted = |drive: Real| {
+                let (permitted, held_back) = DAC.code(drive, *code, config.code_limits());
+                *code = permitted;
+                limited |= held_back;
+                DAC.drive(permitted)
             };
-            let (code, held_back) = DAC.code(drive, leg.code, config.code_limits());
-            leg.code = code;
-            leg.memory.apply(table, DAC.drive(code));
-            leg.requested = requested(mode, leg);
-            let limited = out_of_reach || held_back;
+            if config.mode().inverts() {
+                #follow
+                leg.requested = leg.memory.displacement();
+            } else {
+                let drive = permitted(linear_drive(request));
+                memory.apply(table, drive);
+                leg.requested = linear_displacement(drive);
+            }
             leg.excess = if limited { request - leg.requested } else { 0.0 };
             limited
         }

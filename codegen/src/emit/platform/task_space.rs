@@ -15,7 +15,8 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     };
     let law = &task.law;
     let (period, compliance) = (real(law.period), real(law.compliance));
-    let wrench_to_legs = matrix(&law.wrench_to_legs);
+    let (wrench_to_legs, force_to_modes) = (matrix(&law.wrench_to_legs), matrix(&law.force_to_modes));
+    let (legs_to_modes, modes_to_legs) = (matrix(&law.legs_to_modes), matrix(&law.modes_to_legs));
     let (rest_force, wrench_limit) = (six(&law.rest_force), six(&law.wrench_limit));
     let (keep, negligible) = (real(law.transfer_keep), real(law.transfer_negligible));
     let (cells_per_metre, metres_per_cell) = (real(law.cells_per_metre), real(law.metres_per_cell));
@@ -27,14 +28,21 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         }
     });
     let notch = match &law.notch {
-        None => without_notch(&matrix(&law.jacobian)),
+        None => without_notch(),
         Some(notch) => with_notch(ir, notch, &matrix),
+    };
+    let imports = if law.notch.is_some() {
+        quote! {
+            use specgen_runtime::linear::transform;
+            use specgen_runtime::{NotchState, Section};
+        }
+    } else {
+        quote! { use specgen_runtime::NotchState; }
     };
     quote! {
         #![doc = " Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics."]
 
-        use specgen_runtime::NotchState;
-        use specgen_runtime::linear::{each, transform};
+        #imports
 
         use crate::{LEGS, Real};
 
@@ -44,6 +52,12 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const COMPLIANCE: Real = #compliance;
         /// J⁻ᵀ/k_a at rest: generalised force on the platform to the displacement of each leg that it takes, m/N and 1/N.
         pub const WRENCH_TO_LEGS: [[Real; 6]; LEGS] = #wrench_to_legs;
+        /// V⁻¹ K⁻¹ with K = Jᵀ k_a J: generalised force to the deflection it makes, in modal coordinates.
+        pub const FORCE_TO_MODES: [[Real; 6]; 6] = #force_to_modes;
+        /// V⁻¹ J⁻¹: leg displacements to modal coordinates.
+        pub const LEGS_TO_MODES: [[Real; 6]; 6] = #legs_to_modes;
+        /// J V: the modes as leg displacements.
+        pub const MODES_TO_LEGS: [[Real; 6]; LEGS] = #modes_to_legs;
         /// Leg forces under which the gauges were zeroed: gravity at rest, N.
         pub const REST_FORCE: [Real; LEGS] = [#rest_force];
         /// Largest |component| of the measured wrench that is believed, N and N m; from `control.interaction`.
@@ -72,12 +86,10 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     }
 }
 
-fn without_notch(jacobian: &TokenStream) -> TokenStream {
+/// Coordinates of the pose stand for the modal ones: V is the identity.
+fn without_notch() -> TokenStream {
     quote! {
-        /// J at rest: pose to leg displacements, m/m and m/rad; from the dynamics.
-        pub const JACOBIAN: [[Real; 6]; LEGS] = #jacobian;
-
-        /// The error as it is: the spec declares no notch.
+        /// The error as it is: the spec declares no notch, and its modal coordinates are those of the pose.
         #[inline]
         #[must_use]
         pub fn modal_error(error: &[Real; 6]) -> [Real; 6] {
@@ -91,18 +103,11 @@ fn without_notch(jacobian: &TokenStream) -> TokenStream {
             *error
         }
 
-        /// `withheld` − J⁻ᵀF/k_a − J e of each leg, m: the spec declares no notch.
+        /// The innovation as it is: the spec declares no notch.
         #[inline]
         #[must_use]
-        pub fn notch_innovation(
-            _notch: &mut NotchState<Real>,
-            error: &[Real; 6],
-            force: &[Real; 6],
-            withheld: Option<&[Real; LEGS]>,
-        ) -> [Real; LEGS] {
-            let (moved, pushed) = (transform(&JACOBIAN, error), transform(&WRENCH_TO_LEGS, force));
-            let innovation = each(|leg| -moved[leg] - pushed[leg]);
-            withheld.map_or(innovation, |withheld| each(|leg| innovation[leg] + withheld[leg]))
+        pub fn notch_innovation(_notch: &mut NotchState<Real>, innovation: &[Real; 6]) -> [Real; 6] {
+            *innovation
         }
     }
 }
@@ -113,23 +118,13 @@ fn with_notch(ir: &Ir, notch: &Notch, matrix: &dyn Fn(&[[f64; 6]; 6]) -> TokenSt
         quote! { Section { depth: #depth, a: [#a] } }
     });
     let (pose_to_modes, modes_to_pose) = (matrix(&notch.pose_to_modes), matrix(&notch.modes_to_pose));
-    let force_to_modes = matrix(&notch.force_to_modes);
-    let (legs_to_modes, modes_to_legs) = (matrix(&notch.legs_to_modes), matrix(&notch.modes_to_legs));
     quote! {
-        use specgen_runtime::Section;
-
         /// Notch of each mode; from `control.notch_damping`.
         pub const NOTCH: [Section<Real>; 6] = [#(#sections),*];
         /// V⁻¹: pose to modal coordinates.
         pub const POSE_TO_MODES: [[Real; 6]; 6] = #pose_to_modes;
         /// V: the modes as poses.
         pub const MODES_TO_POSE: [[Real; 6]; 6] = #modes_to_pose;
-        /// V⁻¹ K⁻¹ with K = Jᵀ k_a J: generalised force to the deflection it makes, in modal coordinates.
-        pub const FORCE_TO_MODES: [[Real; 6]; 6] = #force_to_modes;
-        /// V⁻¹ J⁻¹: leg displacements to modal coordinates.
-        pub const LEGS_TO_MODES: [[Real; 6]; 6] = #legs_to_modes;
-        /// J V: the modes as leg displacements.
-        pub const MODES_TO_LEGS: [[Real; 6]; 6] = #modes_to_legs;
 
         /// V⁻¹ e: the pose error in modal coordinates.
         #[inline]
@@ -145,22 +140,11 @@ fn with_notch(ir: &Ir, notch: &Notch, matrix: &dyn Fn(&[[f64; 6]; 6]) -> TokenSt
             transform(&MODES_TO_POSE, &notch.filter(&NOTCH, modal_error))
         }
 
-        /// N(`withheld` − J⁻ᵀF/k_a − J e) of each leg, m, for a modal error.
+        /// N of an innovation in modal coordinates.
         #[inline]
         #[must_use]
-        pub fn notch_innovation(
-            notch: &mut NotchState<Real>,
-            modal_error: &[Real; 6],
-            force: &[Real; 6],
-            withheld: Option<&[Real; LEGS]>,
-        ) -> [Real; LEGS] {
-            let pushed = transform(&FORCE_TO_MODES, force);
-            let mut innovation = each(|mode| -modal_error[mode] - pushed[mode]);
-            if let Some(withheld) = withheld {
-                let withheld = transform(&LEGS_TO_MODES, withheld);
-                innovation = each(|mode| innovation[mode] + withheld[mode]);
-            }
-            transform(&MODES_TO_LEGS, &notch.filter(&NOTCH, &innovation))
+        pub fn notch_innovation(notch: &mut NotchState<Real>, innovation: &[Real; 6]) -> [Real; 6] {
+            notch.filter(&NOTCH, innovation)
         }
     }
 }

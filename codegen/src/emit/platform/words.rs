@@ -36,10 +36,12 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         #![doc = " Inputs, outputs and settings as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target"]
         #![doc = " reads and writes these, so that two of them can be compared bit for bit."]
 
+        use specgen_runtime::linear::{each, transform};
         use specgen_runtime::setpoint::{Command, CommandKind, Target};
         use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Real as _};
 
         use crate::config::Environment;
+        use crate::task_space::MODES_TO_LEGS;
         use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput};
 
         /// Words of a tick's input.
@@ -82,17 +84,20 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
             }
         }
 
-        /// Words in the order of [`OUTPUT_NAMES`], of a tick and of the state that it left.
+        /// Words in the order of [`OUTPUT_NAMES`], of a tick and of the state that it left. `level` and `drift` are δ̂ and φ̂ as
+        /// displacements of the legs.
         #[must_use]
         pub fn output_words(output: &TickOutput, state: &State) -> [u64; OUTPUT_WORDS] {
             let mut words = [0; OUTPUT_WORDS];
             let target = state.generator.target();
+            let level = transform(&MODES_TO_LEGS, &each(|mode| state.estimates[mode].level));
+            let drift = transform(&MODES_TO_LEGS, &each(|mode| state.estimates[mode].drift));
             for (index, leg) in state.legs.iter().enumerate() {
                 words[index] = output.voltage[index].to_word();
                 words[LEGS + index] = leg.requested.to_word();
                 words[2 * LEGS + index] = state.demand[index].to_word();
-                words[3 * LEGS + index] = leg.estimate.level.to_word();
-                words[4 * LEGS + index] = leg.estimate.drift.to_word();
+                words[3 * LEGS + index] = level[index].to_word();
+                words[4 * LEGS + index] = drift[index].to_word();
                 words[5 * LEGS + index] = output.dac_code[index] as u32 as u64;
                 words[6 * LEGS + index] = state.pose[index].to_word();
                 words[7 * LEGS + index] = target.pose[index].to_word();
