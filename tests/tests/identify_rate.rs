@@ -127,11 +127,11 @@ fn creep_and_dead_time_that_made_the_records_come_back() {
     assert_eq!(*option, RateOption::Creep);
     assert!((model.dead_time - 3e-4).abs() < 4e-5, "{}", model.dead_time);
     let creep: f64 = model.creep.iter().map(|term| term.weight).sum();
-    assert!((creep - 0.06).abs() < 0.01, "{:?}", model.creep);
+    assert!((creep - 0.06).abs() < 0.02, "{:?}", model.creep);
     assert!(found.report.verdict.beats_static.contains(&RateOption::Creep));
     assert_eq!(found.report.verdict.best, RateOption::Creep);
     let creep = &found.report.options[3];
-    assert!(creep.left_out.iter().all(|error| *error < 0.15), "{:?}", creep.left_out);
+    assert!(creep.left_out.iter().all(|error| *error < 0.2), "{:?}", creep.left_out);
 }
 
 #[test]

@@ -45,10 +45,15 @@ pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Re
                 for (weight, x) in linear.weights.iter().zip(&signals[1..]) {
                     target.iter_mut().zip(x).for_each(|(y, x)| *y -= weight * x);
                 }
+                // With the line taken out, and one offset for the record: what moves between the branches is creep.
+                let time = &p.record.time[p.first..];
+                let rest: Vec<f64> = target.iter().zip(&signals[0]).map(|(y, f)| y - linear.scale * f).collect();
+                let line = Line::fit(time, &rest);
+                target.iter_mut().zip(time).for_each(|(y, t)| *y -= line.at(*t));
                 target
             })
             .collect();
-        model.still = fit::table(plane, records, &targets)?;
+        model.still = fit::table_of_whole(plane, records, &targets)?;
         let terms = times.iter().zip(&linear.weights);
         model.creep = kept(terms.map(|(tau, w)| CreepTerm { time_constant: *tau, weight: w / linear.scale }).collect());
     }

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 
 use super::prepare::Prepared;
 use crate::everett::EverettTable;
+use crate::identify::branches::Branch;
 use crate::identify::normal::each_row;
 use crate::identify::regressor::{Plane, Term};
 
@@ -33,11 +34,21 @@ impl Normal {
 /// Over the branches of `p`. `targets` are over its used part (m). `rate_unit`: also the second table, with rates in this
 /// unit (V/s).
 pub(super) fn accumulate(plane: &Plane, p: &Prepared, targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
+    over(plane, p, &p.branches, targets, rate_unit)
+}
+
+/// Over the used part of `p` as a whole: one offset for all of it.
+pub(super) fn accumulate_whole(plane: &Plane, p: &Prepared, target: &[f64]) -> Normal {
+    let whole = Branch { first: p.first, end: p.record.time.len(), rising: true };
+    over(plane, p, &[whole], &[target.to_vec()], None)
+}
+
+fn over(plane: &Plane, p: &Prepared, branches: &[Branch], targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
     let nodes = plane.nodes();
     let unknowns = if rate_unit.is_some() { 2 * nodes } else { nodes };
     let mut sums = Sums::new(unknowns, targets.len());
     let mut full = Vec::new();
-    let mut pending = p.branches.iter().peekable();
+    let mut pending = branches.iter().peekable();
     each_row(plane, &p.record.drive, p.first, |k, row| {
         full.clear();
         full.extend_from_slice(row);
