@@ -29,7 +29,7 @@ use ui::{Failure, Ui};
     after_help = "Examples:\n  specgen platform.toml -o controller    compile, write a workspace, build and measure it\n  \
                   specgen check platform.toml            every finding, nothing written\n  \
                   specgen sim platform.toml              the paper's experiments with the emitted controller\n  \
-                  specgen identify record.csv --drive -90:90 --grid 32\n\n\
+                  specgen identify record.csv --drive -90:90\n  specgen identify linear 0.1hz.csv 1hz.csv 10hz.csv\n\n\
                   Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment."
 )]
 struct Cli {
@@ -57,7 +57,7 @@ enum Command {
     Sim(sim::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
-    /// Identify the Everett table of a leg from a reversal-curve record.
+    /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
     Identify(identify::Arguments),
     /// Simulate the reversal-curve experiment that `identify` needs, on the reference leg or another.
     Forc(sim::ForcArguments),

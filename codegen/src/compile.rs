@@ -101,7 +101,7 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
 }
 
 /// Legs with their own gauges adapt each on its own; a controller in task space closes its loops over the platform's modes.
-fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<Design>), Vec<Diagnostic>> {
+pub(crate) fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<Design>), Vec<Diagnostic>> {
     match &model.task_space {
         None => stability::check(model).map(|margins| (Some(margins), None)),
         Some(task) => {

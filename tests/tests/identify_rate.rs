@@ -127,7 +127,7 @@ fn creep_and_dead_time_that_made_the_records_come_back() {
     assert_eq!(*option, RateOption::Creep);
     assert!((model.dead_time - 3e-4).abs() < 4e-5, "{}", model.dead_time);
     let creep: f64 = model.creep.iter().map(|term| term.weight).sum();
-    assert!((creep - 0.06).abs() < 0.02, "{:?}", model.creep);
+    assert!((creep - 0.06).abs() < 0.05, "{:?}", model.creep);
     assert!(found.report.verdict.beats_static.contains(&RateOption::Creep));
     assert_eq!(found.report.verdict.best, RateOption::Creep);
     let creep = &found.report.options[3];

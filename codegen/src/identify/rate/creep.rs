@@ -2,7 +2,10 @@
 //!
 //! With the table fixed, f and its creep states are known signals; scale of f, weights (≥ 0) and a change of the dead time
 //! follow from one small least-squares problem, in which each record has an offset and a line of its own:
-//! y(t + τ) = s f + Σ w_j x_j − δτ ḟ. With those fixed, the table is fitted to y(t + τ) − Σ w_j x_j.
+//! y(t + τ) = s f + Σ w_j x_j − δτ ḟ. With those fixed, the table is fitted to y(t + τ) − Σ w_j x_j, with a free offset for each
+//! branch. One offset for a record would be the same least squares in both steps and finds the weights of a leg that creeps
+//! linearly; on one that does not (the reference leg's creep has thresholds) it trades table for creep without bound and
+//! was far worse in the controller.
 
 use nalgebra::DMatrix;
 
@@ -45,15 +48,10 @@ pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Re
                 for (weight, x) in linear.weights.iter().zip(&signals[1..]) {
                     target.iter_mut().zip(x).for_each(|(y, x)| *y -= weight * x);
                 }
-                // With the line taken out, and one offset for the record: what moves between the branches is creep.
-                let time = &p.record.time[p.first..];
-                let rest: Vec<f64> = target.iter().zip(&signals[0]).map(|(y, f)| y - linear.scale * f).collect();
-                let line = Line::fit(time, &rest);
-                target.iter_mut().zip(time).for_each(|(y, t)| *y -= line.at(*t));
                 target
             })
             .collect();
-        model.still = fit::table_of_whole(plane, records, &targets)?;
+        model.still = fit::table(plane, records, &targets)?;
         let terms = times.iter().zip(&linear.weights);
         model.creep = kept(terms.map(|(tau, w)| CreepTerm { time_constant: *tau, weight: w / linear.scale }).collect());
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DVector};
 
-use super::normal::{Normal, accumulate, accumulate_whole};
+use super::normal::{Normal, accumulate};
 use super::prepare::Prepared;
 use super::{RateModel, creep, mixed};
 use crate::everett::EverettTable;
@@ -51,21 +51,7 @@ pub(super) fn sum(plane: &Plane, records: &[&Prepared], targets: &[Vec<f64>]) ->
 
 /// The table that fits `targets` (m, one for each record) best.
 pub(super) fn table(plane: &Plane, records: &[&Prepared], targets: &[Vec<f64>]) -> Result<EverettTable, Failure> {
-    solved(plane, sum(plane, records, targets))
-}
-
-/// The same with one offset for each record instead of one for each branch.
-pub(super) fn table_of_whole(
-    plane: &Plane,
-    records: &[&Prepared],
-    targets: &[Vec<f64>],
-) -> Result<EverettTable, Failure> {
-    let each = records.iter().zip(targets).map(|(p, y)| accumulate_whole(plane, p, y));
-    solved(plane, each.reduce(|sum, more| sum.add(&more)))
-}
-
-fn solved(plane: &Plane, normal: Option<Normal>) -> Result<EverettTable, Failure> {
-    let mut normal = normal.ok_or(Failure::Singular)?;
+    let mut normal = sum(plane, records, targets).ok_or(Failure::Singular)?;
     prior::add(plane.grid, &mut normal.gram);
     // To order one: the tolerances of the solver are relative, and so small weights keep their digits.
     let scale = 1.0 / size(&normal.rhs[0]);

@@ -4,7 +4,6 @@ use nalgebra::DMatrix;
 
 use super::prepare::Prepared;
 use crate::everett::EverettTable;
-use crate::identify::branches::Branch;
 use crate::identify::normal::each_row;
 use crate::identify::regressor::{Plane, Term};
 
@@ -34,21 +33,11 @@ impl Normal {
 /// Over the branches of `p`. `targets` are over its used part (m). `rate_unit`: also the second table, with rates in this
 /// unit (V/s).
 pub(super) fn accumulate(plane: &Plane, p: &Prepared, targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
-    over(plane, p, &p.branches, targets, rate_unit)
-}
-
-/// Over the used part of `p` as a whole: one offset for all of it.
-pub(super) fn accumulate_whole(plane: &Plane, p: &Prepared, target: &[f64]) -> Normal {
-    let whole = Branch { first: p.first, end: p.record.time.len(), rising: true };
-    over(plane, p, &[whole], &[target.to_vec()], None)
-}
-
-fn over(plane: &Plane, p: &Prepared, branches: &[Branch], targets: &[Vec<f64>], rate_unit: Option<f64>) -> Normal {
     let nodes = plane.nodes();
     let unknowns = if rate_unit.is_some() { 2 * nodes } else { nodes };
     let mut sums = Sums::new(unknowns, targets.len());
     let mut full = Vec::new();
-    let mut pending = branches.iter().peekable();
+    let mut pending = p.branches.iter().peekable();
     each_row(plane, &p.record.drive, p.first, |k, row| {
         full.clear();
         full.extend_from_slice(row);
@@ -56,7 +45,7 @@ fn over(plane: &Plane, p: &Prepared, branches: &[Branch], targets: &[Vec<f64>], 
             full.extend(row.iter().map(|(node, c)| (nodes + node, c * p.slope[k] / unit)));
         }
         while let Some(branch) = pending.peek() {
-            if k >= branch.first {
+            if k >= branch.first && !p.record.weightless[k] {
                 sums.add(&full, targets, k - p.first);
             }
             if k + 1 < branch.end {

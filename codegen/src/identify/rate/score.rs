@@ -26,7 +26,7 @@ pub(super) fn on(model: &RateModel, plane: &Plane, p: &Prepared) -> f64 {
     let memory = Staircase::negative_saturation(plane.range);
     let predicted = predict(model, plane, p.record, &p.slope, p.first, memory);
     let y = p.delayed(model.dead_time);
-    let compared: Vec<usize> = (0..y.len()).collect();
+    let compared: Vec<usize> = (0..y.len()).filter(|k| !p.record.weightless[p.first + k]).collect();
     percent(&p.record.time[p.first..], &y, &predicted, &compared)
 }
 
@@ -64,7 +64,7 @@ impl<'a> Unknown<'a> {
             if k > first && (record.drive[k] - record.drive[k - 1]).abs() > JUMP * span {
                 settled = k + SETTLING;
             }
-            if k >= settled {
+            if k >= settled && !record.weightless[k] {
                 compared.push(k - first);
             }
         }
