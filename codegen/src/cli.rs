@@ -8,6 +8,7 @@ mod check;
 mod dynamics;
 mod file;
 mod identify;
+mod identify_rate;
 mod sim;
 mod tune;
 mod ui;

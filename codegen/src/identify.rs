@@ -26,6 +26,7 @@ pub mod linear;
 pub mod nnls;
 mod normal;
 mod prior;
+pub mod rate;
 mod record;
 pub mod regressor;
 mod report;

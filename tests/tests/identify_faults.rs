@@ -250,9 +250,7 @@ fn the_cause_of_the_residual_is_named() {
     // A dead time that the record does not show (one rate) and that is held at zero.
     let late = with(|c| {
         let y = c.displacement.clone();
-        for k in 5..y.len() {
-            c.displacement[k] = y[k - 5];
-        }
+        c.displacement[5..].copy_from_slice(&y[..y.len() - 5]);
     })
     .unwrap();
     assert!(late.report.cause.shares.iter().any(|(s, share)| *s == Source::DeadTime && *share >= 0.0));
@@ -266,9 +264,7 @@ fn the_cause_of_the_residual_is_named() {
         .ramp(0.0, 800.0);
     let y = response(&random_table(8, RANGE, 40e-6, 0.3, 7), &fast.samples);
     let mut moved = y.clone();
-    for k in 5..y.len() {
-        moved[k] = y[k - 5];
-    }
+    moved[5..].copy_from_slice(&y[..y.len() - 5]);
     let record = Record::from_columns("fast.csv", fast.time(), fast.samples.clone(), moved).unwrap();
     let judged = validate(&with(|_| {}).unwrap().table, &record, 0.0).unwrap();
     assert_eq!(judged.cause.main, Source::DeadTime, "{:?}", judged.cause);

@@ -17,6 +17,7 @@ use crate::compile::Refused;
 use crate::diagnostic::Diagnostic;
 
 pub use everett::summary;
+pub(super) use everett::{grid, range};
 
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
@@ -42,6 +43,8 @@ enum Kind {
     Gauge(gauge::Arguments),
     /// Axial stiffness from force and displacement at constant drive.
     Stiffness(stiffness::Arguments),
+    /// Compare rate-dependent models on records of one leg at several rates.
+    Rate(super::identify_rate::Arguments),
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
@@ -50,6 +53,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(Kind::Response(arguments)) => response::run(arguments, ui),
         Some(Kind::Gauge(arguments)) => gauge::run(arguments, ui),
         Some(Kind::Stiffness(arguments)) => stiffness::run(arguments, ui),
+        Some(Kind::Rate(arguments)) => super::identify_rate::run(arguments, ui),
         None => everett::run(&arguments.everett, ui),
     }
 }

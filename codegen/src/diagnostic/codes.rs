@@ -115,6 +115,8 @@ codes! {
         "The gauge words are volts for all six gauges or metres for all six.";
     TOO_MANY_TRAJECTORIES = "E0326", "too many trajectories",
         "The controller chooses among at most 32.";
+    RATE_KEYS = "E0327", "keys that do not fit hysteresis.rate",
+        "rate = \"dynamic-preisach\" takes rate_tables, rate = \"creep\" takes creep_times and creep_weights, one weight for each time and less than 1 in all. A key of another option would silently do nothing.";
     UNSTABLE_STATIC = "E0401", "adaptation unstable on any leg",
         "With these weights and the declared gain_ratio the loop grows even on a leg without dynamics (Appendix B). The help names the largest weight that would do.";
     UNSTABLE_SAMPLED = "E0402", "adaptation unstable on this leg",
@@ -275,6 +277,14 @@ codes! {
         "A calibration cannot remove that.";
     GAUGE_GLITCH = "W0638", "a point far off the calibration",
         "Was the reading disturbed?";
+    ONE_RATE = "E0640", "records of one rate only",
+        "Rate dependence shows between records of one leg at different rates: record the same sweep at two rates or more.";
+    RATE_TABLE_FILE = "E0641", "not a table of the second weight",
+        "A table named in hysteresis.rate_tables is as `identify rate -o NAME` writes it to NAME-mu1.csv: the nodes of a triangle of rising thresholds, of either sign.";
+    RATE_TABLE_MISMATCH = "E0642", "a second table of another grid or voltage range",
+        "A table named in hysteresis.rate_tables must have the cells of hysteresis.grid over the range of actuator.voltage: identify both tables with these.";
+    RATE_NOT_IN_STABILITY = "W0643", "rate term not part of the stability check",
+        "The stability of the adaptation was checked with the static inverse. The inverse of (6) can raise the gain of fast corrections, by a factor of two at most, before it falls back to the static one: keep gain_ratio wide enough for that.";
     STIFFNESS_SIGN = "E0644", "negative stiffness",
         "Force counts positive where it pushes the displacement up.";
     STIFFNESS_DRIVE = "E0645", "drive that moves while the stiffness is measured",

@@ -201,10 +201,10 @@ impl Optimiser for Cma {
         let (values, vectors) = eigen(&self.covariance);
         let floor = 1e-14 * values.iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
         let roots: Vec<f64> = values.iter().map(|v| libm::sqrt(if *v > floor { *v } else { floor })).collect();
-        for i in 0..n {
-            for k in 0..n {
-                self.axes[i][k] = vectors[i][k] * roots[k];
-                self.inverse_axes[i][k] = vectors[i][k] / roots[k];
+        for (i, vector) in vectors.iter().enumerate() {
+            for (k, (value, root)) in vector.iter().zip(&roots).enumerate() {
+                self.axes[i][k] = value * root;
+                self.inverse_axes[i][k] = value / root;
             }
         }
         let longest = roots.iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
@@ -219,6 +219,7 @@ impl Optimiser for Cma {
 }
 
 /// Eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi rotations in a fixed order.
+#[allow(clippy::needless_range_loop)] // Rows p and q change together.
 fn eigen(matrix: &[Vec<f64>]) -> (Vec<f64>, Vec<Vec<f64>>) {
     let n = matrix.len();
     let mut a = matrix.to_vec();
