@@ -92,10 +92,12 @@ fn every_command_explains_itself() {
         assert_eq!((help.code, help.stderr.as_str()), (0, ""));
         let text = &help.stdout;
         assert!(text.contains(&format!("Usage: specgen {command}")) && text.contains("--json"), "{text}");
-        // Every option and argument has a sentence; deeper lines are the rest of one.
+        // Every option and argument has a sentence, beside it or below; deeper lines are the rest of one.
         let depth = |line: &str| line.len() - line.trim_start().len();
-        for line in text.lines().filter(|line| (2..=6).contains(&depth(line))) {
-            let explained = line.trim().split_once("  ").is_some_and(|(_, text)| text.trim().len() > 4);
+        let lines: Vec<&str> = text.lines().chain([""]).collect();
+        for (line, next) in lines.iter().zip(&lines[1..]).filter(|(line, _)| (2..=6).contains(&depth(line))) {
+            let beside = line.trim().split_once("  ").is_some_and(|(_, text)| text.trim().len() > 4);
+            let explained = beside || (depth(next) == 10 && next.trim().len() > 4);
             assert!(explained, "{command}: `{line}`");
         }
     }

@@ -7,8 +7,10 @@ use super::report::Report;
 use super::sanity::median;
 use super::selection::Used;
 
-/// A lag of one sampling interval that widens the loop by this share of the range is worth a warning.
+/// A lag that widens the loop by this share of the range is worth a warning.
 const WIDENING: f64 = 0.01;
+/// The lag that is thought of: one sampling interval, but no more than amplifiers and gauges have, s.
+const LONGEST_LAG: f64 = 1e-3;
 /// Curves are told apart if their ends differ by this many noise floors.
 const ABOVE_NOISE: f64 = 2.0;
 /// Curves that turn back within this share of the range of each other repeat one curve.
@@ -34,6 +36,7 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
         }
     }
     let (rate, at) = fastest;
+    let lag = if interval < LONGEST_LAG { interval } else { LONGEST_LAG };
     let unknown = !report.dead_time_basis.starts_with("estimated") && report.dead_time == 0.0;
     if rate * interval > plane.interval() {
         let message = format!(
@@ -43,11 +46,12 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
             plane.interval()
         );
         findings.warning("W0620", None, message, "sweep more slowly, sample faster, or choose a coarser grid");
-    } else if unknown && rate * interval > WIDENING * span {
+    } else if unknown && rate * lag > WIDENING * span {
         let message = format!(
-            "from {} s on the drive runs at {rate:.0} V/s, where a dead time of one sampling interval alone widens the loop by {:.1} nm; all of the dead time that there may be is counted as hysteresis (dead time {})",
+            "from {} s on the drive runs at {rate:.0} V/s, where a dead time of {:.3} ms alone widens the loop by {:.1} nm; all of the dead time that there may be is counted as hysteresis (dead time {})",
             record.time[at],
-            2.0 * rate * interval * gain * 1e9,
+            lag * 1e3,
+            2.0 * rate * lag * gain * 1e9,
             report.dead_time_basis
         );
         findings.warning(
