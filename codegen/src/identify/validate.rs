@@ -28,6 +28,18 @@ pub enum Start {
     Demagnetised,
 }
 
+impl Start {
+    /// In words.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NegativeSaturation => "negative saturation",
+            Self::PositiveSaturation => "positive saturation",
+            Self::Demagnetised => "demagnetised",
+        }
+    }
+}
+
 /// Result under one assumption about the start. Lengths in m; percentages are of the displacement range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartResult {

@@ -87,12 +87,12 @@ pub fn run(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
     if let Some(validation) = &validation {
         let _ = writeln!(
             text,
-            "{}: predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm (start taken as {:?})",
+            "{}: predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm (start taken as {})",
             validation.record,
             validation.best.rms_percent,
             validation.best.max_percent,
             validation.displacement_range * 1e6,
-            validation.best.start
+            validation.best.start.name()
         );
         let _ = writeln!(text, "  this residual: {}", account(&validation.cause));
     }
