@@ -17,6 +17,7 @@ pub mod machine;
 pub mod model;
 pub mod numerics;
 pub mod reach;
+pub mod robust;
 pub mod spec;
 pub mod stability;
 pub mod target;

@@ -9,6 +9,7 @@ mod electrical;
 mod gauges;
 mod mechanics;
 mod records;
+mod robust;
 mod trajectories;
 
 use std::path::Path;
@@ -50,6 +51,7 @@ const CHECKS: &[Check] = &[
     gauges::six,
     gauges::directions,
     gauges::calibrated_alike,
+    robust::ranges_in_order,
     trajectories::keys_of_kind,
     trajectories::names_differ,
     trajectories::not_too_many,
