@@ -48,16 +48,16 @@ pub struct Arguments {
     #[arg(long, value_name = "SEED|NAME")]
     replay: Option<String>,
     /// Gate: largest rms error of the translation, or of legs, such as "30 nm"; that of [robust] if not given.
-    #[arg(long, value_name = "LENGTH", value_parser = length, allow_negative_numbers = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     max_error: Option<f64>,
     /// Gate: largest rms error of the angles, such as "100 nrad"; for a spec with [control].
-    #[arg(long, value_name = "ANGLE", value_parser = angle, allow_negative_numbers = true)]
+    #[arg(long, value_name = "ANGLE", value_parser = angle, allow_hyphen_values = true)]
     max_orientation: Option<f64>,
     /// Quantile of the draws that the gate compares, %; the largest of draws and corners if not given.
     #[arg(long, value_name = "PERCENT", value_parser = percent, allow_negative_numbers = true)]
     quantile: Option<f64>,
     /// Error beyond which a run counts as unstable; 5 % of the stroke if not given.
-    #[arg(long, value_name = "LENGTH", value_parser = length, allow_negative_numbers = true)]
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
     unstable_above: Option<f64>,
     /// Worker threads; as many as the machine has if not given. The result does not depend on it.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
@@ -71,7 +71,9 @@ pub struct Arguments {
 
 fn measure(text: &str, dimension: Dimension, example: &str) -> Result<f64, String> {
     let found = quantity::parse(text).ok().filter(|found| found.dimension == dimension && found.value > 0.0);
-    found.map(|found| found.value).ok_or_else(|| format!("expected a quantity above zero such as {example}, found `{text}`"))
+    found
+        .map(|found| found.value)
+        .ok_or_else(|| format!("expected a quantity above zero such as {example}, found `{text}`"))
 }
 
 fn length(text: &str) -> Result<f64, String> {
@@ -158,7 +160,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         if !ui.is_json() {
             ui.out(&text);
         }
-        let message = format!("interrupted: the figures are of {} of {all} machines, and no gate is passed", runs.len());
+        let message =
+            format!("interrupted: the figures are of {} of {all} machines, and no gate is passed", runs.len());
         return Err(Failure::Interrupted { message, result: value });
     }
     if !reasons.is_empty() {
@@ -183,6 +186,7 @@ fn gate(arguments: &Arguments, compiled: &Compiled) -> Result<Gate, Failure> {
     Ok(Gate {
         error_nm: arguments.max_error.or(declared.max_error).map(|error| error * 1e9),
         orientation_nrad: arguments.max_orientation.or(orientation).map(|error| error * 1e9),
-        quantile: arguments.quantile,
+        // Of one machine there is one figure.
+        quantile: arguments.quantile.filter(|_| arguments.replay.is_none()),
     })
 }

@@ -74,9 +74,8 @@ mod tests {
     #[test]
     fn the_largest_counts_corners_and_a_quantile_only_draws() {
         let runs = [run("mass-low", false, Some(50.0)), run("7", true, Some(10.0)), run("8", true, Some(20.0))];
-        let reasons = |error_nm, quantile| {
-            Gate { error_nm: Some(error_nm), orientation_nrad: None, quantile }.reasons(&runs)
-        };
+        let reasons =
+            |error_nm, quantile| Gate { error_nm: Some(error_nm), orientation_nrad: None, quantile }.reasons(&runs);
         assert!(reasons(50.0, None).is_empty());
         assert!(reasons(49.9, None)[0].contains("largest rms error is 50.00 nm, above 49.90 nm"));
         assert!(reasons(20.0, Some(95.0)).is_empty() && reasons(10.0, Some(50.0)).is_empty());

@@ -90,12 +90,14 @@ fn corners(factors: &Factors, seed: u64) -> Vec<Member> {
     let mut varied = Vec::new();
     for one in factors.iter() {
         let [low, high] = one.range;
-        for (end, value) in [("low", low), ("high", high)] {
-            let value = |factor: Factor| if factor == one.factor { value } else { factor.nominal() };
-            add(format!("{}-{end}", one.factor), Deviation::common(value));
-        }
+        let alone =
+            |value: f64| Deviation::common(|factor| if factor == one.factor { value } else { factor.nominal() });
         if high > low {
             varied.push(one.factor);
+            add(format!("{}-low", one.factor), alone(low));
+            add(format!("{}-high", one.factor), alone(high));
+        } else {
+            add(one.factor.to_string(), alone(low));
         }
     }
     // What is known and differs from 1 is so in every combination.
@@ -118,4 +120,90 @@ fn corners(factors: &Factors, seed: u64) -> Vec<Member> {
         }
     }
     members
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compile::compile;
+    use crate::robust::factors::Given;
+
+    /// Of the spec of six legs, with `given` in place of what it says.
+    fn factors(given: &[&str]) -> Factors {
+        let spec = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../specs/legs.toml");
+        let given: Vec<Given> = given.iter().map(|text| Given::parse(text).unwrap()).collect();
+        Factors::of(&compile(&spec).unwrap().model, &given)
+    }
+
+    fn names(plan: &Plan) -> Vec<&str> {
+        plan.members.iter().filter(|member| !member.drawn).map(|member| member.name.as_str()).collect()
+    }
+
+    #[test]
+    fn draws_fill_their_ranges_leg_by_leg_and_are_drawn_alone_as_in_a_plan() {
+        let factors = factors(&["delay_ticks=2"]);
+        let plan = Plan::new(&factors, 300, 7);
+        let draws: Vec<&Member> = plan.members.iter().filter(|member| member.drawn).collect();
+        assert_eq!(draws.len(), 300);
+        let fills = |factor: Factor, of: &dyn Fn(&Deviation) -> f64| {
+            let [low, high] = factors.range(factor);
+            let values: Vec<f64> = draws.iter().map(|member| of(&member.deviation)).collect();
+            assert!(values.iter().all(|value| *value >= low && *value <= high), "{factor}");
+            let within = |part: f64| low + part * (high - low);
+            assert!(values.iter().any(|v| *v < within(0.03)) && values.iter().any(|v| *v > within(0.97)), "{factor}");
+            let mean = values.iter().sum::<f64>() / 300.0;
+            // Five deviations of the mean of 300 uniform numbers; a whole number of 0, 1, 2 spreads a little more.
+            assert!((mean - within(0.5)).abs() < 5.0 * 0.41 / 300_f64.sqrt() * (high - low), "{factor} {mean}");
+        };
+        fills(Factor::Mass, &|d| d.mass);
+        fills(Factor::Damping, &|d| d.damping);
+        fills(Factor::Noise, &|d| d.noise);
+        fills(Factor::DelayTicks, &|d| f64::from(d.delay_ticks));
+        for leg in 0..6 {
+            fills(Factor::Stiffness, &|d| d.legs[leg].stiffness);
+            fills(Factor::Gain, &|d| d.legs[leg].gain);
+            fills(Factor::Hysteresis, &|d| d.legs[leg].hysteresis);
+            fills(Factor::Creep, &|d| d.legs[leg].creep);
+            fills(Factor::Lag, &|d| d.legs[leg].lag);
+        }
+        for (index, member) in draws.iter().enumerate() {
+            assert!(draws[..index].iter().all(|other| other.seed != member.seed));
+            assert!(member.deviation.legs.windows(2).all(|pair| pair[0] != pair[1]));
+            assert_eq!(Plan::alone(&factors, &member.name, 99).unwrap().members, [(*member).clone()]);
+        }
+        assert_ne!(plan, Plan::new(&factors, 300, 8));
+    }
+
+    #[test]
+    fn corners_are_the_ends_of_each_factor_and_the_two_at_the_edge() {
+        let plan = Plan::new(&factors(&["delay_ticks=0", "creep=1:1", "lag=1.5:1.5"]), 1, 1);
+        let names = names(&plan);
+        assert_eq!(names[..3], ["nominal", "mass-low", "mass-high"]);
+        assert_eq!(names[names.len() - 3..], ["noise-high", "all-soft", "all-stiff"]);
+        // What is nominal anyway has no corner, what is known and differs has one.
+        assert!(names.contains(&"lag") && !names.iter().any(|name| name.contains("delay") || name.contains("creep")));
+        let soft = &plan.members.iter().find(|member| member.name == "all-soft").unwrap().deviation;
+        assert_eq!((soft.mass, soft.damping, soft.legs[3].stiffness, soft.legs[3].lag), (1.05, 0.7, 0.95, 1.5));
+        assert_eq!(soft.legs[0].gain, 1.1);
+    }
+
+    #[test]
+    fn of_few_factors_every_combination_is_a_corner_once() {
+        let fixed = ["mass=1:1", "stiffness=1:1", "damping=1:1", "creep=1:1", "lag=1:1", "noise=1:1", "delay_ticks=0"];
+        let plan = Plan::new(&factors(&fixed), 1, 1);
+        let expected = [
+            "nominal",
+            "gain-low",
+            "gain-high",
+            "hysteresis-low",
+            "hysteresis-high",
+            "gain-low+hysteresis-low",
+            "gain-high+hysteresis-low",
+            "gain-low+hysteresis-high",
+            "gain-high+hysteresis-high",
+        ];
+        assert_eq!(names(&plan), expected);
+        let error = Plan::alone(&factors(&fixed), "gain", 1).unwrap_err();
+        assert!(error.contains("one of nominal, gain-low"), "{error}");
+    }
 }
