@@ -8,6 +8,7 @@ mod check;
 mod dynamics;
 mod file;
 mod identify;
+mod identify_rate;
 mod robust;
 mod sim;
 mod tune;
@@ -31,7 +32,8 @@ use ui::{Failure, Ui};
     after_help = "Examples:\n  specgen platform.toml -o controller    compile, write a workspace, build and measure it\n  \
                   specgen check platform.toml            every finding, nothing written\n  \
                   specgen sim platform.toml              the paper's experiments with the emitted controller\n  \
-                  specgen identify record.csv --drive -90:90 --grid 32\n\n\
+                  specgen tune platform.toml --write     gains from the simulated loop, into the spec\n  \
+                  specgen identify record.csv --drive -90:90\n  specgen identify linear 0.1hz.csv 1hz.csv 10hz.csv\n\n\
                   Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment, 130 interrupted with a result."
 )]
 struct Cli {
@@ -63,7 +65,7 @@ enum Command {
     Robust(robust::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
-    /// Identify the Everett table of a leg from a reversal-curve record.
+    /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
     Identify(identify::Arguments),
     /// Simulate the reversal-curve experiment that `identify` needs, on the reference leg or another.
     Forc(sim::ForcArguments),

@@ -9,7 +9,7 @@ use crate::everett::EverettTable;
 use crate::identify;
 use crate::ir::{Ir, Setpoints};
 use crate::lower::{PoseNoise, lower, platform, pose_noise, scalar, setpoint};
-use crate::model::{Model, TrajectoryKind};
+use crate::model::{Model, RateDependence, TrajectoryKind};
 use crate::reach::{self, Reach};
 use crate::spec::{self, SpecSource};
 use crate::stability::platform::{Design, RestDynamics};
@@ -94,7 +94,7 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
         }
     };
     let task = design.as_ref().zip(setpoints.setpoints);
-    let lowered = lower(&model, task, &identified.tables, &digest(&source, &identified.texts));
+    let lowered = lower(&model, task, &identified.tables, &identified.rate_tables, &digest(&source, &identified.texts));
     let (ir, pose_noise) = match lowered.and_then(|ir| Ok((ir, pose_noise(&model)?))) {
         Ok(both) => both,
         Err(found) => {
@@ -108,7 +108,7 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
 }
 
 /// Legs with their own gauges adapt each on its own; a controller in task space closes its loops over the platform's modes.
-fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<Design>), Vec<Diagnostic>> {
+pub(crate) fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<Design>), Vec<Diagnostic>> {
     match &model.task_space {
         None => stability::check(model).map(|margins| (Some(margins), None)),
         Some(task) => {
@@ -185,6 +185,8 @@ fn lower_setpoints(source: &SpecSource, model: &Model) -> Result<LoweredSetpoint
 /// What the records of a spec yield.
 struct IdentifiedRecords {
     tables: Vec<EverettTable>,
+    /// Of the second weight, m s/V.
+    rate_tables: Vec<EverettTable>,
     reports: Vec<Option<identify::Report>>,
     findings: Vec<Diagnostic>,
     /// Name and text of each file, for the digest.
@@ -192,8 +194,13 @@ struct IdentifiedRecords {
 }
 
 fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedRecords, Vec<Diagnostic>> {
-    let mut result =
-        IdentifiedRecords { tables: Vec::new(), reports: Vec::new(), findings: Vec::new(), texts: Vec::new() };
+    let mut result = IdentifiedRecords {
+        tables: Vec::new(),
+        rate_tables: Vec::new(),
+        reports: Vec::new(),
+        findings: Vec::new(),
+        texts: Vec::new(),
+    };
     let mut errors = Vec::new();
     for name in &model.hysteresis.records {
         let text = match identify::read_file(&source.dir.join(name), name) {
@@ -218,6 +225,21 @@ fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedReco
             Err(found) => errors.extend(found),
         }
         result.texts.push((name.clone(), text));
+    }
+    if let RateDependence::DynamicPreisach(files) = &model.hysteresis.rate {
+        for name in files {
+            let read = identify::read_file(&source.dir.join(name), name).and_then(|text| {
+                let table = identify::rate::read_rate_csv(&text, name)?;
+                result.texts.push((name.clone(), text));
+                fits_spec(model, name, &table, codes::RATE_TABLE_MISMATCH, "hysteresis.rate_tables")?;
+                Ok(table)
+            });
+            match read {
+                Ok(table) => result.rate_tables.push(table),
+                Err(found) => errors.extend(found),
+            }
+        }
+        result.findings.push(rate_not_in_stability(model));
     }
     if errors.is_empty() {
         Ok(result)
@@ -259,16 +281,44 @@ fn wrong_scale(model: &Model, name: &str, table: &EverettTable) -> Option<Diagno
 /// A table that `specgen identify` wrote: it must be of the grid and the voltage range that the spec declares.
 fn read_table(model: &Model, name: &str, text: &str) -> Result<EverettTable, Vec<Diagnostic>> {
     let table = identify::read_table_csv(text, name)?;
+    fits_spec(model, name, &table, codes::TABLE_MISMATCH, "hysteresis.records")?;
+    Ok(table)
+}
+
+/// The check of the adaptation knows the static inverse only.
+fn rate_not_in_stability(model: &Model) -> Diagnostic {
+    let key = "hysteresis.rate";
+    Diagnostic {
+        severity: Severity::Warning,
+        code: codes::RATE_NOT_IN_STABILITY,
+        key: key.to_owned(),
+        place: model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec),
+        message: "the stability of the adaptation was checked without the rate term of (6)".to_owned(),
+        help: format!(
+            "its inverse at most doubles the gain of fast corrections: let gain_ratio reach twice its upper end ({}), or simulate",
+            2.0 * model.adaptation.gain_ratio[1]
+        ),
+    }
+}
+
+/// Refuses a table of another grid or range than the spec's.
+fn fits_spec(
+    model: &Model,
+    name: &str,
+    table: &EverettTable,
+    code: &'static str,
+    key: &str,
+) -> Result<(), Vec<Diagnostic>> {
     let [min, max] = model.actuator.voltage;
     let slack = 1e-9 * (max - min);
     let fits = (table.drive_min - min).abs() <= slack && (table.drive_max - max).abs() <= slack;
     if table.grid == model.hysteresis.grid && fits {
-        return Ok(table);
+        return Ok(());
     }
     Err(vec![Diagnostic {
         severity: Severity::Error,
-        code: codes::TABLE_MISMATCH,
-        key: "hysteresis.records".to_owned(),
+        code,
+        key: key.to_owned(),
         place: Place::File { path: name.to_owned(), line: None },
         message: format!(
             "the table has {} cells over {} V to {} V; the spec declares {} cells (hysteresis.grid) over {min} V to {max} V (actuator.voltage)",

@@ -10,21 +10,35 @@
 //! E(u_i, u_j) = f(u_i) − f_{u_i}(u_j) with less noise, for any spacing of the curves, and without negative weights.
 
 mod branches;
+mod cause;
 mod columns;
 mod coverage;
 mod dead_time;
+mod distrust;
+pub mod draw;
 mod export;
 pub(crate) mod findings;
+pub mod gauge;
+mod grid_choice;
+mod least_squares;
+mod limits;
+pub mod linear;
 pub mod nnls;
 mod normal;
 mod prior;
+pub mod rate;
 mod record;
 pub mod regressor;
 mod report;
 mod residual;
+pub mod response;
 mod sanity;
 mod selection;
+mod signals;
 mod staircase;
+pub mod stiffness;
+mod sweep;
+mod trace;
 mod trend;
 mod validate;
 
@@ -35,11 +49,14 @@ use normal::Normal;
 use regressor::Plane;
 use residual::Residual;
 
-pub use coverage::MAX_GRID;
+pub use cause::{Cause, Source};
+pub use coverage::{MAX_GRID, Region};
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
+pub use grid_choice::{GridChoice, Score, choose_grid};
 pub use record::{MAX_FILE_BYTES, Record, parse_record, read_file, read_record};
 pub use report::{Branches, Report};
 pub use staircase::Staircase;
+pub use trace::Trace;
 pub use validate::{Start, StartResult, Validation, validate};
 
 /// What to identify.
@@ -80,6 +97,8 @@ pub struct Identified {
     pub table: EverettTable,
     /// Figures.
     pub report: Report,
+    /// Samples and residual behind the first usable one.
+    pub trace: Trace,
     /// Findings that refuse nothing, those of the record included.
     pub warnings: Vec<Diagnostic>,
 }
@@ -99,12 +118,16 @@ pub fn identify(record: &Record, options: &Options) -> Result<Identified, Vec<Di
     let mut all = record.warnings.clone();
     all.extend(findings.into_diagnostics());
     match found {
-        Some((table, report)) if !refused => Ok(Identified { table, report, warnings: all }),
+        Some((table, report, trace)) if !refused => Ok(Identified { table, report, trace, warnings: all }),
         _ => Err(all),
     }
 }
 
-fn identify_checked(record: &Record, options: &Options, findings: &mut Findings) -> Option<(EverettTable, Report)> {
+fn identify_checked(
+    record: &Record,
+    options: &Options,
+    findings: &mut Findings,
+) -> Option<(EverettTable, Report, Trace)> {
     let plane = coverage::plane(options, findings)?;
     coverage::check_range(record, &plane, findings);
     if findings.any_error() {
@@ -125,7 +148,7 @@ fn identify_checked(record: &Record, options: &Options, findings: &mut Findings)
     let scale = 1.0 / record.displacement_range();
     let target: Vec<f64> = displacement.iter().map(|y| y * scale).collect();
     let (mut normal, fitted, excited) = selection::select(&plane, record, &used, &target);
-    coverage::check_excited(&plane, &excited, findings);
+    let unexcited = coverage::check_excited(&plane, &excited, findings);
 
     prior::add(plane.grid, &mut normal.gram);
     let solution = solve(&normal, findings)?;
@@ -139,6 +162,9 @@ fn identify_checked(record: &Record, options: &Options, findings: &mut Findings)
     let percent = 100.0 / residual.range;
     let (fit_rms, fit_max) = trend::rms_and_max(&residual.detrended);
     let branch_rms = residual.within(&fitted_branches, used.first);
+    let noise_floor = trend::noise_floor(&record.displacement[used.first..]);
+    let gain = residual.range / (plane.range[1] - plane.range[0]);
+    let cause = residual.cause(record, used.first, noise_floor, gain);
     let report = Report {
         record: record.shown_as.clone(),
         grid: plane.grid,
@@ -161,12 +187,16 @@ fn identify_checked(record: &Record, options: &Options, findings: &mut Findings)
         drift_removed: options.drift,
         dead_time,
         dead_time_basis,
-        noise_floor: trend::noise_floor(&record.displacement[used.first..]),
+        noise_floor,
+        weightless: record.weightless[used.first..].iter().filter(|w| **w).count(),
+        cause,
+        unexcited,
         zero_weights: solution.weights.iter().filter(|w| **w == 0.0).count(),
         weights: plane.nodes(),
         solver_iterations: solution.iterations,
         kkt_violation: nnls::kkt_violation(&normal.gram, &normal.rhs[0], &solution.weights),
     };
+    sweep::check(&plane, record, &used, &report, findings);
     if report.fit_rms_percent > POOR_FIT_PERCENT {
         let message = format!("the fitted table misses the record by {:.2} % rms of its range", report.fit_rms_percent);
         findings.warning(
@@ -176,7 +206,8 @@ fn identify_checked(record: &Record, options: &Options, findings: &mut Findings)
             "is the record one actuator at one load, without steps or lost samples?",
         );
     }
-    Some((table, report))
+    let trace = residual.trace(record, used.first, &displacement);
+    Some((table, report, trace))
 }
 
 /// Non-negative weights in units of the target.

@@ -236,6 +236,47 @@ pub struct Hysteresis {
     pub tables: Vec<Vec<f64>>,
     /// Table of each leg.
     pub table_of_leg: [usize; LEGS],
+    /// What accounts for the rate; none in a static model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate: Option<RateModel>,
+    /// Lead of the leg displacements asked for; none without a dead time.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lead: Option<Lead>,
+}
+
+/// Rate dependence of the leg model, at the period of the spec.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RateModel {
+    /// (6).
+    DynamicPreisach {
+        /// Distinct tables of the second weight, laid out as those of the first, m per cell a tick.
+        tables: Vec<Vec<f64>>,
+        /// Table of each leg.
+        table_of_leg: [usize; LEGS],
+        /// Miss of the demand at which the inverse is found, m.
+        tolerance: f64,
+    },
+    /// Creep behind the static model.
+    Creep {
+        /// g_j = 1 − e^(−T/τ_j).
+        gains: Vec<f64>,
+        /// w_j.
+        weights: Vec<f64>,
+        /// w_j (1 − g_j).
+        carried: Vec<f64>,
+        /// 1 + Σ w_j g_j.
+        direct: f64,
+    },
+}
+
+/// Lead on the demand of a leg.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Lead {
+    /// Ticks.
+    pub ticks: f64,
+    /// Most that it adds, m.
+    pub limit: f64,
 }
 
 /// Converter and limits.

@@ -6,6 +6,7 @@ mod actuation;
 mod dynamics;
 mod kinematics;
 mod linear;
+mod rate;
 mod sensing;
 pub mod setpoint;
 mod task_space;
@@ -16,7 +17,7 @@ pub use sensing::{PoseNoise, pose_noise};
 
 use crate::diagnostic::Diagnostic;
 use crate::everett::EverettTable;
-use crate::ir::{Bounds, Defaults, Hysteresis, Ir, LEGS, Law, Scalar, Setpoint, Setpoints, TaskSpace};
+use crate::ir::{Bounds, Defaults, Hysteresis, Ir, Law, Scalar, Setpoint, Setpoints, TaskSpace};
 use crate::model::{self, Model};
 use crate::stability::platform::{Design, RestDynamics};
 use specgen_runtime::Motion;
@@ -27,7 +28,8 @@ const LEG_SETPOINT_STROKES: f64 = 2.0;
 /// Computes every constant of the controller.
 ///
 /// `task` is the tuning of a controller in task space and its set-points ([`setpoint::lower`]), none for six legs with their own
-/// gauges; `tables` holds one Everett table for all legs or one for each; `digest` is the hex digest of spec and records.
+/// gauges; `tables` holds one Everett table for all legs or one for each, `rate_tables` those of the second weight of (6), if the
+/// spec names any; `digest` is the hex digest of spec and records.
 ///
 /// # Errors
 /// Findings about values that cannot be turned into a controller (a converter too coarse
@@ -36,10 +38,11 @@ pub fn lower(
     model: &Model,
     task: Option<(&Design, Setpoints)>,
     tables: &[EverettTable],
+    rate_tables: &[EverettTable],
     digest: &str,
 ) -> Result<Ir, Vec<Diagnostic>> {
     let scalar = scalar(model);
-    let hysteresis = hysteresis(model, tables, scalar);
+    let hysteresis = hysteresis(model, tables, rate_tables, scalar);
     let (actuation, max_step) = actuation::lower(model, scalar)?;
     let stroke = model.actuator.stroke;
     let round = |value| scalar.round(value);
@@ -111,18 +114,15 @@ fn task_space(
     })
 }
 
-/// Tables in the layout of the controller, each distinct one once.
-fn hysteresis(model: &Model, tables: &[EverettTable], scalar: Scalar) -> Hysteresis {
-    let mut distinct: Vec<Vec<f64>> = Vec::new();
-    let mut table_of_leg = [0; LEGS];
-    for (leg, of_leg) in table_of_leg.iter_mut().enumerate() {
-        let table = &tables[if tables.len() == LEGS { leg } else { 0 }];
-        let nodes: Vec<f64> =
-            (0..=table.grid).flat_map(|up| (0..=up).map(move |down| scalar.round(table.node(up, down)))).collect();
-        *of_leg = distinct.iter().position(|known| *known == nodes).unwrap_or_else(|| {
-            distinct.push(nodes);
-            distinct.len() - 1
-        });
+/// Tables in the layout of the controller, each distinct one once, and what goes with them.
+fn hysteresis(model: &Model, tables: &[EverettTable], rate_tables: &[EverettTable], scalar: Scalar) -> Hysteresis {
+    let (distinct, table_of_leg) = rate::distinct(tables, 1.0, scalar);
+    Hysteresis {
+        grid: model.hysteresis.grid,
+        memory: model.hysteresis.memory,
+        tables: distinct,
+        table_of_leg,
+        rate: rate::lower(model, tables, rate_tables, scalar),
+        lead: rate::lead(model, scalar),
     }
-    Hysteresis { grid: model.hysteresis.grid, memory: model.hysteresis.memory, tables: distinct, table_of_leg }
 }

@@ -188,6 +188,21 @@ pub struct Hysteresis {
     pub memory: usize,
     /// Reversal-curve files relative to the spec: one for all legs, or six.
     pub records: Vec<String>,
+    /// How the rate is accounted for.
+    pub rate: RateDependence,
+    /// s by which the displacement lags the drive, for six legs with their own gauges.
+    pub dead_time: f64,
+}
+
+/// Rate dependence of the leg model.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RateDependence {
+    /// None.
+    Static,
+    /// (6), with the files of the second table: one for all legs, or six.
+    DynamicPreisach(Vec<String>),
+    /// Time constant (s) and weight of each operator behind the static model.
+    Creep(Vec<[f64; 2]>),
 }
 
 /// How the run-to-run estimate is used.

@@ -60,6 +60,13 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["identify", record, "--drive", "a:b"], "two voltages"),
         (&["identify", record, "--drive", "0:100", "--grid", "x"], "whole number such as 32, found `x`"),
         (&["identify", record, "--drive", "0:100", "--grid", "-3"], "whole number such as 32, found `-3`"),
+        (&["identify", record, "--drive", "0:100", "--plot", "x.png"], "ends in .svg or .html, found `x.png`"),
+        (&["identify", "linear"], "<RECORDS>"),
+        (&["identify", "linear", record, "--frequency", "1,2"], "2 frequencies for 1 records"),
+        (&["identify", "linear", record, "--frequency", "0"], "frequency in Hz above zero, found `0`"),
+        (&["identify", "response"], "<RECORD>"),
+        (&["identify", "gauge", record, "--degree", "6"], "--degree"),
+        (&["identify", "stiffness", record, "--drive", "0:1"], "--drive"),
     ];
     for (arguments, word) in cases {
         folder.run(arguments).says(2, &["error: ", word]);

@@ -106,7 +106,9 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let good = Emitted::new("ulp-good", "legs.toml", &[ALIGNED]);
     let Some(image) = good.image(Mcu::Mps2An500) else { return };
     let ir = &good.compiled.ir;
-    let table_value = ir.hysteresis.tables[0][20 * 21 / 2 + 3];
+    // E(N, 0): a saturated leg shows it as it is. Of another node an ulp may be lost in rounding, tick after tick.
+    let grid = ir.hysteresis.grid;
+    let table_value = ir.hysteresis.tables[0][grid * (grid + 1) / 2];
     let cases = [
         ("controller/src/hysteresis.rs", table_value, false, "requested"),
         ("controller/src/kinematics.rs", ir.kinematics.rest_leg[2][0], true, "demand[2]"),

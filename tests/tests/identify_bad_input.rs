@@ -194,7 +194,11 @@ fn records_that_do_not_cover_the_plane() {
     expect(&errors(csv(&rows).as_bytes()), "E0606", "no cell with a down_threshold below 40 V");
     let wide = Drive::at(0.0, 100.0).reversal_curves(8, [0.0, 150.0], 50.0);
     let rows: Vec<_> = wide.time().iter().zip(&wide.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
-    expect(&errors(csv(&rows).as_bytes()), "E0605", "0 V to 150 V");
+    expect(
+        &errors(csv(&rows).as_bytes()),
+        "E0605",
+        "to 150 V (at 24.04 s), but the table is to cover 0 V to 100 V; it leaves that range at 13.33 s",
+    );
     let one = Drive::at(0.0, 100.0).reversal_curves(1, RANGE, 50.0);
     let rows: Vec<_> = one.time().iter().zip(&one.samples).map(|(t, u)| [*t, *u, 0.5 * u]).collect();
     expect(&errors(csv(&rows).as_bytes()), "E0607", "1 reversal curves");

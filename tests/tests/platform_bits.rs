@@ -155,7 +155,8 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let legs = &["requested", "load", "voltage", "dac_code", "level", "drift"][..];
     let cases = [
         ("task_space", notch.sections[2].depth, legs),
-        ("task_space", task.law.wrench_to_legs[1][2], legs),
+        ("task_space", task.law.force_to_modes[0][1], legs),
+        ("task_space", task.law.modes_to_legs[1][2], legs),
         ("sensing", task.sensing.inverse[2][0], &["pose"]),
         ("sensing", task.sensing.inverse[3][1], &["pose"]),
         ("dynamics", ir.dynamics.legs[3].rest[2], &["demand", "load"]),

@@ -179,9 +179,9 @@ impl Summary {
                 let budget = if stage.name == "step" { of(target.instructions) } else { String::new() };
                 let _ = writeln!(
                     out,
-                    "    {:<13} {:.0}{budget} instructions mean, {} to {} ({} calls)",
+                    "    {:<13} {}{budget} instructions mean, {} to {} ({} calls)",
                     stage.name,
-                    stage.mean,
+                    group(stage.mean.round() as u64),
                     group(stage.min),
                     group(stage.max),
                     group(stage.calls)

@@ -123,15 +123,25 @@ pub struct ForcArguments {
     /// Reversal curves, and cells per axis of the grid that they identify.
     #[arg(long, default_value_t = 32, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=256))]
     grid: u32,
+    /// Slope of the drive, V/s: records at several rates are what `identify rate` needs.
+    #[arg(long, value_name = "V/S", default_value_t = 20.0, allow_negative_numbers = true, value_parser = slope)]
+    rate: f64,
     #[command(flatten)]
     plant: PlantArguments,
+}
+
+/// Slopes from one sweep in hours to one in milliseconds.
+fn slope(text: &str) -> Result<f64, String> {
+    let expected = || format!("expected a slope from 0.1 to 100000 V/s, found `{text}`");
+    text.parse().ok().filter(|rate| (0.1..=1e5).contains(rate)).ok_or_else(expected)
 }
 
 pub fn run_forc(arguments: &ForcArguments, ui: &mut Ui) -> Result<(), Failure> {
     let (parameters, noise) = arguments.plant.read()?;
     let mut leg = LegPlant::new(&parameters);
     let mut gauge = Gauge::new(&noise, arguments.plant.seed, 0);
-    let record = ReversalExperiment::reference(arguments.grid).run(&mut leg, &mut gauge);
+    let record = ReversalExperiment { rate: arguments.rate, ..ReversalExperiment::reference(arguments.grid) }
+        .run(&mut leg, &mut gauge);
     let rows = record.rows.len();
     write_file(&arguments.output, record.to_csv().as_bytes())?;
     let text = format!("wrote {rows} rows to {}\n", arguments.output.display());

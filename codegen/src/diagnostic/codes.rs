@@ -115,6 +115,8 @@ codes! {
         "The gauge words are volts for all six gauges or metres for all six.";
     TOO_MANY_TRAJECTORIES = "E0326", "too many trajectories",
         "The controller chooses among at most 32.";
+    RATE_KEYS = "E0327", "keys that do not fit hysteresis.rate",
+        "rate = \"dynamic-preisach\" takes rate_tables, rate = \"creep\" takes creep_times and creep_weights, one weight for each time and less than 1 in all. A key of another option would silently do nothing.";
     UNSTABLE_STATIC = "E0401", "adaptation unstable on any leg",
         "With these weights and the declared gain_ratio the loop grows even on a leg without dynamics (Appendix B). The help names the largest weight that would do.";
     UNSTABLE_SAMPLED = "E0402", "adaptation unstable on this leg",
@@ -209,6 +211,12 @@ codes! {
         "It falls when the drive rises, or hardly follows it: a sign or a column is wrong.";
     RECORD_UNIT = "W0515", "displacement in another unit?",
         "The range is far from what a piezo actuator does; the column is in micrometres.";
+    RECORD_LIMITED = "E0516", "displacement limited or stuck, with noise",
+        "Over a long way of the drive the displacement hardly moves: the gauge or the amplifier is at its limit, or the gauge is stuck. The message names the time.";
+    RECORD_GLITCH = "W0517", "a glitch in the displacement",
+        "A single sample is far off its neighbours. It gets no weight in any fit.";
+    RECORD_JUMP = "W0518", "a jump of the drive",
+        "No rate-independent model follows a jump, and the actuator rings behind it: the samples there get no weight.";
     GRID_NOT_IDENTIFIABLE = "E0601", "grid beyond identification",
         "A table of that size cannot be fitted to a record.";
     DRIVE_RANGE_EMPTY = "E0602", "empty drive range",
@@ -239,6 +247,52 @@ codes! {
         "A table named in hysteresis.records must have the cells of hysteresis.grid over the range of actuator.voltage: identify the record again with both.";
     RECORD_SCALE = "E0615", "a record that the actuator cannot have made",
         "Its displacement is more than five times, or less than a fifth, of stacks x stack_gain x voltage: most likely it is not in micrometres.";
+    SWEEP_TOO_FAST = "W0620", "sweep too fast to tell hysteresis from dead time",
+        "A dead time widens the loop in proportion to the rate. Where it cannot be told from hysteresis it is counted as such.";
+    CURVES_IN_NOISE = "W0621", "curves closer than the noise",
+        "Neighbouring reversal curves differ by less than the gauge can tell.";
+    GRID_NOT_CHOSEN = "E0622", "grid that cannot be chosen from the record",
+        "Cross-validation holds out curves that turn back at other voltages than the rest: there must be several. Give --grid otherwise.";
+    DISPLACEMENT_UNIT = "E0623", "displacement in another unit",
+        "The displacement covers more or less than any piezo actuator does; the column is in micrometres.";
+    NO_CYCLE = "E0625", "no linear relation in the record",
+        "The relation Y = rho X + delta is fitted to whole cycles of one frequency, with the displacement rising with the drive.";
+    FREQUENCY_UNCLEAR = "E0626", "record of no one frequency, or of another one",
+        "Each record of a linear relation holds one frequency. The message names the cycle that differs.";
+    RESPONSE_SAMPLES = "E0630", "record that gives no frequency response",
+        "Samples must be evenly spaced, and enough for several segments.";
+    RESPONSE_COHERENCE = "E0631", "coherence too low",
+        "Where the coherence is low the response is noise. The bands are named; the resonance must lie in a coherent one.";
+    RESPONSE_FIT = "E0632", "response that the model does not fit",
+        "A second-order resonance with a first-order lag and a dead time is fitted, with a positive static gain.";
+    RESPONSE_BAND = "W0633", "part of the response left out or not resolved",
+        "Bands of low coherence get no weight; a resonance narrower than a few bins looks broader than it is.";
+    RESPONSE_POOR = "W0634", "response fitted poorly",
+        "Most often the band holds more than one resonance.";
+    GAUGE_NOT_MONOTONE = "E0635", "calibration that turns back",
+        "One voltage would mean two displacements.";
+    GAUGE_RECORD = "E0636", "record that gives no calibration",
+        "Too few positions, or another unit than volts and micrometres.";
+    GAUGE_HYSTERESIS = "W0637", "gauge that reads differently on the way back",
+        "A calibration cannot remove that.";
+    GAUGE_GLITCH = "W0638", "a point far off the calibration",
+        "Was the reading disturbed?";
+    ONE_RATE = "E0640", "records of one rate only",
+        "Rate dependence shows between records of one leg at different rates: record the same sweep at two rates or more.";
+    RATE_TABLE_FILE = "E0641", "not a table of the second weight",
+        "A table named in hysteresis.rate_tables is as `identify rate -o NAME` writes it to NAME-mu1.csv: the nodes of a triangle of rising thresholds, of either sign.";
+    RATE_TABLE_MISMATCH = "E0642", "a second table of another grid or voltage range",
+        "A table named in hysteresis.rate_tables must have the cells of hysteresis.grid over the range of actuator.voltage: identify both tables with these.";
+    RATE_NOT_IN_STABILITY = "W0643", "rate term not part of the stability check",
+        "The stability of the adaptation was checked with the static inverse. The inverse of (6) can raise the gain of fast corrections, by a factor of two at most, before it falls back to the static one: keep gain_ratio wide enough for that.";
+    STIFFNESS_SIGN = "E0644", "negative stiffness",
+        "Force counts positive where it pushes the displacement up.";
+    STIFFNESS_DRIVE = "E0645", "drive that moves while the stiffness is measured",
+        "The drive's own displacement would be taken for the force's.";
+    STIFFNESS_RECORD = "E0646", "record that gives no stiffness",
+        "The force must rise and fall, move the actuator beyond the noise, and be in newtons.";
+    STIFFNESS_UNCERTAIN = "W0647", "stiffness uncertain",
+        "The standard error is more than a tenth of the value.";
     TUNE_NOTHING = "E0701", "nothing to tune",
         "The spec's mode uses none of the numbers that `--what` names. The help says which modes use which.";
     TUNE_BOUNDS = "E0702", "bounds that hold nothing",

@@ -1,34 +1,32 @@
-//! `src/hysteresis.rs`: the Everett tables. Reads [`ir::Hysteresis`](crate::ir::Hysteresis); exports `table` and the types
-//! of table and memory.
+//! `src/hysteresis.rs`: the Everett tables. Reads [`ir::Hysteresis`](crate::ir::Hysteresis); exports `TABLES` and the types
+//! of table and memory: of the static model, or of one that knows the rate. All three are used alike.
 
-use proc_macro2::TokenStream;
+use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
 use super::literal;
-use crate::ir::Ir;
+use crate::ir::{Ir, LEGS, RateModel, Scalar};
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let h = &ir.hysteresis;
     let (grid, memory) = (literal::count(h.grid), literal::count(h.memory));
-    let names: Vec<_> = (0..h.tables.len()).map(|k| format_ident!("EVERETT_{k}")).collect();
-    let tables = h.tables.iter().zip(&names).enumerate().map(|(k, (nodes, name))| {
-        let legs: Vec<String> =
-            (0..).zip(&h.table_of_leg).filter(|(_, table)| **table == k).map(|(leg, _): (usize, _)| leg.to_string()).collect();
-        let doc = format!(
-            " Everett function of leg {}, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.",
-            legs.join(", ")
-        );
-        let nodes = literal::reals(ir.scalar, nodes);
+    let doc = "Everett function of leg {}, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.";
+    let (tables, of_leg) = statics(ir.scalar, &h.tables, &h.table_of_leg, "EVERETT", doc);
+    let rate = rate(ir, &of_leg);
+    let (imports, types, constants) = (rate.imports, rate.types, rate.constants);
+    let lead = h.lead.as_ref().map(|lead| {
+        let (ticks, limit) = (literal::real(ir.scalar, lead.ticks), literal::real(ir.scalar, lead.limit));
         quote! {
-            #[doc = #doc]
-            static #name: [Real; NODES] = [#nodes];
+            /// Lead of the leg displacements asked for, ticks; from `hysteresis.dead_time`.
+            pub const LEAD: Real = #ticks;
+            /// Most that it adds to a demand, m; from `actuator.slew_rate`.
+            pub const LEAD_LIMIT: Real = #limit;
         }
     });
-    let of_leg = h.table_of_leg.iter().map(|k| &names[*k]);
     quote! {
         #![doc = " Preisach tables of the legs; the model that uses them is in `specgen_runtime::memory`."]
 
-        use specgen_runtime::{Everett, ReversalMemory};
+        use specgen_runtime::#imports;
 
         use crate::{LEGS, Real};
 
@@ -38,14 +36,148 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const NODES: usize = (GRID + 1) * (GRID + 2) / 2;
         /// Capacity of the reversal memory, extrema; from `hysteresis.memory`.
         pub const MEMORY: usize = #memory;
-        /// Everett function of one leg.
-        pub type Table = Everett<Real, GRID, NODES>;
-        /// Reversal memory of one leg.
-        pub type Memory = ReversalMemory<Real, MEMORY>;
+        #types
+        #lead
 
-        /// Tables of the six legs.
-        pub static TABLES: [Table; LEGS] = [#(Everett { nodes: &#of_leg }),*];
+        #constants
 
         #(#tables)*
+    }
+}
+
+/// What depends on the rate model.
+struct Rate {
+    imports: TokenStream,
+    types: TokenStream,
+    constants: TokenStream,
+}
+
+fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
+    match &ir.hysteresis.rate {
+        None => Rate {
+            imports: quote! { {Everett, ReversalMemory} },
+            types: quote! {
+                /// Everett function of one leg.
+                pub type Table = Everett<Real, GRID, NODES>;
+                /// Reversal memory of one leg.
+                pub type Memory = ReversalMemory<Real, MEMORY>;
+            },
+            constants: quote! {
+                /// Tables of the six legs.
+                pub static TABLES: [Table; LEGS] = [#(Everett { nodes: &#of_leg }),*];
+            },
+        },
+        Some(RateModel::DynamicPreisach { tables, table_of_leg, tolerance }) => {
+            let doc = "Second Everett function of leg {}, m per cell a tick, laid out as the first; from `hysteresis.rate_tables`.";
+            let (rates, rate_of_leg) = statics(ir.scalar, tables, table_of_leg, "RATE", doc);
+            let tolerance = literal::real(ir.scalar, *tolerance);
+            Rate {
+                imports: quote! { {DynamicEverett, DynamicMemory, Everett} },
+                types: quote! {
+                    /// The two Everett functions of one leg, (6).
+                    pub type Table = DynamicEverett<Real, GRID, NODES>;
+                    /// Reversal memory of one leg, with both.
+                    pub type Memory = DynamicMemory<Real, MEMORY>;
+                },
+                constants: quote! {
+                    /// Miss of the demand at which the inverse is found, m: an eighth of a converter code.
+                    const TOLERANCE: Real = #tolerance;
+                    /// Tables of the six legs.
+                    pub static TABLES: [Table; LEGS] = [#(DynamicEverett {
+                        still: Everett { nodes: &#of_leg },
+                        rate: Everett { nodes: &#rate_of_leg },
+                        tolerance: TOLERANCE,
+                    }),*];
+
+                    #(#rates)*
+                },
+            }
+        }
+        Some(RateModel::Creep { gains, weights, carried, direct }) => {
+            let count = literal::count(gains.len());
+            let list = |values: &[f64]| literal::reals(ir.scalar, values);
+            let (gains, weights, carried) = (list(gains), list(weights), list(carried));
+            let direct = literal::real(ir.scalar, *direct);
+            Rate {
+                imports: quote! { {Creep, CreepEverett, CreepMemory, Everett} },
+                types: quote! {
+                    /// Creep operators; from `hysteresis.creep_times`.
+                    pub const CREEP: usize = #count;
+                    /// Everett function of one leg, with creep behind it.
+                    pub type Table = CreepEverett<Real, GRID, NODES, CREEP>;
+                    /// Reversal memory and creep states of one leg.
+                    pub type Memory = CreepMemory<Real, MEMORY, CREEP>;
+                },
+                constants: quote! {
+                    /// Creep of every leg over a tick of `timing.period`; from `hysteresis.creep_times` and `creep_weights`.
+                    static CREEP_OF_LEGS: Creep<Real, CREEP> = Creep {
+                        gains: [#gains],
+                        weights: [#weights],
+                        carried: [#carried],
+                        direct: #direct,
+                    };
+                    /// Tables of the six legs.
+                    pub static TABLES: [Table; LEGS] = [#(CreepEverett {
+                        still: Everett { nodes: &#of_leg },
+                        creep: &CREEP_OF_LEGS,
+                    }),*];
+                },
+            }
+        }
+    }
+}
+
+/// A `static` for each distinct table, and the name of that of each leg.
+fn statics(
+    scalar: Scalar,
+    tables: &[Vec<f64>],
+    table_of_leg: &[usize; LEGS],
+    prefix: &str,
+    doc: &str,
+) -> (Vec<TokenStream>, Vec<Ident>) {
+    let names: Vec<Ident> = (0..tables.len()).map(|k| format_ident!("{prefix}_{k}")).collect();
+    let statics = tables.iter().zip(&names).enumerate().map(|(k, (nodes, name))| {
+        let legs: Vec<String> = (0..)
+            .zip(table_of_leg)
+            .filter(|(_, table)| **table == k)
+            .map(|(leg, _): (usize, _)| leg.to_string())
+            .collect();
+        let doc = format!(" {}", doc.replace("{}", &legs.join(", ")));
+        let nodes = literal::reals(scalar, nodes);
+        quote! {
+            #[doc = #doc]
+            static #name: [Real; NODES] = [#nodes];
+        }
+    });
+    (statics.collect(), table_of_leg.iter().map(|k| names[*k].clone()).collect())
+}
+
+/// What the model has beyond the static one, in lines for the documentation of the crate.
+pub fn rate_doc(ir: &Ir) -> Vec<&'static str> {
+    let mut lines = Vec::new();
+    match &ir.hysteresis.rate {
+        None => {}
+        Some(RateModel::DynamicPreisach { .. }) => lines.extend([
+            " Γ is the dynamic Preisach model (6), its rate being that of one tick to the next; see `specgen_runtime::dynamic`.",
+            " Where (6) cannot be inverted safely the static inverse is used, and `STATIC_INVERSE` says so.",
+        ]),
+        Some(RateModel::Creep { .. }) => {
+            lines.push(" Γ is the static model with creep behind it; see `specgen_runtime::creep`.");
+        }
+    }
+    if ir.hysteresis.lead.is_some() {
+        lines.push(" T is led by `LEAD` ticks at its own rate, for the dead time of the legs.");
+    }
+    if !lines.is_empty() {
+        lines.insert(0, "");
+    }
+    lines
+}
+
+/// Name of the status bits that a model with an inverse of its own has, and a comma.
+pub fn status_name(ir: &Ir) -> TokenStream {
+    match &ir.hysteresis.rate {
+        Some(RateModel::DynamicPreisach { .. }) => quote! { STATIC_INVERSE, },
+        _ => quote! {},
     }
 }

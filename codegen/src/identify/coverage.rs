@@ -1,13 +1,14 @@
 //! Does a record excite the plane that the table covers? Checks that need the drive range and the grid.
 
 use nalgebra::DMatrix;
+use serde::Serialize;
 
 use super::Options;
 use super::branches::Branch;
 use super::findings::Findings;
 use super::record::Record;
 use super::regressor::Plane;
-use super::sanity::extent;
+use super::sanity::{PLAUSIBLE_RANGE, extent};
 use crate::everett::EverettTable;
 
 /// Largest grid that can be identified: the normal matrix of 64 intervals has 2,080 × 2,080 entries.
@@ -40,7 +41,11 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     let [low, high] = plane.range;
     let span = high - low;
     let (bottom, top) = extent(&record.drive);
-    let found = format!("the drive goes from {bottom} V to {top} V, but the table is to cover {low} V to {high} V");
+    let (lowest, highest) = (time_of(record, |u| u <= bottom), time_of(record, |u| u >= top));
+    let found = format!(
+        "the drive goes from {bottom} V (at {lowest} s) to {top} V (at {highest} s), but the table is to cover {low} V to {high} V"
+    );
+    check_displacement_unit(record, findings);
     let ratio = (top - bottom) / span;
     let um = record.displacement_range() * 1e6;
     if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
@@ -60,7 +65,8 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     }
     if bottom < low - BEYOND * span || top > high + BEYOND * span {
         let help = "declare the range in which the record was taken, or record again within the declared one";
-        findings.error("E0605", None, found.clone(), help);
+        let left = time_of(record, |u| u < low - BEYOND * span || u > high + BEYOND * span);
+        findings.error("E0605", None, format!("{found}; it leaves that range at {left} s"), help);
     }
     let interval = plane.interval();
     if bottom > low + interval {
@@ -71,6 +77,30 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
         let message = format!("{found}: no cell with an up_threshold above {top} V was ever excited");
         findings.error("E0606", None, message, "let the last curves rise to the upper end of the drive range");
     }
+}
+
+/// Time of the first sample whose drive fits, s.
+fn time_of(record: &Record, fits: impl Fn(f64) -> bool) -> f64 {
+    record.drive.iter().position(|u| fits(*u)).map_or(record.time[0], |k| record.time[k])
+}
+
+/// A displacement that no piezo actuator makes refuses the identification: a table in a wrong unit would be believed.
+fn check_displacement_unit(record: &Record, findings: &mut Findings) {
+    let (low, high) = extent(&record.displacement);
+    let range = high - low;
+    if (PLAUSIBLE_RANGE[0]..=PLAUSIBLE_RANGE[1]).contains(&range) {
+        return;
+    }
+    let at = |value: f64| record.displacement.iter().position(|y| *y == value).map_or(0.0, |k| record.time[k]);
+    let unit = if range > PLAUSIBLE_RANGE[1] { "nm" } else { "mm or m" };
+    let message = format!(
+        "the displacement goes from {} um (at {} s) to {} um (at {} s), which no piezo actuator does: is it in {unit}?",
+        low * 1e6,
+        at(low),
+        high * 1e6,
+        at(high)
+    );
+    findings.error("E0623", None, message, "convert the column to micrometres");
 }
 
 /// Number of reversal curves: falls from a reversal. Refuses a record with too few of them for the grid.
@@ -130,31 +160,94 @@ pub(crate) fn excited(plane: &Plane, gram: &DMatrix<f64>) -> Vec<bool> {
     excited
 }
 
-/// Warns of cells that were not [`excited`] and names the part of the plane they lie in.
-pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Findings) {
-    let missing = excited.iter().filter(|e| !**e).count();
-    if missing == 0 {
-        return;
-    }
-    let (mut up, mut down) = ([f64::INFINITY, f64::NEG_INFINITY], [f64::INFINITY, f64::NEG_INFINITY]);
-    let threshold = |k: usize| plane.range[0] + k as f64 * plane.interval();
-    for i in 1..=plane.grid {
-        for j in (0..i).filter(|&j| !excited[EverettTable::index(i, j)]) {
-            up = [smaller(up[0], threshold(i - 1)), -smaller(-up[1], -threshold(i))];
-            down = [smaller(down[0], threshold(j)), -smaller(-down[1], -threshold(j + 1))];
-        }
-    }
-    let message = format!(
-        "{missing} of {} cells of the plane were never excited apart from their neighbours (up_threshold {:.3} to {:.3} V, down_threshold {:.3} to {:.3} V); their weights are interpolated",
-        excited.len(),
-        up[0],
-        up[1],
-        down[0],
-        down[1],
-    );
-    findings.warning("W0609", None, message, "add reversal curves that turn back in that part of the range");
+/// A part of the plane, connected over the edges of its cells, that a record does not excite.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Region {
+    /// Cells in it.
+    pub cells: usize,
+    /// Share of all cells.
+    pub share: f64,
+    /// up_thresholds from and to, V.
+    pub up: [f64; 2],
+    /// down_thresholds from and to, V.
+    pub down: [f64; 2],
+    /// The cells as (up, down), for drawing: the cell lies below threshold `up` and above threshold `down`.
+    #[serde(skip)]
+    pub members: Vec<(usize, usize)>,
 }
 
-fn smaller(a: f64, b: f64) -> f64 {
-    if b < a { b } else { a }
+/// Regions named one by one in a message.
+const NAMED: usize = 3;
+
+/// Warns of cells that were not [`excited`], names the parts of the plane they lie in and what the table does there.
+pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Findings) -> Vec<Region> {
+    let regions = regions(plane, excited);
+    if regions.is_empty() {
+        return regions;
+    }
+    let missing = excited.iter().filter(|e| !**e).count();
+    let mut places: Vec<String> = regions
+        .iter()
+        .take(NAMED)
+        .map(|r| {
+            format!(
+                "up_threshold {:.3} to {:.3} V, down_threshold {:.3} to {:.3} V",
+                r.up[0], r.up[1], r.down[0], r.down[1]
+            )
+        })
+        .collect();
+    if regions.len() > NAMED {
+        places.push(format!("{} smaller parts", regions.len() - NAMED));
+    }
+    let message = format!(
+        "{missing} of {} cells of the plane ({:.1} %) were never excited apart from their neighbours ({}): there the record holds only sums of weights. \
+         No weight is added to these sums; within a part the table divides them evenly, a straight line between the measured curves around it",
+        excited.len(),
+        100.0 * missing as f64 / excited.len() as f64,
+        places.join("; "),
+    );
+    findings.warning("W0609", None, message, "add reversal curves that turn back in that part of the range");
+    regions
+}
+
+/// Connected parts of cells that are not excited, the largest first.
+fn regions(plane: &Plane, excited: &[bool]) -> Vec<Region> {
+    let grid = plane.grid;
+    let threshold = |k: usize| plane.range[0] + k as f64 * plane.interval();
+    let mut seen = excited.to_vec();
+    let mut regions = Vec::new();
+    for up in 1..=grid {
+        for down in 0..up {
+            if seen[EverettTable::index(up, down)] {
+                continue;
+            }
+            seen[EverettTable::index(up, down)] = true;
+            let mut members = vec![(up, down)];
+            let mut next = 0;
+            while let Some(&(i, j)) = members.get(next) {
+                next += 1;
+                for (a, b) in [(i + 1, j), (i - 1, j), (i, j + 1), (i, j.wrapping_sub(1))] {
+                    if a <= grid && b < a && !seen[EverettTable::index(a, b)] {
+                        seen[EverettTable::index(a, b)] = true;
+                        members.push((a, b));
+                    }
+                }
+            }
+            members.sort_unstable();
+            let (mut ups, mut downs) = ([up, up], [down, down]);
+            for &(i, j) in &members {
+                ups = [ups[0].min(i), ups[1].max(i)];
+                downs = [downs[0].min(j), downs[1].max(j)];
+            }
+            regions.push(Region {
+                cells: members.len(),
+                share: members.len() as f64 / excited.len() as f64,
+                up: [threshold(ups[0] - 1), threshold(ups[1])],
+                down: [threshold(downs[0]), threshold(downs[1] + 1)],
+                members,
+            });
+        }
+    }
+    regions.sort_by_key(|r| std::cmp::Reverse(r.cells));
+    regions
 }

@@ -90,11 +90,12 @@ pub fn accumulate(
     let mut pending = branches.iter().peekable();
     each_row(plane, &record.drive, first, |k, row| {
         let weight = match weighting {
+            _ if record.weightless[k] => 0.0,
             Weighting::Even => 1.0,
             Weighting::AtNodes => node_weight(plane, record.drive[k]),
         };
         while let Some(branch) = pending.peek() {
-            if k >= branch.first {
+            if k >= branch.first && weight > 0.0 {
                 fill(k, &mut values);
                 sums.add(row, &values, weight);
             }

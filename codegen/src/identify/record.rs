@@ -7,6 +7,7 @@ use std::io::Read;
 use std::path::Path;
 
 use super::columns::{self, DISPLACEMENT, DRIVE, NAMES, TIME};
+use super::distrust;
 use super::findings::Findings;
 use super::sanity;
 use crate::diagnostic::Diagnostic;
@@ -28,6 +29,8 @@ pub struct Record {
     pub drive: Vec<f64>,
     /// Displacement, m.
     pub displacement: Vec<f64>,
+    /// Samples that no fit believes: glitches, and what follows a jump of the drive.
+    pub weightless: Vec<bool>,
     /// Findings that refuse nothing.
     pub warnings: Vec<Diagnostic>,
 }
@@ -112,8 +115,9 @@ fn finish(
         return Err(findings.into_diagnostics());
     }
     let [time, drive, displacement] = columns;
+    let weightless = distrust::weightless(&lines, &time, &drive, &displacement, &mut findings);
     let warnings = findings.into_diagnostics();
-    Ok(Record { shown_as: shown_as.to_owned(), time, drive, displacement, warnings })
+    Ok(Record { shown_as: shown_as.to_owned(), time, drive, displacement, weightless, warnings })
 }
 
 /// The text of the file without a byte order mark, or `None` after the reason was reported.
@@ -194,7 +198,7 @@ fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 
 }
 
 /// The number in a field, or NaN after the problem was reported.
-fn number(field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> f64 {
+pub(crate) fn number(field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> f64 {
     let Some(field) = field else {
         findings.error(
             "E0506",

@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+use super::cause::Cause;
+use super::coverage::Region;
+
 /// Which branches the table was fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -60,6 +63,12 @@ pub struct Report {
     pub dead_time_basis: String,
     /// Standard deviation of white noise on the displacement.
     pub noise_floor: f64,
+    /// Used samples that got no weight: glitches, and what follows a jump of the drive.
+    pub weightless: usize,
+    /// What the residual behind `fit_rms` consists of.
+    pub cause: Cause,
+    /// Parts of the plane that the record does not excite, largest first.
+    pub unexcited: Vec<Region>,
     /// Weights that are zero because the data would make them negative.
     pub zero_weights: usize,
     /// Weights in all.

@@ -1,9 +1,11 @@
 //! What a fitted table leaves of its own record.
 
 use super::branches::Branch;
+use super::cause::{self, Cause};
 use super::record::Record;
 use super::regressor::{self, Plane};
 use super::selection::Used;
+use super::trace::Trace;
 use super::{normal, sanity, trend};
 use crate::everett::EverettTable;
 
@@ -11,7 +13,7 @@ use crate::everett::EverettTable;
 pub(crate) struct Residual {
     /// As it is, m.
     plain: Vec<f64>,
-    /// Without `line`, m.
+    /// Without `line`, of the samples that have weight, m.
     pub(crate) detrended: Vec<f64>,
     /// Offset (m) and linear drift (m/s) of `plain`.
     pub(crate) line: trend::Line,
@@ -26,11 +28,30 @@ impl Residual {
         normal::each_row(plane, &record.drive, used.first, |k, row| {
             plain.push(displacement[k] - regressor::evaluate(row, &table.nodes));
         });
-        let time = &record.time[used.first..];
-        let line = trend::Line::fit(time, &plain);
-        let detrended = plain.iter().zip(time).map(|(r, t)| r - line.at(*t)).collect();
-        let (low, high) = sanity::extent(&displacement[used.first..]);
+        let believed = |values: &[f64]| -> Vec<f64> {
+            let paired = values.iter().zip(&record.weightless[used.first..]);
+            paired.filter(|(_, weightless)| !**weightless).map(|(v, _)| *v).collect()
+        };
+        let (time, kept) = (believed(&record.time[used.first..]), believed(&plain));
+        let line = trend::Line::fit(&time, &kept);
+        let detrended = kept.iter().zip(&time).map(|(r, t)| r - line.at(*t)).collect();
+        let (low, high) = sanity::extent(&believed(&displacement[used.first..]));
         Self { plain, detrended, line, range: high - low }
+    }
+
+    /// What it consists of, given white noise `noise` (m) and the gain (m/V).
+    pub(crate) fn cause(&self, record: &Record, first: usize, noise: f64, gain: f64) -> Cause {
+        let keep: Vec<bool> = record.weightless[first..].iter().map(|w| !w).collect();
+        cause::explain(&record.time[first..], &record.drive[first..], &self.plain, noise, gain, &keep)
+    }
+
+    /// The samples from the first used one on, for drawing; `displacement` as given to [`Residual::of`].
+    pub(crate) fn trace(&self, record: &Record, first: usize, displacement: &[f64]) -> Trace {
+        let time = record.time[first..].to_vec();
+        let off =
+            |k: usize| if record.weightless[first + k] { f64::NAN } else { self.plain[k] - self.line.at(time[k]) };
+        let residual = (0..time.len()).map(off).collect();
+        Trace { time, drive: record.drive[first..].to_vec(), measured: displacement[first..].to_vec(), residual }
     }
 
     /// Root mean square over `branches` with the mean of each branch removed, m.

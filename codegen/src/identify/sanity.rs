@@ -2,6 +2,7 @@
 
 use super::columns::{DISPLACEMENT, DRIVE, TIME};
 use super::findings::Findings;
+use super::limits;
 
 /// Fewer samples are no record.
 pub const MIN_SAMPLES: usize = 100;
@@ -10,28 +11,32 @@ const GAP: f64 = 10.0;
 /// The displacement may stay exactly equal while the drive travels this share of its range; longer is a stuck or limited sensor.
 const STUCK_TRAVEL: f64 = 0.05;
 /// A displacement range outside these bounds (m) is unusual for a piezo actuator and suggests another unit.
-const PLAUSIBLE_RANGE: [f64; 2] = [50e-9, 2e-3];
+pub(crate) const PLAUSIBLE_RANGE: [f64; 2] = [50e-9, 2e-3];
 
 /// Checks columns of finite numbers in s, V, m; `lines[k]` is where sample k stands in the file.
 pub(crate) fn check(lines: &[usize], columns: &[Vec<f64>; 3], findings: &mut Findings) {
     let [time, drive, displacement] = columns;
     if time.len() < MIN_SAMPLES {
-        let message = format!("has {} samples; at least {MIN_SAMPLES} are needed", time.len());
+        let until = time.last().map_or_else(String::new, |t| format!(" and ends at {t} s"));
+        let message = format!("has {} samples{until}; at least {MIN_SAMPLES} are needed", time.len());
         findings.error("E0509", None, message, "record more samples per reversal curve");
         return;
     }
     check_time(lines, time, findings);
     let moving = [(drive, "drive_V", DRIVE), (displacement, "displacement_um", DISPLACEMENT)]
         .into_iter()
-        .all(|(column, name, which)| check_not_constant(column, name, which, findings));
+        .all(|(column, name, which)| check_not_constant(time, column, name, which, findings));
     if moving {
-        check_stuck(lines, drive, displacement, findings);
-        check_sign(drive, displacement, findings);
-        check_displacement_unit(displacement, findings);
+        check_stuck(lines, time, drive, displacement, findings);
+        check_sign(time, drive, displacement, findings);
+        check_displacement_unit(time, displacement, findings);
+    }
+    if !findings.any_error() {
+        limits::check(lines, time, drive, displacement, findings);
     }
 }
 
-fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings) {
+pub(crate) fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings) {
     let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
     let mut increasing = true;
     for (k, dt) in intervals.iter().enumerate().filter(|(_, dt)| **dt <= 0.0) {
@@ -64,18 +69,18 @@ fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings) {
     }
 }
 
-fn check_not_constant(column: &[f64], name: &str, which: usize, findings: &mut Findings) -> bool {
+fn check_not_constant(time: &[f64], column: &[f64], name: &str, which: usize, findings: &mut Findings) -> bool {
     let (low, high) = extent(column);
     if low < high {
         return true;
     }
     let shown = if which == DISPLACEMENT { low * 1e6 } else { low };
-    let message = format!("`{name}` is {shown} in every sample");
+    let message = format!("`{name}` is {shown} in every sample, from {} s to {} s", time[0], time[time.len() - 1]);
     findings.error("E0512", None, message, "record while the drive runs through its range; is the channel connected?");
     false
 }
 
-fn check_stuck(lines: &[usize], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
+fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
     let (low, high) = extent(drive);
     let (bottom, top) = extent(displacement);
     let mut first = 0;
@@ -87,7 +92,9 @@ fn check_stuck(lines: &[usize], drive: &[f64], displacement: &[f64], findings: &
             let um = value * 1e6;
             let what = if value == bottom || value == top { "is limited at" } else { "is stuck at" };
             let message = format!(
-                "the displacement {what} {um} um for {run} samples while the drive goes through {run_low} V to {run_high} V"
+                "from {} s to {} s the displacement {what} {um} um for {run} samples while the drive goes through {run_low} V to {run_high} V",
+                time[first],
+                time[first + run - 1]
             );
             findings.error(
                 "E0513",
@@ -101,7 +108,7 @@ fn check_stuck(lines: &[usize], drive: &[f64], displacement: &[f64], findings: &
 }
 
 /// Displacement must grow with the drive: a Preisach model with non-negative weights cannot do otherwise.
-fn check_sign(drive: &[f64], displacement: &[f64], findings: &mut Findings) {
+fn check_sign(time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
     let count = drive.len() as f64;
     let mean = |x: &[f64]| x.iter().fold(0.0, |sum, v| sum + v) / count;
     let (mean_u, mean_y) = (mean(drive), mean(displacement));
@@ -112,26 +119,48 @@ fn check_sign(drive: &[f64], displacement: &[f64], findings: &mut Findings) {
         uy += (u - mean_u) * (y - mean_y);
     }
     let correlation = uy / (uu * yy).sqrt();
+    if correlation < 0.5 {
+        relation(time, drive, displacement, correlation, findings);
+    }
+}
+
+/// Reports a relation that no actuator has, with the stretch of the record that shows it best.
+fn relation(time: &[f64], drive: &[f64], displacement: &[f64], correlation: f64, findings: &mut Findings) {
+    let at = |value: f64| drive.iter().position(|u| *u == value).unwrap_or(0);
+    let (low, high) = extent(drive);
+    let (a, b) = (at(low).min(at(high)), at(low).max(at(high)));
+    let shown = format!(
+        "between {} s and {} s the drive goes from {} V to {} V and the displacement from {:.4} um to {:.4} um",
+        time[a],
+        time[b],
+        drive[a],
+        drive[b],
+        displacement[a] * 1e6,
+        displacement[b] * 1e6
+    );
     if correlation < -0.5 {
-        let message = format!("the displacement falls when the drive rises (correlation {correlation:.2})");
+        let message = format!("the displacement falls when the drive rises (correlation {correlation:.2}): {shown}");
         findings.error("E0514", None, message, "change the sign of one of the two columns");
-    } else if correlation < 0.5 {
+    } else {
         let message = format!(
-            "the displacement hardly follows the drive (correlation {correlation:.2}; a piezo actuator shows more than 0.9)"
+            "the displacement hardly follows the drive (correlation {correlation:.2}; a piezo actuator shows more than 0.9): {shown}"
         );
         findings.error("E0514", None, message, "check that `drive_V` and `displacement_um` hold what their names say");
     }
 }
 
-fn check_displacement_unit(displacement: &[f64], findings: &mut Findings) {
+fn check_displacement_unit(time: &[f64], displacement: &[f64], findings: &mut Findings) {
     let (low, high) = extent(displacement);
     let range = high - low;
     let um = range * 1e6;
+    let at = |value: f64| displacement.iter().position(|y| *y == value).map_or(0.0, |k| time[k]);
+    let times = format!("least at {} s, most at {} s", at(low), at(high));
     if range > PLAUSIBLE_RANGE[1] {
-        let message = format!("the displacement covers {um:.0} um, too much for a piezo actuator: is it in nm?");
+        let message =
+            format!("the displacement covers {um:.0} um ({times}), too much for a piezo actuator: is it in nm?");
         findings.warning("W0515", None, message, "convert the column to micrometres");
     } else if range < PLAUSIBLE_RANGE[0] {
-        let message = format!("the displacement covers only {um:.2e} um: is it in mm or m?");
+        let message = format!("the displacement covers only {um:.2e} um ({times}): is it in mm or m?");
         findings.warning("W0515", None, message, "convert the column to micrometres");
     }
 }

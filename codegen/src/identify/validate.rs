@@ -3,12 +3,15 @@
 use serde::Serialize;
 
 use super::branches::branches;
+use super::cause::{self, Cause};
+use super::distrust::{JUMP, SETTLING};
 use super::findings::Findings;
 use super::normal;
 use super::record::Record;
 use super::regressor::{self, Plane};
 use super::staircase::Staircase;
-use super::trend::{Line, rms_and_max};
+use super::trace::Trace;
+use super::trend::{Line, noise_floor, rms_and_max};
 use super::{dead_time, sanity};
 use crate::diagnostic::Diagnostic;
 use crate::everett::EverettTable;
@@ -57,14 +60,15 @@ pub struct Validation {
     pub dead_time: f64,
     /// The start that fits best. It is one discrete unknown of the record, estimated from it.
     pub best: StartResult,
+    /// What the residual under that start consists of.
+    pub cause: Cause,
+    /// Samples compared and their errors, for drawing.
+    #[serde(skip)]
+    pub trace: Trace,
     /// Every start that was tried, in the order of [`Start`].
     pub starts: Vec<StartResult>,
 }
 
-/// A step between two samples by this share of the drive range is a jump, which a rate-independent model cannot follow.
-const JUMP: f64 = 0.1;
-/// Samples that are not compared from a jump on.
-const SETTLING: usize = 200;
 /// Swings of a demagnetisation.
 const SWINGS: u32 = 100;
 
@@ -101,16 +105,22 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
         return Err(findings.into_diagnostics());
     };
     let displacement = dead_time::delayed(record, dead_time);
-    let compared = compared(&record.drive, first, JUMP * (plane.range[1] - plane.range[0]));
+    let jumps = compared(&record.drive, first, JUMP * (plane.range[1] - plane.range[0]));
+    let samples_after_jumps = record.time.len() - first - jumps.len();
+    let compared: Vec<usize> = jumps.into_iter().filter(|&k| !record.weightless[k]).collect();
     let time: Vec<f64> = compared.iter().map(|&k| record.time[k]).collect();
     let (bottom, top) = sanity::extent(&compared.iter().map(|&k| displacement[k]).collect::<Vec<_>>());
     let range = top - bottom;
-    let run = |start: Start| {
+    let errors_of = |start: Start| {
         let mut all = Vec::with_capacity(displacement.len() - first);
         let memory = history(start, &plane, record.drive[first]);
         normal::each_row_from(memory, &plane, &record.drive, first, |k, row| {
             all.push(displacement[k] - regressor::evaluate(row, &table.nodes));
         });
+        all
+    };
+    let run = |start: Start| {
+        let all = errors_of(start);
         let mut errors: Vec<f64> = compared.iter().map(|&k| all[k - first]).collect();
         let line = Line::fit(&time, &errors);
         for (e, t) in errors.iter_mut().zip(&time) {
@@ -122,14 +132,29 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
     };
     let starts = [Start::NegativeSaturation, Start::PositiveSaturation, Start::Demagnetised].map(run);
     let best = starts.iter().fold(starts[0], |best, s| if s.rms < best.rms { *s } else { best });
+    let mut keep = vec![false; record.time.len() - first];
+    compared.iter().for_each(|&k| keep[k - first] = true);
+    let noise = noise_floor(&record.displacement[first..]);
+    let gain = table.node(table.grid, 0) / (plane.range[1] - plane.range[0]);
+    let errors = errors_of(best.start);
+    let cause = cause::explain(&record.time[first..], &record.drive[first..], &errors, noise, gain, &keep);
+    let line = Line::fit(&time, &compared.iter().map(|&k| errors[k - first]).collect::<Vec<_>>());
+    let trace = Trace {
+        drive: compared.iter().map(|&k| record.drive[k]).collect(),
+        measured: compared.iter().map(|&k| displacement[k]).collect(),
+        residual: compared.iter().zip(&time).map(|(&k, t)| errors[k - first] - line.at(*t)).collect(),
+        time,
+    };
     Ok(Validation {
         record: record.shown_as.clone(),
         samples_skipped: first,
-        samples_after_jumps: record.time.len() - first - compared.len(),
+        samples_after_jumps,
         samples: compared.len(),
         displacement_range: range,
         dead_time,
         best,
+        cause,
+        trace,
         starts: starts.to_vec(),
     })
 }

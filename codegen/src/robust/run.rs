@@ -15,8 +15,8 @@ use crate::tuning::{Case, Conditions, Setting, TrajectoryChoice};
 
 /// Status bits of legs at a limit of voltage or slew.
 const LIMITS: u32 = 0x3f;
-/// Status bits of gauges that are not believed, and of set-points that are refused or stale.
-const FAULTS: u32 = 0x3f00 | 0x1_0000 | 0x2_0000;
+/// Status bits of gauges or forces that are not believed, and of set-points that are refused or stale.
+const FAULTS: u32 = 0x3f00 | 0x1_0000 | 0x2_0000 | 0x8_0000;
 
 /// What a run that kept its bound did.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
@@ -31,7 +31,7 @@ pub struct Figures {
     pub orientation_peak_nrad: f64,
     /// Part of the ticks with a leg at a limit, %.
     pub limited_percent: f64,
-    /// Ticks with a bad gauge, a set-point refused or stale.
+    /// Ticks with a bad gauge or force, a set-point refused or stale.
     pub fault_ticks: u64,
     /// Their status bits.
     pub fault_bits: u32,

@@ -4,7 +4,7 @@ use super::fields::Fields;
 use super::{joints, task_space};
 use crate::model::{
     Actuator, Adaptation, AdaptationMode, Amplifier, ControllerOptions, Dac, Geometry, Hysteresis, LegBody, Mcu, Model,
-    RigidBody, Robust, Scalar, Sensor, SetpointKind, Target, Timing, Workspace,
+    RateDependence, RigidBody, Robust, Scalar, Sensor, SetpointKind, Target, Timing, Workspace,
 };
 
 /// The model, or `None` if a value is missing: then there is a finding for it.
@@ -47,6 +47,8 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
             grid: f.whole("hysteresis.grid")?,
             memory: f.whole("hysteresis.memory")?,
             records: f.texts("hysteresis.records")?.to_vec(),
+            rate: rate(f)?,
+            dead_time: f.number("hysteresis.dead_time")?,
         },
         adaptation: adaptation(f)?,
         timing: Timing { period: f.number("timing.period")? },
@@ -59,6 +61,18 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
         task_space: task_space::task_space(f)?,
         robust: robust(f),
         spans: f.spans(),
+    })
+}
+
+fn rate(f: &Fields) -> Option<RateDependence> {
+    Some(match f.choice("hysteresis.rate")? {
+        "dynamic-preisach" => RateDependence::DynamicPreisach(f.texts("hysteresis.rate_tables")?.to_vec()),
+        "creep" => {
+            let times = f.numbers("hysteresis.creep_times")?;
+            let weights = f.numbers("hysteresis.creep_weights")?;
+            RateDependence::Creep(times.iter().zip(weights).map(|(time, weight)| [*time, *weight]).collect())
+        }
+        _ => RateDependence::Static,
     })
 }
 

@@ -8,6 +8,7 @@ mod control;
 mod electrical;
 mod gauges;
 mod mechanics;
+mod rate;
 mod records;
 mod robust;
 mod trajectories;
@@ -48,6 +49,9 @@ const CHECKS: &[Check] = &[
     control::cutoff_below_tick_rate,
     control::environment_for_model,
     control::bias_inside_workspace,
+    rate::keys_of_option,
+    rate::creep_lists,
+    rate::dead_time_of_legs,
     gauges::six,
     gauges::directions,
     gauges::calibrated_alike,

@@ -127,6 +127,7 @@ pub struct Case {
     stroke: f64,
 }
 
+#[allow(clippy::large_enum_variant)] // One for each case, never in a list.
 enum Kind {
     Platform {
         study: PlatformStudy,

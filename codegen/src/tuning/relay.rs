@@ -3,7 +3,7 @@
 //!
 //! One axis at a time, at the bias pose. The relay stands where k_p would: behind the modal notch, and its force ± d asks the
 //! legs for K⁻¹ d. The emitted controller turns that motion into voltages in mode F with the inverse model alone, so that
-//! the hysteresis is compensated as it will be. On the bare loop the test finds the first resonance; with the notch in it
+//! the hysteresis is compensated as it will be; its lead, which works on set-points and not on feedback, is undone. On the bare loop the test finds the first resonance; with the notch in it
 //! finds where the lag of amplifier, notch and tick turn the phase.
 
 use core::f64::consts::PI;
@@ -47,7 +47,8 @@ impl Ultimate {
     }
 }
 
-/// The test on each axis; none where no oscillation came up.
+/// The test on each axis; none where no oscillation came up. `radius` of the platform joints (m), `lead` of the set-point
+/// (ticks).
 ///
 /// # Errors
 /// If the machine does not come to its bias pose.
@@ -55,7 +56,7 @@ pub fn test(
     scenario: &PlatformScenario,
     controller: &Controller,
     closed_loop: &ClosedLoop,
-    radius: f64,
+    [radius, lead]: [f64; 2],
 ) -> Result<[Option<Ultimate>; 6], RunError> {
     let mut out = [None; 6];
     for (axis, found) in out.iter_mut().enumerate() {
@@ -63,7 +64,8 @@ pub fn test(
         let mut words = controller.default_config();
         controller.description().set_config(&mut words, "mode", OPEN)?;
         controller.configure(&words)?;
-        *found = one_axis(scenario, &mut controller, closed_loop, axis, if axis < 3 { 1.0 } else { 1.0 / radius })?;
+        let unit = if axis < 3 { 1.0 } else { 1.0 / radius };
+        *found = one_axis(scenario, &mut controller, closed_loop, axis, [unit, lead])?;
     }
     Ok(out)
 }
@@ -74,7 +76,7 @@ fn one_axis(
     controller: &mut Controller,
     closed_loop: &ClosedLoop,
     axis: usize,
-    unit: f64,
+    [unit, lead]: [f64; 2],
 ) -> Result<Option<Ultimate>, RunError> {
     let options = &scenario.options;
     let mut rig = scenario.rig().clone();
@@ -94,6 +96,7 @@ fn one_axis(
     let mut notch = ModalNotch::of(closed_loop);
     let center = bench.rig().machine().pose();
     let mut relay = Relay::default();
+    let mut asked = 0.0;
     for tick in 0..PATIENCE {
         let pose = bench.rig().machine().pose();
         let error = notch.filter(&std::array::from_fn(|k| center[k] - pose[k]))[axis];
@@ -101,7 +104,9 @@ fn one_axis(
         if let Some((gain, period)) = relay.found {
             return Ok(Some(Ultimate { gain, period: period * options.interval }));
         }
-        bench.tick(&Request::stream(PoseTarget { pose: motion.map(|x| x * output), ..PoseTarget::default() }))?;
+        // The controller asks for r + lead (r − r_last): this r makes it the relay's output.
+        asked = (output + lead * asked) / (1.0 + lead);
+        bench.tick(&Request::stream(PoseTarget { pose: motion.map(|x| x * asked), ..PoseTarget::default() }))?;
     }
     Ok(None)
 }

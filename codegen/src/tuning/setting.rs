@@ -12,6 +12,7 @@ const LEG_SETPOINTS: f64 = 1.0;
 
 /// Numbers of a controller of either kind.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[allow(clippy::large_enum_variant)] // A box would cost it `Copy`, and there are no more of them than candidates.
 pub enum Setting {
     /// Six legs with their own gauges: weights per run.
     Legs {

@@ -10,6 +10,8 @@
 //! |---|---|---|
 //! | [`everett`] | Everett function on a grid: look-up and inverse along one branch | section 3 |
 //! | [`memory`] | reversal memory: forward Preisach model, its inverse, bounded storage | section 3, operator Γ and Γ⁻¹ |
+//! | [`dynamic`] | rate-dependent model and inverse: a second weight times the rate of the drive | section 3, (6) |
+//! | [`creep`] | rate dependence as creep behind the static model, and its inverse | |
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
 //! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
 //! | [`feedback`] | position feedback with anti-windup | (7) |
@@ -33,8 +35,10 @@
 
 pub mod adaptation;
 pub mod attitude;
+pub mod creep;
 pub mod dac;
 pub mod digest;
+pub mod dynamic;
 pub mod dynamics;
 pub mod everett;
 pub mod feedback;
@@ -53,8 +57,10 @@ pub mod velocity;
 
 pub use adaptation::{Estimate, Law};
 pub use attitude::{Attitude, Series};
+pub use creep::{Creep, CreepEverett, CreepMemory};
 pub use dac::{CodeLimits, Dac};
 pub use digest::Digest;
+pub use dynamic::{DynamicEverett, DynamicMemory};
 pub use dynamics::{Load, Platform};
 pub use everett::Everett;
 pub use feedback::{Gains, Integral};

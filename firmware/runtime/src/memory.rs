@@ -32,6 +32,17 @@ pub struct ReversalMemory<T, const CAP: usize> {
     dropped: u32,
 }
 
+/// Where a branch starts.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Origin<T> {
+    /// Which extremum it starts at; [`ReversalMemory::depth`] if that is the present point, which would become one.
+    pub(crate) place: usize,
+    /// Drive there, cells.
+    pub(crate) start: T,
+    /// Displacement there, m.
+    pub(crate) at_start: T,
+}
+
 /// A branch that a drive may be on: what a look-up found, for the drive that is then applied.
 #[derive(Clone, Copy)]
 struct Branch<T> {
@@ -240,6 +251,35 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
             table.fall(start, self.drive, at_start - wanted)
         };
         (drive, Branch { top, at_start, line })
+    }
+
+    /// Where the branch starts that [`ReversalMemory::apply`] of `drive` would end on. Does not change the memory.
+    #[inline]
+    pub(crate) fn origin(&self, drive: T) -> Origin<T> {
+        let rising = drive > self.drive;
+        let (mut start, mut at_start, mut place) = if rising == self.is_rising() {
+            let top = self.len - 1;
+            (self.extremum(top), self.displacement_at(top), top)
+        } else {
+            (self.drive, self.displacement, self.len)
+        };
+        while place >= 2 {
+            let bound = self.extremum(place - 1);
+            let wiped_out = if rising { drive >= bound } else { drive <= bound };
+            if !wiped_out {
+                break;
+            }
+            place -= 2;
+            start = self.extremum(place);
+            at_start = self.displacement_at(place);
+        }
+        Origin { place, start, at_start }
+    }
+
+    /// Extremum `k`, cells.
+    #[inline]
+    pub(crate) fn extremum_at(&self, k: usize) -> T {
+        self.extremum(k)
     }
 
     /// Adds everything that the future depends on to a digest.

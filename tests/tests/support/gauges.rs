@@ -67,11 +67,11 @@ fn table(model: &Model) -> EverettTable {
 
 pub fn lowered(model: &Model) -> Result<Ir, Vec<Diagnostic>> {
     let Some(task) = model.task_space.as_ref() else {
-        return lower::lower(model, None, &[table(model)], &"0".repeat(64));
+        return lower::lower(model, None, &[table(model)], &[], &"0".repeat(64));
     };
     let design = platform::design(model, task, &RestDynamics::of(&lower::platform(model)?))?;
     let (setpoints, _) = lower::setpoint::lower(model, task, &[], lower::scalar(model))?;
-    lower::lower(model, Some((&design, setpoints)), &[table(model)], &"0".repeat(64))
+    lower::lower(model, Some((&design, setpoints)), &[table(model)], &[], &"0".repeat(64))
 }
 
 pub fn with_scalar(mut model: Model, scalar: Scalar) -> Model {

@@ -103,7 +103,8 @@ fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failu
     let mut scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), seed);
     scenario.options.latency = job.arguments.latency as usize;
     let radius = model.geometry.joint_radius();
-    relay::test(&scenario, &job.controller, closed_loop, radius).map(Some).map_err(environment)
+    let lead = task.lead / model.timing.period;
+    relay::test(&scenario, &job.controller, closed_loop, [radius, lead]).map(Some).map_err(environment)
 }
 
 /// PI gains of the relay test in place of the spec's; none if an axis did not oscillate.

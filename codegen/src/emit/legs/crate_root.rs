@@ -3,10 +3,11 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::emit::identity;
+use crate::emit::{hysteresis, identity};
 use crate::ir::Ir;
 
 pub fn emit(ir: &Ir) -> TokenStream {
+    let (rate_doc, static_inverse) = (hysteresis::rate_doc(ir), hysteresis::status_name(ir));
     let title = identity::title(ir);
     let identity = identity::emit(ir);
     quote! {
@@ -21,6 +22,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " u = Γ⁻¹(T − δ̂ − φ̂)                  hysteresis     inverse Preisach model, (AII.2), (AII.4)"]
         #![doc = " code, ρ̂X = Γ(voltage(code))         limits         voltage, slew rate, converter; what was really requested"]
         #![doc = " ```"]
+        #(#![doc = #rate_doc])*
         #![doc = ""]
         #![doc = " SI units throughout (m, rad, V, s); poses are measured from rest in the base frame {B}. No panic, no allocation, no"]
         #![doc = " `unsafe`; every voltage is finite and within limits whatever the inputs. `Config` holds what may change while running,"]
@@ -44,7 +46,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};
         pub use specgen_runtime::{CodeLimits, Law};
         pub use state::{LegState, State};
-        pub use step::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, TickInput, TickOutput, actuate, step};
+        pub use step::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, #static_inverse TickInput, TickOutput, actuate, step};
         pub use words::{
             CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words,
         };

@@ -5,7 +5,18 @@ use quote::quote;
 
 use crate::ir::Ir;
 
-pub fn emit(_ir: &Ir) -> TokenStream {
+pub fn emit(ir: &Ir) -> TokenStream {
+    let (lead_field, no_lead, digest_lead) = match &ir.hysteresis.lead {
+        None => (quote! {}, quote! {}, quote! {}),
+        Some(_) => (
+            quote! {
+                /// What the leg is asked for beyond the demand, so that it arrives in time, m.
+                pub lead: Real,
+            },
+            quote! { lead: 0.0, },
+            quote! { digest.real(leg.lead); },
+        ),
+    };
     quote! {
         #![doc = " What the controller remembers from tick to tick. No NaN or infinity is ever stored here."]
 
@@ -23,6 +34,7 @@ pub fn emit(_ir: &Ir) -> TokenStream {
             pub estimate: Estimate<Real>,
             /// Converter code now held at the output.
             pub code: i32,
+            #lead_field
         }
 
         /// State of the controller.
@@ -46,7 +58,7 @@ pub fn emit(_ir: &Ir) -> TokenStream {
             /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there, no correction.
             #[must_use]
             pub const fn new() -> Self {
-                let leg = LegState { memory: Memory::new(), estimate: Estimate::new(), code: limits::CODES[0] };
+                let leg = LegState { memory: Memory::new(), estimate: Estimate::new(), code: limits::CODES[0], #no_lead };
                 Self { legs: [leg; LEGS], demand: [0.0; LEGS], ticks_in_run: 0 }
             }
 
@@ -58,6 +70,7 @@ pub fn emit(_ir: &Ir) -> TokenStream {
                     leg.memory.digest(&mut digest);
                     leg.estimate.digest(&mut digest);
                     digest.word(leg.code as u32 as u64);
+                    #digest_lead
                 }
                 for demand in &self.demand {
                     digest.real(*demand);

@@ -3,9 +3,11 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::ir::Ir;
+use crate::ir::{Ir, RateModel};
 
-pub fn emit(_ir: &Ir) -> TokenStream {
+pub fn emit(ir: &Ir) -> TokenStream {
+    let Variant { imports, status_bit, status, demand_before, take_lead, requested, model, out_of_reach, request } =
+        Variant::of(ir);
     quote! {
         #![doc = " One control tick."]
         #![doc = ""]
@@ -14,7 +16,7 @@ pub fn emit(_ir: &Ir) -> TokenStream {
 
         use specgen_runtime::{Law, Real as _};
 
-        use crate::hysteresis::{TABLES, Table};
+        use crate::hysteresis::{#imports TABLES, Table};
         use crate::limits::{self, DAC};
         use crate::{Config, LEGS, LegState, Real, SetpointKind, State, kinematics};
 
@@ -24,6 +26,7 @@ pub fn emit(_ir: &Ir) -> TokenStream {
         pub const GAUGE_FAULT: u32 = 0x3f00;
         /// Bit 16: set-point not finite or out of bounds; the last accepted one was held.
         pub const SETPOINT_FAULT: u32 = 0x1_0000;
+        #status_bit
 
         /// What a tick reads.
         #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,6 +59,7 @@ pub fn emit(_ir: &Ir) -> TokenStream {
 
         /// One control tick. See the module for the timing.
         pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
+            #demand_before
             let accepted = take_setpoint(config, state, input);
             let run_ends = count_run(config, state);
             let mut output = TickOutput {
@@ -73,13 +77,14 @@ pub fn emit(_ir: &Ir) -> TokenStream {
                 if config.law() == Law::Invhys || (run_ends && gauge_good) {
                     adapt(config, leg, gauge);
                 }
+                #take_lead
                 let limited = actuate(config, leg, table, state.demand[index]);
                 output.voltage[index] = DAC.voltage(leg.code);
-                output.requested[index] = leg.memory.displacement();
+                output.requested[index] = #requested;
                 output.level[index] = leg.estimate.level;
                 output.drift[index] = leg.estimate.drift;
                 output.dac_code[index] = leg.code;
-                output.status |= (limited as u32) << index | (!gauge_good as u32) << (8 + index);
+                output.status |= (limited as u32) << index | (!gauge_good as u32) << (8 + index) #status;
             }
             output
         }
@@ -112,7 +117,7 @@ pub fn emit(_ir: &Ir) -> TokenStream {
         /// m = Y − ρ̂X, then (AII.3) or (AII.5), (AII.6).
         #[inline]
         fn adapt(config: &Config, leg: &mut LegState, gauge: Real) {
-            let model_error = gauge - leg.memory.displacement();
+            let model_error = gauge - #model;
             leg.estimate.update(config.law(), config.level_weight(), config.drift_weight(), model_error);
         }
 
@@ -120,13 +125,69 @@ pub fn emit(_ir: &Ir) -> TokenStream {
         /// limit of table, voltage or slew rate held the leg back.
         #[inline]
         pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, demand: Real) -> bool {
-            let request = demand - leg.estimate.correction();
-            let out_of_reach = !(request >= Real::ZERO && request <= table.full_displacement());
+            let request = #request - leg.estimate.correction();
+            let out_of_reach = #out_of_reach;
             let drive = leg.memory.solve(table, request);
             let (code, held_back) = DAC.code(drive, leg.code, config.code_limits());
             leg.code = code;
             leg.memory.apply(table, DAC.drive(code));
             out_of_reach || held_back
         }
+    }
+}
+
+/// What a rate-dependent model or a lead changes in the tick.
+struct Variant {
+    imports: TokenStream,
+    status_bit: TokenStream,
+    status: TokenStream,
+    demand_before: TokenStream,
+    take_lead: TokenStream,
+    requested: TokenStream,
+    model: TokenStream,
+    out_of_reach: TokenStream,
+    request: TokenStream,
+}
+
+impl Variant {
+    fn of(ir: &Ir) -> Self {
+        let h = &ir.hysteresis;
+        let mut variant = Self {
+            imports: quote! {},
+            status_bit: quote! {},
+            status: quote! {},
+            demand_before: quote! {},
+            take_lead: quote! {},
+            requested: quote! { leg.memory.displacement() },
+            model: quote! { leg.memory.displacement() },
+            out_of_reach: quote! { !(request >= Real::ZERO && request <= table.full_displacement()) },
+            request: quote! { demand },
+        };
+        if h.rate.is_some() {
+            variant.out_of_reach = quote! { !leg.memory.reaches(table, request) };
+        }
+        if let Some(RateModel::DynamicPreisach { .. }) = h.rate {
+            variant.status_bit = quote! {
+                /// Bits 24 to 29: the rate-dependent inverse of the leg was not safe to use; the static one stood in for it.
+                pub const STATIC_INVERSE: u32 = 0x3f00_0000;
+            };
+            variant.status = quote! { | (leg.memory.fell_back() as u32) << (24 + index) };
+        }
+        if h.lead.is_some() {
+            variant.imports = quote! { LEAD, LEAD_LIMIT, };
+            variant.demand_before = quote! { let demand_before = state.demand; };
+            variant.take_lead = quote! {
+                leg.lead = specgen_runtime::real::saturate(
+                    (state.demand[index] - demand_before[index]) * LEAD,
+                    -LEAD_LIMIT,
+                    LEAD_LIMIT,
+                );
+            };
+            // The leg is asked for the lead so that it arrives in time: it is no part of what it is to show.
+            variant.requested = quote! { leg.memory.displacement() - leg.lead };
+            variant.model = quote! { (leg.memory.displacement() - leg.lead) };
+            variant.request = quote! { (demand + leg.lead) };
+        }
+        variant
     }
 }

@@ -3,12 +3,13 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::emit::identity;
+use crate::emit::{hysteresis, identity};
 use crate::ir::Ir;
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let title = identity::title(ir);
     let identity = identity::emit(ir);
+    let (rate_doc, static_inverse) = (hysteresis::rate_doc(ir), hysteresis::status_name(ir));
     quote! {
         #![doc = #title]
         #![doc = ""]
@@ -24,6 +25,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " code, q̂                             limits         voltage, slew rate, converter; what was really requested"]
         #![doc = " ```"]
         #![doc = " [`ControlMode`] says which of them are at work: P, F or P/F."]
+        #(#![doc = #rate_doc])*
         #![doc = ""]
         #![doc = " SI units throughout (m, rad, V, s); poses are measured from rest in the base frame {B}. No panic, no allocation, no"]
         #![doc = " `unsafe`; every voltage is finite and within limits whatever the inputs. `Config` holds what may change while running,"]
@@ -52,7 +54,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
         pub use state::{LegState, State};
         pub use step::{
-            GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE, TickInput, TickOutput, WRENCH_FAULT,
+            GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE, #static_inverse TickInput, TickOutput, WRENCH_FAULT,
             actuate, step,
         };
         pub use words::{

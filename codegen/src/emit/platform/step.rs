@@ -3,13 +3,42 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::ir::Ir;
+use crate::ir::{Ir, RateModel};
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let has_lead = ir.task_space.as_ref().is_some_and(|task| task.law.lead != 0.0);
     let (lead, lead_import) = match has_lead {
         true => (quote! { + (demand[leg] - state.demand[leg]) * LEAD }, quote! { LEAD, }),
         false => (quote! {}, quote! {}),
+    };
+    let (status_bit, find_static, status) = match &ir.hysteresis.rate {
+        Some(RateModel::DynamicPreisach { .. }) => (
+            quote! {
+                /// Bits 24 to 29: the rate-dependent inverse of the leg was not safe to use; the static one stood in for it.
+                pub const STATIC_INVERSE: u32 = 0x3f00_0000;
+            },
+            quote! {
+                let mut static_inverse = 0;
+                for (index, leg) in state.legs.iter().enumerate() {
+                    static_inverse |= ((config.mode().inverts() && leg.memory.fell_back()) as u32) << (24 + index);
+                }
+            },
+            quote! { static_inverse | },
+        ),
+        _ => (quote! {}, quote! {}, quote! {}),
+    };
+    let follow = match &ir.hysteresis.rate {
+        None => quote! {
+            let within = table.within_reach(request);
+            memory.follow(table, within, &mut permitted);
+            limited |= within != request;
+        },
+        Some(_) => quote! {
+            let within = memory.reaches(table, request);
+            let drive = permitted(memory.solve(table, request));
+            memory.apply(table, drive);
+            limited |= !within;
+        },
     };
     quote! {
         #![doc = " One control tick."]
@@ -65,6 +94,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const GENERATOR_BUSY: u32 = 0x4_0000;
         /// Bit 19: measured wrench not finite or out of range; the last one believed was kept.
         pub const WRENCH_FAULT: u32 = 0x8_0000;
+        #status_bit
 
         /// What a tick reads.
         #[derive(Debug, Clone, Copy, PartialEq)]
@@ -131,11 +161,12 @@ pub fn emit(ir: &Ir) -> TokenStream {
                 limited |= (held_back as u32) << index;
             }
             state.limited = limited != 0;
+            #find_static
             let legs = &state.legs;
             TickOutput {
                 voltage: each(|leg| DAC.voltage(legs[leg].code)),
                 dac_code: each(|leg| legs[leg].code),
-                status: limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
+                status: #status limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
             }
         }
 
@@ -300,9 +331,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
                 DAC.drive(permitted)
             };
             if config.mode().inverts() {
-                let within = table.within_reach(request);
-                memory.follow(table, within, &mut permitted);
-                limited |= within != request;
+                #follow
                 leg.requested = leg.memory.displacement();
             } else {
                 let drive = permitted(linear_drive(request));

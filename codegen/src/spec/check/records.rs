@@ -8,16 +8,23 @@ use crate::spec::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text;
 
-const KEY: &str = "hysteresis.records";
+const KEYS: [&str; 2] = ["hysteresis.records", "hysteresis.rate_tables"];
 
 pub(in crate::spec) fn readable(f: &Fields, dir: &Path, findings: &mut Findings) -> Option<()> {
-    let records = f.texts(KEY)?;
+    for key in KEYS {
+        let _ = readable_of(f, dir, findings, key);
+    }
+    Some(())
+}
+
+fn readable_of(f: &Fields, dir: &Path, findings: &mut Findings, key: &str) -> Option<()> {
+    let records = f.texts(key)?;
     if !matches!(records.len(), 1 | 6) {
         findings.error(
             codes::RECORD_COUNT,
-            KEY,
-            f.span(KEY),
-            format!("`{KEY}` names {} files, expected 1 or 6", records.len()),
+            key,
+            f.span(key),
+            format!("`{key}` names {} files, expected 1 or 6", records.len()),
             "name one file for all legs, or six: one for each leg, in the order of the joints".to_owned(),
         );
     }
@@ -38,7 +45,7 @@ pub(in crate::spec) fn readable(f: &Fields, dir: &Path, findings: &mut Findings)
             ))
         };
         if let Some((code, message, help)) = finding {
-            findings.error(code, &format!("{KEY}[{i}]"), f.item_span(KEY, i), message, help);
+            findings.error(code, &format!("{key}[{i}]"), f.item_span(key, i), message, help);
         }
     }
     Some(())

@@ -45,6 +45,9 @@ const WEIGHT: Shape = Shape::One(Item::Number(Range::above(0.0, 1.0)));
 const BANDWIDTH: Shape = one(Dimension::ANGULAR_RATE, Range::above(0.0, 1e6), "rad/s");
 const RATIO: Item = Item::Number(Range::above(0.0, 10.0));
 const FACTORS: Shape = Shape::List(&[RATIO; 2]);
+const CREEP_TIME: Item = item(Dimension::TIME, Range::closed(1e-6, 1e5), "ms");
+const CREEP_TIMES: Shape = Shape::Leading(1, &[CREEP_TIME; 6]);
+const CREEP_WEIGHTS: Shape = Shape::Leading(1, &[Item::Number(Range::closed(0.0, 1.0)); 6]);
 const TRAVEL: Item = item(Dimension::LENGTH, Range::closed(0.0, 0.1), "um");
 // The controller's series for small angles are sized by this bound.
 const TURN: Item = item(Dimension::ANGLE, Range::closed(0.0, 0.5), "mrad");
@@ -246,6 +249,11 @@ pub const SECTIONS: &[Section] = &[
             row("grid", integer(2, MAX_GRID as i64), Default("32"), "N", "32", "Intervals per axis of the Preisach plane; the table grows and the error falls with its square."),
             row("memory", integer(8, 256), Default("64"), "", "64", "Reversals that the controller can remember."),
             row("records", Shape::Records, Required, "", "[\"records/reference-forc.csv\"]", "Reversal-curve files, relative to the spec: one for all legs, or six. A table that `specgen identify -o` wrote is taken as it is."),
+            row("rate", Shape::One(Item::Choice(&["static", "dynamic-preisach", "creep"])), Default("\"static\""), "", "\"creep\"", "Rate dependence in model and inverse: none; the dynamic Preisach model (6); creep behind the static model. `specgen identify rate` finds out which is worth it."),
+            row("rate_tables", Shape::Records, Rule("error with rate = \"dynamic-preisach\""), "mu_1", "[\"records/leg-mu1.csv\"]", "With \"dynamic-preisach\": tables of the second weight as `specgen identify rate -o` writes them, one for all legs or six."),
+            row("creep_times", CREEP_TIMES, Rule("error with rate = \"creep\""), "", "[\"0.8 s\", \"40 ms\"]", "With \"creep\": time constants of up to six creep operators in parallel."),
+            row("creep_weights", CREEP_WEIGHTS, Rule("error with rate = \"creep\""), "", "[0.03, 0.09]", "With \"creep\": what each adds in the end, as a share of the static displacement; their sum is below 1."),
+            row("dead_time", one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Default("\"0 ms\""), "", "\"0.13 ms\"", "Of six legs with their own gauges: time by which the displacement lags the drive. The demand is led by it, less half a period. With [control] it is `control.lead`."),
         ],
     },
     Section {

@@ -1,0 +1,107 @@
+//! Samples that a record holds but that a fit must not believe: they get no weight, and a finding says when they were.
+
+use super::findings::Findings;
+use super::sanity::{extent, median};
+use super::trend::noise_floor;
+
+/// A sample that differs from the median of its neighbourhood by this share of the displacement range is a glitch, if
+/// that is also far above noise and above what the drive moves in a sample.
+const GLITCH: f64 = 0.02;
+/// Noise floors that a glitch exceeds.
+const ABOVE_NOISE: f64 = 12.0;
+/// Spreads of its neighbours that it exceeds.
+const ALONE: f64 = 3.0;
+/// Half width of the neighbourhood, samples.
+const NEAR: usize = 2;
+/// A step between two samples by this share of the drive's range is a jump: no rate-independent model follows it.
+pub(crate) const JUMP: f64 = 0.1;
+/// Samples that get no weight from a jump on: the actuator is still ringing.
+pub(crate) const SETTLING: usize = 200;
+
+/// Which samples get no weight: glitches of the displacement, and what follows a jump of the drive.
+pub(crate) fn weightless(
+    lines: &[usize],
+    time: &[f64],
+    drive: &[f64],
+    displacement: &[f64],
+    findings: &mut Findings,
+) -> Vec<bool> {
+    let mut weightless = vec![false; time.len()];
+    glitches(lines, time, drive, displacement, &mut weightless, findings);
+    jumps(lines, time, drive, &mut weightless, findings);
+    weightless
+}
+
+fn glitches(
+    lines: &[usize],
+    time: &[f64],
+    drive: &[f64],
+    displacement: &[f64],
+    weightless: &mut [bool],
+    findings: &mut Findings,
+) {
+    let (low, high) = extent(displacement);
+    let (bottom, top) = extent(drive);
+    if high <= low || top <= bottom {
+        return;
+    }
+    let gain = (high - low) / (top - bottom);
+    let noise = noise_floor(displacement);
+    for k in NEAR..time.len().saturating_sub(NEAR) {
+        let around = k - NEAR..=k + NEAR;
+        let mut near = displacement[around.clone()].to_vec();
+        let off = (displacement[k] - median(&mut near)).abs();
+        // Cheap test first: hardly any sample passes it.
+        if off <= GLITCH * (high - low) || off <= ABOVE_NOISE * noise {
+            continue;
+        }
+        let (near_low, near_high) = extent(&drive[around]);
+        // Ringing moves the neighbours too: what stands out of them alone is a glitch.
+        let (least, most) = extent(&[k - 2, k - 1, k + 1, k + 2].map(|i| displacement[i]));
+        if off <= GLITCH * (high - low) + 3.0 * gain * (near_high - near_low) || off <= ALONE * (most - least) {
+            continue;
+        }
+        weightless[k] = true;
+        let message = format!(
+            "at {} s the displacement is off its neighbours by {:.3} um for a single sample: it gets no weight",
+            time[k],
+            off * 1e6
+        );
+        findings.warning("W0517", Some(lines[k]), message, "look for interference or a loose contact, or record again");
+    }
+}
+
+fn jumps(lines: &[usize], time: &[f64], drive: &[f64], weightless: &mut [bool], findings: &mut Findings) {
+    let (low, high) = extent(drive);
+    let mut k = 1;
+    while k < drive.len() {
+        if (drive[k] - drive[k - 1]).abs() <= JUMP * (high - low) {
+            k += 1;
+            continue;
+        }
+        let end = (k + SETTLING).min(drive.len());
+        weightless[k..end].iter_mut().for_each(|w| *w = true);
+        let message = format!(
+            "at {} s the drive jumps from {} V to {} V: {} samples from there get no weight",
+            time[k],
+            drive[k - 1],
+            drive[k],
+            end - k
+        );
+        findings.warning(
+            "W0518",
+            Some(lines[k]),
+            message,
+            "drive by ramps or sines: a jump excites the resonance, which hides the hysteresis",
+        );
+        k += 1;
+        // Further jumps in the settling time belong to it.
+        while k < end {
+            if (drive[k] - drive[k - 1]).abs() > JUMP * (high - low) {
+                let end = (k + SETTLING).min(drive.len());
+                weightless[k..end].iter_mut().for_each(|w| *w = true);
+            }
+            k += 1;
+        }
+    }
+}

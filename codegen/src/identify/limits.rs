@@ -1,0 +1,100 @@
+//! Finds where a displacement hardly moves while the drive does: a gauge at the end of its range or stuck, with noise
+//! still on it, or an amplifier at its limit.
+
+use super::findings::Findings;
+use super::sanity::{extent, median};
+use super::trend::noise_floor;
+
+/// Travel of the drive over which it is judged, as a share of its range, and least number of samples in it.
+const TRAVEL: f64 = 0.1;
+const SAMPLES: usize = 10;
+/// Samples behind a reversal that are not judged: a dead time holds the displacement there.
+const SKIPPED: usize = 16;
+/// Share of the mean gain below which nothing of a piezo's motion is left; behind a reversal it moves by about half.
+const HARDLY: f64 = 0.08;
+/// Times that the travel's displacement must exceed the noise for a verdict.
+const ABOVE_NOISE: f64 = 30.0;
+
+/// Reports every stretch on which the displacement hardly moves.
+pub(crate) fn check(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
+    let (low, high) = extent(drive);
+    let (bottom, top) = extent(displacement);
+    let gain = (top - bottom) / (high - low);
+    let travel = TRAVEL * (high - low);
+    if gain * travel < ABOVE_NOISE * noise_floor(displacement) {
+        return;
+    }
+    // A glitch at the end of a stretch is no standstill: medians of three do not see it.
+    let middle: Vec<f64> = (0..displacement.len())
+        .map(|k| {
+            let (from, to) = (k.saturating_sub(1), (k + 2).min(displacement.len()));
+            median(&mut displacement[from..to].to_vec())
+        })
+        .collect();
+    for (first, end, rising) in runs(drive) {
+        let sign = if rising { 1.0 } else { -1.0 };
+        let mut at = first + SKIPPED;
+        let mut flat: Option<(usize, usize)> = None;
+        while at < end {
+            let Some(to) = (at..end).find(|&k| k >= at + SAMPLES && (drive[k] - drive[at]).abs() >= travel) else {
+                break;
+            };
+            let moved = sign * (middle[to] - middle[at]);
+            let hardly = moved < HARDLY * gain * (drive[to] - drive[at]).abs();
+            flat = match (flat, hardly) {
+                (Some((from, _)), true) => Some((from, to)),
+                (None, true) => Some((at, to)),
+                (found, false) => found,
+            };
+            if flat.is_some() && !hardly {
+                break;
+            }
+            at += 1 + (to - at) / 8;
+        }
+        if let Some((from, to)) = flat {
+            let (y_low, y_high) = extent(&displacement[from..=to]);
+            let near = 0.05 * (top - bottom);
+            let where_ = if y_high > top - near || y_low < bottom + near { "is limited at" } else { "is stuck at" };
+            let message = format!(
+                "from {} s to {} s the displacement {where_} about {:.4} um while the drive goes from {} V to {} V",
+                time[from],
+                time[to],
+                0.5e6 * (y_low + y_high),
+                drive[from],
+                drive[to]
+            );
+            findings.error(
+                "E0516",
+                Some(lines[from]),
+                message,
+                "check the range of the gauge, the limit of the amplifier and the preload; record again within them",
+            );
+        }
+    }
+}
+
+/// Stretches `first..end` over which the drive never turns back, and whether it rises.
+fn runs(drive: &[f64]) -> Vec<(usize, usize, bool)> {
+    let mut runs = Vec::new();
+    let mut first = 0;
+    let mut rising = None;
+    for k in 1..drive.len() {
+        let step = drive[k] - drive[k - 1];
+        if step == 0.0 {
+            continue;
+        }
+        match rising {
+            Some(up) if up != (step > 0.0) => {
+                runs.push((first, k, up));
+                first = k - 1;
+                rising = Some(step > 0.0);
+            }
+            None => rising = Some(step > 0.0),
+            _ => {}
+        }
+    }
+    if let Some(up) = rising {
+        runs.push((first, drive.len(), up));
+    }
+    runs
+}

@@ -1,0 +1,14 @@
+//! Samples of an identification or a validation, for drawing.
+
+/// Columns of equal length.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trace {
+    /// s.
+    pub time: Vec<f64>,
+    /// V.
+    pub drive: Vec<f64>,
+    /// Displacement moved by the dead time, m.
+    pub measured: Vec<f64>,
+    /// Displacement minus model, offset and drift, m; NaN for a sample of no weight.
+    pub residual: Vec<f64>,
+}

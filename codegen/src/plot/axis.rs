@@ -1,0 +1,134 @@
+//! Linear and logarithmic axes with round ticks.
+
+/// Kind of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// Even.
+    Linear,
+    /// Decades; values that are not positive are not drawn.
+    Log,
+}
+
+/// Values to pixels.
+pub(super) struct Axis {
+    scale: Scale,
+    low: f64,
+    high: f64,
+    pixels: [f64; 2],
+}
+
+/// A marked value.
+pub(super) struct Tick {
+    pub(super) value: f64,
+    pub(super) label: String,
+}
+
+impl Axis {
+    /// Over all finite `values`, with a little room, or over `limits`.
+    pub(super) fn over(
+        values: impl Iterator<Item = f64>,
+        scale: Scale,
+        limits: Option<[f64; 2]>,
+        pixels: [f64; 2],
+    ) -> Self {
+        let fits = |v: &f64| v.is_finite() && (scale == Scale::Linear || *v > 0.0);
+        let (mut low, mut high) = values.filter(fits).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+            (if v < a { v } else { a }, if v > b { v } else { b })
+        });
+        if let Some([a, b]) = limits {
+            (low, high) = (a, b);
+        }
+        if low > high {
+            (low, high) = (1.0, 10.0);
+        }
+        if scale == Scale::Log {
+            (low, high) = (low.log10(), high.log10());
+        }
+        if high - low <= 1e-12 * high.abs().max(low.abs()).max(1e-300) {
+            let room = if low == 0.0 { 1.0 } else { 0.1 * low.abs() };
+            (low, high) = (low - room, high + room);
+        }
+        let room = if limits.is_some() { 0.0 } else { 0.03 * (high - low) };
+        Self { scale, low: low - room, high: high + room, pixels }
+    }
+
+    /// Pixel of `value`; NaN for what cannot be drawn.
+    pub(super) fn at(&self, value: f64) -> f64 {
+        let value = match self.scale {
+            Scale::Linear => value,
+            Scale::Log if value > 0.0 => value.log10(),
+            Scale::Log => f64::NAN,
+        };
+        self.pixels[0] + (value - self.low) / (self.high - self.low) * (self.pixels[1] - self.pixels[0])
+    }
+
+    pub(super) fn ticks(&self) -> Vec<Tick> {
+        match self.scale {
+            Scale::Linear => linear(self.low, self.high),
+            Scale::Log => logarithmic(self.low, self.high),
+        }
+    }
+}
+
+fn linear(low: f64, high: f64) -> Vec<Tick> {
+    let rough = (high - low) / 6.0;
+    let decade = 10f64.powf(rough.log10().floor());
+    let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * decade >= rough).unwrap_or(10.0);
+    let step = factor * decade;
+    let digits = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
+    let first = (low / step).ceil() as i64;
+    let last = (high / step).floor() as i64;
+    (first..=last.min(first + 20))
+        .map(|k| {
+            let value = k as f64 * step;
+            let label = if value != 0.0 && (step >= 1e5 || digits > 5) {
+                format!("{value:.1e}")
+            } else {
+                format!("{value:.digits$}")
+            };
+            Tick { value, label }
+        })
+        .collect()
+}
+
+fn logarithmic(low: f64, high: f64) -> Vec<Tick> {
+    let factors: &[f64] = if high - low > 3.5 {
+        &[1.0]
+    } else if high - low > 1.2 {
+        &[1.0, 3.0]
+    } else {
+        &[1.0, 2.0, 3.0, 5.0, 7.0]
+    };
+    let mut ticks = Vec::new();
+    for decade in (low.floor() as i32)..=(high.ceil() as i32) {
+        for factor in factors {
+            let value = factor * 10f64.powi(decade);
+            if value.log10() >= low && value.log10() <= high {
+                let label = if (-3..5).contains(&decade) {
+                    format!("{}", (value * 1e6).round() / 1e6)
+                } else {
+                    format!("{factor}e{decade}")
+                };
+                ticks.push(Tick { value, label });
+            }
+        }
+    }
+    // Less than a factor two between the ends: even steps show more.
+    if ticks.len() < 2 {
+        ticks = linear(10f64.powf(low), 10f64.powf(high));
+    }
+    ticks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        let labels = |low, high| linear(low, high).into_iter().map(|t| t.label).collect::<Vec<_>>();
+        assert_eq!(labels(-90.0, 90.0), ["-50", "0", "50"]);
+        assert_eq!(labels(0.0, 0.5), ["0.0", "0.1", "0.2", "0.3", "0.4", "0.5"]);
+        assert_eq!(logarithmic(0.0, 2.0).len(), 5);
+    }
+}

@@ -1,0 +1,86 @@
+//! The rate dependence of the leg model: each option has its own keys.
+
+use super::control;
+use crate::diagnostic::codes;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+use crate::spec::text::number;
+
+/// Option, its keys, and how they are written.
+const OPTIONS: [(&str, &[&str], &str); 2] = [
+    ("dynamic-preisach", &["rate_tables"], "rate_tables = [\"records/leg-mu1.csv\"]"),
+    (
+        "creep",
+        &["creep_times", "creep_weights"],
+        "creep_times = [\"0.8 s\", \"40 ms\"] and creep_weights = [0.03, 0.09]",
+    ),
+];
+
+pub(super) fn keys_of_option(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let chosen = f.choice("hysteresis.rate")?;
+    for (option, keys, example) in OPTIONS {
+        for key in keys {
+            let path = format!("hysteresis.{key}");
+            let given = f.given(&path);
+            if given && option != chosen {
+                findings.error(
+                    codes::RATE_KEYS,
+                    &path,
+                    f.span(&path),
+                    format!("`{path}` belongs to rate = \"{option}\", but rate is \"{chosen}\""),
+                    format!("write rate = \"{option}\", or take `{key}` out"),
+                );
+            } else if !given && option == chosen && !findings.mentions(&[&path]) {
+                findings.error(
+                    codes::RATE_KEYS,
+                    &path,
+                    f.span("hysteresis.rate"),
+                    format!("rate = \"{chosen}\" needs `{path}`"),
+                    format!("write {example}; `specgen identify rate` prints the lines"),
+                );
+            }
+        }
+    }
+    Some(())
+}
+
+pub(super) fn creep_lists(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let path = "hysteresis.creep_weights";
+    let (times, weights) = (f.numbers("hysteresis.creep_times")?, f.numbers(path)?);
+    if times.len() != weights.len() {
+        findings.error(
+            codes::RATE_KEYS,
+            path,
+            f.span(path),
+            format!("{} creep weights for {} time constants", weights.len(), times.len()),
+            "give one weight for each time constant, in the same order".to_owned(),
+        );
+    }
+    let sum = weights.iter().fold(0.0, |sum, weight| sum + weight);
+    if sum >= 1.0 {
+        findings.error(
+            codes::RATE_KEYS,
+            path,
+            f.span(path),
+            format!("the creep weights add up to {}: the leg would creep by more than it moves", number(sum)),
+            "weights are shares of the static displacement; those of a piezo leg add up to about 0.1".to_owned(),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn dead_time_of_legs(f: &Fields, findings: &mut Findings) -> Option<()> {
+    control::there(f)?;
+    let path = "hysteresis.dead_time";
+    let dead_time = f.number(path)?;
+    if dead_time > 0.0 {
+        findings.error(
+            codes::LEG_KEY_WITH_CONTROL,
+            path,
+            f.span(path),
+            format!("`{path}` stands beside [control]: there the legs are led by `control.lead`"),
+            format!("write control.lead = \"{} ms\", less half a period, in its place", number(dead_time * 1e3)),
+        );
+    }
+    Some(())
+}

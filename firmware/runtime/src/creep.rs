@@ -1,0 +1,143 @@
+//! Rate dependence as creep behind the static model (Hammerstein): Preisach first, then linear dynamics.
+//!
+//! With f = Γ\[u\] the displacement of the static model, held over a tick of length T,
+//!
+//! ```text
+//! ẋ_j = (f − x_j)/τ_j          x_j ← x_j + g_j (f − x_j),   g_j = 1 − e^(−T/τ_j)      exact for a held drive
+//! y   = f + Σ w_j x_j          at the end of the tick, w_j ≥ 0
+//! ```
+//! The inverse solves the same line for f: what the states will have crept to is taken off the demand, and the rest goes
+//! through Γ⁻¹: f = (y − Σ w_j (1 − g_j) x_j)/(1 + Σ w_j g_j). One division, no iteration.
+//!
+//! Each state is a mean of past f with positive weights, so it stays within the reach of the table whatever is demanded.
+
+use crate::digest::Digest;
+use crate::everett::Everett;
+use crate::memory::ReversalMemory;
+use crate::real::{Real, saturate};
+
+/// `K` creep operators in parallel, for one length of the tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Creep<T, const K: usize> {
+    /// g_j, share of the way to f that a state goes in a tick, within (0, 1\].
+    pub gains: [T; K],
+    /// w_j ≥ 0.
+    pub weights: [T; K],
+    /// w_j (1 − g_j).
+    pub carried: [T; K],
+    /// 1 + Σ w_j g_j.
+    pub direct: T,
+}
+
+/// Everett function of one leg with creep behind it.
+#[derive(Debug, Clone, Copy)]
+pub struct CreepEverett<T: 'static, const N: usize, const NODES: usize, const K: usize> {
+    /// The static model.
+    pub still: Everett<T, N, NODES>,
+    /// What follows it.
+    pub creep: &'static Creep<T, K>,
+}
+
+/// Reversal memory and creep states of one leg. Resets to rest: drive 0 after negative saturation, nothing left to creep.
+#[derive(Debug, Clone, Copy)]
+pub struct CreepMemory<T, const CAP: usize, const K: usize> {
+    memory: ReversalMemory<T, CAP>,
+    /// x_j, m.
+    states: [T; K],
+    /// y at the end of the tick, m.
+    displacement: T,
+}
+
+impl<T: Real, const CAP: usize, const K: usize> Default for CreepMemory<T, CAP, K> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
+    /// At rest.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { memory: ReversalMemory::new(), states: [T::ZERO; K], displacement: T::ZERO }
+    }
+
+    /// The drive last applied, cells.
+    #[inline]
+    #[must_use]
+    pub fn drive(&self) -> T {
+        self.memory.drive()
+    }
+
+    /// The displacement that the model gives at the end of the tick over which the last drive is held, m.
+    #[inline]
+    #[must_use]
+    pub fn displacement(&self) -> T {
+        self.displacement
+    }
+
+    /// x_j, m: within 0 and the full displacement of the table.
+    #[must_use]
+    pub fn states(&self) -> &[T; K] {
+        &self.states
+    }
+
+    /// One tick with `drive` (cells, finite, held within 0..=N); returns the displacement at its end, m.
+    #[inline]
+    pub fn apply<const N: usize, const NODES: usize>(&mut self, table: &CreepEverett<T, N, NODES, K>, drive: T) -> T {
+        let still = self.memory.apply(&table.still, drive);
+        let full = table.still.full_displacement();
+        let mut displacement = still;
+        for ((state, gain), weight) in self.states.iter_mut().zip(&table.creep.gains).zip(&table.creep.weights) {
+            *state = saturate(*state + *gain * (still - *state), T::ZERO, full);
+            displacement = displacement + *weight * *state;
+        }
+        self.displacement = displacement;
+        displacement
+    }
+
+    /// The drive (cells) with which the next tick ends at `displacement` (m, finite), as near as the table reaches.
+    #[inline]
+    #[must_use]
+    pub fn solve<const N: usize, const NODES: usize>(
+        &self,
+        table: &CreepEverett<T, N, NODES, K>,
+        displacement: T,
+    ) -> T {
+        self.memory.solve(&table.still, self.still_part(table, displacement))
+    }
+
+    /// Whether the table reaches `displacement` (m) from here.
+    #[inline]
+    #[must_use]
+    pub fn reaches<const N: usize, const NODES: usize>(
+        &self,
+        table: &CreepEverett<T, N, NODES, K>,
+        displacement: T,
+    ) -> bool {
+        let still = self.still_part(table, displacement);
+        still >= T::ZERO && still <= table.still.full_displacement()
+    }
+
+    /// f: what the static model must give for `displacement` at the end of the next tick, m; not limited.
+    #[inline]
+    fn still_part<const N: usize, const NODES: usize>(
+        &self,
+        table: &CreepEverett<T, N, NODES, K>,
+        displacement: T,
+    ) -> T {
+        let mut rest = displacement;
+        for (state, carried) in self.states.iter().zip(&table.creep.carried) {
+            rest = rest - *carried * *state;
+        }
+        rest / table.creep.direct
+    }
+
+    /// Adds everything that the future depends on to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        self.memory.digest(digest);
+        for state in &self.states {
+            digest.real(*state);
+        }
+        digest.real(self.displacement);
+    }
+}

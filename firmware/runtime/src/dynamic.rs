@@ -1,0 +1,281 @@
+//! The dynamic Preisach model (6), forward and inverse: q = Γ₀\[u\] + u̇ Γ₁\[u\], on one reversal memory.
+//!
+//! Γ₁ has an Everett table of its own, whose weights may have either sign. In the tick that ends at u, u̇ = (u − u_last)/T;
+//! drives are counted in cells and rates in cells a tick, so that
+//!
+//! ```text
+//! h(u) = Γ₀[u] + (u − u_last) Γ₁[u]
+//! ```
+//! The inverse solves h(u) = q between bounds that the static inverse gives, by at most [`DynamicMemory::ITERATIONS`] steps of
+//! regula falsi (Illinois). It gives the static inverse instead, and says so, where (6) cannot be inverted safely:
+//!
+//! - no root between the bounds, h not monotone on the points looked at, or the steps do not suffice;
+//! - the rate term takes away more than half of what Γ₀ gains since the last tick. On a straight branch of slope f' the inverse
+//!   is u ← (q + Γ₁ u_last)/(f' + Γ₁), and grows from tick to tick if Γ₁ < −f'/2.
+
+use crate::digest::Digest;
+use crate::everett::Everett;
+use crate::memory::ReversalMemory;
+use crate::real::{Real, saturate};
+
+/// The two Everett functions of one leg.
+#[derive(Debug, Clone, Copy)]
+pub struct DynamicEverett<T: 'static, const N: usize, const NODES: usize> {
+    /// Of μ₀, m.
+    pub still: Everett<T, N, NODES>,
+    /// Of μ₁, m per cell a tick; of either sign, not monotone. Only its values are looked up.
+    pub rate: Everett<T, N, NODES>,
+    /// How far h may be from the demand for the inverse to count as found, m.
+    pub tolerance: T,
+}
+
+/// Reversal memory of one leg, with Γ₁ along it. Resets to rest at drive 0 after negative saturation.
+#[derive(Debug, Clone, Copy)]
+pub struct DynamicMemory<T, const CAP: usize> {
+    memory: ReversalMemory<T, CAP>,
+    /// Γ₁ at each extremum of the memory, m per cell a tick.
+    rate_at: [T; CAP],
+    /// Γ₁ at the present drive.
+    rate: T,
+    /// h of the last tick, m.
+    displacement: T,
+    /// The last inverse was the static one.
+    fell_back: bool,
+}
+
+/// h and its parts at a drive.
+#[derive(Clone, Copy)]
+struct Point<T> {
+    drive: T,
+    /// Γ₀ − Γ₀ at the last drive, m.
+    gain: T,
+    /// (u − u_last) Γ₁, m.
+    rate_term: T,
+}
+
+impl<T: Real, const CAP: usize> Default for DynamicMemory<T, CAP> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
+    /// Most evaluations of h within the bounds.
+    pub const ITERATIONS: u32 = 12;
+
+    /// At rest.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            memory: ReversalMemory::new(),
+            rate_at: [T::ZERO; CAP],
+            rate: T::ZERO,
+            displacement: T::ZERO,
+            fell_back: false,
+        }
+    }
+
+    /// The drive last applied, cells.
+    #[inline]
+    #[must_use]
+    pub fn drive(&self) -> T {
+        self.memory.drive()
+    }
+
+    /// What the last tick requested, see [`DynamicMemory::apply`], m.
+    #[inline]
+    #[must_use]
+    pub fn displacement(&self) -> T {
+        self.displacement
+    }
+
+    /// Whether the last [`DynamicMemory::solve`] gave the static inverse for want of a safe one of (6).
+    #[inline]
+    #[must_use]
+    pub fn fell_back(&self) -> bool {
+        self.fell_back
+    }
+
+    /// Whether the tables reach `displacement` (m) at rest.
+    #[inline]
+    #[must_use]
+    pub fn reaches<const N: usize, const NODES: usize>(
+        &self,
+        table: &DynamicEverett<T, N, NODES>,
+        displacement: T,
+    ) -> bool {
+        displacement >= T::ZERO && displacement <= table.still.full_displacement()
+    }
+
+    /// One tick that ends at `drive` (cells, finite, held within 0..=N); returns what was requested by it, m: h, or Γ₀ if the
+    /// last inverse was the static one. Whoever compares a gauge with it must see the model that was inverted: a rate term too
+    /// large to be inverted would come back through the adaptation.
+    #[inline]
+    pub fn apply<const N: usize, const NODES: usize>(&mut self, table: &DynamicEverett<T, N, NODES>, drive: T) -> T {
+        let drive = saturate(drive, T::ZERO, table.still.full_scale());
+        let last = self.memory.drive();
+        if drive != last {
+            let (dropped, depth) = (self.memory.dropped(), self.memory.depth());
+            let branch = self.memory.origin(drive);
+            let at_start = if branch.place < depth { self.rate_at(branch.place) } else { self.rate };
+            self.memory.apply(&table.still, drive);
+            if self.memory.dropped() != dropped {
+                self.restore(table);
+            } else if drive <= T::ZERO {
+                self.rate = T::ZERO;
+            } else {
+                self.rate_at[if branch.place < CAP { branch.place } else { CAP - 1 }] = at_start;
+                self.rate = along(&table.rate, branch.start, at_start, drive);
+            }
+        }
+        let still = self.memory.displacement();
+        self.displacement = if self.fell_back { still } else { still + (drive - last) * self.rate };
+        self.displacement
+    }
+
+    /// The drive (cells) with which the next tick ends at `displacement` (m, finite): of (6), or of the static model where
+    /// [`DynamicMemory::fell_back`] then says so.
+    #[inline]
+    pub fn solve<const N: usize, const NODES: usize>(
+        &mut self,
+        table: &DynamicEverett<T, N, NODES>,
+        displacement: T,
+    ) -> T {
+        let wanted = saturate(displacement, T::ZERO, table.still.full_displacement());
+        let still = self.memory.solve(&table.still, wanted);
+        let found = self.invert(table, wanted - self.memory.displacement(), still);
+        self.fell_back = found.is_none();
+        found.unwrap_or(still)
+    }
+
+    /// The drive at which h exceeds Γ₀ at the last drive by `wanted` (m); `still` is that of the static model.
+    fn invert<const N: usize, const NODES: usize>(
+        &self,
+        table: &DynamicEverett<T, N, NODES>,
+        wanted: T,
+        still: T,
+    ) -> Option<T> {
+        let last = self.memory.drive();
+        let step = still - last;
+        if step == T::ZERO {
+            // No rate, no rate term. A table that ends here, or is flat, gives no more than this.
+            return Some(still);
+        }
+        let rising = wanted > T::ZERO;
+        // Excess over the demand in the direction of travel: negative before the root, positive behind it.
+        let excess = |point: &Point<T>| {
+            let h = point.gain + point.rate_term - wanted;
+            if rising { h } else { -h }
+        };
+        let start = Point { drive: last, gain: T::ZERO, rate_term: T::ZERO };
+        let middle = self.point(table, still);
+        let (mut near, mut far) = if excess(&middle) >= T::ZERO {
+            (start, middle)
+        } else {
+            let beyond = still + step + step * T::HALF;
+            let end = self.point(table, saturate(beyond, T::ZERO, table.still.full_scale()));
+            (middle, end)
+        };
+        let (mut low, mut high) = (excess(&near), excess(&far));
+        if high < T::ZERO {
+            return None;
+        }
+        // Illinois: an end that stays twice counts half, or it would never move.
+        let (mut low_weight, mut high_weight) = (low, high);
+        let mut root = if high <= table.tolerance {
+            Some(far)
+        } else if -low <= table.tolerance {
+            Some(near)
+        } else {
+            None
+        };
+        for _ in 0..Self::ITERATIONS {
+            if root.is_some() {
+                break;
+            }
+            let share = low_weight / (low_weight - high_weight);
+            let try_at = near.drive + share * (far.drive - near.drive);
+            let point = self.point(table, try_at);
+            let at = excess(&point);
+            if !(at >= low && at <= high) {
+                return None;
+            }
+            if at.abs() <= table.tolerance {
+                root = Some(point);
+            } else if at < T::ZERO {
+                (near, low, low_weight) = (point, at, at);
+                high_weight = high_weight * T::HALF;
+            } else {
+                (far, high, high_weight) = (point, at, at);
+                low_weight = low_weight * T::HALF;
+            }
+        }
+        let root = root?;
+        // The rate term against the gain: both in the direction of travel.
+        let (gain, rate_term) = if rising { (root.gain, root.rate_term) } else { (-root.gain, -root.rate_term) };
+        (rate_term >= -(gain * T::HALF)).then_some(root.drive)
+    }
+
+    /// h and its parts at `drive`, reached from here.
+    fn point<const N: usize, const NODES: usize>(&self, table: &DynamicEverett<T, N, NODES>, drive: T) -> Point<T> {
+        let last = self.memory.drive();
+        if drive == last {
+            return Point { drive, gain: T::ZERO, rate_term: T::ZERO };
+        }
+        if drive <= T::ZERO {
+            return Point { drive: T::ZERO, gain: -self.memory.displacement(), rate_term: T::ZERO };
+        }
+        let branch = self.memory.origin(drive);
+        let still = along(&table.still, branch.start, branch.at_start, drive);
+        let at_start = if branch.place < self.memory.depth() { self.rate_at(branch.place) } else { self.rate };
+        let rate = along(&table.rate, branch.start, at_start, drive);
+        Point { drive, gain: still - self.memory.displacement(), rate_term: (drive - last) * rate }
+    }
+
+    /// Γ₁ at every extremum anew: the memory was full and has given up a pair of them.
+    #[cold]
+    #[inline(never)]
+    fn restore<const N: usize, const NODES: usize>(&mut self, table: &DynamicEverett<T, N, NODES>) {
+        let depth = self.memory.depth();
+        let mut at = T::ZERO;
+        for k in 0..CAP {
+            if k >= depth {
+                break;
+            }
+            if k > 0 {
+                at = along(&table.rate, self.memory.extremum_at(k - 1), at, self.memory.extremum_at(k));
+            }
+            self.rate_at[k] = at;
+        }
+        let top = if depth > 0 { depth - 1 } else { 0 };
+        self.rate = along(&table.rate, self.memory.extremum_at(top), at, self.memory.drive());
+    }
+
+    /// Bounded read.
+    #[inline]
+    fn rate_at(&self, k: usize) -> T {
+        self.rate_at[if k < CAP { k } else { CAP - 1 }]
+    }
+
+    /// Adds everything that the future depends on to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        self.memory.digest(digest);
+        digest.real(self.rate);
+        digest.real(self.displacement);
+        digest.word(u64::from(self.fell_back));
+        for rate in self.rate_at.iter().take(self.memory.depth()) {
+            digest.real(*rate);
+        }
+    }
+}
+
+/// The value at `drive` on the branch from `start`, where it is `at_start`.
+#[inline]
+fn along<T: Real, const N: usize, const NODES: usize>(
+    table: &Everett<T, N, NODES>,
+    start: T,
+    at_start: T,
+    drive: T,
+) -> T {
+    if drive > start { at_start + table.value(drive, start) } else { at_start - table.value(start, drive) }
+}
