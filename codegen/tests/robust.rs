@@ -92,6 +92,14 @@ fn a_platform_beyond_the_gain_that_the_eigenvalues_allow_is_unstable_and_below_i
     }
 }
 
+#[test]
+fn a_leg_that_is_short_of_voltage_is_said_to_be_at_its_limit() {
+    let folder = Folder::new();
+    let run = folder.run(&["robust", "legs.toml", "--vary", "gain=0.5:0.5", "--replay", "gain"]);
+    run.says(1, &["not robust"]);
+    assert!(run.stdout.contains(", a leg at its limit in "), "{}", run.stdout);
+}
+
 /// Two ways to one figure: the nominal machine here, and the spec's own row of `tune`.
 #[test]
 fn nominal_legs_have_the_error_that_tune_scores() {

@@ -66,7 +66,7 @@ mod tests {
         let deviation = Deviation::common(Factor::nominal);
         let outcome = match error_nm {
             Some(error_nm) => Outcome::Ran(Figures { error_nm, ..Figures::default() }),
-            None => Outcome::Unstable { time: Some(0.1), reason: "test".to_owned() },
+            None => Outcome::Unstable { time: Some(0.1), reason: "test".to_owned(), limited_percent: 0.0 },
         };
         (Member { name: name.to_owned(), seed: 1, drawn, deviation }, outcome)
     }

@@ -49,6 +49,8 @@ pub enum Outcome {
         time: Option<f64>,
         /// In words.
         reason: String,
+        /// Part of the ticks before with a leg at a limit, %: a leg short of stroke or voltage leaves the bound as well.
+        limited_percent: f64,
     },
 }
 
@@ -87,7 +89,7 @@ impl Study<'_> {
     pub fn run(&self, member: &Member) -> Result<Outcome, RunError> {
         match self.simulate(member) {
             Err(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. })) => {
-                Ok(Outcome::Unstable { time: None, reason: error.to_string() })
+                Ok(Outcome::Unstable { time: None, reason: error.to_string(), limited_percent: 0.0 })
             }
             other => other,
         }
@@ -119,11 +121,12 @@ impl Study<'_> {
         case.observe(&mut case.worker(), &setting, |seen| {
             // A NaN keeps no bound.
             let kept = seen.largest <= self.bound && seen.orientation * radius <= self.bound;
+            ticks += 1;
+            limited += u64::from(seen.status & LIMITS != 0);
             if !kept {
                 lost = Some(seen.time);
                 return ControlFlow::Break(());
             }
-            ticks += 1;
             square += seen.translation * seen.translation;
             turned += seen.orientation * seen.orientation;
             let raise = |peak: &mut f64, value: f64| {
@@ -133,19 +136,19 @@ impl Study<'_> {
             };
             raise(&mut figures.peak_nm, seen.largest * 1e9);
             raise(&mut figures.orientation_peak_nrad, seen.orientation * 1e9);
-            limited += u64::from(seen.status & LIMITS != 0);
             figures.fault_ticks += u64::from(seen.status & FAULTS != 0);
             figures.fault_bits |= seen.status & FAULTS;
             ControlFlow::Continue(())
         })?;
+        figures.limited_percent = 100.0 * limited as f64 / ticks.max(1) as f64;
         if let Some(time) = lost {
             let reason = format!("error beyond {:.0} nm", self.bound * 1e9);
-            return Ok(Outcome::Unstable { time: Some(time), reason });
+            let limited_percent = figures.limited_percent;
+            return Ok(Outcome::Unstable { time: Some(time), reason, limited_percent });
         }
         let rms = |sum: f64| libm::sqrt(sum / ticks.max(1) as f64) * 1e9;
         figures.error_nm = rms(square);
         figures.orientation_nrad = rms(turned);
-        figures.limited_percent = 100.0 * limited as f64 / ticks.max(1) as f64;
         Ok(Outcome::Ran(figures))
     }
 

@@ -123,8 +123,16 @@ impl Report<'_> {
                 }
                 out
             }
-            Outcome::Unstable { time: Some(time), reason } => format!("unstable: {reason} after {time:.4} s"),
-            Outcome::Unstable { time: None, reason } => format!("unstable: {reason}"),
+            Outcome::Unstable { time, reason, limited_percent } => {
+                let mut out = format!("unstable: {reason}");
+                if let Some(time) = time {
+                    let _ = write!(out, " after {time:.4} s");
+                }
+                if *limited_percent > 0.0 {
+                    let _ = write!(out, ", a leg at its limit in {limited_percent:.1} % of the ticks before");
+                }
+                out
+            }
         }
     }
 
