@@ -18,6 +18,7 @@ pub mod model;
 pub mod numerics;
 pub mod plot;
 pub mod reach;
+pub mod robust;
 pub mod spec;
 pub mod stability;
 pub mod target;

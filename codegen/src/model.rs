@@ -38,8 +38,37 @@ pub struct Model {
     pub target: Target,
     /// The controller that sees the platform: a spec with `[control]`. None: six legs with a gauge each.
     pub task_space: Option<TaskSpace>,
+    /// What `specgen robust` varies, and its gate; no constant of the controller comes from here.
+    pub robust: Robust,
     /// Where each key stands in the spec file, by key path (`actuator.voltage[1]`), for findings of later phases.
     pub spans: BTreeMap<String, Range<usize>>,
+}
+
+/// Declared uncertainties, as smallest and largest factor on what the rest of the spec says; none where it does not say.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Robust {
+    /// On mass and inertia of the platform.
+    pub mass: Option<[f64; 2]>,
+    /// On the axial stiffness of a leg.
+    pub stiffness: Option<[f64; 2]>,
+    /// On the damping ratio.
+    pub damping: Option<[f64; 2]>,
+    /// λ, on the gain of a leg.
+    pub gain: Option<[f64; 2]>,
+    /// On the width of the hysteresis of a leg.
+    pub hysteresis: Option<[f64; 2]>,
+    /// On its creep.
+    pub creep: Option<[f64; 2]>,
+    /// On the lag of an amplifier.
+    pub lag: Option<[f64; 2]>,
+    /// On the noise of gauges, amplifiers and force sensor.
+    pub noise: Option<[f64; 2]>,
+    /// Control intervals by which voltages come late, at most.
+    pub delay_ticks: Option<u32>,
+    /// Largest error of the translation or of the legs, rms, m.
+    pub max_error: Option<f64>,
+    /// Largest error of the angles, rms, rad.
+    pub max_orientation: Option<f64>,
 }
 
 /// Joints of base and platform, and the pose at rest. Radii and angles of a spec, (1) and (2), are joints here already.

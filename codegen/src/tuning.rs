@@ -20,7 +20,7 @@ pub mod setting;
 pub mod space;
 pub mod write;
 
-pub use evaluate::{Case, Conditions, Evaluation, Score, TrajectoryChoice};
+pub use evaluate::{Case, Conditions, Evaluation, Observed, Score, TrajectoryChoice};
 pub use search::{Candidate, Optimiser, Search, SearchOptions};
 pub use setting::Setting;
 pub use space::{Space, What};

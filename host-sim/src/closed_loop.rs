@@ -3,6 +3,7 @@
 //! At tick n (time t_n) the controller gets the set-point for the end of the coming interval, T_{n+1}, and the gauge
 //! readings Y_n; its voltages are held until t_{n+1}, where Y_{n+1} is read.
 
+use std::collections::VecDeque;
 use std::fmt;
 use std::ops::ControlFlow;
 
@@ -31,6 +32,7 @@ struct Channel<P> {
 #[derive(Debug, Clone)]
 pub struct Rig<P> {
     channels: [Channel<P>; LEGS],
+    latency: usize,
 }
 
 /// What is done to the legs before the gauges are zeroed.
@@ -173,7 +175,7 @@ impl<P: Plant> Rig<P> {
             index += 1;
             channel
         });
-        Self { channels }
+        Self { channels, latency: 0 }
     }
 
     /// Pre-cycle, rest, then zeroes the gauges.
@@ -210,6 +212,11 @@ impl<P: Plant> Rig<P> {
         Ok(Run { trace, tracking: Tracking { interval, samples } })
     }
 
+    /// Makes voltages come `ticks` control intervals late, in every run from here on; 0 V before the first.
+    pub fn set_latency(&mut self, ticks: usize) {
+        self.latency = ticks;
+    }
+
     /// Draws the noise of the next `ticks` ticks and the reading before them now: clones made after this share it. The bits
     /// of a run stay as they are.
     pub fn draw_ahead(&mut self, ticks: usize) {
@@ -236,6 +243,7 @@ impl<P: Plant> Rig<P> {
         let mut input = vec![0; controller.description().input_names.len()];
         let mut output = vec![0; controller.description().output_names.len()];
         controller.reset();
+        let mut underway = VecDeque::from(vec![[0.0; LEGS]; self.latency]);
         let mut measured = self.read();
         for tick in 0..ticks {
             let time = (tick + 1) as f64 * interval;
@@ -247,13 +255,14 @@ impl<P: Plant> Rig<P> {
             controller.step(&input, &mut output);
             // Of the tick, before anything moves: costs nothing unless it is asked for.
             let words = Words { input: &input, output: &output, controller: &*controller };
-            let mut requested = [0.0; LEGS];
-            for (leg, channel) in self.channels.iter_mut().enumerate() {
-                let voltage = scalar.decode(output[wiring.voltage[leg]]);
-                if !voltage.is_finite() {
-                    return Err(RunError::NotFinite { tick, leg });
-                }
-                requested[leg] = scalar.decode(output[wiring.requested[leg]]);
+            let (requested, voltages) = (wiring.requested, wiring.voltage);
+            let [requested, voltages] = [requested, voltages].map(|six| six.map(|place| scalar.decode(output[place])));
+            if let Some(leg) = voltages.iter().position(|voltage| !voltage.is_finite()) {
+                return Err(RunError::NotFinite { tick, leg });
+            }
+            underway.push_back(voltages);
+            let held = underway.pop_front().unwrap_or(voltages);
+            for (channel, voltage) in self.channels.iter_mut().zip(held) {
                 channel.leg.hold(voltage + channel.amplifier.draw(), interval);
             }
             measured = self.read();

@@ -29,6 +29,13 @@ pub enum Failure {
     Target(TargetError),
     /// The file system or the simulator said no.
     Environment(String),
+    /// A gate is not passed, with the figures that say why: exit code 1.
+    Judged {
+        /// Why.
+        message: String,
+        /// For programs; the text is out already.
+        result: Value,
+    },
     /// Ended from outside with a result: what was found so far.
     Interrupted {
         /// What is left undone.
@@ -120,6 +127,11 @@ impl Ui {
         }
     }
 
+    /// Whether someone looks at standard error.
+    pub fn is_terminal(&self) -> bool {
+        std::io::stderr().is_terminal()
+    }
+
     /// Whether the result is for programs.
     pub fn is_json(&self) -> bool {
         self.json
@@ -145,11 +157,12 @@ impl Ui {
             Failure::Write(error) => (3, error.to_string()),
             Failure::Target(error) => (3, error.to_string()),
             Failure::Environment(text) => (3, text.clone()),
+            Failure::Judged { message, .. } => (1, message.clone()),
             Failure::Interrupted { message, .. } => (INTERRUPTED, message.clone()),
         };
         if self.json {
             let result = match failure {
-                Failure::Interrupted { result, .. } => result.clone(),
+                Failure::Interrupted { result, .. } | Failure::Judged { result, .. } => result.clone(),
                 _ => Value::Null,
             };
             self.document(code, result, Some(&message));

@@ -4,7 +4,7 @@ use super::fields::Fields;
 use super::{joints, task_space};
 use crate::model::{
     Actuator, Adaptation, AdaptationMode, Amplifier, ControllerOptions, Dac, Geometry, Hysteresis, LegBody, Mcu, Model,
-    RateDependence, RigidBody, Scalar, Sensor, SetpointKind, Target, Timing, Workspace,
+    RateDependence, RigidBody, Robust, Scalar, Sensor, SetpointKind, Target, Timing, Workspace,
 };
 
 /// The model, or `None` if a value is missing: then there is a finding for it.
@@ -59,6 +59,7 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
         },
         target: target(f)?,
         task_space: task_space::task_space(f)?,
+        robust: robust(f),
         spans: f.spans(),
     })
 }
@@ -122,6 +123,22 @@ pub(super) fn weight(f: &Fields, which: &str) -> Option<f64> {
 pub(super) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     let length = libm::sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
     (length > 1e-9).then(|| vector.map(|component| component / length))
+}
+
+fn robust(f: &Fields) -> Robust {
+    Robust {
+        mass: f.list("robust.mass"),
+        stiffness: f.list("robust.stiffness"),
+        damping: f.list("robust.damping"),
+        gain: f.list("robust.gain"),
+        hysteresis: f.list("robust.hysteresis"),
+        creep: f.list("robust.creep"),
+        lag: f.list("robust.lag"),
+        noise: f.list("robust.noise"),
+        delay_ticks: f.whole("robust.delay_ticks"),
+        max_error: f.number("robust.max_error"),
+        max_orientation: f.number("robust.max_orientation"),
+    }
 }
 
 fn target(f: &Fields) -> Option<Target> {

@@ -10,6 +10,7 @@ mod gauges;
 mod mechanics;
 mod rate;
 mod records;
+mod robust;
 mod trajectories;
 
 use std::path::Path;
@@ -54,6 +55,7 @@ const CHECKS: &[Check] = &[
     gauges::six,
     gauges::directions,
     gauges::calibrated_alike,
+    robust::ranges_in_order,
     trajectories::keys_of_kind,
     trajectories::names_differ,
     trajectories::not_too_many,

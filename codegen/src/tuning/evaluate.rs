@@ -6,6 +6,8 @@
 //! with their own gauges have no feedback: |h̃| is the root mean square over the legs and η what the estimates change in a
 //! tick, µm rms.
 
+mod observe;
+
 use std::ops::ControlFlow;
 
 use host_sim::closed_loop::{LEGS, RunError, ticks_within};
@@ -17,6 +19,8 @@ use host_sim::platform::{PlatformScenario, Specimen};
 use host_sim::scenario::LegScenario;
 use host_sim::trajectory::{LegTrajectory, Multisine, PaperLeg, PaperPath, PaperPose, PoseTrajectory, Reading};
 use serde::Serialize;
+
+pub use observe::Observed;
 
 use super::Setting;
 use super::space::axis_stiffness;
@@ -68,7 +72,7 @@ pub struct Conditions {
     pub noise: Option<u64>,
     /// Seed of the machine's tolerances; none for a machine as its data sheet. Legs with their own gauges have none.
     pub machine: Option<u64>,
-    /// Control intervals by which voltages come late. For a platform.
+    /// Control intervals by which voltages come late.
     pub latency: usize,
     /// One step per control interval where that is offered, or the small steps of `specgen sim`.
     pub whole_ticks: bool,
@@ -185,6 +189,7 @@ impl Case {
         let period = model.timing.period;
         let ticks = ticks_within(trajectory.duration(), period)?;
         scenario.rig_mut().draw_ahead(ticks);
+        scenario.rig_mut().set_latency(conditions.latency);
         let controller = controller.fork();
         let stroke = model.actuator.stroke;
         Ok(Self { kind: Kind::Legs { scenario, controller, trajectory, ticks }, period, stroke })

@@ -39,7 +39,7 @@ pub struct Genetic {
 }
 
 /// Uniform in [0, 1).
-pub(super) fn unit(rng: &mut ChaCha8Rng) -> f64 {
+pub(crate) fn unit(rng: &mut ChaCha8Rng) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }
 

@@ -44,6 +44,7 @@ const READING: Item = item(Dimension::LENGTH, Range::closed(-0.1, 0.1), "um");
 const WEIGHT: Shape = Shape::One(Item::Number(Range::above(0.0, 1.0)));
 const BANDWIDTH: Shape = one(Dimension::ANGULAR_RATE, Range::above(0.0, 1e6), "rad/s");
 const RATIO: Item = Item::Number(Range::above(0.0, 10.0));
+const FACTORS: Shape = Shape::List(&[RATIO; 2]);
 const CREEP_TIME: Item = item(Dimension::TIME, Range::closed(1e-6, 1e5), "ms");
 const CREEP_TIMES: Shape = Shape::Leading(1, &[CREEP_TIME; 6]);
 const CREEP_WEIGHTS: Shape = Shape::Leading(1, &[Item::Number(Range::closed(0.0, 1.0)); 6]);
@@ -392,6 +393,24 @@ pub const SECTIONS: &[Section] = &[
             row("ram", BYTES, Optional, "", "\"32 KiB\"", "RAM, stack included."),
             row("stack", BYTES, Optional, "", "\"2 KiB\"", "Stack of one tick."),
             row("instructions", integer(1, 1_000_000_000), Optional, "", "3000", "Mean instructions per tick."),
+        ],
+    },
+    Section {
+        name: "robust",
+        kind: Kind::Optional,
+        doc: "What `specgen robust` varies: smallest and largest factor on what the other sections say, and the error that it lets pass. Nothing of it is in the controller.",
+        keys: &[
+            row("mass", FACTORS, Rule("[0.95, 1.05]"), "", "[0.95, 1.05]", "On mass and inertia of the platform."),
+            row("stiffness", FACTORS, Rule("[0.95, 1.05]"), "", "[0.95, 1.05]", "On the axial stiffness of a leg."),
+            row("damping", FACTORS, Rule("[0.7, 1.3]"), "", "[0.7, 1.3]", "On the damping ratio of the structure."),
+            row("gain", FACTORS, Rule("`adaptation.gain_ratio`"), "lambda", "[0.9, 1.1]", "On the gain of a leg."),
+            row("hysteresis", FACTORS, Rule("[0.9, 1.1]"), "", "[0.9, 1.1]", "On the width of a leg's hysteresis: the thresholds of its plays."),
+            row("creep", FACTORS, Rule("[0.9, 1.1]"), "", "[0.9, 1.1]", "On the creep of a leg."),
+            row("lag", FACTORS, Rule("[0.8, 1.2]"), "", "[0.8, 1.2]", "On the lag of an amplifier."),
+            row("noise", FACTORS, Rule("[0.5, 1.5]"), "", "[0.5, 1.5]", "On the noise of gauges, amplifiers and force sensor."),
+            row("delay_ticks", integer(0, 100), Rule("1"), "", "1", "Control intervals by which voltages come late, at most: none to so many are tried."),
+            row("max_error", one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "\"200 nm\"", "Gate: largest rms error of the translation, or of the legs."),
+            row("max_orientation", one(Dimension::ANGLE, Range::closed(1e-12, 0.1), "nrad"), Optional, "", "\"1 urad\"", "Gate: largest rms error of the angles."),
         ],
     },
 ];

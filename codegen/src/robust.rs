@@ -1,0 +1,19 @@
+//! What the closed loop does on machines that are not their data sheet: corners and random draws of declared uncertainties.
+//!
+//! ```text
+//! factors (spec, options, defaults) → plan: nominal, corners, draws with a seed each → run (emitted controller) → quantiles → gate
+//! ```
+//! Each member of a plan is a machine of its own, prepared from the start, under the spec's own settings.
+
+pub mod deviation;
+pub mod factors;
+pub mod gate;
+pub mod plan;
+pub mod quantiles;
+pub mod run;
+
+pub use deviation::Deviation;
+pub use factors::{Factor, Factors, Origin};
+pub use gate::Gate;
+pub use plan::{Member, Plan};
+pub use run::{Figures, Outcome, Study};

@@ -1,0 +1,95 @@
+//! Whether the figures will do.
+
+use serde::Serialize;
+
+use super::plan::Member;
+use super::quantiles::quantile;
+use super::run::{Figures, Outcome};
+
+/// What must not be exceeded.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Gate {
+    /// Largest rms error of the translation, or of the legs, nm.
+    pub error_nm: Option<f64>,
+    /// Largest rms error of the angles, nrad.
+    pub orientation_nrad: Option<f64>,
+    /// Quantile of the draws that is compared, %; none for the largest of draws and corners.
+    pub quantile: Option<f64>,
+}
+
+impl Gate {
+    /// Why the runs do not pass, one reason a line; nothing if they do.
+    #[must_use]
+    pub fn reasons(&self, runs: &[(Member, Outcome)]) -> Vec<String> {
+        let mut reasons = Vec::new();
+        let lost: Vec<&str> = runs
+            .iter()
+            .filter(|(_, outcome)| outcome.figures().is_none())
+            .map(|(member, _)| member.name.as_str())
+            .collect();
+        if let Some(first) = lost.first() {
+            reasons.push(format!("{} of {} runs are unstable, the first of them {first}", lost.len(), runs.len()));
+        }
+        type Figure = fn(&Figures) -> f64;
+        let looked_at: [(Option<f64>, &str, &str, Figure); 2] = [
+            (self.error_nm, "error", "nm", |figures| figures.error_nm),
+            (self.orientation_nrad, "orientation error", "nrad", |figures| figures.orientation_nrad),
+        ];
+        for (limit, what, unit, of) in looked_at {
+            let Some(limit) = limit else { continue };
+            let compared: Vec<Option<f64>> = runs
+                .iter()
+                .filter(|(member, _)| self.quantile.is_none() || member.drawn)
+                .map(|(_, outcome)| outcome.figures().map(of))
+                .collect();
+            let which = self.quantile.map_or("largest".to_owned(), |percent| format!("{percent} % quantile of the"));
+            match quantile(&compared, self.quantile.unwrap_or(100.0)) {
+                Some(found) if found <= limit => {}
+                Some(found) => {
+                    reasons.push(format!("{which} rms {what} is {found:.2} {unit}, above {limit:.2} {unit}"));
+                }
+                // Of unstable runs the first reason speaks.
+                None if compared.is_empty() => reasons.push(format!("no draw to take the {which} rms {what} from")),
+                None => reasons.push(format!("{which} rms {what} falls on an unstable run")),
+            }
+        }
+        reasons
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robust::{Deviation, Factor};
+
+    fn run(name: &str, drawn: bool, error_nm: Option<f64>) -> (Member, Outcome) {
+        let deviation = Deviation::common(Factor::nominal);
+        let outcome = match error_nm {
+            Some(error_nm) => Outcome::Ran(Figures { error_nm, ..Figures::default() }),
+            None => Outcome::Unstable { time: Some(0.1), reason: "test".to_owned(), limited_percent: 0.0 },
+        };
+        (Member { name: name.to_owned(), seed: 1, drawn, deviation }, outcome)
+    }
+
+    #[test]
+    fn the_largest_counts_corners_and_a_quantile_only_draws() {
+        let runs = [run("mass-low", false, Some(50.0)), run("7", true, Some(10.0)), run("8", true, Some(20.0))];
+        let reasons =
+            |error_nm, quantile| Gate { error_nm: Some(error_nm), orientation_nrad: None, quantile }.reasons(&runs);
+        assert!(reasons(50.0, None).is_empty());
+        assert!(reasons(49.9, None)[0].contains("largest rms error is 50.00 nm, above 49.90 nm"));
+        assert!(reasons(20.0, Some(95.0)).is_empty() && reasons(10.0, Some(50.0)).is_empty());
+        assert!(reasons(19.9, Some(95.0))[0].starts_with("95 % quantile of the rms error is 20.00 nm"));
+    }
+
+    #[test]
+    fn an_unstable_run_fails_whatever_is_asked_for() {
+        let runs = [run("all-soft", false, None), run("7", true, Some(10.0))];
+        for quantile in [None, Some(50.0)] {
+            let gate = Gate { error_nm: None, orientation_nrad: None, quantile };
+            assert_eq!(gate.reasons(&runs), ["1 of 2 runs are unstable, the first of them all-soft"]);
+        }
+        let gate = Gate { error_nm: Some(1e9), orientation_nrad: None, quantile: None };
+        assert_eq!(gate.reasons(&runs).len(), 2);
+    }
+}

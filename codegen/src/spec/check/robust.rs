@@ -1,0 +1,24 @@
+//! Ranges of `[robust]`.
+
+use super::in_order;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+
+const RANGES: [&str; 8] = [
+    "robust.mass",
+    "robust.stiffness",
+    "robust.damping",
+    "robust.gain",
+    "robust.hysteresis",
+    "robust.creep",
+    "robust.lag",
+    "robust.noise",
+];
+
+/// One number twice is a factor that is known and differs from 1.
+pub(super) fn ranges_in_order(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for path in RANGES {
+        let _ = in_order(f, findings, path, true);
+    }
+    Some(())
+}

@@ -1,0 +1,215 @@
+//! `specgen robust` as a user runs it: replay to the bit, threads, the gate, what it calls unstable, what it refuses.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+mod support;
+
+use std::collections::BTreeSet;
+use std::io::{BufRead, BufReader, Read};
+use std::process::Stdio;
+
+use serde_json::Value;
+use specgen::compile::compile;
+use specgen::model::AdaptationMode;
+use specgen::stability::platform::{Adapting, Law};
+use support::{Folder, contents};
+
+/// A run of `name` in a report.
+fn machine<'a>(report: &'a Value, name: &str) -> &'a Value {
+    let runs = report["runs"].as_array().unwrap();
+    runs.iter().find(|run| run["name"] == name).unwrap_or_else(|| panic!("no {name} in {report:#}"))
+}
+
+#[test]
+fn a_machine_run_alone_gives_the_same_bits() {
+    for spec in ["reference.toml", "legs.toml"] {
+        let folder = Folder::new();
+        let some = ["robust", spec, "--samples", "4", "--seed", "3", "--vary", "mass=20%"];
+        let whole = folder.json(&some).value;
+        let report = &whole["result"];
+        let drawn: Vec<&Value> = report["runs"].as_array().unwrap().iter().filter(|run| run["drawn"] == true).collect();
+        assert_eq!(drawn.len(), 4);
+        let names = [drawn[0]["name"].as_str().unwrap(), drawn[3]["name"].as_str().unwrap(), "all-stiff"];
+        for name in names {
+            let mut arguments = some.to_vec();
+            arguments.extend(["--replay", name]);
+            let alone = folder.json(&arguments).value;
+            assert_eq!(alone["result"]["runs"].as_array().unwrap().len(), 1);
+            // Numbers of JSON are the shortest that name the double: equal texts are equal bits.
+            assert_eq!(machine(&alone["result"], name).to_string(), machine(report, name).to_string(), "{spec} {name}");
+        }
+        assert_ne!(drawn[0]["outcome"], drawn[1]["outcome"], "the comparison can fail");
+        // The command that is printed for the worst case is that machine's.
+        let rows = report["table"].as_array().unwrap().iter();
+        let worst: BTreeSet<[&str; 2]> =
+            rows.map(|row| ["replay", "name"].map(|key| row["worst"][key].as_str().unwrap())).collect();
+        for [command, name] in worst {
+            let words: Vec<&str> = command.split(' ').skip(1).collect();
+            let alone = folder.json(&words).value;
+            assert_eq!(machine(&alone["result"], name), machine(report, name), "{command}");
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads() {
+    for spec in ["reference.toml", "legs.toml"] {
+        let folder = Folder::new();
+        let run = |threads: &str, output: &str, seed: &str| {
+            let run =
+                folder.run(&["robust", spec, "--samples", "5", "--threads", threads, "-o", output, "--seed", seed]);
+            assert_eq!(run.code, 0, "{run:#?}");
+            (run.stdout, contents(&folder.path(output)))
+        };
+        let first = run("1", "a", "5");
+        assert!(first.1.len() == 2 && first.0.contains("worst error"), "{}", first.0);
+        for (threads, output) in [("1", "b"), ("2", "c"), ("2", "d"), ("3", "e")] {
+            assert_eq!(run(threads, output, "5"), first, "{spec}, {threads} threads");
+        }
+        // The comparison can fail.
+        assert_ne!(run("1", "f", "6"), first, "{spec}");
+    }
+}
+
+#[test]
+fn a_platform_beyond_the_gain_that_the_eigenvalues_allow_is_unstable_and_below_it_is_not() {
+    let folder = Folder::new();
+    let compiled = compile(&folder.path("reference.toml")).unwrap();
+    assert_eq!(compiled.model.adaptation.mode, AdaptationMode::Pcc);
+    let margins = &compiled.design.as_ref().unwrap().margins;
+    let limit = margins.iter().find(|one| one.law == Law::Combined(Adapting::Pcc)).unwrap().gain_ratio_limit.unwrap();
+    for (gain, stable) in [(0.93 * limit, true), (1.12 * limit, false)] {
+        let vary = format!("gain={gain}:{gain}");
+        let arguments = ["robust", "reference.toml", "--vary", &vary, "--no-noise", "--replay", "gain"];
+        let run = folder.run(&arguments);
+        if stable {
+            assert_eq!(run.code, 0, "λ {gain:.2}: {run:#?}");
+            assert!(run.stdout.contains("gate: passed (all stable)"), "{}", run.stdout);
+        } else {
+            run.says(1, &["not robust: 1 of 1 runs are unstable, the first of them gain"]);
+            assert!(run.stdout.contains("unstable: error beyond 3000 nm after"), "{}", run.stdout);
+        }
+    }
+}
+
+#[test]
+fn a_leg_that_is_short_of_voltage_is_said_to_be_at_its_limit() {
+    let folder = Folder::new();
+    let run = folder.run(&["robust", "legs.toml", "--vary", "gain=0.5:0.5", "--replay", "gain"]);
+    run.says(1, &["not robust"]);
+    assert!(run.stdout.contains(", a leg at its limit in "), "{}", run.stdout);
+}
+
+/// Two ways to one figure: the nominal machine here, and the spec's own row of `tune`.
+#[test]
+fn nominal_legs_have_the_error_that_tune_scores() {
+    let folder = Folder::new();
+    let tuned = folder.json(&["tune", "legs.toml", "--evaluations", "8", "--seconds", "0.1"]).value;
+    let rows = tuned["result"]["settings"].as_array().unwrap();
+    let scored = rows.iter().find(|row| row["name"] == "spec").unwrap()["scored_on"]["Scored"].clone();
+    // Tune scores on the seed after its own.
+    let here = folder.json(&["robust", "legs.toml", "--seed", "2", "--replay", "nominal"]).value;
+    let ran = &machine(&here["result"], "nominal")["outcome"]["ran"];
+    let (expected, found) = (scored["error_nm"].as_f64().unwrap(), ran["error_nm"].as_f64().unwrap());
+    assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    let late = folder.json(&["robust", "legs.toml", "--vary", "delay_ticks=1", "--replay", "delay_ticks-high"]).value;
+    let late = machine(&late["result"], "delay_ticks-high")["outcome"]["ran"]["error_nm"].as_f64().unwrap();
+    assert!(late > 1.1 * found, "a tick of delay must show: {late} {found}");
+}
+
+#[test]
+fn the_gate_of_options_or_spec_fails_a_build_with_the_reason_and_the_figures() {
+    let folder = Folder::new();
+    let few = ["robust", "legs.toml", "--samples", "3", "--vary", "gain=1%"];
+    let with = |more: &[&str]| folder.run(&[&few, more].concat());
+    with(&["--max-error", "1 nm"]).says(1, &["not robust: largest rms error is", "above 1.00 nm"]);
+    with(&["--max-error", "1 nm", "--quantile", "95"]).says(1, &["95 % quantile of the rms error is"]);
+    let passed = with(&["--max-error", "1 um"]);
+    assert_eq!(passed.code, 0, "{passed:#?}");
+    assert!(passed.stdout.contains("gate: passed (all stable, largest rms error at most 1000.00 nm)"));
+
+    // For programs the figures come along.
+    let judged = with(&["--max-error", "1 nm", "--json"]);
+    let document: Value = serde_json::from_str(&judged.stdout).unwrap();
+    assert_eq!((judged.code, document["exit_code"].as_u64()), (1, Some(1)));
+    assert!(document["error"].as_str().unwrap().starts_with("not robust"));
+    assert_eq!(document["result"]["gate"]["reasons"].as_array().unwrap().len(), 1);
+    assert!(document["result"]["runs"].as_array().unwrap().len() > 3);
+
+    // The spec's own gate and ranges; an option goes before.
+    let text = folder.read("legs.toml");
+    folder.write("legs.toml", format!("{text}\n[robust]\ngain = [0.99, 1.01]\nmax_error = \"1 nm\"\n"));
+    let own = folder.run(&few[..4]);
+    own.says(1, &["above 1.00 nm"]);
+    assert!(own.stdout.contains("gain          0.990 to 1.010  (spec"), "{}", own.stdout);
+    let given = folder.run(&["robust", "legs.toml", "--samples", "3", "--max-error", "1 um", "--vary", "gain=2%"]);
+    assert_eq!(given.code, 0, "{given:#?}");
+    assert!(given.stdout.contains("gain          0.980 to 1.020  (option"), "{}", given.stdout);
+}
+
+#[test]
+fn what_cannot_be_run_is_refused_with_a_mend_and_nothing_is_written() {
+    let folder = Folder::new();
+    let before = folder.listing();
+    let cases: &[(&str, &[&str], &str)] = &[
+        ("legs.toml", &["--samples", "0"], "0 is not in 1..=1000000"),
+        ("legs.toml", &["--vary", "mass=-0.5:1"], "expected factors above 0"),
+        ("legs.toml", &["--vary", "mass=1.1:0.9"], "give the smaller value first"),
+        ("legs.toml", &["--vary", "colour=5%"], "expected one of mass"),
+        ("legs.toml", &["--max-error", "-1 nm"], "such as \"30 nm\""),
+        ("legs.toml", &["--max-error", "1 urad"], "such as \"30 nm\""),
+        ("legs.toml", &["--max-orientation", "1 urad"], "is for a spec with [control]"),
+        ("legs.toml", &["--quantile", "101"], "up to 100"),
+        ("legs.toml", &["--trajectory", "case-1"], "name one of leg, multisine"),
+        ("reference.toml", &["--trajectory", "leg"], "name one of case-1, case-2, machining, multisine"),
+        ("legs.toml", &["--replay", "mass"], "one of nominal, mass-low"),
+    ];
+    for (spec, more, mend) in cases {
+        folder.run(&[&["robust", spec, "-o", "out"], *more].concat()).says(2, &[mend]);
+    }
+    assert_eq!(folder.listing(), before);
+    let text = folder.read("legs.toml");
+    for (line, code) in [
+        ("mass = [1.1, 0.9]", "E0302"),
+        ("mass = [-1.0, 1.0]", "E0301"),
+        ("mass = [1.0]", "E0207"),
+        ("weight = [0.9, 1.1]", "E0202"),
+        ("max_error = 30", "E0208"),
+        ("max_error = \"30 nrad\"", "E0211"),
+        ("delay_ticks = -1", "E0301"),
+    ] {
+        folder.write("bad.toml", format!("{text}\n[robust]\n{line}\n"));
+        let document = folder.json(&["robust", "bad.toml"]);
+        assert_eq!(document.code, 1, "{line}");
+        assert!(!document.finding(code)["help"].as_str().unwrap().is_empty(), "{line}");
+    }
+}
+
+/// An interrupt as the terminal sends it.
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_what_was_run_and_says_so() {
+    let folder = Folder::new();
+    let mut child = folder
+        .command()
+        .args(["robust", "legs.toml", "--samples", "2000", "--threads", "1"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.starts_with("robust: ") {
+        line.clear();
+        assert_ne!(stderr.read_line(&mut line).unwrap(), 0, "it ended before it was interrupted");
+    }
+    let process = child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &process]).status().unwrap().success());
+    let mut said = String::new();
+    stderr.read_to_string(&mut said).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    assert!(said.contains("interrupted: the figures are of ") && said.contains("no gate is passed"), "{said}");
+    let shown = String::from_utf8(output.stdout).unwrap();
+    assert!(shown.contains("worst error") && !shown.contains("gate: passed"), "{shown}");
+}
