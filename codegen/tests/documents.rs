@@ -9,7 +9,15 @@ use std::fs;
 
 use support::{Folder, repository};
 
-const DOCUMENTS: [&str; 3] = ["README.md", "ARCHITECTURE.md", "docs/control-law.md"];
+const DOCUMENTS: [&str; 7] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "docs/control-law.md",
+    "docs/hysteresis.md",
+    "docs/identification.md",
+    "docs/tuning.md",
+    "docs/robustness.md",
+];
 
 fn read(name: &str) -> String {
     fs::read_to_string(repository().join(name)).unwrap()
