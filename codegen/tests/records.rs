@@ -258,7 +258,10 @@ fn columns_in_the_wrong_order_are_refused() {
 #[test]
 fn a_record_that_does_not_cover_the_declared_range_is_refused() {
     let lower = changed(|rows| rows.iter_mut().for_each(|row| row[1] *= 0.75));
-    refused(lower, &expect(None, "E0606", &["0 V (at 0 s) to 75 V (at 40 s)", "0 V to 100 V", "above 75 V"], "upper end"));
+    refused(
+        lower,
+        &expect(None, "E0606", &["0 V (at 0 s) to 75 V (at 40 s)", "0 V to 100 V", "above 75 V"], "upper end"),
+    );
     // The same good record under other limits, below, above, and around.
     for (limits, code, words) in [
         ("\"0 V\", \"140 V\"", "E0606", ["0 V (at 0 s) to 100 V (at 40 s)", "0 V to 140 V"]),
