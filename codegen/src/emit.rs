@@ -4,7 +4,7 @@
 
 //!
 //! Files that every controller has are emitted here; what differs between six legs with their own gauges and a platform in
-//! task space lies in [`legs`] and [`platform`].
+//! task space lies in `legs` and `platform`.
 
 mod description;
 mod dynamics;

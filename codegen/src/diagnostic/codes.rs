@@ -16,7 +16,7 @@ pub struct Code {
 
 macro_rules! codes {
     ($($name:ident = $id:literal, $title:literal, $explanation:literal;)*) => {
-        $(#[doc = concat!($id, ": ", $title, ".")] pub const $name: &str = $id;)*
+        $(#[doc = concat!($id, ": `", $title, "`.")] pub const $name: &str = $id;)*
         /// Every code, in order.
         pub const REGISTRY: &[Code] = &[$(Code { id: $id, title: $title, explanation: $explanation }),*];
     };

@@ -107,7 +107,7 @@ pub struct Gains {
     pub derivative: [f64; 6],
 }
 
-/// Config of a platform at start-up; code limits are in [`Defaults`].
+/// Config of a platform at start-up; code limits are in [`super::Defaults`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlatformDefaults {
     /// P, F or P/F.
@@ -163,7 +163,7 @@ pub struct Sensing {
     pub rate_gain: f64,
 }
 
-/// Constants of `specgen_runtime::setpoint::Plan`; the workspace is in [`Bounds`].
+/// Constants of `specgen_runtime::setpoint::Plan`; the workspace is in [`super::Bounds`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Setpoints {
     /// T_s, s.

@@ -49,6 +49,11 @@ impl Findings {
         self.list.iter().any(|d| keys.contains(&d.key.as_str()))
     }
 
+    /// Whether there is a finding about this key or one of its items.
+    pub(super) fn mentions_item(&self, key: &str) -> bool {
+        self.list.iter().any(|d| d.key.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('[')))
+    }
+
     pub(super) fn all(&self) -> &[Diagnostic] {
         &self.list
     }

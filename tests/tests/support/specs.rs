@@ -36,7 +36,7 @@ pub fn folder_with_records() -> tempfile::TempDir {
     fs::create_dir_all(dir.path().join("records")).expect("created");
     fs::create_dir_all(dir.path().join("specs/records")).expect("created");
     for place in ["records", "specs/records"] {
-        for name in ["reference-forc", "leg1", "leg2", "leg3", "leg4", "leg5", "leg6"] {
+        for name in ["reference-forc", "leg1", "leg2", "leg3", "leg4", "leg5", "leg6", "leg-mu1"] {
             fs::write(dir.path().join(place).join(format!("{name}.csv")), "").expect("written");
         }
     }
@@ -65,13 +65,15 @@ pub struct Choice {
     pub joints: bool,
     /// The first trajectory is a waveform instead of a path of the paper.
     pub waveform: bool,
+    /// Dynamic Preisach instead of creep.
+    pub dynamic: bool,
 }
 
 /// The task-space controller, with joint circles and a path of the paper.
-pub const PLATFORM: Choice = Choice { control: true, weights: false, joints: false, waveform: false };
+pub const PLATFORM: Choice = Choice { control: true, weights: false, joints: false, waveform: false, dynamic: false };
 
 /// The leg feed-forward, with weights per run.
-pub const LEGS: Choice = Choice { control: false, weights: true, joints: false, waveform: false };
+pub const LEGS: Choice = Choice { control: false, weights: true, joints: false, waveform: false, dynamic: false };
 
 impl Choice {
     /// Whether the key stands in the text.
@@ -80,6 +82,9 @@ impl Choice {
         match (section.name, key.presence) {
             (_, Presence::InsteadOf(_)) => key.name.ends_with("_weight") == self.weights,
             (_, Presence::Form(form)) => form.contains("one by one") == self.joints,
+            ("hysteresis", _) if key.name == "rate_tables" => self.dynamic,
+            ("hysteresis", _) if key.name.starts_with("creep_") => !self.dynamic,
+            ("hysteresis", _) if key.name == "dead_time" => !self.control,
             ("sensor", _) if key.name == "calibration" => self.control,
             ("trajectory", Presence::Rule(_)) => of_waveform == self.waveform,
             _ => true,
@@ -92,7 +97,13 @@ impl Choice {
         let mut text = if header.is_empty() { header } else { header + "\n" };
         for key in section.keys.iter().filter(|key| self.takes(section, key)) {
             let waveform = section.name == "trajectory" && key.name == "kind" && self.waveform;
-            text.push_str(&format!("{} = {}\n", key.name, if waveform { "\"waveform\"" } else { key.example }));
+            let dynamic = section.name == "hysteresis" && key.name == "rate" && self.dynamic;
+            let value = match (waveform, dynamic) {
+                (true, _) => "\"waveform\"",
+                (_, true) => "\"dynamic-preisach\"",
+                _ => key.example,
+            };
+            text.push_str(&format!("{} = {value}\n", key.name));
         }
         text
     }

@@ -30,9 +30,9 @@ pub(super) fn keys_of_option(f: &Fields, findings: &mut Findings) -> Option<()> 
                     format!("`{path}` belongs to rate = \"{option}\", but rate is \"{chosen}\""),
                     format!("write rate = \"{option}\", or take `{key}` out"),
                 );
-            } else if !given && option == chosen && !findings.mentions(&[&path]) {
+            } else if !given && option == chosen && !findings.mentions_item(&path) {
                 findings.error(
-                    codes::RATE_KEYS,
+                    codes::MISSING_KEY,
                     &path,
                     f.span("hysteresis.rate"),
                     format!("rate = \"{chosen}\" needs `{path}`"),
