@@ -72,7 +72,9 @@ fn tests_that_figures_come_from_exist() {
     }
     assert!(names.len() > 4, "{names:?}");
     for name in names {
-        let exists = folders.iter().any(|folder| repository().join(folder).join(format!("{name}.rs")).is_file());
+        let files = [format!("{name}.rs"), format!("{name}/main.rs")];
+        let exists =
+            folders.iter().any(|folder| files.iter().any(|file| repository().join(folder).join(file).is_file()));
         assert!(exists, "README names the test {name}");
     }
 }
