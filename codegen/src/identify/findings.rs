@@ -45,6 +45,16 @@ impl Findings {
         self.found.iter().any(|d| d.severity == Severity::Error)
     }
 
+    /// What a record gave, with the warnings about it, unless a finding refuses it.
+    pub(crate) fn conclude<T>(self, found: Option<T>) -> Result<(T, Vec<Diagnostic>), Vec<Diagnostic>> {
+        let refused = self.any_error();
+        let all = self.into_diagnostics();
+        match found {
+            Some(found) if !refused => Ok((found, all)),
+            _ => Err(all),
+        }
+    }
+
     /// All findings in the order found, followed by one line for each kind that was cut short.
     pub(crate) fn into_diagnostics(self) -> Vec<Diagnostic> {
         let Self { path, mut found, count } = self;

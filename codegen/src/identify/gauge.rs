@@ -93,14 +93,9 @@ pub fn calibrate_text(text: &str, shown_as: &str, degree: Option<usize>) -> Resu
 fn of_signals(signals: &Signals, degree: Option<usize>) -> Result<GaugeReport, Vec<Diagnostic>> {
     let mut findings = Findings::new(&signals.shown_as);
     let report = calibrate_checked(signals, degree, &mut findings);
-    let refused = findings.any_error();
-    match report {
-        Some(mut report) if !refused => {
-            report.warnings = findings.into_diagnostics();
-            Ok(report)
-        }
-        _ => Err(findings.into_diagnostics()),
-    }
+    let (mut report, warnings) = findings.conclude(report)?;
+    report.warnings = warnings;
+    Ok(report)
 }
 
 fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Findings) -> Option<GaugeReport> {

@@ -110,14 +110,9 @@ pub fn respond_text(text: &str, shown_as: &str, segment: Option<usize>) -> Resul
 fn of_signals(signals: &Signals, segment: Option<usize>) -> Result<ResponseReport, Vec<Diagnostic>> {
     let mut findings = Findings::new(&signals.shown_as);
     let report = responded(signals, segment, &mut findings);
-    let refused = findings.any_error();
-    match report {
-        Some(mut report) if !refused => {
-            report.warnings = findings.into_diagnostics();
-            Ok(report)
-        }
-        _ => Err(findings.into_diagnostics()),
-    }
+    let (mut report, warnings) = findings.conclude(report)?;
+    report.warnings = warnings;
+    Ok(report)
 }
 
 fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings) -> Option<ResponseReport> {

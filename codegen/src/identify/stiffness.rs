@@ -97,14 +97,9 @@ pub fn measure_text(text: &str, shown_as: &str) -> Result<StiffnessReport, Vec<D
 fn of_signals(signals: &Signals) -> Result<StiffnessReport, Vec<Diagnostic>> {
     let mut findings = Findings::new(&signals.shown_as);
     let report = measured(signals, &mut findings);
-    let refused = findings.any_error();
-    match report {
-        Some(mut report) if !refused => {
-            report.warnings = findings.into_diagnostics();
-            Ok(report)
-        }
-        _ => Err(findings.into_diagnostics()),
-    }
+    let (mut report, warnings) = findings.conclude(report)?;
+    report.warnings = warnings;
+    Ok(report)
 }
 
 fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessReport> {
