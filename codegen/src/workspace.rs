@@ -45,6 +45,8 @@ const FIXED: &[(&str, &str)] = &[
     ("runtime/src/setpoint/profile.rs", include_str!("../../firmware/runtime/src/setpoint/profile.rs")),
     ("runtime/src/setpoint/stop.rs", include_str!("../../firmware/runtime/src/setpoint/stop.rs")),
     ("runtime/src/setpoint/trajectory.rs", include_str!("../../firmware/runtime/src/setpoint/trajectory.rs")),
+    ("runtime/src/supervisor.rs", include_str!("../../firmware/runtime/src/supervisor.rs")),
+    ("runtime/src/supervisor/kinds.rs", include_str!("../../firmware/runtime/src/supervisor/kinds.rs")),
     ("runtime/src/trig.rs", include_str!("../../firmware/runtime/src/trig.rs")),
     ("host/Cargo.toml", include_str!("../../firmware/host/Cargo.toml")),
     ("host/build.rs", include_str!("../../firmware/host/build.rs")),
