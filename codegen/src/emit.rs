@@ -11,6 +11,7 @@ mod dynamics;
 mod format;
 mod hysteresis;
 mod identity;
+mod integrity;
 mod kinematics;
 mod legs;
 mod limits;
@@ -36,6 +37,7 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
         ("src/dynamics.rs", dynamics::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
+        ("src/integrity.rs", integrity::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
     ];
