@@ -4,6 +4,7 @@
 
 mod actuation;
 mod dynamics;
+mod gauge_converter;
 mod integrity;
 mod kinematics;
 mod linear;
@@ -79,6 +80,7 @@ pub fn lower(
         &defaults,
         task_space.as_ref(),
     );
+    let sensing = task_space.as_ref().map(|task| &task.sensing);
     Ok(Ir {
         name: model.name.clone(),
         digest: digest.to_owned(),
@@ -93,6 +95,7 @@ pub fn lower(
             leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
             sensor: model.sensor.range.map(round),
         },
+        gauge_converter: gauge_converter::lower(model, sensing, scalar),
         defaults,
         task_space,
         integrity,

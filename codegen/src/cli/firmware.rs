@@ -4,6 +4,7 @@ mod flash;
 mod size;
 mod text;
 
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -37,6 +38,10 @@ pub struct Common {
     /// Output folder; `<name>-controller` if not given. Must be new, empty, or an unchanged earlier output.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Where cargo builds for microcontrollers; `target` in the output folder if not given. Share it between outputs to
+    /// build less.
+    #[arg(long, value_name = "DIR")]
+    target_dir: Option<PathBuf>,
     /// Do not run the emulator: no instruction counts, no comparison of bits.
     #[arg(long)]
     no_measure: bool,
@@ -91,6 +96,26 @@ fn judge(made: &Made, text: &str, ui: &mut Ui) -> Result<(), Failure> {
     Err(Failure::Judged { message: refusal(made), result: json!(made) })
 }
 
+/// What every ELF file begins with.
+const ELF: [u8; 4] = [0x7f, b'E', b'L', b'F'];
+
+/// The file if it is an ELF image; none if it is something else, which can only be a spec.
+fn read_image(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
+    let mut file = match std::fs::File::open(path) {
+        Ok(file) => file,
+        // The compiler has the words for a spec that cannot be read.
+        Err(_) => return Ok(None),
+    };
+    let mut bytes = Vec::new();
+    let reading = |error| TargetError::io("reading", path, error);
+    // A spec may be a pipe or a device; only what begins as an image is read to its end.
+    if file.by_ref().take(ELF.len() as u64).read_to_end(&mut bytes).is_err() || bytes != ELF {
+        return Ok(None);
+    }
+    file.read_to_end(&mut bytes).map_err(reading)?;
+    Ok(Some(bytes))
+}
+
 /// Why an image must not be used.
 fn refusal(made: &Made) -> String {
     let list: String = made.failures.iter().map(|failure| format!("\n  {failure}")).collect();
@@ -117,7 +142,8 @@ fn make(spec: &Path, common: &Common, ui: &mut Ui) -> Result<(Compiled, Made), F
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[target.folder]);
     workspace::write(&output, &files)?;
     ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
-    let made = build(&compiled, target, &output, !common.no_measure, ui)?;
+    let target_dir = common.target_dir.clone().unwrap_or_else(|| output.join("target"));
+    let made = build(&compiled, target, &Folders { output: &output, target: &target_dir }, !common.no_measure, ui)?;
     Ok((compiled, made))
 }
 
@@ -144,8 +170,16 @@ fn wrong_part(compiled: &Compiled, mcu: Mcu, target: Target) -> Option<Diagnosti
     ))
 }
 
-fn build(compiled: &Compiled, target: Target, output: &Path, measure: bool, ui: &Ui) -> Result<Made, Failure> {
-    let target_dir = output.join("target");
+/// Where things are.
+#[derive(Clone, Copy)]
+struct Folders<'a> {
+    output: &'a Path,
+    /// Of cargo.
+    target: &'a Path,
+}
+
+fn build(compiled: &Compiled, target: Target, folders: &Folders<'_>, measure: bool, ui: &Ui) -> Result<Made, Failure> {
+    let Folders { output, target: target_dir } = *folders;
     let declared = compiled.model.target.mcu;
     let mut made = Made {
         name: compiled.ir.name.clone(),
@@ -166,29 +200,29 @@ fn build(compiled: &Compiled, target: Target, output: &Path, measure: bool, ui: 
         Kind::Host => {
             ui.progress("building the host library");
             made.board = "this machine".to_owned();
-            made.artifact = target::host::build_library(output, &target_dir)?.display().to_string();
+            made.artifact = target::host::build_library(output, &output.join("target"))?.display().to_string();
         }
         Kind::Program => {
             ui.progress(&format!("building {} for this machine", target.folder));
             made.board = "this machine".to_owned();
-            made.artifact = target::host::build_program(output, target.folder, &target_dir)?.display().to_string();
+            made.artifact = target::host::build_program(output, target.folder, target_dir)?.display().to_string();
         }
         Kind::Emulated => {
             made.board = declared.part().machine.to_owned();
             let toolchain = target::toolchain::find()?;
             ui.progress(&format!("building for {}", made.board));
-            let image = target::build::build_image_with(&toolchain, output, declared, &target_dir)?;
-            examine(&mut made, &image, true, &target_dir)?;
+            let image = target::build::build_image_with(&toolchain, output, declared, target_dir)?;
+            examine(&mut made, &image, true, output)?;
             if measure {
-                made.measurement = emulate(compiled, output, Some(&image), &mut made.notes, ui)?;
+                made.measurement = emulate(compiled, folders, Some(&image), &mut made.notes, ui)?;
             }
         }
         Kind::Board(mcu) => {
             made.board = mcu.part().board.to_owned();
             let toolchain = target::toolchain::find()?;
             ui.progress(&format!("building for {}", made.board));
-            let image = target::build::build_folder(&toolchain, output, target.folder, mcu, &target_dir)?;
-            examine(&mut made, &image, false, &target_dir)?;
+            let image = target::build::build_folder(&toolchain, output, target.folder, mcu, target_dir)?;
+            examine(&mut made, &image, false, output)?;
             if mcu != declared {
                 made.notes.push(format!(
                     "the spec declares {}; built for {} of the same core, whose memory is the limit where no budget is declared",
@@ -197,7 +231,7 @@ fn build(compiled: &Compiled, target: Target, output: &Path, measure: bool, ui: 
                 ));
             }
             if measure {
-                made.measurement = emulate(compiled, output, None, &mut made.notes, ui)?;
+                made.measurement = emulate(compiled, folders, None, &mut made.notes, ui)?;
             }
         }
     }
@@ -206,8 +240,10 @@ fn build(compiled: &Compiled, target: Target, output: &Path, measure: bool, ui: 
 }
 
 /// Size and checks of an image, and the image under a name that stays.
-fn examine(made: &mut Made, image: &Image, whole_image: bool, target_dir: &Path) -> Result<(), Failure> {
-    let kept = target_dir.join(format!("{}.elf", made.target));
+fn examine(made: &mut Made, image: &Image, whole_image: bool, output: &Path) -> Result<(), Failure> {
+    let folder = output.join("target");
+    std::fs::create_dir_all(&folder).map_err(|error| TargetError::io("creating", &folder, error))?;
+    let kept = folder.join(format!("{}.elf", made.target));
     std::fs::write(&kept, &image.elf).map_err(|error| TargetError::io("writing", &kept, error))?;
     made.artifact = kept.display().to_string();
     made.compiler = Some(image.compiler.clone());
@@ -220,7 +256,7 @@ fn examine(made: &mut Made, image: &Image, whole_image: bool, target_dir: &Path)
 /// The exercise on the host and on the emulated machine of the same core, if there is an emulator.
 fn emulate(
     compiled: &Compiled,
-    output: &Path,
+    folders: &Folders<'_>,
     image: Option<&Image>,
     notes: &mut Vec<String>,
     ui: &Ui,
@@ -234,9 +270,9 @@ fn emulate(
         Err(error) => return Err(error.into()),
     };
     let mcu = compiled.model.target.mcu;
-    let target_dir = output.join("target");
+    let Folders { output, target: target_dir } = *folders;
     ui.progress(&format!("counting instructions on {}", mcu.machine()));
-    let library = target::host::build_library(output, &target_dir)?;
+    let library = target::host::build_library(output, &output.join("target"))?;
     let environment = |error: String| Failure::Environment(error);
     let mut controller = Controller::load(&library).map_err(|error| environment(error.to_string()))?;
     let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS)
@@ -245,7 +281,7 @@ fn emulate(
     let image = match image {
         Some(image) => image,
         None => {
-            built = target::build::build_image_with(&tools.toolchain, output, mcu, &target_dir)?;
+            built = target::build::build_image_with(&tools.toolchain, output, mcu, target_dir)?;
             &built
         }
     };

@@ -29,14 +29,18 @@ mod config;
 
 pub mod dynamics;
 pub mod hysteresis;
+pub mod integrity;
 pub mod kinematics;
 pub mod limits;
+mod machine_words;
+
 pub mod sensing;
 pub mod setpoint;
 pub mod stages;
 mod state;
 mod step;
 
+pub mod supervised;
 pub mod task_space;
 mod words;
 

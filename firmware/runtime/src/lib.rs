@@ -28,6 +28,7 @@
 //! | [`dynamics`] | motion of the platform to leg forces and displacements | (4), (AI.1)–(AI.17) |
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
 //! | [`crc`] | checksum of tables and settings in memory | |
+//! | [`supervisor`] | phases of the machine, causes of faults | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
@@ -53,6 +54,7 @@ pub mod notch;
 pub mod real;
 pub mod sensing;
 pub mod setpoint;
+pub mod supervisor;
 pub mod transfer;
 pub mod trig;
 pub mod velocity;
@@ -73,6 +75,6 @@ pub use mode::{ControlMode, Interaction};
 pub use motion::Motion;
 pub use notch::{NotchState, Section};
 pub use real::Real;
-pub use sensing::{Calibration, Gauges};
+pub use sensing::{Calibration, GaugeConverter, Gauges};
 pub use transfer::Transfer;
 pub use velocity::{Rate, RateFilter};

@@ -2,14 +2,18 @@
 
 use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
 use clap::Args;
 use serde_json::json;
 
-use super::{Common, make, refusal, text};
+use super::{Common, make, read_image, refusal, text};
+use crate::budget;
 use crate::cli::ui::{Failure, Ui};
+use crate::model::{self, Mcu};
+use crate::target::checks::{self, Rules};
 use crate::target::find_program;
+use crate::target::size::size;
 use crate::target::targets::{Kind, Target};
 
 /// The program that talks to the debug probe.
@@ -20,8 +24,9 @@ const INSTALL: &str = "cargo install probe-rs-tools --locked";
 /// Arguments of `flash`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// The spec file.
-    spec: PathBuf,
+    /// A spec, which is built first, or an ELF image that `specgen build` made.
+    #[arg(value_name = "SPEC|ELF")]
+    file: PathBuf,
     #[command(flatten)]
     common: Common,
     /// The amplifiers are off: do not ask.
@@ -33,49 +38,38 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let (compiled, made) = make(&arguments.spec, &arguments.common, ui)?;
-    if !ui.is_json() {
-        ui.out(&text::of(&compiled, &made));
-    }
-    if !made.failures.is_empty() {
-        let message = format!("{}\nnothing was flashed", refusal(&made));
-        return Err(Failure::Judged { message, result: json!(made) });
-    }
-    let chip = match Target::named(made.target).map(|target| target.kind) {
-        Some(Kind::Board(mcu)) => mcu.part().chip,
-        _ => None,
+    let ready = match read_image(&arguments.file)? {
+        Some(elf) => of_image(arguments, &elf, ui)?,
+        None => of_spec(arguments, ui)?,
     };
-    let Some(chip) = chip else {
-        return Err(Failure::Usage(format!(
-            "{} is no board that could be flashed: name one by --target stm32h743 or stm32f4, or in the spec's target.mcu",
-            made.board
-        )));
+    let Ready { image, mcu } = ready;
+    let part = mcu.part();
+    let Some(chip) = part.chip else {
+        return Err(not_a_board(part.board));
     };
-    let mut words = vec!["download", "--chip", chip, "--verify"];
-    if let Some(probe) = &arguments.probe {
-        words.extend(["--probe", probe]);
-    }
-    words.push(&made.artifact);
-    let command = format!("{PROBE_RS} {}", words.join(" "));
-    let reset = format!("{PROBE_RS} reset --chip {chip}");
+    let probe: Vec<&str> = arguments.probe.iter().flat_map(|probe| ["--probe", probe.as_str()]).collect();
+    let download = [&["download", "--chip", chip, "--verify"], &probe[..], &[image.as_str()]].concat();
+    let reset = [&["reset", "--chip", chip], &probe[..]].concat();
+    let commands = format!("  {PROBE_RS} {}\n  {PROBE_RS} {}", download.join(" "), reset.join(" "));
     let Some(program) = find_program(PROBE_RS) else {
         return Err(Failure::Environment(format!(
-            "{PROBE_RS} is not installed (looked for on PATH), so nothing was flashed. The image is built and checked; \
-             install {PROBE_RS} with: {INSTALL}\nand with the amplifiers off run:\n  {command}\n  {reset}"
+            "{PROBE_RS} is not installed (looked for on PATH), so nothing was flashed; {image} is checked. \
+             Install it with: {INSTALL}\nthen, with the amplifiers off, run this again, or by hand:\n{commands}"
         )));
     };
     if !arguments.yes {
-        confirm(ui, &made.board)?;
+        confirm(ui, part.board)?;
     }
-    for (what, words) in [("writing", words), ("restarting", vec!["reset", "--chip", chip])] {
+    for (what, words) in [("writing", download), ("restarting", reset)] {
         ui.progress(&format!("{what}: {PROBE_RS} {}", words.join(" ")));
-        let status = Command::new(&program).args(&words).status();
-        match status {
+        // Its progress is for the eyes; on standard output stands our result alone.
+        let output = Command::new(&program).args(&words).stdin(Stdio::null()).stdout(std::io::stderr()).status();
+        match output {
             Ok(status) if status.success() => {}
             Ok(status) => {
                 return Err(Failure::Environment(format!(
-                    "{PROBE_RS} failed ({status}) at {what}; the flash may hold half an image: keep the amplifiers off, check \
-                     cable and power of the board, and run again:\n  {command}\n  {reset}"
+                    "{PROBE_RS} failed ({status}) at {what} {image}; the flash may hold part of an image: keep the amplifiers \
+                     off, check cable and power of the board, and run again:\n{commands}"
                 )));
             }
             Err(error) => {
@@ -84,10 +78,66 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         }
     }
     ui.result(
-        &format!("flashed {} to {} ({chip}), verified and restarted\n", made.artifact, made.board),
-        json!({ "flashed": made.artifact, "board": made.board, "chip": chip }),
+        &format!("flashed {image} to {} ({chip}), verified and restarted\n", part.board),
+        json!({ "flashed": image, "board": part.board, "chip": chip }),
     );
     Ok(())
+}
+
+/// An image that passed every check.
+struct Ready {
+    image: String,
+    mcu: Mcu,
+}
+
+fn of_spec(arguments: &Arguments, ui: &mut Ui) -> Result<Ready, Failure> {
+    let (compiled, made) = make(&arguments.file, &arguments.common, ui)?;
+    if !ui.is_json() {
+        ui.out(&text::of(&compiled, &made));
+    }
+    if !made.failures.is_empty() {
+        let message = format!("{}\nnothing was flashed", refusal(&made));
+        return Err(Failure::Judged { message, result: json!(made) });
+    }
+    match Target::named(made.target).map(|target| target.kind) {
+        Some(Kind::Board(mcu)) => Ok(Ready { image: made.artifact, mcu }),
+        _ => Err(not_a_board(&made.board)),
+    }
+}
+
+/// The same checks for an image at hand. Which part it is for, it does not say.
+fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Failure> {
+    let named = arguments.common.target.as_deref().and_then(Target::named).map(|target| target.kind);
+    let Some(Kind::Board(mcu)) = named else {
+        return Err(Failure::Usage("an image does not say which board it is for: name it by --target".to_owned()));
+    };
+    let part = mcu.part();
+    let checked = checks::check(elf, None, Rules { single: !part.double, whole_image: false })?;
+    let size = size(elf)?;
+    let limits = model::Target { mcu, flash: None, ram: None, stack: None, instructions: None };
+    let used = budget::Used { flash: size.flash(), ram: size.ram(), stack: checked.stack, ..budget::Used::default() };
+    let mut failures: Vec<String> = checked.faults.iter().map(|fault| fault.text.clone()).collect();
+    failures.extend(budget::over(&limits, &used));
+    if size.identity.is_none() {
+        failures
+            .push("it holds no identity of a controller: was it made by specgen, and does it check itself?".to_owned());
+    }
+    if !ui.is_json() {
+        ui.out(&(text::sections(&size) + &text::checked(&checked)));
+    }
+    let image = arguments.file.display().to_string();
+    if failures.is_empty() {
+        return Ok(Ready { image, mcu });
+    }
+    let list: String = failures.iter().map(|failure| format!("\n  {failure}")).collect();
+    let message = format!("{image} is refused for {}:{list}\nnothing was flashed", part.board);
+    Err(Failure::Judged { message, result: json!({ "image": image, "failures": failures }) })
+}
+
+fn not_a_board(name: &str) -> Failure {
+    Failure::Usage(format!(
+        "nothing was flashed: {name} is no board with a debug probe; name one by --target stm32h743 or --target stm32f4"
+    ))
 }
 
 /// A controller that starts with its amplifiers on could move the platform.

@@ -6,14 +6,11 @@ use clap::Args;
 use object::{Architecture, Object};
 use serde_json::json;
 
-use super::{Common, make, refusal, text};
+use super::{Common, make, read_image, refusal, text};
 use crate::cli::ui::{Failure, Ui};
 use crate::target::TargetError;
 use crate::target::checks::{self, Rules};
 use crate::target::size::{has_tick, size};
-
-/// What every ELF file begins with.
-const ELF: [u8; 4] = [0x7f, b'E', b'L', b'F'];
 
 /// Arguments of `size`.
 #[derive(Args, Debug)]
@@ -33,8 +30,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = &arguments.file;
-    let bytes = std::fs::read(path).map_err(|error| TargetError::io("reading", path, error))?;
-    if !bytes.starts_with(&ELF) {
+    let Some(bytes) = read_image(path)? else {
         let (_, made) = make(path, &arguments.common, ui)?;
         let mut out = format!("{} for {}\n", made.artifact, made.board);
         if let Some(size) = &made.size {
@@ -51,7 +47,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             ui.out(&out);
         }
         return Err(Failure::Judged { message: refusal(&made), result: json!(made) });
-    }
+    };
     let malformed = |error: object::Error| TargetError::MalformedImage { text: format!("{}: {error}", path.display()) };
     let machine = object::File::parse(&*bytes).map_err(malformed)?.architecture();
     let size = size(&bytes)?;
