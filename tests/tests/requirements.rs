@@ -81,7 +81,8 @@ fn the_step_of_the_platform_is_the_worst_of_all_roundings() {
     let solved = jacobian.lu();
     let mut worst = [0.0_f64; 3];
     for signs in 0..64_u32 {
-        let legs = nalgebra::Vector6::from_fn(|leg, _| if signs >> leg & 1 == 1 { found.leg } else { -found.leg } / 2.0);
+        let legs =
+            nalgebra::Vector6::from_fn(|leg, _| if signs >> leg & 1 == 1 { found.leg } else { -found.leg } / 2.0);
         let pose = solved.solve(&legs).unwrap();
         for (most, step) in worst.iter_mut().zip(pose.iter()) {
             *most = most.max(step.abs());
