@@ -23,7 +23,7 @@ pub mod stack;
 mod thumb;
 pub mod toolchain;
 
-pub use build::{Image, build_image};
+pub use build::{Image, build_image, build_pil};
 pub use error::TargetError;
 pub use replay::{ReplayResult, replay};
 

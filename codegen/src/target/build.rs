@@ -41,6 +41,24 @@ pub fn build_image(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, Tar
 /// # Errors
 /// As [`build_image`].
 pub fn build_image_with(toolchain: &Toolchain, dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
+    build_program(toolchain, dir, mcu, target_dir, &["--bin", "replay"])
+}
+
+/// Builds the image of `dir/qemu` that [`pil`](crate::pil) talks to, as [`build_image`] does that of the replay.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_pil(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
+    build_program(&toolchain::find()?, dir, mcu, target_dir, &["--bin", "pil", "--features", "pil"])
+}
+
+fn build_program(
+    toolchain: &Toolchain,
+    dir: &Path,
+    mcu: Mcu,
+    target_dir: &Path,
+    program: &[&str],
+) -> Result<Image, TargetError> {
     let package = dir.join("qemu");
     let what = format!("{} for {}", package.display(), mcu.machine());
     // A folder per part: they differ in flags only, and cargo would build everything again at each change.
@@ -49,12 +67,15 @@ pub fn build_image_with(toolchain: &Toolchain, dir: &Path, mcu: Mcu, target_dir:
     let link = |command: &mut Command| {
         cargo_artifact(command, &request, &what, |message| message["executable"].as_str().map(PathBuf::from))
     };
-    let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
-    let executable = link(&mut command).map_err(|error| match error {
+    let cargo = || {
+        let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
+        command.args(program);
+        command
+    };
+    let executable = link(&mut cargo()).map_err(|error| match error {
         TargetError::PanicPath { what, text } => {
             // Once more without the proof, to see where the panic paths are.
-            let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
-            let traced = link(command.env("SPECGEN_LOCATE_PANICS", "1"));
+            let traced = link(cargo().env("SPECGEN_LOCATE_PANICS", "1"));
             let sites = traced.and_then(|image| panics::sites(&image.bytes));
             // The first error stands whether or not the search for its cause succeeds.
             let text = sites.map_or(text, |sites| sites.join("\n"));

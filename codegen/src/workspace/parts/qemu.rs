@@ -17,9 +17,12 @@ pub const PART: Part = Part {
         "src/instructions.rs",
         "src/main.rs",
         "src/panic.rs",
+        "src/pil.rs",
+        "src/pipe.rs",
         "src/semihosting.rs",
         "src/stack.rs",
         "src/stages.rs",
         "src/stats.rs",
+        "src/steps.rs",
     },
 };
