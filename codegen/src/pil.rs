@@ -7,11 +7,13 @@
 //!    └──────────────────────────────────────── plant ◄──────────────────────────────────────────┘
 //! ```
 
+mod difference;
 mod lockstep;
 mod pipes;
 mod serial;
 mod wait;
 
-pub use lockstep::{Cost, Difference, Lockstep, Stop, Stopped};
+pub use difference::Difference;
+pub use lockstep::{Cost, Lockstep, OpenError, Stop};
 pub use pipes::Pipes;
 pub use serial::{BAUD, SerialLine};

@@ -2,6 +2,7 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
@@ -51,8 +52,10 @@ impl Pipes {
         let file = File::create(&printed).map_err(|e| TargetError::io("creating", &printed, e))?;
         let mut command = emulator.command(image, folder.path())?;
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(file);
-        let emulator = command.spawn().map_err(|e| TargetError::io("running", &emulator.program, e))?;
-        Ok(Self { emulator, to: Some(to), from, folder })
+        // Of a group of its own: Ctrl-C is for us, who then close the pipe.
+        command.process_group(0);
+        let child = command.spawn().map_err(|e| TargetError::io("running", &emulator.program, e))?;
+        Ok(Self { emulator: child, to: Some(to), from, folder })
     }
 
     /// The emulator's process.

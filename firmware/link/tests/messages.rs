@@ -129,7 +129,8 @@ fn a_status_carries_the_counters_of_the_endpoint() {
 fn what_does_not_fit_is_refused_on_both_sides() {
     let long = Bytes(&[1; MESSAGE]);
     let (mut sent, mut nobody) = (Vec::new(), |_: &[u8]| Vec::new());
-    let refused = Client::open(Tap(&mut sent, &mut nobody, Vec::new()), 9, Patience { limit: Duration::ZERO, attempts: 3 });
+    let refused =
+        Client::open(Tap(&mut sent, &mut nobody, Vec::new()), 9, Patience { limit: Duration::ZERO, attempts: 3 });
     // Nobody answers.
     let Err(ClientError::Silent { attempts: 3, .. }) = refused else { panic!("not silent") };
     assert_eq!(sent.len(), 1 + 3, "a zero, then three times the same frame");
