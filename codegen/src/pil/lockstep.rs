@@ -238,8 +238,7 @@ impl<P: Port> Lockstep<P> {
     /// Sends the settings in force, with a reset or without.
     fn settle(&mut self, reset: bool) -> Result<(), Stop> {
         let words = put_words(&self.config, &mut self.bytes).ok_or(Stop::Link(ClientError::TooLong))?;
-        let request =
-            if reset { Request::LockstepReset { config: words } } else { Request::WriteConfig { words } };
+        let request = if reset { Request::LockstepReset { config: words } } else { Request::WriteConfig { words } };
         match self.client.ask(&request).map_err(Stop::Link)? {
             Reply::Done => Ok(()),
             _ => Err(Stop::Link(ClientError::Unexpected)),

@@ -78,7 +78,9 @@ impl Pipes {
 }
 
 fn printed(folder: &Path) -> String {
-    std::fs::read(folder.join("printed.txt")).map(|text| String::from_utf8_lossy(&text).into_owned()).unwrap_or_default()
+    std::fs::read(folder.join("printed.txt"))
+        .map(|text| String::from_utf8_lossy(&text).into_owned())
+        .unwrap_or_default()
 }
 
 impl Port for Pipes {

@@ -57,7 +57,8 @@ fn advice(error: &io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => "no such device; is the board plugged in? ls /dev/ttyACM* /dev/ttyUSB*".to_owned(),
         ErrorKind::PermissionDenied => {
-            "no permission; add yourself to its group (often: sudo usermod -aG dialout $USER) and log in again".to_owned()
+            "no permission; add yourself to its group (often: sudo usermod -aG dialout $USER) and log in again"
+                .to_owned()
         }
         ErrorKind::ResourceBusy => "another program has it open; end that one first".to_owned(),
         _ => error.to_string(),

@@ -81,20 +81,20 @@ impl Emulator {
 
 /// Why it ended, and what it printed.
 pub(crate) fn ended(status: ExitStatus, stderr: &str) -> String {
-        let mut text = match status.code() {
-            Some(code) if code >= CONFIG_REFUSED => format!(
-                "the controller refuses word {} of the configuration (see its CONFIG_NAMES and Config::from_words)",
-                code - CONFIG_REFUSED
-            ),
-            Some(code) => {
-                let words = EXITS.iter().find(|(known, _)| *known == code).map(|(_, words)| *words);
-                words.map_or_else(|| format!("{status}"), ToOwned::to_owned)
-            }
-            None => format!("{status}"),
-        };
-        let stderr = stderr.trim();
-        if !stderr.is_empty() {
-            text = format!("{text}; it printed: {stderr}");
+    let mut text = match status.code() {
+        Some(code) if code >= CONFIG_REFUSED => format!(
+            "the controller refuses word {} of the configuration (see its CONFIG_NAMES and Config::from_words)",
+            code - CONFIG_REFUSED
+        ),
+        Some(code) => {
+            let words = EXITS.iter().find(|(known, _)| *known == code).map(|(_, words)| *words);
+            words.map_or_else(|| format!("{status}"), ToOwned::to_owned)
         }
-        text
+        None => format!("{status}"),
+    };
+    let stderr = stderr.trim();
+    if !stderr.is_empty() {
+        text = format!("{text}; it printed: {stderr}");
+    }
+    text
 }

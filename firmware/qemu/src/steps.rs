@@ -101,10 +101,9 @@ impl lockstep::Machine for Steps {
     }
 }
 
-/// Ticks that the stages and the stack are measured on, for that takes longer than the tick: every eighth of the first
-/// 20,000, every 64th of later ones.
+/// Ticks that the stages and the stack are measured on, for that takes far longer than the tick.
 const fn is_due(tick: u64) -> bool {
-    tick.is_multiple_of(if tick < 20_000 { 8 } else { 64 })
+    tick.is_multiple_of(32)
 }
 
 /// One tick with its instructions and, if it is to be `painted`, its stack, bytes; else 0. In a frame of its own, so

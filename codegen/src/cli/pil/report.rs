@@ -109,8 +109,11 @@ impl Report {
         if !self.costs.is_empty() {
             let _ = writeln!(out, "{:<18}{:>10}{:>10}{:>12}{:>10}", self.counted, "calls", "min", "mean", "max");
             for cost in &self.costs {
-                let _ =
-                    writeln!(out, "  {:<16}{:>10}{:>10}{:>12.1}{:>10}", cost.name, cost.calls, cost.min, cost.mean, cost.max);
+                let _ = writeln!(
+                    out,
+                    "  {:<16}{:>10}{:>10}{:>12.1}{:>10}",
+                    cost.name, cost.calls, cost.min, cost.mean, cost.max
+                );
             }
         }
         if let Some(whole) = self.costs.first().filter(|whole| whole.stack > 0) {

@@ -2,11 +2,11 @@
 
 use std::fmt::Write as _;
 
+use host_sim::plant::NoiseParameters;
 use host_sim::platform::rig::{Noise, PlatformRun};
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select as select_platform};
 use host_sim::platform::table::{AXES, MachiningTable, PoseRow};
 use host_sim::platform::{PlatformScenario, WorkPart};
-use host_sim::plant::NoiseParameters;
 use host_sim::scenario::{LegScenario, MODES, select as select_legs};
 use host_sim::table::TrackingRow;
 use host_sim::trajectory::{LegTrajectory, PaperLeg, PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
@@ -80,14 +80,16 @@ impl Plan {
     fn platform(arguments: &Arguments, task: &TaskSpace) -> Result<Self, Failure> {
         if arguments.samples.is_some() {
             return Err(Failure::Usage(
-                "--samples is for legs with their own gauges; a spec with [control] runs at its timing.period".to_owned(),
+                "--samples is for legs with their own gauges; a spec with [control] runs at its timing.period"
+                    .to_owned(),
             ));
         }
         let wanted = arguments.mode.as_deref().map(|name| mode(name, &PLATFORM_MODES)).transpose()?;
         if let Some(name) = &arguments.trajectory {
             if arguments.frequency.is_some() {
                 return Err(Failure::Usage(
-                    "--frequency is for the paper's cases; the spec gives the frequency of its own trajectories".to_owned(),
+                    "--frequency is for the paper's cases; the spec gives the frequency of its own trajectories"
+                        .to_owned(),
                 ));
             }
             let selector = sim::platform::selector(task, name)?;
@@ -204,7 +206,9 @@ fn legs<P: Port>(
 fn platform(compiled: &Compiled, arguments: &Arguments, ui: &Ui) -> Result<PlatformScenario, Broken> {
     let model = &compiled.model;
     // A plan of a platform is made of a spec that has one.
-    let Some(task) = &model.task_space else { return Err(Failure::Usage("this spec has no [control]".to_owned()).into()) };
+    let Some(task) = &model.task_space else {
+        return Err(Failure::Usage("this spec has no [control]".to_owned()).into());
+    };
     let seed = arguments.plant.seed;
     let specimen = machine::specimen(model, task, &arguments.plant.leg()?, Some(seed));
     let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
@@ -215,7 +219,11 @@ fn platform(compiled: &Compiled, arguments: &Arguments, ui: &Ui) -> Result<Platf
 /// Says if the controller held instead of following.
 fn refused(name: &str, run: &PlatformRun, report: &mut Report) {
     if run.status & (REFUSED | STALE) != 0 {
-        let _ = writeln!(report.errors, "{name}: the controller refused set-points (status {:#x}), as it did on the host", run.status);
+        let _ = writeln!(
+            report.errors,
+            "{name}: the controller refused set-points (status {:#x}), as it did on the host",
+            run.status
+        );
     }
 }
 
