@@ -120,7 +120,7 @@ fn six_legs_and_a_platform_are_bit_equal_in_closed_loop_and_legs_outrun_real_tim
     assert_eq!(result["first_difference"], Value::Null);
     assert!(number(&result["ticks"]) > 2000.0);
     let row = &result["free_motion"][0];
-    assert_eq!((&row["case"], &row["mode"]), (&"case-1".into(), &"pf-pcc".into()), "{row:#}");
+    assert_eq!((&row["trajectory"], &row["mode"]), (&"case-1".into(), &"pf-pcc".into()), "{row:#}");
     let names: Vec<&str> =
         result["costs"].as_array().unwrap().iter().map(|cost| cost["name"].as_str().unwrap()).collect();
     assert!(names.starts_with(&["supervise", "sense"]), "{names:?}");
@@ -189,12 +189,11 @@ fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
         drop(lockstep);
         assert!(!Path::new("/proc").join(&process).exists(), "{signal}: the emulator is left running");
     }
-    // An image that does not speak the link.
-    let replay = target::build_image(&folder, Mcu::Mps2An500, &folder.join("target")).unwrap();
-    let pipes = Pipes::start(&emulator, &replay).unwrap();
+    let nonsense = Image { elf: b"no image".to_vec(), ..image };
+    let pipes = Pipes::start(&emulator, &nonsense).unwrap();
     let patience = Patience { limit: Duration::from_secs(20), attempts: 1 };
     let error = Lockstep::open(supervised(&folder), pipes, patience, &NEVER).err().unwrap().to_string();
-    assert!(error.contains("the firmware cannot open config.bin"), "{error}");
+    assert!(error.contains("the emulator ended: ") && error.contains("image.elf"), "{error}");
 }
 
 #[test]
@@ -205,15 +204,16 @@ fn ctrl_c_ends_it_with_what_was_done_and_leaves_no_emulator() {
     let (_one, folder) = workspace();
     let (_, file, _) = legs(&folder);
     let mut command = pil(&spec("legs.toml"), &folder, &["--frequency", "0.1", "--samples", "50000", "--elf"]);
-    let mut child = command.arg(file).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let child = command.arg(file).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let children = format!("/proc/{0}/task/{0}/children", child.id());
     let start = Instant::now();
     let emulator = loop {
         assert!(start.elapsed() < Duration::from_secs(60), "no emulator was started");
         let list = std::fs::read_to_string(&children).unwrap_or_default();
         let is_emulator = |id: &&str| {
-            let name = std::fs::read_to_string(format!("/proc/{id}/comm")).unwrap_or_default();
-            name.starts_with("qemu")
+            // Before the run it is asked for its version.
+            let words = std::fs::read_to_string(format!("/proc/{id}/cmdline")).unwrap_or_default();
+            words.contains("image.elf")
         };
         if let Some(id) = list.split_whitespace().find(is_emulator) {
             break id.to_owned();
