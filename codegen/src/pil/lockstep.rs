@@ -15,6 +15,7 @@ use super::difference::Difference;
 /// Ticks that arming may take.
 const ARMING: u64 = 100_000;
 /// Phases of the supervisor.
+const DISARMED: u8 = 0;
 const RUNNING: u8 = 2;
 /// Requests to it.
 const ARM: u64 = 1;
@@ -283,7 +284,8 @@ impl<P: Port> Lockstep<P> {
             if self.tick >= ARMING {
                 return Err(Stop::Supervisor { tick: self.tick, word });
             }
-            word = self.tick(input, RUN)?;
+            // Run is taken once it is armed.
+            word = self.tick(input, if word.phase == DISARMED { ARM } else { RUN })?;
         }
         Ok(())
     }
