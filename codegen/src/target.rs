@@ -26,7 +26,7 @@ pub mod targets;
 mod thumb;
 pub mod toolchain;
 
-pub use build::{Image, build_image};
+pub use build::{Image, build_image, build_pil};
 pub use error::TargetError;
 pub use process::find_in_path as find_program;
 pub use replay::{ReplayResult, replay, replay_machine};
