@@ -7,7 +7,7 @@ pub const PART: Part = Part {
     member: false,
     what: "the same controller on an emulated Cortex-M: see its README",
     needs: "target `thumbv7em-none-eabihf`, QEMU",
-    with: &[],
+    with: &["link"],
     files: files! { "qemu":
         "Cargo.lock",
         "Cargo.toml",

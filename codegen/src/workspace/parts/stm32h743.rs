@@ -7,6 +7,6 @@ pub const PART: Part = Part {
     member: false,
     what: "firmware of the NUCLEO-H743ZI2 (Cortex-M7)",
     needs: "target `thumbv7em-none-eabihf`",
-    with: &["hal", "link"],
+    with: &["board", "hal", "link"],
     files: files! { "stm32h743": },
 };
