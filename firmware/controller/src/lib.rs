@@ -29,6 +29,7 @@ mod config;
 
 pub mod dynamics;
 pub mod hysteresis;
+pub mod integrity;
 pub mod kinematics;
 pub mod limits;
 mod machine_words;
