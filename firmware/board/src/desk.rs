@@ -41,9 +41,8 @@ impl Desk {
         }
     }
 
-    /// Takes the latest report, and shows that the background is alive. Before requests are looked at, again and again.
-    pub const fn fetch(&mut self, exchange: &mut Exchange) {
-        exchange.beat = exchange.beat.wrapping_add(1);
+    /// Takes the latest report, before requests are looked at.
+    pub const fn fetch(&mut self, exchange: &Exchange) {
         self.report = exchange.report;
     }
 

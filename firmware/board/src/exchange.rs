@@ -62,6 +62,18 @@ impl Report {
     };
 }
 
+impl Report {
+    /// A tick has run: when it began after it was due, and how long it took, counts of the timer.
+    pub const fn took(&mut self, late: u32, duration: u32) {
+        if late > self.latest {
+            self.latest = late;
+        }
+        if duration > self.longest {
+            self.longest = duration;
+        }
+    }
+}
+
 /// Orders one way, reports the other. Whoever holds it holds off the tick: copy and let go.
 #[derive(Debug, Clone, Copy)]
 pub struct Exchange {
