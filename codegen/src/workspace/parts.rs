@@ -8,6 +8,7 @@ mod link;
 mod qemu;
 mod rt_pc;
 mod runtime;
+mod stm32;
 mod stm32f4;
 mod stm32h743;
 
@@ -49,6 +50,7 @@ pub const PARTS: &[&Part] = &[
     &link::PART,
     &hal::PART,
     &board::PART,
+    &stm32::PART,
     &stm32h743::PART,
     &stm32f4::PART,
     &rt_pc::PART,

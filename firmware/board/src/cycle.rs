@@ -2,7 +2,8 @@
 
 use controller::sensing::gauge_reading;
 use controller::supervised::{
-    CONVERTER, Cause, INTEGRITY, LINK_LOST, MACHINE_INPUT_WORDS, MISSED_TICK, Machine, MachineInput, Request, STOP, supervise,
+    CONVERTER, Cause, INTEGRITY, LINK_LOST, MACHINE_INPUT_WORDS, MISSED_TICK, Machine, MachineInput, Request, STOP,
+    supervise,
 };
 use controller::{INPUT_WORDS, Real};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
@@ -50,15 +51,7 @@ impl<G: Gauges, A: Amplifiers> Board<G, A> {
     #[must_use]
     pub const fn new(gauges: G, amplifiers: A, intact: bool) -> Self {
         let () = Self::SAME_CODES;
-        Self {
-            gauges,
-            amplifiers,
-            machine: Machine::new(),
-            intact,
-            started: false,
-            pending: 0,
-            request: Request::None,
-        }
+        Self { gauges, amplifiers, machine: Machine::new(), intact, started: false, pending: 0, request: Request::None }
     }
 
     /// Brings the converters into their working state, amplifiers disabled. May take a millisecond.

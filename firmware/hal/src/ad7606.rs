@@ -51,10 +51,7 @@ impl Window {
     /// `millivolts` ± `tolerance` at an input range of ±`range`, all mV and below 20 V, in codes of `bits` (16 or 18).
     #[must_use]
     pub const fn around(millivolts: i32, tolerance: i32, range: i32, bits: u32) -> Self {
-        Self {
-            low: code_of(millivolts - tolerance, range, bits),
-            high: code_of(millivolts + tolerance, range, bits),
-        }
+        Self { low: code_of(millivolts - tolerance, range, bits), high: code_of(millivolts + tolerance, range, bits) }
     }
 }
 

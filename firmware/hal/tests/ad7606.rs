@@ -38,8 +38,7 @@ fn read<const BITS: usize>(busy: &[State], spi: &[SpiStep<u8>]) -> Result<[i32; 
     let start = [PinStep::set(State::Low), PinStep::set(State::High)];
     let looks: Vec<PinStep> = busy.iter().map(|&state| PinStep::get(state)).collect();
     let (spi, start, busy, reset) = (Spi::new(spi), Pin::new(&start), Pin::new(&looks), Pin::new(&[]));
-    let mut adc: Ad7606<BITS, _, _, _, _, _> =
-        Ad7606::new(spi, start, busy, reset, NoopDelay, window(BITS as u32));
+    let mut adc: Ad7606<BITS, _, _, _, _, _> = Ad7606::new(spi, start, busy, reset, NoopDelay, window(BITS as u32));
     let result = adc.read();
     let (mut spi, mut start, mut busy, mut reset, _) = adc.release();
     spi.done();

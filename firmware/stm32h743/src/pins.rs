@@ -2,10 +2,10 @@
 
 use embassy_stm32::Peripherals;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
+use embassy_stm32::mode::Async;
 use embassy_stm32::peripherals::{IWDG1, USART3};
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{ConfigError, Uart};
-use embassy_stm32::mode::Async;
 use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals, usart};
 use specgen_stm32::converters::{AdcPins, DacPins, adc_spi, dac_spi};
 use specgen_stm32::serial;
