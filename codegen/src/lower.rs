@@ -72,7 +72,6 @@ pub fn lower(
         (Some(task), Some((design, setpoints))) => Some(task_space(model, task, scalar, design, setpoints)?),
         _ => None,
     };
-    let sensing = task_space.as_ref().map(|task| &task.sensing);
     let integrity = integrity::lower(
         integrity::identity(&model.name, digest, scalar),
         scalar,
@@ -81,6 +80,7 @@ pub fn lower(
         &defaults,
         task_space.as_ref(),
     );
+    let sensing = task_space.as_ref().map(|task| &task.sensing);
     Ok(Ir {
         name: model.name.clone(),
         digest: digest.to_owned(),

@@ -27,8 +27,8 @@
 //! | [`velocity`] | rate of the measured pose, filtered | (7), k_v |
 //! | [`dynamics`] | motion of the platform to leg forces and displacements | (4), (AI.1)–(AI.17) |
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
-//! | [`supervisor`] | phases of the machine, causes of faults | |
 //! | [`crc`] | checksum of tables and settings in memory | |
+//! | [`supervisor`] | phases of the machine, causes of faults | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!

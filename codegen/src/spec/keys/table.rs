@@ -379,10 +379,16 @@ pub const SECTIONS: &[Section] = &[
         ],
     },
     Section {
+        name: "requirements",
+        kind: Kind::Optional,
+        doc: "What the platform is for. A spec that cannot meet it is refused.",
+        keys: &[row("precision", one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "\"50 nm\"", "Finest displacement that matters. No converter code may move a leg by more, nor half a code on every leg the platform along an axis.")],
+    },
+    Section {
         name: "target",
         kind: Kind::Plain,
         doc: "What it runs on.",
-        keys: &[row("mcu", Shape::One(Item::Choice(&["mps2-an500", "mps2-an386"])), Default("\"mps2-an500\""), "", "\"mps2-an500\"", "Cortex-M7 with double-precision FPU, or Cortex-M4F with single precision.")],
+        keys: &[row("mcu", Shape::One(Item::Choice(&["mps2-an500", "mps2-an386", "stm32h743zi", "stm32f446re"])), Default("\"mps2-an500\""), "", "\"mps2-an500\"", "Microcontroller: `mps2-an500` and `stm32h743zi` are a Cortex-M7 with double-precision FPU, `mps2-an386` and `stm32f446re` a Cortex-M4F with single precision; the first of each is emulated.")],
     },
     Section {
         name: "target.budget",
