@@ -20,8 +20,8 @@ pub const ADC_BITS: usize = if GAUGE_BITS <= 16 { 16 } else { 18 };
 /// What V8 shows: the 2.5 V reference ± 2 % at ±5 V (RANGE low).
 const REFERENCE: Window = Window::around(2500, 50, 5000, ADC_BITS as u32);
 
-/// An SPI that waits for each word. DMA would not pay: a tick moves 40 bytes in eleven frames of 3 and one of 16 bytes, waits
-/// for the codes before it can compute, and setting up a transfer takes as long as three bytes.
+/// An SPI that waits for each word. DMA would not pay: a tick moves 40 bytes in nine frames and waits for the
+/// codes before it can compute, and setting up a transfer takes about as long as three bytes.
 pub type Bus = Spi<'static, Blocking, Master>;
 /// A converter's SPI with its chip select.
 pub type AdcSpi<const CYCLES: u32> = ExclusiveDevice<Bus, Output<'static>, CycleDelay<CYCLES>>;
