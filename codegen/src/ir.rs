@@ -288,6 +288,8 @@ pub struct Lead {
 /// Converter and limits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Actuation {
+    /// Bits of a code.
+    pub bits: u32,
     /// Voltage of code 0, V.
     pub volts_at_zero: f64,
     /// V per code.

@@ -81,7 +81,7 @@ pub fn lower(
         &defaults,
         task_space.as_ref(),
     );
-    let sensing = task_space.as_ref().map(|task| &task.sensing);
+    let gauge_converter = gauge_converter::lower(model, task_space.as_ref().map(|task| &task.sensing), scalar);
     Ok(Ir {
         name: model.name.clone(),
         digest: digest.to_owned(),
@@ -97,7 +97,7 @@ pub fn lower(
             leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
             sensor: model.sensor.range.map(round),
         },
-        gauge_converter: gauge_converter::lower(model, sensing, scalar),
+        gauge_converter,
         defaults,
         task_space,
         integrity,

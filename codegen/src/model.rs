@@ -42,10 +42,10 @@ pub struct Model {
     pub target: Target,
     /// The controller that sees the platform: a spec with `[control]`. None: six legs with a gauge each.
     pub task_space: Option<TaskSpace>,
-    /// What the supervisor takes for a fault.
-    pub supervisor: Supervisor,
     /// Finest displacement that matters, m, if declared.
     pub precision: Option<f64>,
+    /// What the supervisor takes for a fault.
+    pub supervisor: Supervisor,
     /// What `specgen robust` varies, and its gate; no constant of the controller comes from here.
     pub robust: Robust,
     /// Where each key stands in the spec file, by key path (`actuator.voltage[1]`), for findings of later phases.

@@ -59,8 +59,8 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
         },
         target: target(f)?,
         task_space: task_space::task_space(f)?,
-        supervisor: supervisor(f)?,
         precision: f.number("requirements.precision"),
+        supervisor: supervisor(f)?,
         robust: robust(f),
         spans: f.spans(),
     })

@@ -380,6 +380,12 @@ pub const SECTIONS: &[Section] = &[
         ],
     },
     Section {
+        name: "requirements",
+        kind: Kind::Optional,
+        doc: "What the platform is for. A spec that cannot meet it is refused.",
+        keys: &[row("precision", one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "\"50 nm\"", "Finest displacement that matters. No converter code may move a leg by more, nor half a code on every leg the platform along an axis.")],
+    },
+    Section {
         name: "supervisor",
         kind: Kind::Plain,
         doc: "What the supervisor in the controller takes for a fault, and for how long it must last; docs/supervisor.md. Gauges are looked at in turn, one a tick.",
@@ -397,12 +403,6 @@ pub const SECTIONS: &[Section] = &[
             row("slew_time", TIMEOUT, Rule("50 ms, at least a period"), "", "\"50 ms\"", "Time that a leg may stay at the limit of its slew rate."),
             row("missed_ticks", integer(1, 1000), Default("3"), "", "3", "Missed ticks within a second that are a fault."),
         ],
-    },
-    Section {
-        name: "requirements",
-        kind: Kind::Optional,
-        doc: "What the platform is for. A spec that cannot meet it is refused.",
-        keys: &[row("precision", one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "\"50 nm\"", "Finest displacement that matters. No converter code may move a leg by more, nor half a code on every leg the platform along an axis.")],
     },
     Section {
         name: "target",
