@@ -36,7 +36,8 @@ fn begins(kind: Kind, mode: f64, more: &[(&str, &str)]) -> i64 {
         // Somebody asks for another place in the very tick in which the law begins.
         bench.setpoint = match kind {
             Kind::Legs => std::array::from_fn(|_| 3e-6 + draw(35e-6)),
-            Kind::Platform => [draw(6e-6), draw(6e-6), draw(10e-6), 0.0, 0.0, 0.0],
+            // Within reach: the bias leaves the legs 8 µm downwards.
+            Kind::Platform => [draw(0.5e-6), draw(0.5e-6), draw(20e-6), 0.0, 0.0, 0.0],
         };
         let held = bench.codes();
         bench.until(RUNNING, RUN);
@@ -51,7 +52,9 @@ fn begins(kind: Kind, mode: f64, more: &[(&str, &str)]) -> i64 {
             assert_eq!(bench.tick(RUN, 0).phase, RUNNING, "{kind:?} round {round}: {:x}", bench.conditions());
         }
     }
-    println!("{kind:?}, mode {mode}: held between codes {lowest} and {highest}; the first tick moves a leg by {most} codes at most");
+    println!(
+        "{kind:?}, mode {mode}: held between codes {lowest} and {highest}; the first tick moves a leg by {most} codes at most"
+    );
     assert!(highest - lowest > 3000, "{kind:?}: the holds were all in one place");
     most
 }
