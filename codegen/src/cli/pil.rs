@@ -131,7 +131,7 @@ fn image(
     if let Some(path) = &arguments.elf {
         let elf = std::fs::read(path)
             .map_err(|error| Failure::Environment(format!("could not read `{}`: {error}", path.display())))?;
-        return Ok(Image { mcu, elf, compiler: String::new() });
+        return Ok(Image { mcu, elf, path: path.clone(), compiler: String::new() });
     }
     ui.progress(&format!("building the image for {}", mcu.machine()));
     Ok(target::build_pil(output, mcu, target_dir)?)

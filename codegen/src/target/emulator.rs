@@ -17,13 +17,14 @@ pub struct Emulator {
 }
 
 /// How the firmware says why it ended: the codes of `firmware/qemu/src/semihosting.rs`.
-const EXITS: [(i32, &str); 6] = [
+const EXITS: [(i32, &str); 7] = [
     (10, "the firmware cannot open config.bin"),
     (11, "config.bin does not hold as many words as the controller's Config"),
     (12, "the firmware cannot open input.bin"),
     (13, "input.bin ends within a row: rows must hold as many words as the controller's TickInput"),
     (14, "the firmware cannot write output.bin or stats.bin; is the disk full?"),
     (15, "the processor took a fault"),
+    (20, "tables or settings in the image are not what specgen wrote: it was changed after the link"),
 ];
 /// Statuses from here on name the word of the configuration that the controller refuses.
 const CONFIG_REFUSED: i32 = 64;
