@@ -67,10 +67,15 @@ impl Amplifiers for Parts {
     }
 }
 
-fn started(intact: bool) -> (Parts, Board<Parts, Parts>, Exchange) {
+/// For the rest of the test, as on a board.
+fn at_reset() -> &'static mut Machine {
+    Box::leak(Box::new(Machine::new()))
+}
+
+fn started(intact: bool) -> (Parts, Board<'static, Parts, Parts>, Exchange) {
     let parts = Parts::default();
     parts.0.borrow_mut().codes = [1 << 17; 6];
-    let mut board = Board::new(parts.clone(), parts.clone(), intact);
+    let mut board = Board::new(parts.clone(), parts.clone(), at_reset(), intact);
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
     exchange.silence.heard();
@@ -182,7 +187,7 @@ fn a_code_taken_with_another_shift_is_seen() {
 #[test]
 fn a_link_that_was_never_heard_or_fell_silent_is_an_event() {
     let parts = Parts::default();
-    let mut board = Board::new(parts.clone(), parts, true);
+    let mut board = Board::new(parts.clone(), parts, at_reset(), true);
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
     board.tick(&mut exchange, Noticed::default());
@@ -215,7 +220,7 @@ fn a_damaged_flash_is_an_event_of_every_tick() {
 fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_starts_them() {
     let parts = Parts::default();
     parts.0.borrow_mut().start_fault = Some(Fault::ReadBack);
-    let mut board = Board::new(parts.clone(), parts.clone(), true);
+    let mut board = Board::new(parts.clone(), parts.clone(), at_reset(), true);
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
     assert_eq!(exchange.report.faults, Fault::ReadBack.bit());
