@@ -94,7 +94,13 @@ impl ByHand {
         Self { config: Config::new(), machine: Machine::new() }
     }
 
-    fn tick(&mut self, command: &[u64; COMMAND_WORDS], gauge: [Real; 6], request: Request, events: u32) -> MachineOutput {
+    fn tick(
+        &mut self,
+        command: &[u64; COMMAND_WORDS],
+        gauge: [Real; 6],
+        request: Request,
+        events: u32,
+    ) -> MachineOutput {
         let vector = |start: usize| core::array::from_fn(|k| Real::from_bits(command[start + k]));
         let command = Command {
             kind: CommandKind::from_word(command[0]),
@@ -224,7 +230,8 @@ fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_sta
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
     assert_eq!(exchange.report.faults, Fault::ReadBack.bit());
-    for request in [Request::Arm, Request::Run, Request::Acknowledge, Request::Acknowledge, Request::Run, Request::Run] {
+    for request in [Request::Arm, Request::Run, Request::Acknowledge, Request::Acknowledge, Request::Run, Request::Run]
+    {
         exchange.silence.heard();
         exchange.report.events = 0;
         exchange.orders.request = request;

@@ -99,15 +99,7 @@ mod app {
         watchdog.pet();
         (
             Shared { exchange },
-            Local {
-                board,
-                schedule,
-                health: Health::new(),
-                watchdog,
-                stop: wiring.stop,
-                receiver,
-                sender,
-            },
+            Local { board, schedule, health: Health::new(), watchdog, stop: wiring.stop, receiver, sender },
         )
     }
 
