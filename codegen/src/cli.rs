@@ -10,6 +10,7 @@ mod file;
 mod firmware;
 mod identify;
 mod identify_rate;
+mod pil;
 mod robust;
 mod sim;
 mod tune;
@@ -70,6 +71,8 @@ enum Command {
     Tune(tune::Arguments),
     /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
     Robust(robust::Arguments),
+    /// Close the loop of a simulated machine with the program of a microcontroller, emulated or at a serial port.
+    Pil(pil::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
     /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
@@ -100,6 +103,7 @@ pub fn run() -> ExitCode {
         Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
         Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
         Some(Command::Robust(arguments)) => robust::run(arguments, &mut ui),
+        Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
         Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
@@ -117,7 +121,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, dynamics, identify, forc, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, dump-ir) with its own arguments",
         ),
         _ => error,
     };

@@ -17,6 +17,7 @@ pub mod lower;
 pub mod machine;
 pub mod model;
 pub mod numerics;
+pub mod pil;
 pub mod plot;
 pub mod reach;
 pub mod requirements;

@@ -26,10 +26,10 @@ pub mod targets;
 mod thumb;
 pub mod toolchain;
 
-pub use build::{Image, build_image};
+pub use build::{Image, build_image, build_pil};
 pub use error::TargetError;
 pub use process::find_in_path as find_program;
-pub use replay::{ReplayResult, replay};
+pub use replay::{ReplayResult, replay, replay_machine};
 
 /// Rust's name of the compilation target of every [`Mcu`](crate::model::Mcu) here.
 pub const TRIPLE: &str = "thumbv7em-none-eabihf";

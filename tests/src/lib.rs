@@ -3,7 +3,6 @@
 //! Controllers are emitted into `target/tests`, built there for the host and for the emulated microcontrollers, and run
 //! through their words: what is tested is what a user gets.
 
-pub mod figures;
 pub mod pair;
 
 use std::collections::BTreeMap;
@@ -29,9 +28,20 @@ pub fn repository() -> PathBuf {
     here.parent().unwrap_or(here).to_owned()
 }
 
-/// Where tests build.
+/// Where tests build: a folder for each test binary, as several run at once.
+///
+/// # Panics
+/// If the system cannot name the running binary.
 #[must_use]
 pub fn scratch() -> PathBuf {
+    let binary = std::env::current_exe().expect("a running binary has a name");
+    let stem = binary.file_stem().expect("and not only a folder").to_string_lossy().into_owned();
+    // Cargo appends a hash, which changes with the compiler.
+    builds().join(stem.rsplit_once('-').map_or(&*stem, |(name, _)| name))
+}
+
+/// Where the folders of all test binaries are, and what they share.
+fn builds() -> PathBuf {
     repository().join("target/tests")
 }
 
@@ -105,7 +115,8 @@ impl Emitted {
             panic!("{missing}");
         }
         let _one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(target::build_image(&self.dir, mcu, &scratch().join("build")).unwrap_or_else(|error| panic!("{error}")))
+        // Shared by all test binaries, so that `core` is compiled once; it is locked while one builds.
+        Some(target::build_image(&self.dir, mcu, &builds().join("build")).unwrap_or_else(|error| panic!("{error}")))
     }
 
     /// Input rows of every kind that a tick may meet, for leg or pose set-points.

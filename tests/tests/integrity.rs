@@ -29,6 +29,8 @@ controller = { path = \"../controller\" }
 panic = \"abort\"
 ";
 
+static RUN: std::sync::Mutex<()> = std::sync::Mutex::new(());
+
 /// A program with the emitted controller in it.
 fn probe(emitted: &Emitted) -> PathBuf {
     let folder = emitted.dir.join("probe");
@@ -41,6 +43,7 @@ fn probe(emitted: &Emitted) -> PathBuf {
     for name in ["CARGO_TARGET_DIR", "CARGO_ENCODED_RUSTFLAGS", "RUSTFLAGS"] {
         cargo.env_remove(name);
     }
+    let _one = RUN.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     assert!(cargo.status().unwrap().success());
     folder.join("target/release/probe")
 }
@@ -107,7 +110,9 @@ fn no_flipped_bit_is_believed(name: &str, spec: &str, edits: &[(&str, &str)], fl
             };
             let mut spoilt = good.clone();
             spoilt[place.start + bit / 8] ^= 1 << (bit % 8);
-            // A file of its own each time: one that was just run may still be open.
+            // While one test writes a program, no other starts one: it would inherit the open file, and what is open for
+            // writing cannot be run.
+            let _one = RUN.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             let copy = program.with_file_name(format!("spoilt-{tried}"));
             fs::write(&copy, &spoilt).unwrap();
             fs::set_permissions(&copy, fs::Permissions::from_mode(0o755)).unwrap();
@@ -134,9 +139,8 @@ fn no_flipped_bit_of_legs_with_creep_in_f32_is_believed() {
 
 #[test]
 fn another_spec_or_another_setting_has_another_checksum() {
-    let crc = |edits: &[(&str, &str)]| {
-        specgen_tests::compile_edited("integrity-crc", "legs.toml", edits, &[]).ir.integrity
-    };
+    let crc =
+        |edits: &[(&str, &str)]| specgen_tests::compile_edited("integrity-crc", "legs.toml", edits, &[]).ir.integrity;
     let (plain, again) = (crc(&[]), crc(&[]));
     assert_eq!(plain, again);
     let other = crc(&[("\"40 V/ms\"", "\"41 V/ms\"")]);

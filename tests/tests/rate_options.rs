@@ -4,6 +4,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
+mod figures;
+
 use host_sim::controller::TickController;
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
@@ -94,10 +96,9 @@ fn cost(name: &str, emitted: &Emitted, image: &Image) {
         ("instructions, actuate at most", leg.max as f64),
         ("bytes of State", m.state as f64),
         ("bytes of stack", stack as f64),
-        ("bytes of flash", m.flash as f64),
     ];
     let figures = figures.map(|(what, value)| (what.to_owned(), value)).into();
-    specgen_tests::figures::hold("rate.json", &name, &m.compiler, figures);
+    figures::hold("rate.json", &name, &m.compiler, figures);
     // The gate names who costs most.
     let mut tight = model.target.clone();
     tight.instructions = Some(m.used.instructions.unwrap() - 1);

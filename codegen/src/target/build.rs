@@ -46,7 +46,15 @@ pub fn build_image(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, Tar
 /// # Errors
 /// As [`build_image`].
 pub fn build_image_with(toolchain: &Toolchain, dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
-    build_folder(toolchain, dir, EMULATED, mcu, target_dir)
+    build_program(toolchain, dir, EMULATED, mcu, target_dir, &["--bin", "replay"])
+}
+
+/// Builds the image of `dir/qemu` that [`pil`](crate::pil) talks to, as [`build_image`] does that of the replay.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_pil(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
+    build_program(&toolchain::find()?, dir, EMULATED, mcu, target_dir, &["--bin", "pil", "--features", "pil"])
 }
 
 /// Builds the firmware in `dir/folder` for `mcu`.
@@ -60,6 +68,17 @@ pub fn build_folder(
     mcu: Mcu,
     target_dir: &Path,
 ) -> Result<Image, TargetError> {
+    build_program(toolchain, dir, folder, mcu, target_dir, &[])
+}
+
+fn build_program(
+    toolchain: &Toolchain,
+    dir: &Path,
+    folder: &str,
+    mcu: Mcu,
+    target_dir: &Path,
+    program: &[&str],
+) -> Result<Image, TargetError> {
     let package = dir.join(folder);
     let place = if folder == EMULATED { mcu.machine() } else { mcu.part().name };
     let what = format!("{} for {place}", package.display());
@@ -71,12 +90,15 @@ pub fn build_folder(
     let link = |command: &mut Command| {
         cargo_artifact(command, &request, &what, |message| message["executable"].as_str().map(PathBuf::from))
     };
-    let mut command = toolchain.cargo_build(&[&cpu]);
-    let executable = link(&mut command).map_err(|error| match error {
+    let cargo = || {
+        let mut command = toolchain.cargo_build(&[&cpu]);
+        command.args(program);
+        command
+    };
+    let executable = link(&mut cargo()).map_err(|error| match error {
         TargetError::PanicPath { what, text } => {
             // Once more without the proof, to see where the panic paths are.
-            let mut command = toolchain.cargo_build(&[&cpu]);
-            let traced = link(command.env("SPECGEN_LOCATE_PANICS", "1"));
+            let traced = link(cargo().env("SPECGEN_LOCATE_PANICS", "1"));
             let sites = traced.and_then(|image| panics::sites(&image.bytes));
             // The first error stands whether or not the search for its cause succeeds.
             let text = sites.map_or(text, |sites| sites.join("\n"));

@@ -15,7 +15,8 @@ pub const MESSAGE: usize = BODY - HEADER - CHECKSUM;
 
 /// What COBS adds to the longest body: one byte, and one more for every 254.
 const STUFFING: usize = 5;
-const BODY: usize = FRAME - 1 - STUFFING;
+/// Longest body, bytes.
+pub(crate) const BODY: usize = FRAME - 1 - STUFFING;
 const HEADER: usize = 6;
 const CHECKSUM: usize = 4;
 const _: () = assert!(BODY.div_ceil(254) <= STUFFING);
@@ -71,7 +72,7 @@ pub struct Header {
 /// Why bytes between two zeros are no frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Damage {
-    /// Longer than [`FRAME`].
+    /// Longer than a body can be.
     Overlong,
     /// Not what COBS makes, or too short.
     Malformed,
@@ -121,10 +122,8 @@ pub(crate) fn encode(header: &Header, message: &impl serde::Serialize, out: &mut
     Some(length + 1)
 }
 
-/// Header and message of the bytes before a zero, decoded where they stand.
-pub(crate) fn decode(bytes: &mut [u8]) -> Result<(Header, &[u8]), Damage> {
-    let length = cobs::decode_in_place(bytes).map_err(|_| Damage::Malformed)?;
-    let body = bytes.get(..length).ok_or(Damage::Malformed)?;
+/// Header and message of a body.
+pub(crate) fn open(body: &[u8]) -> Result<(Header, &[u8]), Damage> {
     let (body, checksum) = body.split_last_chunk::<CHECKSUM>().ok_or(Damage::Malformed)?;
     let (start, message) = body.split_first_chunk::<HEADER>().ok_or(Damage::Malformed)?;
     if CRC.checksum(body) != u32::from_le_bytes(*checksum) {

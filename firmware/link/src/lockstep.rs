@@ -19,11 +19,14 @@ pub trait Machine {
     /// In what they are counted.
     fn counted(&self) -> Counted;
 
-    /// As at power-up, with these settings.
+    /// Takes settings; what it remembers stays.
     ///
     /// # Errors
     /// The place of the first word out of range; nothing has changed then.
-    fn reset(&mut self, config: &[u64]) -> Result<(), usize>;
+    fn configure(&mut self, config: &[u64]) -> Result<(), usize>;
+
+    /// As at power-up, with the settings in force.
+    fn reset(&mut self);
 
     /// One tick; the digest after it, and what it cost.
     fn step(&mut self, input: &[u64], output: &mut [u64]) -> (u64, u32);
@@ -70,19 +73,25 @@ impl<M: Machine> Lockstep<M> {
         }
     }
 
-    fn reset(&mut self, config: Bytes<'_>) -> Reply<'static> {
+    fn configure(&mut self, config: Bytes<'_>) -> Reply<'static> {
         let [count, ..] = self.machine.words();
         let Some(words) = self.words.get_mut(..count) else { return Reply::Refused(Refusal::TooLong) };
         if !config.read_words(words) {
             return Reply::Refused(Refusal::Length { expected: count as u16 });
         }
-        match self.machine.reset(words) {
-            Ok(()) => {
-                self.ready = true;
-                Reply::Done
-            }
+        match self.machine.configure(words) {
+            Ok(()) => Reply::Done,
             Err(index) => Reply::Refused(Refusal::Word { index: index as u16 }),
         }
+    }
+
+    fn reset(&mut self, config: Bytes<'_>) -> Reply<'static> {
+        let reply = self.configure(config);
+        if reply == Reply::Done {
+            self.machine.reset();
+            self.ready = true;
+        }
+        reply
     }
 
     fn step(&mut self, input: Bytes<'_>) -> Reply<'_> {
@@ -112,6 +121,7 @@ impl<M: Machine> Device for Lockstep<M> {
         match *request {
             Request::Hello => Reply::Identity(self.identity()),
             Request::Describe { offset } => piece(self.machine.description().as_bytes(), offset),
+            Request::WriteConfig { words } => self.configure(words),
             Request::LockstepReset { config } => self.reset(config),
             Request::LockstepStep { input } => self.step(input),
             Request::LockstepStage { index } => {

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use crate::repository;
+use specgen_tests::repository;
 
 /// A figure may grow by this share of the committed one, and by as much, before it is a regression.
 const GROWTH: (f64, f64) = (0.03, 2.0);
@@ -73,21 +73,16 @@ pub fn hold(file: &str, name: &str, compiler: &str, found: Figures) {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn growth_by_four_percent_and_a_new_figure_are_seen() {
-        let committed = Figures::from([("step".to_owned(), 4000.0), ("stack".to_owned(), 288.0)]);
-        assert_eq!(grown(&committed, &committed), Vec::<String>::new());
-        for (factor, expected) in [(1.04, 1), (1.02, 0), (0.5, 0)] {
-            let mut found = committed.clone();
-            *found.get_mut("step").unwrap() *= factor;
-            assert_eq!(grown(&committed, &found).len(), expected, "{factor}");
-        }
-        let found = Figures::from([("another".to_owned(), 1.0)]);
-        assert_eq!(grown(&committed, &found), ["another: no committed figure"]);
-        assert_eq!(minor_version("rustc 1.96.0 (ac68faa20 2026-05-25)"), "1.96");
+#[test]
+fn growth_by_four_percent_and_a_new_figure_are_seen() {
+    let committed = Figures::from([("step".to_owned(), 4000.0), ("stack".to_owned(), 288.0)]);
+    assert_eq!(grown(&committed, &committed), Vec::<String>::new());
+    for (factor, expected) in [(1.04, 1), (1.02, 0), (0.5, 0)] {
+        let mut found = committed.clone();
+        *found.get_mut("step").unwrap() *= factor;
+        assert_eq!(grown(&committed, &found).len(), expected, "{factor}");
     }
+    let found = Figures::from([("another".to_owned(), 1.0)]);
+    assert_eq!(grown(&committed, &found), ["another: no committed figure"]);
+    assert_eq!(minor_version("rustc 1.96.0 (ac68faa20 2026-05-25)"), "1.96");
 }
