@@ -28,6 +28,7 @@
 //! | [`dynamics`] | motion of the platform to leg forces and displacements | (4), (AI.1)–(AI.17) |
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
+//! | [`snapshot`] | a state as words and back, checked | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
 //! Rules kept here: no panic path, no allocation, no `unsafe`, loops with a fixed bound, no `min`/`max`/`clamp`/`mul_add`
@@ -51,6 +52,7 @@ pub mod notch;
 pub mod real;
 pub mod sensing;
 pub mod setpoint;
+pub mod snapshot;
 pub mod transfer;
 pub mod trig;
 pub mod velocity;
@@ -71,5 +73,6 @@ pub use motion::Motion;
 pub use notch::{NotchState, Section};
 pub use real::Real;
 pub use sensing::{Calibration, Gauges};
+pub use snapshot::Snapshot;
 pub use transfer::Transfer;
 pub use velocity::{Rate, RateFilter};
