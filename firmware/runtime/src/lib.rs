@@ -29,6 +29,8 @@
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`snapshot`] | a state as words and back, checked | |
+//! | [`wave`] | set-points on board: sine, chirp, multisine, reversal curves | |
+//! | [`recorder`], [`record`] | ticks kept in fixed memory, and the format they leave in | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
 //! Rules kept here: no panic path, no allocation, no `unsafe`, loops with a fixed bound, no `min`/`max`/`clamp`/`mul_add`
@@ -50,12 +52,15 @@ pub mod mode;
 pub mod motion;
 pub mod notch;
 pub mod real;
+pub mod record;
+pub mod recorder;
 pub mod sensing;
 pub mod setpoint;
 pub mod snapshot;
 pub mod transfer;
 pub mod trig;
 pub mod velocity;
+pub mod wave;
 
 pub use adaptation::{Estimate, Law};
 pub use attitude::{Attitude, Series};
@@ -72,7 +77,9 @@ pub use mode::{ControlMode, Interaction};
 pub use motion::Motion;
 pub use notch::{NotchState, Section};
 pub use real::Real;
+pub use recorder::Recorder;
 pub use sensing::{Calibration, Gauges};
 pub use snapshot::Snapshot;
 pub use transfer::Transfer;
 pub use velocity::{Rate, RateFilter};
+pub use wave::Wave;

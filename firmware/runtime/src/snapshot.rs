@@ -13,6 +13,8 @@ use crate::real::Real;
 pub const LARGEST_PLACE: f64 = 16.0;
 /// Largest |rate|, |acceleration| or |force| that is loaded, in SI units.
 pub const LARGEST: f64 = 1e9;
+/// Largest stiffness of an environment that is loaded, N/m and N m/rad: that of a `Config`.
+pub const LARGEST_STIFFNESS: f64 = 1e15;
 
 /// Something that later ticks depend on.
 pub trait Snapshot {
