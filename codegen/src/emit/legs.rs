@@ -2,6 +2,8 @@
 
 pub mod config;
 pub mod crate_root;
+pub mod sensing;
+pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;

@@ -27,6 +27,7 @@
 //! | [`velocity`] | rate of the measured pose, filtered | (7), k_v |
 //! | [`dynamics`] | motion of the platform to leg forces and displacements | (4), (AI.1)–(AI.17) |
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
+//! | [`supervisor`] | phases of the machine, causes of faults | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`snapshot`] | a state as words and back, checked | |
 //! | [`wave`] | set-points on board: sine, chirp, multisine, reversal curves | |
@@ -57,6 +58,7 @@ pub mod recorder;
 pub mod sensing;
 pub mod setpoint;
 pub mod snapshot;
+pub mod supervisor;
 pub mod transfer;
 pub mod trig;
 pub mod velocity;
@@ -78,7 +80,7 @@ pub use motion::Motion;
 pub use notch::{NotchState, Section};
 pub use real::Real;
 pub use recorder::Recorder;
-pub use sensing::{Calibration, Gauges};
+pub use sensing::{Calibration, GaugeConverter, Gauges};
 pub use snapshot::Snapshot;
 pub use transfer::Transfer;
 pub use velocity::{Rate, RateFilter};

@@ -13,6 +13,7 @@
 mod ring;
 
 use crate::record::{HAS_DIGEST, LARGEST_INPUT, Layout, Reason};
+use crate::supervisor::Phase;
 use ring::Ring;
 
 /// What makes a recorder keep what it has, besides [`Recorder::trigger`].
@@ -26,7 +27,7 @@ pub struct Trigger {
 
 impl Trigger {
     /// Word of the phase that is a fault.
-    pub const FAULTED: u32 = 5;
+    pub const FAULTED: u32 = Phase::Faulted.word() as u32;
 }
 
 /// How a recorder records.
