@@ -35,6 +35,7 @@ mod machine_words;
 
 pub mod sensing;
 pub mod setpoint;
+pub mod snapshot;
 pub mod stages;
 mod state;
 mod step;
