@@ -4,6 +4,7 @@
 //! lost, and what is whole before and after it is read all the same.
 
 mod csv;
+mod recorded;
 mod replay;
 mod writer;
 
@@ -18,6 +19,7 @@ use specgen_runtime::record::{
 use crate::description::{Description, DescriptionError, fields};
 
 pub use csv::write_csv;
+pub use recorded::{Ended, Recorded};
 pub use replay::{Divergence, PhaseChange, Replay, ReplayError, replay};
 pub use writer::{Taker, Writer};
 

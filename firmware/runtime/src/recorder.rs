@@ -167,6 +167,11 @@ impl<'m> Recorder<'m> {
         self.asked = true;
     }
 
+    /// The controller was reset: a block that does not continue the last one begins with the next row.
+    pub fn restarted(&mut self) {
+        self.due = Some(Reason::Started);
+    }
+
     /// The settings of the controller changed: a block with the new ones begins with the next row.
     pub fn settings_changed(&mut self) {
         if self.due.is_none() {

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::io::Read;
 
+use specgen_runtime::record::Reason;
+
 use super::{Block, Header, Piece, Reader, RecordError, Row};
 use crate::controller::{ControllerError, SnapshotError, Supervised};
 
@@ -188,9 +190,11 @@ impl Run<'_> {
         if block.decimation != 1 {
             return Err(ReplayError::Decimated(block.decimation));
         }
-        let follows = self.next == Some(block.first);
+        let adjoins = self.next == Some(block.first);
+        // A controller that was reset begins anew.
+        let follows = adjoins && block.reason != Reason::Started;
         if let Some(next) = self.next
-            && !follows
+            && !adjoins
         {
             self.found.gaps.push((next, block.first));
         }
