@@ -23,6 +23,7 @@ pub fn emit(imports: &TokenStream, input: &TokenStream, leg: &Leg, state: &Token
         #![doc = " A record of [`supervise_recorded`] replays bit for bit wherever it begins: `specgen replay`."]
 
         use specgen_runtime::record::Layout;
+        pub use specgen_runtime::recorder;
         use specgen_runtime::recorder::{Recorder, Row};
         pub use specgen_runtime::snapshot::Invalid;
         use specgen_runtime::snapshot::{Reader, Snapshot, Writer};
