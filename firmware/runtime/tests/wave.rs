@@ -91,9 +91,9 @@ fn rates_and_accelerations_are_the_derivatives_and_nothing_jumps() {
             if axis == 4 && (2998..=3001).contains(&tick) {
                 continue;
             }
-            assert!((rate - now.rate[axis]).abs() < 3e-5, "axis {axis}, tick {tick}: {rate} {}", now.rate[axis]);
+            assert!((rate - now.rate[axis]).abs() < 6e-5, "axis {axis}, tick {tick}: {rate} {}", now.rate[axis]);
             let miss = (acceleration - now.acceleration[axis]).abs();
-            assert!(miss < 0.03, "axis {axis}, tick {tick}: {acceleration} {}", now.acceleration[axis]);
+            assert!(miss < 0.06, "axis {axis}, tick {tick}: {acceleration} {}", now.acceleration[axis]);
         }
     }
     // It begins and ends at the center, at rest.
