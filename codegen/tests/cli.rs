@@ -11,7 +11,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 7] = ["check", "sim", "tune", "dynamics", "identify", "forc", "dump-ir"];
+const COMMANDS: [&str; 8] = ["check", "sim", "tune", "replay", "dynamics", "identify", "forc", "dump-ir"];
 
 #[test]
 fn arguments_that_make_no_sense_are_usage_errors() {

@@ -6,6 +6,8 @@
 //! A record of [`supervise_recorded`] replays bit for bit wherever it begins: `specgen replay`.
 
 use specgen_runtime::record::Layout;
+
+pub use specgen_runtime::recorder;
 use specgen_runtime::recorder::{Recorder, Row};
 
 pub use specgen_runtime::snapshot::Invalid;
