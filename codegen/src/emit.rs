@@ -24,6 +24,7 @@ mod setpoint;
 mod snapshot;
 mod stage_type;
 mod supervised;
+mod supervision;
 
 use std::collections::BTreeMap;
 
@@ -42,7 +43,7 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
         ("src/hysteresis.rs", hysteresis::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
-        ("src/supervised.rs", supervised::emit(ir)),
+        ("src/supervision.rs", supervision::emit(ir)),
     ];
     match &ir.task_space {
         None => sources.extend(legs_sources(ir)),
@@ -65,6 +66,7 @@ fn legs_sources(ir: &Ir) -> Vec<(&'static str, TokenStream)> {
         ("src/stages.rs", legs::stages::emit()),
         ("src/state.rs", legs::state::emit(ir)),
         ("src/step.rs", legs::step::emit(ir)),
+        ("src/supervised.rs", legs::supervised::emit(ir)),
         ("src/words.rs", legs::words::emit(ir)),
     ]
 }
@@ -80,6 +82,7 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
         ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),
         ("src/step.rs", platform::step::emit(ir)),
+        ("src/supervised.rs", platform::supervised::emit()),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),
         ("src/words.rs", platform::words::emit(ir, task)),
     ]

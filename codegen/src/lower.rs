@@ -10,6 +10,7 @@ mod linear;
 mod rate;
 mod sensing;
 pub mod setpoint;
+mod supervision;
 mod task_space;
 
 pub use dynamics::{GRAVITY, platform};
@@ -53,7 +54,7 @@ pub fn lower(
         (Some(task), Some((design, setpoints))) => Some(task_space(model, task, scalar, design, setpoints)?),
         _ => None,
     };
-    let sensing = task_space.as_ref().map(|task| &task.sensing);
+    let gauge_converter = gauge_converter::lower(model, task_space.as_ref().map(|task| &task.sensing), scalar);
     Ok(Ir {
         name: model.name.clone(),
         digest: digest.to_owned(),
@@ -62,13 +63,14 @@ pub fn lower(
         kinematics: kinematics::lower(model, scalar)?,
         dynamics: dynamics::lower(model, scalar)?,
         hysteresis,
+        supervision: supervision::lower(model, &actuation, max_step, scalar)?,
         actuation,
         bounds: Bounds {
             pose: [tx, ty, tz, rx, ry, rz].map(round),
             leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
             sensor: model.sensor.range.map(round),
         },
-        gauge_converter: gauge_converter::lower(model, sensing, scalar),
+        gauge_converter,
         defaults: Defaults {
             law: match model.adaptation.mode {
                 model::AdaptationMode::Invhys => Law::Invhys,

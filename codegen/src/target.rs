@@ -25,7 +25,7 @@ pub mod toolchain;
 
 pub use build::{Image, build_image};
 pub use error::TargetError;
-pub use replay::{ReplayResult, replay};
+pub use replay::{ReplayResult, replay, replay_machine};
 
 /// Rust's name of the compilation target of every [`Mcu`](crate::model::Mcu) here.
 pub const TRIPLE: &str = "thumbv7em-none-eabihf";

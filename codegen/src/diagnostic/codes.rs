@@ -181,6 +181,12 @@ codes! {
         "The time column rises from row to row by trajectory.period.";
     WAVEFORM_LENGTH = "E0463", "too few or too many rows",
         "A table of poses has at least two rows, and no more than a microcontroller holds.";
+    SUPERVISOR_TIME = "E0470", "a time of the supervisor shorter than it can see",
+        "The supervisor counts ticks, and looks at the six gauges in turn: what the gauges show takes twelve periods to be seen twice, everything else one.";
+    SUPERVISOR_BOUND = "E0471", "a bound of the supervisor below the noise",
+        "A bound that the noise of the gauges, or a step of their converter, passes by itself would stop a sound machine.";
+    SUPERVISOR_RAMP = "E0472", "a ramp to rest faster than the slew rate",
+        "Voltages go to rest no faster than amplifier and stack stand.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",

@@ -7,4 +7,5 @@ pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;
+pub mod supervised;
 pub mod words;

@@ -6,5 +6,6 @@ pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;
+pub mod supervised;
 pub mod task_space;
 pub mod words;

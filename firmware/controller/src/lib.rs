@@ -41,6 +41,7 @@ mod state;
 mod step;
 
 pub mod supervised;
+pub mod supervision;
 pub mod task_space;
 mod words;
 

@@ -13,6 +13,7 @@ const ARMING: u64 = 1_000_000;
 /// Phases of the supervisor.
 const DISARMED: u8 = 0;
 const RUNNING: u8 = 2;
+const FAULTED: u8 = 5;
 /// Requests to it.
 const ARM: u64 = 1;
 const RUN: u64 = 2;
@@ -102,7 +103,7 @@ impl<'r, 'm> Recorded<'r, 'm> {
             if word.phase == DISARMED {
                 break;
             }
-            if left == 0 {
+            if left == 0 || word.phase == FAULTED {
                 return Err(Ended::Supervisor { tick: self.recorder.tick(), word });
             }
         }
@@ -149,7 +150,8 @@ impl<'r, 'm> Recorded<'r, 'm> {
                 if self.recorder.tick() - start >= ARMING {
                     return Err(Ended::Supervisor { tick: self.recorder.tick() - 1, word });
                 }
-                word = self.tick(input, RUN)?;
+                // A request to arm that could not be followed at once waits for as long as it is given.
+                word = self.tick(input, if word.phase == DISARMED { ARM } else { RUN })?;
             }
         }
         let word = self.tick(input, RUN)?;

@@ -45,6 +45,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         mod state;
         mod step;
         pub mod supervised;
+        pub mod supervision;
         mod words;
 
         pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};

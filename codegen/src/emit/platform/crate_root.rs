@@ -49,6 +49,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         mod state;
         mod step;
         pub mod supervised;
+        pub mod supervision;
         pub mod task_space;
         mod words;
 

@@ -27,6 +27,7 @@ const fn integer(min: i64, max: i64) -> Shape {
     Shape::One(Item::Integer(min, max))
 }
 
+const TIMEOUT: Shape = one(Dimension::TIME, Range::closed(1e-6, 60.0), "ms");
 const RADIUS: Range = Range::closed(1e-3, 10.0);
 const JOINT_ANGLE: Range = Range::open(0.0, 2.0 * std::f64::consts::FRAC_PI_3);
 const CIRCLES: &str = "joint circles";
@@ -376,6 +377,25 @@ pub const SECTIONS: &[Section] = &[
         keys: &[
             row("scalar", Shape::One(Item::Choice(&["f32", "f64"])), Default("\"f64\""), "", "\"f64\"", "Arithmetic of the controller."),
             row("setpoint", Shape::One(Item::Choice(&["pose", "leg"])), Default("\"pose\""), "", "\"pose\"", "What the six set-point numbers are at start-up: a pose, or leg displacements."),
+        ],
+    },
+    Section {
+        name: "supervisor",
+        kind: Kind::Plain,
+        doc: "What the supervisor in the controller takes for a fault, and for how long it must last; docs/supervisor.md. Gauges are looked at in turn, one a tick.",
+        keys: &[
+            row("arm_time", TIMEOUT, Rule("100 ms, at least a period"), "", "\"100 ms\"", "Time without any condition that arming takes. Of six legs with their own gauges also the time constant with which the set-point is approached from where the legs are."),
+            row("ramp_rate", one(Dimension::SLEW_RATE, Range::closed(1e-3, 1e12), "V/ms"), Rule("the whole voltage in a second, or `actuator.slew_rate` if that is less"), "", "\"0.1 V/ms\"", "Rate at which voltages go to rest when they ramp down, at most the slew rate."),
+            row("gauge_time", TIMEOUT, Rule("10 ms, at least a period"), "", "\"10 ms\"", "Time after which a gauge that is not finite or out of range, or a converter that does not answer, is a fault."),
+            row("stuck_motion", one(Dimension::LENGTH, Range::closed(1e-12, 1e-2), "nm"), Rule("10 steps of the gauge's converter or 10 times `sensor.noise`, whichever is more"), "", "\"100 nm\"", "Motion along a gauge that the voltages sent must have caused before an unchanged reading shows that the gauge is stuck."),
+            row("stuck_time", TIMEOUT, Rule("50 ms, at least 12 periods"), "", "\"50 ms\"", "Time after that for which the reading must still be the same."),
+            row("disagreement", one(Dimension::LENGTH, Range::closed(1e-12, 1e-2), "um"), Rule("a fifth of `actuator.stroke`"), "", "\"12 um\"", "Largest difference between a gauge's reading and what the hysteresis model gives for the voltages sent and the known load."),
+            row("disagreement_time", TIMEOUT, Rule("100 ms, at least 12 periods"), "", "\"100 ms\"", "Time for which it must be larger."),
+            row("tracking_error", Shape::One(Item::Number(Range::above(0.0, 10.0))), Default("0.2"), "", "0.2", "Largest tracking error of each axis, as a share of its workspace bound; of six legs with their own gauges, of a leg as a share of `actuator.stroke`."),
+            row("tracking_time", TIMEOUT, Rule("100 ms, at least 12 periods"), "", "\"100 ms\"", "Time for which it must be larger."),
+            row("voltage_time", TIMEOUT, Rule("500 ms, at least a period"), "", "\"500 ms\"", "Time that a leg may stay at a limit of its voltage or table."),
+            row("slew_time", TIMEOUT, Rule("50 ms, at least a period"), "", "\"50 ms\"", "Time that a leg may stay at the limit of its slew rate."),
+            row("missed_ticks", integer(1, 1000), Default("3"), "", "3", "Missed ticks within a second that are a fault."),
         ],
     },
     Section {

@@ -15,6 +15,7 @@ pub const PART: Part = Part {
         "build.rs",
         "memory.x",
         "src/instructions.rs",
+        "src/machine.rs",
         "src/main.rs",
         "src/panic.rs",
         "src/semihosting.rs",

@@ -37,6 +37,7 @@ mod state;
 mod step;
 
 pub mod supervised;
+pub mod supervision;
 mod words;
 
 pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};

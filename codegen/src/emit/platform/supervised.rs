@@ -1,0 +1,123 @@
+//! What `src/supervised.rs` has of a platform: how the law begins, works and stands still.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use crate::emit::supervised::{self, Parts};
+
+pub fn emit() -> TokenStream {
+    let imports = quote! {
+        use specgen_runtime::linear::each;
+        use specgen_runtime::setpoint::Generator;
+        use specgen_runtime::{Estimate, Integral, NotchState, Real as _, Transfer};
+
+        use crate::setpoint::PLAN as SETPOINTS;
+        use crate::step::sense;
+        use crate::supervision::READINGS_PER_LEG;
+        use crate::{kinematics, sensing};
+    };
+    let functions = quote! {
+        /// Puts the law where the machine is. No leg moves in the first tick: a mode that begins takes over what is held.
+        ///
+        /// After arming set-points begin at the measured pose and the estimates at zero; after a hold the last set-point and the
+        /// estimates stay, and only what feeds back begins anew.
+        #[cold]
+        #[inline(never)]
+        fn begin(_config: &Config, state: &mut State, supervisor: &mut Supervisor, _input: &TickInput) {
+            if supervisor.fresh {
+                state.generator = Generator::starting_at(&SETPOINTS, &state.pose);
+                state.demand = kinematics::leg_displacements(&state.generator.target().pose);
+                state.load = [0.0; LEGS];
+                state.estimates = [Estimate::new(); 6];
+            } else {
+                state.generator.stand_still();
+            }
+            supervisor.fresh = false;
+            state.mode = None;
+            state.integral = Integral::new();
+            state.error_notch = NotchState::new();
+            state.innovation_notch = NotchState::new();
+            state.error = [0.0; 6];
+            state.deflection = [0.0; 6];
+            state.transfer = Transfer::new();
+            state.limited = false;
+            for leg in &mut state.legs {
+                leg.excess = 0.0;
+            }
+        }
+
+        /// The channel whose turn it is, after the law has seen the readings.
+        #[inline]
+        fn look(
+            state: &State,
+            supervisor: &mut Supervisor,
+            input: &TickInput,
+            channel: usize,
+            expected: Real,
+            target: Real,
+        ) {
+            let error = Some(target - component(&state.pose, channel));
+            supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
+        }
+
+        /// Codes held or on their way to rest, the law suspended; pose and rate are still measured.
+        #[cold]
+        #[inline(never)]
+        fn stand(
+            config: &Config,
+            state: &mut State,
+            supervisor: &mut Supervisor,
+            input: &TickInput,
+            channel: usize,
+            expected: Real,
+        ) -> TickOutput {
+            move_codes(config, state, supervisor);
+            for leg in &mut state.legs {
+                leg.requested = leg.memory.displacement();
+            }
+            let faults = sense(config, state, &input.gauge);
+            if faults == 0 && compares(supervisor.phase) {
+                supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, None));
+            }
+            supervisor.see(faults, 0, &input.gauge, &[0; LEGS], 1);
+            let legs = &state.legs;
+            TickOutput {
+                voltage: each(|leg| DAC.voltage(legs[leg].code)),
+                dac_code: each(|leg| legs[leg].code),
+                status: faults << 8,
+            }
+        }
+
+        /// What a gauge ought to read by the codes sent over the interval that has ended and the known load, m; and the set-point
+        /// of the axis of that number, m or rad.
+        #[inline]
+        fn expectation(state: &State, channel: usize) -> (Real, Real) {
+            let Some([a, b, c, d, e, f]) = READINGS_PER_LEG.get(channel) else { return (0.0, 0.0) };
+            let legs = &state.legs;
+            let load = &state.load;
+            let displaced = |leg: usize| legs[leg].memory.displacement() - load[leg];
+            let half = *a * displaced(0) + *b * displaced(1) + *c * displaced(2);
+            let expected = half + *d * displaced(3) + *e * displaced(4) + *f * displaced(5);
+            (expected, component(&state.generator.target().pose, channel))
+        }
+
+        #[inline]
+        fn sample(gauge: &[Real; 6], channel: usize, expected: Real, error: Option<Real>) -> Sample<Real> {
+            Sample { word: component(gauge, channel), reading: component(&sensing::readings(gauge), channel), expected, error }
+        }
+
+        #[inline]
+        fn component(vector: &[Real; 6], index: usize) -> Real {
+            match vector.get(index) {
+                Some(value) => *value,
+                None => Real::ZERO,
+            }
+        }
+    };
+    supervised::emit(&Parts {
+        imports,
+        functions,
+        law: quote! { step(config, state, &input.tick) },
+        gauges: quote! { gauge },
+    })
+}
