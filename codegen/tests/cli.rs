@@ -11,8 +11,8 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 11] =
-    ["check", "build", "size", "flash", "sim", "tune", "pil", "dynamics", "identify", "forc", "dump-ir"];
+const COMMANDS: [&str; 12] =
+    ["check", "build", "size", "flash", "sim", "tune", "pil", "replay", "dynamics", "identify", "forc", "dump-ir"];
 
 #[test]
 fn arguments_that_make_no_sense_are_usage_errors() {
@@ -27,7 +27,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "-o", ""], "--output"),
         (&["legs.toml", "minimal.toml"], "one spec file is expected"),
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
-        (&["chek", "legs.toml"], "check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, dump-ir"),
+        (&["chek", "legs.toml"], "check, build, size, flash, sim, tune, robust, pil, replay, dynamics, identify, forc, dump-ir"),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
         (&["sim"], "<SPEC>"),

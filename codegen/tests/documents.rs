@@ -9,7 +9,7 @@ use std::fs;
 
 use support::{Folder, repository};
 
-const DOCUMENTS: [&str; 9] = [
+const DOCUMENTS: [&str; 10] = [
     "README.md",
     "ARCHITECTURE.md",
     "docs/control-law.md",
@@ -19,6 +19,7 @@ const DOCUMENTS: [&str; 9] = [
     "docs/robustness.md",
     "docs/pil.md",
     "docs/supervisor.md",
+    "docs/recorder.md",
 ];
 
 fn read(name: &str) -> String {
