@@ -2,6 +2,7 @@
 //! from the sources that specgen itself was built with. [`write()`] puts them into a folder, whole or not at all.
 
 mod output;
+pub mod parts;
 
 use std::collections::BTreeMap;
 
@@ -11,68 +12,26 @@ use crate::emit::EmittedCrate;
 use crate::ir::Ir;
 
 pub use output::{WriteError, write};
-
-/// Hand-written files that every workspace gets, as path and text.
-const FIXED: &[(&str, &str)] = &[
-    ("runtime/Cargo.toml", include_str!("../../firmware/runtime/Cargo.toml")),
-    ("runtime/src/lib.rs", include_str!("../../firmware/runtime/src/lib.rs")),
-    ("runtime/src/adaptation.rs", include_str!("../../firmware/runtime/src/adaptation.rs")),
-    ("runtime/src/attitude.rs", include_str!("../../firmware/runtime/src/attitude.rs")),
-    ("runtime/src/creep.rs", include_str!("../../firmware/runtime/src/creep.rs")),
-    ("runtime/src/dac.rs", include_str!("../../firmware/runtime/src/dac.rs")),
-    ("runtime/src/digest.rs", include_str!("../../firmware/runtime/src/digest.rs")),
-    ("runtime/src/dynamic.rs", include_str!("../../firmware/runtime/src/dynamic.rs")),
-    ("runtime/src/dynamics.rs", include_str!("../../firmware/runtime/src/dynamics.rs")),
-    ("runtime/src/dynamics/attitude.rs", include_str!("../../firmware/runtime/src/dynamics/attitude.rs")),
-    ("runtime/src/dynamics/balance.rs", include_str!("../../firmware/runtime/src/dynamics/balance.rs")),
-    ("runtime/src/dynamics/lanes.rs", include_str!("../../firmware/runtime/src/dynamics/lanes.rs")),
-    ("runtime/src/dynamics/leg.rs", include_str!("../../firmware/runtime/src/dynamics/leg.rs")),
-    ("runtime/src/everett.rs", include_str!("../../firmware/runtime/src/everett.rs")),
-    ("runtime/src/kinematics.rs", include_str!("../../firmware/runtime/src/kinematics.rs")),
-    ("runtime/src/memory.rs", include_str!("../../firmware/runtime/src/memory.rs")),
-    ("runtime/src/feedback.rs", include_str!("../../firmware/runtime/src/feedback.rs")),
-    ("runtime/src/linear.rs", include_str!("../../firmware/runtime/src/linear.rs")),
-    ("runtime/src/mode.rs", include_str!("../../firmware/runtime/src/mode.rs")),
-    ("runtime/src/motion.rs", include_str!("../../firmware/runtime/src/motion.rs")),
-    ("runtime/src/notch.rs", include_str!("../../firmware/runtime/src/notch.rs")),
-    ("runtime/src/transfer.rs", include_str!("../../firmware/runtime/src/transfer.rs")),
-    ("runtime/src/real.rs", include_str!("../../firmware/runtime/src/real.rs")),
-    ("runtime/src/sensing.rs", include_str!("../../firmware/runtime/src/sensing.rs")),
-    ("runtime/src/velocity.rs", include_str!("../../firmware/runtime/src/velocity.rs")),
-    ("runtime/src/setpoint.rs", include_str!("../../firmware/runtime/src/setpoint.rs")),
-    ("runtime/src/setpoint/frames.rs", include_str!("../../firmware/runtime/src/setpoint/frames.rs")),
-    ("runtime/src/setpoint/generator.rs", include_str!("../../firmware/runtime/src/setpoint/generator.rs")),
-    ("runtime/src/setpoint/profile.rs", include_str!("../../firmware/runtime/src/setpoint/profile.rs")),
-    ("runtime/src/setpoint/stop.rs", include_str!("../../firmware/runtime/src/setpoint/stop.rs")),
-    ("runtime/src/setpoint/trajectory.rs", include_str!("../../firmware/runtime/src/setpoint/trajectory.rs")),
-    ("runtime/src/trig.rs", include_str!("../../firmware/runtime/src/trig.rs")),
-    ("host/Cargo.toml", include_str!("../../firmware/host/Cargo.toml")),
-    ("host/build.rs", include_str!("../../firmware/host/build.rs")),
-    ("host/src/lib.rs", include_str!("../../firmware/host/src/lib.rs")),
-    ("qemu/Cargo.lock", include_str!("../../firmware/qemu/Cargo.lock")),
-    ("qemu/README.md", include_str!("../../firmware/qemu/README.md")),
-    ("qemu/Cargo.toml", include_str!("../../firmware/qemu/Cargo.toml")),
-    ("qemu/build.rs", include_str!("../../firmware/qemu/build.rs")),
-    ("qemu/memory.x", include_str!("../../firmware/qemu/memory.x")),
-    ("qemu/src/instructions.rs", include_str!("../../firmware/qemu/src/instructions.rs")),
-    ("qemu/src/main.rs", include_str!("../../firmware/qemu/src/main.rs")),
-    ("qemu/src/panic.rs", include_str!("../../firmware/qemu/src/panic.rs")),
-    ("qemu/src/semihosting.rs", include_str!("../../firmware/qemu/src/semihosting.rs")),
-    ("qemu/src/stack.rs", include_str!("../../firmware/qemu/src/stack.rs")),
-    ("qemu/src/stages.rs", include_str!("../../firmware/qemu/src/stages.rs")),
-    ("qemu/src/stats.rs", include_str!("../../firmware/qemu/src/stats.rs")),
-];
+use parts::Part;
 
 /// All files of a workspace: path relative to its root, text. The same spec gives the same bytes.
 #[must_use]
 pub fn files(ir: &Ir, controller: &EmittedCrate) -> BTreeMap<String, String> {
+    files_with(ir, controller, &[])
+}
+
+/// The same with the folders of more targets (see [`parts`]), such as `stm32h743`.
+#[must_use]
+pub fn files_with(ir: &Ir, controller: &EmittedCrate, targets: &[&str]) -> BTreeMap<String, String> {
+    let parts = parts::select(targets);
+    let fixed = parts.iter().flat_map(|part| part.files.iter());
     let mut files: BTreeMap<String, String> =
-        FIXED.iter().map(|(path, text)| ((*path).to_owned(), (*text).to_owned())).collect();
+        fixed.map(|(path, text)| ((*path).to_owned(), (*text).to_owned())).collect();
     for (path, text) in controller {
         files.insert(format!("controller/{path}"), text.clone());
     }
-    files.insert("Cargo.toml".to_owned(), root_manifest(ir));
-    files.insert("README.md".to_owned(), readme(ir));
+    files.insert("Cargo.toml".to_owned(), root_manifest(ir, &parts));
+    files.insert("README.md".to_owned(), readme(ir, &parts));
     files.insert("ir.json".to_owned(), ir_text(ir));
     files
 }
@@ -87,13 +46,17 @@ pub fn ir_text(ir: &Ir) -> String {
     }
 }
 
-fn root_manifest(ir: &Ir) -> String {
+fn root_manifest(ir: &Ir, parts: &[&Part]) -> String {
+    let list = |member: bool| {
+        let folders = parts.iter().filter(|part| part.member == member).map(|part| format!("\"{}\"", part.folder));
+        folders.collect::<Vec<_>>().join(", ")
+    };
     format!(
         "# Generated by specgen {} from platform `{}`.
 [workspace]
 resolver = \"3\"
-members = [\"controller\", \"runtime\", \"host\"]
-exclude = [\"qemu\"]
+members = [\"controller\", {}]
+exclude = [{}]
 
 [profile.dev]
 panic = \"abort\"
@@ -105,11 +68,17 @@ lto = \"fat\"
 codegen-units = 1
 debug = \"line-tables-only\"
 ",
-        ir.specgen_version, ir.name
+        ir.specgen_version,
+        ir.name,
+        list(true),
+        list(false)
     )
 }
 
-fn readme(ir: &Ir) -> String {
+fn readme(ir: &Ir, parts: &[&Part]) -> String {
+    let row = |part: &&Part| format!("| `{}/` | {} | {} |\n", part.folder, part.what, part.needs);
+    let folders: Vec<String> = parts.iter().map(|part| format!("`{}/`", part.folder)).collect();
+    let (last, others) = folders.split_last().map_or(("", &[][..]), |(last, others)| (last.as_str(), others));
     format!(
         "# Controller of platform `{name}`
 
@@ -118,20 +87,19 @@ Generated by specgen {version}; spec digest `{digest}`. Do not edit: change the 
 | folder | what | needs |
 |---|---|---|
 | `controller/` | the controller: `no_std`, no allocation, no panic path, `{scalar}` | nothing |
-| `runtime/` | the kernels it calls | nothing |
-| `host/` | the same controller as a shared library: `cargo build --release` | a host toolchain |
-| `qemu/` | the same controller on an emulated Cortex-M: see its README | target `thumbv7em-none-eabihf`, QEMU |
-| `ir.json` | every constant of the controller | |
+{rows}| `ir.json` | every constant of the controller | |
 
 Start reading at `controller/src/step.rs`.
 
-Generated code carries no licence restriction of its own: use it as you like. `runtime/`, `host/` and `qemu/` are
+Generated code carries no licence restriction of its own: use it as you like. {others} and {last} are
 MIT OR Apache-2.0, like specgen.
 ",
         name = ir.name,
         version = ir.specgen_version,
         digest = ir.digest,
         scalar = format_args!("f{}", ir.scalar.bits()),
+        rows = parts.iter().map(row).collect::<String>(),
+        others = others.join(", "),
     )
 }
 
@@ -147,25 +115,54 @@ mod tests {
 
     use super::*;
 
+    /// All files below, lock files included, but not what cargo builds.
     fn list(root: &Path, below: &str) -> Vec<String> {
-        let inside =
-            |(path, kind): (String, std::fs::FileType)| if kind.is_dir() { list(root, &path) } else { vec![path] };
-        output::entries(root, below).unwrap().into_iter().flat_map(inside).collect()
+        let mut paths = Vec::new();
+        for entry in std::fs::read_dir(root.join(below)).unwrap() {
+            let entry = entry.unwrap();
+            let path = format!("{below}/{}", entry.file_name().to_string_lossy());
+            if !entry.file_type().unwrap().is_dir() {
+                paths.push(path);
+            } else if entry.file_name() != "target" {
+                paths.extend(list(root, &path));
+            }
+        }
+        paths
     }
 
     /// Nothing that a target needs is forgotten: what lies in its folder is copied, but for tests.
     #[test]
     fn every_hand_written_file_of_runtime_and_targets_is_copied() {
         let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware");
-        let mut present: Vec<String> = list(&firmware, "")
-            .into_iter()
-            .filter(|path| !path.starts_with("controller/") && !path.starts_with("runtime/tests/"))
-            .collect();
-        // `list` passes lock files over; the one of the image is ours.
-        present.push("qemu/Cargo.lock".to_owned());
-        present.sort();
-        let mut copied: Vec<String> = FIXED.iter().map(|(path, _)| (*path).to_owned()).collect();
-        copied.sort();
-        assert_eq!(present, copied);
+        let folders = std::fs::read_dir(&firmware).unwrap().map(|entry| entry.unwrap().file_name());
+        let folders = folders.map(|name| name.to_string_lossy().into_owned()).filter(|name| name != "controller");
+        for folder in folders {
+            let part = parts::PARTS.iter().find(|part| part.folder == folder);
+            let part = part.unwrap_or_else(|| panic!("firmware/{folder} is no part: see workspace/parts.rs"));
+            let mut present = list(&firmware, &folder);
+            present.retain(|path| !path.starts_with(&format!("{folder}/tests/")));
+            // A lock file that cargo leaves in a member of some workspace is nobody's.
+            present.retain(|path| part.files.iter().any(|(file, _)| file == path) || !path.ends_with("/Cargo.lock"));
+            let mut copied: Vec<String> = part.files.iter().map(|(path, _)| (*path).to_owned()).collect();
+            present.sort();
+            copied.sort();
+            assert_eq!(present, copied, "codegen/src/workspace/parts lists the files of firmware/{folder}");
+            let text = |name: &str| part.files.iter().find(|(path, _)| *path == format!("{folder}/{name}"));
+            if text("Cargo.toml").is_some_and(|(_, manifest)| manifest.contains("[workspace]")) {
+                assert!(text("Cargo.lock").is_some(), "firmware/{folder} stands alone: commit and list its Cargo.lock");
+            }
+        }
+    }
+
+    #[test]
+    fn a_target_brings_what_it_depends_on() {
+        let folders = |targets: &[&str]| parts::select(targets).iter().map(|part| part.folder).collect::<Vec<_>>();
+        for part in parts::PARTS.iter().filter(|part| !part.files.is_empty()) {
+            let chosen = folders(&[part.folder]);
+            for needed in part.with.iter().chain(parts::ALWAYS).chain([&part.folder]) {
+                let known = parts::PARTS.iter().find(|other| other.folder == *needed).unwrap();
+                assert!(known.files.is_empty() || chosen.contains(needed), "{} without {needed}", part.folder);
+            }
+        }
     }
 }

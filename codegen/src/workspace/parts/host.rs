@@ -1,0 +1,16 @@
+//! The controller as a shared library for this machine.
+
+use super::{Part, files};
+
+pub const PART: Part = Part {
+    folder: "host",
+    member: true,
+    what: "the same controller as a shared library: `cargo build --release`",
+    needs: "a host toolchain",
+    with: &[],
+    files: files! { "host":
+        "Cargo.toml",
+        "build.rs",
+        "src/lib.rs",
+    },
+};

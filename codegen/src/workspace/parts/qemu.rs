@@ -1,0 +1,25 @@
+//! The controller on an emulated Cortex-M.
+
+use super::{Part, files};
+
+pub const PART: Part = Part {
+    folder: "qemu",
+    member: false,
+    what: "the same controller on an emulated Cortex-M: see its README",
+    needs: "target `thumbv7em-none-eabihf`, QEMU",
+    with: &[],
+    files: files! { "qemu":
+        "Cargo.lock",
+        "Cargo.toml",
+        "README.md",
+        "build.rs",
+        "memory.x",
+        "src/instructions.rs",
+        "src/main.rs",
+        "src/panic.rs",
+        "src/semihosting.rs",
+        "src/stack.rs",
+        "src/stages.rs",
+        "src/stats.rs",
+    },
+};

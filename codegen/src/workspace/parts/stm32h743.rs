@@ -1,0 +1,12 @@
+//! Firmware of the NUCLEO-H743ZI2.
+
+use super::{Part, files};
+
+pub const PART: Part = Part {
+    folder: "stm32h743",
+    member: false,
+    what: "firmware of the NUCLEO-H743ZI2 (Cortex-M7)",
+    needs: "target `thumbv7em-none-eabihf`",
+    with: &["hal", "link"],
+    files: files! { "stm32h743": },
+};
