@@ -9,17 +9,20 @@
 mod description;
 mod dynamics;
 mod format;
+mod gauge_converter;
 mod hysteresis;
 mod identity;
 mod kinematics;
 mod legs;
 mod limits;
 mod literal;
+mod machine_words;
 mod manifest;
 mod platform;
 mod sensing;
 mod setpoint;
 mod stage_type;
+mod supervised;
 
 use std::collections::BTreeMap;
 
@@ -38,6 +41,7 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
         ("src/hysteresis.rs", hysteresis::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
+        ("src/supervised.rs", supervised::emit(ir)),
     ];
     match &ir.task_space {
         None => sources.extend(legs_sources(ir)),
@@ -54,6 +58,8 @@ fn legs_sources(ir: &Ir) -> Vec<(&'static str, TokenStream)> {
     vec![
         ("src/config.rs", legs::config::emit(ir)),
         ("src/lib.rs", legs::crate_root::emit(ir)),
+        ("src/machine_words.rs", machine_words::emit(&legs::words::inputs(), &legs::words::outputs())),
+        ("src/sensing.rs", legs::sensing::emit(ir)),
         ("src/stages.rs", legs::stages::emit()),
         ("src/state.rs", legs::state::emit(ir)),
         ("src/step.rs", legs::step::emit(ir)),
@@ -65,7 +71,8 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
     vec![
         ("src/config.rs", platform::config::emit(ir, &task.defaults)),
         ("src/lib.rs", platform::crate_root::emit(ir)),
-        ("src/sensing.rs", sensing::emit(ir.scalar, &task.sensing)),
+        ("src/machine_words.rs", machine_words::emit(&platform::words::inputs(), &platform::words::outputs())),
+        ("src/sensing.rs", sensing::emit(ir, &task.sensing)),
         ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
         ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),

@@ -74,6 +74,8 @@ pub struct Ir {
     pub actuation: Actuation,
     /// What inputs are believed.
     pub bounds: Bounds,
+    /// Codes of the gauges' converters.
+    pub gauge_converter: GaugeConverter,
     /// Config at start-up.
     pub defaults: Defaults,
     /// Control in task space; none for six legs with their own gauges.
@@ -309,6 +311,19 @@ pub struct Bounds {
     pub leg: [f64; 2],
     /// Gauge reading, m.
     pub sensor: [f64; 2],
+}
+
+/// Codes of the gauges' converters; the constants of [`specgen_runtime::GaugeConverter`], where each is explained.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GaugeConverter {
+    /// Number at code 0, m; V with a calibration.
+    pub at_zero: f64,
+    /// Step of a code.
+    pub per_code: f64,
+    /// Highest code.
+    pub highest: i32,
+    /// Below and above what is believed.
+    pub beyond: [f64; 2],
 }
 
 /// Config at start-up.

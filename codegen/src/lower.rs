@@ -4,6 +4,7 @@
 
 mod actuation;
 mod dynamics;
+mod gauge_converter;
 mod kinematics;
 mod linear;
 mod rate;
@@ -48,6 +49,11 @@ pub fn lower(
     let round = |value| scalar.round(value);
     let [tx, ty, tz] = model.workspace.translation;
     let [rx, ry, rz] = model.workspace.rotation;
+    let task_space = match (&model.task_space, task) {
+        (Some(task), Some((design, setpoints))) => Some(task_space(model, task, scalar, design, setpoints)?),
+        _ => None,
+    };
+    let sensing = task_space.as_ref().map(|task| &task.sensing);
     Ok(Ir {
         name: model.name.clone(),
         digest: digest.to_owned(),
@@ -62,6 +68,7 @@ pub fn lower(
             leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
             sensor: model.sensor.range.map(round),
         },
+        gauge_converter: gauge_converter::lower(model, sensing, scalar),
         defaults: Defaults {
             law: match model.adaptation.mode {
                 model::AdaptationMode::Invhys => Law::Invhys,
@@ -79,10 +86,7 @@ pub fn lower(
             period: model.timing.period,
             leg_gain: model.actuator.leg_gain(),
         },
-        task_space: match (&model.task_space, task) {
-            (Some(task), Some((design, setpoints))) => Some(task_space(model, task, scalar, design, setpoints)?),
-            _ => None,
-        },
+        task_space,
     })
 }
 

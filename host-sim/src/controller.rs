@@ -1,7 +1,8 @@
 //! Runs an emitted controller's host shared library; the only module with unsafe code but for one that picks instructions.
 //!
-//! The library's C interface, version 1: `specgen_abi_version`, `_describe`, `_config_default`, `_config_check`,
-//! `_config_load`, `_state_reset`, `_step`, `_state_digest`, and for analysis `_dynamics`.
+//! The library's C interface, version 2: `specgen_abi_version`, `_describe`, `_config_default`, `_config_check`,
+//! `_config_load`, `_state_reset`, `_step`, `_state_digest`, for analysis `_dynamics`, and under the supervisor `_machine_reset`,
+//! `_machine_step`, `_machine_digest` ([`Supervised`]).
 #![allow(unsafe_code)]
 
 use std::alloc::{Layout, alloc_zeroed, dealloc, handle_alloc_error};
@@ -15,7 +16,7 @@ use libloading::Library;
 use crate::description::{Description, DescriptionError, fields};
 
 /// Version of the C interface that this module speaks.
-pub const ABI_VERSION: u32 = 1;
+pub const ABI_VERSION: u32 = 2;
 
 /// Something that runs one control tick: the emitted controller, or a stand-in in a test.
 pub trait TickController {
@@ -178,6 +179,8 @@ pub struct Controller {
     functions: Functions,
     config: Buffer,
     state: Buffer,
+    /// Memory of a machine: the state with its supervisor.
+    machine_layout: Layout,
     /// Where it came from.
     path: PathBuf,
     /// Last, so that it is unloaded after everything else.
@@ -200,7 +203,7 @@ impl Controller {
         // SAFETY: loading runs the library's initialisers. The caller names a controller library; an emitted one has none.
         let library = unsafe { Library::new(path) }.map_err(failed)?;
 
-        // SAFETY: the types are those of interface version 1; the version function itself is the same in every version,
+        // SAFETY: the types are those of the interface version; the version function itself is the same in every version,
         // and is asked before any other is called. The pointers are used only while `library` lives, see `Controller`.
         let (describe, functions) = unsafe {
             let abi_version: unsafe extern "C" fn() -> u32 = *library.get(b"specgen_abi_version\0").map_err(failed)?;
@@ -235,8 +238,11 @@ impl Controller {
         let state = Buffer::new(layout(&text, "state_bytes", "state_align")?);
         let config = Buffer::new(layout(&text, "config_bytes", "config_align")?);
 
+        let machine_layout = layout(&text, "machine_bytes", "machine_align")?;
+
         let path = path.to_owned();
-        let mut controller = Self { description, functions, config, state, path, library: Arc::new(library) };
+        let library = Arc::new(library);
+        let mut controller = Self { description, functions, config, state, machine_layout, path, library };
         let words = controller.default_config();
         controller.configure(&words)?;
         controller.reset();
@@ -252,6 +258,7 @@ impl Controller {
             functions: self.functions,
             config: self.config.copy(),
             state: self.state.copy(),
+            machine_layout: self.machine_layout,
             path: self.path.clone(),
             library: Arc::clone(&self.library),
         }
@@ -357,6 +364,10 @@ impl TickController for Controller {
         unsafe { (self.functions.state_digest)(self.state.start()) }
     }
 }
+
+mod supervised;
+
+pub use supervised::{MachineWord, Supervised};
 
 /// Zeroed memory of a given size and alignment.
 struct Buffer {

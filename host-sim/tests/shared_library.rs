@@ -12,7 +12,7 @@ use host_sim::controller::{Controller, ControllerError, TickController};
 const SOURCE: &str = r#"
 static TEXT: &str = "name=toy\ndigest=ab\nversion=0.1.0\nscalar_bits=64\nconfig_names=gain,limit\n\
 input_names=setpoint[0]\noutput_names=voltage[0],status\n\
-state_bytes=32\nstate_align=16\nconfig_bytes=8\nconfig_align=8\n";
+state_bytes=32\nstate_align=16\nconfig_bytes=8\nconfig_align=8\nmachine_bytes=48\nmachine_align=16\n";
 #[unsafe(no_mangle)] extern "C" fn specgen_abi_version() -> u32 { ABI }
 #[unsafe(no_mangle)] unsafe extern "C" fn specgen_describe(s: *mut *const u8, n: *mut usize) { unsafe { *s = TEXT.as_ptr(); *n = TEXT.len() } }
 #[unsafe(no_mangle)] unsafe extern "C" fn specgen_config_default(w: *mut u64) { unsafe { *w = 2.0f64.to_bits(); *w.add(1) = 7 } }
@@ -60,7 +60,7 @@ fn refusal(file: &Path) -> ControllerError {
 
 #[test]
 fn a_library_is_described_configured_reset_and_stepped() {
-    let Some(file) = library("toy", &SOURCE.replace("ABI", "1")) else {
+    let Some(file) = library("toy", &SOURCE.replace("ABI", "2")) else {
         return;
     };
     let mut controller = Controller::load(&file).unwrap();
@@ -85,7 +85,7 @@ fn a_library_is_described_configured_reset_and_stepped() {
 
 #[test]
 fn a_refused_word_is_named_and_the_configuration_in_force_stays() {
-    let Some(file) = library("toy_refuses", &SOURCE.replace("ABI", "1")) else {
+    let Some(file) = library("toy_refuses", &SOURCE.replace("ABI", "2")) else {
         return;
     };
     let mut controller = Controller::load(&file).unwrap();
@@ -103,8 +103,8 @@ fn another_interface_version_and_a_missing_function_are_refused() {
     let Some(file) = library("toy_abi", &SOURCE.replace("ABI", "7")) else {
         return;
     };
-    assert!(refusal(&file).to_string().contains("interface version 7, expected 1"));
-    let source = SOURCE.replace("ABI", "1").replace("specgen_state_digest", "other");
+    assert!(refusal(&file).to_string().contains("interface version 7, expected 2"));
+    let source = SOURCE.replace("ABI", "2").replace("specgen_state_digest", "other");
     let Some(file) = library("toy_lacks", &source) else {
         return;
     };
@@ -114,7 +114,7 @@ fn another_interface_version_and_a_missing_function_are_refused() {
 
 #[test]
 fn a_bad_description_is_refused() {
-    let source = SOURCE.replace("ABI", "1").replace("scalar_bits=64", "scalar_bits=80");
+    let source = SOURCE.replace("ABI", "2").replace("scalar_bits=64", "scalar_bits=80");
     let Some(file) = library("toy_scalar", &source) else {
         return;
     };

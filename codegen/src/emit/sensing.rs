@@ -4,10 +4,12 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::literal;
-use crate::ir::{Scalar, Sensing};
+use super::{gauge_converter, literal};
+use crate::ir::{Ir, Sensing};
 
-pub fn emit(scalar: Scalar, s: &Sensing) -> TokenStream {
+pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
+    let scalar = ir.scalar;
+    let converter = gauge_converter::emit(ir);
     let vectors = |rows| literal::vectors(scalar, rows);
     let (direction, normal) = (vectors(&s.direction), vectors(&s.normal));
     let (skew, pierced) = (vectors(&s.skew), vectors(&s.pierced));
@@ -44,7 +46,7 @@ pub fn emit(scalar: Scalar, s: &Sensing) -> TokenStream {
         #![doc = " Pose from six gauges that see the platform, and the filter of its rate."]
 
         #import
-        use specgen_runtime::{Gauges, RateFilter, sensing};
+        use specgen_runtime::{GaugeConverter, Gauges, RateFilter, sensing};
 
         use crate::Real;
 
@@ -65,6 +67,8 @@ pub fn emit(scalar: Scalar, s: &Sensing) -> TokenStream {
         pub const RAW_LIMITS: [[Real; 2]; 6] = [#([#limits]),*];
         /// First-order filter of the pose's rate; from `velocity_cutoff` and `timing.period`.
         pub const RATE: RateFilter<Real> = RateFilter { keep: #keep, gain: #gain };
+
+        #converter
 
         /// Gauges whose word is not finite or out of [`RAW_LIMITS`]: bit k for gauge k.
         #[inline]

@@ -31,12 +31,15 @@ pub mod dynamics;
 pub mod hysteresis;
 pub mod kinematics;
 pub mod limits;
+mod machine_words;
+
 pub mod sensing;
 pub mod setpoint;
 pub mod stages;
 mod state;
 mod step;
 
+pub mod supervised;
 pub mod task_space;
 mod words;
 

@@ -3,7 +3,7 @@
 
 //! Pose from six gauges that see the platform, and the filter of its rate.
 
-use specgen_runtime::{Gauges, RateFilter, sensing};
+use specgen_runtime::{GaugeConverter, Gauges, RateFilter, sensing};
 use crate::Real;
 
 /// Lines and planes at rest; the passes leave 1.5e-15 m and 1.0e-14 rad over the declared workspace. From `gauge` and `workspace`.
@@ -76,6 +76,21 @@ pub const RATE: RateFilter<Real> = RateFilter {
     keep: 0.14956861922263504,
     gain: 8504.31380777365,
 };
+
+/// Codes of the gauges' converters; from `sensor`.
+pub const CONVERTER: GaugeConverter<Real> = GaugeConverter {
+    at_zero: -5.5e-5,
+    per_code: 8.392333984375e-10,
+    highest: 131071,
+    beyond: [-0.000165, 0.000165],
+};
+
+/// What a gauge's converter means by a code of 0..2^bits, m; a code at either end is a gauge fault.
+#[inline]
+#[must_use]
+pub fn gauge_reading(code: i32) -> Real {
+    CONVERTER.reading(code)
+}
 
 /// Gauges whose word is not finite or out of [`RAW_LIMITS`]: bit k for gauge k.
 #[inline]

@@ -12,10 +12,13 @@
 use core::mem::{align_of, size_of};
 
 use controller::dynamics::{ANALYSIS_WORDS, MOTION_WORDS};
+use controller::supervised::{
+    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_output_words, supervise,
+};
 use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput};
 
 /// Version of this interface.
-const ABI_VERSION: u32 = 1;
+const ABI_VERSION: u32 = 2;
 
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo) -> ! {
@@ -33,7 +36,7 @@ pub extern "C" fn specgen_abi_version() -> u32 {
 }
 
 /// What this controller is: `key=value` lines in UTF-8, those of `controller::DESCRIPTION` and `state_bytes`,
-/// `state_align`, `config_bytes`, `config_align`.
+/// `state_align`, `config_bytes`, `config_align`, `machine_bytes`, `machine_align`.
 ///
 /// # Safety
 /// `text` and `length` point to writable memory. The text lives as long as the library is loaded.
@@ -47,11 +50,13 @@ pub unsafe extern "C" fn specgen_describe(text: *mut *const u8, length: *mut usi
 }
 
 /// Keys of the memory that the caller provides, with their values.
-const MEMORY: [(&str, usize); 4] = [
+const MEMORY: [(&str, usize); 6] = [
     ("state_bytes=", size_of::<State>()),
     ("state_align=", align_of::<State>()),
     ("config_bytes=", size_of::<Config>()),
     ("config_align=", align_of::<Config>()),
+    ("machine_bytes=", size_of::<Machine>()),
+    ("machine_align=", align_of::<Machine>()),
 ];
 /// Decimal digits of each value, leading zeros included.
 const DIGITS: usize = 8;
@@ -171,6 +176,54 @@ pub unsafe extern "C" fn specgen_step(config: *const u8, state: *mut u8, input: 
 pub unsafe extern "C" fn specgen_state_digest(state: *const u8) -> u64 {
     // SAFETY: the caller's duty.
     unsafe { (*state.cast::<State>()).digest() }
+}
+
+/// Bytes of a `Machine`: what the controller remembers with its supervisor.
+#[unsafe(no_mangle)]
+pub extern "C" fn specgen_machine_bytes() -> usize {
+    size_of::<Machine>()
+}
+
+/// Puts a `Machine` at reset.
+///
+/// # Safety
+/// `machine` points to memory for a `Machine`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_machine_reset(machine: *mut u8) {
+    // SAFETY: the caller's duty.
+    unsafe { machine.cast::<Machine>().write(Machine::new()) }
+}
+
+/// One supervised tick: what the other targets run.
+///
+/// # Safety
+/// `config` holds a loaded `Config`, `machine` a `Machine` put at reset before; `input` points to `MACHINE_INPUT_WORDS` words,
+/// `output` to `MACHINE_OUTPUT_WORDS` writable words. No two threads step the same machine at once.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_machine_step(
+    config: *const u8,
+    machine: *mut u8,
+    input: *const u64,
+    output: *mut u64,
+) {
+    // SAFETY: the caller's duty.
+    let (config, machine, input) = unsafe {
+        (&*config.cast::<Config>(), &mut *machine.cast::<Machine>(), &*input.cast::<[u64; MACHINE_INPUT_WORDS]>())
+    };
+    let result = supervise(config, machine, &MachineInput::from_words(input));
+    let words = machine_output_words(&result, machine);
+    // SAFETY: the caller's duty.
+    unsafe { output.cast::<[u64; MACHINE_OUTPUT_WORDS]>().write(words) }
+}
+
+/// Fingerprint of a `Machine`.
+///
+/// # Safety
+/// `machine` holds a `Machine` put at reset before.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_machine_digest(machine: *const u8) -> u64 {
+    // SAFETY: the caller's duty.
+    unsafe { (*machine.cast::<Machine>()).digest() }
 }
 
 /// The dynamics at a motion, see `controller::dynamics::analysis`.

@@ -27,6 +27,7 @@
 //! | [`velocity`] | rate of the measured pose, filtered | (7), k_v |
 //! | [`dynamics`] | motion of the platform to leg forces and displacements | (4), (AI.1)–(AI.17) |
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
+//! | [`supervisor`] | phases of the machine, causes of faults | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
@@ -51,6 +52,7 @@ pub mod notch;
 pub mod real;
 pub mod sensing;
 pub mod setpoint;
+pub mod supervisor;
 pub mod transfer;
 pub mod trig;
 pub mod velocity;
@@ -70,6 +72,6 @@ pub use mode::{ControlMode, Interaction};
 pub use motion::Motion;
 pub use notch::{NotchState, Section};
 pub use real::Real;
-pub use sensing::{Calibration, Gauges};
+pub use sensing::{Calibration, GaugeConverter, Gauges};
 pub use transfer::Transfer;
 pub use velocity::{Rate, RateFilter};

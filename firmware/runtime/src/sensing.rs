@@ -159,6 +159,35 @@ impl<T: Real, const N: usize> Calibration<T, N> {
     }
 }
 
+/// From the code of a gauge's converter to the number that the controller takes.
+#[derive(Debug, Clone, Copy)]
+pub struct GaugeConverter<T> {
+    /// The number at code 0, m or V.
+    pub at_zero: T,
+    /// Step of a code.
+    pub per_code: T,
+    /// Highest code, 2^bits − 1.
+    pub highest: i32,
+    /// Below and above whatever is believed: what a converter at its end stands for.
+    pub beyond: [T; 2],
+}
+
+impl<T: Real> GaugeConverter<T> {
+    /// The number of a code. A converter at its lowest or highest code only says that the signal is there or beyond, as that
+    /// of a broken line is: it gives a number that is a gauge fault.
+    #[inline]
+    #[must_use]
+    pub fn reading(&self, code: i32) -> T {
+        if code <= 0 {
+            self.beyond[0]
+        } else if code >= self.highest {
+            self.beyond[1]
+        } else {
+            self.at_zero + T::from_i32(code) * self.per_code
+        }
+    }
+}
+
 /// Gauges whose raw value is not finite or not within its limits: bit k for gauge k.
 #[inline]
 #[must_use]

@@ -38,9 +38,12 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod hysteresis;
         pub mod kinematics;
         pub mod limits;
+        mod machine_words;
+        pub mod sensing;
         pub mod stages;
         mod state;
         mod step;
+        pub mod supervised;
         mod words;
 
         pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};

@@ -6,10 +6,20 @@ use quote::quote;
 use crate::emit::{description, literal};
 use crate::ir::Ir;
 
-pub fn emit(ir: &Ir) -> TokenStream {
-    let inputs = description::vectors(&["setpoint", "displacement"]);
+/// Names of the input words.
+pub fn inputs() -> Vec<String> {
+    description::vectors(&["setpoint", "displacement"])
+}
+
+/// Names of the output words.
+pub fn outputs() -> Vec<String> {
     let mut outputs = description::vectors(&["voltage", "requested", "demand", "level", "drift", "dac_code"]);
     outputs.push("status".to_owned());
+    outputs
+}
+
+pub fn emit(ir: &Ir) -> TokenStream {
+    let (inputs, outputs) = (inputs(), outputs());
     let config = [
         "mode",
         "setpoint_kind",

@@ -15,12 +15,23 @@ const OUTPUT_VECTORS: [&str; 9] =
 const GAIN_VECTORS: [&str; 8] =
     ["kp", "ki", "kv", "position_kp", "position_ki", "position_kv", "environment_stiffness", "environment_rest"];
 
-pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
+/// Names of the input words.
+pub fn inputs() -> Vec<String> {
     let mut inputs: Vec<String> = ["command", "selector", "sequence"].map(str::to_owned).to_vec();
     inputs.extend(description::vectors(&COMMAND_VECTORS));
     inputs.extend(description::vectors(&MEASURED_VECTORS));
+    inputs
+}
+
+/// Names of the output words.
+pub fn outputs() -> Vec<String> {
     let mut outputs = description::vectors(&OUTPUT_VECTORS);
     outputs.push("status".to_owned());
+    outputs
+}
+
+pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
+    let (inputs, outputs) = (inputs(), outputs());
     let mut config: Vec<String> =
         ["mode", "interaction", "level_weight", "drift_weight", "max_step_codes", "code_min", "code_max"]
             .map(str::to_owned)

@@ -38,6 +38,8 @@ pub const PART: Part = Part {
         "src/setpoint/profile.rs",
         "src/setpoint/stop.rs",
         "src/setpoint/trajectory.rs",
+        "src/supervisor.rs",
+        "src/supervisor/kinds.rs",
         "src/transfer.rs",
         "src/trig.rs",
         "src/velocity.rs",

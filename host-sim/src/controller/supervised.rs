@@ -1,0 +1,139 @@
+//! The supervised tick of a controller library: what the other targets run.
+
+use libloading::Symbol;
+
+use super::{Buffer, Controller, ControllerError, TickController};
+
+/// Words that the supervised tick takes beyond those of the control law: request, events.
+const MORE_INPUTS: usize = 2;
+/// Words that it gives beyond them: the supervisor's, conditions.
+const MORE_OUTPUTS: usize = 2;
+
+/// The supervisor's word of an output row, taken apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MachineWord {
+    /// 0 disarmed, 1 arming, 2 running, 3 holding, 4 ramping down, 5 faulted.
+    pub phase: u8,
+    /// 0 none, 1 gauge not finite, 2 gauge range, 3 gauge stuck, 4 gauge disagreement, 5 tracking error, 6 voltage saturation,
+    /// 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop.
+    pub cause: u8,
+    /// Whether the amplifiers are to be on.
+    pub amplifier_on: bool,
+}
+
+impl MachineWord {
+    /// phase | cause << 8 | amplifier on << 16.
+    #[must_use]
+    pub fn of(word: u64) -> Self {
+        let [phase, cause, on, ..] = word.to_le_bytes();
+        Self { phase, cause, amplifier_on: on & 1 == 1 }
+    }
+}
+
+type Reset = unsafe extern "C" fn(*mut u8);
+type Step = unsafe extern "C" fn(*const u8, *mut u8, *const u64, *mut u64);
+type Digest = unsafe extern "C" fn(*const u8) -> u64;
+
+/// A controller with its supervisor: configuration and library of a [`Controller`], and a machine of its own.
+pub struct Supervised {
+    machine: Buffer,
+    reset: Reset,
+    step: Step,
+    digest: Digest,
+    /// Last, so that the library is unloaded after everything else.
+    controller: Controller,
+}
+
+// SAFETY: as for `Controller`: the machine's memory belongs to this value alone and holds plain values.
+unsafe impl Send for Supervised {}
+
+impl Supervised {
+    /// Puts a controller under its supervisor, disarmed.
+    ///
+    /// # Errors
+    /// If the library lacks the supervised tick: it is of an older specgen.
+    pub fn new(controller: Controller) -> Result<Self, ControllerError> {
+        let failed = |cause| ControllerError::Load { path: controller.path.clone(), cause };
+        // SAFETY: the types are those of the interface's version, which `Controller::load` asked for. The pointers are used only
+        // while `controller` keeps the library loaded.
+        let (reset, step, digest) = unsafe {
+            let reset: Symbol<'_, Reset> = controller.library.get(b"specgen_machine_reset\0").map_err(failed)?;
+            let step: Symbol<'_, Step> = controller.library.get(b"specgen_machine_step\0").map_err(failed)?;
+            let digest: Symbol<'_, Digest> = controller.library.get(b"specgen_machine_digest\0").map_err(failed)?;
+            (*reset, *step, *digest)
+        };
+        let mut supervised = Self { machine: Buffer::new(controller.machine_layout), reset, step, digest, controller };
+        supervised.reset();
+        Ok(supervised)
+    }
+
+    /// The controller underneath: its description and configuration. Its own state is not that of the machine.
+    #[must_use]
+    pub fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// Takes a configuration; the machine is kept.
+    ///
+    /// # Errors
+    /// If the number of words is wrong or a word is refused; the configuration in force then stays.
+    pub fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
+        self.controller.configure(words)
+    }
+
+    /// Names of the input words of [`Supervised::step`].
+    #[must_use]
+    pub fn input_names(&self) -> Vec<String> {
+        let mut names = self.controller.description.input_names.clone();
+        names.extend(["request", "events"].map(str::to_owned));
+        names
+    }
+
+    /// Names of the output words of [`Supervised::step`].
+    #[must_use]
+    pub fn output_names(&self) -> Vec<String> {
+        let mut names = self.controller.description.output_names.clone();
+        names.extend(["supervisor", "conditions"].map(str::to_owned));
+        names
+    }
+
+    /// As at power-up: disarmed.
+    pub fn reset(&mut self) {
+        // SAFETY: the buffer has the size and alignment that the library asks for.
+        unsafe { (self.reset)(self.machine.start()) };
+    }
+
+    /// One supervised tick; returns the supervisor's word of the output.
+    ///
+    /// # Panics
+    /// If `input` or `output` has not two words more than the description names.
+    pub fn step(&mut self, input: &[u64], output: &mut [u64]) -> MachineWord {
+        let description = &self.controller.description;
+        assert_eq!(input.len(), description.input_names.len() + MORE_INPUTS, "input words");
+        assert_eq!(output.len(), description.output_names.len() + MORE_OUTPUTS, "output words");
+        // SAFETY: configuration and machine are initialised; the slices have the lengths that the library says, checked above.
+        unsafe {
+            (self.step)(self.controller.config.start(), self.machine.start(), input.as_ptr(), output.as_mut_ptr());
+        }
+        MachineWord::of(output[description.output_names.len()])
+    }
+
+    /// Digest of the machine.
+    #[must_use]
+    pub fn digest(&self) -> u64 {
+        // SAFETY: the machine is initialised.
+        unsafe { (self.digest)(self.machine.start()) }
+    }
+
+    /// Another machine in the same state: to continue from here more than once.
+    #[must_use]
+    pub fn fork(&self) -> Self {
+        Self {
+            machine: self.machine.copy(),
+            reset: self.reset,
+            step: self.step,
+            digest: self.digest,
+            controller: self.controller.fork(),
+        }
+    }
+}
