@@ -133,7 +133,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         device,
         config,
         places,
-        standing_events: control::integrity_event(controller::integrity::intact()),
+        standing_events: control::integrity_event(true),
         wishes: wish_consumer,
         rows: row_producer,
         shared: &shared,
