@@ -9,6 +9,7 @@ mod dynamics;
 mod file;
 mod identify;
 mod identify_rate;
+mod plant;
 mod robust;
 mod sim;
 mod tune;
@@ -69,6 +70,8 @@ enum Command {
     Identify(identify::Arguments),
     /// Simulate the reversal-curve experiment that `identify` needs, on the reference leg or another.
     Forc(sim::ForcArguments),
+    /// Serve the simulated machine of a spec to a real-time controller on this computer.
+    Plant(plant::Arguments),
     /// Print the intermediate representation of a spec: every constant of its controller.
     DumpIr {
         /// The spec file.
@@ -93,6 +96,7 @@ pub fn run() -> ExitCode {
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
         Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
+        Some(Command::Plant(arguments)) => plant::run(arguments, &mut ui),
         Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),
     };
     match done {
@@ -107,7 +111,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, sim, tune, robust, dynamics, identify, forc, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, sim, tune, robust, dynamics, identify, forc, plant, dump-ir) with its own arguments",
         ),
         _ => error,
     };

@@ -19,6 +19,7 @@ pub mod numerics;
 pub mod plot;
 pub mod reach;
 pub mod robust;
+pub mod served;
 pub mod spec;
 pub mod stability;
 pub mod target;

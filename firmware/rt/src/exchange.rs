@@ -11,7 +11,8 @@
 //! the sensing of tick n + 1 out ahead of time. A controller that skipped ticks asks for the sensing of a later one by the word
 //! `wanted`: the machine then goes on under the codes that it has, as a real one would have.
 //!
-//! Whoever waits looks at the words for a while, then sleeps on a futex, so that neither side needs a processor of its own.
+//! Whoever waits looks at the words for a while, then sleeps on a futex, so that neither side needs a processor of its own. Only a
+//! side that sleeps is woken: a call of the system costs the real-time thread more than all the rest of a tick.
 #![allow(unsafe_code)] // Mapping and futex calls; each says why it is sound. The words themselves are atomics.
 
 mod mapping;
@@ -27,7 +28,7 @@ use mapping::Mapping;
 /// "SPGPLANT" in little-endian bytes.
 const MAGIC: u64 = u64::from_le_bytes(*b"SPGPLANT");
 const VERSION: u64 = 1;
-/// How long whoever waits looks before it sleeps, ns.
+/// How long a controller that waits looks before it sleeps, ns.
 const LOOK: u64 = 30_000;
 /// Tries to read a block while the other side writes it; a block takes some 50 ns to write.
 const TRIES: usize = 10_000;
@@ -77,7 +78,14 @@ struct Words {
     sensing_count: AtomicU64,
     sensing: [AtomicU64; 2 + 2 * CHANNELS],
     /// What the machine's side sleeps on, and the controller's.
-    bells: [AtomicU32; 2],
+    bells: [Bell; 2],
+}
+
+/// A count that the other side raises, and whether somebody sleeps on it.
+#[repr(C)]
+struct Bell {
+    count: AtomicU32,
+    sleepers: AtomicU32,
 }
 
 /// Why a machine cannot be reached.
@@ -203,11 +211,11 @@ impl Server {
     }
 
     /// The latest actuation and what the controller waits for (session, tick), once the counter of either has moved on from
-    /// `seen`; none after `patience` (ns).
+    /// `seen`; none after `patience` (ns). It looks for `look` (ns) before it sleeps.
     #[must_use]
-    pub fn wait(&self, seen: &mut u32, patience: u64) -> Option<(Actuation, [u64; 2])> {
+    pub fn wait(&self, seen: &mut u32, look: u64, patience: u64) -> Option<(Actuation, [u64; 2])> {
         let words = self.mapping.words();
-        *seen = wait_for(&words.bells[0], *seen, patience)?;
+        *seen = wait_for(&words.bells[0], *seen, look, patience)?;
         let mut block = [0; 3 + CHANNELS];
         read_block(&words.actuation_count, &words.actuation, &mut block)?;
         let [session, tick, enable, codes @ ..] = block;
@@ -266,7 +274,7 @@ impl Client {
         let deadline = clock::now().saturating_add(patience);
         let mut asked = false;
         loop {
-            let bell = words.bells[1].load(Ordering::Acquire);
+            let bell = words.bells[1].count.load(Ordering::Acquire);
             let mut block = [0; 2 + 2 * CHANNELS];
             if read_block(&words.sensing_count, &words.sensing, &mut block).is_some()
                 && block[0] == self.session
@@ -291,7 +299,7 @@ impl Client {
             if left == 0 {
                 return None;
             }
-            let _ = wait_for(&words.bells[1], bell, left);
+            let _ = wait_for(&words.bells[1], bell, LOOK, left);
         }
     }
 
@@ -344,16 +352,19 @@ fn read_block<const N: usize>(count: &AtomicU64, words: &[AtomicU64; N], block: 
     None
 }
 
-fn ring(bell: &AtomicU32) {
-    bell.fetch_add(1, Ordering::Release);
-    mapping::wake(bell);
+fn ring(bell: &Bell) {
+    // In one order with the sleeper's: either it sees the new count, or it is seen here.
+    bell.count.fetch_add(1, Ordering::SeqCst);
+    if bell.sleepers.load(Ordering::SeqCst) > 0 {
+        mapping::wake(&bell.count);
+    }
 }
 
-/// The bell's count once it is no more `seen`; none after `patience` (ns).
-fn wait_for(bell: &AtomicU32, seen: u32, patience: u64) -> Option<u32> {
+/// The bell's count once it is no more `seen`; none after `patience` (ns). Sleeps after `look` (ns).
+fn wait_for(bell: &Bell, seen: u32, look: u64, patience: u64) -> Option<u32> {
     let start = clock::now();
     loop {
-        let count = bell.load(Ordering::Acquire);
+        let count = bell.count.load(Ordering::Acquire);
         if count != seen {
             return Some(count);
         }
@@ -361,10 +372,12 @@ fn wait_for(bell: &AtomicU32, seen: u32, patience: u64) -> Option<u32> {
         if waited >= patience {
             return None;
         }
-        if waited < LOOK {
+        if waited < look {
             core::hint::spin_loop();
         } else {
-            mapping::sleep(bell, seen, patience - waited);
+            bell.sleepers.fetch_add(1, Ordering::SeqCst);
+            mapping::sleep(&bell.count, seen, patience - waited);
+            bell.sleepers.fetch_sub(1, Ordering::SeqCst);
         }
     }
 }

@@ -17,7 +17,7 @@ fn a_machine_answers_every_tick_and_catches_up_after_skipped_ones() {
         let mut held = [0; 6];
         let mut position = [0; 6];
         while tick < 2_000 {
-            let Some((actuation, wanted)) = server.wait(&mut seen, 1_000_000_000) else { break };
+            let Some((actuation, wanted)) = server.wait(&mut seen, 1_000, 1_000_000_000) else { break };
             if wanted[0] != session {
                 (session, tick) = (wanted[0], wanted[1]);
             } else {
@@ -69,7 +69,7 @@ fn a_block_is_never_seen_half_written() {
     let mut seen = 0;
     let mut last = 0;
     while last < 199_999 {
-        let Some((actuation, _)) = server.wait(&mut seen, 2_000_000_000) else { break };
+        let Some((actuation, _)) = server.wait(&mut seen, 0, 2_000_000_000) else { break };
         assert!(actuation.tick >= last && actuation.codes == [actuation.tick as i32; 6], "{actuation:?}");
         last = actuation.tick;
     }
