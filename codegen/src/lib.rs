@@ -8,6 +8,7 @@
 pub mod cli;
 pub mod compile;
 pub mod diagnostic;
+pub mod doctor;
 pub mod emit;
 pub mod everett;
 pub mod identify;

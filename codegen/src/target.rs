@@ -25,6 +25,7 @@ pub mod toolchain;
 
 pub use build::{Image, build_image};
 pub use error::TargetError;
+pub use process::find_in_path;
 pub use replay::{ReplayResult, replay};
 
 /// Rust's name of the compilation target of every [`Mcu`](crate::model::Mcu) here.

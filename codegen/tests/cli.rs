@@ -26,7 +26,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "-o", ""], "--output"),
         (&["legs.toml", "minimal.toml"], "one spec file is expected"),
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
-        (&["chek", "legs.toml"], "check, sim, tune, robust, dynamics, identify, forc, plant, dump-ir"),
+        (&["chek", "legs.toml"], "check, sim, tune, robust, dynamics, identify, forc, plant, doctor, dump-ir"),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
         (&["sim"], "<SPEC>"),

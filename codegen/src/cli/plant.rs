@@ -57,10 +57,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     ui.findings(Some(&compiled.source), &compiled.findings);
     let machine = prepared(arguments, &compiled, ui)?;
     let mut served = Served::new(machine, &compiled.model, &compiled.ir);
-    for refused in [
-        arguments.cpu.map_or(Ok(()), scheduling::pin),
-        arguments.priority.map_or(Ok(()), scheduling::set_fifo),
-    ] {
+    for refused in
+        [arguments.cpu.map_or(Ok(()), scheduling::pin), arguments.priority.map_or(Ok(()), scheduling::set_fifo)]
+    {
         refused.map_err(environment)?;
     }
     // Whatever ends it, the file is to go. A handler that is set already ends it as well.

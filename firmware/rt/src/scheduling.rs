@@ -60,6 +60,12 @@ pub fn lock_memory() -> Result<(), Refused> {
     refused(answer, || "locking memory (mlockall)".to_owned(), MEND_MEMORY)
 }
 
+/// Lets the system take pages away again.
+pub fn unlock_memory() {
+    // SAFETY: takes no pointers.
+    unsafe { libc::munlockall() };
+}
+
 /// Keeps the calling thread on one processor.
 ///
 /// # Errors
