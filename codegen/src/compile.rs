@@ -218,6 +218,9 @@ fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedReco
         match one {
             Ok((table, report, warnings)) => {
                 errors.extend(wrong_scale(model, name, &table));
+                if report.is_some() && matches!(model.hysteresis.rate, RateDependence::Creep(_)) {
+                    result.findings.push(static_table_with_creep(model, name));
+                }
                 result.tables.push(table);
                 result.reports.push(report);
                 result.findings.extend(warnings);
@@ -298,6 +301,21 @@ fn rate_not_in_stability(model: &Model) -> Diagnostic {
             "its inverse at most doubles the gain of fast corrections: let gain_ratio reach twice its upper end ({}), or simulate",
             2.0 * model.adaptation.gain_ratio[1]
         ),
+    }
+}
+
+fn static_table_with_creep(model: &Model, record: &str) -> Diagnostic {
+    let key = "hysteresis.records";
+    Diagnostic {
+        severity: Severity::Warning,
+        code: codes::STATIC_TABLE_WITH_CREEP,
+        key: key.to_owned(),
+        place: model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec),
+        message: format!(
+            "the table of `{record}` is fitted without creep, and the creep that is in it is compensated once more"
+        ),
+        help: "name the table that `specgen identify rate SLOW.csv FAST.csv -o NAME` writes to NAME-creep.csv"
+            .to_owned(),
     }
 }
 

@@ -285,6 +285,8 @@ codes! {
         "A table named in hysteresis.rate_tables must have the cells of hysteresis.grid over the range of actuator.voltage: identify both tables with these.";
     RATE_NOT_IN_STABILITY = "W0643", "rate term not part of the stability check",
         "The stability of the adaptation was checked with the static inverse. The inverse of (6) can raise the gain of fast corrections, by a factor of two at most, before it falls back to the static one: keep gain_ratio wide enough for that.";
+    STATIC_TABLE_WITH_CREEP = "W0648", "static table beside creep terms",
+        "A table that is fitted to a record of reversal curves alone holds part of the creep, which the creep terms then compensate once more: take the table that was fitted together with them.";
     STIFFNESS_SIGN = "E0644", "negative stiffness",
         "Force counts positive where it pushes the displacement up.";
     STIFFNESS_DRIVE = "E0645", "drive that moves while the stiffness is measured",
