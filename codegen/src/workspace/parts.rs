@@ -5,6 +5,7 @@ mod hal;
 mod host;
 mod link;
 mod qemu;
+mod rt;
 mod rt_pc;
 mod runtime;
 mod stm32f4;
@@ -49,6 +50,7 @@ pub const PARTS: &[&Part] = &[
     &hal::PART,
     &stm32h743::PART,
     &stm32f4::PART,
+    &rt::PART,
     &rt_pc::PART,
 ];
 

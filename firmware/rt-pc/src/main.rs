@@ -84,9 +84,17 @@ fn open(options: &Options) -> Result<(), Failure> {
             run(options, &mut device.map_err(|error| Failure::Environment(error.to_string()))?)
         }
         #[cfg(feature = "comedi")]
-        options::Machine::Comedi(path) => {
-            let device = devices::comedi::Comedi::open(path);
-            run(options, &mut device.map_err(|error| Failure::Environment(error.to_string()))?)
+        options::Machine::Comedi(input) => {
+            let library = devices::comedi::library::Comedilib::open(options.comedi_library.as_deref());
+            let library = library.map_err(Failure::Environment)?;
+            let settings = devices::comedi::Settings {
+                input: input.clone(),
+                outputs: options.comedi_outputs.clone(),
+                input_volts: options.comedi_ranges[0],
+                output_volts: options.comedi_ranges[1],
+            };
+            let device = devices::comedi::Comedi::open(&library, &settings);
+            run(options, &mut device.map_err(Failure::Environment)?)
         }
         #[cfg(not(feature = "comedi"))]
         options::Machine::Comedi(_) => {

@@ -120,7 +120,8 @@ impl Operator {
             }
             (Step::GoingDown, Phase::Disarmed | Phase::Faulted) if !said.on => self.go(Step::Over, Request::None, now),
             (Step::GoingDown, _) if waited > DOWN_LIMIT => {
-                let text = format!("not down after {} s ({:?}): amplifiers switched off", DOWN_LIMIT / SECOND, said.phase);
+                let text =
+                    format!("not down after {} s ({:?}): amplifiers switched off", DOWN_LIMIT / SECOND, said.phase);
                 self.complaint.get_or_insert(text);
                 self.go(Step::Over, Request::None, now);
             }

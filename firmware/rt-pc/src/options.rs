@@ -14,6 +14,10 @@ Usage: rt-pc [OPTIONS]
 Machine
   --sim NAME           the machine that `specgen plant SPEC --name NAME` simulates (default: NAME is `plant`)
   --comedi DEVICE      a data acquisition card such as /dev/comedi0; needs a build with `--features comedi`
+  --comedi-out DEVICE  a card of the amplifiers, once for each in order (default: that of the gauges)
+  --comedi-range LOW:HIGH       voltages that the range of a gauge's input must hold (default -10:10)
+  --comedi-out-range LOW:HIGH   voltages that the range of an amplifier's output must hold (default -10:10)
+  --comedi-library FILE         another libcomedi than the system's
   --patience MS        how long a reading of the simulated machine may take before it counts as broken (default 20)
 
 Time
@@ -47,9 +51,16 @@ pub enum Machine {
 
 /// What is asked for.
 #[derive(Debug, Clone)]
+#[cfg_attr(not(feature = "comedi"), allow(dead_code))] // The settings of cards.
 pub struct Options {
     /// The machine.
     pub machine: Machine,
+    /// Cards of the amplifiers.
+    pub comedi_outputs: Vec<PathBuf>,
+    /// Of inputs and of outputs, V.
+    pub comedi_ranges: [[f64; 2]; 2],
+    /// The library's file.
+    pub comedi_library: Option<PathBuf>,
     /// ns.
     pub patience: u64,
     /// ns.
@@ -96,6 +107,9 @@ pub fn parse(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<
 fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked, lexopt::Error> {
     let mut options = Options {
         machine: Machine::Simulated("plant".to_owned()),
+        comedi_outputs: Vec::new(),
+        comedi_ranges: [[-10.0, 10.0]; 2],
+        comedi_library: None,
         patience: 20_000_000,
         duration: None,
         late_after: 0.5,
@@ -120,6 +134,10 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             }
             Long("sim") => options.machine = Machine::Simulated(parser.value()?.string()?),
             Long("comedi") => options.machine = Machine::Comedi(parser.value()?.into()),
+            Long("comedi-out") => options.comedi_outputs.push(parser.value()?.into()),
+            Long("comedi-range") => options.comedi_ranges[0] = range(&mut parser, "--comedi-range")?,
+            Long("comedi-out-range") => options.comedi_ranges[1] = range(&mut parser, "--comedi-out-range")?,
+            Long("comedi-library") => options.comedi_library = Some(parser.value()?.into()),
             Long("patience") => options.patience = (number(&mut parser, "--patience", 0.1, 10_000.0)? * 1e6) as u64,
             Long("seconds") => {
                 options.duration = Some((number(&mut parser, "--seconds", 0.01, 1e7)? * SECOND as f64) as u64);
@@ -152,6 +170,14 @@ fn number(parser: &mut lexopt::Parser, name: &str, low: f64, high: f64) -> Resul
         .ok_or_else(|| format!("{name}: expected a number from {low} to {high}, found `{text}`").into())
 }
 
+/// Two voltages, the lower one first.
+fn range(parser: &mut lexopt::Parser, name: &str) -> Result<[f64; 2], lexopt::Error> {
+    let text = parser.value()?.string()?;
+    let volts = text.split_once(':').and_then(|(low, high)| Some([low.parse().ok()?, high.parse().ok()?]));
+    let fits = |volts: &[f64; 2]| volts[0] < volts[1] && volts.iter().all(|volt| volt.abs() <= 100.0);
+    volts.filter(fits).ok_or_else(|| format!("{name}: expected two voltages such as -10:10, found `{text}`").into())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,6 +198,7 @@ mod tests {
             ("--seconds nan", "from 0.01 to 10000000, found `nan`"),
             ("--priority 0", "from 1 to 99, found `0`"),
             ("--late-after 2", "from 0.01 to 1, found `2`"),
+            ("--comedi-range 10:-10", "two voltages such as -10:10, found `10:-10`"),
             ("--cpu x", "cannot parse"),
             ("now", "unexpected argument"),
             ("--fast", "--fast"),

@@ -35,7 +35,10 @@ impl Summary<'_> {
         }
         let run: u64 = self.account.on_time() + self.account.late().iter().sum::<u64>();
         if outcome.rows + self.lost_rows != run {
-            return Some(format!("{run} ticks were run, but {} rows came and {} were lost", outcome.rows, self.lost_rows));
+            return Some(format!(
+                "{run} ticks were run, but {} rows came and {} were lost",
+                outcome.rows, self.lost_rows
+            ));
         }
         if allocation::noticed() > 0 {
             return Some(format!("the real-time thread used the allocator {} times", allocation::noticed()));
@@ -45,7 +48,9 @@ impl Summary<'_> {
         }
         if self.lost_rows > 0 && outcome.record.is_some() {
             let lost = self.lost_rows;
-            return Some(format!("the record lacks {lost} ticks: the disk was slower than the loop; write it to a faster one"));
+            return Some(format!(
+                "the record lacks {lost} ticks: the disk was slower than the loop; write it to a faster one"
+            ));
         }
         if let Some(complaint) = &outcome.complaint {
             return Some(complaint.clone());

@@ -83,6 +83,7 @@ pub fn place(name: &str) -> Result<usize, NoWord> {
 
 /// A number as a word of this controller's arithmetic, an f32 with zeros above.
 #[must_use]
+#[allow(clippy::useless_conversion)] // Of the bits of an f64; those of an f32 have 32.
 pub fn word(value: Real) -> u64 {
     u64::from(value.to_bits())
 }

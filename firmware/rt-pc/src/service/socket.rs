@@ -30,9 +30,14 @@ impl Socket {
     /// If somebody listens there, or the path cannot be used.
     pub fn listen(path: &Path) -> io::Result<Self> {
         if UnixStream::connect(path).is_ok() {
-            return Err(io::Error::new(io::ErrorKind::AddrInUse, "another program listens there: choose another --socket"));
+            return Err(io::Error::new(
+                io::ErrorKind::AddrInUse,
+                "another program listens there: choose another --socket",
+            ));
         }
-        if std::fs::symlink_metadata(path).is_ok_and(|meta| std::os::unix::fs::FileTypeExt::is_socket(&meta.file_type())) {
+        if std::fs::symlink_metadata(path)
+            .is_ok_and(|meta| std::os::unix::fs::FileTypeExt::is_socket(&meta.file_type()))
+        {
             std::fs::remove_file(path)?;
         }
         let listener = UnixListener::bind(path)?;
