@@ -112,7 +112,7 @@ pub extern "C" fn comedi_get_n_channels(_: *mut c_void, subdevice: c_uint) -> c_
 
 #[unsafe(no_mangle)]
 pub extern "C" fn comedi_get_maxdata(_: *mut c_void, _: c_uint, _: c_uint) -> c_uint {
-    number("FAKE_HIGHEST", 65535) as c_uint
+    number("FAKE_HIGHEST", 131_071) as c_uint
 }
 
 #[unsafe(no_mangle)]
@@ -134,7 +134,7 @@ pub unsafe extern "C" fn comedi_do_insnlist(card: *mut c_void, list: *mut List) 
                 if log.reads > number("FAKE_FAIL_AFTER", u64::MAX) {
                     return -1;
                 }
-                *code = number("FAKE_CODE", 32768) as u32;
+                *code = number("FAKE_CODE", 65_536) as u32;
             }
             (0x0800_0001, 1, 1) if instruction.channel == ground && place < 4 => {
                 log.writes[card as usize] += 1;
