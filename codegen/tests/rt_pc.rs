@@ -55,12 +55,14 @@ impl Bench {
         cargo(&["build"]);
         let library = target::host::build_library(&root, &kept).unwrap();
         let name = format!("test-{}-{}", spec.trim_end_matches(".toml"), std::process::id());
-        let plant = Command::new(env!("CARGO_BIN_EXE_specgen"))
-            .args(["plant", spec_file.to_str().unwrap(), "--name", &name])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
+        // Under real-time priority where that is granted: other tests want the processors too.
+        let plant = |more: &[&str]| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
+            command.args(["plant", spec_file.to_str().unwrap(), "--name", &name]).args(more);
+            command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+        };
+        let granted = Command::new("chrt").args(["-f", "50", "true"]).stderr(Stdio::null()).status();
+        let plant = plant(if granted.is_ok_and(|status| status.success()) { &["--priority", "50"] } else { &[] });
         let place = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
         wait_for("the machine", || place.exists());
         Self { binary: kept.join("release/rt-pc"), folder, library, plant, name }
@@ -144,7 +146,8 @@ fn signal(process: &Child, name: &str) {
 fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_bit() {
     let bench = Bench::new("reference.toml");
     let seconds: f64 = std::env::var(SECONDS).map_or(2.5, |text| text.parse().expect("a number of seconds"));
-    let output = bench.command("a.trace").args(["--seconds", &seconds.to_string(), "--set", "command=3"]).output().unwrap();
+    let output =
+        bench.command("a.trace").args(["--seconds", &seconds.to_string(), "--set", "command=3"]).output().unwrap();
     let (summary, trace) = bench.check(&output, "a.trace");
     // At 10 kHz; the ramp down comes after.
     assert!(summary["planned"].as_f64().unwrap() > 1e4 * (seconds - 0.1), "{summary}");
@@ -161,17 +164,23 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
     let name = trace.description().output_names[3].clone();
     assert_eq!(bench.first_difference(&flipped), Some((tick, name)));
 
-    // SIGTERM: down, and off.
-    let mut running =
-        bench.command("b.trace").arg("--arm").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    wait_for("the record", || fs::metadata(bench.path("b.trace")).is_ok_and(|file| file.len() > 0));
-    std::thread::sleep(Duration::from_millis(700));
-    assert!(running.try_wait().unwrap().is_none());
+    // With time that waits it runs on any computer. SIGTERM: down, and off.
+    let mut command = bench.command("b.trace");
+    command
+        .args(["--elastic", "--patience", "5000", "--set", "command=3"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let mut running = command.spawn().unwrap();
+    wait_for("the record", || fs::metadata(bench.path("b.trace")).is_ok_and(|file| file.len() > 4_000_000));
+    assert!(running.try_wait().unwrap().is_none(), "it runs until it is told");
     signal(&running, "TERM");
-    let (summary, trace) = bench.check(&running.wait_with_output().unwrap(), "b.trace");
-    assert!(["Disarmed", "Faulted"].contains(&summary["last_phase"].as_str().unwrap()), "{summary}");
+    let output = running.wait_with_output().unwrap();
+    let (summary, trace) = bench.check(&output, "b.trace");
+    assert_eq!((&summary["last_phase"], &summary["skipped"]), (&"Disarmed".into(), &0.into()), "{summary}");
     let supervisor = width - 1 - 2;
+    assert!(trace.rows().any(|row| row[supervisor] & 0xff == 2), "it ran");
     assert_eq!(trace.rows().last().unwrap()[supervisor] >> 16, 0, "amplifiers off in the last tick");
+    assert_eq!(output.status.code(), Some(0), "{summary}");
 
     a_card_is_read_driven_and_switched_off(&bench);
 }
@@ -190,6 +199,8 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
         command.args(["--comedi", "/dev/fake1"]).args(arguments).arg("--record").arg(bench.path("card.trace"));
         command.env("FAKE_LOG", bench.path("card.log")).envs(variables.iter().copied()).output().unwrap()
     };
+    // Whether the amplifiers were ever to be on.
+    let was_on = |trace: &Trace| trace.rows().any(|row| row[trace.width() - 3] >> 16 & 1 == 1);
     let log = || {
         let text = fs::read_to_string(bench.path("card.log")).unwrap();
         let field = |key: &str| text.lines().find_map(|line| line.strip_prefix(key)).unwrap().to_owned();
@@ -205,13 +216,13 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
     assert_eq!(reads, 6 * trace.len() as u64);
     assert_eq!((first, second), (4 * trace.len() as u64, 2 * trace.len() as u64));
     assert!(sound && highest <= 43_690);
-    assert!(line.starts_with('0') && line.ends_with('0') && line.contains('1'), "off, on, off: {line}");
+    assert!(line.starts_with('0') && line.ends_with('0') && line.contains('1') == was_on(&trace), "{line}");
 
     // A card that fails in the middle: counted, told to the supervisor, off at the end.
-    let (summary, trace) = bench.check(&run(&[("FAKE_FAIL_AFTER", "6000")], &two), "card.trace");
+    let (summary, trace) = bench.check(&run(&[("FAKE_FAIL_AFTER", "600")], &two), "card.trace");
     let events = trace.description().input_names.iter().position(|name| name == "events").unwrap();
     let broken = trace.rows().filter(|row| row[events] & 8 != 0).count() as u64;
-    assert!(broken > 0 && broken == trace.len() as u64 - 1000, "{broken} of {}", trace.len());
+    assert!(broken > 0 && broken == trace.len() as u64 - 100, "{broken} of {}", trace.len());
     assert_eq!(summary["device_faults"], broken);
     assert!(log().1.ends_with('0'));
 
@@ -233,7 +244,8 @@ fn legs_are_moved_by_lines_and_a_machine_that_is_killed_is_a_converter_that_does
     let mut bench = Bench::new("legs.toml");
     let socket = bench.path("socket");
     let mut command = bench.command("legs.trace");
-    let running = command.arg("--socket").arg(&socket).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    command.args(["--elastic", "--patience", "1000", "--socket"]).arg(&socket);
+    let running = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_for("the socket", || UnixStream::connect(&socket).is_ok());
     let mut lines = BufReader::new(UnixStream::connect(&socket).unwrap());
     lines.get_ref().set_read_timeout(Some(Duration::from_secs(20))).unwrap();
@@ -251,12 +263,16 @@ fn legs_are_moved_by_lines_and_a_machine_that_is_killed_is_a_converter_that_does
     assert_eq!(ask("run"), "ok");
     wait_for("running", || ask("status").contains("phase=Running"));
     assert_eq!(ask("set setpoint[2]=2e-6"), "ok");
-    std::thread::sleep(Duration::from_millis(500));
+    let tick = |status: &str| status.split(['=', ' ']).nth(1).unwrap().parse::<u64>().unwrap();
+    let start = tick(&ask("status"));
+    wait_for("half a second of its time", || tick(&ask("status")) > start + 2_500);
 
     signal(&bench.plant, "KILL");
     bench.plant.wait().unwrap();
-    std::thread::sleep(Duration::from_millis(500));
-    assert!(ask("status").starts_with("tick="));
+    // The first reading is waited for, the next ones are not.
+    std::thread::sleep(Duration::from_millis(1_000));
+    let start = tick(&ask("status"));
+    wait_for("ticks without a machine", || tick(&ask("status")) > start + 100);
     signal(&running, "INT");
     let (summary, trace) = bench.check(&running.wait_with_output().unwrap(), "legs.trace");
     assert!(summary["device_faults"].as_u64().unwrap() > 0, "{summary}");

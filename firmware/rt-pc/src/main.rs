@@ -108,9 +108,11 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     let environment = |error: String| Failure::Environment(error);
     let config = configure(&options.config).map_err(usage)?;
     let period = words::period().ok_or_else(|| environment("the controller does not state its period".to_owned()))?;
-    let timing = Timing { period, limit: (period as f64 * options.late_after) as u64 };
+    let timing = Timing { period, limit: (period as f64 * options.late_after) as u64, elastic: options.elastic };
     let places = Places::find().map_err(|error| environment(error.to_string()))?;
-    let mut operator = Operator::new(places.clone());
+    // Somebody or something is there to end it.
+    let attended = options.socket.is_some() || options.duration.is_some();
+    let mut operator = Operator::new(places.clone(), attended);
     if options.arm {
         operator.plan(&options.set, clock::now()).map_err(|error| usage(format!("--set: {error}")))?;
     }

@@ -58,12 +58,14 @@ pub struct Operator {
     /// Why the plan could not be carried out.
     pub complaint: Option<String>,
     changed: bool,
+    /// After a fault the loop goes on, for somebody will look at it or end it.
+    attended: bool,
 }
 
 impl Operator {
-    /// An operator without a plan.
+    /// An operator without a plan. If the plan fails the loop goes on where it is `attended`, else it ends.
     #[must_use]
-    pub fn new(places: Places) -> Self {
+    pub fn new(places: Places, attended: bool) -> Self {
         Self {
             places,
             words: [0; MACHINE_INPUT_WORDS],
@@ -73,6 +75,7 @@ impl Operator {
             play: Vec::new(),
             complaint: None,
             changed: true,
+            attended,
         }
     }
 
@@ -187,7 +190,11 @@ impl Operator {
 
     fn complain(&mut self, text: String, now: u64) {
         self.complaint.get_or_insert(text);
-        self.go(Step::GoingDown, Request::RampDown, now);
+        if self.attended {
+            self.go(Step::Free, Request::RampDown, now);
+        } else {
+            self.go(Step::GoingDown, Request::RampDown, now);
+        }
     }
 
     /// Place and word of `name=value`.
@@ -216,7 +223,7 @@ mod tests {
     }
 
     fn operator() -> Operator {
-        Operator::new(Places::find().unwrap())
+        Operator::new(Places::find().unwrap(), false)
     }
 
     #[test]
@@ -251,6 +258,18 @@ mod tests {
         operator.hear(&said(Phase::Holding, true), 2);
         assert!(!operator.is_over());
         operator.hear(&said(Phase::Holding, true), 2 + DOWN_LIMIT);
+        assert!(operator.is_over());
+    }
+
+    #[test]
+    fn where_somebody_looks_a_fault_does_not_end_the_loop() {
+        let mut operator = Operator::new(Places::find().unwrap(), true);
+        operator.plan(&[], 0).unwrap();
+        operator.hear(&said(Phase::Faulted, false), 1);
+        operator.hear(&said(Phase::Faulted, false), 2);
+        assert!(operator.complaint.is_some() && !operator.is_over());
+        operator.go_down(3);
+        operator.hear(&said(Phase::Faulted, false), 4);
         assert!(operator.is_over());
     }
 

@@ -24,6 +24,7 @@ Time
   --seconds S          ramp down and end after S seconds (default: at a signal)
   --late-after SHARE   outputs later than this share of the period count as late (default 0.5)
   --priority P         SCHED_FIFO priority, 1 to 99 (default 80)
+  --elastic            with --sim: a late tick moves the next ones, none is skipped, for PCs that cannot keep the period
   --cpu N              keep the loop on processor N (default: not pinned)
   --allow-no-rt        run without the rights for real time, after saying which are missing
 
@@ -67,6 +68,8 @@ pub struct Options {
     pub duration: Option<u64>,
     /// Share of the period.
     pub late_after: f64,
+    /// Late ticks move the next ones.
+    pub elastic: bool,
     /// 1 to 99.
     pub priority: u8,
     /// Processor of the loop.
@@ -113,6 +116,7 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
         patience: 20_000_000,
         duration: None,
         late_after: 0.5,
+        elastic: false,
         priority: 80,
         cpu: None,
         allow_no_rt: false,
@@ -144,6 +148,7 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             }
             Long("late-after") => options.late_after = number(&mut parser, "--late-after", 0.01, 1.0)?,
             Long("priority") => options.priority = number(&mut parser, "--priority", 1.0, 99.0)? as u8,
+            Long("elastic") => options.elastic = true,
             Long("cpu") => options.cpu = Some(parser.value()?.parse()?),
             Long("allow-no-rt") => options.allow_no_rt = true,
             Long("arm") => options.arm = true,
@@ -157,6 +162,9 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             Long("json") => options.json = true,
             _ => return Err(argument.unexpected()),
         }
+    }
+    if options.elastic && !matches!(options.machine, Machine::Simulated(_)) {
+        return Err("--elastic is for a simulated machine: a real one does not wait".into());
     }
     Ok(Asked::Run(Box::new(options)))
 }
@@ -200,6 +208,7 @@ mod tests {
             ("--late-after 2", "from 0.01 to 1, found `2`"),
             ("--comedi-range 10:-10", "two voltages such as -10:10, found `10:-10`"),
             ("--cpu x", "cannot parse"),
+            ("--elastic --comedi /dev/comedi0", "a real one does not wait"),
             ("now", "unexpected argument"),
             ("--fast", "--fast"),
         ] {
