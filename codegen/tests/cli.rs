@@ -356,8 +356,9 @@ fn a_computer_is_judged_by_the_period_of_a_spec() {
     }
 
     // With a spec the verdict is the exit code, and the figures come all the same.
-    let judged = folder.json(&["doctor", "legs.toml", "--seconds", "0.2"]);
-    let result = &judged.value["result"];
+    let judged = folder.run(&["doctor", "legs.toml", "--seconds", "0.2", "--json"]);
+    let document: serde_json::Value = serde_json::from_str(&judged.stdout).unwrap();
+    let result = &document["result"];
     let bad = result["verdict"]["grade"] == "bad";
     assert_eq!(judged.code, i32::from(bad));
     assert_eq!(bad, result["latency"]["skipped"] != 0);

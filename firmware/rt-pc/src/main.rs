@@ -81,7 +81,7 @@ fn open(options: &Options) -> Result<(), Failure> {
         options::Machine::Simulated(name) => {
             let path = exchange::path_of(name).map_err(|text| Failure::Usage(format!("--sim: {text}")))?;
             let device = Simulated::open(&path, options.patience);
-            run(options, &mut device.map_err(|error| Failure::Environment(error.to_string()))?)
+            run(options, &mut device.map_err(Failure::Environment)?)
         }
         #[cfg(feature = "comedi")]
         options::Machine::Comedi(input) => {

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use controller::sensing::CONVERTER;
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
-use specgen_rt::exchange::{Client, OpenError};
+use specgen_rt::clock;
+use specgen_rt::exchange::Client;
 
 use super::Device;
 
@@ -28,10 +29,22 @@ impl Simulated {
     /// Opens it and waits until it gives its first reading. Later ones may take `patience`, ns.
     ///
     /// # Errors
-    /// If there is no such machine, or it is of another spec.
-    pub fn open(path: &Path, patience: u64) -> Result<Self, OpenError> {
-        let client = Client::open(path, controller::SPEC_DIGEST)?;
-        client.sense(0, FIRST);
+    /// In words: if there is no such machine, it is of another spec, or it does not answer.
+    pub fn open(path: &Path, patience: u64) -> Result<Self, String> {
+        let client = Client::open(path, controller::SPEC_DIGEST).map_err(|error| error.to_string())?;
+        let start = clock::now();
+        while client.sense(0, FIRST / 100).is_none() {
+            if client.is_abandoned() {
+                let path = path.display();
+                return Err(format!(
+                    "{path}: the process that served this machine has ended; start `specgen plant` again"
+                ));
+            }
+            if clock::now() - start > FIRST {
+                let path = path.display();
+                return Err(format!("{path}: the machine does not answer; is another controller moving it?"));
+            }
+        }
         Ok(Self {
             client,
             path: path.display().to_string(),
