@@ -8,11 +8,4 @@ fn main() {
     println!("cargo:rustc-link-search={}", root.display());
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
     println!("cargo:rerun-if-changed=memory.x");
-
-    // See src/panic.rs.
-    println!("cargo:rustc-check-cfg=cfg(specgen_locate_panics)");
-    println!("cargo:rerun-if-env-changed=SPECGEN_LOCATE_PANICS");
-    if std::env::var_os("SPECGEN_LOCATE_PANICS").is_some() {
-        println!("cargo:rustc-cfg=specgen_locate_panics");
-    }
 }

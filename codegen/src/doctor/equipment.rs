@@ -59,7 +59,7 @@ fn may_use(path: &Path) -> bool {
 /// Tools, each with the command that installs it.
 #[must_use]
 pub fn tools() -> Vec<Finding> {
-    let tool = |subject, program: &str, mend: &str| match target::find_in_path(program) {
+    let tool = |subject, program: &str, mend: &str| match target::find_program(program) {
         Some(path) => Finding::good(subject, path.display().to_string()),
         None => Finding::of(subject, Warning, format!("no {program} on PATH"), mend),
     };

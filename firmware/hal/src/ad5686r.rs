@@ -191,26 +191,9 @@ where
     ENABLE: OutputPin,
     DELAY: DelayNs,
 {
-    /// Takes the pins; nothing is driven until [`Self::start`]. `enable` is active high.
+    /// Takes the pins; nothing is driven until [`Amplifiers::start`]. `enable` is active high.
     pub const fn new(first: FIRST, second: SECOND, ldac: LDAC, enable: ENABLE, delay: DELAY) -> Self {
         Self { first: Part { spi: first }, second: Part { spi: second }, ldac, enable, delay, written: None, turn: 0 }
-    }
-
-    /// Amplifiers disabled, both parts at power-up state with outputs at zero, and both proved to answer: channel D of each
-    /// gives [`PATTERNS`] back.
-    ///
-    /// # Errors
-    /// [`Fault::Bus`], [`Fault::Pin`], [`Fault::ReadBack`]. The amplifiers are disabled all the same.
-    pub fn start(&mut self) -> Result<(), Fault> {
-        self.written = None;
-        self.enable.set_low().map_err(|_| Fault::Pin)?;
-        self.ldac.set_high().map_err(|_| Fault::Pin)?;
-        // Both, so that one part that does not answer leaves the other at zero.
-        let first = self.first.start(&mut self.delay);
-        let second = self.second.start(&mut self.delay);
-        first.and(second)?;
-        self.written = Some([0; CHANNELS]);
-        Ok(())
     }
 
     /// Gives the pins back, in the order of [`Self::new`].
@@ -247,6 +230,20 @@ where
     DELAY: DelayNs,
 {
     const BITS: u32 = 16;
+
+    /// Amplifiers disabled, both parts at power-up state with outputs at zero, and both proved to answer: channel D of each
+    /// gives [`PATTERNS`] back.
+    fn start(&mut self) -> Result<(), Fault> {
+        self.written = None;
+        self.enable.set_low().map_err(|_| Fault::Pin)?;
+        self.ldac.set_high().map_err(|_| Fault::Pin)?;
+        // Both, so that one part that does not answer leaves the other at zero.
+        let first = self.first.start(&mut self.delay);
+        let second = self.second.start(&mut self.delay);
+        first.and(second)?;
+        self.written = Some([0; CHANNELS]);
+        Ok(())
+    }
 
     /// Eight frames and LDAC. Codes go out even where a read-back differs: the other channels need theirs.
     fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault> {

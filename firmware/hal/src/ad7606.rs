@@ -51,10 +51,7 @@ impl Window {
     /// `millivolts` ± `tolerance` at an input range of ±`range`, all mV and below 20 V, in codes of `bits` (16 or 18).
     #[must_use]
     pub const fn around(millivolts: i32, tolerance: i32, range: i32, bits: u32) -> Self {
-        Self {
-            low: code_of(millivolts - tolerance, range, bits),
-            high: code_of(millivolts + tolerance, range, bits),
-        }
+        Self { low: code_of(millivolts - tolerance, range, bits), high: code_of(millivolts + tolerance, range, bits) }
     }
 }
 
@@ -85,23 +82,10 @@ where
 {
     const WIDTH: () = assert!(BITS == 16 || BITS == 18, "AD7606 family: codes of 16 or 18 bits");
 
-    /// Takes the pins. `start` is CONVST A and B; nothing is driven until [`Self::reset`].
+    /// Takes the pins. `start` is CONVST A and B; nothing is driven until [`Gauges::start`].
     pub const fn new(spi: SPI, start: START, busy: BUSY, reset: RESET, delay: DELAY, window: Window) -> Self {
         let () = Self::WIDTH;
         Self { spi, start, busy, reset, delay, window }
-    }
-
-    /// Resets the part, as it must be after power-up. Takes 0.3 ms.
-    ///
-    /// # Errors
-    /// [`Fault::Pin`].
-    pub fn reset(&mut self) -> Result<(), Fault> {
-        self.start.set_high().map_err(|_| Fault::Pin)?;
-        self.reset.set_high().map_err(|_| Fault::Pin)?;
-        self.delay.delay_ns(RESET_HIGH);
-        self.reset.set_low().map_err(|_| Fault::Pin)?;
-        self.delay.delay_ns(RESET_WAIT);
-        Ok(())
     }
 
     /// Samples and reads all eight inputs: V1 to V8, 0 to 2^BITS − 1. Takes 4 µs and the transfer, 15 µs at most before it
@@ -158,6 +142,16 @@ where
     DELAY: DelayNs,
 {
     const BITS: u32 = BITS as u32;
+
+    /// Resets the part, as it must be after power-up, and samples once. Takes 0.3 ms.
+    fn start(&mut self) -> Result<(), Fault> {
+        self.start.set_high().map_err(|_| Fault::Pin)?;
+        self.reset.set_high().map_err(|_| Fault::Pin)?;
+        self.delay.delay_ns(RESET_HIGH);
+        self.reset.set_low().map_err(|_| Fault::Pin)?;
+        self.delay.delay_ns(RESET_WAIT);
+        self.sample().map(|_| ())
+    }
 
     fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {
         let [v1, v2, v3, v4, v5, v6, _, _] = self.sample()?;

@@ -58,7 +58,9 @@ impl fmt::Display for Fault {
             Self::NotStarted => "BUSY stayed low: is the ADC supplied, and is CONVST connected?",
             Self::NotEnded => "BUSY stayed high: is it connected, and is the ADC out of reset?",
             Self::Blank => "all bits of the ADC's frame are the same: is DOUTA connected?",
-            Self::Reference => "channel V8 does not show the reference: are RANGE, supply and V8 as in the wiring table?",
+            Self::Reference => {
+                "channel V8 does not show the reference: are RANGE, supply and V8 as in the wiring table?"
+            }
             Self::ReadBack => "a DAC gave back another code than it was sent: are SDO, SYNC and SCLK connected?",
             Self::Code => "a code is outside of the converter's range",
         })

@@ -27,6 +27,15 @@ pub trait Gauges {
     /// Bits of a code.
     const BITS: u32;
 
+    /// Brings the parts into their working state and finds out whether they answer. Called once at power-up, and again after a
+    /// fault while the amplifiers are disabled. May take a millisecond.
+    ///
+    /// # Errors
+    /// The first [`Fault`] found.
+    fn start(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+
     /// Samples all gauges at once and returns their codes, 0 to 2^[`Self::BITS`] − 1: 0 at the lowest input, not in two's
     /// complement. Blocks until the codes are there, for a time that does not depend on what the part answers by more than
     /// its driver says.
@@ -40,6 +49,15 @@ pub trait Gauges {
 pub trait Amplifiers {
     /// Bits of a code.
     const BITS: u32;
+
+    /// Disables the amplifiers, brings the parts into their working state with all outputs at code 0, and finds out whether
+    /// they answer. Called once at power-up, and again after a fault while the amplifiers are disabled. May take a millisecond.
+    ///
+    /// # Errors
+    /// The first [`Fault`] found. The amplifiers are disabled all the same.
+    fn start(&mut self) -> Result<(), Fault> {
+        self.enable(false)
+    }
 
     /// Gives out six codes, 0 to 2^[`Self::BITS`] − 1; all outputs change at the same instant, after the last is written.
     ///
@@ -57,6 +75,10 @@ pub trait Amplifiers {
 impl<G: Gauges> Gauges for &mut G {
     const BITS: u32 = G::BITS;
 
+    fn start(&mut self) -> Result<(), Fault> {
+        (**self).start()
+    }
+
     fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {
         (**self).read()
     }
@@ -64,6 +86,10 @@ impl<G: Gauges> Gauges for &mut G {
 
 impl<A: Amplifiers> Amplifiers for &mut A {
     const BITS: u32 = A::BITS;
+
+    fn start(&mut self) -> Result<(), Fault> {
+        (**self).start()
+    }
 
     fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault> {
         (**self).write(codes)

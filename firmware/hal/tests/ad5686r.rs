@@ -54,7 +54,9 @@ const GOOD: [u16; 3] = [0xa55a, 0x5aa5, 0x0000];
 fn write_words(address: u8, answer: u16, codes: [u16; 3]) -> Vec<(Word, Word)> {
     let [high, low] = answer.to_be_bytes();
     let mut words = vec![([0x90 | address, 0, 0], NONE)];
-    for (channel, (code, answer)) in [0x11, 0x12, 0x14].into_iter().zip(codes.into_iter().zip([[0, high, low], NONE, NONE])) {
+    for (channel, (code, answer)) in
+        [0x11, 0x12, 0x14].into_iter().zip(codes.into_iter().zip([[0, high, low], NONE, NONE]))
+    {
         let [code_high, code_low] = code.to_be_bytes();
         words.push(([channel, code_high, code_low], answer));
     }

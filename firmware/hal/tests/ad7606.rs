@@ -38,8 +38,7 @@ fn read<const BITS: usize>(busy: &[State], spi: &[SpiStep<u8>]) -> Result<[i32; 
     let start = [PinStep::set(State::Low), PinStep::set(State::High)];
     let looks: Vec<PinStep> = busy.iter().map(|&state| PinStep::get(state)).collect();
     let (spi, start, busy, reset) = (Spi::new(spi), Pin::new(&start), Pin::new(&looks), Pin::new(&[]));
-    let mut adc: Ad7606<BITS, _, _, _, _, _> =
-        Ad7606::new(spi, start, busy, reset, NoopDelay, window(BITS as u32));
+    let mut adc: Ad7606<BITS, _, _, _, _, _> = Ad7606::new(spi, start, busy, reset, NoopDelay, window(BITS as u32));
     let result = adc.read();
     let (mut spi, mut start, mut busy, mut reset, _) = adc.release();
     spi.done();
@@ -110,21 +109,25 @@ fn the_window_is_in_codes_of_the_part() {
     assert_eq!(window(18), Window { low: 195_297, high: 197_918 });
 }
 
-#[test]
-fn reset_leaves_convst_high_and_reset_low() {
-    let (start, reset) = ([PinStep::set(High)], [PinStep::set(High), PinStep::set(Low)]);
-    let mut adc: Ad7606<16, _, _, _, _, _> = Ad7606::new(
-        Spi::<u8>::new(&[]),
-        Pin::new(&start),
-        Pin::new(&[]),
-        Pin::new(&reset),
-        NoopDelay,
-        window(16),
-    );
-    assert_eq!(adc.reset(), Ok(()));
+/// The start: reset, then one conversion that must be believable.
+fn start(busy: &[State], spi: &[SpiStep<u8>]) -> Result<(), Fault> {
+    let start = [PinStep::set(High), PinStep::set(Low), PinStep::set(High)];
+    let reset = [PinStep::set(High), PinStep::set(Low)];
+    let looks: Vec<PinStep> = busy.iter().map(|&state| PinStep::get(state)).collect();
+    let (spi, start, busy, reset) = (Spi::new(spi), Pin::new(&start), Pin::new(&looks), Pin::new(&reset));
+    let mut adc: Ad7606<16, _, _, _, _, _> = Ad7606::new(spi, start, busy, reset, NoopDelay, window(16));
+    let result = adc.start();
     let (mut spi, mut start, mut busy, mut reset, _) = adc.release();
     spi.done();
     start.done();
     busy.done();
     reset.done();
+    result
+}
+
+#[test]
+fn start_resets_the_part_and_proves_it() {
+    assert_eq!(start(&[High, Low], &answer(&frame16([0, 0, 0, 0, 0, 0, 0, REFERENCE]))), Ok(()));
+    assert_eq!(start(&[Low], &[]), Err(Fault::NotStarted));
+    assert_eq!(start(&[High, Low], &answer(&[0; 16])), Err(Fault::Blank));
 }

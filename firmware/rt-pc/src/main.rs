@@ -143,7 +143,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         device,
         config,
         places,
-        standing_events: control::integrity_event(true),
+        standing_events: control::integrity_event(controller::integrity::intact()),
         wishes: wish_consumer,
         rows: row_producer,
         shared: &shared,
@@ -223,7 +223,7 @@ fn prepare_thread(cpu: Option<usize>, priority: u8) -> Vec<Refused> {
 
 /// The spec's settings with assignments such as `mode=6`.
 fn configure(assignments: &[String]) -> Result<Config, String> {
-    let mut words: [u64; CONFIG_WORDS] = Config::new().to_words();
+    let mut words: [u64; CONFIG_WORDS] = controller::integrity::config().to_words();
     for text in assignments {
         let (name, value) =
             text.split_once('=').ok_or_else(|| format!("--config: expected NAME=VALUE, found `{text}`"))?;
