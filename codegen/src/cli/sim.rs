@@ -83,7 +83,7 @@ impl PlantArguments {
         }
     }
 
-    fn read(&self) -> Result<(LegParameters, NoiseParameters), Failure> {
+    pub(super) fn read(&self) -> Result<(LegParameters, NoiseParameters), Failure> {
         let parameters = self.leg()?;
         let noise = if self.no_noise { NoiseParameters::NONE } else { parameters.noise };
         Ok((parameters, noise))
