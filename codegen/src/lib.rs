@@ -12,6 +12,7 @@ pub mod emit;
 pub mod everett;
 pub mod identify;
 pub mod ir;
+pub mod lint;
 pub mod lower;
 pub mod machine;
 pub mod model;
