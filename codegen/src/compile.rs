@@ -15,8 +15,7 @@ use crate::reach::{self, Reach};
 use crate::spec::{self, SpecSource};
 use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
-use crate::waveform::{self, Waveform};
-use crate::workspace;
+use crate::{waveform, workspace};
 
 /// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
 /// factor, a wrong unit is 1000.
@@ -114,7 +113,19 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
     };
     let files = workspace::files(&ir, &emit::emit(&ir));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
-    Ok(Compiled { source, model, records: identified.reports, margins, design, reach, demands, pose_noise, ir, files, findings })
+    Ok(Compiled {
+        source,
+        model,
+        records: identified.reports,
+        margins,
+        design,
+        reach,
+        demands,
+        pose_noise,
+        ir,
+        files,
+        findings,
+    })
 }
 
 /// Legs with their own gauges adapt each on its own; a controller in task space closes its loops over the platform's modes.
@@ -147,7 +158,7 @@ fn check_reach(
     let mut errors = Vec::new();
     let reach = reach::check(model, task, &platform, stroke).map_err(|found| errors.extend(found));
     let paths = setpoint::stretches(model, task, setpoints)?;
-    let (demands, asked) = lint::paths::check(model, task, &platform, &paths, &lowered.waveforms);
+    let (demands, asked) = lint::paths::check(model, task, &platform, &paths);
     for (index, path) in paths.iter().enumerate() {
         let key = format!("trajectory[{index}].kind");
         let name = &task.trajectories[index].name;
@@ -171,8 +182,6 @@ fn check_reach(
 struct LoweredSetpoints {
     setpoints: Option<Setpoints>,
     warnings: Vec<Diagnostic>,
-    /// The table of each trajectory that is one.
-    waveforms: Vec<Option<Waveform>>,
     /// Name and text of each table of poses, for the digest.
     texts: Vec<(String, String)>,
 }
@@ -195,12 +204,14 @@ fn lower_setpoints(source: &SpecSource, model: &Model) -> Result<LoweredSetpoint
         });
         waveforms.push(parsed.map_err(|found| errors.extend(found)).ok());
     }
+    let stepping: Vec<Diagnostic> = waveforms.iter().flatten().filter_map(lint::paths::steps).collect();
     match setpoint::lower(model, task, &waveforms, scalar(model)) {
-        Ok((setpoints, warnings)) if errors.is_empty() => {
-            Ok(LoweredSetpoints { setpoints: Some(setpoints), warnings, waveforms, texts })
+        Ok((setpoints, mut warnings)) if errors.is_empty() => {
+            warnings.extend(stepping);
+            Ok(LoweredSetpoints { setpoints: Some(setpoints), warnings, texts })
         }
-        Ok((_, warnings)) => Err(errors.into_iter().chain(warnings).collect()),
-        Err(found) => Err(errors.into_iter().chain(found).collect()),
+        Ok((_, warnings)) => Err(errors.into_iter().chain(warnings).chain(stepping).collect()),
+        Err(found) => Err(errors.into_iter().chain(found).chain(stepping).collect()),
     }
 }
 

@@ -18,6 +18,7 @@ pub mod machine;
 pub mod model;
 pub mod numerics;
 pub mod plot;
+pub mod precision;
 pub mod reach;
 pub mod robust;
 pub mod spec;

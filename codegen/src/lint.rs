@@ -9,14 +9,18 @@
 //! stability in [`crate::stability`], paths in [`crate::lower::setpoint`], gauges in [`crate::lower`].
 
 mod actuator;
+mod alike;
 mod bodies;
 mod budget;
 mod electronics;
+mod gauge_layout;
 mod gauges;
 mod layout;
 mod motion;
 pub mod paths;
 mod timing;
+
+pub use budget::least;
 
 use specgen_runtime::Platform;
 
@@ -29,6 +33,8 @@ type Rule = fn(&Facts, &mut Found);
 
 const RULES: &[Rule] = &[
     layout::joints_apart,
+    layout::joints_turn,
+    layout::base_is_wider,
     bodies::leg_parts_have_size,
     bodies::mass_centres_off_the_joints,
     bodies::moments_of_each_axis,
@@ -37,6 +43,7 @@ const RULES: &[Rule] = &[
     actuator::strain,
     actuator::stiffness_fits_resonance,
     actuator::slew_spares_the_stacks,
+    actuator::slew_moves_the_legs,
     electronics::lag_fits_slew,
     electronics::current_fits_slew,
     electronics::amplifier_noise,
@@ -47,6 +54,10 @@ const RULES: &[Rule] = &[
     gauges::odd_coordinates,
     gauges::opposite_directions,
     gauges::size_of_layout,
+    gauge_layout::slip_of_one,
+    alike::calibrations,
+    alike::gains_by_stiffness,
+    alike::work_piece,
     timing::times_that_do_nothing,
     timing::lead_of_the_lag,
     timing::transfer,
@@ -86,6 +97,11 @@ impl Legs {
             lengths: platform.rest_lengths(),
             modes: basis.map(|basis| basis.frequencies.map(|omega| omega / core::f64::consts::TAU)),
         }
+    }
+
+    /// Stiffness of each axis of the platform on its legs, N/m and N m/rad: the diagonal of Jᵀ k_a J.
+    fn stiffness(&self, of_leg: f64) -> [f64; 6] {
+        core::array::from_fn(|axis| self.jacobian.iter().fold(0.0, |sum, row| sum + row[axis] * row[axis]) * of_leg)
     }
 
     fn shortest(&self) -> f64 {
@@ -174,9 +190,14 @@ mod tests {
 
     #[test]
     fn figures_have_four_digits_and_no_more() {
-        for (value, text) in
-            [(0.0, "0"), (150.0, "150"), (0.08, "0.08"), (-1.23456, "-1.235"), (2.5e-9, "2.500e-9"), (123_456.7, "123457")]
-        {
+        for (value, text) in [
+            (0.0, "0"),
+            (150.0, "150"),
+            (0.08, "0.08"),
+            (-1.23456, "-1.235"),
+            (2.5e-9, "2.500e-9"),
+            (123_456.7, "123457"),
+        ] {
             assert_eq!(figure(value), text);
         }
     }

@@ -350,6 +350,10 @@ codes! {
         "A leg part weighs more than five times the platform, or less than a five-thousandth of it.";
     JOINTS_TOUCH = "W0815", "joints that would touch",
         "Two joints of one body are nearer to each other than two thousandths of its radius.";
+    PLATFORM_WIDER = "W0816", "platform wider than its base",
+        "Possible, but most hexapods stand on the wider side: are the two in each other's place?";
+    SLEW_TOO_SLOW = "W0809", "a slew rate that leaves the legs standing",
+        "The voltage takes more than a second over its range.";
     GAUGE_QUIET = "W0820", "gauge noise far below its step",
         "Nobody can measure a noise below a fiftieth of the converter's step: probably a slip of the unit.";
     GAUGE_LOPSIDED = "W0821", "a range with ends in different units?",
@@ -362,6 +366,14 @@ codes! {
         "Of gauges along the same direction one counts the other way. A wrong sign makes the loop run away; check it by moving the platform by hand before the amplifiers are on.";
     GAUGE_FAR = "W0825", "a gauge that looks past the platform",
         "The line of the gauge meets its target plane far outside the platform: probably coordinates in another order or unit.";
+    GAUGE_SLIP = "W0826", "a layout of gauges that one slip would explain",
+        "The gauges see some motion badly, and would not if one of them had another sign, or two coordinates in another order.";
+    CALIBRATION_ODD = "W0827", "a calibration unlike the others",
+        "Offset or slope of one gauge is far from those of the other five, or of another sign.";
+    GAIN_UNEVEN = "W0828", "a gain unlike the others",
+        "Gains go with the stiffness of their axes. One is more than ten times, or less than a tenth, of what the others have.";
+    WORK_PIECE_ODD = "W0829", "a work piece too soft or too stiff",
+        "Its stiffness along an axis is less than a thousandth of the platform's on its legs, or more than twenty times it.";
     TIME_WITHOUT_EFFECT = "W0830", "a time too short to have an effect",
         "Lag, lead or dead time is less than a hundredth of a tick.";
     LEAD_TOO_LONG = "W0831", "a lead longer than what it takes out",

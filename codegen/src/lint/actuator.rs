@@ -13,6 +13,8 @@ const SMALLEST_STRAIN: f64 = 1e-6;
 const RESONANCE_SLACK: f64 = 5.0;
 /// Share of the resonance's period in which a stack may be driven over its range.
 const FASTEST: f64 = 0.2;
+/// A stack that takes longer over its range, s, follows nothing.
+const SLOWEST: f64 = 1.0;
 
 /// No piezo leg moves by more than a hundredth of its length.
 pub(super) fn strain(facts: &Facts, found: &mut Found) {
@@ -24,7 +26,12 @@ pub(super) fn strain(facts: &Facts, found: &mut Found) {
     found.warning(
         codes::STRAIN_ODD,
         "actuator.stroke",
-        format!("a stroke of {} um is {} of a leg of {} mm", figure(stroke * 1e6), figure(stroke / length), figure(length * 1e3)),
+        format!(
+            "a stroke of {} um is {} of a leg of {} mm",
+            figure(stroke * 1e6),
+            figure(stroke / length),
+            figure(length * 1e3)
+        ),
         "stacks give 0.001 to 0.0015 of their own length: check the units of `actuator.stroke` and of [geometry]",
     );
 }
@@ -76,5 +83,26 @@ pub(super) fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
             "a stack that is driven faster than a third of its period overshoots into tension: at most \"{} V/ms\" is usual; check the unit (V/ms or V/s)",
             figure((high - low) * 3.0 * actuator.resonance * 1e-3)
         ),
+    );
+}
+
+/// A limit so low that nothing moves.
+pub(super) fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
+    let actuator = &facts.model.actuator;
+    let [low, high] = actuator.voltage;
+    let time = (high - low) / actuator.slew_rate;
+    if time <= SLOWEST {
+        return;
+    }
+    found.warning(
+        codes::SLEW_TOO_SLOW,
+        "actuator.slew_rate",
+        format!(
+            "at {} V/ms a leg takes {} s over its stroke: it moves at {} um/s at most",
+            figure(actuator.slew_rate * 1e-3),
+            figure(time),
+            figure(actuator.slew_rate * actuator.leg_gain() * 1e6)
+        ),
+        "check the unit: V/ms or V/s",
     );
 }

@@ -2,7 +2,7 @@
 
 use super::{Facts, Found, figure};
 use crate::diagnostic::codes;
-use crate::model::Scalar;
+use crate::model::{Model, Scalar};
 
 /// Least stack of a tick, bytes: six legs and a pose in flight.
 const LEAST_STACK: u64 = 256;
@@ -13,15 +13,15 @@ const LOOSE: u64 = 512;
 
 /// Bytes that tables and reversal memories take, and with them everything that can be said before a build: the rest is
 /// measured by `specgen build`.
-pub fn least(facts_of: &crate::model::Model) -> [u64; 2] {
-    let scalar = match facts_of.controller.scalar {
+pub fn least(model: &Model) -> [u64; 2] {
+    let scalar = match model.controller.scalar {
         Scalar::F32 => 4,
         Scalar::F64 => 8,
     };
-    let nodes = (facts_of.hysteresis.grid + 1) * (facts_of.hysteresis.grid + 2) / 2;
-    let table = nodes * scalar * facts_of.hysteresis.records.len();
+    let nodes = (model.hysteresis.grid + 1) * (model.hysteresis.grid + 2) / 2;
+    let table = nodes * scalar * model.hysteresis.records.len();
     // Each reversal is an extremum; six legs remember their own.
-    let memory = 6 * facts_of.hysteresis.memory * scalar;
+    let memory = 6 * model.hysteresis.memory * scalar;
     [table as u64, memory as u64]
 }
 
@@ -44,11 +44,15 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
                 format!("`{key}` is {declared} B, but {what} {least} B"),
                 "check the unit (B or KiB); `specgen build` measures what it really takes",
             );
-        } else if declared > LOOSE * least.max(4096) {
+        } else if declared > LOOSE * least.max(if name == "stack" { 1024 } else { 4096 }) {
             found.warning(
                 codes::BUDGET_LOOSE,
                 &key,
-                format!("`{key}` is {} MiB; the tables take {} KiB", figure(declared as f64 / 1_048_576.0), figure(least as f64 / 1024.0)),
+                format!(
+                    "`{key}` is {} MiB; the tables take {} KiB",
+                    figure(declared as f64 / 1_048_576.0),
+                    figure(least as f64 / 1024.0)
+                ),
                 "a budget that no controller can exceed checks nothing: check the unit (KiB or MiB)",
             );
         }

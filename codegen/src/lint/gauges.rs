@@ -33,7 +33,12 @@ pub(super) fn noise_of_a_step(facts: &Facts, found: &mut Found) {
     found.warning(
         codes::GAUGE_QUIET,
         "sensor.noise",
-        format!("a noise of {} nm rms is {} of the converter's step of {} nm", figure(noise * 1e9), figure(noise / step), figure(step * 1e9)),
+        format!(
+            "a noise of {} nm rms is {} of the converter's step of {} nm",
+            figure(noise * 1e9),
+            figure(noise / step),
+            figure(step * 1e9)
+        ),
         "nobody can measure a noise so far below the step: check the unit (nm or pm), or leave the noise out",
     );
 }
@@ -74,7 +79,12 @@ pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
     found.warning(
         codes::GAUGE_COARSE,
         "sensor.bits",
-        format!("one code of the gauge is {} nm, {} of the stroke of {} um", figure(step * 1e9), figure(step / stroke), figure(stroke * 1e6)),
+        format!(
+            "one code of the gauge is {} nm, {} of the stroke of {} um",
+            figure(step * 1e9),
+            figure(step / stroke),
+            figure(stroke * 1e6)
+        ),
         "a converter of 16 bits or more is usual; check `sensor.range` and `sensor.bits`",
     );
 }
@@ -91,7 +101,12 @@ pub(super) fn odd_coordinates(facts: &Facts, found: &mut Found) {
             found.warning(
                 codes::COORDINATE_ODD,
                 &format!("gauge[{gauge}].point[{axis}]"),
-                format!("{} of gauge {gauge} is {}, on a platform of {} mm", ["x", "y", "z"][axis], amount(0, value), figure(radius * 1e3)),
+                format!(
+                    "{} of gauge {gauge} is {}, on a platform of {} mm",
+                    ["x", "y", "z"][axis],
+                    amount(0, value),
+                    figure(radius * 1e3)
+                ),
                 "check the unit (mm or um); write \"0 mm\" if it is meant to be in the middle",
             );
         }
@@ -121,7 +136,9 @@ pub(super) fn opposite_directions(facts: &Facts, found: &mut Found) {
             codes::GAUGE_REVERSED,
             &format!("gauge[{gauge}].direction"),
             format!("gauge {gauge} counts against gauge {other}, which looks along the same line the other way"),
-            "a wrong sign makes the loop run away: move the platform by hand and see that both readings go as [[gauge]] says; if so, nothing is wrong",
+            &format!(
+                "a wrong sign makes the loop run away: with the amplifiers off, move the platform by hand and see that the readings go as `gauge[{other}].direction` and `gauge[{gauge}].direction` say; if so, nothing is wrong"
+            ),
         );
     }
 }

@@ -61,7 +61,12 @@ pub(super) fn moves_end(facts: &Facts, found: &mut Found) {
         found.warning(
             codes::MOVE_SLOW,
             &format!("control.setpoint.speed[{axis}]"),
-            format!("at {}/s a move across the workspace along {} takes {} s", amount(axis, speed), AXES[axis], figure(time)),
+            format!(
+                "at {}/s a move across the workspace along {} takes {} s",
+                amount(axis, speed),
+                AXES[axis],
+                figure(time)
+            ),
             "check the units of `control.setpoint.speed` and [workspace]",
         );
     }
@@ -83,14 +88,34 @@ pub(super) fn limits_bind(facts: &Facts, found: &mut Found) {
             );
         };
         if speed / acceleration < WITHIN_TICK * tick {
-            say("acceleration", shown(acceleration, "s^2"), format!("does nothing: a speed of {} is there within a tick", shown(speed, "s")));
+            say(
+                "acceleration",
+                shown(acceleration, "s^2"),
+                format!("does nothing: a speed of {} is there within a tick", shown(speed, "s")),
+            );
         } else if speed * speed / acceleration > NEVER * way(facts, axis) {
-            say("acceleration", shown(acceleration, "s^2"), format!("is so low that a speed of {} is never reached in the workspace", shown(speed, "s")));
+            say(
+                "acceleration",
+                shown(acceleration, "s^2"),
+                format!("is so low that a speed of {} is never reached in the workspace", shown(speed, "s")),
+            );
         }
         if acceleration / jerk < WITHIN_TICK * tick {
-            say("jerk", shown(jerk, "s^3"), format!("does nothing: an acceleration of {} is there within a tick", shown(acceleration, "s^2")));
+            say(
+                "jerk",
+                shown(jerk, "s^3"),
+                format!("does nothing: an acceleration of {} is there within a tick", shown(acceleration, "s^2")),
+            );
         } else if acceleration * acceleration / jerk > 50.0 * NEVER * speed {
-            say("jerk", shown(jerk, "s^3"), format!("is so low that an acceleration of {} is never reached below a speed of {}", shown(acceleration, "s^2"), shown(speed, "s")));
+            say(
+                "jerk",
+                shown(jerk, "s^3"),
+                format!(
+                    "is so low that an acceleration of {} is never reached below a speed of {}",
+                    shown(acceleration, "s^2"),
+                    shown(speed, "s")
+                ),
+            );
         }
     }
 }
@@ -129,11 +154,20 @@ pub(super) fn workspace_is_used(facts: &Facts, found: &mut Found) {
         if bound == 0.0 || bound >= SMALLEST_USE * reached {
             continue;
         }
-        let key = if axis < 3 { format!("workspace.translation[{axis}]") } else { format!("workspace.rotation[{}]", axis - 3) };
+        let key = if axis < 3 {
+            format!("workspace.translation[{axis}]")
+        } else {
+            format!("workspace.rotation[{}]", axis - 3)
+        };
         found.warning(
             codes::WORKSPACE_TINY,
             &key,
-            format!("{} is bound to ±{}, while the legs reach ±{}", AXES[axis], amount(axis, bound), amount(axis, reached)),
+            format!(
+                "{} is bound to ±{}, while the legs reach ±{}",
+                AXES[axis],
+                amount(axis, bound),
+                amount(axis, reached)
+            ),
             "check the unit; write 0 to keep an axis still",
         );
     }

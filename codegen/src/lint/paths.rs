@@ -39,14 +39,13 @@ pub struct PathDemand {
     pub current: Option<f64>,
 }
 
-/// Looks at every trajectory of `task`, whose poses are `paths` and whose tables `waveforms`, both in the order of the spec.
+/// Looks at every trajectory of `task`, whose poses are `paths`, in the order of the spec.
 #[must_use]
 pub fn check(
     model: &Model,
     task: &TaskSpace,
     platform: &Platform<f64>,
     paths: &[Vec<Stretch>],
-    waveforms: &[Option<Waveform>],
 ) -> (Vec<PathDemand>, Vec<Diagnostic>) {
     let mut found = Found::new(model);
     let legs = Legs::of(model, platform);
@@ -79,9 +78,7 @@ pub fn check(
         }
         demands.push(demand);
     }
-    let mut list = found.list();
-    list.extend(waveforms.iter().flatten().flat_map(steps));
-    (demands, list)
+    (demands, found.list())
 }
 
 fn larger(slot: &mut f64, value: f64) {
@@ -113,7 +110,8 @@ fn look(
             larger(&mut demand.leg_acceleration, second(three[0][leg], three[1][leg], three[2][leg]).abs());
         }
         // f = J⁻ᵀ M ḧ: over the travel of a piezo M and J are those at rest.
-        let acceleration: [f64; 6] = core::array::from_fn(|axis| second(poses[0][axis], poses[1][axis], poses[2][axis]));
+        let acceleration: [f64; 6] =
+            core::array::from_fn(|axis| second(poses[0][axis], poses[1][axis], poses[2][axis]));
         let wrench: [f64; 6] =
             core::array::from_fn(|row| (0..6).fold(0.0, |sum, axis| sum + mass[row][axis] * acceleration[axis]));
         for leg in 0..6 {
@@ -162,7 +160,10 @@ fn current(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
             figure(demand.slew * 1e-3),
             figure(limit)
         ),
-        &format!("play it {} times slower; or check `actuator.capacitance` and `amplifier.current`", figure(needed * GAIN_SLACK / limit)),
+        &format!(
+            "play it {} times slower; or check `actuator.capacitance` and `amplifier.current`",
+            figure(needed * GAIN_SLACK / limit)
+        ),
     );
 }
 
@@ -198,7 +199,8 @@ fn excitation(key: &str, name: &str, frequency: f64, mode: f64, found: &mut Foun
 }
 
 /// Steps of a table that stand out from those around them: a jump that no speed limit sees.
-fn steps(waveform: &Waveform) -> Option<Diagnostic> {
+#[must_use]
+pub fn steps(waveform: &Waveform) -> Option<Diagnostic> {
     let rows = &waveform.rows;
     for axis in 0..6 {
         let steps: Vec<f64> = rows.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs()).collect();

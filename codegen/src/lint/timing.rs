@@ -20,14 +20,23 @@ pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let tick = model.timing.period;
     let lead = model.task_space.as_ref().map_or(0.0, |task| task.lead);
-    for (key, time) in [("amplifier.lag", model.amplifier.lag), ("control.lead", lead), ("hysteresis.dead_time", model.hysteresis.dead_time)] {
+    for (key, time) in [
+        ("amplifier.lag", model.amplifier.lag),
+        ("control.lead", lead),
+        ("hysteresis.dead_time", model.hysteresis.dead_time),
+    ] {
         if time == 0.0 || time >= NOTHING * tick {
             continue;
         }
         found.warning(
             codes::TIME_WITHOUT_EFFECT,
             key,
-            format!("`{key}` is {} us, {} of a tick of {} us: it has no effect", figure(time * 1e6), figure(time / tick), figure(tick * 1e6)),
+            format!(
+                "`{key}` is {} us, {} of a tick of {} us: it has no effect",
+                figure(time * 1e6),
+                figure(time / tick),
+                figure(tick * 1e6)
+            ),
             "check the unit (ms or us), or leave the key out",
         );
     }
@@ -60,7 +69,11 @@ pub(super) fn transfer(facts: &Facts, found: &mut Found) {
     if time >= tick && time <= LONGEST_TRANSFER {
         return;
     }
-    let how = if time < tick { "shorter than a tick: modes change with a bump" } else { "so long that a mode takes a minute to be what it says" };
+    let how = if time < tick {
+        "shorter than a tick: modes change with a bump"
+    } else {
+        "so long that a mode takes a minute to be what it says"
+    };
     found.warning(
         codes::TRANSFER_ODD,
         "control.transfer_time",
@@ -71,7 +84,9 @@ pub(super) fn transfer(facts: &Facts, found: &mut Found) {
 
 /// A velocity that is filtered below the modes says nothing about them.
 pub(super) fn velocity_filter(facts: &Facts, found: &mut Found) {
-    let (Some(task), Some(modes)) = (&facts.model.task_space, facts.legs.as_ref().and_then(|legs| legs.modes)) else { return };
+    let (Some(task), Some(modes)) = (&facts.model.task_space, facts.legs.as_ref().and_then(|legs| legs.modes)) else {
+        return;
+    };
     let cutoff = task.velocity_cutoff / core::f64::consts::TAU;
     if cutoff >= SLOWEST_FILTER * modes[0] {
         return;
@@ -79,7 +94,11 @@ pub(super) fn velocity_filter(facts: &Facts, found: &mut Found) {
     found.warning(
         codes::VELOCITY_FILTER_SLOW,
         "control.velocity_cutoff",
-        format!("the velocity is filtered at {} Hz, far below the lowest mode of {} Hz", figure(cutoff), figure(modes[0])),
+        format!(
+            "the velocity is filtered at {} Hz, far below the lowest mode of {} Hz",
+            figure(cutoff),
+            figure(modes[0])
+        ),
         "at least the frequency of the lowest mode: check the unit (rad/s, not Hz)",
     );
 }
