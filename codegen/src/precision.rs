@@ -27,7 +27,7 @@ pub use double::Double;
 pub use enclosed::Enclosed;
 
 /// Random poses beside the corners of the workspace.
-const SAMPLES: usize = 1000;
+const SAMPLES: usize = 3000;
 
 /// Errors of the chosen scalar, m and rad, in the order x, y, z, θx, θy, θz.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -20,6 +20,8 @@ pub struct Enclosed<const SINGLE: bool> {
 
 /// The bounds themselves are computed in doubles: a part in 10¹³ covers that.
 const ROUND_UP: f64 = 1.0 + 1e-13;
+/// Exponent bits of a double: what is left of a positive number is the power of two below it.
+const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
 
 impl<const SINGLE: bool> Enclosed<SINGLE> {
     /// Half a last bit of 1.
@@ -58,7 +60,9 @@ impl<const SINGLE: bool> Enclosed<SINGLE> {
     /// The result of an operation with ends `low` and `high` and the errors of its operands.
     fn rounded(low: f64, high: f64, error: f64) -> Self {
         let exact = Self { low, high, error };
-        let half_bit = Self::UNIT * exact.magnitude() * ROUND_UP;
+        // Half a last bit is the same all over a binade: that of its lower end.
+        let largest = exact.magnitude() * ROUND_UP;
+        let half_bit = Self::UNIT * f64::from_bits(largest.to_bits() & EXPONENT);
         Self { low: low - half_bit, high: high + half_bit, error: (error + half_bit) * ROUND_UP }
     }
 }
