@@ -8,7 +8,7 @@
 //! next request: ρ̂ X_{n+1} = T_{n+1} − δ̂_n − φ̂_n                          (AII.2), (AII.4)
 //! ```
 //! ρ̂ X is the displacement really requested, after every limit: that is the anti-windup. The integrator form
-//! (AII.8), (AII.13) belongs to another error (Y − Ŷ); it must not be fed with m.
+//! (AII.7)–(AII.13) belongs to another error (Y − Ŷ); it must not be fed with m.
 
 use crate::digest::Digest;
 use crate::real::Real;
