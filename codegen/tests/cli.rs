@@ -12,8 +12,8 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use support::{Document, Folder, Run};
 
 const COMMANDS: [&str; 14] = [
-    "check", "build", "size", "flash", "sim", "tune", "pil", "replay", "dynamics", "identify", "forc", "plant", "doctor",
-    "dump-ir",
+    "check", "build", "size", "flash", "sim", "tune", "pil", "replay", "dynamics", "identify", "forc", "plant",
+    "doctor", "dump-ir",
 ];
 
 #[test]
