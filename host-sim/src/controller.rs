@@ -247,7 +247,8 @@ impl Controller {
 
         let path = path.to_owned();
         let library = Arc::new(library);
-        let mut controller = Self { text, description, functions, config, state, machine_layout, machine_words, path, library };
+        let mut controller =
+            Self { text, description, functions, config, state, machine_layout, machine_words, path, library };
         let words = controller.default_config();
         controller.configure(&words)?;
         controller.reset();

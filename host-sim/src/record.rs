@@ -12,8 +12,8 @@ use std::fmt;
 use std::io::{self, Read};
 
 use specgen_runtime::record::{
-    BLOCK_MAGIC, FILE_MAGIC, FORMAT, HAS_DIGEST, HEADER_WORDS, LARGEST_INPUT, NO_TRIGGER, OUTPUT_WORDS, Reason, checksum,
-    write_header,
+    BLOCK_MAGIC, FILE_MAGIC, FORMAT, HAS_DIGEST, HEADER_WORDS, LARGEST_INPUT, NO_TRIGGER, OUTPUT_WORDS, Reason,
+    checksum, write_header,
 };
 
 use crate::description::{Description, DescriptionError, fields};
@@ -112,9 +112,14 @@ pub enum RecordError {
 impl fmt::Display for RecordError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotARecord => write!(f, "not a record: it does not begin with SPGRECRD; name a file that a recorder wrote"),
+            Self::NotARecord => {
+                write!(f, "not a record: it does not begin with SPGRECRD; name a file that a recorder wrote")
+            }
             Self::Format(found) => {
-                write!(f, "record format {found}, expected {FORMAT}; use the specgen version that the target was built with")
+                write!(
+                    f,
+                    "record format {found}, expected {FORMAT}; use the specgen version that the target was built with"
+                )
             }
             Self::Header(reason) => write!(f, "the record's beginning is damaged ({reason}); fetch or copy it again"),
             Self::Description(error) => write!(f, "the record's beginning: {error}"),
@@ -217,7 +222,9 @@ impl<R: Read> Reader<R> {
         if magic != BLOCK_MAGIC || length < HEADER_WORDS as u64 || length > LARGEST_BLOCK {
             // Where the next one begins is not known either.
             self.ended = true;
-            return Ok(Some(self.damaged("it does not begin as a block does, and what follows it cannot be found".to_owned())));
+            return Ok(Some(
+                self.damaged("it does not begin as a block does, and what follows it cannot be found".to_owned()),
+            ));
         }
         let mut rest = vec![0; (length as usize - HEADER_WORDS + 1) * 8];
         let more = fill(&mut self.source, &mut rest)?;
@@ -268,7 +275,8 @@ fn parse(words: &[u64], inputs: usize) -> Result<Block, String> {
     }
     let reason_word = reason & 0xffff_ffff;
     let decimation = (reason >> 32) as u32;
-    let reason = Reason::from_word(reason_word).ok_or_else(|| format!("it begins for reason {reason_word}, which is none"))?;
+    let reason =
+        Reason::from_word(reason_word).ok_or_else(|| format!("it begins for reason {reason_word}, which is none"))?;
     if decimation == 0 {
         return Err("its decimation is 0".to_owned());
     }

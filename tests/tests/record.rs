@@ -5,9 +5,9 @@ use std::fs;
 use std::io::Cursor;
 
 use host_sim::controller::{Supervised, TickController};
+use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{BUSY, Bench, Noise, Request};
 use host_sim::record::{Piece, Reader, Recorded, Replay, Row, Writer, replay};
-use host_sim::plant::LegParameters;
 use host_sim::trajectory::PoseTarget;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -114,12 +114,8 @@ fn flipped(bytes: &[u8], block: (usize, usize), word: usize, bit: u32, mended: b
     let (start, count) = block;
     bytes[start + word * 8 + bit as usize / 8] ^= 1 << (bit % 8);
     if mended {
-        let words: Vec<u64> = bytes[start..start + count * 8]
-            .as_chunks()
-            .0
-            .iter()
-            .map(|chunk| u64::from_le_bytes(*chunk))
-            .collect();
+        let words: Vec<u64> =
+            bytes[start..start + count * 8].as_chunks().0.iter().map(|chunk| u64::from_le_bytes(*chunk)).collect();
         let sum = checksum(&words).to_le_bytes();
         bytes[start + count * 8..start + (count + 1) * 8].copy_from_slice(&sum);
     }
@@ -210,7 +206,9 @@ fn a_record_replays_from_wherever_it_begins_and_a_changed_bit_is_found_and_named
     // In a block that begins a record nothing was before the snapshot: it is loaded, and its digest tells.
     let alone = [&bytes[..blocks[0].0], &bytes[block.0..]].concat();
     let start = (blocks[0].0, block.1);
-    for (word, bit) in [(HEADER_WORDS + config, 62), (HEADER_WORDS + config + 2, 1), (HEADER_WORDS + config + state / 2, 63)] {
+    for (word, bit) in
+        [(HEADER_WORDS + config, 62), (HEADER_WORDS + config + 2, 1), (HEADER_WORDS + config + state / 2, 63)]
+    {
         let found = run(&flipped(&alone, start, word, bit, true), &mut machine);
         let divergence = found.divergence.unwrap_or_else(|| panic!("word {word}, bit {bit}: not seen"));
         println!("snapshot word {word}, bit {bit}: {divergence}");
@@ -263,7 +261,14 @@ fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
     }
     assert!(closed > 3, "{closed} blocks");
     for stage in &target.stats.stages {
-        println!("{:<10} {:>6} calls, {:>6} to {:>6} instructions, mean {:.0}", stage.name, stage.calls, stage.smallest, stage.largest, stage.mean());
+        println!(
+            "{:<10} {:>6} calls, {:>6} to {:>6} instructions, mean {:.0}",
+            stage.name,
+            stage.calls,
+            stage.smallest,
+            stage.largest,
+            stage.mean()
+        );
     }
     println!("{} words of a machine", machine.state_words());
     let most = |name: &str| target.stats.stage(name).unwrap().largest;
@@ -309,14 +314,15 @@ fn quiet(names: &[String], rng: &mut ChaCha8Rng, single: bool, request: u64) -> 
 fn bring_to_run(machine: &mut Supervised, names: &[String], rng: &mut ChaCha8Rng, single: bool) {
     let mut output = vec![0; machine.output_names().len()];
     for tick in 0..200_000_u32 {
-        let request = match machine.step(&quiet(names, rng, single, if tick % 2 == 0 { 0 } else { 5 }), &mut output).phase {
-            2 => return,
-            0 => 1,
-            5 => 5,
-            // What was held for a cause is brought to rest, and armed again.
-            3 if tick > 100_000 => 4,
-            _ => 2,
-        };
+        let request =
+            match machine.step(&quiet(names, rng, single, if tick % 2 == 0 { 0 } else { 5 }), &mut output).phase {
+                2 => return,
+                0 => 1,
+                5 => 5,
+                // What was held for a cause is brought to rest, and armed again.
+                3 if tick > 100_000 => 4,
+                _ => 2,
+            };
         if machine.step(&quiet(names, rng, single, request), &mut output).phase == 2 {
             return;
         }
@@ -365,7 +371,13 @@ fn same_future(name: &str, spec: &str, edits: &[(&str, &str)], seed: u64) {
                 0 => rng.next_u64(),
                 1 => spoilt[place] ^ 1 << (rng.next_u32() % 64),
                 2 => u64::MAX,
-                _ => if single { 0x7f80_0000 } else { 0x7ff0 << 48 },
+                _ => {
+                    if single {
+                        0x7f80_0000
+                    } else {
+                        0x7ff0 << 48
+                    }
+                }
             };
             let before = loaded.digest();
             if loaded.load(&spoilt).is_err() {
@@ -377,14 +389,22 @@ fn same_future(name: &str, spec: &str, edits: &[(&str, &str)], seed: u64) {
             for input in inputs.iter().take(20) {
                 loaded.step(input, &mut theirs);
                 for leg in 0..6 {
-                    let voltage = description.scalar.decode(theirs[description.output(&format!("voltage[{leg}]")).unwrap()]);
+                    let voltage =
+                        description.scalar.decode(theirs[description.output(&format!("voltage[{leg}]")).unwrap()]);
                     let code = theirs[description.output(&format!("dac_code[{leg}]")).unwrap()] as i64;
-                    assert!(voltage.is_finite() && (limit[0]..=limit[1]).contains(&code), "{name}: word {place} {:016x}", spoilt[place]);
+                    assert!(
+                        voltage.is_finite() && (limit[0]..=limit[1]).contains(&code),
+                        "{name}: word {place} {:016x}",
+                        spoilt[place]
+                    );
                 }
             }
         }
     }
-    println!("{name}: {} words, {refused} spoilt ones refused, {taken} taken, memory to {deepest} extrema", loaded.state_words());
+    println!(
+        "{name}: {} words, {refused} spoilt ones refused, {taken} taken, memory to {deepest} extrema",
+        loaded.state_words()
+    );
     assert!(refused > 100 && taken > 10, "{name}: {refused}, {taken}");
     let short = loaded.load(&[0; 3]).unwrap_err().to_string();
     assert!(short.starts_with("a state of 3 words; this controller's has "), "{short}");

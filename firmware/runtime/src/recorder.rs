@@ -259,8 +259,7 @@ impl<'m> Recorder<'m> {
     #[inline]
     fn write(&mut self, input: &[u64], row: &Row, digest: impl FnOnce() -> u64) {
         let has_digest = self.settings.digest_every > 0 && self.digest_in == 0;
-        self.digest_in =
-            if has_digest { self.settings.digest_every - 1 } else { self.digest_in.saturating_sub(1) };
+        self.digest_in = if has_digest { self.settings.digest_every - 1 } else { self.digest_in.saturating_sub(1) };
         let Some(mut slots) = self.ring.row() else { return };
         let mut which = if has_digest { HAS_DIGEST } else { 0 };
         let mut bit = 1;

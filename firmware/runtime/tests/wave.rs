@@ -122,7 +122,11 @@ fn limits_hold_and_are_not_wasted() {
             Wave::new(limits).set(&settings)
         };
         assert_eq!(with(&|limits| limits.high[axis] = high - 1e-12 + 0.0), Err(Refused::Range(axis)), "axis {axis}");
-        assert_eq!(with(&|limits| limits.low[axis] = settings.center[axis] + 1e-9), Err(Refused::Range(axis)), "axis {axis}");
+        assert_eq!(
+            with(&|limits| limits.low[axis] = settings.center[axis] + 1e-9),
+            Err(Refused::Range(axis)),
+            "axis {axis}"
+        );
         assert_eq!(with(&|limits| limits.rate[axis] = rate * 0.999), Err(Refused::Rate(axis)), "axis {axis}");
         assert_eq!(with(&|limits| limits.rate[axis] = rate * 2.0 + 1e-9), Ok(()), "axis {axis}");
         let refused = with(&|limits| limits.acceleration[axis] = acceleration * 0.999);

@@ -6,7 +6,8 @@ use super::{Block, Header};
 use crate::word::WordKind;
 
 /// Names of what came out.
-const OUTPUTS: &str = "dac_code[0],dac_code[1],dac_code[2],dac_code[3],dac_code[4],dac_code[5],status,phase,cause,amplifiers_on";
+const OUTPUTS: &str =
+    "dac_code[0],dac_code[1],dac_code[2],dac_code[3],dac_code[4],dac_code[5],status,phase,cause,amplifiers_on";
 
 /// The rows of a block; with the line of names before them for the `first` block.
 ///

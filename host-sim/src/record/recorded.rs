@@ -131,9 +131,7 @@ impl<'r, 'm> Recorded<'r, 'm> {
         let row = Row {
             codes: self.codes.map(|code| place(code) as i32),
             status: place(self.status) as u32,
-            supervisor: u32::from(word.phase)
-                | u32::from(word.cause) << 8
-                | u32::from(word.amplifier_on) << 16,
+            supervisor: u32::from(word.phase) | u32::from(word.cause) << 8 | u32::from(word.amplifier_on) << 16,
         };
         let machine = &self.machine;
         self.recorder.push(&self.input, &row, || machine.digest());

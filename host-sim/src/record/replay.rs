@@ -226,7 +226,8 @@ impl Run<'_> {
 
     /// Puts the machine where the block begins, or compares it with that.
     fn begin(&mut self, block: &Block, follows: bool) -> Result<Option<Divergence>, ReplayError> {
-        let differs = |signal: String, recorded, replayed| Some(Divergence { tick: block.first, signal, recorded, replayed });
+        let differs =
+            |signal: String, recorded, replayed| Some(Divergence { tick: block.first, signal, recorded, replayed });
         if !follows && let Err(error) = self.machine.load(&block.state) {
             return match error {
                 SnapshotError::Word { index, word } => {
@@ -244,7 +245,11 @@ impl Run<'_> {
             return Ok(differs(format!("state word {index} before it"), recorded, state[index]));
         }
         let digest = self.machine.digest();
-        Ok(if digest == block.digest { None } else { differs("state_digest before it".to_owned(), block.digest, digest) })
+        Ok(if digest == block.digest {
+            None
+        } else {
+            differs("state_digest before it".to_owned(), block.digest, digest)
+        })
     }
 
     fn tick(&mut self, row: &Row) -> Option<Divergence> {

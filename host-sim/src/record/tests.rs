@@ -90,8 +90,12 @@ fn a_trigger_keeps_what_was_before_it_and_so_many_rows_after() {
         // Without a gap, and well before the trigger.
         assert!(blocks.windows(2).all(|pair| pair[0].first + pair[0].rows.len() as u64 == pair[1].first));
         assert!(blocks.len() >= 3 && blocks[0].first < at - 30, "{} blocks from {}", blocks.len(), blocks[0].first);
-        let digests: Vec<u64> =
-            blocks.iter().flat_map(|block| &block.rows).filter(|row| row.digest.is_some()).map(|row| row.tick).collect();
+        let digests: Vec<u64> = blocks
+            .iter()
+            .flat_map(|block| &block.rows)
+            .filter(|row| row.digest.is_some())
+            .map(|row| row.tick)
+            .collect();
         assert!(digests.len() > 5 && digests.windows(2).all(|pair| pair[1] - pair[0] == 10), "{digests:?}");
     }
 }

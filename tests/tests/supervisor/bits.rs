@@ -106,7 +106,13 @@ fn a_tick_in_which_nothing_is_wrong_costs_little_more_than_the_law() {
         }
         let mut inputs = Vec::new();
         for tick in 0..4000 {
-            let request = if tick < 10 { NOTHING } else if tick < 60 { ARM } else { RUN };
+            let request = if tick < 10 {
+                NOTHING
+            } else if tick < 60 {
+                ARM
+            } else {
+                RUN
+            };
             bench.tick(request, 0);
             inputs.push(bench.input.clone());
         }

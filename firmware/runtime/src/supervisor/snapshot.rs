@@ -63,7 +63,8 @@ impl<T: Real> Snapshot for Supervisor<T> {
         for set in [&mut self.fresh, &mut self.wants_arming, &mut self.busy] {
             *set = words.flag()?;
         }
-        for word in [&mut self.seen, &mut self.conditions, &mut self.ticks].into_iter().chain(&mut self.debounce.counts) {
+        for word in [&mut self.seen, &mut self.conditions, &mut self.ticks].into_iter().chain(&mut self.debounce.counts)
+        {
             *word = words.counter()?;
         }
         for channel in &mut self.watch.channels {

@@ -205,7 +205,9 @@ impl Cursor {
 
     pub(super) fn start<T: Real>(axis: &AxisWave<T>) -> Self {
         match &axis.shape {
-            Shape::Sine { tone } | Shape::Chirp { tone, .. } => Self { phase: tone.phase, step: tone.step, ..Self::new() },
+            Shape::Sine { tone } | Shape::Chirp { tone, .. } => {
+                Self { phase: tone.phase, step: tone.step, ..Self::new() }
+            }
             Shape::Triangle { step, .. } => Self { step: *step, ..Self::new() },
             _ => Self::new(),
         }
@@ -288,9 +290,5 @@ fn triangle<T: Real>(amplitude: T, phase: u64, step: u64) -> Sample<T> {
     let value = amplitude * share;
     let turns = angular::<T>(step) * T::from_f64(4.0 / core::f64::consts::TAU);
     let rate = amplitude * turns;
-    if falls {
-        Sample { value: -value, rate: -rate, bend: T::ZERO }
-    } else {
-        Sample { value, rate, bend: T::ZERO }
-    }
+    if falls { Sample { value: -value, rate: -rate, bend: T::ZERO } } else { Sample { value, rate, bend: T::ZERO } }
 }

@@ -74,7 +74,8 @@ impl Supervised {
         if words.len() != expected {
             return Err(SnapshotError::Length { given: words.len(), expected });
         }
-        let failed = |cause| SnapshotError::Library(ControllerError::Load { path: self.controller.path.clone(), cause });
+        let failed =
+            |cause| SnapshotError::Library(ControllerError::Load { path: self.controller.path.clone(), cause });
         // SAFETY: the buffer has the size and alignment that the library asks for; there are as many words as it reads.
         let bad = unsafe {
             let load: Symbol<'_, Load> = self.controller.library.get(b"specgen_machine_load\0").map_err(failed)?;

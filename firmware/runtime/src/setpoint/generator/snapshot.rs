@@ -11,7 +11,8 @@ use crate::snapshot::{Invalid, LARGEST, LARGEST_PLACE, Reader, Snapshot, Writer}
 const MOST: i32 = 1 << 30;
 
 impl<T: Real> Snapshot for Generator<T> {
-    const WORDS: usize = 2 + 5 * 6 + <crate::motion::Motion<T> as Snapshot>::WORDS + Profile::<T>::WORDS + 1 + Stop::<T>::WORDS + 2 + 3;
+    const WORDS: usize =
+        2 + 5 * 6 + <crate::motion::Motion<T> as Snapshot>::WORDS + Profile::<T>::WORDS + 1 + Stop::<T>::WORDS + 2 + 3;
 
     fn save(&self, words: &mut Writer<'_>) {
         let (phase, index) = match self.phase {
