@@ -65,7 +65,11 @@ impl PendingFile {
     pub fn keep(self) -> Result<(), Failure> {
         let Self { file, target } = self;
         file.persist(&target).map(|_| ()).map_err(|error| {
-            Failure::Environment(format!("could not write `{}`: {}; nothing was changed", target.display(), error.error))
+            Failure::Environment(format!(
+                "could not write `{}`: {}; nothing was changed",
+                target.display(),
+                error.error
+            ))
         })
     }
 }

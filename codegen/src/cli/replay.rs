@@ -124,7 +124,9 @@ fn verdict(found: &Replay) -> Option<String> {
         return Some(format!("the first tick that differs is {divergence}"));
     }
     if let Some((block, reason)) = found.damaged.first() {
-        return Some(format!("block {block} is damaged: {reason}; the ticks around it are bit-equal. Fetch or copy it again"));
+        return Some(format!(
+            "block {block} is damaged: {reason}; the ticks around it are bit-equal. Fetch or copy it again"
+        ));
     }
     if found.ticks == 0 {
         return Some("there is no tick in it; record again".to_owned());
@@ -149,7 +151,8 @@ fn text(found: &Replay, period: f64) -> String {
             let _ = writeln!(out, "  … {} more changes of the phase", found.phases.len() - SHOWN);
             break;
         }
-        let _ = writeln!(out, "  tick {:>9} {:>10.4} s  {}", change.tick, seconds(change.tick), name(change.supervisor));
+        let _ =
+            writeln!(out, "  tick {:>9} {:>10.4} s  {}", change.tick, seconds(change.tick), name(change.supervisor));
     }
     for tick in &found.triggers {
         let _ = writeln!(out, "  tick {tick:>9} {:>10.4} s  trigger", seconds(*tick));

@@ -12,8 +12,8 @@ use host_sim::record::{Ended, Recorded, Writer};
 use host_sim::scenario::{LegScenario, select};
 use host_sim::trajectory::{LegTrajectory, PoseTarget};
 use serde_json::json;
-use specgen_runtime::recorder::{Recorder, Settings as Recording};
 use specgen_runtime::record::Layout;
+use specgen_runtime::recorder::{Recorder, Settings as Recording};
 use specgen_runtime::wave::{AxisWave, Limits, Settings, Shape, Tone, Wave, step_of};
 
 use super::{Arguments, environment};
@@ -45,7 +45,9 @@ pub(super) fn run(
     let seconds = arguments.seconds;
     let ticks = (seconds / period).round();
     if !(1.0..1e9).contains(&ticks) {
-        return Err(Failure::Usage(format!("--seconds {seconds} is {ticks} ticks of {period} s; expected 1 to 10^9 ticks")));
+        return Err(Failure::Usage(format!(
+            "--seconds {seconds} is {ticks} ticks of {period} s; expected 1 to 10^9 ticks"
+        )));
     }
     let text = controller.text().to_owned();
     let machine = Supervised::new(controller).map_err(environment)?;
@@ -119,7 +121,13 @@ fn wave(compiled: &Compiled, ticks: i32) -> Result<Wave<f64>, Failure> {
             let [low, high] = ir.bounds.leg;
             // A leg follows no faster than its amplifier lets it; what accelerates it is not limited by the spec.
             let rate = compiled.model.actuator.slew_rate * compiled.model.actuator.leg_gain();
-            Limits { low: [low; 6], high: [high; 6], rate: [rate; 6], acceleration: [1e6; 6], ticks_per_second: 1.0 / period }
+            Limits {
+                low: [low; 6],
+                high: [high; 6],
+                rate: [rate; 6],
+                acceleration: [1e6; 6],
+                ticks_per_second: 1.0 / period,
+            }
         }
     };
     settings.ticks = ticks;
@@ -130,7 +138,13 @@ fn wave(compiled: &Compiled, ticks: i32) -> Result<Wave<f64>, Failure> {
         for axis in 0..6 {
             let room = limits.high[axis] - settings.center[axis];
             let below = settings.center[axis] - limits.low[axis];
-            let room = if on_legs { room } else if room < below { room } else { below };
+            let room = if on_legs {
+                room
+            } else if room < below {
+                room
+            } else {
+                below
+            };
             let amplitude = share * SHARES[usize::from(axis != 2 && !on_legs)] * room;
             let tone = Tone { amplitude, phase: 0, step: step_of(FREQUENCIES[axis], period) };
             let offset = if on_legs { 0.4 * room } else { 0.0 };
@@ -165,11 +179,9 @@ fn platform(
     bench.arm(ARMING)?;
     for _ in 0..ticks {
         let request = match wave.next() {
-            Some(motion) => Request::stream(PoseTarget {
-                pose: motion.pose,
-                rate: motion.rate,
-                acceleration: motion.acceleration,
-            }),
+            Some(motion) => {
+                Request::stream(PoseTarget { pose: motion.pose, rate: motion.rate, acceleration: motion.acceleration })
+            }
             None => Request::default(),
         };
         bench.tick(&request)?;
@@ -191,7 +203,10 @@ fn legs(
     let law = controller.default_config().first().copied().unwrap_or_default();
     select(controller, u32::try_from(law).unwrap_or_default())?;
     let wave = LegWave { wave: RefCell::new(wave), seconds };
-    scenario.rig().clone().follow(controller, &wave, compiled.model.timing.period, |_, _| std::ops::ControlFlow::Continue(()))
+    scenario
+        .rig()
+        .clone()
+        .follow(controller, &wave, compiled.model.timing.period, |_, _| std::ops::ControlFlow::Continue(()))
 }
 
 /// A wave as a trajectory that is asked once a tick.

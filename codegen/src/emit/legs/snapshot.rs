@@ -17,11 +17,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
     };
     let (lead, save_lead, restore_lead) = match &ir.hysteresis.lead {
         None => (quote! {}, quote! {}, quote! {}),
-        Some(_) => (
-            quote! { + 1 },
-            quote! { words.real(self.lead); },
-            quote! { self.lead = words.real(LARGEST_PLACE)?; },
-        ),
+        Some(_) => {
+            (quote! { + 1 }, quote! { words.real(self.lead); }, quote! { self.lead = words.real(LARGEST_PLACE)?; })
+        }
     };
     let leg = snapshot::Leg {
         words: quote! { <Memory as Snapshot>::WORDS + <Estimate<Real> as Snapshot>::WORDS + 1 #lead },
