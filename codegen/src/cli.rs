@@ -13,6 +13,7 @@ mod identify;
 mod identify_rate;
 mod pil;
 mod plant;
+mod replay;
 mod robust;
 mod sim;
 mod tune;
@@ -75,6 +76,8 @@ enum Command {
     Robust(robust::Arguments),
     /// Close the loop of a simulated machine with the program of a microcontroller, emulated or at a serial port.
     Pil(pil::Arguments),
+    /// Run a record of a target again on the host and compare every tick by bits; export it as CSV.
+    Replay(replay::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
     /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
@@ -110,6 +113,7 @@ pub fn run() -> ExitCode {
         Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
         Some(Command::Robust(arguments)) => robust::run(arguments, &mut ui),
         Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
+        Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
         Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
@@ -129,7 +133,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, plant, doctor, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir) with its own arguments",
         ),
         _ => error,
     };
