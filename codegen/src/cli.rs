@@ -9,6 +9,7 @@ mod dynamics;
 mod file;
 mod identify;
 mod identify_rate;
+mod reproduce;
 mod robust;
 mod sim;
 mod tune;
@@ -63,6 +64,8 @@ enum Command {
     Tune(tune::Arguments),
     /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
     Robust(robust::Arguments),
+    /// Run the paper's whole list of experiments, from specs in the binary: ours beside the paper's, with remarks.
+    Reproduce(reproduce::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
     /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
@@ -90,6 +93,7 @@ pub fn run() -> ExitCode {
         Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
         Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
         Some(Command::Robust(arguments)) => robust::run(arguments, &mut ui),
+        Some(Command::Reproduce(arguments)) => reproduce::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
         Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
@@ -107,7 +111,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, sim, tune, robust, dynamics, identify, forc, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, sim, tune, robust, reproduce, dynamics, identify, forc, dump-ir) with its own arguments",
         ),
         _ => error,
     };
