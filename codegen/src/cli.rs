@@ -9,6 +9,7 @@ mod dynamics;
 mod file;
 mod identify;
 mod identify_rate;
+mod report;
 mod reproduce;
 mod robust;
 mod sim;
@@ -64,6 +65,8 @@ enum Command {
     Tune(tune::Arguments),
     /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
     Robust(robust::Arguments),
+    /// Write one HTML file about a spec: the paper's figures from the emitted controller, error budget, margins, findings.
+    Report(report::Arguments),
     /// Run the paper's whole list of experiments, from specs in the binary: ours beside the paper's, with remarks.
     Reproduce(reproduce::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
@@ -93,6 +96,7 @@ pub fn run() -> ExitCode {
         Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
         Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
         Some(Command::Robust(arguments)) => robust::run(arguments, &mut ui),
+        Some(Command::Report(arguments)) => report::run(arguments, &mut ui),
         Some(Command::Reproduce(arguments)) => reproduce::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
@@ -111,7 +115,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, sim, tune, robust, reproduce, dynamics, identify, forc, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, sim, tune, robust, report, reproduce, dynamics, identify, forc, dump-ir) with its own arguments",
         ),
         _ => error,
     };

@@ -19,6 +19,7 @@ pub mod numerics;
 pub mod paper;
 pub mod plot;
 pub mod reach;
+pub mod report;
 pub mod reproduce;
 pub mod robust;
 pub mod spec;

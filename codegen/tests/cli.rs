@@ -11,7 +11,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 8] = ["check", "sim", "tune", "reproduce", "dynamics", "identify", "forc", "dump-ir"];
+const COMMANDS: [&str; 9] = ["check", "sim", "tune", "report", "reproduce", "dynamics", "identify", "forc", "dump-ir"];
 
 #[test]
 fn arguments_that_make_no_sense_are_usage_errors() {
@@ -26,7 +26,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "-o", ""], "--output"),
         (&["legs.toml", "minimal.toml"], "one spec file is expected"),
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
-        (&["chek", "legs.toml"], "check, sim, tune, robust, reproduce, dynamics, identify, forc, dump-ir"),
+        (&["chek", "legs.toml"], "check, sim, tune, robust, report, reproduce, dynamics, identify, forc, dump-ir"),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
         (&["sim"], "<SPEC>"),

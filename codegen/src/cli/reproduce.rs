@@ -159,6 +159,11 @@ fn converge(
     ui: &Ui,
 ) -> Result<convergence::Convergence, Failure> {
     let progress = |at: &crate::tuning::search::Progress| {
+        // A run whose output is not looked at gets ten lines.
+        let tenth = (at.all / 10).max(1);
+        if !ui.is_terminal() && at.done % tenth != 0 {
+            return;
+        }
         ui.rate(&format!("  {} of {} strings, {:.0} s left", at.done, at.all, at.left.as_secs_f64()));
     };
     let leg = LegParameters::reference();

@@ -22,7 +22,8 @@ pub struct Results {
 }
 
 /// Four significant digits, without an exponent.
-fn digits(value: f64) -> String {
+#[must_use]
+pub(crate) fn digits(value: f64) -> String {
     if !value.is_finite() {
         return "–".to_owned();
     }
@@ -31,7 +32,7 @@ fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-fn cell(cell: &Cell) -> String {
+pub(crate) fn cell(cell: &Cell) -> String {
     match cell {
         Cell::Number(value) => digits(*value),
         Cell::Text(text) => text.clone(),
@@ -43,7 +44,7 @@ fn frequency(row: &Row) -> String {
 }
 
 /// How the search went, in a sentence.
-fn fell(convergence: &Convergence) -> String {
+pub(crate) fn fell(convergence: &Convergence) -> String {
     let (Some(first), Some(last)) = (convergence.history.first(), convergence.history.last()) else {
         return "No generation was run.".to_owned();
     };
@@ -96,9 +97,9 @@ impl Results {
                     row.quantity,
                     frequency(row),
                     row.unit,
-                    cell(&row.paper),
-                    cell(&row.ours),
-                    row.ratio.map_or_else(String::new, |ratio| format!("{ratio:.3}")),
+                    cell(&row.paper).replace('|', "\\|"),
+                    cell(&row.ours).replace('|', "\\|"),
+                    row.ratio.map_or_else(String::new, digits),
                     row.remark.map_or("", |remark| remark.id())
                 );
             }
@@ -180,8 +181,8 @@ mod tests {
     #[test]
     fn ratios_and_remarks_stand_beside_the_values() {
         let text = results().markdown();
-        assert!(text.contains("| 10 | nm | 156.2 | 16.49 | 0.106 | upper-bound |"), "{text}");
-        assert!(text.contains("| 0.1 | nm | 127.0 | 126.8 | 0.998 | agrees |"), "{text}");
+        assert!(text.contains("| 10 | nm | 156.2 | 16.49 | 0.1055 | upper-bound |"), "{text}");
+        assert!(text.contains("| 0.1 | nm | 127.0 | 126.8 | 0.9981 | agrees |"), "{text}");
         assert_eq!(text.matches("- **upper-bound**").count(), 1);
     }
 
