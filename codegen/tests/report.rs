@@ -24,7 +24,12 @@ fn drawn(page: &Path) -> Option<Drawn> {
     let run = |program: &str| {
         Command::new(program)
             .args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking"])
-            .args(["--disable-component-update", "--disable-sync", "--enable-logging=stderr", "--virtual-time-budget=4000"])
+            .args([
+                "--disable-component-update",
+                "--disable-sync",
+                "--enable-logging=stderr",
+                "--virtual-time-budget=4000",
+            ])
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .args(["--dump-dom", &format!("file://{}", page.display())])
             .output()
@@ -71,7 +76,9 @@ fn the_report_of_six_legs_is_one_small_page_with_every_figure() {
     let page = folder.read("page.html");
     assert_eq!(result["bytes"], page.len());
     assert!(page.len() < LARGEST, "{} bytes", page.len());
-    for word in ["Fig. 3", "Fig. 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 29", "Table 1", "Table 2", "Table 3", "Error budget"] {
+    for word in
+        ["Fig. 3", "Fig. 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 29", "Table 1", "Table 2", "Table 3", "Error budget"]
+    {
         assert!(page.contains(word), "{word}");
     }
     assert!(page.contains("Not measured: left out by --no-target"));
@@ -103,7 +110,9 @@ fn the_report_of_a_platform_has_the_figures_of_section_4() {
 /// The judge of pages sees what it is there for.
 #[test]
 fn a_page_with_an_empty_figure_or_an_error_is_seen() {
-    let (count, empty) = figures("<figure data-points=\"12\"></figure><figure class=\"chart\" data-points=\"0\"></figure><figure class=\"chart\"></figure>");
+    let (count, empty) = figures(
+        "<figure data-points=\"12\"></figure><figure class=\"chart\" data-points=\"0\"></figure><figure class=\"chart\"></figure>",
+    );
     assert_eq!((count, empty.len()), (3, 2));
     let folder = Folder::new();
     folder.write("bad.html", "<!doctype html><title>x</title><script>nowhere()</script>");
@@ -130,7 +139,11 @@ fn reproduce_gives_the_same_bytes_twice_and_every_table() {
     for output in ["first", "second"] {
         let run = folder.run(&["reproduce", "--generations", "1", "-o", output]);
         assert_eq!(run.code, 0, "{}", run.stderr);
-        assert!(run.stderr.contains("s left]") && run.stdout.starts_with("# The paper's experiments"), "{}", run.stderr);
+        assert!(
+            run.stderr.contains("s left]") && run.stdout.starts_with("# The paper's experiments"),
+            "{}",
+            run.stderr
+        );
     }
     let first = support::contents(&folder.path("first"));
     assert_eq!(first.len(), 4);

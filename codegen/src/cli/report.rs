@@ -12,15 +12,17 @@ use serde_json::json;
 
 use super::check::describe;
 use super::file::write_file;
-use super::sim::environment;
+use super::sim::{emitted, environment};
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled};
 use crate::model::TaskSpace;
 use crate::paper::convergence;
 use crate::report::evidence::Bits;
+use crate::report::noise::{FINE_BITS, Pair};
 use crate::report::page::{self, Head};
 use crate::report::section::{Part, Section};
 use crate::report::{evidence, hysteresis, legs, linear, machining, motion, noise, region, view};
+use crate::spec::SpecSource;
 use crate::target::TargetError;
 use crate::verify::{self, Measurement};
 use crate::{lower, machine, reproduce, target, workspace};
@@ -61,9 +63,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", compiled.ir.name)));
     let mut built = build(&compiled, arguments.no_target, ui)?;
     let name = file_name(&arguments.spec);
+    let mut fine = fine(&compiled, ui)?;
     let simulated = match &compiled.model.task_space {
-        Some(task) => of_platform(&compiled, task, &mut built.controller, &name, ui)?,
-        None => of_legs(&compiled, &mut built.controller, &name, ui)?,
+        Some(task) => of_platform(&compiled, task, [&mut built.controller, &mut fine], &name, ui)?,
+        None => of_legs(&compiled, [&mut built.controller, &mut fine], &name, ui)?,
     };
     let converged = converge(&compiled, &built.controller, arguments.generations, &name, ui)?;
 
@@ -99,6 +102,24 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         json!({ "file": output.display().to_string(), "digest": compiled.ir.digest, "bytes": html.len(), "sections": ids, "figures": figures }),
     );
     Ok(())
+}
+
+/// The controller of the spec with a drive converter as fine as there is, for the error budget.
+fn fine(compiled: &Compiled, ui: &Ui) -> Result<Controller, Failure> {
+    let lost = |why: String| {
+        Failure::Environment(format!(
+            "the spec with dac.bits = {FINE_BITS} does not compile: {why}; report this as a defect of specgen with the spec"
+        ))
+    };
+    let mut document: toml_edit::DocumentMut =
+        compiled.source.text.parse().map_err(|error: toml_edit::TomlError| lost(error.to_string()))?;
+    // It compiled, so `dac` is a table; anything else would end here.
+    document["dac"]["bits"] = toml_edit::value(FINE_BITS);
+    let source = SpecSource { text: document.to_string(), ..compiled.source.clone() };
+    let fine = compile::compile_source(source).map_err(|refused| {
+        lost(refused.findings.into_iter().map(|finding| finding.message).collect::<Vec<_>>().join("; "))
+    })?;
+    emitted(&fine, ui)
 }
 
 /// Charts and views of a part.
@@ -157,7 +178,7 @@ fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure
 fn of_platform(
     compiled: &Compiled,
     task: &TaskSpace,
-    controller: &mut Controller,
+    [controller, fine]: [&mut Controller; 2],
     name: &str,
     ui: &Ui,
 ) -> Result<Vec<Section>, Failure> {
@@ -175,7 +196,8 @@ fn of_platform(
     let machined =
         machining::section(&scenario, controller, &format!("specgen sim {name} -o DIR")).map_err(environment)?;
     let lines = linear::of_platform(&scenario, controller, &platform, &model.actuator, "").map_err(environment)?;
-    let budget = noise::of_platform(model, task, &specimen, controller, SEED).map_err(environment)?;
+    let budget =
+        noise::of_platform(model, task, &specimen, Pair { own: controller, fine }, SEED).map_err(environment)?;
     let mut sections = vec![view::section(model, Some(&platform), shown.as_ref(), model.timing.period), budget];
     sections.extend(motions);
     sections.push(machined);
@@ -185,7 +207,12 @@ fn of_platform(
     Ok(sections)
 }
 
-fn of_legs(compiled: &Compiled, controller: &mut Controller, name: &str, ui: &Ui) -> Result<Vec<Section>, Failure> {
+fn of_legs(
+    compiled: &Compiled,
+    [controller, fine]: [&mut Controller; 2],
+    name: &str,
+    ui: &Ui,
+) -> Result<Vec<Section>, Failure> {
     let model = &compiled.model;
     let leg = LegParameters::reference();
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
@@ -197,7 +224,7 @@ fn of_legs(compiled: &Compiled, controller: &mut Controller, name: &str, ui: &Ui
     let lines = linear::of_legs(&scenario, controller, &model.actuator, &sim).map_err(environment)?;
     let adaptation = &model.adaptation;
     let mode = usize::from(adaptation.level_weight > 0.0) + usize::from(adaptation.drift_weight > 0.0);
-    let budget = noise::of_legs(model, &leg, mode, controller, SEED).map_err(environment)?;
+    let budget = noise::of_legs(&leg, mode, Pair { own: controller, fine }, SEED).map_err(environment)?;
     let region = region::section(compiled, Some(controller)).map_err(environment)?;
     Ok(vec![
         view::section(model, None, None, model.timing.period),

@@ -112,7 +112,7 @@ fn section_3(compiled: &Compiled, steps: &mut Steps) -> Result<Vec<Table>, Failu
     steps.next("Table 2: three laws at three frequencies", LEGS);
     let table_2 = legs::table_2(&scenario, &mut controller);
     steps.next("Fig. 29: the stability region", REGION);
-    let figure_29 = legs::figure_29(&mut controller);
+    let figure_29 = legs::figure_29(&mut controller, compiled.model.adaptation.run_interval);
     [table_1, table_2, figure_29].into_iter().map(|table| table.map_err(environment)).collect()
 }
 

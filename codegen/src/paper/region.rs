@@ -66,22 +66,28 @@ pub fn jury(level: f64, drift: Option<f64>) -> f64 {
     drift.map_or_else(|| ewma_limit(level), |drift| pcc_limit(level, drift))
 }
 
-/// The limits at the weights of [`TRIED`], with the emitted controller of six legs with their own gauges.
+/// The limits at the weights of [`TRIED`], with the emitted controller of six legs with their own gauges, which adapts every
+/// `run_interval` ticks.
 ///
 /// # Errors
 /// If it lacks a word, or refuses weights within (0, 1].
-pub fn limits(controller: &mut dyn TickController) -> Result<Vec<Limit>, ControllerError> {
+pub fn limits(controller: &mut dyn TickController, run_interval: u32) -> Result<Vec<Limit>, ControllerError> {
     TRIED
         .iter()
         .map(|&(level, drift)| {
-            let emitted = emitted_limit(controller, level, drift)?;
+            let emitted = emitted_limit(controller, level, drift, run_interval)?;
             Ok(Limit { level, drift, printed: printed(level, drift), jury: jury(level, drift), emitted })
         })
         .collect()
 }
 
 /// λ up to which the loop settles, found by trying six values at once.
-fn emitted_limit(controller: &mut dyn TickController, level: f64, drift: Option<f64>) -> Result<f64, ControllerError> {
+fn emitted_limit(
+    controller: &mut dyn TickController,
+    level: f64,
+    drift: Option<f64>,
+    run_interval: u32,
+) -> Result<f64, ControllerError> {
     let mode = MODES[if drift.is_some() { 2 } else { 1 }].1;
     select(controller, mode)?;
     let mut words = controller.default_config();
@@ -95,7 +101,7 @@ fn emitted_limit(controller: &mut dyn TickController, level: f64, drift: Option<
     for _ in 0..CUTS {
         let part = (high - low) / (LEGS + 1) as f64;
         let ratios: [f64; LEGS] = std::array::from_fn(|leg| low + part * (leg + 1) as f64);
-        let settled = settles(controller, &ratios)?;
+        let settled = settles(controller, &ratios, run_interval as usize)?;
         // The first that does not settle ends the region, whatever comes beyond it.
         let stable = settled.iter().take_while(|settled| **settled).count();
         (low, high) = (low + part * stable as f64, low + part * (stable + 1) as f64);
@@ -104,7 +110,11 @@ fn emitted_limit(controller: &mut dyn TickController, level: f64, drift: Option<
 }
 
 /// Whether legs of these λ settle after the disturbance.
-fn settles(controller: &mut dyn TickController, ratios: &[f64; LEGS]) -> Result<[bool; LEGS], ControllerError> {
+fn settles(
+    controller: &mut dyn TickController,
+    ratios: &[f64; LEGS],
+    run_interval: usize,
+) -> Result<[bool; LEGS], ControllerError> {
     controller.reset();
     let description = controller.description().clone();
     let (scalar, setpoint, measured) =
@@ -113,7 +123,9 @@ fn settles(controller: &mut dyn TickController, ratios: &[f64; LEGS]) -> Result<
     let mut input = vec![0; description.input_names.len()];
     let mut output = vec![0; description.output_names.len()];
     let (mut reading, mut last, mut largest) = ([PLACE; LEGS], [PLACE; LEGS], [0.0_f64; LEGS]);
-    for run in 0..RUNS {
+    // The legs answer at once, so nothing changes within a run.
+    for tick in 0..RUNS * run_interval {
+        let run = tick / run_interval;
         for leg in 0..LEGS {
             input[setpoint + leg] = scalar.encode(PLACE);
             input[measured + leg] = scalar.encode(reading[leg]);

@@ -134,6 +134,15 @@ impl Chart {
         self
     }
 
+    /// Gives the last series the colour of that number; several may share one.
+    #[must_use]
+    pub fn colored(mut self, color: usize) -> Self {
+        if let Some(last) = self.series.last_mut() {
+            last.color = color;
+        }
+        self
+    }
+
     /// Adds `values` at even times: the first at `start`, `step` apart (s). Long ones are thinned to the lowest and highest
     /// of each stretch, so that no peak is lost.
     #[must_use]

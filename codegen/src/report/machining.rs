@@ -10,7 +10,7 @@ use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen_runtime::setpoint::{REFUSED, STALE};
 
 use super::chart::{Axis, Chart, Style};
-use super::motion::{AXES, change, error};
+use super::motion::{AXES, TARGETS, change, error};
 use super::section::Section;
 use crate::reproduce::platform::{MACHINING_FREQUENCY, parts, table_9};
 
@@ -65,7 +65,11 @@ pub fn section(
                 let law = if combined { "P/F" } else { "P" };
                 let values: Vec<f64> = run.samples.iter().map(|sample| error(sample, axis)).collect();
                 change(&mut errors[turning], |chart| {
-                    chart.over_time(&format!("{label}, {law}"), Style::Line, times, &values)
+                    chart.over_time(&format!("{label}, {law}"), Style::Line, times, &values).colored(if combined {
+                        axis % 3
+                    } else {
+                        TARGETS + axis % 3
+                    })
                 });
                 if combined {
                     let target: Vec<f64> = run.samples.iter().map(|sample| sample.target[axis] * 1e6).collect();

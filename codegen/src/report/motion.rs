@@ -16,6 +16,9 @@ use crate::reproduce::platform::{CASES, FREQUENCIES, tables};
 /// Names of the coordinates on charts.
 pub(super) const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 
+/// Colours of targets, beside those of the axes.
+pub(super) const TARGETS: usize = 8;
+
 /// What a sample shows of one coordinate.
 type Pick = fn(&PoseSample, usize) -> f64;
 
@@ -117,8 +120,10 @@ impl Figures {
                 let name = AXES[axis];
                 change(&mut self.paths[turning], |chart| {
                     chart
-                        .over_time(&format!("{name} target"), Style::Dash, times, &of(|s, k| s.target[k] * 1e6))
                         .over_time(name, Style::Line, times, &of(|s, k| s.tick.pose[k] * 1e6))
+                        .colored(axis % 3)
+                        .over_time(&format!("{name} target"), Style::Dash, times, &of(|s, k| s.target[k] * 1e6))
+                        .colored(TARGETS + axis % 3)
                 });
                 change(&mut self.errors[turning], |chart| chart.over_time(name, Style::Line, times, &of(error)));
             }

@@ -48,7 +48,7 @@ pub fn section(compiled: &Compiled, controller: Option<&mut dyn TickController>)
         .text("Below a curve the run-to-run law is stable on a leg that answers at once. With amplifier lag and modes the limit is lower: that is what the compiler checks, see margins.");
     let mut table = None;
     if let Some(controller) = controller {
-        let found = limits(controller)?;
+        let found = limits(controller, adaptation.run_interval)?;
         let mut grid = Grid::new(
             "The emitted controller on legs without dynamics, after a step of 0.2 µm",
             &[

@@ -76,8 +76,8 @@ pub fn table_2(scenario: &LegScenario, controller: &mut dyn TickController) -> R
 ///
 /// # Errors
 /// As [`region::limits`].
-pub fn figure_29(controller: &mut dyn TickController) -> Result<Table, RunError> {
-    let rows = region::limits(controller)?.into_iter().map(|limit| {
+pub fn figure_29(controller: &mut dyn TickController, run_interval: u32) -> Result<Table, RunError> {
+    let rows = region::limits(controller, run_interval)?.into_iter().map(|limit| {
         let (case, reason) = match limit.drift {
             None => (format!("EWMA, ω = {}", limit.level), Remark::Ewma),
             Some(drift) => (format!("PCC, ω1 = {}, ω2 = {drift}", limit.level), Remark::Unexplained),

@@ -93,7 +93,7 @@ class Chart {
     }
   }
 
-  color(s) { return "var(--c" + (s.color % 8) + ")"; }
+  color(s) { return "var(--c" + (s.color % 11) + ")"; }
   seen() { return this.series.filter(s => !s.off); }
 
   place(v, axis) { return axis.log ? (v > 0 ? Math.log10(v) : NaN) : v; }
