@@ -1,8 +1,8 @@
 //! Fig. 29: up to which λ the adaptation is stable, by the paper's formulas and by the emitted controller.
 //!
 //! The controller runs on six legs without dynamics that answer λ times what it requests, counted from where they stand;
-//! each leg has a λ of its own. A step of 0.2 µm disturbs them. Where the loop is stable, what changes from run to run dies
-//! away; where it is not, it grows until limits stop it.
+//! each leg has a λ of its own. A step of 0.2 µm disturbs them. Where the loop is stable, what is left of it dies away; where
+//! it is not, it grows until a limit or a gauge out of range holds it, far from where it should stand.
 
 use host_sim::closed_loop::LEGS;
 use host_sim::controller::{ControllerError, TickController};
@@ -14,13 +14,14 @@ use crate::stability::{ewma_limit, pcc_limit};
 /// Runs of a trial, and how many of its last ones are looked at.
 const RUNS: usize = 700;
 const LAST: usize = 60;
-/// The run in which the disturbance comes.
-const DISTURBED: usize = 3;
+/// The run in which the disturbance comes. Before it the legs do what is requested: at first they are slewed to their place.
+const DISTURBED: usize = 60;
 /// Place at which the legs stand, and size of the disturbance, m.
 const PLACE: f64 = 20e-6;
 const DISTURBANCE: f64 = 0.2e-6;
-/// Change from run to run below which a trial has settled, m: converter steps are some nanometres.
-const SETTLED: f64 = 20e-9;
+/// A leg within this of where it should stand has settled, m: steps of the converter times λ are less, and what grows by 1 %
+/// a run is a hundred times more in the end.
+const SETTLED: f64 = 1e-6;
 /// λ looked at, and how often the interval is cut by seven.
 const RANGE: [f64; 2] = [0.05, 60.0];
 const CUTS: usize = 5;
@@ -122,7 +123,7 @@ fn settles(
     let requested = description.output("requested[0]")?;
     let mut input = vec![0; description.input_names.len()];
     let mut output = vec![0; description.output_names.len()];
-    let (mut reading, mut last, mut largest) = ([PLACE; LEGS], [PLACE; LEGS], [0.0_f64; LEGS]);
+    let (mut reading, mut largest) = ([PLACE; LEGS], [0.0_f64; LEGS]);
     // The legs answer at once, so nothing changes within a run.
     for tick in 0..RUNS * run_interval {
         let run = tick / run_interval;
@@ -132,16 +133,15 @@ fn settles(
         }
         controller.step(&input, &mut output);
         for leg in 0..LEGS {
-            let moved = ratios[leg] * (scalar.decode(output[requested + leg]) - PLACE);
-            reading[leg] = PLACE + moved + if run >= DISTURBED { DISTURBANCE } else { 0.0 };
-            let change = (reading[leg] - last[leg]).abs();
-            last[leg] = reading[leg];
-            if run >= RUNS - LAST && change > largest[leg] {
-                largest[leg] = change;
+            let moved = scalar.decode(output[requested + leg]) - PLACE;
+            let error = if run < DISTURBED { moved } else { ratios[leg] * moved + DISTURBANCE };
+            reading[leg] = PLACE + error;
+            if run >= RUNS - LAST && error.abs() > largest[leg] {
+                largest[leg] = error.abs();
             }
         }
     }
-    Ok(std::array::from_fn(|leg| largest[leg] < SETTLED * if ratios[leg] > 1.0 { ratios[leg] } else { 1.0 }))
+    Ok(largest.map(|error| error < SETTLED))
 }
 
 #[cfg(test)]

@@ -96,10 +96,13 @@ class View {
     const legs = base.map((p, k) => [p, top[k], k]).sort((a, b) => b[0][2] + b[1][2] - a[0][2] - a[1][2]);
     for (const [from, to, k] of legs) {
       element("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1], stroke: "var(--c" + k + ")", "stroke-width": 5, "stroke-linecap": "round" }, svg);
-      // Joints come in pairs: a quarter up the leg the numbers are apart.
-      element("text", { x: 0.75 * from[0] + 0.25 * to[0] + 8, y: 0.75 * from[1] + 0.25 * to[1] + 4 }, svg).textContent = String(k + 1);
     }
     plate(top, "--c0");
+    // Joints come in pairs: a quarter up the legs the numbers are apart.
+    for (const [from, to, k] of legs) {
+      const at = { x: 0.75 * from[0] + 0.25 * to[0] + 9, y: 0.75 * from[1] + 0.25 * to[1] + 4, stroke: "var(--back)", "stroke-width": 4, "paint-order": "stroke" };
+      element("text", at, svg).textContent = String(k + 1);
+    }
     this.axes();
     if (data.poses.length) this.path(frame, factor);
     if (data.poses.length) this.bars(data.legs[frame]);
