@@ -14,7 +14,7 @@ use crate::reach::{self, Reach};
 use crate::spec::{self, SpecSource};
 use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
-use crate::{waveform, workspace};
+use crate::{requirements, waveform, workspace};
 
 /// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
 /// factor, a wrong unit is 1000.
@@ -75,7 +75,11 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
     let stability = check_stability(&model).map_err(|found| findings.extend(found));
     let identified = identify_records(&source, &model).map_err(|found| findings.extend(found));
     let setpoints = lower_setpoints(&source, &model).map_err(|found| findings.extend(found));
-    let (Ok((margins, design)), Ok(mut identified), Ok(setpoints)) = (stability, identified, setpoints) else {
+    let too_coarse = requirements::check(&model);
+    let coarse = !too_coarse.is_empty();
+    findings.extend(too_coarse);
+    let (Ok((margins, design)), Ok(mut identified), Ok(setpoints), false) = (stability, identified, setpoints, coarse)
+    else {
         return Err(Refused { source: Some(source), findings });
     };
     findings.extend(identified.findings);

@@ -12,6 +12,7 @@ mod format;
 mod gauge_converter;
 mod hysteresis;
 mod identity;
+mod integrity;
 mod kinematics;
 mod legs;
 mod limits;
@@ -23,6 +24,7 @@ mod sensing;
 mod setpoint;
 mod stage_type;
 mod supervised;
+mod supervision;
 
 use std::collections::BTreeMap;
 
@@ -39,9 +41,10 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
         ("src/dynamics.rs", dynamics::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
+        ("src/integrity.rs", integrity::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
-        ("src/supervised.rs", supervised::emit(ir)),
+        ("src/supervision.rs", supervision::emit(ir)),
     ];
     match &ir.task_space {
         None => sources.extend(legs_sources(ir)),
@@ -63,6 +66,7 @@ fn legs_sources(ir: &Ir) -> Vec<(&'static str, TokenStream)> {
         ("src/stages.rs", legs::stages::emit()),
         ("src/state.rs", legs::state::emit(ir)),
         ("src/step.rs", legs::step::emit(ir)),
+        ("src/supervised.rs", legs::supervised::emit(ir)),
         ("src/words.rs", legs::words::emit(ir)),
     ]
 }
@@ -77,6 +81,7 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
         ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),
         ("src/step.rs", platform::step::emit(ir)),
+        ("src/supervised.rs", platform::supervised::emit()),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),
         ("src/words.rs", platform::words::emit(ir, task)),
     ]

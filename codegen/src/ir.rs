@@ -76,11 +76,15 @@ pub struct Ir {
     pub bounds: Bounds,
     /// Codes of the gauges' converters.
     pub gauge_converter: GaugeConverter,
+    /// What the supervisor takes for a fault.
+    pub supervision: Supervision,
     /// Config at start-up.
     pub defaults: Defaults,
     /// Control in task space; none for six legs with their own gauges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub task_space: Option<TaskSpace>,
+    /// Settings and checksum for the check at start-up.
+    pub integrity: Integrity,
 }
 
 /// Leg kinematics in difference form.
@@ -284,6 +288,8 @@ pub struct Lead {
 /// Converter and limits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Actuation {
+    /// Bits of a code.
+    pub bits: u32,
     /// Voltage of code 0, V.
     pub volts_at_zero: f64,
     /// V per code.
@@ -324,6 +330,40 @@ pub struct GaugeConverter {
     pub highest: i32,
     /// Below and above what is believed.
     pub beyond: [f64; 2],
+}
+
+/// The supervisor; the constants of [`specgen_runtime::supervisor::Plan`], where each is explained.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Supervision {
+    /// Ticks.
+    pub arm_ticks: u32,
+    /// Code at rest.
+    pub rest: i32,
+    /// Codes of a step of a ramp.
+    pub ramp_step: i32,
+    /// Ticks from one to the next.
+    pub ramp_every: u32,
+    /// Counts at which a condition is a cause: gauge not finite, gauge range, voltage, slew, missed tick, converter.
+    pub patience: [u32; 6],
+    /// What a tick with the condition counts.
+    pub weight: [u32; 6],
+    /// m.
+    pub stuck_motion: f64,
+    /// Samples.
+    pub stuck_samples: u32,
+    /// m.
+    pub disagreement: f64,
+    /// Samples.
+    pub disagreement_samples: u32,
+    /// m and rad, of each axis; or m, of each leg.
+    pub tracking: [f64; 6],
+    /// Samples.
+    pub tracking_samples: u32,
+    /// Reading of each gauge (rows) per leg displacement (columns); none where each leg has its own gauge.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub readings_per_leg: Option<[[f64; 6]; LEGS]>,
+    /// What is left of the way to the set-point after a tick, where there is no generator.
+    pub approach_keep: f64,
 }
 
 /// Config at start-up.
@@ -367,4 +407,21 @@ pub enum Setpoint {
     Pose,
     /// Leg displacements.
     Leg,
+}
+
+/// What the controller checks itself by.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Integrity {
+    /// Compiler, platform and spec in one line, kept in every image.
+    pub identity: String,
+    /// The settings as words, in the order of the emitted `CONFIG_NAMES`.
+    #[serde(serialize_with = "as_hex")]
+    pub settings: Vec<u64>,
+    /// CRC-32 of identity, tables, trajectories and settings.
+    pub crc: u32,
+}
+
+/// Words in hexadecimal: as numbers, readers that know `f64` alone would round them.
+fn as_hex<S: serde::Serializer>(words: &[u64], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(words.iter().map(|word| format!("{word:#x}")))
 }

@@ -5,14 +5,17 @@
 mod actuation;
 mod dynamics;
 mod gauge_converter;
+mod integrity;
 mod kinematics;
 mod linear;
 mod rate;
 mod sensing;
 pub mod setpoint;
+mod supervision;
 mod task_space;
 
 pub use dynamics::{GRAVITY, platform};
+pub use integrity::IDENTITY_MARK;
 pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
 pub use sensing::{PoseNoise, pose_noise};
 
@@ -49,11 +52,36 @@ pub fn lower(
     let round = |value| scalar.round(value);
     let [tx, ty, tz] = model.workspace.translation;
     let [rx, ry, rz] = model.workspace.rotation;
+    let defaults = Defaults {
+        law: match model.adaptation.mode {
+            model::AdaptationMode::Invhys => Law::Invhys,
+            model::AdaptationMode::Ewma => Law::Ewma,
+            model::AdaptationMode::Pcc => Law::Pcc,
+        },
+        setpoint: match model.controller.setpoint {
+            model::SetpointKind::Pose => Setpoint::Pose,
+            model::SetpointKind::Leg => Setpoint::Leg,
+        },
+        level_weight: round(model.adaptation.level_weight),
+        drift_weight: round(model.adaptation.drift_weight),
+        run_interval: model.adaptation.run_interval,
+        max_step,
+        period: model.timing.period,
+        leg_gain: model.actuator.leg_gain(),
+    };
     let task_space = match (&model.task_space, task) {
         (Some(task), Some((design, setpoints))) => Some(task_space(model, task, scalar, design, setpoints)?),
         _ => None,
     };
-    let sensing = task_space.as_ref().map(|task| &task.sensing);
+    let integrity = integrity::lower(
+        integrity::identity(&model.name, digest, scalar),
+        scalar,
+        &hysteresis,
+        &actuation,
+        &defaults,
+        task_space.as_ref(),
+    );
+    let gauge_converter = gauge_converter::lower(model, task_space.as_ref().map(|task| &task.sensing), scalar);
     Ok(Ir {
         name: model.name.clone(),
         digest: digest.to_owned(),
@@ -62,31 +90,17 @@ pub fn lower(
         kinematics: kinematics::lower(model, scalar)?,
         dynamics: dynamics::lower(model, scalar)?,
         hysteresis,
+        supervision: supervision::lower(model, &actuation, max_step, scalar)?,
         actuation,
         bounds: Bounds {
             pose: [tx, ty, tz, rx, ry, rz].map(round),
             leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
             sensor: model.sensor.range.map(round),
         },
-        gauge_converter: gauge_converter::lower(model, sensing, scalar),
-        defaults: Defaults {
-            law: match model.adaptation.mode {
-                model::AdaptationMode::Invhys => Law::Invhys,
-                model::AdaptationMode::Ewma => Law::Ewma,
-                model::AdaptationMode::Pcc => Law::Pcc,
-            },
-            setpoint: match model.controller.setpoint {
-                model::SetpointKind::Pose => Setpoint::Pose,
-                model::SetpointKind::Leg => Setpoint::Leg,
-            },
-            level_weight: round(model.adaptation.level_weight),
-            drift_weight: round(model.adaptation.drift_weight),
-            run_interval: model.adaptation.run_interval,
-            max_step,
-            period: model.timing.period,
-            leg_gain: model.actuator.leg_gain(),
-        },
+        gauge_converter,
+        defaults,
         task_space,
+        integrity,
     })
 }
 

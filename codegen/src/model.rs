@@ -2,8 +2,12 @@
 //!
 //! Vectors are in the base frame {B} or the platform frame {P} as stated; angles in rad.
 
+mod mcu;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
+
+pub use mcu::{Mcu, Part};
 
 /// A spec that passed every check that needs no computation.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +42,10 @@ pub struct Model {
     pub target: Target,
     /// The controller that sees the platform: a spec with `[control]`. None: six legs with a gauge each.
     pub task_space: Option<TaskSpace>,
+    /// Finest displacement that matters, m, if declared.
+    pub precision: Option<f64>,
+    /// What the supervisor takes for a fault.
+    pub supervisor: Supervisor,
     /// What `specgen robust` varies, and its gate; no constant of the controller comes from here.
     pub robust: Robust,
     /// Where each key stands in the spec file, by key path (`actuator.voltage[1]`), for findings of later phases.
@@ -69,6 +77,35 @@ pub struct Robust {
     pub max_error: Option<f64>,
     /// Largest error of the angles, rms, rad.
     pub max_orientation: Option<f64>,
+}
+
+/// What the supervisor takes for a fault; none where the rule of the key holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Supervisor {
+    /// Time without any condition that arming takes, s.
+    pub arm_time: Option<f64>,
+    /// V/s.
+    pub ramp_rate: Option<f64>,
+    /// s.
+    pub gauge_time: Option<f64>,
+    /// m.
+    pub stuck_motion: Option<f64>,
+    /// s.
+    pub stuck_time: Option<f64>,
+    /// m.
+    pub disagreement: Option<f64>,
+    /// s.
+    pub disagreement_time: Option<f64>,
+    /// Share of the workspace bound of an axis, or of the stroke.
+    pub tracking_error: f64,
+    /// s.
+    pub tracking_time: Option<f64>,
+    /// s.
+    pub voltage_time: Option<f64>,
+    /// s.
+    pub slew_time: Option<f64>,
+    /// Within a second.
+    pub missed_ticks: u32,
 }
 
 /// Joints of base and platform, and the pose at rest. Radii and angles of a spec, (1) and (2), are joints here already.
@@ -283,15 +320,6 @@ pub struct ControllerOptions {
     pub scalar: Scalar,
     /// Meaning of the set-point at start-up.
     pub setpoint: SetpointKind,
-}
-
-/// A microcontroller that specgen can build for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mcu {
-    /// Cortex-M7 with double-precision FPU, emulated.
-    Mps2An500,
-    /// Cortex-M4F, single-precision FPU, emulated.
-    Mps2An386,
 }
 
 /// Where it runs, and what it may use there.

@@ -133,7 +133,7 @@ fn units_and_swapped_columns_are_named_with_times() {
         c.time = (0..rest + drive.len()).map(|k| k as f64 * interval).collect();
         // It creeps to its rest by a tenth of its range.
         let creep = |k: usize| 5e-6 * (1.0 - k as f64 / rest as f64);
-        let noise = |k: usize| if k % 2 == 0 { 2e-9 } else { -2e-9 };
+        let noise = |k: usize| if k.is_multiple_of(2) { 2e-9 } else { -2e-9 };
         c.drive = (0..rest).map(|k| (displacement[0] + creep(k) + noise(k)) * 1e6).collect();
         c.drive.extend(displacement.iter().enumerate().map(|(k, y)| (y + noise(k)) * 1e6));
         c.displacement = vec![drive[0] * 1e-6; rest];

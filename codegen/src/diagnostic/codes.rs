@@ -117,6 +117,14 @@ codes! {
         "The controller chooses among at most 32.";
     RATE_KEYS = "E0327", "keys that do not fit hysteresis.rate",
         "rate = \"dynamic-preisach\" takes rate_tables, rate = \"creep\" takes creep_times and creep_weights, one weight for each time and less than 1 in all. A key of another option would silently do nothing.";
+    SCALAR_WITHOUT_FPU = "E0330", "double precision on a single-precision FPU",
+        "The FPU of a Cortex-M4F computes `f32`. In `f64` every operation is a call of software, and a tick takes ten times as long. Choose `controller.scalar = \"f32\"`, whose figures are in the README, or a part with a double-precision FPU.";
+    BUDGET_BEYOND_PART = "E0331", "a budget larger than the part",
+        "The microcontroller has less memory than the budget allows, so the budget would let an image pass that does not fit. RAM is that of the region images are linked into.";
+    TOO_FEW_BITS = "E0332", "converter too coarse for the precision asked for",
+        "A code of `dac.bits` over `dac.range` moves the leg, or the platform, by more than `requirements.precision`. The help says how many bits would do. Feedback does not help: what lies between two codes cannot be reached, only crossed.";
+    WRONG_PART = "E0333", "firmware for another part than the spec's",
+        "Scalar, margins of time and memory belong to `target.mcu`. A board with another core is refused; one with the same core is built and said so.";
     UNSTABLE_STATIC = "E0401", "adaptation unstable on any leg",
         "With these weights and the declared gain_ratio the loop grows even on a leg without dynamics (Appendix B). The help names the largest weight that would do.";
     UNSTABLE_SAMPLED = "E0402", "adaptation unstable on this leg",
@@ -181,6 +189,12 @@ codes! {
         "The time column rises from row to row by trajectory.period.";
     WAVEFORM_LENGTH = "E0463", "too few or too many rows",
         "A table of poses has at least two rows, and no more than a microcontroller holds.";
+    SUPERVISOR_TIME = "E0470", "a time of the supervisor shorter than it can see",
+        "The supervisor counts ticks, and looks at the six gauges in turn: what the gauges show takes twelve periods to be seen twice, everything else one.";
+    SUPERVISOR_BOUND = "E0471", "a bound of the supervisor below the noise",
+        "A bound that the noise of the gauges, or a step of their converter, passes by itself would stop a sound machine.";
+    SUPERVISOR_RAMP = "E0472", "a ramp to rest faster than the slew rate",
+        "Voltages go to rest no faster than amplifier and stack stand.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",
@@ -313,8 +327,6 @@ codes! {
         "More than a hundredth of the range: probably a slip of the unit. The paper prints 2.2 um for 2.2 nm.";
     SENSOR_RANGE = "W0304", "gauge range does not fit the stroke",
         "The range leaves out the displacement at rest, or is far smaller or larger than the stroke.";
-    DOUBLE_ON_SINGLE = "W0305", "double precision on a single-precision FPU",
-        "The Cortex-M4F computes f64 in software, some twenty times slower.";
     GYRATION_ODD = "W0306", "mass and inertia fit the size badly",
         "The radius of gyration is unusual for the size of the platform, though possible.";
     UNUSED_WEIGHT = "W0307", "weight that the mode does not use",

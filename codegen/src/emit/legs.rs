@@ -6,4 +6,5 @@ pub mod sensing;
 pub mod stages;
 pub mod state;
 pub mod step;
+pub mod supervised;
 pub mod words;

@@ -25,8 +25,8 @@ pub fn emit(inputs: &[String], outputs: &[String]) -> TokenStream {
         pub const MACHINE_OUTPUT_WORDS: usize = OUTPUT_WORDS + #more_outputs;
         /// Names of the input words. `request` is 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge; `events` holds bits.
         pub const MACHINE_INPUT_NAMES: [&str; MACHINE_INPUT_WORDS] = [#(#inputs,)* #(#input_names),*];
-        /// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16; `conditions` has a bit for each
-        /// cause that is present in the tick, debounced or not: bit 1 << cause.
+        /// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16; `conditions` has bit 1 << cause
+        /// for each cause that is present, whether it has lasted or not, and from bit 16 on the gauges or legs concerned.
         pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] = [#(#outputs,)* #(#output_names),*];
 
         impl MachineInput {
@@ -53,6 +53,7 @@ pub fn emit(inputs: &[String], outputs: &[String]) -> TokenStream {
                 *slot = word;
             }
             words[OUTPUT_WORDS] = output.phase.word() | output.cause.word() << 8 | (output.amplifier_on as u64) << 16;
+            words[OUTPUT_WORDS + 1] = machine.supervisor.conditions as u64;
             words
         }
     }

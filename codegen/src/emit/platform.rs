@@ -5,5 +5,6 @@ pub mod crate_root;
 pub mod stages;
 pub mod state;
 pub mod step;
+pub mod supervised;
 pub mod task_space;
 pub mod words;

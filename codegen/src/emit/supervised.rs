@@ -3,19 +3,23 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::ir::Ir;
-
-pub fn emit(_ir: &Ir) -> TokenStream {
+/// `imports`: what `parts` needs. `parts`: the functions `begin`, `work` and `stand` of this kind of controller.
+pub fn emit(imports: &TokenStream, parts: &TokenStream) -> TokenStream {
     quote! {
         #![doc = " The control law under its supervisor: what every target calls."]
 
         pub use specgen_runtime::supervisor::{CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STOP};
+        use specgen_runtime::supervisor::{Sample, toward};
         use specgen_runtime::{Digest, supervisor};
 
+        use crate::hysteresis::TABLES;
+        use crate::limits::DAC;
         pub use crate::machine_words::{
             MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS, machine_output_words,
         };
-        use crate::{Config, Real, State, TickInput, TickOutput, step};
+        use crate::supervision::PLAN;
+        #imports
+        use crate::{Config, LEGS, Real, State, TickInput, TickOutput, step};
 
         /// State of the supervisor in this controller's arithmetic.
         pub type Supervisor = supervisor::Supervisor<Real>;
@@ -77,22 +81,61 @@ pub fn emit(_ir: &Ir) -> TokenStream {
         }
 
         /// One supervised tick.
+        ///
+        /// What events and request say acts in this tick; what the readings show acts in the next one, after the law has seen
+        /// them.
         pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
             let Machine { state, supervisor } = machine;
-            supervisor.phase = match input.request {
-                Request::Arm | Request::Run => Phase::Running,
-                Request::RampDown => Phase::Disarmed,
-                _ => supervisor.phase,
-            };
-            supervisor.request = input.request;
-            let mut tick = step(config, state, &input.tick);
-            let amplifier_on = supervisor.phase == Phase::Running;
-            if !amplifier_on {
-                *state = State::new();
-                tick.dac_code = [crate::limits::CODES[0]; crate::LEGS];
-                tick.voltage = [crate::limits::DAC.voltage(crate::limits::CODES[0]); crate::LEGS];
+            let at_rest = supervisor.phase != Phase::Running && state.legs.iter().all(|leg| leg.code == PLAN.rest);
+            let begins = supervisor.decide(&PLAN, input.request, input.events, at_rest);
+            if begins {
+                begin(config, state, supervisor, &input.tick);
             }
-            MachineOutput { tick, phase: supervisor.phase, cause: supervisor.cause, amplifier_on }
+            let tick = if supervisor.phase == Phase::Running {
+                work(config, state, supervisor, &input.tick)
+            } else {
+                stand(config, state, supervisor, &input.tick)
+            };
+            MachineOutput {
+                tick,
+                phase: supervisor.phase,
+                cause: supervisor.cause,
+                amplifier_on: supervisor.phase.is_powered(),
+            }
+        }
+
+        #parts
+
+        /// Codes held, or on their way to rest; the memories follow what is really sent.
+        fn move_codes(config: &Config, state: &mut State, supervisor: &mut Supervisor) {
+            let step = supervisor.step_to_rest(&PLAN, config.code_limits().max_step);
+            for (leg, table) in state.legs.iter_mut().zip(&TABLES) {
+                leg.code = toward(leg.code, PLAN.rest, step);
+                leg.memory.apply(table, DAC.drive(leg.code));
+            }
+        }
+
+        /// Codes held at the outputs.
+        #[inline]
+        fn codes(state: &State) -> [i32; LEGS] {
+            let [a, b, c, d, e, f] = &state.legs;
+            [a.code, b.code, c.code, d.code, e.code, f.code]
+        }
+
+        /// Codes by which each leg moved.
+        #[cold]
+        fn moved(state: &State, before: &[i32; LEGS]) -> [i32; LEGS] {
+            let mut moved = codes(state);
+            for (code, before) in moved.iter_mut().zip(before) {
+                *code -= *before;
+            }
+            moved
+        }
+
+        /// Whether gauges are compared with the model although the law does not run: the codes must stand still.
+        #[inline]
+        fn compares(phase: Phase) -> bool {
+            matches!(phase, Phase::Arming | Phase::Holding)
         }
     }
 }

@@ -208,10 +208,10 @@ mod tests {
     #[test]
     fn a_source_is_what_it_adds_to_the_run_without_noise() {
         let quiet = 3.0;
-        let found =
-            each(&[("gauge noise", NoiseParameters { sensor_nm_rms: 2.0, ..NoiseParameters::NONE })], |noise| {
-                Ok(vec![vec![quiet + noise.sensor_nm_rms; 4]; 6])
-            });
+        let sources = [("gauge noise", NoiseParameters { sensor_nm_rms: 2.0, ..NoiseParameters::NONE })];
+        let found = each(&sources, vec![vec![3.5; 4]; 6], |noise: NoiseParameters| {
+            Ok(vec![vec![quiet + noise.sensor_nm_rms; 4]; 6])
+        });
         let found = found.unwrap();
         assert_eq!((found[0].name, found[0].errors[0][0]), ("hysteresis residual", 3.0));
         assert_eq!((found[1].name, found[1].errors[5][3]), ("gauge noise", 2.0));

@@ -4,7 +4,7 @@ use super::fields::Fields;
 use super::{joints, task_space};
 use crate::model::{
     Actuator, Adaptation, AdaptationMode, Amplifier, ControllerOptions, Dac, Geometry, Hysteresis, LegBody, Mcu, Model,
-    RateDependence, RigidBody, Robust, Scalar, Sensor, SetpointKind, Target, Timing, Workspace,
+    RateDependence, RigidBody, Robust, Scalar, Sensor, SetpointKind, Supervisor, Target, Timing, Workspace,
 };
 
 /// The model, or `None` if a value is missing: then there is a finding for it.
@@ -59,6 +59,8 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
         },
         target: target(f)?,
         task_space: task_space::task_space(f)?,
+        precision: f.number("requirements.precision"),
+        supervisor: supervisor(f)?,
         robust: robust(f),
         spans: f.spans(),
     })
@@ -125,6 +127,24 @@ pub(super) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     (length > 1e-9).then(|| vector.map(|component| component / length))
 }
 
+fn supervisor(f: &Fields) -> Option<Supervisor> {
+    let number = |key: &str| f.number(&format!("supervisor.{key}"));
+    Some(Supervisor {
+        arm_time: number("arm_time"),
+        ramp_rate: number("ramp_rate"),
+        gauge_time: number("gauge_time"),
+        stuck_motion: number("stuck_motion"),
+        stuck_time: number("stuck_time"),
+        disagreement: number("disagreement"),
+        disagreement_time: number("disagreement_time"),
+        tracking_error: number("tracking_error")?,
+        tracking_time: number("tracking_time"),
+        voltage_time: number("voltage_time"),
+        slew_time: number("slew_time"),
+        missed_ticks: f.whole("supervisor.missed_ticks")?,
+    })
+}
+
 fn robust(f: &Fields) -> Robust {
     Robust {
         mass: f.list("robust.mass"),
@@ -144,7 +164,7 @@ fn robust(f: &Fields) -> Robust {
 fn target(f: &Fields) -> Option<Target> {
     let bytes = |key: &str| f.number(key).map(|bytes| bytes as u64);
     Some(Target {
-        mcu: if f.choice("target.mcu")? == "mps2-an386" { Mcu::Mps2An386 } else { Mcu::Mps2An500 },
+        mcu: Mcu::named(f.choice("target.mcu")?)?,
         flash: bytes("target.budget.flash"),
         ram: bytes("target.budget.ram"),
         stack: bytes("target.budget.stack"),

@@ -98,6 +98,31 @@ pub fn replay(
     inputs: &[Vec<u64>],
     limit: Duration,
 ) -> Result<ReplayResult, TargetError> {
+    replay_from("input.bin", image, config, inputs, limit)
+}
+
+/// Replays supervised ticks, rows of MACHINE_INPUT_WORDS words, from a machine at reset. Output rows have
+/// MACHINE_OUTPUT_WORDS words; digests and sizes are those of the machine. Stages: `supervise`, ticks that run on; `law`, the
+/// control law alone in these; `other phases`.
+///
+/// # Errors
+/// As [`replay`].
+pub fn replay_machine(
+    image: &Image,
+    config: &[u64],
+    inputs: &[Vec<u64>],
+    limit: Duration,
+) -> Result<ReplayResult, TargetError> {
+    replay_from("machine.bin", image, config, inputs, limit)
+}
+
+fn replay_from(
+    file: &str,
+    image: &Image,
+    config: &[u64],
+    inputs: &[Vec<u64>],
+    limit: Duration,
+) -> Result<ReplayResult, TargetError> {
     let emulator = Emulator::find()?;
     let width = inputs.first().map_or(0, Vec::len);
     if let Some(tick) = inputs.iter().position(|row| row.len() != width) {
@@ -106,7 +131,7 @@ pub fn replay(
     }
     let folder = tempfile::tempdir().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
     write_words(&folder.path().join("config.bin"), config.iter().copied())?;
-    write_words(&folder.path().join("input.bin"), inputs.iter().flatten().copied())?;
+    write_words(&folder.path().join(file), inputs.iter().flatten().copied())?;
     emulator.run(image, folder.path(), limit)?;
     let stats = parse_stats(&read_words(&folder.path().join("stats.bin"))?)?;
     let words = read_words(&folder.path().join("output.bin"))?;

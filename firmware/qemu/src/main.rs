@@ -2,12 +2,14 @@
 //!
 //! Reads `config.bin` (CONFIG_WORDS words) and `input.bin` (rows of INPUT_WORDS words) from the emulator's
 //! working folder; writes `output.bin` (rows of OUTPUT_WORDS words and the digest of the state after the
-//! tick) and `stats.bin` (see [`stats`]). All words are 64 bits, little endian. No control decision is made here.
+//! tick) and `stats.bin` (see [`stats`]). Where there is a `machine.bin` it replays supervised ticks from that instead, see
+//! [`machine`]. All words are 64 bits, little endian. No control decision is made here.
 
 #![no_std]
 #![no_main]
 
 mod instructions;
+mod machine;
 mod panic;
 mod semihosting;
 mod stack;
@@ -35,11 +37,17 @@ fn main() -> ! {
 
 /// The whole run: files in, files out.
 fn replay() -> Result<(), Exit> {
+    if !controller::integrity::intact() {
+        return Err(Exit::Corrupt);
+    }
     let timer = cortex_m::Peripherals::take().ok_or(Exit::Fault)?.SYST;
     let mut counter = InstructionCounter::new(timer);
     let self_test = counter.self_test();
 
     let config = read_config()?;
+    if let Some(input) = File::open(b"machine.bin\0") {
+        return machine::replay(&mut counter, self_test, &config, &input);
+    }
     let input = File::open(b"input.bin\0").ok_or(Exit::NoInput)?;
     let output = File::create(b"output.bin\0").ok_or(Exit::CannotWrite)?;
 

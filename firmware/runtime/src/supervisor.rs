@@ -1,43 +1,52 @@
-//! The supervisor: which phase the machine is in, and why.
+//! The supervisor: which phase the machine is in, why, and what the codes do in it.
+//!
+//! ```text
+//!             arm                    time, all good               run
+//! disarmed ────────► arming ───────────────────────────► holding ◄────► running
+//!     ▲                 │                                   │   hold       │
+//!     │   codes at rest │ ramp down, or a cause             │              │
+//!     ├─────────────────┴──── ramping down ◄────────────────┴──────────────┘
+//!     │ acknowledge               │ for a cause
+//!     └───────── faulted ◄────────┘            a cause that takes the amplifiers off at once: from any phase to faulted
+//! ```
+//! The law runs in one phase only. In all others codes stand still or go to rest by whole codes, never by more than the slew
+//! limit, so that no reading and no request can make a jump. `docs/supervisor.md` has the table of causes.
+//!
+//! | module | what |
+//! |---|---|
+//! | `kinds` | phases, requests, causes, event bits |
+//! | `plan` | what the spec fixes |
+//! | `debounce` | for how long a condition must last before it is a cause |
+//! | `watch` | what the gauges show against what was sent: stuck, disagreeing, astray |
+//! | `phases` | the state machine |
+//! | `approach` | set-points from where the legs are to where they are asked for |
 
+mod approach;
+mod debounce;
 mod kinds;
+mod phases;
+mod plan;
+mod watch;
 
-pub use kinds::{CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STOP};
+pub use approach::Approach;
+pub use debounce::{Debounce, TIMED};
+pub use kinds::{
+    CONVERTER, Cause, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, RAMPS_DOWN, Request, STOP, SWITCHES_OFF,
+};
+pub use phases::Supervisor;
+pub use plan::Plan;
+pub use watch::{Channel, Sample, Watch};
 
-use crate::digest::Digest;
-use crate::real::Real;
-
-/// State of the supervisor.
-#[derive(Debug, Clone, Copy)]
-pub struct Supervisor<T> {
-    /// What the machine is doing.
-    pub phase: Phase,
-    /// Why, if it was forced upon it.
-    pub cause: Cause,
-    /// The request of the last tick.
-    pub request: Request,
-    /// Displacement of each leg that the gauges last showed, m.
-    pub measured: [T; 6],
-}
-
-impl<T: Real> Default for Supervisor<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<T: Real> Supervisor<T> {
-    /// Reset: disarmed.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { phase: Phase::Disarmed, cause: Cause::None, request: Request::None, measured: [T::ZERO; 6] }
-    }
-
-    /// Adds the state to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        digest.word(self.phase.word() | self.cause.word() << 8 | self.request.word() << 16);
-        for value in &self.measured {
-            digest.real(*value);
-        }
+/// `code` moved towards `goal` by at most `step` (≥ 0) codes.
+#[inline]
+#[must_use]
+pub fn toward(code: i32, goal: i32, step: i32) -> i32 {
+    let (up, down) = (code.saturating_add(step), code.saturating_sub(step));
+    if goal > up {
+        up
+    } else if goal < down {
+        down
+    } else {
+        goal
     }
 }

@@ -36,6 +36,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         mod config;
         pub mod dynamics;
         pub mod hysteresis;
+        pub mod integrity;
         pub mod kinematics;
         pub mod limits;
         mod machine_words;
@@ -44,6 +45,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         mod state;
         mod step;
         pub mod supervised;
+        pub mod supervision;
         mod words;
 
         pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};

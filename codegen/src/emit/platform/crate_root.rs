@@ -39,6 +39,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         mod config;
         pub mod dynamics;
         pub mod hysteresis;
+        pub mod integrity;
         pub mod kinematics;
         pub mod limits;
         mod machine_words;
@@ -48,6 +49,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         mod state;
         mod step;
         pub mod supervised;
+        pub mod supervision;
         pub mod task_space;
         mod words;
 

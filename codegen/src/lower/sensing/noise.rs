@@ -20,6 +20,17 @@ pub struct PoseNoise {
     pub leg: [f64; 6],
 }
 
+/// Reading of each gauge (rows) per pose coordinate (columns) at rest, m/m and m/rad; none without gauges that see the platform.
+///
+/// # Errors
+/// Gauges that do not fix the pose.
+pub fn readings_per_pose(model: &Model) -> Result<Option<[[f64; 6]; 6]>, Vec<Diagnostic>> {
+    match &model.task_space {
+        Some(task) => Ok(Some(layout::check(model, &task.probes)?.jacobian)),
+        None => Ok(None),
+    }
+}
+
 /// Pose noise of a platform with gauges; none for one without.
 ///
 /// # Errors

@@ -26,7 +26,7 @@ use super::stop::Stop;
 use super::trajectory::Cursor;
 use super::{Command, CommandKind, Frames, Plan, Target};
 use crate::digest::Digest;
-use crate::real::Real;
+use crate::real::{Real, saturate};
 
 /// Status: a set-point or command is refused and the platform held, for it is not finite, out of the workspace, or a jump.
 pub const REFUSED: u32 = 1 << 16;
@@ -96,6 +96,27 @@ impl<T: Real> Generator<T> {
             finished: None,
             sequence: 0,
             age: 0,
+        }
+    }
+
+    /// At rest at a pose of the platform (finite, brought within the workspace); the bias is approached from there.
+    #[must_use]
+    pub fn starting_at<F>(plan: &Plan<T, F>, pose: &[T; 6]) -> Self {
+        let mut generator = Self::new();
+        for axis in 0..6 {
+            let bound = plan.bound[axis];
+            generator.target.pose[axis] = saturate(pose[axis], -bound, bound);
+        }
+        generator
+    }
+
+    /// Stands still at once where the last set-point was, whatever motion was under way; a bias that was not reached is
+    /// approached anew.
+    pub fn stand_still(&mut self) {
+        let began = !matches!(self.phase, Phase::Reset | Phase::Bias);
+        self.rest();
+        if !began {
+            self.phase = Phase::Reset;
         }
     }
 
@@ -196,12 +217,16 @@ impl<T: Real> Generator<T> {
         if accepted { 0 } else { REFUSED }
     }
 
-    /// The bias is a move of the platform itself, for the user's frames may bend the way. Without it nothing moves.
+    /// The bias is a move of the platform itself, for the user's frames may bend the way. Without it nothing moves. It begins
+    /// where the platform stands: at rest after reset.
     #[inline(never)]
     fn begin_bias<F: Frames<T>>(&mut self, plan: &Plan<T, F>) -> bool {
         self.place = plan.home;
         match plan.admitted(&plan.home) {
-            Some(goal) => self.begin_straight(plan, &[T::ZERO; 6], &goal, Phase::Bias),
+            Some(goal) => {
+                let from = self.target.pose;
+                self.begin_straight(plan, &from, &goal, Phase::Bias)
+            }
             None => false,
         }
     }

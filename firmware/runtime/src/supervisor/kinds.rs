@@ -43,6 +43,13 @@ impl Phase {
         }
     }
 
+    /// Whether the amplifiers are to be on.
+    #[inline]
+    #[must_use]
+    pub const fn is_powered(self) -> bool {
+        !matches!(self, Self::Disarmed | Self::Faulted)
+    }
+
     /// The inverse of [`Phase::word`]; none for any other number.
     #[must_use]
     pub const fn from_word(word: u64) -> Option<Self> {
@@ -175,6 +182,13 @@ impl Cause {
         }
     }
 
+    /// 1 << word: its bit in conditions.
+    #[inline]
+    #[must_use]
+    pub const fn bit(self) -> u32 {
+        1 << self.word()
+    }
+
     /// The inverse of [`Cause::word`]; none for any other number.
     #[must_use]
     pub const fn from_word(word: u64) -> Option<Self> {
@@ -196,6 +210,21 @@ impl Cause {
         })
     }
 }
+
+/// Causes that take the amplifiers off at once, in any phase.
+pub const SWITCHES_OFF: u32 = Cause::Integrity.bit() | Cause::EmergencyStop.bit();
+/// Causes that bring the codes to rest, then take the amplifiers off.
+pub const RAMPS_DOWN: u32 = Cause::GaugeNotFinite.bit()
+    | Cause::GaugeRange.bit()
+    | Cause::GaugeStuck.bit()
+    | Cause::GaugeDisagreement.bit();
+/// Causes that hold the codes.
+pub const HOLDS: u32 = Cause::TrackingError.bit()
+    | Cause::VoltageSaturation.bit()
+    | Cause::SlewSaturation.bit()
+    | Cause::MissedTick.bit()
+    | Cause::LinkLost.bit()
+    | Cause::Converter.bit();
 
 #[cfg(test)]
 mod tests {

@@ -6,13 +6,22 @@
 pub use specgen_runtime::supervisor::{
     CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STOP,
 };
+use specgen_runtime::supervisor::{Sample, toward};
 use specgen_runtime::{Digest, supervisor};
+use crate::hysteresis::TABLES;
+use crate::limits::DAC;
 
 pub use crate::machine_words::{
     MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS,
     machine_output_words,
 };
-use crate::{Config, Real, State, TickInput, TickOutput, step};
+use crate::supervision::PLAN;
+use specgen_runtime::{Estimate, Law, Real as _};
+use crate::limits::{gauge_is_accepted, leg_setpoint_is_accepted};
+use crate::step::{GAUGE_FAULT, LEG_LIMITED};
+use crate::supervision::{APPROACH_KEEP, APPROACH_NEGLIGIBLE};
+use crate::{SetpointKind, kinematics};
+use crate::{Config, LEGS, Real, State, TickInput, TickOutput, step};
 
 /// State of the supervisor in this controller's arithmetic.
 pub type Supervisor = supervisor::Supervisor<Real>;
@@ -77,30 +86,224 @@ pub struct MachineOutput {
 }
 
 /// One supervised tick.
+///
+/// What events and request say acts in this tick; what the readings show acts in the next one, after the law has seen
+/// them.
 pub fn supervise(
     config: &Config,
     machine: &mut Machine,
     input: &MachineInput,
 ) -> MachineOutput {
     let Machine { state, supervisor } = machine;
-    supervisor.phase = match input.request {
-        Request::Arm | Request::Run => Phase::Running,
-        Request::RampDown => Phase::Disarmed,
-        _ => supervisor.phase,
-    };
-    supervisor.request = input.request;
-    let mut tick = step(config, state, &input.tick);
-    let amplifier_on = supervisor.phase == Phase::Running;
-    if !amplifier_on {
-        *state = State::new();
-        tick.dac_code = [crate::limits::CODES[0]; crate::LEGS];
-        tick.voltage = [crate::limits::DAC
-            .voltage(crate::limits::CODES[0]); crate::LEGS];
+    let at_rest = supervisor.phase != Phase::Running
+        && state.legs.iter().all(|leg| leg.code == PLAN.rest);
+    let begins = supervisor.decide(&PLAN, input.request, input.events, at_rest);
+    if begins {
+        begin(config, state, supervisor, &input.tick);
     }
+    let tick = if supervisor.phase == Phase::Running {
+        work(config, state, supervisor, &input.tick)
+    } else {
+        stand(config, state, supervisor, &input.tick)
+    };
     MachineOutput {
         tick,
         phase: supervisor.phase,
         cause: supervisor.cause,
-        amplifier_on,
+        amplifier_on: supervisor.phase.is_powered(),
     }
+}
+
+/// Puts the law where the machine is: the demand on a leg is where its gauge shows it, and its level estimate is what the
+/// model lacks to that, so that the code held stays what the law asks for. Without adaptation, or where the gauge is not
+/// believed, the demand is where the model has the leg. From there the demand goes to the set-point that is given.
+#[cold]
+#[inline(never)]
+fn begin(
+    config: &Config,
+    state: &mut State,
+    supervisor: &mut Supervisor,
+    input: &TickInput,
+) {
+    let State { legs, demand, ticks_in_run } = state;
+    *ticks_in_run = 0;
+    for ((leg, demand), reading) in legs
+        .iter_mut()
+        .zip(demand.iter_mut())
+        .zip(&input.displacement)
+    {
+        let modelled = leg.memory.displacement();
+        let adapts = config.law() != Law::Invhys && gauge_is_accepted(*reading);
+        *demand = if adapts { *reading } else { modelled };
+        leg.estimate = Estimate {
+            level: *demand - modelled,
+            drift: 0.0,
+        };
+    }
+    supervisor.fresh = false;
+    supervisor
+        .approach
+        .begin(
+            match config.setpoint() {
+                SetpointKind::Pose => kinematics::pose_from_legs(demand),
+                SetpointKind::Leg => *demand,
+            },
+        );
+}
+
+/// The control law, watched.
+#[inline]
+fn work(
+    config: &Config,
+    state: &mut State,
+    supervisor: &mut Supervisor,
+    input: &TickInput,
+) -> TickOutput {
+    let channel = supervisor.watch.take_turn();
+    let expected = expected(state, channel);
+    let target = component(&state.demand, channel);
+    let before = codes(state);
+    let accepted = match config.setpoint() {
+        SetpointKind::Pose => kinematics::pose_is_accepted(&input.setpoint),
+        SetpointKind::Leg => leg_setpoint_is_accepted(&input.setpoint),
+    };
+    let setpoint = supervisor
+        .approach
+        .setpoint(&input.setpoint, accepted, APPROACH_KEEP, APPROACH_NEGLIGIBLE);
+    let output = step(
+        config,
+        state,
+        &TickInput {
+            setpoint,
+            displacement: input.displacement,
+        },
+    );
+    let faults = output.status & GAUGE_FAULT;
+    let limited = output.status & LEG_LIMITED;
+    if faults == 0 {
+        let reading = component(&input.displacement, channel);
+        let error = Some(target - reading);
+        supervisor
+            .look(
+                &PLAN,
+                channel,
+                &Sample {
+                    word: reading,
+                    reading,
+                    expected,
+                    error,
+                },
+            );
+    }
+    if faults | limited == 0 {
+        supervisor.seen = 0;
+    } else {
+        let step = config.code_limits().max_step;
+        supervisor
+            .see(
+                faults >> 8,
+                limited,
+                &input.displacement,
+                &moved(state, &before),
+                step,
+            );
+    }
+    output
+}
+
+/// Codes held or on their way to rest, the law suspended.
+#[cold]
+#[inline(never)]
+fn stand(
+    config: &Config,
+    state: &mut State,
+    supervisor: &mut Supervisor,
+    input: &TickInput,
+) -> TickOutput {
+    let channel = supervisor.watch.take_turn();
+    let expected = expected(state, channel);
+    move_codes(config, state, supervisor);
+    let mut output = TickOutput {
+        voltage: [0.0; LEGS],
+        requested: [0.0; LEGS],
+        demand: state.demand,
+        level: [0.0; LEGS],
+        drift: [0.0; LEGS],
+        dac_code: codes(state),
+        status: 0,
+    };
+    let mut faults = 0;
+    for (index, leg) in state.legs.iter().enumerate() {
+        faults |= (!gauge_is_accepted(input.displacement[index]) as u32) << index;
+        output.voltage[index] = DAC.voltage(leg.code);
+        output.requested[index] = leg.memory.displacement();
+        output.level[index] = leg.estimate.level;
+        output.drift[index] = leg.estimate.drift;
+    }
+    output.status = faults << 8;
+    if faults == 0 && compares(supervisor.phase) {
+        let reading = component(&input.displacement, channel);
+        supervisor
+            .look(
+                &PLAN,
+                channel,
+                &Sample {
+                    word: reading,
+                    reading,
+                    expected,
+                    error: None,
+                },
+            );
+    }
+    supervisor.see(faults, 0, &input.displacement, &[0; LEGS], 1);
+    output
+}
+
+/// What a leg ought to show by the code sent over the interval that has ended, m.
+#[inline]
+fn expected(state: &State, channel: usize) -> Real {
+    match state.legs.get(channel) {
+        Some(leg) => leg.memory.displacement(),
+        None => Real::ZERO,
+    }
+}
+
+#[inline]
+fn component(vector: &[Real; 6], index: usize) -> Real {
+    match vector.get(index) {
+        Some(value) => *value,
+        None => Real::ZERO,
+    }
+}
+
+/// Codes held, or on their way to rest; the memories follow what is really sent.
+fn move_codes(config: &Config, state: &mut State, supervisor: &mut Supervisor) {
+    let step = supervisor.step_to_rest(&PLAN, config.code_limits().max_step);
+    for (leg, table) in state.legs.iter_mut().zip(&TABLES) {
+        leg.code = toward(leg.code, PLAN.rest, step);
+        leg.memory.apply(table, DAC.drive(leg.code));
+    }
+}
+
+/// Codes held at the outputs.
+#[inline]
+fn codes(state: &State) -> [i32; LEGS] {
+    let [a, b, c, d, e, f] = &state.legs;
+    [a.code, b.code, c.code, d.code, e.code, f.code]
+}
+
+/// Codes by which each leg moved.
+#[cold]
+fn moved(state: &State, before: &[i32; LEGS]) -> [i32; LEGS] {
+    let mut moved = codes(state);
+    for (code, before) in moved.iter_mut().zip(before) {
+        *code -= *before;
+    }
+    moved
+}
+
+/// Whether gauges are compared with the model although the law does not run: the codes must stand still.
+#[inline]
+fn compares(phase: Phase) -> bool {
+    matches!(phase, Phase::Arming | Phase::Holding)
 }

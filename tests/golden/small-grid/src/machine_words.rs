@@ -30,8 +30,8 @@ pub const MACHINE_INPUT_NAMES: [&str; MACHINE_INPUT_WORDS] = [
     "events",
 ];
 
-/// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16; `conditions` has a bit for each
-/// cause that is present in the tick, debounced or not: bit 1 << cause.
+/// Names of the output words. `supervisor` is phase | cause << 8 | amplifier on << 16; `conditions` has bit 1 << cause
+/// for each cause that is present, whether it has lasted or not, and from bit 16 on the gauges or legs concerned.
 pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] = [
     "voltage[0]",
     "voltage[1]",
@@ -103,5 +103,6 @@ pub fn machine_output_words(
     }
     words[OUTPUT_WORDS] = output.phase.word() | output.cause.word() << 8
         | (output.amplifier_on as u64) << 16;
+    words[OUTPUT_WORDS + 1] = machine.supervisor.conditions as u64;
     words
 }

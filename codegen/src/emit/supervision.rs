@@ -1,0 +1,65 @@
+//! `src/supervision.rs`: constants of the supervisor. Reads [`ir::Supervision`](crate::ir::Supervision).
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use super::literal;
+use crate::ir::Ir;
+
+pub fn emit(ir: &Ir) -> TokenStream {
+    let s = &ir.supervision;
+    let real = |value| literal::real(ir.scalar, value);
+    let count = |value: u32| literal::count(value as usize);
+    let counts = |values: &[u32; 6]| {
+        let values = values.iter().map(|value| count(*value));
+        quote! { [#(#values),*] }
+    };
+    let (arm_ticks, rest) = (count(s.arm_ticks), literal::integer(s.rest));
+    let (ramp_step, ramp_every) = (literal::integer(s.ramp_step), count(s.ramp_every));
+    let (patience, weight) = (counts(&s.patience), counts(&s.weight));
+    let (stuck_motion, stuck_samples) = (real(s.stuck_motion), count(s.stuck_samples));
+    let (disagreement, disagreement_samples) = (real(s.disagreement), count(s.disagreement_samples));
+    let (tracking, tracking_samples) = (literal::reals(ir.scalar, &s.tracking), count(s.tracking_samples));
+    let of_kind = match &s.readings_per_leg {
+        Some(rows) => {
+            let rows = literal::matrix(ir.scalar, rows);
+            quote! {
+                /// Reading of each gauge (rows) per displacement of each leg (columns) at rest, m/m; from `gauge` and `geometry`.
+                pub const READINGS_PER_LEG: [[Real; 6]; 6] = #rows;
+            }
+        }
+        None => {
+            let keep = real(s.approach_keep);
+            quote! {
+                /// What is left after a tick of the way to the set-point when the law begins; from `supervisor.arm_time`.
+                pub const APPROACH_KEEP: Real = #keep;
+                /// A way this short, m and rad, is none.
+                pub const APPROACH_NEGLIGIBLE: Real = 1e-13;
+            }
+        }
+    };
+    quote! {
+        #![doc = " What the supervisor takes for a fault; from `supervisor`."]
+
+        use specgen_runtime::supervisor::Plan;
+
+        use crate::Real;
+
+        /// Bounds and times, these in ticks, or in samples of six ticks.
+        pub const PLAN: Plan<Real> = Plan {
+            arm_ticks: #arm_ticks,
+            rest: #rest,
+            ramp_step: #ramp_step,
+            ramp_every: #ramp_every,
+            patience: #patience,
+            weight: #weight,
+            stuck_motion: #stuck_motion,
+            stuck_samples: #stuck_samples,
+            disagreement: #disagreement,
+            disagreement_samples: #disagreement_samples,
+            tracking: [#tracking],
+            tracking_samples: #tracking_samples,
+        };
+        #of_kind
+    }
+}

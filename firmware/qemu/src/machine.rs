@@ -1,0 +1,146 @@
+//! Replays supervised ticks: rows of MACHINE_INPUT_WORDS words in, rows of MACHINE_OUTPUT_WORDS words and the digest of the
+//! machine out. Beside each tick that runs throughout, the control law alone is counted on a copy of the state: the difference is
+//! what the supervisor costs.
+
+use crate::instructions::{InstructionCounter, SelfTest};
+use crate::semihosting::{Exit, File};
+use crate::stats::{self, Stage, Summary};
+use crate::{is_due, specgen_step, stack};
+use controller::supervised::{
+    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, MachineOutput, Phase, machine_output_words,
+    supervise,
+};
+use controller::{CONFIG_WORDS, Config, State, TickInput, TickOutput};
+use core::mem::MaybeUninit;
+
+/// Ticks per file access.
+const BATCH: usize = 64;
+
+/// Stages of the statistics: ticks that run on, the law alone in these, all other ticks.
+const RUNNING: usize = 0;
+const LAW: usize = 1;
+const OTHER: usize = 2;
+
+/// The whole run.
+#[inline(never)]
+pub fn replay(
+    counter: &mut InstructionCounter,
+    self_test: SelfTest,
+    config: &Config,
+    input: &File,
+) -> Result<(), Exit> {
+    let output = File::create(b"output.bin\0").ok_or(Exit::CannotWrite)?;
+    let mut machine = Machine::new();
+    let mut stages = [Stage::new("supervise"), Stage::new("law"), Stage::new("other phases")];
+    let mut rows = [[0; MACHINE_INPUT_WORDS]; BATCH];
+    let mut results = [[0; MACHINE_OUTPUT_WORDS + 1]; BATCH];
+    let mut ticks = 0;
+    let mut deepest = 0;
+    loop {
+        let bytes = input.read(rows.as_flattened_mut());
+        let count = bytes / size_of::<[u64; MACHINE_INPUT_WORDS]>();
+        if count * size_of::<[u64; MACHINE_INPUT_WORDS]>() != bytes {
+            return Err(Exit::InputSize);
+        }
+        if count == 0 {
+            break;
+        }
+        for (row, result) in rows.iter().zip(&mut results).take(count) {
+            let tick_input = MachineInput::from_words(row);
+            let ran = machine.supervisor.phase == Phase::Running;
+            let law = ran.then(|| count_law(counter, config, &machine.state, &tick_input.tick));
+            let (tick_output, instructions, depth) = tick(counter, config, &mut machine, &tick_input, is_due(ticks));
+            match law {
+                Some(law) if tick_output.phase == Phase::Running => {
+                    stages[RUNNING].add(instructions);
+                    stages[LAW].add(law);
+                }
+                _ => stages[OTHER].add(instructions),
+            }
+            if depth > deepest {
+                deepest = depth;
+            }
+            let words = machine_output_words(&tick_output, &machine);
+            for (slot, word) in result.iter_mut().zip(words) {
+                *slot = word;
+            }
+            result[MACHINE_OUTPUT_WORDS] = machine.digest();
+            ticks += 1;
+        }
+        if !output.write(results.get(..count).unwrap_or_default().as_flattened()) {
+            return Err(Exit::CannotWrite);
+        }
+    }
+    let sizes =
+        [CONFIG_WORDS, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, size_of::<Machine>(), size_of::<Config>()];
+    let summary = Summary {
+        ticks,
+        sizes: sizes.map(|n| n as u64),
+        stack: [deepest as u64, stack::WINDOW as u64],
+        overhead: u64::from(counter.overhead()),
+        self_test,
+        overflows: counter.overflows(),
+    };
+    let stats_file = File::create(b"stats.bin\0").ok_or(Exit::CannotWrite)?;
+    let written = stats::write(&stats_file, &summary, &stages);
+    if written && stats_file.close() && output.close() { Ok(()) } else { Err(Exit::CannotWrite) }
+}
+
+/// Instructions of the control law alone, on a copy of the state.
+#[inline(never)]
+#[allow(unsafe_code)] // The step is called from assembly that counts it.
+fn count_law(counter: &mut InstructionCounter, config: &Config, state: &State, input: &TickInput) -> u32 {
+    let mut copy = *state;
+    let mut output = MaybeUninit::<TickOutput>::uninit();
+    let arguments = [
+        (&raw mut output) as usize,
+        (&raw const *config) as usize,
+        (&raw mut copy) as usize,
+        (&raw const *input) as usize,
+    ];
+    // SAFETY: C passes the address of a result this large first, then the three references.
+    unsafe { counter.measure_call(specgen_step as *const (), arguments) }
+}
+
+/// One supervised tick with its instructions and, if it is to be `painted`, its stack, bytes; else 0. In a frame of its own, so that the stack pointer stands still
+/// around the call.
+#[inline(never)]
+#[allow(unsafe_code)] // The tick is called from assembly that counts it.
+fn tick(
+    counter: &mut InstructionCounter,
+    config: &Config,
+    machine: &mut Machine,
+    input: &MachineInput,
+    painted: bool,
+) -> (MachineOutput, u32, usize) {
+    let mut output = MaybeUninit::<MachineOutput>::uninit();
+    let arguments = [
+        (&raw mut output) as usize,
+        (&raw const *config) as usize,
+        (&raw mut *machine) as usize,
+        (&raw const *input) as usize,
+    ];
+    // SAFETY: C passes the address of a result this large first, then the three references; the tick writes it.
+    unsafe {
+        let tick = specgen_supervise as *const ();
+        let (instructions, depth) = if painted {
+            stack::measure_depth(|| counter.measure_call(tick, arguments))
+        } else {
+            (counter.measure_call(tick, arguments), 0)
+        };
+        (output.assume_init(), instructions, depth)
+    }
+}
+
+/// C returns what is larger through memory of the caller, whatever its fields.
+const LARGEST_RESULT_IN_REGISTERS: usize = 32;
+const _: () = assert!(size_of::<MachineOutput>() > LARGEST_RESULT_IN_REGISTERS);
+
+/// What the targets call every tick.
+#[unsafe(no_mangle)]
+#[inline(never)]
+#[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
+#[allow(improper_ctypes_definitions)] // Caller and callee are compiled together; only the registers matter.
+extern "C" fn specgen_supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
+    supervise(config, machine, input)
+}

@@ -1,0 +1,81 @@
+//! For how long a condition must last before it is a cause.
+
+use super::kinds::Cause;
+use super::plan::Plan;
+use crate::digest::Digest;
+
+/// Causes that are timed tick by tick, in the order of [`Plan::patience`]. Those of the watch are counted in samples there; all
+/// others act at once.
+pub const TIMED: [Cause; 6] = [
+    Cause::GaugeNotFinite,
+    Cause::GaugeRange,
+    Cause::VoltageSaturation,
+    Cause::SlewSaturation,
+    Cause::MissedTick,
+    Cause::Converter,
+];
+
+/// Causes that act in the tick in which they are seen.
+const AT_ONCE: u32 = Cause::LinkLost.bit() | Cause::Integrity.bit() | Cause::EmergencyStop.bit();
+
+/// Leaky counts: a condition that comes and goes counts, too, if it is there more often than not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Debounce {
+    /// Of each of [`TIMED`].
+    pub counts: [u32; 6],
+}
+
+impl Default for Debounce {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Debounce {
+    /// Nothing counted.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { counts: [0; 6] }
+    }
+
+    /// Counts the conditions that are `present` (bits of causes) and returns the causes that have lasted.
+    ///
+    /// Mostly nothing is, and nothing was: `busy` is what the last call left there, any count above zero.
+    #[inline]
+    pub fn count<T>(&mut self, plan: &Plan<T>, present: u32, busy: &mut bool) -> u32 {
+        if present == 0 && !*busy {
+            return 0;
+        }
+        self.count_slowly(plan, present, busy)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn count_slowly<T>(&mut self, plan: &Plan<T>, present: u32, busy: &mut bool) -> u32 {
+        let mut lasted = present & AT_ONCE;
+        let mut any = 0;
+        for (index, (cause, count)) in TIMED.iter().zip(&mut self.counts).enumerate() {
+            let patience = plan.patience[index];
+            if present & cause.bit() == 0 {
+                *count = count.saturating_sub(1);
+            } else {
+                // Held at the patience, so that it is forgotten as fast as it was learned.
+                let sum = count.saturating_add(plan.weight[index]);
+                *count = if sum > patience { patience } else { sum };
+                if *count >= patience {
+                    lasted |= cause.bit();
+                }
+            }
+            any |= *count;
+        }
+        *busy = any != 0;
+        lasted
+    }
+
+    /// Adds the state to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        for count in &self.counts {
+            digest.word(u64::from(*count));
+        }
+    }
+}

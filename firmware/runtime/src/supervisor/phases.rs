@@ -1,0 +1,263 @@
+//! The state machine.
+
+use super::approach::Approach;
+use super::debounce::Debounce;
+use super::kinds::{Cause, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF};
+use super::plan::Plan;
+use super::watch::{Sample, Watch};
+use crate::digest::Digest;
+use crate::real::Real;
+
+/// Event bits begin at the bit of [`Cause::MissedTick`], in the order of the causes.
+const FIRST_EVENT: u64 = Cause::MissedTick.word();
+const EVENTS: u32 = 0x1f;
+/// Conditions name the gauges or legs that they are about from this bit on.
+const FIRST_CHANNEL: u32 = 16;
+
+/// State of the supervisor.
+#[derive(Debug, Clone, Copy)]
+pub struct Supervisor<T> {
+    /// What the machine is doing.
+    pub phase: Phase,
+    /// Why, if it was forced upon it.
+    pub cause: Cause,
+    /// The request of the last tick.
+    pub request: Request,
+    /// Armed since it last ran: the law begins anew.
+    pub fresh: bool,
+    /// A request to arm that began to be given and could not be followed yet.
+    pub wants_arming: bool,
+    /// What the last tick showed of gauges and limits: bits of causes, and of channels.
+    pub seen: u32,
+    /// Conditions of the present tick: bits of causes, and from bit 16 on the gauges or legs that they are about.
+    pub conditions: u32,
+    /// How long conditions have lasted.
+    pub debounce: Debounce,
+    /// Some of them are being counted.
+    pub busy: bool,
+    /// Ticks without a condition while arming; ticks of a ramp.
+    pub ticks: u32,
+    /// What the gauges show against what was sent.
+    pub watch: Watch<T>,
+    /// Way to the set-point that is asked for, where the law has no generator.
+    pub approach: Approach<T>,
+}
+
+impl<T: Real> Default for Supervisor<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Supervisor<T> {
+    /// Reset: disarmed, nothing seen.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self {
+            phase: Phase::Disarmed,
+            cause: Cause::None,
+            request: Request::None,
+            fresh: true,
+            wants_arming: false,
+            seen: 0,
+            conditions: 0,
+            debounce: Debounce::new(),
+            busy: false,
+            ticks: 0,
+            watch: Watch::new(),
+            approach: Approach::new(),
+        }
+    }
+
+    /// Brings the machine into the phase of the coming interval; returns whether it begins to run with it.
+    ///
+    /// `events` are what the target noticed since the last tick, `at_rest` whether every code is at rest (not asked while
+    /// running).
+    #[inline]
+    pub fn decide(&mut self, plan: &Plan<T>, request: Request, events: u32, at_rest: bool) -> bool {
+        let begun = request != self.request;
+        self.request = request;
+        let present = (self.seen & CAUSES) | self.watch.present | (events & EVENTS) << FIRST_EVENT;
+        self.conditions = self.seen | present | self.watch.suspected() << FIRST_CHANNEL;
+        let lasted = self.debounce.count(plan, present, &mut self.busy) | self.watch.lasted;
+        self.watch.lasted = 0;
+        if self.phase == Phase::Running && lasted == 0 && !matches!(request, Request::Hold | Request::RampDown) {
+            return false;
+        }
+        self.change(plan, begun, present, lasted, at_rest)
+    }
+
+    /// Everything but running on.
+    #[cold]
+    #[inline(never)]
+    fn change(&mut self, plan: &Plan<T>, begun: bool, present: u32, lasted: u32, at_rest: bool) -> bool {
+        if lasted & SWITCHES_OFF != 0 && self.phase != Phase::Faulted {
+            self.enter(Phase::Faulted, first(lasted & SWITCHES_OFF));
+            return false;
+        }
+        match self.phase {
+            Phase::Disarmed => self.disarmed(begun, present, at_rest),
+            Phase::Arming => return self.arming(plan, present, lasted),
+            Phase::Running => self.running(lasted),
+            Phase::Holding => return self.holding(begun, present, lasted),
+            Phase::RampingDown => self.ramping_down(lasted, at_rest),
+            Phase::Faulted => {
+                if self.request == Request::Acknowledge && begun && present == 0 && at_rest {
+                    self.enter(Phase::Disarmed, Cause::None);
+                }
+            }
+        }
+        false
+    }
+
+    fn disarmed(&mut self, begun: bool, present: u32, at_rest: bool) {
+        // A request that stays from before does not count; one that came too early waits as long as it is given.
+        self.wants_arming = self.request == Request::Arm && (begun || self.wants_arming);
+        if self.wants_arming && present == 0 && at_rest {
+            self.wants_arming = false;
+            self.fresh = true;
+            self.enter(Phase::Arming, Cause::None);
+        }
+    }
+
+    fn arming(&mut self, plan: &Plan<T>, present: u32, lasted: u32) -> bool {
+        if lasted & (RAMPS_DOWN | HOLDS) != 0 {
+            self.enter(Phase::RampingDown, first(lasted));
+        } else if self.request == Request::RampDown {
+            self.enter(Phase::RampingDown, Cause::None);
+        } else if present != 0 {
+            self.ticks = 0;
+        } else {
+            self.ticks = self.ticks.saturating_add(1);
+            if self.ticks >= plan.arm_ticks {
+                let runs = self.request == Request::Run;
+                self.enter(if runs { Phase::Running } else { Phase::Holding }, Cause::None);
+                return runs;
+            }
+        }
+        false
+    }
+
+    fn running(&mut self, lasted: u32) {
+        if lasted & RAMPS_DOWN != 0 {
+            self.enter(Phase::RampingDown, first(lasted & RAMPS_DOWN));
+        } else if self.request == Request::RampDown {
+            self.enter(Phase::RampingDown, first(lasted));
+        } else {
+            // For a cause, or because it is requested.
+            self.enter(Phase::Holding, first(lasted));
+        }
+    }
+
+    fn holding(&mut self, begun: bool, present: u32, lasted: u32) -> bool {
+        if lasted & RAMPS_DOWN != 0 {
+            self.enter(Phase::RampingDown, first(lasted & RAMPS_DOWN));
+            return false;
+        }
+        if self.cause == Cause::None {
+            self.cause = first(lasted);
+        }
+        match self.request {
+            Request::RampDown => self.enter(Phase::RampingDown, self.cause),
+            Request::Acknowledge if begun && present == 0 => self.cause = Cause::None,
+            // After a cause, only a request that begins now shows that the user knows of it.
+            Request::Run if present == 0 && (begun || self.cause == Cause::None) => {
+                self.enter(Phase::Running, Cause::None);
+                return true;
+            }
+            _ => {}
+        }
+        false
+    }
+
+    fn ramping_down(&mut self, lasted: u32, at_rest: bool) {
+        if self.cause == Cause::None {
+            self.cause = first(lasted);
+        }
+        if at_rest {
+            let phase = if self.cause == Cause::None { Phase::Disarmed } else { Phase::Faulted };
+            self.enter(phase, self.cause);
+        }
+    }
+
+    fn enter(&mut self, phase: Phase, cause: Cause) {
+        self.phase = phase;
+        self.cause = cause;
+        self.ticks = 0;
+        // What was suspected before belongs to the phase before. A ramp and a hold go on with it.
+        if !matches!(phase, Phase::Holding | Phase::RampingDown) {
+            self.watch.forgive();
+            self.debounce = Debounce::new();
+            self.busy = false;
+        }
+    }
+
+    /// Codes by which every leg goes towards rest in this tick, when the law does not run; never above `max_step`.
+    #[inline]
+    pub fn step_to_rest(&mut self, plan: &Plan<T>, max_step: i32) -> i32 {
+        match self.phase {
+            Phase::Arming | Phase::Holding | Phase::Running => 0,
+            Phase::Disarmed | Phase::Faulted => max_step,
+            Phase::RampingDown => {
+                self.ticks = self.ticks.saturating_add(1);
+                if self.ticks < plan.ramp_every {
+                    return 0;
+                }
+                self.ticks = 0;
+                if plan.ramp_step < max_step { plan.ramp_step } else { max_step }
+            }
+        }
+    }
+
+    /// Takes what a tick showed: gauges that are not believed (bits), legs that a limit held back (bits).
+    #[inline]
+    pub fn see(&mut self, faults: u32, limited: u32, words: &[T; 6], moved: &[i32; 6], max_step: i32) {
+        self.seen = if faults | limited == 0 { 0 } else { seen(faults, limited, words, moved, max_step) };
+    }
+
+    /// Takes a sample of the channel whose turn it was.
+    #[inline]
+    pub fn look(&mut self, plan: &Plan<T>, channel: usize, sample: &Sample<T>) {
+        self.watch.look(plan, channel, sample);
+    }
+
+    /// Adds the state to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        digest.word(self.phase.word() | self.cause.word() << 8 | self.request.word() << 16);
+        digest.word(self.fresh as u64 | (self.wants_arming as u64) << 1 | (self.busy as u64) << 2);
+        digest.word(u64::from(self.seen) | u64::from(self.conditions) << 32);
+        digest.word(u64::from(self.ticks));
+        self.debounce.digest(digest);
+        self.watch.digest(digest);
+        self.approach.digest(digest);
+    }
+}
+
+/// Bits of all causes.
+const CAUSES: u32 = SWITCHES_OFF | RAMPS_DOWN | HOLDS;
+
+/// The cause of the lowest bit.
+fn first(bits: u32) -> Cause {
+    match Cause::from_word(bits.trailing_zeros() as u64) {
+        Some(cause) => cause,
+        None => Cause::None,
+    }
+}
+
+/// Gauge faults and limits as conditions.
+#[cold]
+#[inline(never)]
+fn seen<T: Real>(faults: u32, limited: u32, words: &[T; 6], moved: &[i32; 6], max_step: i32) -> u32 {
+    let mut conditions = (faults | limited) << FIRST_CHANNEL;
+    for (index, (word, moved)) in words.iter().zip(moved).enumerate() {
+        let bit = 1 << index;
+        if faults & bit != 0 {
+            conditions |= if word.is_finite() { Cause::GaugeRange.bit() } else { Cause::GaugeNotFinite.bit() };
+        }
+        if limited & bit != 0 {
+            let slewed = *moved >= max_step || *moved <= -max_step;
+            conditions |= if slewed { Cause::SlewSaturation.bit() } else { Cause::VoltageSaturation.bit() };
+        }
+    }
+    conditions
+}

@@ -1,0 +1,186 @@
+//! What the gauges show against what was sent. One gauge and one axis a tick, in turn: faults last longer than six ticks, and a
+//! sixth of the work is a sixth of the time.
+
+use super::kinds::Cause;
+use super::plan::Plan;
+use crate::digest::Digest;
+use crate::real::Real;
+
+/// One gauge in one tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Sample<T> {
+    /// Its word.
+    pub word: T,
+    /// What the word means, m.
+    pub reading: T,
+    /// What it ought to be by the hysteresis model at the voltages sent and the known load, m.
+    pub expected: T,
+    /// Set-point less what is measured of the axis or leg of the same number, m or rad; none where nothing is tracked.
+    pub error: Option<T>,
+}
+
+/// What is remembered of one gauge and one axis.
+#[derive(Debug, Clone, Copy)]
+pub struct Channel<T> {
+    /// Last word of the gauge.
+    pub word: T,
+    /// There is one.
+    pub known: bool,
+    /// Least and most that was expected since that word came, m.
+    pub expected: [T; 2],
+    /// Samples since these lie apart by more than the gauge could have missed.
+    pub stuck: u32,
+    /// Samples, less those without, in which reading and model disagreed.
+    pub disagreed: u32,
+    /// Samples, less those without, in which the axis was too far from its set-point.
+    pub astray: u32,
+}
+
+/// All of them, and whose turn it is.
+#[derive(Debug, Clone, Copy)]
+pub struct Watch<T> {
+    /// Channels 0 to 5.
+    pub channels: [Channel<T>; 6],
+    /// The next one to be looked at.
+    pub turn: usize,
+    /// Channels that are stuck, disagree, are astray: three sets of bits.
+    pub suspects: [u32; 3],
+    /// Their causes, present but not yet lasting.
+    pub present: u32,
+    /// Causes that have lasted, found in the last sample.
+    pub lasted: u32,
+}
+
+impl<T: Real> Default for Watch<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T: Real> Watch<T> {
+    /// Nothing seen.
+    #[must_use]
+    pub const fn new() -> Self {
+        let channel = Channel { word: T::ZERO, known: false, expected: [T::ZERO; 2], stuck: 0, disagreed: 0, astray: 0 };
+        Self { channels: [channel; 6], turn: 0, suspects: [0; 3], present: 0, lasted: 0 }
+    }
+
+    /// Forgets what was seen, but not whose turn it is.
+    #[inline(never)]
+    pub fn forgive(&mut self) {
+        for channel in &mut self.channels {
+            channel.known = false;
+            channel.stuck = 0;
+            channel.disagreed = 0;
+            channel.astray = 0;
+        }
+        self.suspects = [0; 3];
+        self.present = 0;
+        self.lasted = 0;
+    }
+
+    /// The channel whose turn it is in this tick, 0 to 5; the next tick has the next.
+    #[inline]
+    pub fn take_turn(&mut self) -> usize {
+        let turn = if self.turn < 6 { self.turn } else { 0 };
+        self.turn = turn + 1;
+        turn
+    }
+
+    /// Looks at a channel (0 to 5). Every number of the sample is finite.
+    #[inline]
+    pub fn look(&mut self, plan: &Plan<T>, index: usize, sample: &Sample<T>) {
+        let index = if index < 6 { index } else { 0 };
+        let channel = &mut self.channels[index];
+        let [low, high] = &mut channel.expected;
+        let mut moved = false;
+        if channel.known && sample.word == channel.word {
+            if sample.expected < *low {
+                *low = sample.expected;
+            }
+            if sample.expected > *high {
+                *high = sample.expected;
+            }
+            moved = *high - *low > plan.stuck_motion;
+        } else {
+            channel.word = sample.word;
+            channel.known = true;
+            channel.expected = [sample.expected; 2];
+        }
+        let disagrees = (sample.reading - sample.expected).abs() > plan.disagreement;
+        let astray = match sample.error {
+            Some(error) => error.abs() > plan.tracking[index],
+            None => false,
+        };
+        let counted = channel.stuck | channel.disagreed | channel.astray;
+        if moved | disagrees | astray || counted != 0 {
+            self.count(plan, index, [moved, disagrees, astray]);
+        }
+    }
+
+    /// The counts of a channel that something is, or was, wrong with.
+    #[cold]
+    #[inline(never)]
+    fn count(&mut self, plan: &Plan<T>, index: usize, [moved, disagrees, astray]: [bool; 3]) {
+        let index = if index < 6 { index } else { 0 };
+        let channel = &mut self.channels[index];
+        let lasting = [
+            // One word that changes shows that the gauge lives: nothing is left of the count.
+            count(&mut channel.stuck, moved, plan.stuck_samples, u32::MAX),
+            count(&mut channel.disagreed, disagrees, plan.disagreement_samples, 1),
+            count(&mut channel.astray, astray, plan.tracking_samples, 1),
+        ];
+        let causes = [Cause::GaugeStuck, Cause::GaugeDisagreement, Cause::TrackingError];
+        self.present = 0;
+        for (place, seen) in [moved, disagrees, astray].into_iter().enumerate() {
+            let bit = 1 << index;
+            if seen {
+                self.suspects[place] |= bit;
+            } else {
+                self.suspects[place] &= !bit;
+            }
+            if self.suspects[place] != 0 {
+                self.present |= causes[place].bit();
+            }
+            if lasting[place] {
+                self.lasted |= causes[place].bit();
+            }
+        }
+    }
+
+    /// Channels that anything is suspected of, bit by bit.
+    #[inline]
+    #[must_use]
+    pub fn suspected(&self) -> u32 {
+        self.suspects[0] | self.suspects[1] | self.suspects[2]
+    }
+
+    /// Adds the state to a digest.
+    pub fn digest(&self, digest: &mut Digest) {
+        for channel in &self.channels {
+            digest.real(channel.word);
+            digest.real(channel.expected[0]);
+            digest.real(channel.expected[1]);
+            digest.word(u64::from(channel.stuck) | u64::from(channel.known) << 32);
+            digest.word(u64::from(channel.disagreed) << 32 | u64::from(channel.astray));
+        }
+        for word in [self.suspects[0], self.suspects[1], self.suspects[2], self.present, self.lasted] {
+            digest.word(u64::from(word));
+        }
+        digest.word(self.turn as u64);
+    }
+}
+
+/// Counts a sample in which something was seen, takes `off` for one in which it was not; whether it has lasted.
+#[inline]
+fn count(count: &mut u32, seen: bool, patience: u32, off: u32) -> bool {
+    if !seen {
+        *count = count.saturating_sub(off);
+        return false;
+    }
+    // Held at the patience, so that it is forgotten as fast as it was learned.
+    if *count < patience {
+        *count += 1;
+    }
+    *count >= patience
+}

@@ -1,0 +1,260 @@
+//! A supervised controller on a plant that does what the model says, and what may be wrong with it.
+
+use host_sim::controller::{MachineWord, Supervised, TickController};
+use host_sim::word::Scalar;
+use specgen_tests::Emitted;
+
+pub const DISARMED: u8 = 0;
+pub const ARMING: u8 = 1;
+pub const RUNNING: u8 = 2;
+pub const HOLDING: u8 = 3;
+pub const RAMPING: u8 = 4;
+pub const FAULTED: u8 = 5;
+
+pub const NOTHING: u64 = 0;
+pub const ARM: u64 = 1;
+pub const RUN: u64 = 2;
+pub const HOLD: u64 = 3;
+pub const RAMP_DOWN: u64 = 4;
+pub const ACKNOWLEDGE: u64 = 5;
+
+/// Short times, so that a sequence gets somewhere; `timing.period` of the two kinds.
+const SECTION: &str = "[supervisor]
+arm_time          = \"2 ms\"
+ramp_rate         = \"10 V/ms\"
+gauge_time        = \"1 ms\"
+stuck_time        = \"3.6 ms\"
+disagreement      = \"20 um\"
+disagreement_time = \"3.6 ms\"
+tracking_error    = 0.1
+tracking_time     = \"3.6 ms\"
+voltage_time      = \"2 ms\"
+slew_time         = \"1 ms\"
+missed_ticks      = 2
+
+[timing]
+";
+
+/// A spec of `specs/` with that section and further edits.
+pub fn emitted(name: &str, spec: &str, more: &[(&str, &str)]) -> Emitted {
+    let mut edits = vec![("[timing]\n", SECTION)];
+    edits.extend(more);
+    Emitted::new(name, spec, &edits)
+}
+
+/// Which of the two kinds of controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    Legs,
+    Platform,
+}
+
+impl Kind {
+    pub fn spec(self) -> &'static str {
+        match self {
+            Self::Legs => "legs.toml",
+            Self::Platform => "reference.toml",
+        }
+    }
+}
+
+/// One controller and its plant.
+pub struct Bench {
+    pub kind: Kind,
+    pub machine: Supervised,
+    pub scalar: Scalar,
+    /// Input and output row of the last tick.
+    pub input: Vec<u64>,
+    pub output: Vec<u64>,
+    /// What the supervisor said.
+    pub word: MachineWord,
+    pub tick: u64,
+    /// Set-point: pose or leg displacements.
+    pub setpoint: [f64; 6],
+    /// Added to the readings, m.
+    pub offset: [f64; 6],
+    /// Readings that stay as they are.
+    pub frozen: [bool; 6],
+    readings_per_leg: Option<[[f64; 6]; 6]>,
+    limits: [f64; 2],
+    max_step: i64,
+    config: Vec<u64>,
+}
+
+impl Bench {
+    pub fn new(kind: Kind, emitted: &Emitted, settings: &[(&str, f64)]) -> Self {
+        let controller = emitted.controller();
+        let description = controller.description().clone();
+        let mut config = controller.default_config();
+        for (name, value) in settings {
+            description.set_config(&mut config, name, *value).expect("a setting");
+        }
+        let mut machine = Supervised::new(controller).expect("a library with the supervised tick");
+        machine.configure(&config).expect("permitted settings");
+        let ir = &emitted.compiled.ir;
+        Self {
+            kind,
+            scalar: description.scalar,
+            input: vec![0; machine.input_names().len()],
+            output: vec![0; machine.output_names().len()],
+            machine,
+            word: MachineWord::of(0),
+            tick: 0,
+            setpoint: match kind {
+                Kind::Legs => [15e-6; 6],
+                Kind::Platform => [0.0; 6],
+            },
+            offset: [0.0; 6],
+            frozen: [false; 6],
+            readings_per_leg: ir.supervision.readings_per_leg,
+            limits: emitted.compiled.model.actuator.voltage,
+            max_step: i64::from(ir.defaults.max_step),
+            config,
+        }
+    }
+
+    pub fn config(&self) -> &[u64] {
+        &self.config
+    }
+
+    pub fn input_at(&self, name: &str) -> usize {
+        self.machine.input_names().iter().position(|found| found == name).expect("an input word")
+    }
+
+    pub fn at(&self, name: &str) -> usize {
+        self.machine.output_names().iter().position(|found| found == name).expect("an output word")
+    }
+
+    pub fn six(&self, name: &str) -> [f64; 6] {
+        let first = self.at(&format!("{name}[0]"));
+        std::array::from_fn(|leg| self.scalar.decode(self.output[first + leg]))
+    }
+
+    pub fn codes(&self) -> [i64; 6] {
+        let first = self.at("dac_code[0]");
+        std::array::from_fn(|leg| self.output[first + leg] as i64)
+    }
+
+    /// First word of the gauges.
+    pub fn gauges(&self) -> usize {
+        self.input_at(match self.kind {
+            Kind::Legs => "displacement[0]",
+            Kind::Platform => "gauge[0]",
+        })
+    }
+
+    /// What the gauges read of the codes last sent, by the model, with a nanometre that changes from tick to tick.
+    pub fn readings(&self) -> [f64; 6] {
+        let requested = self.six("requested");
+        let plain = match &self.readings_per_leg {
+            None => requested,
+            Some(rows) => {
+                let load = if self.tick == 0 { [0.0; 6] } else { self.six("load") };
+                rows.map(|row| row.iter().zip(&requested).zip(&load).map(|((g, q), p)| g * (q - p)).sum())
+            }
+        };
+        let noise = |gauge: u64| ((self.tick * 37 + gauge * 11) % 23) as f64 * 1e-10;
+        std::array::from_fn(|gauge| plain[gauge] + self.offset[gauge] + noise(gauge as u64))
+    }
+
+    /// The next row of input, before anybody spoils it.
+    pub fn prepare(&mut self, request: u64, events: u64) {
+        let readings = self.readings();
+        let gauges = self.gauges();
+        for (gauge, reading) in readings.iter().enumerate() {
+            if !self.frozen[gauge] {
+                self.input[gauges + gauge] = self.scalar.encode(*reading);
+            }
+        }
+        let first = self.input_at("setpoint[0]");
+        for (axis, value) in self.setpoint.iter().enumerate() {
+            self.input[first + axis] = self.scalar.encode(*value);
+        }
+        if self.kind == Kind::Platform {
+            let command = self.input_at("command");
+            self.input[command] = 2;
+        }
+        let more = self.input.len() - 2;
+        self.input[more] = request;
+        self.input[more + 1] = events;
+    }
+
+    /// Steps the row as it stands and checks what must always hold.
+    pub fn step(&mut self) -> MachineWord {
+        let before = self.codes();
+        self.word = self.machine.step(&self.input, &mut self.output);
+        self.tick += 1;
+        let codes_at = self.at("dac_code[0]")..=self.at("dac_code[5]");
+        let status = self.at("status");
+        for (place, word) in self.output.iter().enumerate().take(status) {
+            if !codes_at.contains(&place) {
+                let value = self.scalar.decode(*word);
+                assert!(value.is_finite(), "tick {}: output word {place} is {value}", self.tick);
+            }
+        }
+        for (leg, (voltage, (code, before))) in
+            self.six("voltage").iter().zip(self.codes().iter().zip(&before)).enumerate()
+        {
+            let [low, high] = self.limits;
+            assert!((low..=high).contains(voltage), "tick {}: {voltage} V on leg {leg}", self.tick);
+            let step = (code - before).abs();
+            assert!(step <= self.max_step, "tick {}: leg {leg} moves by {step} codes", self.tick);
+        }
+        assert!(self.word.phase <= FAULTED && self.word.cause <= 12, "tick {}: {:?}", self.tick, self.word);
+        let powered = matches!(self.word.phase, ARMING | RUNNING | HOLDING | RAMPING);
+        assert_eq!(self.word.amplifier_on, powered, "tick {}: amplifiers", self.tick);
+        if matches!(self.word.phase, HOLDING | ARMING) {
+            assert_eq!(self.codes(), before, "tick {}: codes are held", self.tick);
+        }
+        self.word
+    }
+
+    /// One tick without anything wrong but what is set.
+    pub fn tick(&mut self, request: u64, events: u64) -> MachineWord {
+        self.prepare(request, events);
+        self.step()
+    }
+
+    /// Ticks until the phase; panics if that takes too long.
+    pub fn until(&mut self, phase: u8, request: u64) {
+        for _ in 0..2000 {
+            if self.tick(request, 0).phase == phase {
+                return;
+            }
+        }
+        panic!("phase {phase} is not reached by request {request}: {:?}, conditions {:x}", self.word, self.conditions());
+    }
+
+    pub fn conditions(&self) -> u64 {
+        self.output[self.output.len() - 1]
+    }
+
+    /// Into a phase by requests alone, from disarmed. Running goes on until it is under way.
+    pub fn bring_to(&mut self, phase: u8) {
+        self.tick(NOTHING, 0);
+        if phase == DISARMED {
+            return;
+        }
+        self.until(ARMING, ARM);
+        if phase == ARMING {
+            return;
+        }
+        self.until(HOLDING, ARM);
+        self.until(RUNNING, RUN);
+        for _ in 0..2000 {
+            self.tick(RUN, 0);
+        }
+        match phase {
+            HOLDING => self.until(HOLDING, HOLD),
+            RAMPING => self.until(RAMPING, RAMP_DOWN),
+            FAULTED => {
+                self.tick(RUN, 16);
+                for _ in 0..200 {
+                    self.tick(NOTHING, 0);
+                }
+            }
+            _ => {}
+        }
+        assert_eq!(self.word.phase, phase);
+    }
+}

@@ -1,0 +1,94 @@
+//! Host and emulated MCU: the same bits of every supervised tick.
+
+use super::bench::*;
+use super::sequences;
+use specgen::model::Mcu;
+use specgen::target;
+use specgen_tests::Emitted;
+use std::fs;
+use std::time::Duration;
+
+const LIMIT: Duration = Duration::from_secs(600);
+
+/// Rows of input, of output with the digest, and the settings.
+struct Recording {
+    inputs: Vec<Vec<u64>>,
+    outputs: Vec<Vec<u64>>,
+    digests: Vec<u64>,
+    config: Vec<u64>,
+}
+
+fn record(kind: Kind, emitted: &Emitted, sequences: u32) -> Recording {
+    let settings: &[(&str, f64)] = if kind == Kind::Legs { &[("setpoint_kind", 1.0)] } else { &[] };
+    let mut bench = Bench::new(kind, emitted, settings);
+    let config = bench.config().to_vec();
+    let mut recording = Recording { inputs: Vec::new(), outputs: Vec::new(), digests: Vec::new(), config };
+    sequences::run(&mut bench, 9, sequences, |bench, _, _| {
+        recording.inputs.push(bench.input.clone());
+        recording.outputs.push(bench.output.clone());
+        recording.digests.push(bench.machine.digest());
+    });
+    recording
+}
+
+/// The first tick that differs.
+fn difference(host: &Recording, outputs: &[Vec<u64>], digests: &[u64]) -> Option<usize> {
+    (0..host.inputs.len()).find(|tick| host.outputs[*tick] != outputs[*tick] || host.digests[*tick] != digests[*tick])
+}
+
+fn compare(name: &str, kind: Kind, more: &[(&str, &str)], mcu: Mcu, sequences: u32) {
+    let emitted = emitted(name, kind.spec(), more);
+    let host = record(kind, &emitted, sequences);
+    let running = host.outputs.iter().filter(|row| row[row.len() - 2] as u8 == RUNNING).count();
+    assert!(running > host.inputs.len() / 20, "{name}: {running} of {} ticks run", host.inputs.len());
+    let Some(image) = emitted.image(mcu) else { return };
+    let result = target::replay_machine(&image, &host.config, &host.inputs, LIMIT).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(difference(&host, &result.outputs, &result.digests), None, "{name}: the first tick that differs");
+    let mean = |stage: &str| result.stats.stage(stage).map_or(0.0, |stage| stage.mean());
+    println!(
+        "{name}: {sequences} sequences, {} ticks equal in every bit; {running} run: {:.0} instructions mean, {:.0} of them the law, \
+         {:.0} the supervisor; other phases {:.0} mean; most of any tick {}; stack {} bytes",
+        host.inputs.len(),
+        mean("supervise"),
+        mean("law"),
+        mean("supervise") - mean("law"),
+        mean("other phases"),
+        result.stats.stages.iter().map(|stage| stage.largest).max().unwrap_or(0),
+        result.stats.painted_stack
+    );
+}
+
+#[test]
+fn ten_thousand_sequences_of_six_legs_have_the_same_bits_on_the_m7() {
+    compare("supervisor-bits-legs", Kind::Legs, &[], Mcu::Mps2An500, sequences::SEQUENCES);
+}
+
+#[test]
+fn sequences_of_a_platform_have_the_same_bits_on_the_m7() {
+    compare("supervisor-bits-platform", Kind::Platform, &[], Mcu::Mps2An500, 2_000);
+}
+
+#[test]
+fn sequences_in_f32_have_the_same_bits_on_the_m4f() {
+    let f32 = ("scalar   = \"f64\"", "scalar   = \"f32\"");
+    compare("supervisor-bits-f32", Kind::Legs, &[f32], Mcu::Mps2An386, 2_000);
+}
+
+/// The comparison can fail: one ulp of one constant of the supervisor is found.
+#[test]
+fn one_ulp_of_a_constant_of_the_supervisor_is_found() {
+    let good = emitted("supervisor-ulp-good", "legs.toml", &[]);
+    let Some(image) = good.image(Mcu::Mps2An500) else { return };
+    let bad = emitted("supervisor-ulp-bad", "legs.toml", &[]);
+    let path = bad.dir.join("controller/src/supervision.rs");
+    let text = fs::read_to_string(&path).expect("emitted");
+    let keep = good.compiled.ir.supervision.approach_keep;
+    let (old, new) = (format!("{keep:?}"), format!("{:?}", f64::from_bits(keep.to_bits() + 1)));
+    assert!(text.contains(&old), "no {old} in {}", path.display());
+    fs::write(&path, text.replacen(&old, &new, 1)).expect("written");
+    let host = record(Kind::Legs, &bad, 200);
+    let result = target::replay_machine(&image, &host.config, &host.inputs, LIMIT).unwrap_or_else(|e| panic!("{e}"));
+    let found = difference(&host, &result.outputs, &result.digests);
+    println!("one ulp of APPROACH_KEEP shows in tick {found:?}");
+    assert!(found.is_some(), "the flipped ulp was not seen");
+}

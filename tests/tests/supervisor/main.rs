@@ -1,0 +1,10 @@
+//! The supervisor in the emitted controller: every cause in every phase, random sequences against a state machine of its own
+//! text, the same bits on the emulated MCU, any input bits at all, and no jump when the law begins.
+
+mod begin;
+mod bench;
+mod bits;
+mod fuzz;
+mod oracle;
+mod sequences;
+mod table;

@@ -1,0 +1,224 @@
+//! The state machine once more, in other words: from `docs/supervisor.md`, not from the runtime. For six legs, where the
+//! displacement that the model gives of each leg is an output word.
+
+use super::bench::*;
+
+/// What the section of `bench` makes of a period of 200 µs.
+const ARM_TICKS: u32 = 10;
+const GAUGE_TICKS: i64 = 5;
+const VOLTAGE_TICKS: i64 = 10;
+const SLEW_TICKS: i64 = 5;
+const SAMPLES: i64 = 3;
+const TICKS_PER_SECOND: i64 = 5000;
+const DISAGREEMENT: f64 = 20e-6;
+const TRACKING: f64 = 6e-6;
+/// Ten times the noise of 2.2 nm, which is more than ten steps of the converter.
+const STUCK_MOTION: f64 = 22e-9;
+const GAUGE_RANGE: [f64; 2] = [-2e-6, 48e-6];
+
+/// What is done about a cause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Act {
+    Hold,
+    Ramp,
+    Off,
+}
+
+fn act(cause: u8) -> Act {
+    match cause {
+        10 | 12 => Act::Off,
+        1..=4 => Act::Ramp,
+        _ => Act::Hold,
+    }
+}
+
+#[derive(Debug, Clone, Default)]
+struct Channel {
+    word: Option<u64>,
+    expected: Vec<f64>,
+    counts: [i64; 3],
+    present: [bool; 3],
+}
+
+/// The supervisor of six legs.
+#[derive(Debug, Clone)]
+pub struct Oracle {
+    pub phase: u8,
+    pub cause: u8,
+    request: u64,
+    arm_waits: bool,
+    good: u32,
+    /// Causes that the readings of the last tick showed, and their counts by cause.
+    seen: Vec<u8>,
+    counts: [i64; 13],
+    channels: [Channel; 6],
+    lasted: Vec<u8>,
+    turn: usize,
+}
+
+impl Oracle {
+    pub fn new() -> Self {
+        Self {
+            phase: DISARMED,
+            cause: 0,
+            request: 0,
+            arm_waits: false,
+            good: 0,
+            seen: Vec::new(),
+            counts: [0; 13],
+            channels: Default::default(),
+            lasted: Vec::new(),
+            turn: 0,
+        }
+    }
+
+    /// The phase and cause of the coming interval.
+    pub fn decide(&mut self, request: u64, events: u64, at_rest: bool) {
+        let request = if request > 5 { HOLD } else { request };
+        let new_request = std::mem::replace(&mut self.request, request) != request;
+        let mut present = self.seen.clone();
+        for (bit, cause) in (0..5).zip(8..) {
+            if events >> bit & 1 == 1 {
+                present.push(cause);
+            }
+        }
+        for (kind, cause) in [3, 4, 5].into_iter().enumerate() {
+            if self.channels.iter().any(|channel| channel.present[kind]) {
+                present.push(cause);
+            }
+        }
+        let mut lasted = std::mem::take(&mut self.lasted);
+        for cause in [1, 2, 6, 7, 8, 11_u8] {
+            let (limit, weight) = match cause {
+                6 => (VOLTAGE_TICKS, 1),
+                7 => (SLEW_TICKS, 1),
+                8 => (TICKS_PER_SECOND + 1, TICKS_PER_SECOND),
+                _ => (GAUGE_TICKS, 1),
+            };
+            let count = &mut self.counts[usize::from(cause)];
+            *count = if present.contains(&cause) { (*count + weight).min(limit) } else { (*count - 1).max(0) };
+            if present.contains(&cause) && *count == limit {
+                lasted.push(cause);
+            }
+        }
+        lasted.extend(present.iter().filter(|cause| matches!(cause, 9 | 10 | 12)));
+        lasted.sort_unstable();
+        let strongest = lasted.iter().map(|cause| act(*cause)).max();
+        let first = |least: Act| lasted.iter().copied().find(|cause| act(*cause) >= least).unwrap_or(0);
+        let well = present.is_empty();
+
+        if strongest == Some(Act::Off) && self.phase != FAULTED {
+            return self.enter(FAULTED, first(Act::Off));
+        }
+        match self.phase {
+            DISARMED => {
+                self.arm_waits = request == ARM && (new_request || self.arm_waits);
+                if self.arm_waits && well && at_rest {
+                    self.arm_waits = false;
+                    self.enter(ARMING, 0);
+                }
+            }
+            ARMING if strongest.is_some() => self.enter(RAMPING, first(Act::Hold)),
+            ARMING if request == RAMP_DOWN => self.enter(RAMPING, 0),
+            ARMING => {
+                self.good = if well { self.good + 1 } else { 0 };
+                if self.good == ARM_TICKS {
+                    self.enter(if request == RUN { RUNNING } else { HOLDING }, 0);
+                }
+            }
+            RUNNING | HOLDING if strongest == Some(Act::Ramp) => self.enter(RAMPING, first(Act::Ramp)),
+            RUNNING if request == RAMP_DOWN => self.enter(RAMPING, first(Act::Hold)),
+            RUNNING if strongest.is_some() || request == HOLD => self.enter(HOLDING, first(Act::Hold)),
+            HOLDING => {
+                if self.cause == 0 {
+                    self.cause = first(Act::Hold);
+                }
+                if request == RAMP_DOWN {
+                    self.enter(RAMPING, self.cause);
+                } else if request == ACKNOWLEDGE && new_request && well {
+                    self.cause = 0;
+                } else if request == RUN && well && (new_request || self.cause == 0) {
+                    self.enter(RUNNING, 0);
+                }
+            }
+            RAMPING => {
+                if self.cause == 0 {
+                    self.cause = first(Act::Hold);
+                }
+                if at_rest {
+                    self.enter(if self.cause == 0 { DISARMED } else { FAULTED }, self.cause);
+                }
+            }
+            FAULTED if request == ACKNOWLEDGE && new_request && well && at_rest => self.enter(DISARMED, 0),
+            _ => {}
+        }
+    }
+
+    fn enter(&mut self, phase: u8, cause: u8) {
+        self.phase = phase;
+        self.cause = cause;
+        self.good = 0;
+        if phase != HOLDING && phase != RAMPING {
+            self.counts = [0; 13];
+            self.channels = Default::default();
+            self.lasted.clear();
+        }
+    }
+
+    /// What a tick shows: the gauges' words and values, the model's displacement and the demand before the tick, the codes
+    /// before and after it, its status.
+    pub fn observe(
+        &mut self,
+        words: &[u64],
+        readings: &[f64; 6],
+        modelled: &[f64; 6],
+        demand: &[f64; 6],
+        codes: [&[i64; 6]; 2],
+        status: u64,
+        max_step: i64,
+    ) {
+        self.seen.clear();
+        let turn = self.turn;
+        self.turn = (turn + 1) % 6;
+        let mut believed = true;
+        for leg in 0..6 {
+            let reading = readings[leg];
+            if !reading.is_finite() {
+                self.seen.push(1);
+                believed = false;
+            } else if reading < GAUGE_RANGE[0] || reading > GAUGE_RANGE[1] {
+                self.seen.push(2);
+                believed = false;
+            }
+            if self.phase == RUNNING && status >> leg & 1 == 1 {
+                let slewed = (codes[1][leg] - codes[0][leg]).abs() >= max_step;
+                self.seen.push(if slewed { 7 } else { 6 });
+            }
+        }
+        if !believed || !matches!(self.phase, ARMING | RUNNING | HOLDING) {
+            return;
+        }
+        let channel = &mut self.channels[turn];
+        if channel.word != Some(words[turn]) {
+            channel.word = Some(words[turn]);
+            channel.expected.clear();
+        }
+        channel.expected.push(modelled[turn]);
+        let least = channel.expected.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = channel.expected.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let tracks = self.phase == RUNNING && (demand[turn] - readings[turn]).abs() > TRACKING;
+        let present = [most - least > STUCK_MOTION, (readings[turn] - modelled[turn]).abs() > DISAGREEMENT, tracks];
+        for (kind, (present, cause)) in present.into_iter().zip([3, 4, 5]).enumerate() {
+            let count = &mut channel.counts[kind];
+            *count = match (present, kind) {
+                (true, _) => (*count + 1).min(SAMPLES),
+                (false, 0) => 0,
+                (false, _) => (*count - 1).max(0),
+            };
+            channel.present[kind] = present;
+            if present && *count == SAMPLES {
+                self.lasted.push(cause);
+            }
+        }
+    }
+}
