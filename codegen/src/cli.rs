@@ -14,6 +14,8 @@ mod identify_rate;
 mod pil;
 mod plant;
 mod replay;
+mod report;
+mod reproduce;
 mod robust;
 mod sim;
 mod tune;
@@ -74,6 +76,10 @@ enum Command {
     Tune(tune::Arguments),
     /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
     Robust(robust::Arguments),
+    /// Write one HTML file about a spec: the paper's figures from the emitted controller, error budget, margins, findings.
+    Report(report::Arguments),
+    /// Run the paper's whole list of experiments, from specs in the binary: ours beside the paper's, with remarks.
+    Reproduce(reproduce::Arguments),
     /// Close the loop of a simulated machine with the program of a microcontroller, emulated or at a serial port.
     Pil(pil::Arguments),
     /// Run a record of a target again on the host and compare every tick by bits; export it as CSV.
@@ -112,6 +118,8 @@ pub fn run() -> ExitCode {
         Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
         Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
         Some(Command::Robust(arguments)) => robust::run(arguments, &mut ui),
+        Some(Command::Report(arguments)) => report::run(arguments, &mut ui),
+        Some(Command::Reproduce(arguments)) => reproduce::run(arguments, &mut ui),
         Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
         Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
@@ -133,7 +141,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, report, reproduce, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir) with its own arguments",
         ),
         _ => error,
     };

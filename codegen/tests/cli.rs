@@ -11,9 +11,23 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 14] = [
-    "check", "build", "size", "flash", "sim", "tune", "pil", "replay", "dynamics", "identify", "forc", "plant",
-    "doctor", "dump-ir",
+const COMMANDS: [&str; 16] = [
+    "check",
+    "build",
+    "size",
+    "flash",
+    "sim",
+    "tune",
+    "report",
+    "reproduce",
+    "pil",
+    "replay",
+    "dynamics",
+    "identify",
+    "forc",
+    "plant",
+    "doctor",
+    "dump-ir",
 ];
 
 #[test]
@@ -31,7 +45,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
         (
             &["chek", "legs.toml"],
-            "check, build, size, flash, sim, tune, robust, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir",
+            "check, build, size, flash, sim, tune, robust, report, reproduce, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir",
         ),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),

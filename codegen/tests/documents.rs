@@ -9,7 +9,7 @@ use std::fs;
 
 use support::{Folder, repository};
 
-const DOCUMENTS: [&str; 10] = [
+const DOCUMENTS: [&str; 11] = [
     "README.md",
     "ARCHITECTURE.md",
     "docs/control-law.md",
@@ -17,6 +17,7 @@ const DOCUMENTS: [&str; 10] = [
     "docs/identification.md",
     "docs/tuning.md",
     "docs/robustness.md",
+    "docs/report.md",
     "docs/pil.md",
     "docs/supervisor.md",
     "docs/recorder.md",

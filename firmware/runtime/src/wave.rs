@@ -181,7 +181,7 @@ impl<T: Real> Wave<T> {
 
     /// The set-point at the end of the coming interval; none if no wave is under way. The last one stands still at the center.
     #[inline]
-    pub fn next(&mut self) -> Option<Motion<T>> {
+    pub fn advance(&mut self) -> Option<Motion<T>> {
         let envelope = self.envelope()?;
         self.sequence = self.sequence.wrapping_add(1);
         let mut target = Motion::at(self.settings.center);
@@ -277,11 +277,13 @@ impl<T: Real> Settings<T> {
                 return Err(Refused::Range(index));
             }
             let reach = if -low > high { -low } else { high };
-            if !((peak.rate + reach * slope) * second <= limits.rate[index]) {
+            let within = (peak.rate + reach * slope) * second <= limits.rate[index];
+            if !within {
                 return Err(Refused::Rate(index));
             }
             let most = peak.bend + (peak.rate + peak.rate) * slope + reach * bend;
-            if !(most * second * second <= limits.acceleration[index]) {
+            let within = most * second * second <= limits.acceleration[index];
+            if !within {
                 return Err(Refused::Acceleration(index));
             }
         }

@@ -24,7 +24,7 @@ fn run(settings: &Settings<f64>, limits: Limits<f64>) -> Vec<Motion<f64>> {
     let mut wave = Wave::new(limits);
     wave.set(settings).unwrap_or_else(|refused| panic!("{refused:?}"));
     wave.start();
-    let all: Vec<_> = std::iter::from_fn(|| wave.next()).take(1_000_000).collect();
+    let all: Vec<_> = std::iter::from_fn(|| wave.advance()).take(1_000_000).collect();
     assert_eq!(wave.stage(), Stage::Idle);
     assert_eq!(wave.sequence() as usize, all.len());
     all
@@ -161,18 +161,18 @@ fn a_wave_is_stopped_smoothly_and_changed_only_at_rest() {
     wave.set(&settings).unwrap();
     wave.start();
     for _ in 0..10_000 {
-        assert!(wave.next().is_some());
+        assert!(wave.advance().is_some());
     }
     assert_eq!(wave.set(&settings), Err(Refused::Busy));
     wave.stop();
-    let rest: Vec<_> = std::iter::from_fn(|| wave.next()).collect();
+    let rest: Vec<_> = std::iter::from_fn(|| wave.advance()).collect();
     assert_eq!((rest.len(), rest[999].pose), (1000, settings.center));
     assert_eq!(wave.set(&settings), Ok(()));
     // Stopped while it starts, it starts first.
     wave.start();
-    wave.next();
+    wave.advance();
     wave.stop();
-    assert_eq!(std::iter::from_fn(|| wave.next()).count(), 1999);
+    assert_eq!(std::iter::from_fn(|| wave.advance()).count(), 1999);
 }
 
 fn random(state: &mut u64) -> u64 {
@@ -222,7 +222,7 @@ fn words_read_back_and_any_words_are_refused_or_keep_their_limits() {
         taken += 1;
         wave.start();
         for _ in 0..200 {
-            let Some(motion) = wave.next() else { break };
+            let Some(motion) = wave.advance() else { break };
             for axis in 0..6 {
                 assert!(motion.pose[axis].abs() <= 5.0001e-5, "{:?}", motion.pose);
                 assert!(motion.rate[axis].abs() <= 0.0501, "{:?}", motion.rate);

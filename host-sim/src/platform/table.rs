@@ -304,6 +304,13 @@ const PAPER_MACHINING: [(&str, &str, f64, f64); 4] = [
     ("aluminium", "pf-pcc", 615.0, 6.9),
 ];
 
+/// The paper's mean error norms of a run (nm and nrad), if it made it.
+#[must_use]
+pub fn paper_machining(part: &str, mode: &str) -> Option<[f64; 2]> {
+    let found = PAPER_MACHINING.iter().find(|(work, law, ..)| *work == part && *law == mode)?;
+    Some([found.2, found.3])
+}
+
 impl MachiningTable {
     /// Adds a run.
     pub fn push(&mut self, part: &str, mode: &str, errors: &PoseErrors) {

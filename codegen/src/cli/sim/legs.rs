@@ -11,12 +11,8 @@ use super::{Arguments, environment, write_folder};
 use crate::cli::ui::{Failure, Ui};
 use crate::compile::Compiled;
 use crate::model::Adaptation;
+use crate::paper::printed;
 
-/// The paper's Table 2, nm, by mode and frequency (0.1, 1, 10 Hz).
-const PAPER_TABLE_2: [(&str, [f64; 3]); 3] =
-    [("invhys", [127.039, 232.143, 504.539]), ("ewma", [103.086, 117.305, 191.409]), ("pcc", [80.5, 81.783, 156.25])];
-/// The paper's Table 1: slope at each frequency as a ratio to that at 0.1 Hz.
-const PAPER_TABLE_1: [f64; 6] = [1.0, 0.9844, 0.9797, 0.9774, 0.9735, 0.9704];
 /// Control ticks per period of the trajectory, unless asked otherwise.
 const SAMPLES: u32 = 500;
 
@@ -87,7 +83,7 @@ fn text(name: &str, tracking: &TrackingTable, linearity: &LinearityTable) -> Str
     // Writing to a String cannot fail.
     let _ = writeln!(out, "{name}: tracking error of the leg trajectory, nm rms of T − Y (paper's Table 2)");
     let _ = writeln!(out, "  {:<8}{:>22}{:>22}{:>22}", "", "0.1 Hz", "1 Hz", "10 Hz");
-    for (mode, paper) in PAPER_TABLE_2 {
+    for (mode, paper) in printed::TABLE_2 {
         let _ = write!(out, "  {mode:<8}");
         for (frequency, paper) in TRACKING_FREQUENCIES.iter().zip(paper) {
             let ours = tracking.rmse_nm(mode, *frequency).map_or("-".to_owned(), |nm| format!("{nm:.2}"));
@@ -96,7 +92,8 @@ fn text(name: &str, tracking: &TrackingTable, linearity: &LinearityTable) -> Str
         out.push('\n');
     }
     let _ = writeln!(out, "{name}: slope of Y on q̂, as a ratio to that at 0.1 Hz (paper's Table 1)");
-    for (row, paper) in linearity.rows.iter().zip(PAPER_TABLE_1) {
+    for (index, row) in linearity.rows.iter().enumerate() {
+        let paper = printed::slope_ratio(index);
         let _ = writeln!(
             out,
             "  {:>5} Hz  λ {:.4}  offset {:>8.1} nm  ratio {:.4} ({paper:.4})",

@@ -178,7 +178,7 @@ fn platform(
     let mut bench = Bench::new(&mut rig, controller, compiled.model.timing.period, arguments.latency as usize)?;
     bench.arm(ARMING)?;
     for _ in 0..ticks {
-        let request = match wave.next() {
+        let request = match wave.advance() {
             Some(motion) => {
                 Request::stream(PoseTarget { pose: motion.pose, rate: motion.rate, acceleration: motion.acceleration })
             }
@@ -221,6 +221,6 @@ impl LegTrajectory for LegWave {
     }
 
     fn displacements(&self, _time: f64) -> [f64; 6] {
-        self.wave.borrow_mut().next().map_or([0.0; 6], |motion| motion.pose)
+        self.wave.borrow_mut().advance().map_or([0.0; 6], |motion| motion.pose)
     }
 }

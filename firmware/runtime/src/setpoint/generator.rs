@@ -105,9 +105,8 @@ impl<T: Real> Generator<T> {
     #[must_use]
     pub fn starting_at<F>(plan: &Plan<T, F>, pose: &[T; 6]) -> Self {
         let mut generator = Self::new();
-        for axis in 0..6 {
-            let bound = plan.bound[axis];
-            generator.target.pose[axis] = saturate(pose[axis], -bound, bound);
+        for ((slot, value), bound) in generator.target.pose.iter_mut().zip(pose).zip(plan.bound) {
+            *slot = saturate(*value, -bound, bound);
         }
         generator
     }

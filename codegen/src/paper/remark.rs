@@ -1,0 +1,120 @@
+//! Why a value of ours is not the paper's.
+
+use serde::{Serialize, Serializer};
+
+/// A ratio within this of 1 needs no explanation.
+pub const AGREES: f64 = 0.10;
+
+/// A reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Remark {
+    /// Within [`AGREES`].
+    Agrees,
+    /// Bias of Table 1.
+    Bias,
+    /// EWMA and PCC of Table 2.
+    UpperBound,
+    /// Tables 5 and 7.
+    Tracking,
+    /// Tables 6 and 8.
+    Angles,
+    /// Table 5, z, PCC, 0.1 Hz.
+    Suspect,
+    /// Table 9, translation.
+    WorkParts,
+    /// Table 9, angles.
+    BelowResolution,
+    /// (AII.18).
+    Ewma,
+    /// None of the known reasons.
+    Unexplained,
+}
+
+impl Remark {
+    /// `reason`, unless the values agree.
+    #[must_use]
+    pub fn of(paper: f64, ours: f64, reason: Self) -> Self {
+        if (ours / paper - 1.0).abs() <= AGREES { Self::Agrees } else { reason }
+    }
+
+    /// Short name for tables.
+    #[must_use]
+    pub fn id(self) -> &'static str {
+        match self {
+            Self::Agrees => "agrees",
+            Self::Bias => "bias",
+            Self::UpperBound => "upper-bound",
+            Self::Tracking => "tracking",
+            Self::Angles => "angles",
+            Self::Suspect => "suspect",
+            Self::WorkParts => "work-parts",
+            Self::BelowResolution => "below-resolution",
+            Self::Ewma => "ewma-limit",
+            Self::Unexplained => "unexplained",
+        }
+    }
+
+    /// The reason in words.
+    #[must_use]
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Agrees => "Within 10 % of the paper.",
+            Self::Bias => {
+                "The paper prints δ (headed \"bias α\") without saying what its zero is; ours counts from the gauge zeroed \
+                 at 0 V after a saturating sweep, of one of five stacks. Only the slope decides λ."
+            }
+            Self::UpperBound => {
+                "The paper's EWMA and PCC rows do not follow from its description: an honest simulation with the printed \
+                 weights on a plant that does match its Invhys row and its slopes comes out 8 to 17 times lower, and for a \
+                 static plant no spectrum of disturbances gives the paper's ratios. They are upper bounds and a ranking \
+                 (Invhys > EWMA > PCC), which ours keeps."
+            }
+            Self::Tracking => {
+                "The machine is ours: geometry, gauge layout, stiffness and the order of the gains are not printed (gains \
+                 appear twice, at 1e-6 without units), so gains follow the compiler's rule and the feed-forward carries \
+                 inertia and gravity. The printed paths jump; the corrected ones are followed. The paper's values are upper \
+                 bounds."
+            }
+            Self::Angles => {
+                "Printed as \"n rad\" and read as µrad: π/72 rad would need ±4.4 mm from legs of 60 µm, so rotations are \
+                 mrad and their errors µrad. Machine and gains are ours, as for the translations."
+            }
+            Self::Suspect => {
+                "The printed 100.149 breaks its row (531.8 and 631.13 at 1 and 10 Hz) and its column; a digit is probably \
+                 lost. Machine and gains are ours besides."
+            }
+            Self::WorkParts => {
+                "Stiffness of the work parts and the tip's place are not printed and assumed (glass 3 MN/m, aluminium \
+                 1.2 MN/m, tip 40 mm above the platform); gains and machine are ours, and x(t) is missing in print."
+            }
+            Self::BelowResolution => {
+                "The printed angles are at or below what the paper's own gauges can see: 2.2 nm at ±80 mm is 20 nrad. Ours \
+                 are true angles, and no smaller than that noise permits."
+            }
+            Self::Ewma => {
+                "(AII.18) prints 0 < λ < 2 for every weight, which is its ω = 1 case; right is 0 < λω < 2, and the emitted \
+                 controller settles up to that."
+            }
+            Self::Unexplained => "Differs by more than 10 %, and the known errors of the paper do not say why.",
+        }
+    }
+}
+
+impl Serialize for Remark {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.id())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_is_given_only_where_values_differ() {
+        assert_eq!(Remark::of(100.0, 109.0, Remark::Tracking), Remark::Agrees);
+        assert_eq!(Remark::of(100.0, 91.0, Remark::Tracking), Remark::Agrees);
+        assert_eq!(Remark::of(100.0, 111.0, Remark::Tracking), Remark::Tracking);
+        assert_eq!(Remark::of(100.0, f64::NAN, Remark::Tracking), Remark::Tracking);
+    }
+}
