@@ -5,12 +5,15 @@
 
 mod build;
 mod check;
+mod doctor;
 mod dynamics;
 mod file;
 mod firmware;
 mod identify;
 mod identify_rate;
 mod pil;
+mod plant;
+mod replay;
 mod robust;
 mod sim;
 mod tune;
@@ -73,12 +76,18 @@ enum Command {
     Robust(robust::Arguments),
     /// Close the loop of a simulated machine with the program of a microcontroller, emulated or at a serial port.
     Pil(pil::Arguments),
+    /// Run a record of a target again on the host and compare every tick by bits; export it as CSV.
+    Replay(replay::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
     /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
     Identify(identify::Arguments),
     /// Simulate the reversal-curve experiment that `identify` needs, on the reference leg or another.
     Forc(sim::ForcArguments),
+    /// Serve the simulated machine of a spec to a real-time controller on this computer.
+    Plant(plant::Arguments),
+    /// Measure how well this computer keeps time, and say what to change for real time.
+    Doctor(doctor::Arguments),
     /// Print the intermediate representation of a spec: every constant of its controller.
     DumpIr {
         /// The spec file.
@@ -104,9 +113,12 @@ pub fn run() -> ExitCode {
         Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
         Some(Command::Robust(arguments)) => robust::run(arguments, &mut ui),
         Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
+        Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
         Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
+        Some(Command::Plant(arguments)) => plant::run(arguments, &mut ui),
+        Some(Command::Doctor(arguments)) => doctor::run(arguments, &mut ui),
         Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),
     };
     match done {
@@ -121,7 +133,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir) with its own arguments",
         ),
         _ => error,
     };

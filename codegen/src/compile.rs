@@ -8,6 +8,7 @@ use crate::emit;
 use crate::everett::EverettTable;
 use crate::identify;
 use crate::ir::{Ir, Setpoints};
+use crate::lint::{self, paths::PathDemand};
 use crate::lower::{PoseNoise, lower, platform, pose_noise, scalar, setpoint};
 use crate::model::{Model, RateDependence, TrajectoryKind};
 use crate::reach::{self, Reach};
@@ -35,6 +36,8 @@ pub struct Compiled {
     pub design: Option<Design>,
     /// Travel of the platform, and how well its legs hold it, for a controller in task space.
     pub reach: Option<Reach>,
+    /// What each trajectory asks of the legs, in the order of the spec.
+    pub demands: Vec<PathDemand>,
     /// Noise of the measured pose, with gauges that see the platform.
     pub pose_noise: Option<PoseNoise>,
     /// Every constant of the controller.
@@ -67,10 +70,16 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
 /// # Errors
 /// As [`compile`].
 pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
-    let (model, mut findings) = spec::load(&source);
+    let (model, mut findings) = spec::load_as_far(&source);
+    findings.extend(model.as_ref().map(lint::check).unwrap_or_default());
     let Some(model) = model else {
         return Err(Refused { source: Some(source), findings });
     };
+    if findings.iter().any(|finding| finding.severity == Severity::Error) {
+        // What the paths are is in the file whatever the platform: say it in the same run.
+        findings.extend(lower_setpoints(&source, &model).map_or_else(|found| found, |lowered| lowered.warnings));
+        return Err(Refused { source: Some(source), findings });
+    }
     // Stability and records do not depend on each other: report both.
     let stability = check_stability(&model).map_err(|found| findings.extend(found));
     let identified = identify_records(&source, &model).map_err(|found| findings.extend(found));
@@ -84,13 +93,13 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
     };
     findings.extend(identified.findings);
     findings.extend(design.iter().flat_map(|design| design.findings.clone()));
-    findings.extend(setpoints.warnings);
-    identified.texts.extend(setpoints.texts);
-    let reach = match check_reach(&model, setpoints.setpoints.as_ref(), &identified.tables) {
-        Ok(None) => None,
-        Ok(Some((reach, found))) => {
+    findings.extend(setpoints.warnings.iter().cloned());
+    identified.texts.extend(setpoints.texts.iter().cloned());
+    let (reach, demands) = match check_reach(&model, &setpoints, &identified.tables) {
+        Ok(None) => (None, Vec::new()),
+        Ok(Some((reach, demands, found))) => {
             findings.extend(found);
-            Some(reach)
+            (Some(reach), demands)
         }
         Err(found) => {
             findings.extend(found);
@@ -108,7 +117,19 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
     };
     let files = workspace::files(&ir, &emit::emit(&ir));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
-    Ok(Compiled { source, model, records: identified.reports, margins, design, reach, pose_noise, ir, files, findings })
+    Ok(Compiled {
+        source,
+        model,
+        records: identified.reports,
+        margins,
+        design,
+        reach,
+        demands,
+        pose_noise,
+        ir,
+        files,
+        findings,
+    })
 }
 
 /// Legs with their own gauges adapt each on its own; a controller in task space closes its loops over the platform's modes.
@@ -122,14 +143,17 @@ pub(crate) fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<
     }
 }
 
+/// Reach, what each trajectory asks of the legs, and warnings.
+type Reached = (Reach, Vec<PathDemand>, Vec<Diagnostic>);
+
 /// Where the legs reach, and that trajectories stay there: as far as both the data sheet's stroke and every leg's table
-/// allow.
+/// allow. And that stacks and amplifiers make them.
 fn check_reach(
     model: &Model,
-    setpoints: Option<&Setpoints>,
+    lowered: &LoweredSetpoints,
     tables: &[EverettTable],
-) -> Result<Option<(Reach, Vec<Diagnostic>)>, Vec<Diagnostic>> {
-    let (Some(task), Some(setpoints)) = (&model.task_space, setpoints) else {
+) -> Result<Option<Reached>, Vec<Diagnostic>> {
+    let (Some(task), Some(setpoints)) = (&model.task_space, &lowered.setpoints) else {
         return Ok(None);
     };
     let largest = tables.iter().map(|table| table.node(table.grid, 0));
@@ -137,16 +161,23 @@ fn check_reach(
     let platform = platform(model)?;
     let mut errors = Vec::new();
     let reach = reach::check(model, task, &platform, stroke).map_err(|found| errors.extend(found));
-    for (index, poses) in setpoint::poses(model, task, setpoints)?.into_iter().enumerate() {
+    let paths = setpoint::stretches(model, task, setpoints)?;
+    let (demands, asked) = lint::paths::check(model, task, &platform, &paths);
+    for (index, path) in paths.iter().enumerate() {
         let key = format!("trajectory[{index}].kind");
         let name = &task.trajectories[index].name;
-        if let Err(found) = reach::check_poses(model, &platform, stroke, [&key, name], poses.into_iter()) {
+        let poses = path.iter().flat_map(|stretch| stretch.poses.iter().copied());
+        if let Err(found) = reach::check_poses(model, &platform, stroke, [&key, name], poses) {
             errors.extend(found);
         }
     }
+    let refused = !errors.is_empty() || asked.iter().any(|finding| finding.severity == Severity::Error);
     match reach {
-        Ok(both) if errors.is_empty() => Ok(Some(both)),
-        _ => Err(errors),
+        Ok((reach, mut found)) if !refused => {
+            found.extend(asked);
+            Ok(Some((reach, demands, found)))
+        }
+        _ => Err(errors.into_iter().chain(asked).collect()),
     }
 }
 
@@ -177,12 +208,14 @@ fn lower_setpoints(source: &SpecSource, model: &Model) -> Result<LoweredSetpoint
         });
         waveforms.push(parsed.map_err(|found| errors.extend(found)).ok());
     }
+    let stepping: Vec<Diagnostic> = waveforms.iter().flatten().filter_map(lint::paths::steps).collect();
     match setpoint::lower(model, task, &waveforms, scalar(model)) {
-        Ok((setpoints, warnings)) if errors.is_empty() => {
+        Ok((setpoints, mut warnings)) if errors.is_empty() => {
+            warnings.extend(stepping);
             Ok(LoweredSetpoints { setpoints: Some(setpoints), warnings, texts })
         }
-        Ok((_, warnings)) => Err(errors.into_iter().chain(warnings).collect()),
-        Err(found) => Err(errors.into_iter().chain(found).collect()),
+        Ok((_, warnings)) => Err(errors.into_iter().chain(warnings).chain(stepping).collect()),
+        Err(found) => Err(errors.into_iter().chain(found).chain(stepping).collect()),
     }
 }
 

@@ -78,7 +78,8 @@ const MARKDOWN_HEAD: &str = "\
 
 # Findings
 
-Every finding has a code that keeps its meaning. E: refused, nothing is written. W: pointed out, nothing is refused.
+Every finding has a code that keeps its meaning. E: refused, nothing is written. W: pointed out, nothing is refused. N: worth
+knowing.
 ";
 
 /// The registry of codes as Markdown; `docs/diagnostics.md` is this text.

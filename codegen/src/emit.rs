@@ -22,6 +22,7 @@ mod manifest;
 mod platform;
 mod sensing;
 mod setpoint;
+mod snapshot;
 mod stage_type;
 mod supervised;
 mod supervision;
@@ -63,6 +64,7 @@ fn legs_sources(ir: &Ir) -> Vec<(&'static str, TokenStream)> {
         ("src/lib.rs", legs::crate_root::emit(ir)),
         ("src/machine_words.rs", machine_words::emit(&legs::words::inputs(), &legs::words::outputs())),
         ("src/sensing.rs", legs::sensing::emit(ir)),
+        ("src/snapshot.rs", legs::snapshot::emit(ir)),
         ("src/stages.rs", legs::stages::emit()),
         ("src/state.rs", legs::state::emit(ir)),
         ("src/step.rs", legs::step::emit(ir)),
@@ -78,6 +80,7 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
         ("src/machine_words.rs", machine_words::emit(&platform::words::inputs(), &platform::words::outputs())),
         ("src/sensing.rs", sensing::emit(ir, &task.sensing)),
         ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
+        ("src/snapshot.rs", platform::snapshot::emit()),
         ("src/stages.rs", platform::stages::emit()),
         ("src/state.rs", platform::state::emit()),
         ("src/step.rs", platform::step::emit(ir)),

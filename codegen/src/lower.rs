@@ -21,7 +21,7 @@ pub use sensing::{PoseNoise, pose_noise};
 
 use crate::diagnostic::Diagnostic;
 use crate::everett::EverettTable;
-use crate::ir::{Bounds, Defaults, Hysteresis, Ir, Law, Scalar, Setpoint, Setpoints, TaskSpace};
+use crate::ir::{Bounds, Defaults, Hysteresis, Ir, Law, Scalar, Sensing, Setpoint, Setpoints, TaskSpace};
 use crate::model::{self, Model};
 use crate::stability::platform::{Design, RestDynamics};
 use specgen_runtime::Motion;
@@ -111,6 +111,14 @@ pub fn scalar(model: &Model) -> Scalar {
         model::Scalar::F32 => Scalar::F32,
         model::Scalar::F64 => Scalar::F64,
     }
+}
+
+/// The constants of the gauges as a controller of `scalar` holds them.
+///
+/// # Errors
+/// As [`lower`].
+pub fn gauges(model: &Model, task: &model::TaskSpace, scalar: Scalar) -> Result<Sensing, Vec<Diagnostic>> {
+    sensing::lower(model, task, scalar)
 }
 
 /// What a controller in task space has of its own.

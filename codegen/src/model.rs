@@ -156,6 +156,8 @@ pub struct LegBody {
     pub fixed_center: f64,
     /// l_e, from the platform joint, m.
     pub extensible_center: f64,
+    /// Angle by which its joints may turn from rest, rad, if the spec says.
+    pub joint_angle: Option<f64>,
 }
 
 /// Piezo stacks of one leg.
@@ -177,6 +179,8 @@ pub struct Actuator {
     pub resonance: f64,
     /// ζ of that resonance.
     pub damping_ratio: f64,
+    /// Of all stacks of a leg together, F, if the spec says.
+    pub capacitance: Option<f64>,
 }
 
 impl Actuator {
@@ -194,6 +198,8 @@ pub struct Amplifier {
     pub lag: f64,
     /// Output noise, V rms.
     pub noise: f64,
+    /// Largest output current for a leg, A, if the spec says.
+    pub current: Option<f64>,
 }
 
 /// Digital-to-analogue converter, referred to the stack.

@@ -6,8 +6,10 @@
 //! set-points include the bias. The poses that a hexapod reaches are no box, so corners of the declared workspace beyond
 //! reach are reported and not refused; a bound that its axis alone cannot reach is.
 
+mod boxes;
 mod conditioning;
 mod findings;
+pub mod joints;
 mod travel;
 
 use serde::Serialize;
@@ -16,6 +18,7 @@ use specgen_runtime::Platform;
 use crate::diagnostic::Diagnostic;
 use crate::model::{Model, TaskSpace};
 
+pub use boxes::Boxes;
 pub use conditioning::Conditioning;
 pub use findings::describe;
 
@@ -44,6 +47,10 @@ pub struct Reach {
     pub demanded_bound: f64,
     /// How well the legs hold the platform.
     pub conditioning: Conditioning,
+    /// Largest turn of a joint over the declared workspace, rad: at the base, at the platform.
+    pub joint_angles: [f64; 2],
+    /// Largest boxes about the middle of the strokes.
+    pub boxes: Boxes,
 }
 
 /// One axis, all others standing still.
@@ -102,7 +109,10 @@ pub fn check(
             core::iter::once([0.0; 6]).chain(travel::samples(&bounds)),
             shortest(&lengths),
             model.geometry.joint_radius(),
-        ),
+        )
+        .bounded(&bounds, shortest(&lengths), model.geometry.joint_radius()),
+        joint_angles: joints::angles(&model.geometry, &bounds),
+        boxes: Boxes::of(&legs, middle, &bounds),
     };
     let found = findings::of(model, &reach, &legs.shift(core::iter::once(bias)));
     if found.iter().any(|one| one.severity == crate::diagnostic::Severity::Error) {

@@ -26,12 +26,23 @@ mod value;
 
 use findings::Findings;
 
-use crate::diagnostic::{Diagnostic, codes};
+use crate::diagnostic::{Diagnostic, Severity, codes};
 use crate::model::Model;
 
 pub use reference::reference_markdown;
 pub use schema::json_schema;
 pub use source::{MAX_BYTES, SpecSource};
+
+/// Errors that leave every value that the model needs as it stands in the file. A gain without a unit counts: gains may be
+/// left out.
+const UNPHYSICAL: [&str; 6] = [
+    codes::GYRATION,
+    codes::INERTIA_UNPHYSICAL,
+    codes::CENTER_OUTSIDE_LEG,
+    codes::WORKSPACE_UNREACHABLE,
+    codes::STROKE_IMPOSSIBLE,
+    codes::UNIT_MISSING,
+];
 
 /// Checks a spec and builds its model.
 ///
@@ -39,6 +50,15 @@ pub use source::{MAX_BYTES, SpecSource};
 /// spec names are looked for beside it, but not read.
 #[must_use]
 pub fn load(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
+    let (model, findings) = load_as_far(source);
+    let refused = findings.iter().any(|finding| finding.severity == Severity::Error);
+    (model.filter(|_| !refused), findings)
+}
+
+/// The same, with the model also where all errors are about what could not be built, so that a second look at masses, limits
+/// and paths still makes sense: a file that has one slip often has another.
+#[must_use]
+pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     let mut findings = Findings::default();
     let text = source.text.as_str();
     if text.len() > MAX_BYTES {
@@ -68,7 +88,8 @@ pub fn load(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     let fields = read::read(text, &parsed.root, &mut findings);
     check::all(&fields, &source.dir, &mut findings);
     drop_wrong_advice(&mut findings);
-    let model = if findings.has_errors() { None } else { build::model(&fields) };
+    let whole = |finding: &Diagnostic| finding.severity < Severity::Error || UNPHYSICAL.contains(&finding.code);
+    let model = if findings.all().iter().all(whole) { build::model(&fields) } else { None };
     (model, findings.finish())
 }
 

@@ -11,8 +11,10 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 11] =
-    ["check", "build", "size", "flash", "sim", "tune", "pil", "dynamics", "identify", "forc", "dump-ir"];
+const COMMANDS: [&str; 14] = [
+    "check", "build", "size", "flash", "sim", "tune", "pil", "replay", "dynamics", "identify", "forc", "plant",
+    "doctor", "dump-ir",
+];
 
 #[test]
 fn arguments_that_make_no_sense_are_usage_errors() {
@@ -27,7 +29,10 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "-o", ""], "--output"),
         (&["legs.toml", "minimal.toml"], "one spec file is expected"),
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
-        (&["chek", "legs.toml"], "check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, dump-ir"),
+        (
+            &["chek", "legs.toml"],
+            "check, build, size, flash, sim, tune, robust, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir",
+        ),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
         (&["sim"], "<SPEC>"),
@@ -61,6 +66,11 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["pil", "reference.toml", "--trajectory", "case-3"], "but not `case-3`"),
         (&["forc"], "--output"),
         (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),
+        (&["plant"], "<SPEC>"),
+        (&["plant", "legs.toml", "--name", "a/b"], "letters, digits, `-` and `_`, found `a/b`"),
+        (&["plant", "legs.toml", "--seconds", "0"], "expected a time from 0.01 to 10000000 s, found `0`"),
+        (&["plant", "legs.toml", "--priority", "99"], "--priority"),
+        (&["doctor", "--seconds", "nan"], "expected a time from 0.1 to 86400 s, found `nan`"),
         (&["identify", record], "--drive"),
         (&["identify", record, "--drive", "10"], "two voltages such as 0:100, found `10`"),
         (&["identify", record, "--drive", "10:5"], "below the upper one"),
@@ -341,4 +351,31 @@ fn a_closed_pipe_is_no_panic() {
     let output = child.wait_with_output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success() && said.is_empty(), "{output:?}");
+}
+
+#[test]
+fn a_computer_is_judged_by_the_period_of_a_spec() {
+    let folder = Folder::new();
+    let free = folder.json(&["doctor", "--seconds", "0.2"]);
+    let result = &free.value["result"];
+    assert_eq!((free.code, &result["period_ns"]), (0, &100_000.into()));
+    let latency = &result["latency"];
+    let count = |key: &str| latency[key].as_u64().unwrap();
+    let measured: u64 = latency["below_ns"].as_array().unwrap().iter().map(|bin| bin[1].as_u64().unwrap()).sum();
+    assert_eq!(measured + count("skipped"), count("planned"));
+    assert!(count("planned") >= 2_000 && count("p50_ns") <= count("max_ns"));
+    for finding in result["findings"].as_array().unwrap() {
+        let good = finding["grade"] == "good";
+        assert_eq!(finding["mend"].is_null(), good, "{finding}");
+    }
+
+    // With a spec the verdict is the exit code, and the figures come all the same.
+    let judged = folder.run(&["doctor", "legs.toml", "--seconds", "0.2", "--json"]);
+    let document: serde_json::Value = serde_json::from_str(&judged.stdout).unwrap();
+    let result = &document["result"];
+    let bad = result["verdict"]["grade"] == "bad";
+    assert_eq!(judged.code, i32::from(bad));
+    assert_eq!(bad, result["latency"]["skipped"] != 0);
+    let text = folder.run(&["doctor", "--seconds", "0.1"]);
+    assert!(text.stdout.contains("wake-ups, from the planned time to running") && text.stdout.contains("10000 Hz: "));
 }

@@ -9,7 +9,7 @@ use std::fs;
 
 use support::{Folder, repository};
 
-const DOCUMENTS: [&str; 8] = [
+const DOCUMENTS: [&str; 10] = [
     "README.md",
     "ARCHITECTURE.md",
     "docs/control-law.md",
@@ -18,6 +18,8 @@ const DOCUMENTS: [&str; 8] = [
     "docs/tuning.md",
     "docs/robustness.md",
     "docs/pil.md",
+    "docs/supervisor.md",
+    "docs/recorder.md",
 ];
 
 fn read(name: &str) -> String {

@@ -262,9 +262,7 @@ impl<P: Plant> Rig<P> {
             }
             underway.push_back(voltages);
             let held = underway.pop_front().unwrap_or(voltages);
-            for (channel, voltage) in self.channels.iter_mut().zip(held) {
-                channel.leg.hold(voltage + channel.amplifier.draw(), interval);
-            }
+            self.hold(&held, interval);
             measured = self.read();
             if watch(&TrackingSample { time, target, requested, measured }, &words).is_break() {
                 break;
@@ -273,7 +271,15 @@ impl<P: Plant> Rig<P> {
         Ok(())
     }
 
-    fn read(&mut self) -> [f64; LEGS] {
+    /// Holds six voltages (V) for `interval` (s), each with the noise of its amplifier.
+    pub fn hold(&mut self, voltages: &[f64; LEGS], interval: f64) {
+        for (channel, voltage) in self.channels.iter_mut().zip(voltages) {
+            channel.leg.hold(voltage + channel.amplifier.draw(), interval);
+        }
+    }
+
+    /// Reads the six gauges, m.
+    pub fn read(&mut self) -> [f64; LEGS] {
         self.channels.each_mut().map(|channel| channel.gauge.read(channel.leg.displacement()))
     }
 }

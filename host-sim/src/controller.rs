@@ -175,12 +175,16 @@ pub struct Dynamics {
 
 /// An emitted controller with one configuration and one state.
 pub struct Controller {
+    /// What it says of itself, in its own words and parsed.
+    text: String,
     description: Description,
     functions: Functions,
     config: Buffer,
     state: Buffer,
     /// Memory of a machine: the state with its supervisor.
     machine_layout: Layout,
+    /// Words of its snapshot.
+    machine_words: usize,
     /// Where it came from.
     path: PathBuf,
     /// Last, so that it is unloaded after everything else.
@@ -239,14 +243,22 @@ impl Controller {
         let config = Buffer::new(layout(&text, "config_bytes", "config_align")?);
 
         let machine_layout = layout(&text, "machine_bytes", "machine_align")?;
+        let machine_words = size(&text, "machine_words")?;
 
         let path = path.to_owned();
         let library = Arc::new(library);
-        let mut controller = Self { description, functions, config, state, machine_layout, path, library };
+        let mut controller =
+            Self { text, description, functions, config, state, machine_layout, machine_words, path, library };
         let words = controller.default_config();
         controller.configure(&words)?;
         controller.reset();
         Ok(controller)
+    }
+
+    /// What the controller says of itself: `key=value` lines, as files of its records begin with.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
     }
 
     /// Another controller of the same library, with the same configuration and in the same state: to continue from here
@@ -254,11 +266,13 @@ impl Controller {
     #[must_use]
     pub fn fork(&self) -> Self {
         Self {
+            text: self.text.clone(),
             description: self.description.clone(),
             functions: self.functions,
             config: self.config.copy(),
             state: self.state.copy(),
             machine_layout: self.machine_layout,
+            machine_words: self.machine_words,
             path: self.path.clone(),
             library: Arc::clone(&self.library),
         }
@@ -367,7 +381,7 @@ impl TickController for Controller {
 
 mod supervised;
 
-pub use supervised::{MachineWord, Supervised};
+pub use supervised::{MachineWord, SnapshotError, Supervised};
 
 /// Zeroed memory of a given size and alignment.
 struct Buffer {
@@ -411,19 +425,21 @@ impl Drop for Buffer {
     }
 }
 
+/// A size under a key of a description.
+fn size(text: &str, key: &'static str) -> Result<usize, DescriptionError> {
+    let fields = fields(text);
+    let value = fields.get(key).ok_or(DescriptionError::Missing(key))?;
+    // A gigabyte is far beyond any controller, and an allocation that would abort the process.
+    value.parse().ok().filter(|size| *size <= 1 << 30).ok_or_else(|| DescriptionError::Bad {
+        key,
+        value: (*value).to_owned(),
+        expected: "a number of bytes up to 2^30",
+    })
+}
+
 /// Size and alignment under two keys of a description; a size of 0 becomes 1.
 fn layout(text: &str, size_key: &'static str, align_key: &'static str) -> Result<Layout, DescriptionError> {
-    let fields = fields(text);
-    let number = |key: &'static str| -> Result<usize, DescriptionError> {
-        let value = fields.get(key).ok_or(DescriptionError::Missing(key))?;
-        // A gigabyte is far beyond any controller, and an allocation that would abort the process.
-        value.parse().ok().filter(|size| *size <= 1 << 30).ok_or_else(|| DescriptionError::Bad {
-            key,
-            value: (*value).to_owned(),
-            expected: "a number of bytes up to 2^30",
-        })
-    };
-    let (size, align) = (number(size_key)?, number(align_key)?);
+    let (size, align) = (size(text, size_key)?, size(text, align_key)?);
     Layout::from_size_align(size.max(1), align).map_err(|_| DescriptionError::Bad {
         key: align_key,
         value: align.to_string(),

@@ -19,6 +19,7 @@ pub mod noise;
 pub mod oracle;
 pub mod plant;
 pub mod platform;
+pub mod record;
 pub mod replay;
 pub mod scenario;
 pub mod stimulus;

@@ -80,7 +80,7 @@ pub enum WordKind {
 }
 
 /// Names (without index) of the words that are integers; all others are real. Part of the controller's interface.
-const INTEGERS: [&str; 13] = [
+const INTEGERS: [&str; 17] = [
     "dac_code",
     "status",
     "state_digest",
@@ -94,6 +94,10 @@ const INTEGERS: [&str; 13] = [
     "selector",
     "sequence",
     "interaction",
+    "request",
+    "events",
+    "supervisor",
+    "conditions",
 ];
 
 impl WordKind {

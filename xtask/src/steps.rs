@@ -9,8 +9,24 @@ use std::process::ExitCode;
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
 /// Built from an emitted workspace.
 const HOST_LIBRARY: &str = "firmware/host/Cargo.toml";
+/// Boards, each its own workspace; built from an emitted one.
+const BOARDS: [&str; 2] = ["firmware/stm32h743/Cargo.toml", "firmware/stm32f4/Cargo.toml"];
+/// What they share: built as a part of theirs.
+const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
+/// Its own workspace, because of its dependencies.
+const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
 /// Members of the workspace that people write.
-const HAND_WRITTEN: [&str; 5] = ["specgen", "specgen-runtime", "host-sim", "specgen-tests", "xtask"];
+const HAND_WRITTEN: [&str; 9] = [
+    "specgen",
+    "specgen-runtime",
+    "specgen-hal",
+    "specgen-link",
+    "specgen-board",
+    "specgen-rt",
+    "host-sim",
+    "specgen-tests",
+    "xtask",
+];
 
 /// `cargo xtask setup`
 pub fn setup() -> ExitCode {
@@ -36,11 +52,14 @@ pub fn test(root: &Path) -> ExitCode {
         expect_success(doc, "see the warnings above")
     });
     report.step("generated files are fresh", || generated::check(root));
-    report.step("firmware lock file is fresh", || {
-        let mut metadata = cargo(root, &["metadata", "--locked", "--format-version=1", "--manifest-path", FIRMWARE]);
-        metadata.stdout(std::process::Stdio::null());
-        expect_success(metadata, "run: cargo xtask bless")
-    });
+    for manifest in [FIRMWARE, REAL_TIME].iter().chain(&BOARDS) {
+        report.step(&format!("lock file of {manifest} is fresh"), || {
+            let mut metadata =
+                cargo(root, &["metadata", "--locked", "--format-version=1", "--manifest-path", manifest]);
+            metadata.stdout(std::process::Stdio::null());
+            expect_success(metadata, "run: cargo xtask bless")
+        });
+    }
     report.finish()
 }
 
@@ -48,10 +67,12 @@ pub fn test(root: &Path) -> ExitCode {
 pub fn bless(root: &Path) -> ExitCode {
     let mut report = Report::default();
     report.step("generated files", || generated::bless(root));
-    report.step("firmware lock file", || {
-        // Keeps the versions that are locked; only the path packages follow their manifests.
-        expect_success(cargo(root, &["update", "--workspace", "--manifest-path", FIRMWARE]), "see above")
-    });
+    for manifest in [FIRMWARE, REAL_TIME].iter().chain(&BOARDS) {
+        report.step(&format!("lock file of {manifest}"), || {
+            // Keeps the versions that are locked; only the path packages follow their manifests.
+            expect_success(cargo(root, &["update", "--workspace", "--manifest-path", manifest]), "see above")
+        });
+    }
     report.finish()
 }
 
@@ -61,7 +82,8 @@ fn formatting(root: &Path) -> Outcome {
     }
     // Not `--all`: the emitted controller is formatted by specgen itself.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
-    let excluded = [FIRMWARE, HOST_LIBRARY].map(|manifest| vec!["--manifest-path", manifest]);
+    let excluded = [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON].into_iter().chain(BOARDS);
+    let excluded = excluded.map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
         let mend = format!("run: cargo fmt {}", scope.join(" "));
         let outcome = expect_success(cargo(root, &[&["fmt", "--check"], &scope[..]].concat()), &mend);

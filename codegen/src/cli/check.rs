@@ -7,8 +7,9 @@ use clap::Args;
 use serde_json::json;
 
 use super::ui::{Failure, Ui};
-use crate::compile::{self, Compiled};
-use crate::{reach, stability};
+use crate::compile::{self, Compiled, Refused};
+use crate::diagnostic::{Diagnostic, Severity, codes};
+use crate::{lint, precision, reach, stability};
 
 /// Arguments of `check`.
 #[derive(Args, Debug)]
@@ -19,10 +20,38 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = compile::compile(&arguments.spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
-    let text = format!("{} is good\n{}", compiled.source.display_name, describe(&compiled));
-    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "reach": compiled.reach, "pose_noise": compiled.pose_noise, "records": compiled.records }));
+    let precision = precision::of(&compiled.model, &compiled.ir)
+        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
+    let mut findings = compiled.findings.clone();
+    findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
+    findings.extend(estimated(&compiled));
+    ui.findings(Some(&compiled.source), &findings);
+    let text = format!(
+        "{} is good\n{}{}",
+        compiled.source.display_name,
+        describe(&compiled),
+        precision::describe(&precision, compiled.ir.scalar)
+    );
+    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "reach": compiled.reach, "pose_noise": compiled.pose_noise, "records": compiled.records, "trajectories": compiled.demands, "precision": precision }));
     Ok(())
+}
+
+/// Says what of a declared budget only a build can tell.
+fn estimated(compiled: &Compiled) -> Option<Diagnostic> {
+    let target = &compiled.model.target;
+    if [target.flash, target.ram, target.stack, target.instructions] == [None; 4] {
+        return None;
+    }
+    let [tables, memory] = lint::least(&compiled.model);
+    Some(Diagnostic::at(
+        &compiled.model.spans,
+        &["target.budget"],
+        (Severity::Note, codes::ESTIMATED),
+        format!(
+            "tables take {tables} B of flash, reversal memories {memory} B of RAM; the rest of the budget is not checked here"
+        ),
+        "`specgen SPEC -o DIR` builds the controller and measures flash, RAM, stack and instructions".to_owned(),
+    ))
 }
 
 /// What identification and the stability check found, a line each.
@@ -48,6 +77,18 @@ pub fn describe(compiled: &Compiled) -> String {
     }
     if let Some(reach) = &compiled.reach {
         text.push_str(&reach::describe(reach));
+    }
+    for demand in &compiled.demands {
+        let current = demand.current.map_or_else(String::new, |amperes| format!(", {:.3} A", amperes));
+        let _ = writeln!(
+            text,
+            "  trajectory {}: legs at up to {:.1} um/s, which takes {:.3} of {:.3} V/ms{current}; inertia bends them by {:.2} nm",
+            demand.name,
+            demand.leg_speed * 1e6,
+            demand.slew * 1e-3,
+            compiled.model.actuator.slew_rate * 1e-3,
+            demand.deflection * 1e9
+        );
     }
     if let (Some(noise), Some(task)) = (&compiled.pose_noise, &compiled.ir.task_space) {
         let list = |values: &[f64]| values.iter().map(|v| format!("{:.1}", v * 1e9)).collect::<Vec<_>>().join("/");

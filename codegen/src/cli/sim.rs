@@ -3,6 +3,7 @@
 
 pub(super) mod legs;
 pub(super) mod platform;
+mod record;
 
 use std::fmt::Display;
 use std::fs;
@@ -43,6 +44,13 @@ pub struct Arguments {
     /// With [control]: control intervals by which voltages reach the amplifiers late.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=100))]
     latency: u32,
+    /// Instead of the experiments: a wave on all axes under the supervisor, every tick of it recorded in this file for
+    /// `specgen replay`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "samples", "frequency", "trajectory"])]
+    record: Option<PathBuf>,
+    /// Length of that wave, s.
+    #[arg(long, default_value_t = 1.0, requires = "record", allow_negative_numbers = true)]
+    seconds: f64,
 }
 
 /// A frequency at which a trajectory has a sensible length.
@@ -75,7 +83,7 @@ impl PlantArguments {
         }
     }
 
-    fn read(&self) -> Result<(LegParameters, NoiseParameters), Failure> {
+    pub(super) fn read(&self) -> Result<(LegParameters, NoiseParameters), Failure> {
         let parameters = self.leg()?;
         let noise = if self.no_noise { NoiseParameters::NONE } else { parameters.noise };
         Ok((parameters, noise))
@@ -97,6 +105,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         None => legs::check(arguments)?,
     }
     let mut controller = emitted(&compiled, ui)?;
+    if let Some(path) = &arguments.record {
+        return record::run(arguments, path, &compiled, controller, ui);
+    }
     match task {
         Some(task) => platform::run(arguments, &compiled, task, &mut controller, ui),
         None => legs::run(arguments, &compiled, &mut controller, ui),

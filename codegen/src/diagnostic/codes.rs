@@ -1,12 +1,13 @@
 //! The registry of finding codes. A code never changes its meaning; a retired one is not used again.
 //!
 //! `docs/diagnostics.md` is generated from here, see [`super::reference_markdown`]. E01: file and syntax, E02: keys and
-//! values, E03: ranges and consistency, E04: stability and lowering, E05: records, E06: identification, E07: tuning.
+//! values, E03: ranges and consistency, E04: stability and lowering, E05: records, E06: identification, E07: tuning,
+//! E08: values that do not fit together (the physical lint).
 
 /// What a code stands for.
 #[derive(Debug, Clone, Copy)]
 pub struct Code {
-    /// Such as `E0102`: E for an error, W for a warning.
+    /// Such as `E0102`: E for an error, W for a warning, N for a note.
     pub id: &'static str,
     /// A few words.
     pub title: &'static str,
@@ -54,7 +55,7 @@ codes! {
     BAD_QUANTITY = "E0209", "not a quantity",
         "A quantity is a number and a unit: `\"1.195 kg\"`, `\"3.26e7 g mm^2\"`, `\"40 V/ms\"`, `\"0.012 pi rad\"`. After a slash, group what stands below it: `N/(m s)`.";
     UNKNOWN_UNIT = "E0210", "unknown unit",
-        "Units are m, g, s, min, V, N, Hz, rad, deg, arcmin, arcsec, Pa, J, W and B with the prefixes f p n u m c d k M G T (Ki Mi Gi for B). Upper and lower case matter.";
+        "Units are m, g, s, min, V, N, Hz, rad, deg, arcmin, arcsec, Pa, J, W, A, F and B with the prefixes f p n u m c d k M G T (Ki Mi Gi for B). Upper and lower case matter.";
     WRONG_DIMENSION = "E0211", "wrong dimension",
         "The unit measures something else than the key wants, such as a voltage where a length is due. Radians count: a rotational stiffness is in N m/rad, a bandwidth in rad/s and not in Hz.";
     NOT_FINITE = "E0212", "not a finite number",
@@ -333,6 +334,102 @@ codes! {
         "The key is checked and kept for a later change of mode, but has no effect at start-up.";
     GAINS_UNUSED = "W0308", "gains without a task-space controller",
         "The leg feed-forward has no feedback: [gains] and [position_gains] take effect with [control].";
+    STROKE_IMPOSSIBLE = "E0801", "a stroke that the stacks do not have",
+        "stacks x stack_gain x voltage range is more than four times the stroke, or less than a quarter: legs would be driven past their ends, or never reach what reach was checked for.";
+    STRAIN_ODD = "W0802", "a stroke that does not fit the length of a leg",
+        "Piezo stacks stretch by 0.001 to 0.0015 of their own length. More than 0.015 of the leg, or less than a millionth, is most often a slip of the unit.";
+    RESONANCE_ODD = "W0803", "resonance, stiffness and mass do not fit",
+        "The resonance lies far from what axial_stiffness makes with the mass of the extensible part, alone or with a sixth of the platform.";
+    SLEW_TOO_FAST = "W0804", "a slew rate that does not spare the stacks",
+        "The voltage could cross its range within a fifth of a period of the resonance. A stack that is driven so fast overshoots into tension, which ceramics do not stand.";
+    LAG_AGAINST_SLEW = "W0805", "an amplifier too slow for the slew rate",
+        "A first-order lag makes at most range / lag of slew.";
+    CURRENT_AGAINST_SLEW = "W0806", "an amplifier without the current for the slew rate",
+        "A leg takes capacitance x slew rate. Beyond its current the amplifier limits the slew itself, unknown to the controller.";
+    AMPLIFIER_NOISE = "W0807", "amplifier noise that cannot be",
+        "More than a hundredth of the voltage range, or less than two ten-millionths: probably a slip of the unit.";
+    CONVERTER_COARSE = "W0808", "converter step large against the stroke",
+        "One code moves a leg by more than a thousandth of its stroke.";
+    LEG_PART_SMALL = "W0810", "mass and inertia of a leg part do not fit the leg",
+        "The radius of gyration of a part is less than a fiftieth of the leg.";
+    CENTRE_AT_JOINT = "W0811", "mass centre in the joint",
+        "The mass centre lies far nearer to its joint than the part's radius of gyration. Write 0 for a part that is balanced about its joint.";
+    MOMENT_ODD = "W0812", "a moment of inertia that does not fit the size",
+        "About one axis the radius of gyration is less than a tenth of the joint circle, or more than three times it.";
+    MOMENTS_UNEVEN = "W0813", "moments of inertia in another order?",
+        "I_xx and I_yy differ by more than a factor of two on a platform whose joints lie alike along x and y.";
+    LEG_MASS_ODD = "W0814", "leg and platform of very different mass",
+        "A leg part weighs more than five times the platform, or less than a five-thousandth of it.";
+    JOINTS_TOUCH = "W0815", "joints that would touch",
+        "Two joints of one body are nearer to each other than two thousandths of its radius.";
+    PLATFORM_WIDER = "W0816", "platform wider than its base",
+        "Possible, but most hexapods stand on the wider side: are the two in each other's place?";
+    SLEW_TOO_SLOW = "W0809", "a slew rate that leaves the legs standing",
+        "The voltage takes more than a second over its range.";
+    GAUGE_QUIET = "W0820", "gauge noise far below its step",
+        "Nobody can measure a noise below a fiftieth of the converter's step: probably a slip of the unit.";
+    GAUGE_LOPSIDED = "W0821", "a range with ends in different units?",
+        "One end of sensor.range lies a hundred times further from rest than the other, or the range of a leg's gauge twenty strokes away.";
+    GAUGE_COARSE = "W0822", "gauge step large against the stroke",
+        "One code of the gauge is more than a thousandth of the stroke.";
+    COORDINATE_ODD = "W0823", "a coordinate that is nearly zero",
+        "Beside the size of the platform a coordinate of a gauge is next to nothing, and not zero: probably a slip of the unit.";
+    GAUGE_REVERSED = "W0824", "gauges that count against each other",
+        "Of gauges along the same direction one counts the other way. A wrong sign makes the loop run away; check it by moving the platform by hand before the amplifiers are on.";
+    GAUGE_FAR = "W0825", "a gauge that looks past the platform",
+        "The line of the gauge meets its target plane far outside the platform: probably coordinates in another order or unit.";
+    GAUGE_SLIP = "W0826", "a layout of gauges that one slip would explain",
+        "The gauges see some motion badly, and would not if one of them had another sign, or two coordinates in another order.";
+    CALIBRATION_ODD = "W0827", "a calibration unlike the others",
+        "Offset or slope of one gauge is far from those of the other five, or of another sign.";
+    GAIN_UNEVEN = "W0828", "a gain unlike the others",
+        "Gains go with the stiffness of their axes. One is more than ten times, or less than a tenth, of what the others have.";
+    WORK_PIECE_ODD = "W0829", "a work piece too soft or too stiff",
+        "Its stiffness along an axis is less than a thousandth of the platform's on its legs, or more than twenty times it.";
+    TIME_WITHOUT_EFFECT = "W0830", "a time too short to have an effect",
+        "Lag, lead or dead time is less than a hundredth of a tick.";
+    LEAD_TOO_LONG = "W0831", "a lead longer than what it takes out",
+        "More than three times amplifier lag and tick together: the legs would run ahead of the set-point.";
+    TRANSFER_ODD = "W0832", "a transfer time that is no transfer",
+        "Shorter than a tick, or longer than five seconds.";
+    VELOCITY_FILTER_SLOW = "W0833", "a velocity filter far below the modes",
+        "It passes less than a tenth of the lowest mode's frequency.";
+    TICKS_AGAINST_MODES = "W0834", "tick and modes do not fit",
+        "Fewer than four ticks to a period of the lowest mode, or more than three thousand: period, stiffness or masses are in another unit.";
+    MOVE_BEYOND_SLEW = "W0840", "moves faster than the slew rate",
+        "At control.setpoint.speed the voltage would have to change faster than actuator.slew_rate.";
+    MOVE_SLOW = "W0841", "moves that take minutes",
+        "At control.setpoint.speed a move across the workspace takes more than two minutes.";
+    LIMIT_WITHOUT_EFFECT = "W0842", "a limit of moves that has no effect",
+        "Speed, acceleration and jerk belong together: one is reached within a tick, or never.";
+    STREAM_UNCHECKED = "W0843", "streamed set-points that are not checked",
+        "At control.setpoint.stream_speed a stream may jump across the whole workspace in one tick.";
+    WORKSPACE_TINY = "W0844", "a workspace bound of next to nothing",
+        "Less than half a hundredth of what the legs reach on this axis.";
+    PATH_BEYOND_SLEW = "E0850", "trajectory faster than the slew rate",
+        "A leg would need a faster change of voltage than actuator.slew_rate, even with a quarter more gain than the mean.";
+    PATH_NEAR_SLEW = "W0851", "trajectory near the slew rate",
+        "Where a stack's gain is lowest a leg may meet its slew limit.";
+    PATH_BEYOND_CURRENT = "E0852", "trajectory that takes more current than the amplifier gives",
+        "I = C dU/dt with actuator.capacitance and the gain of the stacks.";
+    PATH_INERTIA = "W0853", "trajectory whose inertia bends the legs",
+        "By more than a tenth of the stroke: the feed-forward takes it out, but reach does not count it.";
+    PATH_EXCITES = "W0854", "trajectory near the lowest mode",
+        "A sinusoid above a fifth of the lowest mode's frequency excites it.";
+    WAVEFORM_STEP = "W0855", "a step that stands out",
+        "Between two rows of a table an axis moves four times further than in the rows around: a jump between two pieces.";
+    JOINT_ANGLE = "E0860", "joints beyond their angle",
+        "Somewhere in the workspace a joint of a leg turns further than leg.joint_angle.";
+    CONDITION_POOR = "W0861", "legs that hold the platform badly",
+        "Somewhere in the declared workspace the condition number of J may exceed 30: forces and errors along one motion are that many times those along another.";
+    BUDGET_IMPOSSIBLE = "E0870", "a budget below what the tables take",
+        "The constants alone do not fit: the unit is wrong, or grid and memory are too large.";
+    BUDGET_LOOSE = "W0871", "a budget that checks nothing",
+        "It is hundreds of times what the tables take.";
+    PRECISION_POOR = "W0880", "arithmetic too coarse for the gauges",
+        "The rounding errors of the chosen scalar may exceed the noise of the gauges. f64, or a smaller workspace, mends it.";
+    ESTIMATED = "N0872", "memory and time are measured by a build",
+        "`check` knows what tables and memories take; code, stack and instructions are known once it is built.";
     TRUNCATED = "W0001", "further findings left out",
         "Only the first findings are shown; mend them and run again.";
 }
@@ -351,7 +448,7 @@ mod tests {
     fn codes_are_unique_and_well_formed() {
         for (i, code) in REGISTRY.iter().enumerate() {
             assert!(REGISTRY[..i].iter().all(|other| other.id != code.id), "{} twice", code.id);
-            assert!(code.id.len() == 5 && code.id.starts_with(['E', 'W']), "{}", code.id);
+            assert!(code.id.len() == 5 && code.id.starts_with(['E', 'W', 'N']), "{}", code.id);
             assert!(code.id[1..].bytes().all(|b| b.is_ascii_digit()), "{}", code.id);
         }
     }

@@ -3,6 +3,7 @@
 pub mod config;
 pub mod crate_root;
 pub mod sensing;
+pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;

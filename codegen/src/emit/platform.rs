@@ -2,6 +2,7 @@
 
 pub mod config;
 pub mod crate_root;
+pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;

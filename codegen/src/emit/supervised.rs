@@ -3,8 +3,19 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-/// `imports`: what `parts` needs. `parts`: the functions `begin`, `work` and `stand` of this kind of controller.
-pub fn emit(imports: &TokenStream, parts: &TokenStream) -> TokenStream {
+/// What differs between the kinds of controller.
+pub struct Parts {
+    /// What the functions need.
+    pub imports: TokenStream,
+    /// The functions `begin`, `stand`, `expectation`, `look`.
+    pub functions: TokenStream,
+    /// Call of the control law.
+    pub law: TokenStream,
+    /// Field of the input with the gauges' words.
+    pub gauges: TokenStream,
+}
+
+pub fn emit(Parts { imports, functions, law, gauges }: &Parts) -> TokenStream {
     quote! {
         #![doc = " The control law under its supervisor: what every target calls."]
 
@@ -17,6 +28,7 @@ pub fn emit(imports: &TokenStream, parts: &TokenStream) -> TokenStream {
         pub use crate::machine_words::{
             MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS, machine_output_words,
         };
+        use crate::step::{GAUGE_FAULT, LEG_LIMITED};
         use crate::supervision::PLAN;
         #imports
         use crate::{Config, LEGS, Real, State, TickInput, TickOutput, step};
@@ -91,20 +103,31 @@ pub fn emit(imports: &TokenStream, parts: &TokenStream) -> TokenStream {
             if begins {
                 begin(config, state, supervisor, &input.tick);
             }
-            let tick = if supervisor.phase == Phase::Running {
-                work(config, state, supervisor, &input.tick)
-            } else {
-                stand(config, state, supervisor, &input.tick)
-            };
-            MachineOutput {
-                tick,
-                phase: supervisor.phase,
-                cause: supervisor.cause,
-                amplifier_on: supervisor.phase.is_powered(),
+            let channel = supervisor.watch.take_turn();
+            let (expected, target) = expectation(state, channel);
+            let (phase, cause) = (supervisor.phase, supervisor.cause);
+            if phase != Phase::Running {
+                let tick = stand(config, state, supervisor, &input.tick, channel, expected);
+                return MachineOutput { tick, phase, cause, amplifier_on: phase.is_powered() };
             }
+            let before = codes(state);
+            // In its place at once: the output of a tick is as large as a copy is slow.
+            let output = MachineOutput { tick: #law, phase, cause, amplifier_on: true };
+            let status = output.tick.status;
+            if status & GAUGE_FAULT == 0 {
+                look(state, supervisor, &input.tick, channel, expected, target);
+            }
+            if status & (GAUGE_FAULT | LEG_LIMITED) == 0 {
+                supervisor.seen = 0;
+            } else {
+                let (faults, limited) = ((status & GAUGE_FAULT) >> 8, status & LEG_LIMITED);
+                let moved = moved(state, &before);
+                supervisor.see(faults, limited, &input.tick.#gauges, &moved, config.code_limits().max_step);
+            }
+            output
         }
 
-        #parts
+        #functions
 
         /// Codes held, or on their way to rest; the memories follow what is really sent.
         fn move_codes(config: &Config, state: &mut State, supervisor: &mut Supervisor) {

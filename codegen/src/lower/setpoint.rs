@@ -8,7 +8,7 @@ mod segments;
 mod spline;
 mod table;
 
-pub use poses::poses;
+pub use poses::{Stretch, stretches};
 
 use specgen_runtime::setpoint::{Frames as _, MoveLimits, Profile, Target, Tool, Work};
 

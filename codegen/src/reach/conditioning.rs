@@ -20,9 +20,26 @@ pub struct Conditioning {
     /// Within this motion of the joints beyond the workspace there is no singular pose, m: an estimate from below, of
     /// first order in the motion.
     pub free_of_singularities: f64,
+    /// No pose of the declared workspace has a condition above this, to second order in the motion; `f64::MAX` where that
+    /// cannot be said.
+    pub worst_bound: f64,
+    /// Smallest and largest σ at rest.
+    pub at_rest_values: [f64; 2],
 }
 
 impl Conditioning {
+    /// With the bound over the whole box, corner to corner: no joint moves further than translation, turn and its square take
+    /// it, and the singular values change with that no faster than `free_of_singularities` says.
+    pub(super) fn bounded(mut self, bounds: &Pose, shortest_leg: f64, joint_radius: f64) -> Self {
+        let turn = bounds[3] + bounds[4] + bounds[5];
+        let motion = libm::sqrt(bounds[0] * bounds[0] + bounds[1] * bounds[1] + bounds[2] * bounds[2])
+            + libm::expm1(turn) * joint_radius;
+        let change = libm::sqrt(6.0) * 2.0 * (1.0 / shortest_leg + 1.0 / joint_radius) * motion;
+        let [smallest, largest] = self.at_rest_values;
+        self.worst_bound = if smallest > change { (largest + change) / (smallest - change) } else { f64::MAX };
+        self
+    }
+
     /// The first of `poses` is rest.
     pub(super) fn over(
         platform: &Platform<f64>,
@@ -40,6 +57,8 @@ impl Conditioning {
                 worst_pose: pose,
                 smallest_singular_value: smallest,
                 free_of_singularities: 0.0,
+                worst_bound: f64::MAX,
+                at_rest_values: [smallest, largest],
             });
             if condition > one.worst {
                 one.worst = condition;
@@ -55,6 +74,8 @@ impl Conditioning {
             worst_pose: [0.0; 6],
             smallest_singular_value: 0.0,
             free_of_singularities: 0.0,
+            worst_bound: f64::MAX,
+            at_rest_values: [0.0; 2],
         });
         // A joint that moves by ε turns its leg by up to ε/l and its arm by up to ε/r: a row of J changes by twice the sum
         // at most, the six of them by √6 times that, and J stays regular while that is below σ_min.

@@ -19,7 +19,29 @@ pub(super) fn of(model: &Model, reach: &Reach, bias: &PathReach) -> Vec<Diagnost
     for axis in 0..6 {
         findings.extend(of_axis(model, reach, axis));
     }
+    findings.extend(of_condition(model, reach));
     findings
+}
+
+/// Above this condition number one motion is held thirty times worse than another.
+const POOREST: f64 = 30.0;
+
+fn of_condition(model: &Model, reach: &Reach) -> Option<Diagnostic> {
+    let conditioning = &reach.conditioning;
+    if conditioning.worst_bound <= POOREST {
+        return None;
+    }
+    Some(finding(
+        model,
+        Severity::Warning,
+        codes::CONDITION_POOR,
+        &["geometry.height", "geometry"],
+        format!(
+            "the condition number of the legs is {:.1} at rest and may come to {:.1} in the workspace",
+            conditioning.at_rest, conditioning.worst_bound
+        ),
+        "make the height comparable to the radii, close the joint pairs (small base_angle and platform_angle), or reduce [workspace]".to_owned(),
+    ))
 }
 
 fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic> {
@@ -150,10 +172,24 @@ pub fn describe(reach: &Reach) -> String {
     let conditioning = &reach.conditioning;
     let _ = writeln!(
         text,
-        "  condition of J {:.2} at rest, {:.2} at worst; no singular pose within {:.1} mm of the workspace",
+        "  condition of J {:.2} at rest, {:.2} at worst, below {:.3} anywhere in the workspace; no singular pose within {:.1} mm of it",
         conditioning.at_rest,
         conditioning.worst,
+        conditioning.worst_bound,
         conditioning.free_of_singularities * 1e3
+    );
+    let [base, platform] = reach.joint_angles.map(|angle| angle * 1e3);
+    let _ = writeln!(text, "  joints turn by up to {base:.3} mrad at the base and {platform:.3} mrad at the platform");
+    let half = |half: &[f64]| half.iter().map(|width| format!("{:.1}", width * 1e6)).collect::<Vec<_>>().join("/");
+    let _ = writeln!(
+        text,
+        "  largest box that is reached about z = {:.1} um, all at once, ± um and urad: {} and {} of the declared shape; {} and {} by volume; {} without rotation",
+        reach.boxes.centre[2] * 1e6,
+        half(&reach.boxes.as_declared[..3]),
+        half(&reach.boxes.as_declared[3..]),
+        half(&reach.boxes.largest[..3]),
+        half(&reach.boxes.largest[3..]),
+        half(&reach.boxes.without_rotation[..3])
     );
     text
 }

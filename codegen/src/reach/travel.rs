@@ -85,6 +85,13 @@ impl Legs<'_> {
         })
     }
 
+    /// Largest part, up to 1, of a box of half widths `half` about `centre` of which all corners are in reach.
+    pub(super) fn corners_within(&self, centre: &Pose, half: &Pose) -> f64 {
+        self.largest(1.0, |share| {
+            corners().all(|signs| self.holds(&core::array::from_fn(|i| centre[i] + share * signs[i] * half[i])))
+        })
+    }
+
     /// Upper bound of |Δl| over the whole box. With d the motion of a joint, |Δl − s·d| ≤ |d|²/(2 (l₀ − |d|)), and
     /// |R − I − [θ]×| ≤ e^t − 1 − t with t = |θx| + |θy| + |θz|.
     pub(super) fn bound(&self, bounds: &Pose, rest_lengths: &[f64; 6], joint_radius: f64) -> f64 {

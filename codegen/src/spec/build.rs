@@ -25,6 +25,7 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
             extensible_inertia: f.number("leg.extensible_inertia")?,
             fixed_center: f.number("leg.fixed_center")?,
             extensible_center: f.number("leg.extensible_center")?,
+            joint_angle: f.number("leg.joint_angle"),
         },
         actuator: Actuator {
             stacks: f.whole("actuator.stacks")?,
@@ -35,8 +36,13 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
             axial_stiffness: f.number("actuator.axial_stiffness")?,
             resonance: f.number("actuator.resonance")?,
             damping_ratio: f.number("actuator.damping_ratio")?,
+            capacitance: f.number("actuator.capacitance"),
         },
-        amplifier: Amplifier { lag: f.number("amplifier.lag")?, noise: f.number("amplifier.noise")? },
+        amplifier: Amplifier {
+            lag: f.number("amplifier.lag")?,
+            noise: f.number("amplifier.noise")?,
+            current: f.number("amplifier.current"),
+        },
         dac: Dac { bits: f.whole("dac.bits")?, range: f.list("dac.range")? },
         sensor: Sensor {
             range: f.list("sensor.range")?,

@@ -6,6 +6,7 @@ mod hal;
 mod host;
 mod link;
 mod qemu;
+mod rt;
 mod rt_pc;
 mod runtime;
 mod stm32;
@@ -53,6 +54,7 @@ pub const PARTS: &[&Part] = &[
     &stm32::PART,
     &stm32h743::PART,
     &stm32f4::PART,
+    &rt::PART,
     &rt_pc::PART,
 ];
 

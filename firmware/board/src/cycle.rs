@@ -23,10 +23,11 @@ pub struct Noticed {
 
 /// The machine with its converters. Owned by the interrupt that ticks.
 #[derive(Debug)]
-pub struct Board<G, A> {
+pub struct Board<'m, G, A> {
     gauges: G,
     amplifiers: A,
-    machine: Machine,
+    /// Not a part of it: some kilobytes, which no move is to carry over the stack.
+    machine: &'m mut Machine,
     /// Whether tables and settings in flash are what the compiler wrote.
     intact: bool,
     /// Whether both converters were started and proved.
@@ -37,7 +38,7 @@ pub struct Board<G, A> {
     request: Request,
 }
 
-impl<G: Gauges, A: Amplifiers> Board<G, A> {
+impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     /// Bits that a code of the ADC has more than the controller expects.
     const SPARE_BITS: u32 = {
         assert!(GAUGE_BITS <= G::BITS, "sensor.bits of the spec is more than the ADC of this board has");
@@ -47,11 +48,11 @@ impl<G: Gauges, A: Amplifiers> Board<G, A> {
     const SAME_CODES: () =
         assert!(controller::limits::DAC_BITS == A::BITS, "dac.bits of the spec is not what the DAC of this board has");
 
-    /// At power-up, before [`Self::start`]. `intact`: the result of `controller::integrity`.
+    /// At power-up, before [`Self::start`]. `machine` is at reset; `intact`: the result of `controller::integrity`.
     #[must_use]
-    pub const fn new(gauges: G, amplifiers: A, intact: bool) -> Self {
+    pub const fn new(gauges: G, amplifiers: A, machine: &'m mut Machine, intact: bool) -> Self {
         let () = Self::SAME_CODES;
-        Self { gauges, amplifiers, machine: Machine::new(), intact, started: false, pending: 0, request: Request::None }
+        Self { gauges, amplifiers, machine, intact, started: false, pending: 0, request: Request::None }
     }
 
     /// Brings the converters into their working state, amplifiers disabled. May take a millisecond.
@@ -104,7 +105,7 @@ impl<G: Gauges, A: Amplifiers> Board<G, A> {
             }
         };
 
-        let output = supervise(config, &mut self.machine, &input(orders, &readings, events));
+        let output = supervise(config, self.machine, &input(orders, &readings, events));
 
         // Off before the codes change, on only after they are out.
         if !output.amplifier_on {
@@ -129,7 +130,7 @@ impl<G: Gauges, A: Amplifiers> Board<G, A> {
     /// What the controller remembers.
     #[must_use]
     pub const fn machine(&self) -> &Machine {
-        &self.machine
+        self.machine
     }
 
     /// Does something to the amplifiers; a fault is an event of the next tick.

@@ -67,10 +67,15 @@ impl Amplifiers for Parts {
     }
 }
 
-fn started(intact: bool) -> (Parts, Board<Parts, Parts>, Exchange) {
+/// For the rest of the test, as on a board.
+fn at_reset() -> &'static mut Machine {
+    Box::leak(Box::new(Machine::new()))
+}
+
+fn started(intact: bool) -> (Parts, Board<'static, Parts, Parts>, Exchange) {
     let parts = Parts::default();
     parts.0.borrow_mut().codes = [1 << 17; 6];
-    let mut board = Board::new(parts.clone(), parts.clone(), intact);
+    let mut board = Board::new(parts.clone(), parts.clone(), at_reset(), intact);
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
     exchange.silence.heard();
@@ -89,7 +94,13 @@ impl ByHand {
         Self { config: Config::new(), machine: Machine::new() }
     }
 
-    fn tick(&mut self, command: &[u64; COMMAND_WORDS], gauge: [Real; 6], request: Request, events: u32) -> MachineOutput {
+    fn tick(
+        &mut self,
+        command: &[u64; COMMAND_WORDS],
+        gauge: [Real; 6],
+        request: Request,
+        events: u32,
+    ) -> MachineOutput {
         let vector = |start: usize| core::array::from_fn(|k| Real::from_bits(command[start + k]));
         let command = Command {
             kind: CommandKind::from_word(command[0]),
@@ -182,7 +193,7 @@ fn a_code_taken_with_another_shift_is_seen() {
 #[test]
 fn a_link_that_was_never_heard_or_fell_silent_is_an_event() {
     let parts = Parts::default();
-    let mut board = Board::new(parts.clone(), parts, true);
+    let mut board = Board::new(parts.clone(), parts, at_reset(), true);
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
     board.tick(&mut exchange, Noticed::default());
@@ -215,11 +226,12 @@ fn a_damaged_flash_is_an_event_of_every_tick() {
 fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_starts_them() {
     let parts = Parts::default();
     parts.0.borrow_mut().start_fault = Some(Fault::ReadBack);
-    let mut board = Board::new(parts.clone(), parts.clone(), true);
+    let mut board = Board::new(parts.clone(), parts.clone(), at_reset(), true);
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
     assert_eq!(exchange.report.faults, Fault::ReadBack.bit());
-    for request in [Request::Arm, Request::Run, Request::Acknowledge, Request::Acknowledge, Request::Run, Request::Run] {
+    for request in [Request::Arm, Request::Run, Request::Acknowledge, Request::Acknowledge, Request::Run, Request::Run]
+    {
         exchange.silence.heard();
         exchange.report.events = 0;
         exchange.orders.request = request;

@@ -73,7 +73,8 @@ fn the_description_comes_in_pieces() {
     let mut desk = Desk::new(&Exchange::new());
     let mut text = Vec::new();
     loop {
-        let Reply::Chunk { offset, total, bytes } = desk.execute(&Request::Describe { offset: text.len() as u32 }) else {
+        let Reply::Chunk { offset, total, bytes } = desk.execute(&Request::Describe { offset: text.len() as u32 })
+        else {
             unreachable!()
         };
         assert_eq!((offset as usize, total as usize), (text.len(), DESCRIPTION.len()));

@@ -21,7 +21,8 @@ fn every_due_time_is_a_tick_or_is_counted_as_missed() {
         let (mut ticks, mut missed) = (0_u64, 0_u64);
         for _ in 0..2000 {
             // Now and then long after it was due.
-            let delay = if random.next_u32() % 5 == 0 { random.next_u32() % (4 * period) } else { random.next_u32() % period };
+            let delay =
+                if random.next_u32() % 5 == 0 { random.next_u32() % (4 * period) } else { random.next_u32() % period };
             now = now.max(grid) + u64::from(delay);
             let due = schedule.begin(now as u32);
             let skipped = (now - grid) / u64::from(period);

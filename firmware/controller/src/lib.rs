@@ -36,6 +36,7 @@ mod machine_words;
 
 pub mod sensing;
 pub mod setpoint;
+pub mod snapshot;
 pub mod stages;
 mod state;
 mod step;

@@ -15,12 +15,13 @@ pub use crate::machine_words::{
     MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS,
     machine_output_words,
 };
+use crate::step::{GAUGE_FAULT, LEG_LIMITED};
 use crate::supervision::PLAN;
 use specgen_runtime::linear::each;
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::{Estimate, Integral, NotchState, Real as _, Transfer};
 use crate::setpoint::PLAN as SETPOINTS;
-use crate::step::{GAUGE_FAULT, LEG_LIMITED, sense};
+use crate::step::sense;
 use crate::supervision::READINGS_PER_LEG;
 use crate::{kinematics, sensing};
 use crate::{Config, LEGS, Real, State, TickInput, TickOutput, step};
@@ -103,17 +104,44 @@ pub fn supervise(
     if begins {
         begin(config, state, supervisor, &input.tick);
     }
-    let tick = if supervisor.phase == Phase::Running {
-        work(config, state, supervisor, &input.tick)
-    } else {
-        stand(config, state, supervisor, &input.tick)
-    };
-    MachineOutput {
-        tick,
-        phase: supervisor.phase,
-        cause: supervisor.cause,
-        amplifier_on: supervisor.phase.is_powered(),
+    let channel = supervisor.watch.take_turn();
+    let (expected, target) = expectation(state, channel);
+    let (phase, cause) = (supervisor.phase, supervisor.cause);
+    if phase != Phase::Running {
+        let tick = stand(config, state, supervisor, &input.tick, channel, expected);
+        return MachineOutput {
+            tick,
+            phase,
+            cause,
+            amplifier_on: phase.is_powered(),
+        };
     }
+    let before = codes(state);
+    let output = MachineOutput {
+        tick: step(config, state, &input.tick),
+        phase,
+        cause,
+        amplifier_on: true,
+    };
+    let status = output.tick.status;
+    if status & GAUGE_FAULT == 0 {
+        look(state, supervisor, &input.tick, channel, expected, target);
+    }
+    if status & (GAUGE_FAULT | LEG_LIMITED) == 0 {
+        supervisor.seen = 0;
+    } else {
+        let (faults, limited) = ((status & GAUGE_FAULT) >> 8, status & LEG_LIMITED);
+        let moved = moved(state, &before);
+        supervisor
+            .see(
+                faults,
+                limited,
+                &input.tick.gauge,
+                &moved,
+                config.code_limits().max_step,
+            );
+    }
+    output
 }
 
 /// Puts the law where the machine is. No leg moves in the first tick: a mode that begins takes over what is held.
@@ -150,33 +178,18 @@ fn begin(
     }
 }
 
-/// The control law, watched.
+/// The channel whose turn it is, after the law has seen the readings.
 #[inline]
-fn work(
-    config: &Config,
-    state: &mut State,
+fn look(
+    state: &State,
     supervisor: &mut Supervisor,
     input: &TickInput,
-) -> TickOutput {
-    let channel = supervisor.watch.take_turn();
-    let expected = expected(state, channel);
-    let target = component(&state.generator.target().pose, channel);
-    let before = codes(state);
-    let output = step(config, state, input);
-    let faults = output.status & GAUGE_FAULT;
-    let limited = output.status & LEG_LIMITED;
-    if faults == 0 {
-        let error = target - component(&state.pose, channel);
-        supervisor
-            .look(&PLAN, channel, &sample(&input.gauge, channel, expected, Some(error)));
-    }
-    if faults | limited == 0 {
-        supervisor.seen = 0;
-    } else {
-        let step = config.code_limits().max_step;
-        supervisor.see(faults >> 8, limited, &input.gauge, &moved(state, &before), step);
-    }
-    output
+    channel: usize,
+    expected: Real,
+    target: Real,
+) {
+    let error = Some(target - component(&state.pose, channel));
+    supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
 }
 
 /// Codes held or on their way to rest, the law suspended; pose and rate are still measured.
@@ -187,9 +200,9 @@ fn stand(
     state: &mut State,
     supervisor: &mut Supervisor,
     input: &TickInput,
+    channel: usize,
+    expected: Real,
 ) -> TickOutput {
-    let channel = supervisor.watch.take_turn();
-    let expected = expected(state, channel);
     move_codes(config, state, supervisor);
     for leg in &mut state.legs {
         leg.requested = leg.memory.displacement();
@@ -207,15 +220,19 @@ fn stand(
     }
 }
 
-/// What a gauge ought to read by the codes sent over the interval that has ended and the known load, m.
+/// What a gauge ought to read by the codes sent over the interval that has ended and the known load, m; and the set-point
+/// of the axis of that number, m or rad.
 #[inline]
-fn expected(state: &State, channel: usize) -> Real {
-    let Some([a, b, c, d, e, f]) = READINGS_PER_LEG.get(channel) else { return 0.0 };
+fn expectation(state: &State, channel: usize) -> (Real, Real) {
+    let Some([a, b, c, d, e, f]) = READINGS_PER_LEG.get(channel) else {
+        return (0.0, 0.0)
+    };
     let legs = &state.legs;
     let load = &state.load;
     let displaced = |leg: usize| legs[leg].memory.displacement() - load[leg];
-    *a * displaced(0) + *b * displaced(1) + *c * displaced(2) + *d * displaced(3)
-        + *e * displaced(4) + *f * displaced(5)
+    let half = *a * displaced(0) + *b * displaced(1) + *c * displaced(2);
+    let expected = half + *d * displaced(3) + *e * displaced(4) + *f * displaced(5);
+    (expected, component(&state.generator.target().pose, channel))
 }
 
 #[inline]

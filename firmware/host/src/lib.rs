@@ -12,6 +12,7 @@
 use core::mem::{align_of, size_of};
 
 use controller::dynamics::{ANALYSIS_WORDS, MOTION_WORDS};
+use controller::snapshot::MACHINE_STATE_WORDS;
 use controller::supervised::{
     MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_output_words, supervise,
 };
@@ -36,7 +37,8 @@ pub extern "C" fn specgen_abi_version() -> u32 {
 }
 
 /// What this controller is: `key=value` lines in UTF-8, those of `controller::DESCRIPTION` and `state_bytes`,
-/// `state_align`, `config_bytes`, `config_align`, `machine_bytes`, `machine_align`.
+/// `state_align`, `config_bytes`, `config_align`, `machine_bytes`, `machine_align`, and
+/// `machine_words`, the words of its snapshot.
 ///
 /// # Safety
 /// `text` and `length` point to writable memory. The text lives as long as the library is loaded.
@@ -50,13 +52,14 @@ pub unsafe extern "C" fn specgen_describe(text: *mut *const u8, length: *mut usi
 }
 
 /// Keys of the memory that the caller provides, with their values.
-const MEMORY: [(&str, usize); 6] = [
+const MEMORY: [(&str, usize); 7] = [
     ("state_bytes=", size_of::<State>()),
     ("state_align=", align_of::<State>()),
     ("config_bytes=", size_of::<Config>()),
     ("config_align=", align_of::<Config>()),
     ("machine_bytes=", size_of::<Machine>()),
     ("machine_align=", align_of::<Machine>()),
+    ("machine_words=", MACHINE_STATE_WORDS),
 ];
 /// Decimal digits of each value, leading zeros included.
 const DIGITS: usize = 8;
@@ -224,6 +227,35 @@ pub unsafe extern "C" fn specgen_machine_step(
 pub unsafe extern "C" fn specgen_machine_digest(machine: *const u8) -> u64 {
     // SAFETY: the caller's duty.
     unsafe { (*machine.cast::<Machine>()).digest() }
+}
+
+/// A `Machine` as words.
+///
+/// # Safety
+/// `machine` holds a `Machine` put at reset before; `words` points to `MACHINE_STATE_WORDS` writable words.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_machine_save(machine: *const u8, words: *mut u64) {
+    // SAFETY: the caller's duty.
+    let (machine, words) = unsafe { (&*machine.cast::<Machine>(), &mut *words.cast::<[u64; MACHINE_STATE_WORDS]>()) };
+    machine.save(words);
+}
+
+/// A `Machine` of words: returns 0, or one more than the index of the first word that no machine holds (then `machine` is as
+/// it was).
+///
+/// # Safety
+/// `machine` points to memory for a `Machine`, `words` to `MACHINE_STATE_WORDS` words.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn specgen_machine_load(machine: *mut u8, words: *const u64) -> i32 {
+    // SAFETY: the caller's duty.
+    match Machine::load(unsafe { &*words.cast::<[u64; MACHINE_STATE_WORDS]>() }) {
+        Ok(loaded) => {
+            // SAFETY: the caller's duty.
+            unsafe { machine.cast::<Machine>().write(loaded) };
+            0
+        }
+        Err(invalid) => invalid.word as i32 + 1,
+    }
 }
 
 /// The dynamics at a motion, see `controller::dynamics::analysis`.

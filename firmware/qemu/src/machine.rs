@@ -1,6 +1,6 @@
 //! Replays supervised ticks: rows of MACHINE_INPUT_WORDS words in, rows of MACHINE_OUTPUT_WORDS words and the digest of the
-//! machine out. Beside each tick that runs throughout, the control law alone is counted on a copy of the state: the difference is
-//! what the supervisor costs.
+//! machine out. Of some of the ticks that run on, the control law alone is counted, too, on a copy of the state: the difference
+//! is what the supervisor costs.
 
 use crate::instructions::{InstructionCounter, SelfTest};
 use crate::semihosting::{Exit, File};
@@ -48,14 +48,16 @@ pub fn replay(
         for (row, result) in rows.iter().zip(&mut results).take(count) {
             let tick_input = MachineInput::from_words(row);
             let ran = machine.supervisor.phase == Phase::Running;
-            let law = ran.then(|| count_law(counter, config, &machine.state, &tick_input.tick));
-            let (tick_output, instructions, depth) = tick(counter, config, &mut machine, &tick_input, is_due(ticks));
+            let due = is_due(ticks);
+            let law = (ran && due).then(|| count_law(counter, config, &machine.state, &tick_input.tick));
+            let (tick_output, instructions, depth) = tick(counter, config, &mut machine, &tick_input, due);
             match law {
                 Some(law) if tick_output.phase == Phase::Running => {
                     stages[RUNNING].add(instructions);
                     stages[LAW].add(law);
                 }
-                _ => stages[OTHER].add(instructions),
+                _ if tick_output.phase != Phase::Running || !ran => stages[OTHER].add(instructions),
+                _ => {}
             }
             if depth > deepest {
                 deepest = depth;

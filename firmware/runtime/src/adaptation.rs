@@ -1,7 +1,7 @@
 //! Run-to-run adaptation of one leg: EWMA and PCC in the filter form of Fig. 5 with Ĝ_p = ρ̂.
 //!
 //! ```text
-//! m_n = Y_n − ρ̂ X_n                                                      model error of run n
+//! m_n = Y_n − ρ̂ X_n                                                      model error of run n, (AII.1)
 //! EWMA:  δ̂_n = ω m_n + (1−ω) δ̂_{n−1}                                      (AII.3)
 //! PCC:   δ̂_n = ω1 m_n + (1−ω1) δ̂_{n−1}                                    (AII.5)
 //!        φ̂_n = ω2 (m_n − δ̂_{n−1}) + (1−ω2) φ̂_{n−1}                       (AII.6), with the old δ̂

@@ -15,6 +15,7 @@ use crate::digest::Digest;
 use crate::everett::Everett;
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
+use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
 
 /// `K` creep operators in parallel, for one length of the tick.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +67,12 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
     #[must_use]
     pub fn drive(&self) -> T {
         self.memory.drive()
+    }
+
+    /// The highest drive in memory, cells.
+    #[must_use]
+    pub fn highest(&self) -> T {
+        self.memory.highest()
     }
 
     /// The displacement that the model gives at the end of the tick over which the last drive is held, m.
@@ -139,5 +146,22 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
             digest.real(*state);
         }
         digest.real(self.displacement);
+    }
+}
+
+impl<T: Real, const CAP: usize, const K: usize> Snapshot for CreepMemory<T, CAP, K> {
+    const WORDS: usize = ReversalMemory::<T, CAP>::WORDS + K + 1;
+
+    fn save(&self, words: &mut Writer<'_>) {
+        self.memory.save(words);
+        words.reals(&self.states);
+        words.real(self.displacement);
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        self.memory.restore(words)?;
+        words.reals(&mut self.states, LARGEST_PLACE)?;
+        self.displacement = words.real(LARGEST_PLACE)?;
+        Ok(())
     }
 }

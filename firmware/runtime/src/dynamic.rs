@@ -17,6 +17,7 @@ use crate::digest::Digest;
 use crate::everett::Everett;
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
+use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
 
 /// The two Everett functions of one leg.
 #[derive(Debug, Clone, Copy)]
@@ -80,6 +81,12 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     #[must_use]
     pub fn drive(&self) -> T {
         self.memory.drive()
+    }
+
+    /// The highest drive in memory, cells.
+    #[must_use]
+    pub fn highest(&self) -> T {
+        self.memory.highest()
     }
 
     /// What the last tick requested, see [`DynamicMemory::apply`], m.
@@ -278,4 +285,24 @@ fn along<T: Real, const N: usize, const NODES: usize>(
     drive: T,
 ) -> T {
     if drive > start { at_start + table.value(drive, start) } else { at_start - table.value(start, drive) }
+}
+
+impl<T: Real, const CAP: usize> Snapshot for DynamicMemory<T, CAP> {
+    const WORDS: usize = ReversalMemory::<T, CAP>::WORDS + CAP + 3;
+
+    fn save(&self, words: &mut Writer<'_>) {
+        self.memory.save(words);
+        words.first_reals(&self.rate_at, self.memory.depth());
+        words.reals(&[self.rate, self.displacement]);
+        words.flag(self.fell_back);
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        self.memory.restore(words)?;
+        words.reals(&mut self.rate_at, LARGEST_PLACE)?;
+        self.rate = words.real(LARGEST_PLACE)?;
+        self.displacement = words.real(LARGEST_PLACE)?;
+        self.fell_back = words.flag()?;
+        Ok(())
+    }
 }

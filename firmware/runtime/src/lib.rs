@@ -30,6 +30,9 @@
 //! | [`crc`] | checksum of tables and settings in memory | |
 //! | [`supervisor`] | phases of the machine, causes of faults | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
+//! | [`snapshot`] | a state as words and back, checked | |
+//! | [`wave`] | set-points on board: sine, chirp, multisine, reversal curves | |
+//! | [`recorder`], [`record`] | ticks kept in fixed memory, and the format they leave in | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
 //! Rules kept here: no panic path, no allocation, no `unsafe`, loops with a fixed bound, no `min`/`max`/`clamp`/`mul_add`
@@ -52,12 +55,16 @@ pub mod mode;
 pub mod motion;
 pub mod notch;
 pub mod real;
+pub mod record;
+pub mod recorder;
 pub mod sensing;
 pub mod setpoint;
+pub mod snapshot;
 pub mod supervisor;
 pub mod transfer;
 pub mod trig;
 pub mod velocity;
+pub mod wave;
 
 pub use adaptation::{Estimate, Law};
 pub use attitude::{Attitude, Series};
@@ -75,6 +82,9 @@ pub use mode::{ControlMode, Interaction};
 pub use motion::Motion;
 pub use notch::{NotchState, Section};
 pub use real::Real;
+pub use recorder::Recorder;
 pub use sensing::{Calibration, GaugeConverter, Gauges};
+pub use snapshot::Snapshot;
 pub use transfer::Transfer;
 pub use velocity::{Rate, RateFilter};
+pub use wave::Wave;

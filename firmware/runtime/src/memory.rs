@@ -14,6 +14,8 @@ use crate::digest::Digest;
 use crate::everett::{Everett, Line};
 use crate::real::{Real, saturate};
 
+mod snapshot;
+
 /// Staircase of at most `CAP` ≥ 4 extrema. Drives in cells of the Everett grid, displacements in m.
 ///
 /// Reset state: drive 0 after negative saturation, displacement 0; a real leg reaches it by a sweep to the

@@ -26,6 +26,7 @@ mod debounce;
 mod kinds;
 mod phases;
 mod plan;
+mod snapshot;
 mod watch;
 
 pub use approach::Approach;

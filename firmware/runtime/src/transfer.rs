@@ -2,6 +2,7 @@
 
 use crate::digest::Digest;
 use crate::real::Real;
+use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
 
 /// An offset on each leg's request that fades exponentially, m. Zero at reset.
 #[derive(Debug, Clone, Copy)]
@@ -68,5 +69,20 @@ impl<T: Real> Transfer<T> {
             digest.real(*value);
         }
         digest.word(u64::from(self.active));
+    }
+}
+
+impl<T: Real> Snapshot for Transfer<T> {
+    const WORDS: usize = 7;
+
+    fn save(&self, words: &mut Writer<'_>) {
+        words.reals(&self.offset);
+        words.flag(self.active);
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        words.reals(&mut self.offset, LARGEST_PLACE)?;
+        self.active = words.flag()?;
+        Ok(())
     }
 }

@@ -10,6 +10,7 @@
 
 use crate::digest::Digest;
 use crate::real::Real;
+use crate::snapshot::{Invalid, LARGEST, LARGEST_PLACE, Reader, Snapshot, Writer};
 
 /// The filter of one controller: constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,5 +87,22 @@ impl<T: Real> Rate<T> {
             digest.real(*value);
         }
         digest.word(u64::from(self.primed));
+    }
+}
+
+impl<T: Real> Snapshot for Rate<T> {
+    const WORDS: usize = 13;
+
+    fn save(&self, words: &mut Writer<'_>) {
+        words.reals(&self.previous);
+        words.reals(&self.value);
+        words.flag(self.primed);
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        words.reals(&mut self.previous, LARGEST_PLACE)?;
+        words.reals(&mut self.value, LARGEST)?;
+        self.primed = words.flag()?;
+        Ok(())
     }
 }

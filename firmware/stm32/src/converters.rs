@@ -2,6 +2,7 @@
 
 use core::mem::MaybeUninit;
 
+use controller::supervised::Machine;
 use embassy_stm32::gpio::{Input, Output};
 use embassy_stm32::mode::Blocking;
 use embassy_stm32::spi::mode::Master;
@@ -34,7 +35,7 @@ pub type Adc<const CYCLES: u32> =
 pub type Dacs<const CYCLES: u32> =
     Ad5686rPair<DacSpi<CYCLES>, DacSpi<CYCLES>, Output<'static>, Output<'static>, CycleDelay<CYCLES>>;
 /// The machine on them.
-pub type Machine<const CYCLES: u32> = Board<Adc<CYCLES>, Dacs<CYCLES>>;
+pub type OnBoard<const CYCLES: u32> = Board<'static, Adc<CYCLES>, Dacs<CYCLES>>;
 /// Where the bus of the DACs lives.
 pub type BusCell = MaybeUninit<AtomicCell<Bus>>;
 
@@ -84,14 +85,22 @@ fn spi_config(mode: spi::Mode) -> spi::Config {
     config
 }
 
-/// Puts machine and converters together. `intact`: what `controller::integrity` found. None if a chip select cannot be
+/// The machine at reset, made where it stays. A function of its own, so that the compiler fills the memory instead of a copy
+/// of it on the stack; `tests/tests/boards.rs` adds up the stack.
+#[inline(never)]
+pub fn at_reset(memory: &'static mut MaybeUninit<Machine>) -> &'static mut Machine {
+    memory.write(Machine::new())
+}
+
+/// Puts machine (at reset) and converters together. `intact`: what `controller::integrity` found. None if a chip select cannot be
 /// driven, which a pin of these parts never reports.
-pub fn machine<const CYCLES: u32>(
+pub fn board<const CYCLES: u32>(
     adc: AdcPins,
     dac: DacPins,
     cell: &'static mut BusCell,
+    machine: &'static mut Machine,
     intact: bool,
-) -> Option<Machine<CYCLES>> {
+) -> Option<OnBoard<CYCLES>> {
     let delay = CycleDelay::<CYCLES>;
     let bus: &'static AtomicCell<Bus> = cell.write(AtomicCell::new(dac.spi));
     let [first, second] = dac.select;
@@ -100,5 +109,5 @@ pub fn machine<const CYCLES: u32>(
     let adc_spi = ExclusiveDevice::new(adc.spi, adc.select, delay).ok()?;
     let adc = Ad7606::new(adc_spi, adc.start, adc.busy, adc.reset, delay, REFERENCE);
     let dacs = Ad5686rPair::new(first, second, dac.load, dac.enable, delay);
-    Some(Board::new(adc, dacs, intact))
+    Some(Board::new(adc, dacs, machine, intact))
 }

@@ -18,13 +18,13 @@ use specgen_board::{Exchange, Noticed};
 use specgen_stm32::converters;
 
 /// The machine on this board's converters.
-type Machine = converters::Machine<{ clocks::DELAY }>;
+type Board = converters::OnBoard<{ clocks::DELAY }>;
 
 /// A tick without its timer, under a name that the analyses of the image know.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn specgen_tick(machine: &mut Machine, exchange: &mut Exchange, noticed: Noticed) -> bool {
-    machine.tick(exchange, noticed)
+fn specgen_tick(board: &mut Board, exchange: &mut Exchange, noticed: Noticed) -> bool {
+    board.tick(exchange, noticed)
 }
 
 /// Of the watchdog, µs: some hundred ticks, and starting the converters anew.
@@ -34,6 +34,7 @@ const WATCHDOG: u32 = 20_000;
 mod app {
     use core::mem::MaybeUninit;
 
+    use controller::supervised::Machine;
     use embassy_stm32::gpio::Input;
     use embassy_stm32::interrupt::{InterruptExt, Priority};
     use embassy_stm32::mode::Async;
@@ -45,28 +46,29 @@ mod app {
     use specgen_stm32::converters::BusCell;
     use specgen_stm32::{converters, serial, timer};
 
-    use crate::{Machine, WATCHDOG, clocks, pins};
+    use crate::{Board, WATCHDOG, clocks, pins};
 
     #[shared]
     struct Shared {
-        exchange: Exchange,
+        exchange: &'static mut Exchange,
     }
 
     #[local]
     struct Local {
-        machine: Machine,
+        board: Board,
         schedule: Schedule,
         health: Health,
         watchdog: IndependentWatchdog<'static, IWDG>,
         stop: Input<'static>,
         receiver: RingBufferedUartRx<'static>,
         sender: UartTx<'static, Async>,
-        endpoint: Endpoint,
-        desk: Desk,
     }
 
+    // What is large is made where it stays: a move of some kilobytes would go over the stack.
     #[init(local = [
         dac_bus: BusCell = MaybeUninit::uninit(),
+        machine: MaybeUninit<Machine> = MaybeUninit::uninit(),
+        exchange: Exchange = Exchange::new(),
         ring: [u8; serial::RING] = [0; serial::RING],
     ])]
     fn init(context: init::Context) -> (Shared, Local) {
@@ -76,15 +78,15 @@ mod app {
         watchdog.unleash();
 
         let intact = controller::integrity::intact();
-        let mut exchange = Exchange::new();
-        let machine = converters::machine(wiring.adc, wiring.dac, context.local.dac_bus, intact);
-        let (Some(mut machine), Ok(uart)) = (machine, wiring.uart) else { crate::safe::stop() };
-        machine.start(&mut exchange.report);
+        let exchange = context.local.exchange;
+        let machine = converters::at_reset(context.local.machine);
+        let board = converters::board(wiring.adc, wiring.dac, context.local.dac_bus, machine, intact);
+        let (Some(mut board), Ok(uart)) = (board, wiring.uart) else { crate::safe::stop() };
+        board.start(&mut exchange.report);
 
         embassy_stm32::interrupt::USART2.set_priority(Priority::P8);
         let (sender, receiver) = uart.split();
         let receiver = receiver.into_ring_buffered(context.local.ring);
-        let desk = Desk::new(&exchange);
 
         let mut schedule = Schedule::new(timer::period(clocks::TIMER), 0);
         if !timer::start(&mut schedule, clocks::TIMER) || link::spawn().is_err() {
@@ -93,22 +95,12 @@ mod app {
         watchdog.pet();
         (
             Shared { exchange },
-            Local {
-                machine,
-                schedule,
-                health: Health::new(),
-                watchdog,
-                stop: wiring.stop,
-                receiver,
-                sender,
-                endpoint: Endpoint::new(),
-                desk,
-            },
+            Local { board, schedule, health: Health::new(), watchdog, stop: wiring.stop, receiver, sender },
         )
     }
 
     /// One control tick.
-    #[task(binds = TIM2, priority = 16, shared = [exchange], local = [machine, schedule, health, watchdog, stop])]
+    #[task(binds = TIM2, priority = 16, shared = [exchange], local = [board, schedule, health, watchdog, stop])]
     fn tick(mut context: tick::Context) {
         let local = context.local;
         let begin = timer::now();
@@ -117,7 +109,7 @@ mod app {
         timer::arm(due.next);
         let noticed = Noticed { missed: due.missed, stop: local.stop.is_high() };
         context.shared.exchange.lock(|exchange| {
-            if crate::specgen_tick(local.machine, exchange, noticed) {
+            if crate::specgen_tick(local.board, exchange, noticed) {
                 timer::arm(local.schedule.restart(timer::now()));
             }
             exchange.report.took(due.late, timer::now().wrapping_sub(begin));
@@ -132,7 +124,9 @@ mod app {
         priority = 1,
         shared = [exchange],
         local = [
-            receiver, sender, endpoint, desk,
+            receiver, sender,
+            endpoint: Endpoint = Endpoint::new(),
+            desk: Desk = Desk::new(&Exchange::new()),
             answer: [u8; serial::ANSWER] = [0; serial::ANSWER],
         ]
     )]

@@ -1,8 +1,12 @@
 //! The supervised tick of a controller library: what the other targets run.
 
+mod snapshot;
+
 use libloading::Symbol;
 
 use super::{Buffer, Controller, ControllerError, TickController};
+
+pub use snapshot::SnapshotError;
 
 /// Words that the supervised tick takes beyond those of the control law: request, events.
 const MORE_INPUTS: usize = 2;

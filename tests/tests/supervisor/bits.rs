@@ -92,3 +92,42 @@ fn one_ulp_of_a_constant_of_the_supervisor_is_found() {
     println!("one ulp of APPROACH_KEEP shows in tick {found:?}");
     assert!(found.is_some(), "the flipped ulp was not seen");
 }
+
+/// What the supervisor costs a tick in which nothing is wrong, instructions on an M7.
+const MOST_INSTRUCTIONS: f64 = 300.0;
+
+#[test]
+fn a_tick_in_which_nothing_is_wrong_costs_little_more_than_the_law() {
+    for kind in [Kind::Legs, Kind::Platform] {
+        let emitted = emitted(&format!("supervisor-cost-{kind:?}").to_lowercase(), kind.spec(), &[]);
+        let mut bench = Bench::new(kind, &emitted, &[]);
+        if kind == Kind::Legs {
+            bench.setpoint = [1e-6, 2e-6, 9e-6, 0.0, 0.0, 0.0];
+        }
+        let mut inputs = Vec::new();
+        for tick in 0..4000 {
+            let request = if tick < 10 {
+                NOTHING
+            } else if tick < 60 {
+                ARM
+            } else {
+                RUN
+            };
+            bench.tick(request, 0);
+            inputs.push(bench.input.clone());
+        }
+        assert_eq!(bench.word.phase, RUNNING, "{kind:?}: {:x}", bench.conditions());
+        let Some(image) = emitted.image(Mcu::Mps2An500) else { return };
+        let result = target::replay_machine(&image, bench.config(), &inputs, LIMIT).unwrap_or_else(|e| panic!("{e}"));
+        let mean = |stage: &str| result.stats.stage(stage).map_or(0.0, |stage| stage.mean());
+        let cost = mean("supervise") - mean("law");
+        println!(
+            "{kind:?}: {:.0} instructions mean, {:.0} of them the law, {cost:.0} the supervisor; stack {} bytes; Machine {} bytes",
+            mean("supervise"),
+            mean("law"),
+            result.stats.painted_stack,
+            result.stats.state_bytes
+        );
+        assert!(cost > 0.0 && cost < MOST_INSTRUCTIONS, "{kind:?}: {cost:.0} instructions");
+    }
+}

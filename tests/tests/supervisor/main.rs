@@ -4,7 +4,9 @@
 mod begin;
 mod bench;
 mod bits;
+mod document;
 mod fuzz;
 mod oracle;
+mod refusals;
 mod sequences;
 mod table;

@@ -21,6 +21,7 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
         let wrong = draw(4) == 0;
         let gauge = draw(6) as usize;
         let kind = draw(9);
+        let event = 1 << draw(5);
         bench.frozen = [false; 6];
         bench.offset = [0.0; 6];
         let mut request = draw(7);
@@ -36,8 +37,8 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
                 };
             }
             let mut events = 0;
-            if wrong && kind == 0 && draw(3) == 0 {
-                events = 1 << draw(5);
+            if wrong && kind == 0 && draw(3) > 0 {
+                events = event;
             }
             let amount = [30e-6, 8e-6, 1.0, f64::NAN, f64::INFINITY][draw(5) as usize];
             if wrong && kind == 1 {
@@ -58,7 +59,8 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
                 bench.input[gauges + gauge] = bench.scalar.encode(amount);
             } else if wrong && kind == 4 {
                 let place = draw(bench.input.len() as u64) as usize;
-                let mask = if bench.scalar.bits() == 32 && place + 2 < bench.input.len() { 0xffff_ffff } else { u64::MAX };
+                let mask =
+                    if bench.scalar.bits() == 32 && place + 2 < bench.input.len() { 0xffff_ffff } else { u64::MAX };
                 bench.input[place] = draw(u64::MAX) & mask;
             }
             let before = bench.codes();

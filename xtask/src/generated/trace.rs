@@ -113,8 +113,7 @@ fn places(mentions: &[Mention]) -> String {
         files.entry(&mention.file).or_default().insert(&mention.item);
     }
     let shown = files.iter().map(|(file, items)| {
-        let items: Vec<String> =
-            items.iter().filter(|item| !item.is_empty()).map(|item| format!("`{item}`")).collect();
+        let items: Vec<String> = items.iter().filter(|item| !item.is_empty()).map(|item| format!("`{item}`")).collect();
         let link = format!("[{}](../{file})", short(file));
         if items.is_empty() { link } else { format!("{link} {}", items.join(" ")) }
     });

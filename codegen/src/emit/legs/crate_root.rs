@@ -41,6 +41,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod limits;
         mod machine_words;
         pub mod sensing;
+        pub mod snapshot;
         pub mod stages;
         mod state;
         mod step;

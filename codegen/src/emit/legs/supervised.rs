@@ -3,7 +3,7 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::emit::supervised;
+use crate::emit::supervised::{self, Parts};
 use crate::ir::Ir;
 
 pub fn emit(ir: &Ir) -> TokenStream {
@@ -11,12 +11,11 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use specgen_runtime::{Estimate, Law, Real as _};
 
         use crate::limits::{gauge_is_accepted, leg_setpoint_is_accepted};
-        use crate::step::{GAUGE_FAULT, LEG_LIMITED};
         use crate::supervision::{APPROACH_KEEP, APPROACH_NEGLIGIBLE};
         use crate::{SetpointKind, kinematics};
     };
     let no_lead = ir.hysteresis.lead.as_ref().map(|_| quote! { leg.lead = 0.0; });
-    let parts = quote! {
+    let functions = quote! {
         /// Puts the law where the machine is: the demand on a leg is where its gauge shows it, and its level estimate is what the
         /// model lacks to that, so that the code held stays what the law asks for. Without adaptation, or where the gauge is not
         /// believed, the demand is where the model has the leg. From there the demand goes to the set-point that is given.
@@ -39,42 +38,45 @@ pub fn emit(ir: &Ir) -> TokenStream {
             });
         }
 
-        /// The control law, watched.
-        #[inline]
-        fn work(config: &Config, state: &mut State, supervisor: &mut Supervisor, input: &TickInput) -> TickOutput {
-            let channel = supervisor.watch.take_turn();
-            let expected = expected(state, channel);
-            let target = component(&state.demand, channel);
-            let before = codes(state);
+        /// The tick with the set-point that the law is given on its way to the one that is asked for.
+        #[cold]
+        #[inline(never)]
+        fn approaching(config: &Config, supervisor: &mut Supervisor, input: &TickInput) -> TickInput {
             let accepted = match config.setpoint() {
                 SetpointKind::Pose => kinematics::pose_is_accepted(&input.setpoint),
                 SetpointKind::Leg => leg_setpoint_is_accepted(&input.setpoint),
             };
             let setpoint =
                 supervisor.approach.setpoint(&input.setpoint, accepted, APPROACH_KEEP, APPROACH_NEGLIGIBLE);
-            let output = step(config, state, &TickInput { setpoint, displacement: input.displacement });
-            let faults = output.status & GAUGE_FAULT;
-            let limited = output.status & LEG_LIMITED;
-            if faults == 0 {
-                let reading = component(&input.displacement, channel);
-                let error = Some(target - reading);
-                supervisor.look(&PLAN, channel, &Sample { word: reading, reading, expected, error });
-            }
-            if faults | limited == 0 {
-                supervisor.seen = 0;
-            } else {
-                let step = config.code_limits().max_step;
-                supervisor.see(faults >> 8, limited, &input.displacement, &moved(state, &before), step);
-            }
-            output
+            TickInput { setpoint, displacement: input.displacement }
+        }
+
+        /// The leg whose turn it is, after the law has seen the readings.
+        #[inline]
+        fn look(
+            _state: &State,
+            supervisor: &mut Supervisor,
+            input: &TickInput,
+            channel: usize,
+            expected: Real,
+            target: Real,
+        ) {
+            let reading = component(&input.displacement, channel);
+            let error = Some(target - reading);
+            supervisor.look(&PLAN, channel, &Sample { word: reading, reading, expected, error });
         }
 
         /// Codes held or on their way to rest, the law suspended.
         #[cold]
         #[inline(never)]
-        fn stand(config: &Config, state: &mut State, supervisor: &mut Supervisor, input: &TickInput) -> TickOutput {
-            let channel = supervisor.watch.take_turn();
-            let expected = expected(state, channel);
+        fn stand(
+            config: &Config,
+            state: &mut State,
+            supervisor: &mut Supervisor,
+            input: &TickInput,
+            channel: usize,
+            expected: Real,
+        ) -> TickOutput {
             move_codes(config, state, supervisor);
             let mut output = TickOutput {
                 voltage: [0.0; LEGS],
@@ -102,12 +104,12 @@ pub fn emit(ir: &Ir) -> TokenStream {
             output
         }
 
-        /// What a leg ought to show by the code sent over the interval that has ended, m.
+        /// What a leg ought to show by the code sent over the interval that has ended, and the demand on it, m.
         #[inline]
-        fn expected(state: &State, channel: usize) -> Real {
+        fn expectation(state: &State, channel: usize) -> (Real, Real) {
             match state.legs.get(channel) {
-                Some(leg) => leg.memory.displacement(),
-                None => Real::ZERO,
+                Some(leg) => (leg.memory.displacement(), component(&state.demand, channel)),
+                None => (0.0, 0.0),
             }
         }
 
@@ -119,5 +121,16 @@ pub fn emit(ir: &Ir) -> TokenStream {
             }
         }
     };
-    supervised::emit(&imports, &parts)
+    supervised::emit(&Parts {
+        imports,
+        functions,
+        law: quote! {
+            if supervisor.approach.is_done() {
+                step(config, state, &input.tick)
+            } else {
+                step(config, state, &approaching(config, supervisor, &input.tick))
+            }
+        },
+        gauges: quote! { displacement },
+    })
 }

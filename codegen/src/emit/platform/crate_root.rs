@@ -45,6 +45,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         mod machine_words;
         pub mod sensing;
         pub mod setpoint;
+        pub mod snapshot;
         pub mod stages;
         mod state;
         mod step;

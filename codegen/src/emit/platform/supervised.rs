@@ -3,7 +3,7 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::emit::supervised;
+use crate::emit::supervised::{self, Parts};
 
 pub fn emit() -> TokenStream {
     let imports = quote! {
@@ -12,11 +12,11 @@ pub fn emit() -> TokenStream {
         use specgen_runtime::{Estimate, Integral, NotchState, Real as _, Transfer};
 
         use crate::setpoint::PLAN as SETPOINTS;
-        use crate::step::{GAUGE_FAULT, LEG_LIMITED, sense};
+        use crate::step::sense;
         use crate::supervision::READINGS_PER_LEG;
         use crate::{kinematics, sensing};
     };
-    let parts = quote! {
+    let functions = quote! {
         /// Puts the law where the machine is. No leg moves in the first tick: a mode that begins takes over what is held.
         ///
         /// After arming set-points begin at the measured pose and the estimates at zero; after a hold the last set-point and the
@@ -46,35 +46,31 @@ pub fn emit() -> TokenStream {
             }
         }
 
-        /// The control law, watched.
+        /// The channel whose turn it is, after the law has seen the readings.
         #[inline]
-        fn work(config: &Config, state: &mut State, supervisor: &mut Supervisor, input: &TickInput) -> TickOutput {
-            let channel = supervisor.watch.take_turn();
-            let expected = expected(state, channel);
-            let target = component(&state.generator.target().pose, channel);
-            let before = codes(state);
-            let output = step(config, state, input);
-            let faults = output.status & GAUGE_FAULT;
-            let limited = output.status & LEG_LIMITED;
-            if faults == 0 {
-                let error = target - component(&state.pose, channel);
-                supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, Some(error)));
-            }
-            if faults | limited == 0 {
-                supervisor.seen = 0;
-            } else {
-                let step = config.code_limits().max_step;
-                supervisor.see(faults >> 8, limited, &input.gauge, &moved(state, &before), step);
-            }
-            output
+        fn look(
+            state: &State,
+            supervisor: &mut Supervisor,
+            input: &TickInput,
+            channel: usize,
+            expected: Real,
+            target: Real,
+        ) {
+            let error = Some(target - component(&state.pose, channel));
+            supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
         }
 
         /// Codes held or on their way to rest, the law suspended; pose and rate are still measured.
         #[cold]
         #[inline(never)]
-        fn stand(config: &Config, state: &mut State, supervisor: &mut Supervisor, input: &TickInput) -> TickOutput {
-            let channel = supervisor.watch.take_turn();
-            let expected = expected(state, channel);
+        fn stand(
+            config: &Config,
+            state: &mut State,
+            supervisor: &mut Supervisor,
+            input: &TickInput,
+            channel: usize,
+            expected: Real,
+        ) -> TickOutput {
             move_codes(config, state, supervisor);
             for leg in &mut state.legs {
                 leg.requested = leg.memory.displacement();
@@ -92,14 +88,17 @@ pub fn emit() -> TokenStream {
             }
         }
 
-        /// What a gauge ought to read by the codes sent over the interval that has ended and the known load, m.
+        /// What a gauge ought to read by the codes sent over the interval that has ended and the known load, m; and the set-point
+        /// of the axis of that number, m or rad.
         #[inline]
-        fn expected(state: &State, channel: usize) -> Real {
-            let Some([a, b, c, d, e, f]) = READINGS_PER_LEG.get(channel) else { return 0.0 };
+        fn expectation(state: &State, channel: usize) -> (Real, Real) {
+            let Some([a, b, c, d, e, f]) = READINGS_PER_LEG.get(channel) else { return (0.0, 0.0) };
             let legs = &state.legs;
             let load = &state.load;
             let displaced = |leg: usize| legs[leg].memory.displacement() - load[leg];
-            *a * displaced(0) + *b * displaced(1) + *c * displaced(2) + *d * displaced(3) + *e * displaced(4) + *f * displaced(5)
+            let half = *a * displaced(0) + *b * displaced(1) + *c * displaced(2);
+            let expected = half + *d * displaced(3) + *e * displaced(4) + *f * displaced(5);
+            (expected, component(&state.generator.target().pose, channel))
         }
 
         #[inline]
@@ -115,5 +114,10 @@ pub fn emit() -> TokenStream {
             }
         }
     };
-    supervised::emit(&imports, &parts)
+    supervised::emit(&Parts {
+        imports,
+        functions,
+        law: quote! { step(config, state, &input.tick) },
+        gauges: quote! { gauge },
+    })
 }

@@ -10,42 +10,54 @@ const A_PIECE: u32 = 4000;
 /// Poses looked at between two rows of a table.
 const A_ROW: u32 = 4;
 
-/// For each trajectory, in the order of the spec: poses from rest along it, m and rad, bias and frames included.
+/// Poses at even intervals, without a joint between them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stretch {
+    /// s from one pose to the next.
+    pub interval: f64,
+    /// Poses from rest, m and rad, bias and frames included.
+    pub poses: Vec<[f64; 6]>,
+}
+
+/// For each trajectory, in the order of the spec: its stretches from joint to joint.
 ///
 /// # Errors
 /// Frames that [`super::lower`] refuses.
-pub fn poses(model: &Model, task: &TaskSpace, setpoints: &Setpoints) -> Result<Vec<Vec<[f64; 6]>>, Vec<Diagnostic>> {
+pub fn stretches(model: &Model, task: &TaskSpace, setpoints: &Setpoints) -> Result<Vec<Vec<Stretch>>, Vec<Diagnostic>> {
     let user = User::of(model, task)?;
     let along = |kind: &TrajectoryKind, path: &Path| match (kind, path) {
         (TrajectoryKind::Paper { path, as_printed, frequency }, _) => {
             analytic(*frequency, &paper::pieces(*path, *as_printed, *frequency))
         }
-        (TrajectoryKind::Waveform { .. }, Path::Table { rows, .. }) => {
+        (TrajectoryKind::Waveform { period, .. }, Path::Table { rows, .. }) => {
             let between = rows.windows(2).flat_map(|pair| {
                 (0..A_ROW).map(|k| table::at(&pair[0], &pair[1], f64::from(k) / f64::from(A_ROW), 1.0).0)
             });
-            between.chain(rows.last().map(|row| row.pose)).collect()
+            let poses = between.chain(rows.last().map(|row| row.pose)).collect();
+            vec![Stretch { interval: period / f64::from(A_ROW), poses }]
         }
         (TrajectoryKind::Waveform { .. }, Path::Segments { .. }) => Vec::new(),
     };
     let lowered = task.trajectories.iter().zip(&setpoints.trajectories);
     Ok(lowered
         .map(|(declared, lowered)| {
-            let poses: Vec<[f64; 6]> = along(&declared.kind, &lowered.path);
-            poses.into_iter().filter_map(|pose| user.pose(pose)).collect()
+            let mut stretches = along(&declared.kind, &lowered.path);
+            for stretch in &mut stretches {
+                stretch.poses = stretch.poses.iter().filter_map(|pose| user.pose(*pose)).collect();
+            }
+            stretches
         })
         .collect())
 }
 
-fn analytic(frequency: f64, pieces: &[paper::Piece]) -> Vec<[f64; 6]> {
-    let mut poses = Vec::new();
+fn analytic(frequency: f64, pieces: &[paper::Piece]) -> Vec<Stretch> {
+    let mut stretches = Vec::new();
     let mut begin = 0.0;
     for piece in pieces {
-        for k in 0..=A_PIECE {
-            let time = begin + (piece.end - begin) * f64::from(k) / f64::from(A_PIECE);
-            poses.push(piece.at(time, frequency).0);
-        }
+        let interval = (piece.end - begin) / f64::from(A_PIECE);
+        let at = |k: u32| piece.at(begin + interval * f64::from(k), frequency).0;
+        stretches.push(Stretch { interval, poses: (0..=A_PIECE).map(at).collect() });
         begin = piece.end;
     }
-    poses
+    stretches
 }

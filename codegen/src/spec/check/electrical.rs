@@ -6,6 +6,9 @@ use crate::spec::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text::number;
 
+/// Stroke and travel further apart than this are refused.
+const LARGEST_MISMATCH: f64 = 4.0;
+
 pub(super) fn limits_in_order(f: &Fields, findings: &mut Findings) -> Option<()> {
     for path in ["actuator.voltage", "dac.range", "sensor.range"] {
         // A list that is missing has its own finding; the others are still checked.
@@ -58,21 +61,25 @@ pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()
     let (gain, stroke) = (f.number("actuator.stack_gain")?, f.number("actuator.stroke")?);
     let [low, high] = f.list::<2>("actuator.voltage")?;
     let travel = stacks * gain * (high - low);
-    if low < high && !(0.5..=2.0).contains(&(travel / stroke)) {
-        findings.warning(
-            codes::STROKE_MISMATCH,
-            "actuator.stroke",
-            f.span("actuator.stroke"),
-            format!(
-                "{} stacks of {} um/V over {} V give {} um, but the stroke is {} um",
-                number(stacks),
-                number(gain * 1e6),
-                number(high - low),
-                number(travel * 1e6),
-                number(stroke * 1e6)
-            ),
-            "check `stacks`, `stack_gain` (of one stack, not of the leg), `voltage` and `stroke`".to_owned(),
-        );
+    let ratio = travel / stroke;
+    if low >= high || (0.5..=2.0).contains(&ratio) {
+        return Some(());
+    }
+    let (key, span) = ("actuator.stroke", f.span("actuator.stroke"));
+    let message = format!(
+        "{} stacks of {} um/V over {} V give {} um, but the stroke is {} um",
+        number(stacks),
+        number(gain * 1e6),
+        number(high - low),
+        number(travel * 1e6),
+        number(stroke * 1e6)
+    );
+    let check = "check `actuator.stacks`, `actuator.stack_gain` (of one stack, not of the leg), `actuator.voltage` and `actuator.stroke`";
+    if (1.0 / LARGEST_MISMATCH..=LARGEST_MISMATCH).contains(&ratio) {
+        findings.warning(codes::STROKE_MISMATCH, key, span, message, check.to_owned());
+    } else {
+        let how = if ratio > 1.0 { "the legs would be driven far past it" } else { "they never come near it" };
+        findings.error(codes::STROKE_IMPOSSIBLE, key, span, format!("{message}: {how}"), check.to_owned());
     }
     Some(())
 }

@@ -196,6 +196,7 @@ pub const SECTIONS: &[Section] = &[
             row("extensible_inertia", one(Dimension::INERTIA, MOMENT, "g mm^2"), Required, "I_e", "\"5.27e4 g mm^2\"", "The same of the platform-side part."),
             row("fixed_center", LEG_CENTER, Required, "l_s", "\"50 mm\"", "Mass centre of the base-side part, from the base joint."),
             row("extensible_center", LEG_CENTER, Required, "l_e", "\"50 mm\"", "Mass centre of the platform-side part, from the platform joint."),
+            row("joint_angle", one(Dimension::ANGLE, Range::above(0.0, 1.5), "mrad"), Optional, "", "\"20 mrad\"", "Angle by which the joints of a leg may turn from rest, either way."),
         ],
     },
     Section {
@@ -211,6 +212,7 @@ pub const SECTIONS: &[Section] = &[
             row("axial_stiffness", one(Dimension::STIFFNESS, Range::closed(1.0, 1e12), "N/m"), Required, "k_a", "\"1e7 N/m\"", "Axial stiffness of a leg."),
             row("resonance", one(Dimension::FREQUENCY, Range::closed(0.1, 1e7), "Hz"), Required, "", "\"870 Hz\"", "First axial resonance of a leg as mounted."),
             row("damping_ratio", Shape::One(Item::Number(Range::open(0.0, 1.0))), Required, "zeta", "0.1", "Damping ratio of that resonance."),
+            row("capacitance", one(Dimension::CAPACITANCE, Range::above(0.0, 1.0), "uF"), Optional, "", "\"35 uF\"", "Of all stacks of a leg together, for the current that their voltage takes."),
         ],
     },
     Section {
@@ -220,6 +222,7 @@ pub const SECTIONS: &[Section] = &[
         keys: &[
             row("lag", one(Dimension::TIME, Range::closed(0.0, 10.0), "ms"), Default("\"0 ms\""), "", "\"0.35 ms\"", "Time constant of its first-order lag."),
             row("noise", one(Dimension::VOLTAGE, Range::closed(0.0, 100.0), "mV"), Default("\"0 V\""), "", "\"2 mV\"", "Output noise, rms."),
+            row("current", one(Dimension::CURRENT, Range::above(0.0, 1e4), "mA"), Optional, "", "\"2 A\"", "Largest output current for one leg; slew rate and trajectories are held against it with `actuator.capacitance`."),
         ],
     },
     Section {

@@ -36,6 +36,10 @@ impl Dimension {
     pub const PIEZO_GAIN: Self = Self::new([1, 0, 0, -1, 0, 0]);
     /// V/s
     pub const SLEW_RATE: Self = Self::new([0, 0, -1, 1, 0, 0]);
+    /// A = W/V
+    pub const CURRENT: Self = Self::new([2, 1, -3, -1, 0, 0]);
+    /// F = A s/V
+    pub const CAPACITANCE: Self = Self::new([2, 1, -2, -2, 0, 0]);
     /// N
     pub const FORCE: Self = Self::new([1, 1, -2, 0, 0, 0]);
     /// N/m
@@ -122,6 +126,8 @@ const NAMES: &[(Dimension, &str)] = &[
     (Dimension::INERTIA, "a moment of inertia"),
     (Dimension::PIEZO_GAIN, "a displacement per volt"),
     (Dimension::SLEW_RATE, "a voltage per time"),
+    (Dimension::CURRENT, "a current"),
+    (Dimension::CAPACITANCE, "a capacitance"),
     (Dimension::FORCE, "a force"),
     (Dimension::STIFFNESS, "a stiffness"),
     (Dimension::STIFFNESS_RATE, "a stiffness per time"),

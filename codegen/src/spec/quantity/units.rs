@@ -59,6 +59,8 @@ const UNITS: &[Entry] = &[
     entry(&["s"], Dimension::TIME, 0),
     entry(&["V"], Dimension::VOLTAGE, 0),
     entry(&["N"], Dimension::FORCE, 0),
+    entry(&["A"], Dimension::CURRENT, 0),
+    entry(&["F"], Dimension::CAPACITANCE, 0),
     entry(&["Hz"], Dimension::FREQUENCY, 0),
     entry(&["rad"], Dimension::ANGLE, 0),
     entry(&["Pa"], Dimension::new([-1, 1, -2, 0, 0, 0]), 0),

@@ -28,6 +28,8 @@ use super::{Command, CommandKind, Frames, Plan, Target};
 use crate::digest::Digest;
 use crate::real::{Real, saturate};
 
+mod snapshot;
+
 /// Status: a set-point or command is refused and the platform held, for it is not finite, out of the workspace, or a jump.
 pub const REFUSED: u32 = 1 << 16;
 /// Status: the stream is stale and the platform held.

@@ -9,6 +9,7 @@ use super::profile::{LONGEST, MoveLimits, largest, least};
 use super::{Frames, Plan, Target};
 use crate::digest::Digest;
 use crate::real::Real;
+use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
 
 /// Halvings of D that are tried: after them a tick is all that is left.
 const HALVINGS: u32 = 21;
@@ -100,5 +101,24 @@ impl<T: Real> Stop<T> {
             digest.real(*number);
         }
         digest.word((self.ticks as u32 as u64) << 32 | self.tick as u32 as u64);
+    }
+}
+
+impl<T: Real> Snapshot for Stop<T> {
+    const WORDS: usize = 14;
+
+    fn save(&self, words: &mut Writer<'_>) {
+        words.reals(&self.start);
+        words.reals(&self.rate);
+        words.word(u64::from(self.ticks as u32));
+        words.word(u64::from(self.tick as u32));
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        words.reals(&mut self.start, LARGEST_PLACE)?;
+        words.reals(&mut self.rate, LARGEST_PLACE)?;
+        self.ticks = words.count_to(LONGEST)?;
+        self.tick = words.count_to(LONGEST)?;
+        if self.ticks == 0 { Err(words.refused()) } else { Ok(()) }
     }
 }

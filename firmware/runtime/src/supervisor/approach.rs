@@ -39,6 +39,13 @@ impl<T: Real> Approach<T> {
         *self = Self { stage: Stage::Waiting, offset: from };
     }
 
+    /// Whether set-points go through as they are.
+    #[inline]
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.stage == Stage::Done
+    }
+
     /// The set-point to give to the law for the one that is asked for. One that is not `accepted` (finite, within bounds) goes
     /// through as it is, for the law to refuse. `keep` (in [0, 1)) of the way is left after each tick, and none of what is below
     /// `negligible`.

@@ -214,10 +214,8 @@ impl Cause {
 /// Causes that take the amplifiers off at once, in any phase.
 pub const SWITCHES_OFF: u32 = Cause::Integrity.bit() | Cause::EmergencyStop.bit();
 /// Causes that bring the codes to rest, then take the amplifiers off.
-pub const RAMPS_DOWN: u32 = Cause::GaugeNotFinite.bit()
-    | Cause::GaugeRange.bit()
-    | Cause::GaugeStuck.bit()
-    | Cause::GaugeDisagreement.bit();
+pub const RAMPS_DOWN: u32 =
+    Cause::GaugeNotFinite.bit() | Cause::GaugeRange.bit() | Cause::GaugeStuck.bit() | Cause::GaugeDisagreement.bit();
 /// Causes that hold the codes.
 pub const HOLDS: u32 = Cause::TrackingError.bit()
     | Cause::VoltageSaturation.bit()

@@ -61,7 +61,8 @@ impl<T: Real> Watch<T> {
     /// Nothing seen.
     #[must_use]
     pub const fn new() -> Self {
-        let channel = Channel { word: T::ZERO, known: false, expected: [T::ZERO; 2], stuck: 0, disagreed: 0, astray: 0 };
+        let channel =
+            Channel { word: T::ZERO, known: false, expected: [T::ZERO; 2], stuck: 0, disagreed: 0, astray: 0 };
         Self { channels: [channel; 6], turn: 0, suspects: [0; 3], present: 0, lasted: 0 }
     }
 

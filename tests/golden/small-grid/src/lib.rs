@@ -32,6 +32,7 @@ pub mod limits;
 mod machine_words;
 
 pub mod sensing;
+pub mod snapshot;
 pub mod stages;
 mod state;
 mod step;

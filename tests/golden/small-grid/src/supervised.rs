@@ -15,10 +15,10 @@ pub use crate::machine_words::{
     MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS,
     machine_output_words,
 };
+use crate::step::{GAUGE_FAULT, LEG_LIMITED};
 use crate::supervision::PLAN;
 use specgen_runtime::{Estimate, Law, Real as _};
 use crate::limits::{gauge_is_accepted, leg_setpoint_is_accepted};
-use crate::step::{GAUGE_FAULT, LEG_LIMITED};
 use crate::supervision::{APPROACH_KEEP, APPROACH_NEGLIGIBLE};
 use crate::{SetpointKind, kinematics};
 use crate::{Config, LEGS, Real, State, TickInput, TickOutput, step};
@@ -101,17 +101,48 @@ pub fn supervise(
     if begins {
         begin(config, state, supervisor, &input.tick);
     }
-    let tick = if supervisor.phase == Phase::Running {
-        work(config, state, supervisor, &input.tick)
-    } else {
-        stand(config, state, supervisor, &input.tick)
-    };
-    MachineOutput {
-        tick,
-        phase: supervisor.phase,
-        cause: supervisor.cause,
-        amplifier_on: supervisor.phase.is_powered(),
+    let channel = supervisor.watch.take_turn();
+    let (expected, target) = expectation(state, channel);
+    let (phase, cause) = (supervisor.phase, supervisor.cause);
+    if phase != Phase::Running {
+        let tick = stand(config, state, supervisor, &input.tick, channel, expected);
+        return MachineOutput {
+            tick,
+            phase,
+            cause,
+            amplifier_on: phase.is_powered(),
+        };
     }
+    let before = codes(state);
+    let output = MachineOutput {
+        tick: if supervisor.approach.is_done() {
+            step(config, state, &input.tick)
+        } else {
+            step(config, state, &approaching(config, supervisor, &input.tick))
+        },
+        phase,
+        cause,
+        amplifier_on: true,
+    };
+    let status = output.tick.status;
+    if status & GAUGE_FAULT == 0 {
+        look(state, supervisor, &input.tick, channel, expected, target);
+    }
+    if status & (GAUGE_FAULT | LEG_LIMITED) == 0 {
+        supervisor.seen = 0;
+    } else {
+        let (faults, limited) = ((status & GAUGE_FAULT) >> 8, status & LEG_LIMITED);
+        let moved = moved(state, &before);
+        supervisor
+            .see(
+                faults,
+                limited,
+                &input.tick.displacement,
+                &moved,
+                config.code_limits().max_step,
+            );
+    }
+    output
 }
 
 /// Puts the law where the machine is: the demand on a leg is where its gauge shows it, and its level estimate is what the
@@ -151,18 +182,14 @@ fn begin(
         );
 }
 
-/// The control law, watched.
-#[inline]
-fn work(
+/// The tick with the set-point that the law is given on its way to the one that is asked for.
+#[cold]
+#[inline(never)]
+fn approaching(
     config: &Config,
-    state: &mut State,
     supervisor: &mut Supervisor,
     input: &TickInput,
-) -> TickOutput {
-    let channel = supervisor.watch.take_turn();
-    let expected = expected(state, channel);
-    let target = component(&state.demand, channel);
-    let before = codes(state);
+) -> TickInput {
     let accepted = match config.setpoint() {
         SetpointKind::Pose => kinematics::pose_is_accepted(&input.setpoint),
         SetpointKind::Leg => leg_setpoint_is_accepted(&input.setpoint),
@@ -170,45 +197,35 @@ fn work(
     let setpoint = supervisor
         .approach
         .setpoint(&input.setpoint, accepted, APPROACH_KEEP, APPROACH_NEGLIGIBLE);
-    let output = step(
-        config,
-        state,
-        &TickInput {
-            setpoint,
-            displacement: input.displacement,
-        },
-    );
-    let faults = output.status & GAUGE_FAULT;
-    let limited = output.status & LEG_LIMITED;
-    if faults == 0 {
-        let reading = component(&input.displacement, channel);
-        let error = Some(target - reading);
-        supervisor
-            .look(
-                &PLAN,
-                channel,
-                &Sample {
-                    word: reading,
-                    reading,
-                    expected,
-                    error,
-                },
-            );
+    TickInput {
+        setpoint,
+        displacement: input.displacement,
     }
-    if faults | limited == 0 {
-        supervisor.seen = 0;
-    } else {
-        let step = config.code_limits().max_step;
-        supervisor
-            .see(
-                faults >> 8,
-                limited,
-                &input.displacement,
-                &moved(state, &before),
-                step,
-            );
-    }
-    output
+}
+
+/// The leg whose turn it is, after the law has seen the readings.
+#[inline]
+fn look(
+    _state: &State,
+    supervisor: &mut Supervisor,
+    input: &TickInput,
+    channel: usize,
+    expected: Real,
+    target: Real,
+) {
+    let reading = component(&input.displacement, channel);
+    let error = Some(target - reading);
+    supervisor
+        .look(
+            &PLAN,
+            channel,
+            &Sample {
+                word: reading,
+                reading,
+                expected,
+                error,
+            },
+        );
 }
 
 /// Codes held or on their way to rest, the law suspended.
@@ -219,9 +236,9 @@ fn stand(
     state: &mut State,
     supervisor: &mut Supervisor,
     input: &TickInput,
+    channel: usize,
+    expected: Real,
 ) -> TickOutput {
-    let channel = supervisor.watch.take_turn();
-    let expected = expected(state, channel);
     move_codes(config, state, supervisor);
     let mut output = TickOutput {
         voltage: [0.0; LEGS],
@@ -259,12 +276,12 @@ fn stand(
     output
 }
 
-/// What a leg ought to show by the code sent over the interval that has ended, m.
+/// What a leg ought to show by the code sent over the interval that has ended, and the demand on it, m.
 #[inline]
-fn expected(state: &State, channel: usize) -> Real {
+fn expectation(state: &State, channel: usize) -> (Real, Real) {
     match state.legs.get(channel) {
-        Some(leg) => leg.memory.displacement(),
-        None => Real::ZERO,
+        Some(leg) => (leg.memory.displacement(), component(&state.demand, channel)),
+        None => (0.0, 0.0),
     }
 }
 

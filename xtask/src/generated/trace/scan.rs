@@ -17,7 +17,7 @@ pub struct Mention {
     pub item: String,
     /// Of the comment, from 1.
     pub line: usize,
-    /// The item is a test, or the file holds nothing else.
+    /// The item is a test, or stands in a file of tests.
     pub test: bool,
 }
 
@@ -57,7 +57,7 @@ pub fn file(name: &str, text: &str) -> Vec<Mention> {
         let Some(comment) = comment(line) else { continue };
         for equation in cited(comment) {
             let (item, is_test) = place(&lines, k);
-            let test = is_test || (only_tests && item.is_empty());
+            let test = is_test || only_tests;
             mentions.push(Mention { equation, file: name.to_owned(), item, line: k + 1, test });
         }
     }
@@ -74,6 +74,10 @@ pub fn cited(text: &str) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     let mut before: Option<(usize, usize)> = None;
     for (start, _) in text.match_indices('(') {
+        // f(5) is no equation.
+        if text[..start].ends_with(|c: char| c.is_alphanumeric()) {
+            continue;
+        }
         let Some(length) = text[start..].find(')') else { break };
         let inner = &text[start + 1..start + length];
         let Some(index) = EQUATIONS.iter().position(|equation| equation.number == inner) else { continue };
@@ -117,7 +121,26 @@ fn place(lines: &[&str], k: usize) -> (String, bool) {
 fn named(line: &str) -> Option<String> {
     let mut words = line.split(|c: char| !(c.is_alphanumeric() || c == '_')).filter(|word| !word.is_empty());
     words
-        .find(|word| !matches!(*word, "pub" | "crate" | "super" | "const" | "fn" | "struct" | "enum" | "mod" | "static" | "type" | "unsafe" | "extern" | "C" | "in" | "trait"))
+        .find(|word| {
+            !matches!(
+                *word,
+                "pub"
+                    | "crate"
+                    | "super"
+                    | "const"
+                    | "fn"
+                    | "struct"
+                    | "enum"
+                    | "mod"
+                    | "static"
+                    | "type"
+                    | "unsafe"
+                    | "extern"
+                    | "C"
+                    | "in"
+                    | "trait"
+            )
+        })
         .map(str::to_owned)
 }
 
@@ -136,7 +159,7 @@ mod tests {
 
     #[test]
     fn single_numbers_and_ranges_are_cited() {
-        assert_eq!(numbers("/// by (AII.3) or (7), f(x), (20)"), ["7", "AII.3"]);
+        assert_eq!(numbers("/// by (AII.3) or (7), f(5), (20)"), ["7", "AII.3"]);
         assert_eq!(numbers("//! (AI.2)–(AI.4) and (1)"), ["1", "AI.2", "AI.3", "AI.4"]);
         assert_eq!(numbers("/// (AI.2) – not a range – (AI.4)"), ["AI.2", "AI.4"]);
         assert!(numbers("/// none (0.5)").is_empty());
@@ -147,7 +170,10 @@ mod tests {
         let text = "//! (1)\n/// (7).\n#[inline]\npub fn law() {\n    // (9)\n}\n/// (6)\n#[test]\nfn inverse() {}\n";
         let found = file("src/a.rs", text);
         let shown: Vec<_> = found.iter().map(|m| (EQUATIONS[m.equation].number, &*m.item, m.line, m.test)).collect();
-        assert_eq!(shown, [("1", "", 1, false), ("7", "law", 2, false), ("9", "law", 5, false), ("6", "inverse", 7, true)]);
+        assert_eq!(
+            shown,
+            [("1", "", 1, false), ("7", "law", 2, false), ("9", "law", 5, false), ("6", "inverse", 7, true)]
+        );
         assert!(file("crate/tests/a.rs", text)[0].test);
         assert!(file("a.rs", "fn law() { x(1) }").is_empty());
     }

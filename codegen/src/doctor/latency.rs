@@ -1,0 +1,135 @@
+//! How late this computer wakes a thread that sleeps to an absolute time, as the control loop does.
+
+use std::io::{Read as _, Seek as _, SeekFrom};
+use std::thread;
+
+use serde::Serialize;
+use specgen_rt::clock::{self, SECOND, Usage};
+use specgen_rt::histogram::Histogram;
+use specgen_rt::scheduling::{self, AwakeProcessors, Refused};
+
+/// Priority of the measurement, that of rt-pc.
+const PRIORITY: u8 = 80;
+/// From the start to the first tick, ns.
+const LEAD: u64 = 10_000_000;
+
+/// A measurement, with the rights that could be had.
+#[derive(Debug)]
+pub struct Measured {
+    /// From the planned time to running, ns.
+    pub delays: Histogram,
+    /// Ticks whose times came.
+    pub planned: u64,
+    /// Whole periods that were slept through.
+    pub skipped: u64,
+    /// Times the processor was taken away.
+    pub preempted: u64,
+    /// System management interrupts meanwhile, where they are counted.
+    pub management_interrupts: Option<u64>,
+    /// Whether SCHED_FIFO was granted.
+    pub priority: Result<(), Refused>,
+    /// Whether memory could be locked.
+    pub memory: Result<(), Refused>,
+    /// Whether processors could be kept awake.
+    pub awake: bool,
+}
+
+/// Figures of a measurement for programs, ns.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Figures {
+    /// Ticks whose times came.
+    pub planned: u64,
+    /// Whole periods that were slept through.
+    pub skipped: u64,
+    /// Half of the delays are no longer.
+    pub p50_ns: u64,
+    /// 99 % are no longer.
+    pub p99_ns: u64,
+    /// 99.9 %.
+    pub p999_ns: u64,
+    /// The longest.
+    pub max_ns: u64,
+    /// Upper ends and counts by doubling.
+    pub below_ns: Vec<(u64, u64)>,
+}
+
+/// Sleeps `seconds` in periods of `period` (ns), on processor `cpu` if one is named.
+///
+/// # Errors
+/// If there is no such processor, or no thread.
+pub fn measure(period: u64, seconds: f64, cpu: Option<usize>) -> Result<Measured, String> {
+    // Nothing of this process is at stake: what is not granted is part of the result.
+    let memory = scheduling::lock_memory();
+    let awake = AwakeProcessors::request();
+    let before = management_interrupts();
+    let ticks = ((seconds * SECOND as f64) / period as f64) as u64;
+    let measured = thread::Builder::new().name("latency".to_owned()).spawn(move || {
+        cpu.map_or(Ok(()), scheduling::pin)?;
+        let priority = scheduling::set_fifo(PRIORITY);
+        scheduling::touch_stack();
+        let mut delays = Histogram::new();
+        let (mut planned, mut skipped, mut done) = (clock::now() + LEAD, 0, 0);
+        let usage = Usage::of_this_thread();
+        while done < ticks {
+            clock::sleep_until(planned);
+            let delay = clock::now().saturating_sub(planned);
+            delays.add(delay);
+            let over = delay / period;
+            skipped += over;
+            done += over + 1;
+            planned += (over + 1) * period;
+        }
+        let preempted = Usage::of_this_thread().since(usage).involuntary_switches;
+        Ok::<_, Refused>((delays, done, skipped, preempted, priority))
+    });
+    let measured = measured.map_err(|error| format!("no thread to measure with: {error}"))?.join();
+    scheduling::unlock_memory();
+    // The thread has no path that panics.
+    let measured = measured.map_err(|_| "the measuring thread ended early".to_owned())?;
+    let (delays, planned, skipped, preempted, priority) = measured.map_err(|error| error.to_string())?;
+    let management_interrupts = before.zip(management_interrupts()).map(|(before, after)| after.wrapping_sub(before));
+    Ok(Measured { delays, planned, skipped, preempted, management_interrupts, priority, memory, awake: awake.is_ok() })
+}
+
+impl Measured {
+    /// For programs.
+    #[must_use]
+    pub fn figures(&self) -> Figures {
+        let quantile = |share| self.delays.quantile(share);
+        Figures {
+            planned: self.planned,
+            skipped: self.skipped,
+            p50_ns: quantile(0.5),
+            p99_ns: quantile(0.99),
+            p999_ns: quantile(0.999),
+            max_ns: self.delays.largest(),
+            below_ns: self.delays.octaves(),
+        }
+    }
+}
+
+/// Counter of system management interrupts of Intel processors (register 0x34); none without the right to read it.
+fn management_interrupts() -> Option<u64> {
+    const REGISTER: u64 = 0x34;
+    let mut file = std::fs::File::open("/dev/cpu/0/msr").ok()?;
+    file.seek(SeekFrom::Start(REGISTER)).ok()?;
+    let mut bytes = [0; 8];
+    file.read_exact(&mut bytes).ok()?;
+    Some(u64::from_le_bytes(bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_planned_tick_is_measured_or_skipped() {
+        let measured = measure(500_000, 0.1, None).unwrap();
+        assert!(measured.planned >= 200);
+        assert_eq!(measured.planned, measured.delays.count() + measured.skipped);
+        let figures = measured.figures();
+        assert!(figures.p50_ns <= figures.p99_ns && figures.p99_ns <= figures.p999_ns);
+        assert_eq!(figures.below_ns.iter().map(|(_, count)| count).sum::<u64>(), measured.delays.count());
+        assert!(measure(500_000, 0.01, Some(100_000)).unwrap_err().contains("processor 100000"));
+    }
+}

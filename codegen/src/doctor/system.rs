@@ -1,0 +1,272 @@
+//! Kernel, processors and rights.
+
+use specgen_rt::clock;
+use specgen_rt::scheduling::{MEND_MEMORY, MEND_PRIORITY, Refused};
+
+use super::Grade::{Bad, Unknown, Warning};
+use super::{Files, Finding};
+
+const CPU: &str = "/sys/devices/system/cpu";
+
+/// What the files say.
+#[must_use]
+pub fn findings(files: &Files) -> Vec<Finding> {
+    vec![
+        kernel(files),
+        clock_source(files),
+        governor(files),
+        isolation(files),
+        idle(files),
+        virtual_machine(files),
+        throttling(files),
+        load(files),
+    ]
+}
+
+/// What the system answered when it was asked for priority and for locked memory.
+#[must_use]
+pub fn rights(priority: Result<(), &Refused>, memory: Result<(), &Refused>) -> Vec<Finding> {
+    let of = |subject, answer: Result<(), &Refused>, granted: &str, mend: &str| match answer {
+        Ok(()) => Finding::good(subject, granted),
+        Err(refused) => Finding::of(subject, Bad, format!("{}: {}", refused.what, refused.cause), mend),
+    };
+    vec![
+        of("priority", priority, "SCHED_FIFO is granted", MEND_PRIORITY),
+        of("memory", memory, "may be locked", MEND_MEMORY),
+    ]
+}
+
+/// How fine the timer is.
+#[must_use]
+pub fn timer() -> Finding {
+    match clock::resolution() {
+        0 => Finding::of("timer", Unknown, "the kernel does not say", "see `cat /proc/timer_list`"),
+        1 => Finding::good("timer", "1 ns"),
+        coarse => Finding::of(
+            "timer",
+            Bad,
+            format!("{coarse} ns: no high-resolution timers"),
+            "boot a kernel with CONFIG_HIGH_RES_TIMERS, without `highres=off` and `nohz=off`",
+        ),
+    }
+}
+
+fn kernel(files: &Files) -> Finding {
+    const MEND: &str = "install a PREEMPT_RT kernel: `apt-get install linux-image-rt-amd64` (Debian), `pro enable \
+         realtime-kernel` (Ubuntu), kernel-rt (Red Hat); without it the longest delays are not bounded";
+    let version = files.text("/proc/sys/kernel/osrelease").unwrap_or_default();
+    let build = files.text("/proc/sys/kernel/version").unwrap_or_default();
+    if files.text("/sys/kernel/realtime").as_deref() == Some("1") || build.contains("PREEMPT_RT") {
+        return Finding::good("kernel", format!("{version}, PREEMPT_RT"));
+    }
+    if build.is_empty() {
+        return Finding::of("kernel", Unknown, "cannot be seen", MEND);
+    }
+    let kind = build.split_whitespace().find(|word| word.starts_with("PREEMPT")).unwrap_or("no preemption");
+    Finding::of("kernel", Warning, format!("{version}, {kind}, not PREEMPT_RT"), MEND)
+}
+
+fn clock_source(files: &Files) -> Finding {
+    let source = files.text("/sys/devices/system/clocksource/clocksource0/current_clocksource");
+    match source.as_deref() {
+        None => Finding::of("clock", Unknown, "source cannot be seen", "see `dmesg | grep clocksource`"),
+        Some(slow @ ("hpet" | "acpi_pm" | "jiffies" | "refined-jiffies")) => Finding::of(
+            "clock",
+            Warning,
+            format!("{slow}: a reading costs a microsecond or more"),
+            "see in `dmesg | grep -i tsc` why the time stamp counter is not used; `tsc=reliable` if it is sound",
+        ),
+        Some(source) => Finding::good("clock", source),
+    }
+}
+
+fn governor(files: &Files) -> Finding {
+    const MEND: &str = "`cpupower frequency-set -g performance`, at every start";
+    let processors = files.names(CPU, "cpu");
+    let governors = processors.iter().filter_map(|cpu| files.text(&format!("{CPU}/{cpu}/cpufreq/scaling_governor")));
+    let mut governors: Vec<String> = governors.collect();
+    governors.sort();
+    governors.dedup();
+    match governors.as_slice() {
+        [] => Finding::of("frequency", Unknown, "no cpufreq here (virtual machine, or a fixed clock)", MEND),
+        [only] if only == "performance" => Finding::good("frequency", "governor performance"),
+        found => Finding::of("frequency", Warning, format!("governor {}", found.join(", ")), MEND),
+    }
+}
+
+fn isolation(files: &Files) -> Finding {
+    const MEND: &str =
+        "boot with `isolcpus=N nohz_full=N rcu_nocbs=N` for one processor N and start rt-pc with --cpu N";
+    let list = |name: &str| files.text(&format!("{CPU}/{name}")).filter(|text| !text.is_empty() && text != "(null)");
+    match (list("isolated"), list("nohz_full")) {
+        (Some(isolated), Some(quiet)) => {
+            Finding::good("isolation", format!("processors {isolated} isolated, {quiet} without ticks"))
+        }
+        (Some(isolated), None) => {
+            Finding::of("isolation", Warning, format!("processors {isolated} isolated, none without ticks"), MEND)
+        }
+        (None, _) if files.text(&format!("{CPU}/online")).is_none() => {
+            Finding::of("isolation", Unknown, "cannot be seen", MEND)
+        }
+        (None, _) => Finding::of("isolation", Warning, "no processor is kept free of other work", MEND),
+    }
+}
+
+/// Wake-up time above which a sleeping processor is in the way, µs.
+const SLOW_WAKE: u64 = 10;
+
+fn idle(files: &Files) -> Finding {
+    let folder = format!("{CPU}/cpu0/cpuidle");
+    let mut slowest = None;
+    for state in files.names(&folder, "state") {
+        let of = |name: &str| files.text(&format!("{folder}/{state}/{name}"));
+        let latency = of("latency").and_then(|text| text.parse::<u64>().ok()).unwrap_or(0);
+        if of("disable").as_deref() != Some("1") && slowest.as_ref().is_none_or(|(most, _)| latency > *most) {
+            slowest = Some((latency, of("name").unwrap_or(state)));
+        }
+    }
+    match slowest {
+        None => Finding::of(
+            "sleep states",
+            Unknown,
+            "no cpuidle here (virtual machine, or `idle=poll`)",
+            "on a virtual machine its host decides; on a real one see /sys/devices/system/cpu/cpuidle",
+        ),
+        Some((latency, name)) if latency > SLOW_WAKE => Finding::of(
+            "sleep states",
+            Warning,
+            format!("{name} takes {latency} µs to wake from"),
+            "rt-pc forbids them by /dev/cpu_dma_latency where it may write it; else boot with `processor.max_cstate=1 intel_idle.max_cstate=0`",
+        ),
+        Some((latency, name)) => Finding::good("sleep states", format!("{name} at most, {latency} µs")),
+    }
+}
+
+fn virtual_machine(files: &Files) -> Finding {
+    let Some(text) = files.text("/proc/cpuinfo") else {
+        return Finding::of("hardware", Unknown, "cannot be seen", "see /proc/cpuinfo");
+    };
+    let flags = text.lines().find(|line| line.starts_with("flags"));
+    if flags.is_some_and(|flags| flags.split_whitespace().any(|flag| flag == "hypervisor")) {
+        return Finding::of(
+            "hardware",
+            Warning,
+            "a virtual machine: its host stops it whenever it likes",
+            "run on the hardware itself",
+        );
+    }
+    Finding::good("hardware", "no hypervisor is seen")
+}
+
+fn throttling(files: &Files) -> Finding {
+    match files.text("/proc/sys/kernel/sched_rt_runtime_us").and_then(|text| text.parse::<i64>().ok()) {
+        None => Finding::of("throttling", Unknown, "cannot be seen", "see /proc/sys/kernel/sched_rt_runtime_us"),
+        Some(-1) => Finding::good("throttling", "off"),
+        Some(runtime) => Finding::good(
+            "throttling",
+            format!("real-time threads have {runtime} µs of a second's million: enough for a loop that sleeps"),
+        ),
+    }
+}
+
+fn load(files: &Files) -> Finding {
+    let first = files.text("/proc/loadavg").and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
+    let online = files.names(CPU, "cpu").iter().filter(|name| name[3..].parse::<u32>().is_ok()).count();
+    match first {
+        None => Finding::of("load", Unknown, "cannot be seen", "see `uptime`"),
+        Some(load) if online > 0 && load > online as f64 => Finding::of(
+            "load",
+            Warning,
+            format!("{load:.1} threads want {online} processors"),
+            "end other work before you judge the figures below",
+        ),
+        Some(load) => Finding::good("load", format!("{load:.1} on {online} processors")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::super::Grade::Good;
+    use super::*;
+
+    /// Findings of a computer with these files.
+    fn of(files: &[(&str, &str)]) -> Vec<Finding> {
+        let root = tempfile::tempdir().unwrap();
+        for (path, text) in files {
+            let path = root.path().join(path);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        findings(&Files::below(root.path()))
+    }
+
+    fn grades(findings: &[Finding]) -> Vec<super::super::Grade> {
+        findings.iter().map(|finding| finding.grade).collect()
+    }
+
+    #[test]
+    fn a_container_without_sys_and_proc_is_unknown_in_everything() {
+        let found = of(&[]);
+        assert!(found.iter().all(|finding| finding.grade == Unknown && finding.mend.is_some()), "{found:?}");
+    }
+
+    #[test]
+    fn a_computer_set_up_for_real_time_is_good_in_everything() {
+        let found = of(&[
+            ("proc/sys/kernel/osrelease", "6.12.0-rt\n"),
+            ("proc/sys/kernel/version", "#1 SMP PREEMPT_RT Debian\n"),
+            ("sys/kernel/realtime", "1\n"),
+            ("sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc\n"),
+            ("sys/devices/system/cpu/online", "0-3\n"),
+            ("sys/devices/system/cpu/isolated", "3\n"),
+            ("sys/devices/system/cpu/nohz_full", "3\n"),
+            ("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n"),
+            ("sys/devices/system/cpu/cpu0/cpuidle/state0/latency", "0\n"),
+            ("sys/devices/system/cpu/cpu0/cpuidle/state0/name", "POLL\n"),
+            ("sys/devices/system/cpu/cpu0/cpuidle/state1/latency", "200\n"),
+            ("sys/devices/system/cpu/cpu0/cpuidle/state1/disable", "1\n"),
+            ("proc/cpuinfo", "flags\t: fpu sse2\n"),
+            ("proc/sys/kernel/sched_rt_runtime_us", "-1\n"),
+            ("proc/loadavg", "0.10 0.2 0.3 1/100 7\n"),
+        ]);
+        assert_eq!(grades(&found), [Good; 8], "{found:?}");
+        assert!(found.iter().all(|finding| finding.mend.is_none()));
+    }
+
+    #[test]
+    fn what_costs_latency_is_told_with_what_to_change() {
+        let found = of(&[
+            ("proc/sys/kernel/osrelease", "6.1.0\n"),
+            ("proc/sys/kernel/version", "#1 SMP PREEMPT_DYNAMIC Debian\n"),
+            ("sys/devices/system/clocksource/clocksource0/current_clocksource", "hpet\n"),
+            ("sys/devices/system/cpu/online", "0-1\n"),
+            ("sys/devices/system/cpu/isolated", "\n"),
+            ("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n"),
+            ("sys/devices/system/cpu/cpu1/cpufreq/scaling_governor", "powersave\n"),
+            ("sys/devices/system/cpu/cpu0/cpuidle/state0/latency", "2\n"),
+            ("sys/devices/system/cpu/cpu0/cpuidle/state3/latency", "890\n"),
+            ("sys/devices/system/cpu/cpu0/cpuidle/state3/name", "C10\n"),
+            ("proc/cpuinfo", "flags\t: fpu hypervisor sse2\n"),
+            ("proc/sys/kernel/sched_rt_runtime_us", "950000\n"),
+            ("proc/loadavg", "3.50 0.2 0.3 1/100 7\n"),
+        ]);
+        let words = [
+            ("6.1.0, PREEMPT_DYNAMIC, not PREEMPT_RT", "linux-image-rt-amd64"),
+            ("hpet", "tsc"),
+            ("performance, powersave", "cpupower"),
+            ("no processor is kept free", "isolcpus=N"),
+            ("C10 takes 890 µs", "max_cstate"),
+            ("virtual machine", "hardware"),
+            ("950000", ""),
+            ("3.5 threads want 2 processors", "other work"),
+        ];
+        for (finding, (text, mend)) in found.iter().zip(words) {
+            assert!(finding.found.contains(text), "{finding:?}");
+            assert_eq!(finding.grade == Warning, !mend.is_empty(), "{finding:?}");
+            assert!(finding.mend.as_deref().unwrap_or_default().contains(mend), "{finding:?}");
+        }
+        assert_eq!(found.len(), words.len());
+    }
+}

@@ -1,0 +1,130 @@
+//! `src/snapshot.rs`: the machine as words and back, and the supervised tick with a recorder. What differs between the kinds of
+//! controller comes from `legs` and `platform`.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+/// What a leg has besides memory and code.
+pub struct Leg {
+    /// Words of a leg.
+    pub words: TokenStream,
+    /// Statements that save the rest.
+    pub save: TokenStream,
+    /// Statements that restore it.
+    pub restore: TokenStream,
+}
+
+/// `input` are the statements that write the tick's input, `state` is the implementation of `Snapshot` for `State`.
+pub fn emit(imports: &TokenStream, input: &TokenStream, leg: &Leg, state: &TokenStream) -> TokenStream {
+    let Leg { words: leg_words, save: save_leg, restore: restore_leg } = leg;
+    quote! {
+        #![doc = " The machine as 64-bit words and back, and the supervised tick with a recorder."]
+        #![doc = ""]
+        #![doc = " A record of [`supervise_recorded`] replays bit for bit wherever it begins: `specgen replay`."]
+
+        use specgen_runtime::record::Layout;
+        pub use specgen_runtime::recorder;
+        use specgen_runtime::recorder::{Recorder, Row};
+        pub use specgen_runtime::snapshot::Invalid;
+        use specgen_runtime::snapshot::{Reader, Snapshot, Writer};
+        #imports
+
+        use crate::hysteresis::{GRID, Memory};
+        use crate::supervised::{MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, Supervisor, supervise};
+        use crate::{CONFIG_WORDS, Config, LEGS, LegState, Real, State, limits};
+
+        /// Words of a [`Machine`].
+        pub const MACHINE_STATE_WORDS: usize = <State as Snapshot>::WORDS + <Supervisor as Snapshot>::WORDS;
+
+        /// Words of this controller's records.
+        pub const RECORD_LAYOUT: Layout =
+            Layout { config: CONFIG_WORDS, input: MACHINE_INPUT_WORDS, state: MACHINE_STATE_WORDS };
+
+        impl Machine {
+            /// Everything that later ticks depend on, as words.
+            pub fn save(&self, words: &mut [u64; MACHINE_STATE_WORDS]) {
+                self.save_into(words);
+            }
+
+            /// The same into a slice of that length.
+            pub fn save_into(&self, words: &mut [u64]) {
+                let mut writer = Writer::new(words);
+                self.state.save(&mut writer);
+                self.supervisor.save(&mut writer);
+            }
+
+            /// The machine that [`Machine::save`] wrote.
+            ///
+            /// # Errors
+            /// The first word that no machine holds: not finite, none of its kind, a code out of limits, no staircase of extrema.
+            pub fn load(words: &[u64; MACHINE_STATE_WORDS]) -> Result<Self, Invalid> {
+                let mut reader = Reader::new(words);
+                let mut machine = Self::new();
+                machine.state.restore(&mut reader)?;
+                machine.supervisor.restore(&mut reader)?;
+                Ok(machine)
+            }
+        }
+
+        impl MachineInput {
+            /// As words in the order of `MACHINE_INPUT_NAMES`.
+            #[must_use]
+            pub fn to_words(&self) -> [u64; MACHINE_INPUT_WORDS] {
+                let mut all = [0; MACHINE_INPUT_WORDS];
+                let mut words = Writer::new(&mut all);
+                let input = self;
+                #input
+                words.word(self.request.word());
+                words.word(self.events as u64);
+                all
+            }
+        }
+
+        /// [`supervise`], and what the recorder is to keep of it.
+        pub fn supervise_recorded(
+            config: &Config,
+            machine: &mut Machine,
+            input: &MachineInput,
+            recorder: &mut Recorder<'_>,
+        ) -> MachineOutput {
+            if recorder.opens() {
+                recorder.open(&config.to_words(), machine.digest(), |words| machine.save_into(words));
+            }
+            let output = supervise(config, machine, input);
+            let row = Row {
+                codes: output.tick.dac_code,
+                status: output.tick.status,
+                supervisor: output.phase.word() as u32
+                    | (output.cause.word() as u32) << 8
+                    | (output.amplifier_on as u32) << 16,
+            };
+            recorder.push(&input.to_words(), &row, || machine.digest());
+            output
+        }
+
+        impl Snapshot for LegState {
+            const WORDS: usize = #leg_words;
+
+            fn save(&self, words: &mut Writer<'_>) {
+                self.memory.save(words);
+                words.word(self.code as u32 as u64);
+                #save_leg
+            }
+
+            fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+                self.memory.restore(words)?;
+                if self.memory.highest() > GRID as Real {
+                    return Err(words.refused());
+                }
+                self.code = words.count_to(limits::CODES[1])?;
+                if self.code < limits::CODES[0] {
+                    return Err(words.refused());
+                }
+                #restore_leg
+                Ok(())
+            }
+        }
+
+        #state
+    }
+}

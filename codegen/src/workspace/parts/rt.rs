@@ -1,0 +1,23 @@
+//! Real-time Linux without a controller.
+
+use super::{Part, files};
+
+pub const PART: Part = Part {
+    folder: "rt",
+    member: false,
+    what: "what a control loop needs of Linux: clock, rights, book of late ticks, shared memory",
+    needs: "Linux",
+    with: &[],
+    files: files! { "rt":
+        "Cargo.toml",
+        "src/account.rs",
+        "src/allocation.rs",
+        "src/clock.rs",
+        "src/exchange.rs",
+        "src/exchange/mapping.rs",
+        "src/exchange/tests.rs",
+        "src/histogram.rs",
+        "src/lib.rs",
+        "src/scheduling.rs",
+    },
+};

@@ -1,0 +1,159 @@
+//! A stand-in for libcomedi, built by the test: a card with sixteen inputs and four outputs whose inputs stand still. On closing
+//! it writes what was done with it. `FAKE_CODE`: code of every input; `FAKE_FAIL_AFTER`: readings after which it fails;
+//! `FAKE_LOG`: file to write.
+
+use std::ffi::{c_char, c_double, c_int, c_uint, c_void};
+use std::sync::Mutex;
+
+#[repr(C)]
+pub struct Instruction {
+    kind: c_uint,
+    count: c_uint,
+    data: *mut c_uint,
+    subdevice: c_uint,
+    channel: c_uint,
+    unused: [c_uint; 3],
+}
+
+#[repr(C)]
+pub struct List {
+    count: c_uint,
+    instructions: *mut Instruction,
+}
+
+struct Log {
+    cards: u64,
+    reads: u64,
+    writes: [u64; 3],
+    codes: [u32; 2],
+    lines: Vec<u32>,
+    configured: bool,
+    bad: Vec<String>,
+}
+
+static LOG: Mutex<Log> = Mutex::new(Log {
+    cards: 0,
+    reads: 0,
+    writes: [0; 3],
+    codes: [u32::MAX, 0],
+    lines: Vec::new(),
+    configured: false,
+    bad: Vec::new(),
+});
+
+fn number(name: &str, otherwise: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn comedi_open(path: *const c_char) -> *mut c_void {
+    let path = unsafe { std::ffi::CStr::from_ptr(path) }.to_string_lossy().into_owned();
+    // /dev/fake1 is card 1, and so on.
+    match path.strip_prefix("/dev/fake").and_then(|number| number.parse::<usize>().ok()) {
+        Some(card @ 1..=2) => {
+            LOG.lock().unwrap().cards += 1;
+            card as *mut c_void
+        }
+        _ => std::ptr::null_mut(),
+    }
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_close(_: *mut c_void) -> c_int {
+    let mut log = LOG.lock().unwrap();
+    log.cards -= 1;
+    if let (0, Ok(file)) = (log.cards, std::env::var("FAKE_LOG")) {
+        let lines: Vec<String> = log.lines.iter().map(u32::to_string).collect();
+        let text = format!(
+            "reads={}\nwrites1={}\nwrites2={}\nlowest={}\nhighest={}\nline={}\nconfigured={}\nbad={}\n",
+            log.reads,
+            log.writes[1],
+            log.writes[2],
+            log.codes[0],
+            log.codes[1],
+            lines.join(","),
+            log.configured,
+            log.bad.join(";")
+        );
+        std::fs::write(file, text).unwrap();
+    }
+    0
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_errno() -> c_int {
+    2
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_strerror(_: c_int) -> *const c_char {
+    c"No such device".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_get_board_name(_: *mut c_void) -> *const c_char {
+    c"fake-6229".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_find_subdevice_by_type(_: *mut c_void, kind: c_int, _: c_uint) -> c_int {
+    match kind {
+        1 => 0,
+        2 => 1,
+        5 => 2,
+        _ => -1,
+    }
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_get_n_channels(_: *mut c_void, subdevice: c_uint) -> c_int {
+    [16, 4, 32][subdevice as usize]
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_get_maxdata(_: *mut c_void, _: c_uint, _: c_uint) -> c_uint {
+    number("FAKE_HIGHEST", 131_071) as c_uint
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_find_range(_: *mut c_void, _: c_uint, _: c_uint, _: c_uint, low: c_double, high: c_double) -> c_int {
+    if low >= -10.0 && high <= 10.0 { 3 } else { -1 }
+}
+
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn comedi_do_insnlist(card: *mut c_void, list: *mut List) -> c_int {
+    let mut log = LOG.lock().unwrap();
+    let list = unsafe { &*list };
+    let instructions = unsafe { std::slice::from_raw_parts(list.instructions, list.count as usize) };
+    for (place, instruction) in (0_u32..).zip(instructions) {
+        let code = unsafe { &mut *instruction.data };
+        let (differential, ground) = (2 << 24 | 3 << 16 | place, 3 << 16 | place);
+        match (instruction.kind, instruction.subdevice, instruction.count) {
+            (0x0400_0000, 0, 1) if instruction.channel == differential => {
+                log.reads += 1;
+                if log.reads > number("FAKE_FAIL_AFTER", u64::MAX) {
+                    return -1;
+                }
+                *code = number("FAKE_CODE", 65_536) as u32;
+            }
+            (0x0800_0001, 1, 1) if instruction.channel == ground && place < 4 => {
+                log.writes[card as usize] += 1;
+                log.codes = [log.codes[0].min(*code), log.codes[1].max(*code)];
+            }
+            odd => log.bad.push(format!("{odd:?} channel {:x}", instruction.channel)),
+        }
+    }
+    list.count as c_int
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_dio_config(_: *mut c_void, subdevice: c_uint, line: c_uint, direction: c_uint) -> c_int {
+    LOG.lock().unwrap().configured = (subdevice, line, direction) == (2, 0, 1);
+    1
+}
+
+#[unsafe(no_mangle)]
+pub extern "C" fn comedi_dio_write(_: *mut c_void, _: c_uint, _: c_uint, bit: c_uint) -> c_int {
+    LOG.lock().unwrap().lines.push(bit);
+    1
+}

@@ -1,0 +1,182 @@
+//! Data acquisition cards by libcomedi: single synchronous readings and outputs, no streams.
+//!
+//! Gauges are the first six differential inputs of one card, amplifiers the first outputs of one or more cards (an NI PCI-6229
+//! has four), and the enable line is the first digital line of the first card, high for on. Codes are straight binary over the
+//! range of the channel: what volts they are, the spec says.
+
+pub mod library;
+
+use std::path::PathBuf;
+
+use controller::limits::CODES;
+use controller::sensing::CONVERTER;
+use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
+
+use super::Device;
+use library::{ANALOG_INPUT, ANALOG_OUTPUT, Card, Comedilib, DIGITAL, Reference, channel};
+
+/// Cards and ranges.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Card of the gauges and of the enable line.
+    pub input: PathBuf,
+    /// Cards of the amplifiers, in order; that of the gauges if none is named.
+    pub outputs: Vec<PathBuf>,
+    /// Voltages that a gauge's range must hold, V.
+    pub input_volts: [f64; 2],
+    /// Voltages that an output's range must hold, V.
+    pub output_volts: [f64; 2],
+}
+
+/// Outputs of one card.
+struct Bank<'a> {
+    card: Card<'a>,
+    subdevice: u32,
+    channels: [u32; CHANNELS],
+    /// First leg, and how many.
+    first: usize,
+    count: usize,
+}
+
+/// Cards as a machine.
+pub struct Comedi<'a> {
+    input: Card<'a>,
+    gauges: (u32, [u32; CHANNELS]),
+    line: u32,
+    banks: Vec<Bank<'a>>,
+    name: String,
+}
+
+impl<'a> Comedi<'a> {
+    /// Opens the cards; amplifiers are off.
+    ///
+    /// # Errors
+    /// In words: what is missing, and what to do.
+    pub fn open(library: &'a Comedilib, settings: &Settings) -> Result<Self, String> {
+        let path = settings.input.display();
+        let input = library.card(&settings.input)?;
+        let name = input.name();
+        let (line, _) = input
+            .subdevice(DIGITAL)
+            .ok_or_else(|| format!("{path}: {name} has no digital line to enable amplifiers"))?;
+        input.make_output(line, 0).map_err(|error| format!("{path}: digital line 0 as an output: {error}"))?;
+        // Before anything else.
+        if !input.set_line(line, 0, false) {
+            return Err(format!("{path}: digital line 0 cannot be set: amplifiers could not be switched off"));
+        }
+        let (subdevice, count) =
+            input.subdevice(ANALOG_INPUT).ok_or_else(|| format!("{path}: {name} has no analog inputs"))?;
+        if count < CHANNELS as u32 {
+            return Err(format!("{path}: {name} has {count} analog inputs; six gauges need {CHANNELS}"));
+        }
+        let mut channels = [0; CHANNELS];
+        for (number, slot) in (0..).zip(&mut channels) {
+            let highest = input.highest(subdevice, number);
+            if i64::from(highest) != i64::from(CONVERTER.highest) {
+                return Err(format!(
+                    "{path}: input {number} of {name} counts to {highest}, the spec's sensor.bits to {}; set sensor.bits to the card's",
+                    CONVERTER.highest
+                ));
+            }
+            let [low, high] = settings.input_volts;
+            let range = input.range(subdevice, number, settings.input_volts);
+            let range =
+                range.ok_or_else(|| format!("{path}: input {number} of {name} has no range of {low} V to {high} V"))?;
+            *slot = channel(number, range, Reference::Differential);
+        }
+        let outputs =
+            if settings.outputs.is_empty() { std::slice::from_ref(&settings.input) } else { &settings.outputs };
+        let mut banks = Vec::new();
+        let mut first = 0;
+        for output in outputs {
+            let bank = Bank::open(library.card(output)?, first, settings.output_volts);
+            let bank = bank.map_err(|error| format!("{}: {error}", output.display()))?;
+            first += bank.count;
+            banks.push(bank);
+        }
+        if first < CHANNELS {
+            return Err(format!(
+                "the cards have {first} analog outputs, six amplifiers need {CHANNELS}: name more cards, such as --comedi-out {path} --comedi-out /dev/comedi1"
+            ));
+        }
+        Ok(Self { input, gauges: (subdevice, channels), line, banks, name: format!("{name} at {path}") })
+    }
+}
+
+impl<'a> Bank<'a> {
+    fn open(card: Card<'a>, first: usize, volts: [f64; 2]) -> Result<Self, String> {
+        let name = card.name();
+        let (subdevice, count) =
+            card.subdevice(ANALOG_OUTPUT).ok_or_else(|| format!("{name} has no analog outputs"))?;
+        let count = (CHANNELS - first).min(count as usize);
+        let mut channels = [0; CHANNELS];
+        for (number, slot) in (0..).zip(channels.iter_mut().take(count)) {
+            let highest = card.highest(subdevice, number);
+            if i64::from(highest) < i64::from(CODES[1]) {
+                return Err(format!(
+                    "output {number} of {name} counts to {highest}, but the spec's codes go to {}; set dac.bits to the card's",
+                    CODES[1]
+                ));
+            }
+            let [low, high] = volts;
+            let range = card.range(subdevice, number, volts);
+            let range =
+                range.ok_or_else(|| format!("output {number} of {name} has no range of {low} V to {high} V"))?;
+            *slot = channel(number, range, Reference::Ground);
+        }
+        Ok(Self { card, subdevice, channels, first, count })
+    }
+}
+
+impl Gauges for Comedi<'_> {
+    const BITS: u32 = u32::BITS - CONVERTER.highest.leading_zeros();
+
+    fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {
+        let (subdevice, channels) = &self.gauges;
+        let mut codes = [0; CHANNELS];
+        if self.input.read(*subdevice, channels, &mut codes) {
+            Ok(codes.map(|code| code as i32))
+        } else {
+            Err(Fault::Bus)
+        }
+    }
+}
+
+impl Amplifiers for Comedi<'_> {
+    const BITS: u32 = u32::BITS - CODES[1].leading_zeros();
+
+    fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault> {
+        if codes.iter().any(|code| *code < CODES[0] || *code > CODES[1]) {
+            return Err(Fault::Code);
+        }
+        let mut good = true;
+        for bank in &self.banks {
+            let own = core::array::from_fn(|k| codes.get(bank.first + k).map_or(0, |code| *code as u32));
+            good &= bank.card.write(bank.subdevice, &bank.channels, bank.count, &own);
+        }
+        if good { Ok(()) } else { Err(Fault::Bus) }
+    }
+
+    fn enable(&mut self, on: bool) -> Result<(), Fault> {
+        if self.input.set_line(self.line, 0, on) { Ok(()) } else { Err(Fault::Pin) }
+    }
+}
+
+impl Device for Comedi<'_> {
+    fn begin(&mut self, _tick: u64) {}
+
+    fn wrench(&self) -> [f64; CHANNELS] {
+        [0.0; CHANNELS]
+    }
+
+    fn describe(&self) -> String {
+        self.name.clone()
+    }
+}
+
+impl Drop for Comedi<'_> {
+    fn drop(&mut self) {
+        // Whatever ended the run.
+        let _ = self.input.set_line(self.line, 0, false);
+    }
+}

@@ -1,0 +1,243 @@
+//! The emitted controller on a Linux PC, in real time.
+//!
+//! ```text
+//! real-time thread   sleep to the tick → gauges → supervise → amplifiers → hand over     control.rs
+//!        │ rows (ring, never waits)            ▲ wishes (ring, never waits)
+//!        ▼                                     │
+//! main thread        record to a file, lines from a socket, plan, signals                service.rs, operator.rs
+//! ```
+//! The machine outside is a data acquisition card or a simulated one (devices/). What is late is entered in a book and
+//! has a cause; the summary shows it.
+
+mod control;
+mod devices;
+mod operator;
+mod options;
+mod record;
+mod service;
+mod summary;
+mod words;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
+
+use controller::{CONFIG_NAMES, CONFIG_WORDS, Config};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use specgen_rt::account::Account;
+use specgen_rt::allocation::Watched;
+use specgen_rt::scheduling::{self, AwakeProcessors, Refused};
+use specgen_rt::{clock, exchange};
+
+use control::{Loop, Shared, Timing};
+use devices::Device;
+use devices::simulated::Simulated;
+use operator::Operator;
+use options::{Asked, Options};
+use service::{Service, Socket};
+use summary::Summary;
+use words::Places;
+
+/// Notices if the real-time thread allocates.
+#[global_allocator]
+static ALLOCATOR: Watched = Watched;
+
+/// Rows between the threads: 0.8 s at 10 kHz.
+const ROWS: usize = 8192;
+const WISHES: usize = 16;
+/// Bytes of the real-time thread's stack.
+const STACK: usize = 2 * scheduling::STACK + (1 << 20);
+
+/// Why it cannot run, by exit code.
+enum Failure {
+    Run(String),
+    Usage(String),
+    Environment(String),
+}
+
+fn main() -> ExitCode {
+    let asked = options::parse(std::env::args_os()).map_err(Failure::Usage);
+    let done = asked.and_then(|asked| match asked {
+        Asked::Text(text) => {
+            print!("{text}");
+            Ok(())
+        }
+        Asked::Run(options) => open(&options),
+    });
+    let (code, text) = match done {
+        Ok(()) => return ExitCode::SUCCESS,
+        Err(Failure::Run(text)) => (1, text),
+        Err(Failure::Usage(text)) => (2, text),
+        Err(Failure::Environment(text)) => (3, text),
+    };
+    eprintln!("error: {text}");
+    ExitCode::from(code)
+}
+
+/// Opens the machine outside and runs on it.
+fn open(options: &Options) -> Result<(), Failure> {
+    match &options.machine {
+        options::Machine::Simulated(name) => {
+            let path = exchange::path_of(name).map_err(|text| Failure::Usage(format!("--sim: {text}")))?;
+            let device = Simulated::open(&path, options.patience);
+            run(options, &mut device.map_err(Failure::Environment)?)
+        }
+        #[cfg(feature = "comedi")]
+        options::Machine::Comedi(input) => {
+            let library = devices::comedi::library::Comedilib::open(options.comedi_library.as_deref());
+            let library = library.map_err(Failure::Environment)?;
+            let settings = devices::comedi::Settings {
+                input: input.clone(),
+                outputs: options.comedi_outputs.clone(),
+                input_volts: options.comedi_ranges[0],
+                output_volts: options.comedi_ranges[1],
+            };
+            let device = devices::comedi::Comedi::open(&library, &settings);
+            run(options, &mut device.map_err(Failure::Environment)?)
+        }
+        #[cfg(not(feature = "comedi"))]
+        options::Machine::Comedi(_) => {
+            Err(Failure::Usage("--comedi needs another build: cargo build --release --features comedi".to_owned()))
+        }
+    }
+}
+
+fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failure> {
+    let usage = Failure::Usage;
+    let environment = |error: String| Failure::Environment(error);
+    let config = configure(&options.config).map_err(usage)?;
+    let period = words::period().ok_or_else(|| environment("the controller does not state its period".to_owned()))?;
+    let timing = Timing { period, limit: (period as f64 * options.late_after) as u64, elastic: options.elastic };
+    let places = Places::find().map_err(|error| environment(error.to_string()))?;
+    // Somebody or something is there to end it.
+    let attended = options.socket.is_some() || options.duration.is_some();
+    let mut operator = Operator::new(places.clone(), attended);
+    if options.arm {
+        operator.plan(&options.set, clock::now()).map_err(|error| usage(format!("--set: {error}")))?;
+    }
+
+    let signal = Arc::new(AtomicBool::new(false));
+    for number in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(number, Arc::clone(&signal))
+            .map_err(|error| environment(format!("signal {number}: {error}")))?;
+    }
+    let named = |path: &std::path::Path, error: std::io::Error| environment(format!("{}: {error}", path.display()));
+    let socket = options.socket.as_deref().map(|path| Socket::listen(path).map_err(|error| named(path, error)));
+    let socket = socket.transpose()?;
+    let recorder = options.record.as_deref().map(|path| {
+        let recorder = record::Recorder::create(path).map_err(|error| named(path, error))?;
+        Ok::<_, Failure>((path.to_owned(), recorder))
+    });
+    let recorder = recorder.transpose()?;
+
+    let (row_producer, row_consumer) = rtrb::RingBuffer::new(ROWS);
+    let (wish_producer, wish_consumer) = rtrb::RingBuffer::new(WISHES);
+    let shared = Shared::default();
+    shared.service_alive.store(clock::now(), Ordering::Relaxed);
+    let description = device.describe();
+    let mut account = Box::new(Account::new(timing.period, timing.limit));
+    let (mut missing, _awake) = prepare_process();
+
+    let control = Loop {
+        device,
+        config,
+        places,
+        standing_events: control::integrity_event(controller::integrity::intact()),
+        wishes: wish_consumer,
+        rows: row_producer,
+        shared: &shared,
+        timing,
+    };
+    let (ready, hear) = mpsc::channel();
+    let (go, wait) = mpsc::channel();
+    let (cpu, priority) = (options.cpu, options.priority);
+    let book = &mut *account;
+    let outcome = std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new().name("real-time".to_owned()).stack_size(STACK);
+        let spawned = thread.spawn_scoped(scope, move || {
+            let _ = ready.send(prepare_thread(cpu, priority));
+            // Without the word to go there is nothing to run.
+            if wait.recv().is_ok() {
+                control.run(book);
+            }
+        });
+        spawned.map_err(|error| environment(format!("no thread for the loop: {error}")))?;
+        missing.extend(hear.recv().unwrap_or_default());
+        for refused in &missing {
+            eprintln!("{}: {refused}", if options.allow_no_rt { "warning" } else { "error" });
+        }
+        if !missing.is_empty() && !options.allow_no_rt {
+            drop(go);
+            return Err(environment(
+                "this user may not run in real time; see the lines above and `specgen doctor`, or try with --allow-no-rt"
+                    .to_owned(),
+            ));
+        }
+        let until = options.duration.map(|duration| clock::now() + duration);
+        let _ = go.send(());
+        let service = Service {
+            rows: row_consumer,
+            wishes: wish_producer,
+            shared: &shared,
+            operator,
+            recorder,
+            socket,
+            signal,
+            signals: 0,
+            until,
+        };
+        Ok(service.run())
+    })?;
+
+    let summary = Summary {
+        account: &account,
+        outcome: &outcome,
+        lost_rows: shared.lost_rows.load(Ordering::Relaxed),
+        device_faults: shared.device_faults.load(Ordering::Relaxed),
+        device: description,
+        period,
+        missing_rights: missing.iter().map(ToString::to_string).collect(),
+    };
+    print!("{}", if options.json { summary.to_json() } else { summary.to_text() });
+    summary.failure().map_or(Ok(()), |failure| Err(Failure::Run(failure)))
+}
+
+/// Rights of the whole process: what is missing, and what keeps processors awake. That one is a courtesy, not a need.
+fn prepare_process() -> (Vec<Refused>, Option<AwakeProcessors>) {
+    let awake = match AwakeProcessors::request() {
+        Ok(awake) => Some(awake),
+        Err(refused) => {
+            eprintln!("warning: {refused}");
+            None
+        }
+    };
+    (scheduling::lock_memory().err().into_iter().collect(), awake)
+}
+
+/// Rights of the calling thread: what is missing.
+fn prepare_thread(cpu: Option<usize>, priority: u8) -> Vec<Refused> {
+    let pinned = cpu.map_or(Ok(()), scheduling::pin);
+    pinned.err().into_iter().chain(scheduling::set_fifo(priority).err()).collect()
+}
+
+/// The spec's settings with assignments such as `mode=6`.
+fn configure(assignments: &[String]) -> Result<Config, String> {
+    let mut words: [u64; CONFIG_WORDS] = controller::integrity::config().to_words();
+    for text in assignments {
+        let (name, value) =
+            text.split_once('=').ok_or_else(|| format!("--config: expected NAME=VALUE, found `{text}`"))?;
+        let place = CONFIG_NAMES.iter().position(|known| *known == name);
+        let place =
+            place.ok_or_else(|| format!("--config: no setting `{name}`; there are {}", CONFIG_NAMES.join(", ")))?;
+        let number: f64 =
+            value.parse().map_err(|_| format!("--config: `{name}`: expected a number, found `{value}`"))?;
+        words[place] = words::setting(name, number).ok_or_else(|| {
+            format!("--config: `{name}`: expected a finite number, or a whole one from 0 where it is a choice or a code; found `{value}`")
+        })?;
+    }
+    Config::from_words(&words).map_err(|error| {
+        let name = CONFIG_NAMES.get(error.word).copied().unwrap_or("?");
+        format!("--config: the controller refuses `{name}`; its range is in the spec's documentation")
+    })
+}

@@ -1,0 +1,220 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use lexopt::prelude::*;
+use specgen_rt::clock::SECOND;
+
+/// What `--help` prints.
+pub const HELP: &str = "\
+Runs the controller in real time on this PC.
+
+Usage: rt-pc [OPTIONS]
+
+Machine
+  --sim NAME           the machine that `specgen plant SPEC --name NAME` simulates (default: NAME is `plant`)
+  --comedi DEVICE      a data acquisition card such as /dev/comedi0; needs a build with `--features comedi`
+  --comedi-out DEVICE  a card of the amplifiers, once for each in order (default: that of the gauges)
+  --comedi-range LOW:HIGH       voltages that the range of a gauge's input must hold (default -10:10)
+  --comedi-out-range LOW:HIGH   voltages that the range of an amplifier's output must hold (default -10:10)
+  --comedi-library FILE         another libcomedi than the system's
+  --patience MS        how long a reading of the simulated machine may take before it counts as broken (default 20)
+
+Time
+  --seconds S          ramp down and end after S seconds (default: at a signal)
+  --late-after SHARE   outputs later than this share of the period count as late (default 0.5)
+  --priority P         SCHED_FIFO priority, 1 to 99 (default 80)
+  --elastic            with --sim: a late tick moves the next ones, none is skipped, for PCs that cannot keep the period
+  --cpu N              keep the loop on processor N (default: not pinned)
+  --allow-no-rt        run without the rights for real time, after saying which are missing
+
+Operation
+  --arm                arm and run at once; else wait for a line on the socket
+  --set NAME=VALUE     once running, set an input word, such as command=3 or setpoint[2]=1e-6; implies --arm
+  --config NAME=VALUE  a setting for this run, such as mode=6
+  --socket PATH        listen for lines: status, set, arm, run, hold, ramp-down, acknowledge, stop
+  --record FILE        write every tick to FILE, for replay
+  --json               print the summary as JSON
+  --help, --version
+
+SIGINT or SIGTERM ramps down and ends; a second one ends at once with the amplifiers off.
+Exit codes: 0 good, 1 the machine faulted or the book does not balance, 2 usage, 3 environment.
+";
+
+/// Which machine.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Machine {
+    /// Simulated, by name.
+    Simulated(String),
+    /// A card, by device file.
+    Comedi(PathBuf),
+}
+
+/// What is asked for.
+#[derive(Debug, Clone)]
+#[cfg_attr(not(feature = "comedi"), allow(dead_code))] // The settings of cards.
+pub struct Options {
+    /// The machine.
+    pub machine: Machine,
+    /// Cards of the amplifiers.
+    pub comedi_outputs: Vec<PathBuf>,
+    /// Of inputs and of outputs, V.
+    pub comedi_ranges: [[f64; 2]; 2],
+    /// The library's file.
+    pub comedi_library: Option<PathBuf>,
+    /// ns.
+    pub patience: u64,
+    /// ns.
+    pub duration: Option<u64>,
+    /// Share of the period.
+    pub late_after: f64,
+    /// Late ticks move the next ones.
+    pub elastic: bool,
+    /// 1 to 99.
+    pub priority: u8,
+    /// Processor of the loop.
+    pub cpu: Option<usize>,
+    /// Go on without rights.
+    pub allow_no_rt: bool,
+    /// Arm at once.
+    pub arm: bool,
+    /// Assignments of input words.
+    pub set: Vec<String>,
+    /// Assignments of settings.
+    pub config: Vec<String>,
+    /// Socket of the operator.
+    pub socket: Option<PathBuf>,
+    /// File of the record.
+    pub record: Option<PathBuf>,
+    /// Summary as JSON.
+    pub json: bool,
+}
+
+/// What the command line asks for.
+#[derive(Debug)]
+pub enum Asked {
+    /// To run.
+    Run(Box<Options>),
+    /// For a text.
+    Text(String),
+}
+
+/// Reads arguments, the program's name first.
+///
+/// # Errors
+/// In words.
+pub fn parse(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked, String> {
+    read(arguments).map_err(|error| format!("{error}; see rt-pc --help"))
+}
+
+fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked, lexopt::Error> {
+    let mut options = Options {
+        machine: Machine::Simulated("plant".to_owned()),
+        comedi_outputs: Vec::new(),
+        comedi_ranges: [[-10.0, 10.0]; 2],
+        comedi_library: None,
+        patience: 20_000_000,
+        duration: None,
+        late_after: 0.5,
+        elastic: false,
+        priority: 80,
+        cpu: None,
+        allow_no_rt: false,
+        arm: false,
+        set: Vec::new(),
+        config: Vec::new(),
+        socket: None,
+        record: None,
+        json: false,
+    };
+    let mut parser = lexopt::Parser::from_iter(arguments);
+    while let Some(argument) = parser.next()? {
+        match argument {
+            Long("help") | Short('h') => return Ok(Asked::Text(HELP.to_owned())),
+            Long("version") => {
+                let [name, digest] = [controller::SPEC_NAME, controller::SPEC_DIGEST];
+                let version = controller::SPECGEN_VERSION;
+                return Ok(Asked::Text(format!("rt-pc {version}, controller of `{name}`, digest {digest}\n")));
+            }
+            Long("sim") => options.machine = Machine::Simulated(parser.value()?.string()?),
+            Long("comedi") => options.machine = Machine::Comedi(parser.value()?.into()),
+            Long("comedi-out") => options.comedi_outputs.push(parser.value()?.into()),
+            Long("comedi-range") => options.comedi_ranges[0] = range(&mut parser, "--comedi-range")?,
+            Long("comedi-out-range") => options.comedi_ranges[1] = range(&mut parser, "--comedi-out-range")?,
+            Long("comedi-library") => options.comedi_library = Some(parser.value()?.into()),
+            Long("patience") => options.patience = (number(&mut parser, "--patience", 0.1, 10_000.0)? * 1e6) as u64,
+            Long("seconds") => {
+                options.duration = Some((number(&mut parser, "--seconds", 0.01, 1e7)? * SECOND as f64) as u64);
+            }
+            Long("late-after") => options.late_after = number(&mut parser, "--late-after", 0.01, 1.0)?,
+            Long("priority") => options.priority = number(&mut parser, "--priority", 1.0, 99.0)? as u8,
+            Long("elastic") => options.elastic = true,
+            Long("cpu") => options.cpu = Some(parser.value()?.parse()?),
+            Long("allow-no-rt") => options.allow_no_rt = true,
+            Long("arm") => options.arm = true,
+            Long("set") => {
+                options.arm = true;
+                options.set.push(parser.value()?.string()?);
+            }
+            Long("config") => options.config.push(parser.value()?.string()?),
+            Long("socket") => options.socket = Some(parser.value()?.into()),
+            Long("record") => options.record = Some(parser.value()?.into()),
+            Long("json") => options.json = true,
+            _ => return Err(argument.unexpected()),
+        }
+    }
+    if options.elastic && !matches!(options.machine, Machine::Simulated(_)) {
+        return Err("--elastic is for a simulated machine: a real one does not wait".into());
+    }
+    Ok(Asked::Run(Box::new(options)))
+}
+
+fn number(parser: &mut lexopt::Parser, name: &str, low: f64, high: f64) -> Result<f64, lexopt::Error> {
+    let text = parser.value()?.string()?;
+    let fits = |value: &f64| (low..=high).contains(value);
+    text.parse()
+        .ok()
+        .filter(fits)
+        .ok_or_else(|| format!("{name}: expected a number from {low} to {high}, found `{text}`").into())
+}
+
+/// Two voltages, the lower one first.
+fn range(parser: &mut lexopt::Parser, name: &str) -> Result<[f64; 2], lexopt::Error> {
+    let text = parser.value()?.string()?;
+    let volts = text.split_once(':').and_then(|(low, high)| Some([low.parse().ok()?, high.parse().ok()?]));
+    let fits = |volts: &[f64; 2]| volts[0] < volts[1] && volts.iter().all(|volt| volt.abs() <= 100.0);
+    volts.filter(fits).ok_or_else(|| format!("{name}: expected two voltages such as -10:10, found `{text}`").into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(line: &str) -> Result<Asked, String> {
+        parse(std::iter::once("rt-pc").chain(line.split_whitespace()).map(Into::into))
+    }
+
+    #[test]
+    fn options_are_read_and_nonsense_is_told() {
+        let Ok(Asked::Run(options)) = parsed("--sim a --seconds 2.5 --set command=3 --cpu 1 --record x") else {
+            unreachable!("a good line")
+        };
+        assert_eq!((options.machine, options.duration), (Machine::Simulated("a".to_owned()), Some(2_500_000_000)));
+        assert!(options.arm && options.cpu == Some(1) && !options.allow_no_rt);
+        for (line, expected) in [
+            ("--seconds", "missing argument"),
+            ("--seconds nan", "from 0.01 to 10000000, found `nan`"),
+            ("--priority 0", "from 1 to 99, found `0`"),
+            ("--late-after 2", "from 0.01 to 1, found `2`"),
+            ("--comedi-range 10:-10", "two voltages such as -10:10, found `10:-10`"),
+            ("--cpu x", "cannot parse"),
+            ("--elastic --comedi /dev/comedi0", "a real one does not wait"),
+            ("now", "unexpected argument"),
+            ("--fast", "--fast"),
+        ] {
+            let error = parsed(line).map(|_| ()).unwrap_err();
+            assert!(error.contains(expected) && error.ends_with("see rt-pc --help"), "{line}: {error}");
+        }
+        assert!(matches!(parsed("--help"), Ok(Asked::Text(text)) if text == HELP));
+    }
+}

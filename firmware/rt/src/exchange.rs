@@ -1,0 +1,390 @@
+//! Shared memory between a controller and the machine that it moves.
+//!
+//! One file of 64-bit words, mapped by both. The machine's side makes it; a controller opens it. Two blocks, each written by one
+//! side and read by the other under a counter that is odd while the block changes:
+//!
+//! ```text
+//! actuation  controller → machine   session, tick, enable, six converter codes
+//! sensing    machine → controller   session, tick, six converter codes, wrench (six words)
+//! ```
+//! Time is counted in ticks of the controller. After the actuation of tick n the machine goes on by one period under it and gives
+//! the sensing of tick n + 1 out ahead of time. A controller that skipped ticks asks for the sensing of a later one by the word
+//! `wanted`: the machine then goes on under the codes that it has, as a real one would have.
+//!
+//! Whoever waits looks at the words for a while, then sleeps on a futex, so that neither side needs a processor of its own. Only a
+//! side that sleeps is woken: a call of the system costs the real-time thread more than all the rest of a tick.
+#![allow(unsafe_code)] // Mapping and futex calls; each says why it is sound. The words themselves are atomics.
+
+mod mapping;
+
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::clock;
+use mapping::Mapping;
+
+/// "SPGPLANT" in little-endian bytes.
+const MAGIC: u64 = u64::from_le_bytes(*b"SPGPLANT");
+const VERSION: u64 = 1;
+/// How long a controller that waits looks before it sleeps, ns.
+const LOOK: u64 = 30_000;
+/// Tries to read a block while the other side writes it; a block takes some 50 ns to write.
+const TRIES: usize = 10_000;
+
+/// Six legs, six gauges.
+pub const CHANNELS: usize = 6;
+
+/// What the controller gives out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Actuation {
+    /// A number that differs from one run of a controller to the next.
+    pub session: u64,
+    /// Tick of the session whose interval begins, from 0.
+    pub tick: u64,
+    /// Amplifiers on.
+    pub enable: bool,
+    /// Converter codes.
+    pub codes: [i32; CHANNELS],
+}
+
+/// What the machine gives out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Sensing {
+    /// Session that it follows.
+    pub session: u64,
+    /// Tick of the session at whose beginning it is read.
+    pub tick: u64,
+    /// Converter codes of the gauges.
+    pub codes: [i32; CHANNELS],
+    /// Force and torque on the platform as bits of f64, N and N m; 0 without a sensor.
+    pub wrench: [u64; CHANNELS],
+}
+
+/// Words of the file, in order.
+#[repr(C)]
+struct Words {
+    magic: AtomicU64,
+    version: AtomicU64,
+    /// First half of the SHA-256 of the spec.
+    digest: [AtomicU64; 2],
+    /// Process of the machine's side; 0 once it has ended in order.
+    server: AtomicU64,
+    /// Session and tick that the controller waits for.
+    wanted: [AtomicU64; 2],
+    actuation_count: AtomicU64,
+    actuation: [AtomicU64; 3 + CHANNELS],
+    sensing_count: AtomicU64,
+    sensing: [AtomicU64; 2 + 2 * CHANNELS],
+    /// What the machine's side sleeps on, and the controller's.
+    bells: [Bell; 2],
+}
+
+/// A count that the other side raises, and whether somebody sleeps on it.
+#[repr(C)]
+struct Bell {
+    count: AtomicU32,
+    sleepers: AtomicU32,
+}
+
+/// Why a machine cannot be reached.
+#[derive(Debug)]
+pub enum OpenError {
+    /// No such file, or no right to it.
+    File {
+        /// The file.
+        path: PathBuf,
+        /// The system's answer.
+        cause: io::Error,
+    },
+    /// The file is something else, or of another version.
+    NotAMachine {
+        /// The file.
+        path: PathBuf,
+    },
+    /// It is the machine of another spec.
+    OtherSpec {
+        /// The file.
+        path: PathBuf,
+        /// First half of its digest.
+        found: String,
+    },
+    /// A machine of this name is served already.
+    Served {
+        /// The file.
+        path: PathBuf,
+        /// Process that serves it.
+        process: u64,
+    },
+}
+
+impl fmt::Display for OpenError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File { path, cause } if cause.kind() == io::ErrorKind::NotFound => write!(
+                f,
+                "{}: no simulated machine there; start one with `specgen plant SPEC` and give both the same --name",
+                path.display()
+            ),
+            Self::File { path, cause } => {
+                write!(f, "{}: {cause}; expected a file that this user may read and write", path.display())
+            }
+            Self::NotAMachine { path } => write!(
+                f,
+                "{}: not a simulated machine of this version; remove it and start `specgen plant` of the specgen that made this controller",
+                path.display()
+            ),
+            Self::OtherSpec { path, found } => write!(
+                f,
+                "{}: the machine of another spec (digest {found}…); start `specgen plant` with the spec of this controller",
+                path.display()
+            ),
+            Self::Served { path, process } => write!(
+                f,
+                "{}: process {process} serves a machine of this name; end it, or choose another --name",
+                path.display()
+            ),
+        }
+    }
+}
+
+impl std::error::Error for OpenError {}
+
+/// The file of a machine's name. Names are of letters, digits, `-` and `_`.
+///
+/// # Errors
+/// If the name has anything else in it, with what is expected.
+pub fn path_of(name: &str) -> Result<PathBuf, String> {
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    if name.is_empty() || name.len() > 64 || !name.chars().all(fits) {
+        return Err(format!("expected a name of at most 64 letters, digits, `-` and `_`, found `{name}`"));
+    }
+    Ok(Path::new("/dev/shm").join(format!("specgen-plant-{name}")))
+}
+
+/// First half of a SHA-256 in hex as two words; 0 for what is no hex.
+fn half_digest(digest: &str) -> [u64; 2] {
+    [0, 16].map(|at| digest.get(at..at + 16).and_then(|part| u64::from_str_radix(part, 16).ok()).unwrap_or(0))
+}
+
+/// The machine's end.
+pub struct Server {
+    mapping: Mapping<Words>,
+    path: PathBuf,
+}
+
+/// The controller's end.
+pub struct Client {
+    mapping: Mapping<Words>,
+    session: u64,
+}
+
+impl Server {
+    /// Makes the file, for the machine of the spec with `digest` (SHA-256 in hex). It is removed when this is dropped.
+    ///
+    /// # Errors
+    /// If a machine of this name is served, or the file cannot be made.
+    pub fn create(path: &Path, digest: &str) -> Result<Self, OpenError> {
+        let failed = |cause| OpenError::File { path: path.to_owned(), cause };
+        if let Ok(old) = Mapping::<Words>::open(path) {
+            let process = old.words().server.load(Ordering::Acquire);
+            if old.words().magic.load(Ordering::Acquire) == MAGIC && process != 0 && is_alive(process) {
+                return Err(OpenError::Served { path: path.to_owned(), process });
+            }
+        }
+        // Made under another name and renamed: nobody maps half a file, and who still maps an old one keeps that.
+        let fresh = path.with_extension(format!("{}.part", std::process::id()));
+        let mapping = Mapping::<Words>::create(&fresh).map_err(failed)?;
+        let words = mapping.words();
+        words.version.store(VERSION, Ordering::Relaxed);
+        for (word, half) in words.digest.iter().zip(half_digest(digest)) {
+            word.store(half, Ordering::Relaxed);
+        }
+        words.server.store(u64::from(std::process::id()), Ordering::Relaxed);
+        words.magic.store(MAGIC, Ordering::Release);
+        std::fs::rename(&fresh, path).map_err(|cause| {
+            let _ = std::fs::remove_file(&fresh);
+            failed(cause)
+        })?;
+        Ok(Self { mapping, path: path.to_owned() })
+    }
+
+    /// The latest actuation and what the controller waits for (session, tick), once the counter of either has moved on from
+    /// `seen`; none after `patience` (ns). It looks for `look` (ns) before it sleeps.
+    #[must_use]
+    pub fn wait(&self, seen: &mut u32, look: u64, patience: u64) -> Option<(Actuation, [u64; 2])> {
+        let words = self.mapping.words();
+        *seen = wait_for(&words.bells[0], *seen, look, patience)?;
+        let mut block = [0; 3 + CHANNELS];
+        read_block(&words.actuation_count, &words.actuation, &mut block)?;
+        let [session, tick, enable, codes @ ..] = block;
+        let wanted = [&words.wanted[0], &words.wanted[1]].map(|word| word.load(Ordering::Acquire));
+        Some((Actuation { session, tick, enable: enable == 1, codes: codes.map(|code| code as i32) }, wanted))
+    }
+
+    /// Gives a reading out.
+    pub fn publish(&self, sensing: &Sensing) {
+        let words = self.mapping.words();
+        let mut block = [0; 2 + 2 * CHANNELS];
+        (block[0], block[1]) = (sensing.session, sensing.tick);
+        for k in 0..CHANNELS {
+            block[2 + k] = u64::from(sensing.codes[k] as u32);
+            block[2 + CHANNELS + k] = sensing.wrench[k];
+        }
+        write_block(&words.sensing_count, &words.sensing, &block);
+        ring(&words.bells[1]);
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.mapping.words().server.store(0, Ordering::Release);
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+impl Client {
+    /// Opens the machine of the spec with `digest` (SHA-256 in hex).
+    ///
+    /// # Errors
+    /// If there is none, or it is of another spec.
+    pub fn open(path: &Path, digest: &str) -> Result<Self, OpenError> {
+        let mapping = Mapping::<Words>::open(path).map_err(|cause| match cause.kind() {
+            io::ErrorKind::InvalidData => OpenError::NotAMachine { path: path.to_owned() },
+            _ => OpenError::File { path: path.to_owned(), cause },
+        })?;
+        let words = mapping.words();
+        if words.magic.load(Ordering::Acquire) != MAGIC || words.version.load(Ordering::Relaxed) != VERSION {
+            return Err(OpenError::NotAMachine { path: path.to_owned() });
+        }
+        let found = [0, 1].map(|k| words.digest[k].load(Ordering::Relaxed));
+        if found != half_digest(digest) {
+            let found = format!("{:016x}", found[0]);
+            return Err(OpenError::OtherSpec { path: path.to_owned(), found });
+        }
+        // Ticks count from 0 again; the machine sees by this that it is another run.
+        let session = clock::now() ^ (u64::from(std::process::id()) << 40);
+        Ok(Self { mapping, session })
+    }
+
+    /// The reading at the beginning of `tick`; none if the machine does not give it within `patience` (ns).
+    pub fn sense(&self, tick: u64, patience: u64) -> Option<Sensing> {
+        let words = self.mapping.words();
+        let deadline = clock::now().saturating_add(patience);
+        let mut asked = false;
+        loop {
+            let bell = words.bells[1].count.load(Ordering::Acquire);
+            let mut block = [0; 2 + 2 * CHANNELS];
+            if read_block(&words.sensing_count, &words.sensing, &mut block).is_some()
+                && block[0] == self.session
+                && block[1] == tick
+            {
+                let at = |first: usize| core::array::from_fn(|k| block[first + k]);
+                let codes: [u64; CHANNELS] = at(2);
+                return Some(Sensing {
+                    session: block[0],
+                    tick: block[1],
+                    codes: codes.map(|code| code as u32 as i32),
+                    wrench: at(2 + CHANNELS),
+                });
+            }
+            if !asked {
+                words.wanted[1].store(tick, Ordering::Relaxed);
+                words.wanted[0].store(self.session, Ordering::Release);
+                ring(&words.bells[0]);
+                asked = true;
+            }
+            let left = deadline.saturating_sub(clock::now());
+            if left == 0 {
+                return None;
+            }
+            let _ = wait_for(&words.bells[1], bell, LOOK, left);
+        }
+    }
+
+    /// Gives codes out for the interval that begins with `tick`.
+    pub fn actuate(&self, tick: u64, enable: bool, codes: &[i32; CHANNELS]) {
+        let words = self.mapping.words();
+        let mut block = [0; 3 + CHANNELS];
+        (block[0], block[1], block[2]) = (self.session, tick, u64::from(enable));
+        for (word, code) in block[3..].iter_mut().zip(codes) {
+            *word = u64::from(*code as u32);
+        }
+        write_block(&words.actuation_count, &words.actuation, &block);
+        ring(&words.bells[0]);
+    }
+
+    /// Whether the machine's process has ended, in order or not.
+    #[must_use]
+    pub fn is_abandoned(&self) -> bool {
+        let process = self.mapping.words().server.load(Ordering::Acquire);
+        process == 0 || !is_alive(process)
+    }
+}
+
+/// Writes a block that one side alone writes: the counter is odd meanwhile.
+fn write_block<const N: usize>(count: &AtomicU64, words: &[AtomicU64; N], block: &[u64; N]) {
+    let before = count.load(Ordering::Relaxed);
+    count.store(before.wrapping_add(1), Ordering::Relaxed);
+    fence(Ordering::Release);
+    for (word, value) in words.iter().zip(block) {
+        word.store(*value, Ordering::Relaxed);
+    }
+    count.store(before.wrapping_add(2), Ordering::Release);
+}
+
+/// A block that belongs together; none if the other side is stuck halfway.
+fn read_block<const N: usize>(count: &AtomicU64, words: &[AtomicU64; N], block: &mut [u64; N]) -> Option<()> {
+    for _ in 0..TRIES {
+        let before = count.load(Ordering::Acquire);
+        if before & 1 == 0 {
+            for (value, word) in block.iter_mut().zip(words) {
+                *value = word.load(Ordering::Relaxed);
+            }
+            fence(Ordering::Acquire);
+            if count.load(Ordering::Relaxed) == before {
+                return Some(());
+            }
+        }
+        core::hint::spin_loop();
+    }
+    None
+}
+
+fn ring(bell: &Bell) {
+    // In one order with the sleeper's: either it sees the new count, or it is seen here.
+    bell.count.fetch_add(1, Ordering::SeqCst);
+    if bell.sleepers.load(Ordering::SeqCst) > 0 {
+        mapping::wake(&bell.count);
+    }
+}
+
+/// The bell's count once it is no more `seen`; none after `patience` (ns). Sleeps after `look` (ns).
+fn wait_for(bell: &Bell, seen: u32, look: u64, patience: u64) -> Option<u32> {
+    let start = clock::now();
+    loop {
+        let count = bell.count.load(Ordering::Acquire);
+        if count != seen {
+            return Some(count);
+        }
+        let waited = clock::now().saturating_sub(start);
+        if waited >= patience {
+            return None;
+        }
+        if waited < look {
+            core::hint::spin_loop();
+        } else {
+            bell.sleepers.fetch_add(1, Ordering::SeqCst);
+            mapping::sleep(&bell.count, seen, patience - waited);
+            bell.sleepers.fetch_sub(1, Ordering::SeqCst);
+        }
+    }
+}
+
+fn is_alive(process: u64) -> bool {
+    Path::new("/proc").join(process.to_string()).exists()
+}
+
+#[cfg(test)]
+mod tests;

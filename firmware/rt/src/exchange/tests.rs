@@ -1,0 +1,110 @@
+use super::*;
+
+const DIGEST: &str = "00112233445566778899aabbccddeeff00112233445566778899aabbccddeeff";
+
+fn name(test: &str) -> PathBuf {
+    path_of(&format!("test-{test}-{}", std::process::id())).unwrap()
+}
+
+#[test]
+fn a_machine_answers_every_tick_and_catches_up_after_skipped_ones() {
+    let path = name("answers");
+    let server = Server::create(&path, DIGEST).unwrap();
+    let client = Client::open(&path, DIGEST).unwrap();
+    let machine = std::thread::spawn(move || {
+        // Its gauges read the ticks since the start under the codes that it had.
+        let (mut seen, mut session, mut tick) = (0, 0, 0);
+        let mut held = [0; 6];
+        let mut position = [0; 6];
+        while tick < 2_000 {
+            let Some((actuation, wanted)) = server.wait(&mut seen, 1_000, 1_000_000_000) else { break };
+            if wanted[0] != session {
+                (session, tick) = (wanted[0], wanted[1]);
+            } else {
+                let mut go_on = |tick: &mut u64, to: u64, held: &[i32; 6]| {
+                    while *tick < to {
+                        (0..6).for_each(|k| position[k] += held[k]);
+                        *tick += 1;
+                    }
+                };
+                if actuation.session == session && actuation.tick >= tick {
+                    go_on(&mut tick, actuation.tick, &held);
+                    held = if actuation.enable { actuation.codes } else { [0; 6] };
+                    go_on(&mut tick, actuation.tick + 1, &held);
+                }
+                go_on(&mut tick, wanted[1], &held);
+            }
+            server.publish(&Sensing { session, tick, codes: position, wrench: [tick; 6] });
+        }
+    });
+    let mut expected = [0; 6];
+    let mut held = [0; 6];
+    let (mut tick, mut last) = (0, 0);
+    while tick < 2_000 {
+        let sensing = client.sense(tick, 1_000_000_000).expect("the machine answers");
+        for _ in last..tick {
+            (0..6).for_each(|k| expected[k] += held[k]);
+        }
+        assert_eq!((sensing.tick, sensing.codes, sensing.wrench), (tick, expected, [tick; 6]));
+        let enable = tick % 7 != 0;
+        let codes = core::array::from_fn(|k| (tick as i32 % 5) - k as i32);
+        client.actuate(tick, enable, &codes);
+        held = if enable { codes } else { [0; 6] };
+        last = tick;
+        tick += if tick % 50 == 49 { 9 } else { 1 };
+    }
+    client.actuate(5_000, false, &[0; 6]);
+    machine.join().unwrap();
+    assert!(client.is_abandoned());
+}
+
+#[test]
+fn a_block_is_never_seen_half_written() {
+    let path = name("half");
+    let server = Server::create(&path, DIGEST).unwrap();
+    let client = Client::open(&path, DIGEST).unwrap();
+    let writer = std::thread::spawn(move || {
+        (1..200_000_u64).for_each(|n| client.actuate(n, true, &[n as i32; 6]));
+    });
+    let mut seen = 0;
+    let mut last = 0;
+    while last < 199_999 {
+        let Some((actuation, _)) = server.wait(&mut seen, 0, 2_000_000_000) else { break };
+        assert!(actuation.tick >= last && actuation.codes == [actuation.tick as i32; 6], "{actuation:?}");
+        last = actuation.tick;
+    }
+    writer.join().unwrap();
+    assert_eq!(last, 199_999);
+}
+
+#[test]
+fn a_machine_that_is_silent_or_gone_is_noticed_in_time() {
+    let path = name("silent");
+    let server = Server::create(&path, DIGEST).unwrap();
+    let client = Client::open(&path, DIGEST).unwrap();
+    let start = clock::now();
+    assert_eq!(client.sense(0, 3_000_000), None);
+    assert!(clock::now() - start >= 3_000_000);
+    assert!(!client.is_abandoned());
+    drop(server);
+    assert!(client.is_abandoned() && !path.exists());
+}
+
+#[test]
+fn what_cannot_be_opened_says_what_to_do() {
+    let path = name("refused");
+    let refusal = |path: &Path, digest: &str| Client::open(path, digest).map(|_| ()).unwrap_err().to_string();
+    assert!(refusal(&path, DIGEST).contains("start one with `specgen plant SPEC`"));
+    let server = Server::create(&path, DIGEST).unwrap();
+    assert!(refusal(&path, &DIGEST.replace("00112233", "00112234")).contains("the machine of another spec"));
+    let again = Server::create(&path, DIGEST).map(|_| ()).unwrap_err().to_string();
+    assert!(again.contains(&format!("process {} serves", std::process::id())), "{again}");
+    drop(server);
+    std::fs::write(&path, "short").unwrap();
+    assert!(refusal(&path, DIGEST).contains("not a simulated machine"));
+    std::fs::write(&path, vec![0; size_of::<Words>()]).unwrap();
+    assert!(refusal(&path, DIGEST).contains("not a simulated machine"));
+    // What is left of a machine that was killed does not stand in the way.
+    drop(Server::create(&path, DIGEST).unwrap());
+    assert!(path_of("../x").unwrap_err().contains("letters, digits"));
+}

@@ -1,0 +1,196 @@
+//! The record format: what a recorder leaves behind, in memory, over a link and in a file.
+//!
+//! A **block** is a run of 64-bit words that can be replayed by itself:
+//!
+//! ```text
+//! 0        "SPGBLOCK"
+//! 1        words of the block, this header included
+//! 2        rows
+//! 3        tick of the first row, from 0 at the recorder's first
+//! 4        why it begins (see Reason), its decimation << 32
+//! 5        digest of the machine before the first row
+//! 6        words of the settings, of an input << 16, of a state << 32
+//! 7        tick of the trigger; all ones if it was not in this block
+//! 8…       settings, state before the first row, rows
+//! ```
+//! A **row** is a tick, or one in `decimation` of them. Word 0 says which of the input words differ from those of the row
+//! before (bits 0 to 59; before the first row of a block all are zero) and whether a digest follows (bit 63):
+//!
+//! ```text
+//! 0        which input words follow
+//! …        these input words, in order
+//! +0…+2    converter codes of legs 0 and 1, 2 and 3, 4 and 5; the second << 32
+//! +3       status of the tick, the supervisor's word (phase, cause << 8, amplifiers on << 16) << 32
+//! +4       digest of the machine after the tick, if bit 63 of word 0 is set
+//! ```
+//! A **file**, little endian, is "SPGRECRD", the format's version (u32), the length of a text (u32, a multiple of 8), the text
+//! (`key=value` lines: what the controller says of itself), the CRC-32 of all that as a word of 64 bits, then blocks, each
+//! followed by its CRC-32 as a word. A file that is cut off loses no more than its last block.
+
+/// First bytes of a file.
+pub const FILE_MAGIC: [u8; 8] = *b"SPGRECRD";
+/// Version of the format.
+pub const FORMAT: u32 = 1;
+/// First word of a block.
+pub const BLOCK_MAGIC: u64 = u64::from_le_bytes(*b"SPGBLOCK");
+/// Words before the settings of a block.
+pub const HEADER_WORDS: usize = 8;
+/// Most words that an input may have.
+pub const LARGEST_INPUT: usize = 60;
+/// Words of a row's outputs, the digest left out.
+pub const OUTPUT_WORDS: usize = 4;
+/// Bit of a row's first word: a digest ends it.
+pub const HAS_DIGEST: u64 = 1 << 63;
+/// A block without a trigger.
+pub const NO_TRIGGER: u64 = u64::MAX;
+
+/// Why a block begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    /// The recorder was started.
+    Started,
+    /// The block before it was full: no tick lies between them.
+    Continued,
+    /// The settings changed: no tick lies between them.
+    Settings,
+}
+
+impl Reason {
+    /// 0 started, 1 continued, 2 settings.
+    #[must_use]
+    pub const fn word(self) -> u64 {
+        match self {
+            Self::Started => 0,
+            Self::Continued => 1,
+            Self::Settings => 2,
+        }
+    }
+
+    /// The inverse of [`Reason::word`]; none for any other number.
+    #[must_use]
+    pub const fn from_word(word: u64) -> Option<Self> {
+        Some(match word {
+            0 => Self::Started,
+            1 => Self::Continued,
+            2 => Self::Settings,
+            _ => return None,
+        })
+    }
+}
+
+/// How many words a controller's records are made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Layout {
+    /// Of its settings.
+    pub config: usize,
+    /// Of an input, at most [`LARGEST_INPUT`].
+    pub input: usize,
+    /// Of its state.
+    pub state: usize,
+}
+
+impl Layout {
+    /// Words of a block before its first row.
+    #[must_use]
+    pub const fn preamble(&self) -> usize {
+        HEADER_WORDS + self.config + self.state
+    }
+
+    /// Words of the longest row.
+    #[must_use]
+    pub const fn longest_row(&self) -> usize {
+        1 + self.input + OUTPUT_WORDS + 1
+    }
+
+    /// Word 6 of a block.
+    #[must_use]
+    pub const fn word(&self) -> u64 {
+        self.config as u64 | (self.input as u64) << 16 | (self.state as u64) << 32
+    }
+}
+
+/// CRC-32 (IEEE 802.3) of words in little-endian order, as it follows a block in a file. Not for the tick: it takes some
+/// 100 instructions a word.
+#[must_use]
+pub fn checksum(words: &[u64]) -> u64 {
+    let mut crc = Crc::new();
+    for word in words {
+        crc.bytes(&word.to_le_bytes());
+    }
+    crc.finish()
+}
+
+/// The beginning of a file for the text `description`, without the padding that the text needs: call `out` with the pieces.
+///
+/// # Errors
+/// Whatever `out` says, at the first piece that it does not take.
+pub fn write_header<E>(description: &str, mut out: impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
+    const PADDING: [u8; 8] = [b'\n'; 8];
+    let text = description.as_bytes();
+    let padding = PADDING.get(..text.len().wrapping_neg() % 8).unwrap_or_default();
+    let length = (text.len() + padding.len()) as u32;
+    let mut crc = Crc::new();
+    for piece in [&FILE_MAGIC[..], &FORMAT.to_le_bytes()[..], &length.to_le_bytes()[..], text, padding] {
+        crc.bytes(piece);
+        out(piece)?;
+    }
+    out(&crc.finish().to_le_bytes())
+}
+
+/// Running CRC-32, by half bytes: a table of 64 bytes.
+struct Crc(u32);
+
+impl Crc {
+    const TABLE: [u32; 16] = {
+        let mut table = [0; 16];
+        let mut index = 0;
+        while index < 16 {
+            let mut value = index as u32;
+            let mut bit = 0;
+            while bit < 4 {
+                value = if value & 1 == 1 { value >> 1 ^ 0xedb8_8320 } else { value >> 1 };
+                bit += 1;
+            }
+            table[index] = value;
+            index += 1;
+        }
+        table
+    };
+
+    const fn new() -> Self {
+        Self(u32::MAX)
+    }
+
+    fn bytes(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 ^= u32::from(*byte);
+            self.0 = self.0 >> 4 ^ Self::TABLE[(self.0 & 15) as usize];
+            self.0 = self.0 >> 4 ^ Self::TABLE[(self.0 & 15) as usize];
+        }
+    }
+
+    fn finish(&self) -> u64 {
+        u64::from(!self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_checksum_is_the_usual_one() {
+        let mut crc = Crc::new();
+        crc.bytes(b"123456789");
+        assert_eq!(crc.finish(), 0xcbf4_3926);
+        assert_eq!(checksum(&[u64::from_le_bytes(*b"12345678")]), 0x9ae0_daaf);
+    }
+
+    #[test]
+    fn reasons_read_back() {
+        for word in 0..3 {
+            assert_eq!(Reason::from_word(word).map(Reason::word), Some(word));
+        }
+        assert_eq!(Reason::from_word(3), None);
+    }
+}

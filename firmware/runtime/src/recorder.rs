@@ -1,0 +1,301 @@
+//! The recorder: ticks kept in fixed memory, so that they can be looked at, and replayed bit for bit, after the event.
+//!
+//! ```text
+//! start ─► waiting ──trigger──► triggered ──rows after it──► complete      blocks in a ring, the oldest given up
+//!      └─► streaming ─────────────────────────────────────► stop           blocks handed out as they fill
+//! ```
+//! Memory is a slice of the caller, cut into blocks of equal size ([`crate::record`]). Each begins with the settings and a
+//! snapshot of the machine, so that every block that is left can be replayed by itself.
+//!
+//! A target calls [`Recorder::opens`] before a tick and, if it says so, [`Recorder::open`] with the machine as it is then;
+//! after the tick [`Recorder::push`]. The emitted controller does all three (`recording::supervise`).
+
+mod ring;
+
+use crate::record::{HAS_DIGEST, LARGEST_INPUT, Layout, Reason};
+use crate::supervisor::Phase;
+use ring::Ring;
+
+/// What makes a recorder keep what it has, besides [`Recorder::trigger`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Trigger {
+    /// A fault: the phase becomes [`Trigger::FAULTED`].
+    pub fault: bool,
+    /// Any change of phase.
+    pub phase_change: bool,
+}
+
+impl Trigger {
+    /// Word of the phase that is a fault.
+    pub const FAULTED: u32 = Phase::Faulted.word() as u32;
+}
+
+/// How a recorder records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Blocks are handed out as they fill, and nothing triggers.
+    pub streaming: bool,
+    /// What triggers.
+    pub trigger: Trigger,
+    /// Rows that are recorded after the trigger, ≥ 1: the rest of the memory is what was before it.
+    pub after: u32,
+    /// Every so-manieth tick is recorded, ≥ 1. Above 1 a record shows more time but cannot be replayed.
+    pub decimation: u32,
+    /// Every so-manieth row ends with a digest of the machine; 0 for none. It costs the target about as much as a row.
+    pub digest_every: u32,
+}
+
+impl Settings {
+    /// Everything, handed out block by block.
+    pub const STREAM: Self = Self {
+        streaming: true,
+        trigger: Trigger { fault: false, phase_change: false },
+        after: 1,
+        decimation: 1,
+        digest_every: 1,
+    };
+}
+
+/// What a recorder does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Activity {
+    /// Nothing; what it has stays.
+    Stopped,
+    /// Records, and waits for the trigger.
+    Waiting,
+    /// Records what comes after it: so many rows more.
+    Triggered(u32),
+    /// Has what it was to record.
+    Complete,
+    /// Records, and hands out.
+    Streaming,
+}
+
+/// What a tick put out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Row {
+    /// Converter codes.
+    pub codes: [i32; 6],
+    /// Status of the tick.
+    pub status: u32,
+    /// Phase, cause << 8, amplifiers on << 16.
+    pub supervisor: u32,
+}
+
+/// Why a memory is not enough.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unfit {
+    /// It has no room for so many blocks of a row each, or there are fewer than two of them: words needed.
+    TooSmall(usize),
+    /// An input of more words than a row can tell apart.
+    InputTooLong,
+}
+
+/// Records ticks in the memory of a caller.
+#[derive(Debug)]
+pub struct Recorder<'m> {
+    ring: Ring<'m>,
+    layout: Layout,
+    settings: Settings,
+    activity: Activity,
+    /// Ticks seen since it was made.
+    tick: u64,
+    /// Ticks until the next one that is recorded.
+    skip: u32,
+    /// Rows until the next digest.
+    digest_in: u32,
+    /// A new block must begin with the next row, and why.
+    due: Option<Reason>,
+    /// Asked for from outside.
+    asked: bool,
+    /// Phase of the last tick.
+    phase: u32,
+    /// Input of the last row, by which the next is told.
+    last: [u64; LARGEST_INPUT],
+}
+
+impl<'m> Recorder<'m> {
+    /// A stopped recorder that cuts `memory` into `blocks` (≥ 2) blocks.
+    ///
+    /// # Errors
+    /// There is no room for that.
+    pub fn new(memory: &'m mut [u64], blocks: usize, layout: Layout) -> Result<Self, Unfit> {
+        if layout.input > LARGEST_INPUT {
+            return Err(Unfit::InputTooLong);
+        }
+        let least = layout.preamble() + layout.longest_row();
+        let size = memory.len().checked_div(blocks).unwrap_or_default();
+        if blocks < 2 || size < least {
+            return Err(Unfit::TooSmall(least.saturating_mul(if blocks < 2 { 2 } else { blocks })));
+        }
+        Ok(Self {
+            ring: Ring::new(memory, size, blocks, layout),
+            layout,
+            settings: Settings::STREAM,
+            activity: Activity::Stopped,
+            tick: 0,
+            skip: 0,
+            digest_in: 0,
+            due: None,
+            asked: false,
+            phase: 0,
+            last: [0; LARGEST_INPUT],
+        })
+    }
+
+    /// Forgets what it has and records from the next tick on.
+    pub fn start(&mut self, settings: Settings) {
+        self.ring.clear();
+        self.settings = settings;
+        self.activity = if settings.streaming { Activity::Streaming } else { Activity::Waiting };
+        self.skip = 0;
+        self.digest_in = 0;
+        self.asked = false;
+        self.due = Some(Reason::Started);
+    }
+
+    /// Ends the recording; what there is stays to be fetched.
+    pub fn stop(&mut self) {
+        self.ring.close();
+        if self.activity != Activity::Complete {
+            self.activity = Activity::Stopped;
+        }
+    }
+
+    /// Triggers with the next row.
+    pub fn trigger(&mut self) {
+        self.asked = true;
+    }
+
+    /// The controller was reset: a block that does not continue the last one begins with the next row.
+    pub fn restarted(&mut self) {
+        self.due = Some(Reason::Started);
+    }
+
+    /// The settings of the controller changed: a block with the new ones begins with the next row.
+    pub fn settings_changed(&mut self) {
+        if self.due.is_none() {
+            self.due = Some(Reason::Settings);
+        }
+    }
+
+    /// What it does.
+    #[must_use]
+    pub fn activity(&self) -> Activity {
+        self.activity
+    }
+
+    /// Ticks seen since it was made.
+    #[must_use]
+    pub fn tick(&self) -> u64 {
+        self.tick
+    }
+
+    /// Blocks that were given up before anyone had fetched them, while streaming.
+    #[must_use]
+    pub fn lost(&self) -> u32 {
+        self.ring.lost()
+    }
+
+    fn records(&self) -> bool {
+        !matches!(self.activity, Activity::Stopped | Activity::Complete)
+    }
+
+    /// Before a tick: whether a block begins with it, which [`Recorder::open`] must be called for.
+    #[inline]
+    #[must_use]
+    pub fn opens(&self) -> bool {
+        self.records() && self.skip == 0 && (self.due.is_some() || !self.ring.has_room())
+    }
+
+    /// Begins a block, before a tick, with the settings that the tick runs under, the digest of the machine as it is, and its
+    /// state, which `save` writes.
+    pub fn open(&mut self, config: &[u64], digest: u64, save: impl FnOnce(&mut [u64])) {
+        let reason = self.due.take().unwrap_or(Reason::Continued).word() | u64::from(self.settings.decimation) << 32;
+        self.ring.open([self.tick, reason, digest], config, save, self.settings.streaming);
+        self.last = [0; LARGEST_INPUT];
+    }
+
+    /// After a tick: its input words and what came out. `digest` gives that of the machine, where one is due.
+    #[inline]
+    pub fn push(&mut self, input: &[u64], row: &Row, digest: impl FnOnce() -> u64) {
+        let tick = self.tick;
+        self.tick += 1;
+        if !self.records() {
+            return;
+        }
+        let phase = row.supervisor & 0xff;
+        self.look(tick, phase);
+        if self.skip > 0 {
+            self.skip -= 1;
+            return;
+        }
+        self.skip = self.settings.decimation.saturating_sub(1);
+        self.write(input, row, digest);
+        if let Activity::Triggered(left) = self.activity {
+            self.activity = if left > 1 { Activity::Triggered(left - 1) } else { Activity::Complete };
+            if left <= 1 {
+                self.ring.close();
+            }
+        }
+    }
+
+    /// Whether this tick triggers.
+    #[inline]
+    fn look(&mut self, tick: u64, phase: u32) {
+        let changed = phase != self.phase && tick > 0;
+        self.phase = phase;
+        if self.activity != Activity::Waiting {
+            return;
+        }
+        let Trigger { fault, phase_change } = self.settings.trigger;
+        if self.asked || (phase_change && changed) || (fault && changed && phase == Trigger::FAULTED) {
+            self.asked = false;
+            self.activity = Activity::Triggered(if self.settings.after > 0 { self.settings.after } else { 1 });
+            self.ring.mark(tick);
+        }
+    }
+
+    #[inline]
+    fn write(&mut self, input: &[u64], row: &Row, digest: impl FnOnce() -> u64) {
+        let has_digest = self.settings.digest_every > 0 && self.digest_in == 0;
+        self.digest_in = if has_digest { self.settings.digest_every - 1 } else { self.digest_in.saturating_sub(1) };
+        let Some(mut slots) = self.ring.row() else { return };
+        let mut which = if has_digest { HAS_DIGEST } else { 0 };
+        let mut bit = 1;
+        for (last, word) in self.last.iter_mut().zip(input).take(self.layout.input) {
+            if *last != *word {
+                *last = *word;
+                which |= bit;
+                slots.push(*word);
+            }
+            bit <<= 1;
+        }
+        let [a, b, c, d, e, f] = row.codes.map(|code| u64::from(code as u32));
+        slots.push(a | b << 32);
+        slots.push(c | d << 32);
+        slots.push(e | f << 32);
+        slots.push(u64::from(row.status) | u64::from(row.supervisor) << 32);
+        if has_digest {
+            slots.push(digest());
+        }
+        slots.finish(which);
+    }
+
+    /// Blocks that can be fetched: closed ones, and the open one where recording has ended.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.ring.closed()
+    }
+
+    /// The `index`-th of them, the oldest first.
+    #[must_use]
+    pub fn block(&self, index: usize) -> Option<&[u64]> {
+        self.ring.block(index)
+    }
+
+    /// The oldest of them was fetched: its place may be used again. For streams.
+    pub fn release(&mut self) {
+        self.ring.release();
+    }
+}

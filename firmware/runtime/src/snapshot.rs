@@ -1,0 +1,241 @@
+//! A state as 64-bit words and back: what a recording begins with, so that it can be replayed from the middle of a run.
+//!
+//! Every word is the bits of a number (an `f32` zero-extended), an integer or a flag. What is loaded is believed only if each
+//! word is one that a state can hold: a finite number of a size that a machine has, an index within its bounds, a staircase
+//! that is one. That it is the state of *this* run is for its digest to say.
+
+use crate::adaptation::Estimate;
+use crate::feedback::Integral;
+use crate::motion::Motion;
+use crate::real::Real;
+
+/// Largest |place| that is loaded, m and rad, and what is counted alike (estimates, errors, deflections).
+pub const LARGEST_PLACE: f64 = 16.0;
+/// Largest |rate|, |acceleration| or |force| that is loaded, in SI units.
+pub const LARGEST: f64 = 1e9;
+/// Largest stiffness of an environment that is loaded, N/m and N m/rad: that of a `Config`.
+pub const LARGEST_STIFFNESS: f64 = 1e15;
+
+/// Something that later ticks depend on.
+pub trait Snapshot {
+    /// Words that [`Snapshot::save`] writes.
+    const WORDS: usize;
+
+    /// Appends the state.
+    fn save(&self, words: &mut Writer<'_>);
+
+    /// Takes the state that [`Snapshot::save`] wrote.
+    ///
+    /// # Errors
+    /// At the first word that no state holds; what was read before it is taken, so that a state which must not be lost is
+    /// restored into a copy.
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid>;
+}
+
+/// A word that no state holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Invalid {
+    /// Its index.
+    pub word: usize,
+}
+
+/// Words in the order of a state. What does not fit is counted, but not kept.
+#[derive(Debug)]
+pub struct Writer<'a> {
+    words: &'a mut [u64],
+    count: usize,
+}
+
+impl<'a> Writer<'a> {
+    /// Into `words`, from the first on.
+    #[must_use]
+    pub fn new(words: &'a mut [u64]) -> Self {
+        Self { words, count: 0 }
+    }
+
+    /// Words written so far.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// An integer.
+    #[inline]
+    pub fn word(&mut self, word: u64) {
+        if let Some(slot) = self.words.get_mut(self.count) {
+            *slot = word;
+        }
+        self.count += 1;
+    }
+
+    /// A flag.
+    #[inline]
+    pub fn flag(&mut self, flag: bool) {
+        self.word(u64::from(flag));
+    }
+
+    /// A number.
+    #[inline]
+    pub fn real<T: Real>(&mut self, value: T) {
+        self.word(value.to_word());
+    }
+
+    /// Numbers.
+    #[inline]
+    pub fn reals<T: Real>(&mut self, values: &[T]) {
+        let end = self.count + values.len();
+        if let Some(slots) = self.words.get_mut(self.count..end) {
+            for (slot, value) in slots.iter_mut().zip(values) {
+                *slot = value.to_word();
+            }
+        }
+        self.count = end;
+    }
+
+    /// The first `count` numbers, and zeros in place of the others.
+    #[inline]
+    pub fn first_reals<T: Real>(&mut self, values: &[T], count: usize) {
+        let end = self.count + values.len();
+        if let Some(slots) = self.words.get_mut(self.count..end) {
+            slots.fill(0);
+            for (slot, value) in slots.iter_mut().zip(values).take(count) {
+                *slot = value.to_word();
+            }
+        }
+        self.count = end;
+    }
+}
+
+/// Words of a state, checked one by one.
+#[derive(Debug)]
+pub struct Reader<'a> {
+    words: &'a [u64],
+    count: usize,
+}
+
+impl<'a> Reader<'a> {
+    /// From the first of `words` on.
+    #[must_use]
+    pub fn new(words: &'a [u64]) -> Self {
+        Self { words, count: 0 }
+    }
+
+    /// Words read so far.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// That the word last read is none.
+    #[must_use]
+    pub fn refused(&self) -> Invalid {
+        Invalid { word: self.count.saturating_sub(1) }
+    }
+
+    /// An integer up to `largest`.
+    ///
+    /// # Errors
+    /// It is larger, or there are no more words.
+    #[inline]
+    pub fn word(&mut self, largest: u64) -> Result<u64, Invalid> {
+        let word = self.words.get(self.count).copied();
+        self.count += 1;
+        match word {
+            Some(word) if word <= largest => Ok(word),
+            _ => Err(self.refused()),
+        }
+    }
+
+    /// A number of ticks or the like, from 0 to `largest`.
+    ///
+    /// # Errors
+    /// It is none, see [`Reader::word`].
+    #[inline]
+    pub fn count_to(&mut self, largest: i32) -> Result<i32, Invalid> {
+        let largest = if largest < 0 { 0 } else { largest as u64 };
+        Ok(self.word(largest)? as i32)
+    }
+
+    /// A counter.
+    ///
+    /// # Errors
+    /// It has more than 32 bits.
+    #[inline]
+    pub fn counter(&mut self) -> Result<u32, Invalid> {
+        Ok(self.word(u64::from(u32::MAX))? as u32)
+    }
+
+    /// A flag.
+    ///
+    /// # Errors
+    /// It is neither 0 nor 1.
+    #[inline]
+    pub fn flag(&mut self) -> Result<bool, Invalid> {
+        Ok(self.word(1)? != 0)
+    }
+
+    /// A finite number within ±`largest`.
+    ///
+    /// # Errors
+    /// It is none.
+    #[inline]
+    pub fn real<T: Real>(&mut self, largest: f64) -> Result<T, Invalid> {
+        let word = self.word(u64::MAX)?;
+        let value = T::from_word(word);
+        // A NaN fails the comparison; bits above an `f32` do not come back.
+        if value.abs() <= T::from_f64(largest) && value.to_word() == word { Ok(value) } else { Err(self.refused()) }
+    }
+
+    /// Finite numbers within ±`largest`.
+    ///
+    /// # Errors
+    /// At the first that is none.
+    pub fn reals<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), Invalid> {
+        for value in values {
+            *value = self.real(largest)?;
+        }
+        Ok(())
+    }
+}
+
+impl<T: Real> Snapshot for Estimate<T> {
+    const WORDS: usize = 2;
+
+    fn save(&self, words: &mut Writer<'_>) {
+        words.reals(&[self.level, self.drift]);
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        self.level = words.real(LARGEST_PLACE)?;
+        self.drift = words.real(LARGEST_PLACE)?;
+        Ok(())
+    }
+}
+
+impl<T: Real> Snapshot for Integral<T> {
+    const WORDS: usize = 6;
+
+    fn save(&self, words: &mut Writer<'_>) {
+        words.reals(&self.force);
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        words.reals(&mut self.force, LARGEST)
+    }
+}
+
+impl<T: Real> Snapshot for Motion<T> {
+    const WORDS: usize = 18;
+
+    fn save(&self, words: &mut Writer<'_>) {
+        words.reals(&self.pose);
+        words.reals(&self.rate);
+        words.reals(&self.acceleration);
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        words.reals(&mut self.pose, LARGEST_PLACE)?;
+        words.reals(&mut self.rate, LARGEST)?;
+        words.reals(&mut self.acceleration, LARGEST)
+    }
+}

@@ -1,0 +1,294 @@
+//! The shape of one axis: value, rate and curvature at a tick.
+
+use crate::real::Real;
+use crate::trig::sine_cosine_turns;
+
+/// Tones that the multisines of a wave share.
+pub const TONES: usize = 16;
+/// 2π/2³²: rad in a step of 2⁻³² turns.
+const RADIANS: f64 = core::f64::consts::TAU / 4_294_967_296.0;
+
+/// How an axis moves. Amplitudes in m or rad; phases and steps per tick in 2⁻⁶⁴ turns, steps below half a turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape<T> {
+    /// Stays.
+    Constant,
+    /// Straight to `amplitude` in `ticks`, then stays.
+    Ramp {
+        /// Where to; of either sign.
+        amplitude: T,
+        /// ≥ 1.
+        ticks: i32,
+    },
+    /// Straight up to `amplitude`, down to −`amplitude` and back: a period takes one turn.
+    Triangle {
+        /// ≥ 0.
+        amplitude: T,
+        /// A period is one turn.
+        step: u64,
+    },
+    /// Sine.
+    Sine {
+        /// The tone.
+        tone: Tone<T>,
+    },
+    /// Sine whose frequency goes evenly from that of the tone to another, and stays there.
+    Chirp {
+        /// It begins so.
+        tone: Tone<T>,
+        /// Change of the step per tick, as a signed number.
+        sweep: i64,
+        /// Ticks of the change, ≥ 1.
+        ticks: i32,
+    },
+    /// Sum of some of the wave's tones.
+    Multisine {
+        /// The first of them.
+        first: usize,
+        /// How many, `first` + `count` ≤ [`TONES`].
+        count: usize,
+    },
+    /// First-order reversal curves, as `specgen identify` reads them: for k = 1 … `levels`, straight from zero to
+    /// `amplitude` k/`levels` and back, all at one speed; then zero.
+    Reversals {
+        /// Highest peak; of either sign.
+        amplitude: T,
+        /// Peaks, ≥ 1.
+        levels: i32,
+        /// Ticks for `amplitude`/`levels`, ≥ 1.
+        ticks: i32,
+    },
+}
+
+/// A sine.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tone<T> {
+    /// ≥ 0.
+    pub amplitude: T,
+    /// At the start, 2⁻⁶⁴ turns.
+    pub phase: u64,
+    /// Per tick, 2⁻⁶⁴ turns.
+    pub step: u64,
+}
+
+/// The wave of one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisWave<T> {
+    /// Added to the shape, m or rad.
+    pub offset: T,
+    /// What is added to it.
+    pub shape: Shape<T>,
+}
+
+/// A value with its derivatives per tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sample<T> {
+    pub value: T,
+    pub rate: T,
+    pub bend: T,
+}
+
+/// What a shape can come to.
+pub(super) struct Peak<T> {
+    pub low: T,
+    pub high: T,
+    pub rate: T,
+    pub bend: T,
+}
+
+/// Where a shape is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Cursor {
+    /// Ticks since the start, and reversals since then.
+    tick: i32,
+    peak: i32,
+    /// Phase and step of a sine; ticks since the start of a multisine.
+    phase: u64,
+    step: u64,
+}
+
+/// Phase step of a frequency (Hz) at a control period (s).
+#[must_use]
+pub fn step_of(frequency: f64, period: f64) -> u64 {
+    (frequency * period * 18_446_744_073_709_551_616.0) as u64
+}
+
+/// rad per tick of a step below half a turn.
+#[inline]
+fn angular<T: Real>(step: u64) -> T {
+    T::from_i32((step >> 32) as i32) * T::from_f64(RADIANS)
+        + T::from_i32((step as u32 >> 1) as i32) * T::from_f64(RADIANS / 2_147_483_648.0)
+}
+
+impl<T: Real> Sample<T> {
+    const ZERO: Self = Self { value: T::ZERO, rate: T::ZERO, bend: T::ZERO };
+}
+
+impl<T: Real> Tone<T> {
+    /// At a phase, with a step and its change per tick.
+    #[inline]
+    fn at(&self, phase: u64, step: u64, sweep: T) -> Sample<T> {
+        let (sine, cosine) = sine_cosine_turns::<T>(phase);
+        let w = angular::<T>(step);
+        let a = self.amplitude;
+        Sample { value: a * sine, rate: a * w * cosine, bend: a * (sweep * cosine - w * w * sine) }
+    }
+
+    fn peak(&self, step: u64, sweep: T) -> Peak<T> {
+        let (a, w) = (self.amplitude, angular::<T>(step));
+        Peak { low: -a, high: a, rate: a * w, bend: a * (w * w + sweep.abs()) }
+    }
+}
+
+/// rad per tick² of a signed change of a step.
+#[inline]
+fn bend_of<T: Real>(sweep: i64) -> T {
+    let size = angular::<T>(sweep.unsigned_abs());
+    if sweep < 0 { -size } else { size }
+}
+
+impl<T: Real> AxisWave<T> {
+    /// Stays at zero.
+    #[must_use]
+    pub const fn still() -> Self {
+        Self { offset: T::ZERO, shape: Shape::Constant }
+    }
+
+    /// Bounds of the shape, the offset left out.
+    pub(super) fn peak(&self, tones: &[Tone<T>; TONES]) -> Peak<T> {
+        let zero = T::ZERO;
+        match &self.shape {
+            Shape::Constant => Peak { low: zero, high: zero, rate: zero, bend: zero },
+            Shape::Ramp { amplitude, ticks } => straight(*amplitude, amplitude.abs() / T::from_i32(*ticks)),
+            Shape::Reversals { amplitude, levels, ticks } => {
+                straight(*amplitude, amplitude.abs() / T::from_i32(*levels) / T::from_i32(*ticks))
+            }
+            Shape::Triangle { amplitude, step } => {
+                let turns = angular::<T>(*step) * T::from_f64(1.0 / core::f64::consts::TAU);
+                let rate = T::from_i32(4) * *amplitude * turns;
+                Peak { low: -*amplitude, high: *amplitude, rate, bend: zero }
+            }
+            Shape::Sine { tone } => tone.peak(tone.step, zero),
+            Shape::Chirp { tone, sweep, ticks } => {
+                let last = last_step(tone.step, *sweep, *ticks);
+                tone.peak(if last > tone.step { last } else { tone.step }, bend_of(*sweep))
+            }
+            Shape::Multisine { first, count } => {
+                let mut sum = Peak { low: zero, high: zero, rate: zero, bend: zero };
+                for tone in tones.iter().skip(*first).take(*count) {
+                    let peak = tone.peak(tone.step, zero);
+                    sum.low = sum.low + peak.low;
+                    sum.high = sum.high + peak.high;
+                    sum.rate = sum.rate + peak.rate;
+                    sum.bend = sum.bend + peak.bend;
+                }
+                sum
+            }
+        }
+    }
+}
+
+fn straight<T: Real>(amplitude: T, rate: T) -> Peak<T> {
+    let (low, high) = if amplitude < T::ZERO { (amplitude, T::ZERO) } else { (T::ZERO, amplitude) };
+    Peak { low, high, rate, bend: T::ZERO }
+}
+
+/// Step at the end of a chirp.
+fn last_step(step: u64, sweep: i64, ticks: i32) -> u64 {
+    step.wrapping_add((sweep as u64).wrapping_mul(ticks as u64))
+}
+
+impl Cursor {
+    pub(super) const fn new() -> Self {
+        Self { tick: 0, peak: 1, phase: 0, step: 0 }
+    }
+
+    pub(super) fn start<T: Real>(axis: &AxisWave<T>) -> Self {
+        match &axis.shape {
+            Shape::Sine { tone } | Shape::Chirp { tone, .. } => {
+                Self { phase: tone.phase, step: tone.step, ..Self::new() }
+            }
+            Shape::Triangle { step, .. } => Self { step: *step, ..Self::new() },
+            _ => Self::new(),
+        }
+    }
+
+    /// The shape one tick on.
+    #[inline]
+    pub(super) fn next<T: Real>(&mut self, axis: &AxisWave<T>, tones: &[Tone<T>; TONES]) -> Sample<T> {
+        match &axis.shape {
+            Shape::Constant => Sample::ZERO,
+            Shape::Ramp { amplitude, ticks } => {
+                if self.tick >= *ticks {
+                    return Sample { value: *amplitude, ..Sample::ZERO };
+                }
+                self.tick += 1;
+                let slope = *amplitude / T::from_i32(*ticks);
+                Sample { value: slope * T::from_i32(self.tick), rate: slope, bend: T::ZERO }
+            }
+            Shape::Triangle { amplitude, step } => {
+                self.phase = self.phase.wrapping_add(*step);
+                triangle(*amplitude, self.phase, *step)
+            }
+            Shape::Sine { tone } => {
+                self.phase = self.phase.wrapping_add(tone.step);
+                tone.at(self.phase, tone.step, T::ZERO)
+            }
+            Shape::Chirp { tone, sweep, ticks } => {
+                let sweeps = self.tick < *ticks;
+                // φ = φ₀ + n s + n² h with the step s and half its change h: between two ticks it grows by s + (2 n + 1) h.
+                self.phase = self.phase.wrapping_add(self.step);
+                if sweeps {
+                    self.tick += 1;
+                    self.phase = self.phase.wrapping_add((*sweep / 2) as u64);
+                    self.step = self.step.wrapping_add(*sweep as u64);
+                }
+                tone.at(self.phase, self.step, if sweeps { bend_of(*sweep) } else { T::ZERO })
+            }
+            Shape::Multisine { first, count } => {
+                self.phase = self.phase.wrapping_add(1);
+                let mut sum = Sample::ZERO;
+                for tone in tones.iter().skip(*first).take(*count) {
+                    let phase = tone.phase.wrapping_add(tone.step.wrapping_mul(self.phase));
+                    let sample = tone.at(phase, tone.step, T::ZERO);
+                    sum.value = sum.value + sample.value;
+                    sum.rate = sum.rate + sample.rate;
+                    sum.bend = sum.bend + sample.bend;
+                }
+                sum
+            }
+            Shape::Reversals { amplitude, levels, ticks } => self.reversal(*amplitude, *levels, *ticks),
+        }
+    }
+
+    fn reversal<T: Real>(&mut self, amplitude: T, levels: i32, ticks: i32) -> Sample<T> {
+        if self.peak > levels {
+            return Sample::ZERO;
+        }
+        self.tick += 1;
+        let top = self.peak.saturating_mul(ticks);
+        let left = top.saturating_sub(self.tick.saturating_sub(top));
+        let rises = self.tick <= top;
+        let height = if rises { self.tick } else { left };
+        if left <= 0 {
+            self.peak += 1;
+            self.tick = 0;
+        }
+        let slope = amplitude / (T::from_i32(levels) * T::from_i32(ticks));
+        Sample { value: slope * T::from_i32(height), rate: if rises { slope } else { -slope }, bend: T::ZERO }
+    }
+}
+
+/// 0 at phase 0, `amplitude` a quarter of a turn on.
+#[inline]
+fn triangle<T: Real>(amplitude: T, phase: u64, step: u64) -> Sample<T> {
+    // Half a turn about each peak, as a signed share of a quarter turn.
+    let shifted = phase.wrapping_add(1 << 62);
+    let falls = shifted >> 63 == 1;
+    let within = (shifted << 1).wrapping_sub(1 << 63) as i64;
+    let share = T::from_i32((within >> 32) as i32) * T::from_f64(1.0 / 2_147_483_648.0);
+    let value = amplitude * share;
+    let turns = angular::<T>(step) * T::from_f64(4.0 / core::f64::consts::TAU);
+    let rate = amplitude * turns;
+    if falls { Sample { value: -value, rate: -rate, bend: T::ZERO } } else { Sample { value, rate, bend: T::ZERO } }
+}

@@ -1,0 +1,152 @@
+//! Settings of a wave as 64-bit words, for links and files.
+
+use super::shape::{AxisWave, Shape, TONES, Tone};
+use super::{Refused, Settings};
+use crate::real::Real;
+use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Writer};
+
+/// Words of an axis: kind (the shape's place in [`Shape`]), offset, amplitude, and four: steps before phases, levels before
+/// ticks.
+const AXIS: usize = 7;
+/// Words of [`Settings`]: center, axes, tones, two counts.
+pub const WORDS: usize = 6 + 6 * AXIS + TONES * 3 + 2;
+/// Most ticks of anything: a day at 10 kHz.
+const MOST: i32 = 1 << 30;
+/// Steps stay below half a turn.
+const HALF_TURN: u64 = (1 << 63) - 1;
+
+impl<T: Real> Settings<T> {
+    /// As words.
+    #[must_use]
+    pub fn to_words(&self) -> [u64; WORDS] {
+        let mut words = [0; WORDS];
+        let mut writer = Writer::new(&mut words);
+        writer.reals(&self.center);
+        for axis in &self.axes {
+            axis.save(&mut writer);
+        }
+        for tone in &self.tones {
+            tone.save(&mut writer);
+        }
+        writer.word(u64::from(self.ramp_ticks as u32));
+        writer.word(u64::from(self.ticks as u32));
+        words
+    }
+
+    /// From words.
+    ///
+    /// # Errors
+    /// [`Refused::Word`]: the first word that its place cannot hold.
+    pub fn from_words(words: &[u64; WORDS]) -> Result<Self, Refused> {
+        let mut settings = Self::still();
+        settings.read(&mut Reader::new(words)).map_err(|Invalid { word }| Refused::Word(word))?;
+        Ok(settings)
+    }
+
+    fn read(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        words.reals(&mut self.center, LARGEST_PLACE)?;
+        for axis in &mut self.axes {
+            *axis = AxisWave::load(words)?;
+        }
+        for tone in &mut self.tones {
+            *tone = Tone::load(words)?;
+        }
+        self.ramp_ticks = positive(words)?;
+        self.ticks = words.count_to(MOST)?;
+        Ok(())
+    }
+}
+
+fn positive(words: &mut Reader<'_>) -> Result<i32, Invalid> {
+    let count = words.count_to(MOST)?;
+    if count == 0 { Err(words.refused()) } else { Ok(count) }
+}
+
+impl<T: Real> Tone<T> {
+    fn save(&self, words: &mut Writer<'_>) {
+        words.real(self.amplitude);
+        words.word(self.phase);
+        words.word(self.step);
+    }
+
+    fn load(words: &mut Reader<'_>) -> Result<Self, Invalid> {
+        let amplitude: T = words.real(LARGEST_PLACE)?;
+        if amplitude < T::ZERO {
+            return Err(words.refused());
+        }
+        Ok(Self { amplitude, phase: words.word(u64::MAX)?, step: words.word(HALF_TURN)? })
+    }
+}
+
+impl<T: Real> AxisWave<T> {
+    fn save(&self, words: &mut Writer<'_>) {
+        let tick = |count: i32| u64::from(count as u32);
+        let zero = T::ZERO;
+        let (kind, amplitude, rest) = match self.shape {
+            Shape::Constant => (0, zero, [0; 4]),
+            Shape::Ramp { amplitude, ticks } => (1, amplitude, [tick(ticks), 0, 0, 0]),
+            Shape::Triangle { amplitude, step } => (2, amplitude, [step, 0, 0, 0]),
+            Shape::Sine { tone } => (3, tone.amplitude, [tone.step, tone.phase, 0, 0]),
+            Shape::Chirp { tone, sweep, ticks } => {
+                (4, tone.amplitude, [tone.step, tone.phase, sweep as u64, tick(ticks)])
+            }
+            Shape::Multisine { first, count } => (5, zero, [first as u64, count as u64, 0, 0]),
+            Shape::Reversals { amplitude, levels, ticks } => (6, amplitude, [tick(levels), tick(ticks), 0, 0]),
+        };
+        words.word(kind);
+        words.real(self.offset);
+        words.real(amplitude);
+        for word in rest {
+            words.word(word);
+        }
+    }
+
+    fn load(words: &mut Reader<'_>) -> Result<Self, Invalid> {
+        let kind = words.word(6)?;
+        let offset = words.real(LARGEST_PLACE)?;
+        let amplitude: T = words.real(LARGEST_PLACE)?;
+        let signed = matches!(kind, 1 | 6);
+        if amplitude < T::ZERO && !signed {
+            return Err(words.refused());
+        }
+        let (shape, read) = match kind {
+            0 => (Shape::Constant, 0),
+            1 => (Shape::Ramp { amplitude, ticks: positive(words)? }, 1),
+            2 => (Shape::Triangle { amplitude, step: words.word(HALF_TURN)? }, 1),
+            3 => (Shape::Sine { tone: tone(words, amplitude)? }, 2),
+            4 => (chirp(words, amplitude)?, 4),
+            5 => {
+                let first = words.word(TONES as u64)? as usize;
+                (Shape::Multisine { first, count: words.word((TONES - first) as u64)? as usize }, 2)
+            }
+            _ => {
+                let (levels, ticks) = (positive(words)?, positive(words)?);
+                if levels.saturating_mul(ticks) > MOST / 2 {
+                    return Err(words.refused());
+                }
+                (Shape::Reversals { amplitude, levels, ticks }, 2)
+            }
+        };
+        // What a shape does not use is zero, so that there is one way to say it.
+        for _ in read..4 {
+            words.word(0)?;
+        }
+        Ok(Self { offset, shape })
+    }
+}
+
+fn tone<T: Real>(words: &mut Reader<'_>, amplitude: T) -> Result<Tone<T>, Invalid> {
+    Ok(Tone { amplitude, step: words.word(HALF_TURN)?, phase: words.word(u64::MAX)? })
+}
+
+/// A chirp whose step stays below half a turn to its end.
+fn chirp<T: Real>(words: &mut Reader<'_>, amplitude: T) -> Result<Shape<T>, Invalid> {
+    let tone = tone(words, amplitude)?;
+    let sweep = words.word(u64::MAX)? as i64;
+    let ticks = positive(words)?;
+    let last = sweep.checked_mul(i64::from(ticks)).and_then(|change| (tone.step as i64).checked_add(change));
+    match last {
+        Some(last) if last >= 0 => Ok(Shape::Chirp { tone, sweep, ticks }),
+        _ => Err(words.refused()),
+    }
+}

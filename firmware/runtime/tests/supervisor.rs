@@ -1,0 +1,103 @@
+//! Pieces of the supervisor on their own: codes of converters, steps to rest, debounce, approach.
+
+use specgen_runtime::GaugeConverter;
+use specgen_runtime::supervisor::{Approach, Cause, Debounce, Plan, TIMED, toward};
+
+const PLAN: Plan<f64> = Plan {
+    arm_ticks: 10,
+    rest: 0,
+    ramp_step: 5,
+    ramp_every: 1,
+    patience: [5, 5, 10, 5, 201, 3],
+    weight: [1, 1, 1, 1, 100, 1],
+    stuck_motion: 1e-8,
+    stuck_samples: 3,
+    disagreement: 1e-6,
+    disagreement_samples: 3,
+    tracking: [1e-6; 6],
+    tracking_samples: 3,
+};
+
+#[test]
+fn codes_span_the_range_and_the_ends_are_out_of_it() {
+    let step = 110e-6_f64 / 65_536.0;
+    let converter = GaugeConverter { at_zero: -55e-6, per_code: step, highest: 65_535, beyond: [-165e-6, 165e-6] };
+    for code in [i32::MIN, -1, 0] {
+        assert!(converter.reading(code) < -55e-6, "{code}");
+    }
+    for code in [65_535, 65_536, i32::MAX] {
+        assert!(converter.reading(code) > 55e-6, "{code}");
+    }
+    assert!(converter.reading(32_768).abs() < 1e-18, "the middle is rest");
+    for code in 1..65_534 {
+        let (here, next) = (converter.reading(code), converter.reading(code + 1));
+        assert!((-55e-6..=55e-6).contains(&here) && next > here, "{code}");
+    }
+}
+
+#[test]
+fn a_code_moves_towards_its_goal_by_no_more_than_a_step() {
+    for code in [-100, -1, 0, 7, 43_690, i32::MAX, i32::MIN] {
+        for goal in [-100, 0, 5, 43_690, i32::MAX] {
+            for step in [0, 1, 7, 1747, i32::MAX] {
+                let next = toward(code, goal, step);
+                let (moved, way) = (i64::from(next) - i64::from(code), i64::from(goal) - i64::from(code));
+                assert!(moved.abs() <= i64::from(step) && moved * way >= 0, "{code} {goal} {step}: {next}");
+                assert_eq!(moved.abs(), way.abs().min(i64::from(step)), "{code} {goal} {step}");
+            }
+        }
+    }
+}
+
+/// Ticks after which a condition that is there as `shows` says becomes a cause.
+fn lasts(cause: Cause, shows: impl Fn(u32) -> bool) -> Option<u32> {
+    let mut debounce = Debounce::new();
+    let mut busy = false;
+    (0..2000).find(|tick| {
+        let present = if shows(*tick) { cause.bit() } else { 0 };
+        debounce.count(&PLAN, present, &mut busy) & cause.bit() != 0
+    })
+}
+
+#[test]
+fn conditions_become_causes_when_they_have_lasted() {
+    for (cause, patience) in TIMED.into_iter().zip(PLAN.patience) {
+        if cause != Cause::MissedTick {
+            assert_eq!(lasts(cause, |_| true), Some(patience - 1), "{cause:?}");
+            assert_eq!(lasts(cause, |tick| tick % 2 == 0), if patience == 1 { Some(0) } else { None }, "{cause:?}");
+            // Two ticks of three: slower, but as sure.
+            assert!(lasts(cause, |tick| tick % 3 != 2).is_some(), "{cause:?}");
+        }
+    }
+    // Three within a window of 100 ticks, not three that are further apart.
+    assert_eq!(lasts(Cause::MissedTick, |tick| tick % 49 == 0), Some(98));
+    assert_eq!(lasts(Cause::MissedTick, |tick| tick % 101 == 0), None);
+    for cause in [Cause::LinkLost, Cause::Integrity, Cause::EmergencyStop] {
+        assert_eq!(lasts(cause, |_| true), Some(0), "{cause:?}");
+    }
+}
+
+#[test]
+fn an_approach_begins_where_it_stands_and_ends_where_it_is_asked_to() {
+    let (from, asked) = ([1e-6; 6], [21e-6, 1e-6, -5e-6, 0.0, 3e-6, 4e-6]);
+    let mut approach = Approach::new();
+    assert_eq!(approach.setpoint(&asked, true, 0.9, 1e-13), asked, "without a beginning nothing is changed");
+    approach.begin(from);
+    let refused = [f64::NAN; 6];
+    assert!(approach.setpoint(&refused, false, 0.9, 1e-13)[0].is_nan(), "the law is to see what it refuses");
+    let mut last = from;
+    for tick in 0..400 {
+        let setpoint = approach.setpoint(&asked, true, 0.9, 1e-13);
+        for axis in 0..6 {
+            if tick == 0 {
+                assert!((setpoint[axis] - from[axis]).abs() < 1e-20);
+            }
+            let (way, left) = (asked[axis] - last[axis], asked[axis] - setpoint[axis]);
+            assert!(left.abs() <= way.abs() + 1e-20 && left * way >= 0.0, "tick {tick}: away from the goal");
+        }
+        last = setpoint;
+    }
+    assert!(approach.is_done());
+    assert_eq!(last, asked);
+    assert_eq!(Approach::<f64>::from_words(&approach.to_words()).map(|a| a.is_done()), Some(true));
+}

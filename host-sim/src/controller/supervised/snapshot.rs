@@ -1,0 +1,89 @@
+//! A machine as words and back.
+
+use std::fmt;
+
+use libloading::Symbol;
+
+use super::Supervised;
+use crate::controller::ControllerError;
+
+type Save = unsafe extern "C" fn(*const u8, *mut u64);
+type Load = unsafe extern "C" fn(*mut u8, *const u64) -> i32;
+
+/// Why words are not taken for a machine.
+#[derive(Debug)]
+pub enum SnapshotError {
+    /// They are not as many as a machine of this controller has.
+    Length {
+        /// How many.
+        given: usize,
+        /// How many it has.
+        expected: usize,
+    },
+    /// A word that no machine holds.
+    Word {
+        /// Its index.
+        index: usize,
+        /// Its bits.
+        word: u64,
+    },
+    /// The library does not offer it.
+    Library(ControllerError),
+}
+
+impl fmt::Display for SnapshotError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Length { given, expected } => write!(f, "a state of {given} words; this controller's has {expected}"),
+            Self::Word { index, word } => write!(f, "word {index} of the state is {word:016x}, which no state holds"),
+            Self::Library(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for SnapshotError {}
+
+impl Supervised {
+    /// Words of [`Supervised::save`].
+    #[must_use]
+    pub fn state_words(&self) -> usize {
+        self.controller.machine_words
+    }
+
+    /// The machine as words.
+    ///
+    /// # Errors
+    /// If the library does not offer it.
+    pub fn save(&self) -> Result<Vec<u64>, ControllerError> {
+        let mut words = vec![0; self.state_words()];
+        let failed = |cause| ControllerError::Load { path: self.controller.path.clone(), cause };
+        // SAFETY: the machine is initialised; there are as many words as the library says it writes.
+        unsafe {
+            let save: Symbol<'_, Save> = self.controller.library.get(b"specgen_machine_save\0").map_err(failed)?;
+            save(self.machine.start(), words.as_mut_ptr());
+        }
+        Ok(words)
+    }
+
+    /// Takes the machine that [`Supervised::save`] wrote.
+    ///
+    /// # Errors
+    /// If the words are none of a machine of this controller; it then stays as it is.
+    pub fn load(&mut self, words: &[u64]) -> Result<(), SnapshotError> {
+        let expected = self.state_words();
+        if words.len() != expected {
+            return Err(SnapshotError::Length { given: words.len(), expected });
+        }
+        let failed =
+            |cause| SnapshotError::Library(ControllerError::Load { path: self.controller.path.clone(), cause });
+        // SAFETY: the buffer has the size and alignment that the library asks for; there are as many words as it reads.
+        let bad = unsafe {
+            let load: Symbol<'_, Load> = self.controller.library.get(b"specgen_machine_load\0").map_err(failed)?;
+            load(self.machine.start(), words.as_ptr())
+        };
+        match usize::try_from(bad).ok().and_then(|bad| bad.checked_sub(1)) {
+            None => Ok(()),
+            Some(index) => Err(SnapshotError::Word { index, word: words.get(index).copied().unwrap_or_default() }),
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! A supervised controller whose every tick is recorded: it closes the loop of any scenario.
+
+use std::io;
+
+use specgen_runtime::recorder::{Recorder, Row};
+
+use super::Taker;
+use crate::controller::{ControllerError, MachineWord, Supervised, TickController};
+use crate::description::Description;
+
+/// Ticks that arming may take.
+const ARMING: u64 = 1_000_000;
+/// Phases of the supervisor.
+const DISARMED: u8 = 0;
+const RUNNING: u8 = 2;
+const FAULTED: u8 = 5;
+/// Requests to it.
+const ARM: u64 = 1;
+const RUN: u64 = 2;
+const RAMP_DOWN: u64 = 4;
+
+/// Why a recording ended early.
+#[derive(Debug)]
+pub enum Ended {
+    /// The block cannot be kept.
+    Io(io::Error),
+    /// The machine cannot be saved.
+    Controller(ControllerError),
+    /// The supervisor did not come to its running phase, or left it.
+    Supervisor {
+        /// Tick of the record.
+        tick: u64,
+        /// What it says.
+        word: MachineWord,
+    },
+}
+
+/// A controller under its supervisor, with a recorder. After a reset the first tick is preceded by those that arm the machine, with
+/// the readings of that tick, for nothing moves meanwhile; they are recorded too.
+///
+/// Where something fails it gives voltages that are no numbers, which ends every scenario at once; [`Recorded::ended`] says why.
+pub struct Recorded<'r, 'm> {
+    machine: Supervised,
+    recorder: &'r mut Recorder<'m>,
+    taker: &'r mut dyn Taker,
+    config: Vec<u64>,
+    input: Vec<u64>,
+    output: Vec<u64>,
+    /// Places of codes and status in an output.
+    codes: [usize; 6],
+    status: usize,
+    fresh: bool,
+    ended: Option<Ended>,
+}
+
+impl<'r, 'm> Recorded<'r, 'm> {
+    /// Records `machine`; `recorder` was started as a stream, and its blocks go to `taker`.
+    ///
+    /// # Errors
+    /// The controller has no codes or no status.
+    pub fn new(
+        machine: Supervised,
+        recorder: &'r mut Recorder<'m>,
+        taker: &'r mut dyn Taker,
+    ) -> Result<Self, ControllerError> {
+        let description = machine.controller().description();
+        let mut codes = [0; 6];
+        for (leg, place) in codes.iter_mut().enumerate() {
+            *place = description.output(&format!("dac_code[{leg}]"))?;
+        }
+        let status = description.output("status")?;
+        Ok(Self {
+            config: machine.controller().default_config(),
+            input: vec![0; machine.input_names().len()],
+            output: vec![0; machine.output_names().len()],
+            machine,
+            recorder,
+            taker,
+            codes,
+            status,
+            fresh: true,
+            ended: None,
+        })
+    }
+
+    /// Why it ended early, if it did.
+    #[must_use]
+    pub fn ended(&self) -> Option<&Ended> {
+        self.ended.as_ref()
+    }
+
+    /// Ramps down and disarms with the readings of the last tick, and ends the record.
+    ///
+    /// # Errors
+    /// As [`Recorded::ended`].
+    pub fn finish(mut self) -> Result<(), Ended> {
+        if let Some(ended) = self.ended {
+            return Err(ended);
+        }
+        let readings = self.input.clone();
+        for left in (0..ARMING).rev() {
+            let word = self.tick(&readings, RAMP_DOWN)?;
+            if word.phase == DISARMED {
+                break;
+            }
+            if left == 0 || word.phase == FAULTED {
+                return Err(Ended::Supervisor { tick: self.recorder.tick(), word });
+            }
+        }
+        self.recorder.stop();
+        self.taker.drain(self.recorder).map_err(Ended::Io)
+    }
+
+    /// One tick with this request.
+    fn tick(&mut self, input: &[u64], request: u64) -> Result<MachineWord, Ended> {
+        let law = self.machine.controller().description().input_names.len();
+        for (slot, word) in self.input.iter_mut().zip(input.iter().take(law).chain(&[request, 0])) {
+            *slot = *word;
+        }
+        if self.recorder.opens() {
+            let state = self.machine.save().map_err(Ended::Controller)?;
+            let digest = self.machine.digest();
+            self.recorder.open(&self.config, digest, |words| {
+                for (slot, word) in words.iter_mut().zip(&state) {
+                    *slot = *word;
+                }
+            });
+        }
+        let word = self.machine.step(&self.input, &mut self.output);
+        let place = |place: usize| self.output.get(place).copied().unwrap_or_default();
+        let row = Row {
+            codes: self.codes.map(|code| place(code) as i32),
+            status: place(self.status) as u32,
+            supervisor: u32::from(word.phase) | u32::from(word.cause) << 8 | u32::from(word.amplifier_on) << 16,
+        };
+        let machine = &self.machine;
+        self.recorder.push(&self.input, &row, || machine.digest());
+        self.taker.drain(self.recorder).map_err(Ended::Io)?;
+        Ok(word)
+    }
+
+    fn advance(&mut self, input: &[u64]) -> Result<(), Ended> {
+        if self.fresh {
+            self.fresh = false;
+            let mut word = self.tick(input, ARM)?;
+            let start = self.recorder.tick();
+            while word.phase != RUNNING {
+                if self.recorder.tick() - start >= ARMING {
+                    return Err(Ended::Supervisor { tick: self.recorder.tick() - 1, word });
+                }
+                // A request to arm that could not be followed at once waits for as long as it is given.
+                word = self.tick(input, if word.phase == DISARMED { ARM } else { RUN })?;
+            }
+        }
+        let word = self.tick(input, RUN)?;
+        if word.phase == RUNNING { Ok(()) } else { Err(Ended::Supervisor { tick: self.recorder.tick() - 1, word }) }
+    }
+}
+
+impl TickController for Recorded<'_, '_> {
+    fn description(&self) -> &Description {
+        self.machine.controller().description()
+    }
+
+    fn default_config(&self) -> Vec<u64> {
+        self.machine.controller().default_config()
+    }
+
+    fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
+        self.machine.configure(words)?;
+        self.config = words.to_vec();
+        self.recorder.settings_changed();
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.machine.reset();
+        self.recorder.restarted();
+        self.fresh = true;
+        self.ended = None;
+    }
+
+    fn step(&mut self, input: &[u64], output: &mut [u64]) {
+        if self.ended.is_none() {
+            self.ended = self.advance(input).err();
+        }
+        if self.ended.is_some() {
+            output.fill(u64::MAX);
+            return;
+        }
+        for (slot, word) in output.iter_mut().zip(&self.output) {
+            *slot = *word;
+        }
+    }
+
+    fn state_digest(&self) -> u64 {
+        self.machine.digest()
+    }
+}

@@ -1,0 +1,294 @@
+//! Runs a record again on the host and compares every tick by bits.
+
+use std::fmt;
+use std::io::Read;
+
+use specgen_runtime::record::Reason;
+
+use super::{Block, Header, Piece, Reader, RecordError, Row};
+use crate::controller::{ControllerError, SnapshotError, Supervised};
+
+/// Words of an output row after those of the control law: the supervisor's comes first.
+const SUPERVISOR: usize = 0;
+
+/// What a replay found.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Replay {
+    /// Ticks that were run again.
+    pub ticks: u64,
+    /// Of these, ticks whose digest of the machine was compared, too.
+    pub digests: u64,
+    /// Blocks that were run.
+    pub blocks: u64,
+    /// First and last tick of the record.
+    pub span: Option<(u64, u64)>,
+    /// The first tick that differs.
+    pub divergence: Option<Divergence>,
+    /// Stretches of ticks that are missing between blocks, the second not included.
+    pub gaps: Vec<(u64, u64)>,
+    /// Blocks that are damaged: which (from 1), and how.
+    pub damaged: Vec<(usize, String)>,
+    /// The file ends within a block; the tick from which on nothing is known.
+    pub cut: Option<u64>,
+    /// Ticks of triggers.
+    pub triggers: Vec<u64>,
+    /// Changes of the phase, the first one included.
+    pub phases: Vec<PhaseChange>,
+}
+
+/// The first difference.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Divergence {
+    /// Its tick; for a state, that of the tick it stands before.
+    pub tick: u64,
+    /// What differs.
+    pub signal: String,
+    /// Its bits in the record.
+    pub recorded: u64,
+    /// Its bits on the host.
+    pub replayed: u64,
+}
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { tick, signal, recorded, replayed } = self;
+        write!(f, "tick {tick} {signal}: recorded {recorded:016x}")?;
+        let plain = !(signal.contains("digest") || signal.contains("state"));
+        if plain {
+            write!(f, " ({})", *recorded as i32)?;
+        }
+        write!(f, ", replayed {replayed:016x}")?;
+        if plain { write!(f, " ({})", *replayed as i32) } else { Ok(()) }
+    }
+}
+
+/// A change of the phase.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PhaseChange {
+    /// The tick.
+    pub tick: u64,
+    /// Phase, cause << 8, amplifiers on << 16.
+    pub supervisor: u32,
+}
+
+/// Why a record cannot be run again.
+#[derive(Debug)]
+pub enum ReplayError {
+    /// It is no record.
+    Record(RecordError),
+    /// It is another controller's: which line of the description, in the record, in the library.
+    Other {
+        /// What differs.
+        field: &'static str,
+        /// In the record.
+        recorded: String,
+        /// In the library.
+        library: String,
+    },
+    /// Ticks are left out.
+    Decimated(u32),
+    /// The controller refuses the recorded settings.
+    Config(u64, ControllerError),
+    /// The library cannot be used.
+    Controller(ControllerError),
+}
+
+impl fmt::Display for ReplayError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Record(error) => error.fmt(f),
+            Self::Other { field, recorded, library } => write!(
+                f,
+                "the record is of another controller: {field} {recorded}, the spec gives {library}; name the spec that the target \
+                 was built from, and the specgen version that built it"
+            ),
+            Self::Decimated(every) => write!(
+                f,
+                "only every {every}th tick is in the record, so it cannot be replayed; record with decimation 1 (--csv exports it as it is)"
+            ),
+            Self::Config(tick, error) => write!(f, "settings at tick {tick}: {error}"),
+            Self::Controller(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for ReplayError {}
+
+impl From<RecordError> for ReplayError {
+    fn from(error: RecordError) -> Self {
+        Self::Record(error)
+    }
+}
+
+/// Runs a record again on `machine` and calls `each` with every block.
+///
+/// After a difference the rest is only read, not run. Where a block follows the one before it without a gap, the machine goes on as
+/// it is, and must then be what the block says it was.
+///
+/// # Errors
+/// It is no record of this controller, or one that cannot be replayed.
+pub fn replay<R: Read>(
+    reader: &mut Reader<R>,
+    machine: &mut Supervised,
+    mut each: impl FnMut(&Header, &Block),
+) -> Result<Replay, ReplayError> {
+    same_controller(reader.header(), machine)?;
+    let mut run = Run {
+        input: machine.input_names().len(),
+        output: vec![0; machine.output_names().len()],
+        machine,
+        found: Replay::default(),
+        next: None,
+        config: Vec::new(),
+    };
+    let header = reader.header().clone();
+    while let Some(piece) = reader.next_piece()? {
+        match piece {
+            Piece::Block(block) => {
+                each(&header, &block);
+                run.block(&block)?;
+            }
+            Piece::Damaged { block, reason } => {
+                run.found.damaged.push((block, reason));
+            }
+            Piece::Cut { .. } => run.found.cut = Some(run.next.unwrap_or_default()),
+        }
+    }
+    Ok(run.found)
+}
+
+fn same_controller(header: &Header, machine: &Supervised) -> Result<(), ReplayError> {
+    use crate::controller::TickController;
+
+    let (a, b) = (&header.description, machine.controller().description());
+    let fields = [
+        ("spec digest", a.digest.clone(), b.digest.clone()),
+        ("specgen version", a.version.clone(), b.version.clone()),
+        ("scalar bits", a.scalar.bits().to_string(), b.scalar.bits().to_string()),
+        ("input words", a.input_names.join(","), b.input_names.join(",")),
+        ("settings", a.config_names.join(","), b.config_names.join(",")),
+    ];
+    match fields.into_iter().find(|(_, a, b)| a != b) {
+        None => Ok(()),
+        Some((field, recorded, library)) => Err(ReplayError::Other { field, recorded, library }),
+    }
+}
+
+struct Run<'a> {
+    machine: &'a mut Supervised,
+    input: usize,
+    output: Vec<u64>,
+    found: Replay,
+    /// Tick that follows the last one.
+    next: Option<u64>,
+    /// Settings in force.
+    config: Vec<u64>,
+}
+
+impl Run<'_> {
+    fn block(&mut self, block: &Block) -> Result<(), ReplayError> {
+        if block.decimation != 1 {
+            return Err(ReplayError::Decimated(block.decimation));
+        }
+        let adjoins = self.next == Some(block.first);
+        // A controller that was reset begins anew.
+        let follows = adjoins && block.reason != Reason::Started;
+        if let Some(next) = self.next
+            && !adjoins
+        {
+            self.found.gaps.push((next, block.first));
+        }
+        self.found.triggers.extend(block.trigger);
+        let last = block.first + block.rows.len() as u64;
+        self.next = Some(last);
+        let start = self.found.span.map_or(block.first, |(start, _)| start);
+        self.found.span = Some((start, last.saturating_sub(1)));
+        for row in &block.rows {
+            self.note_phase(row);
+        }
+        if self.found.divergence.is_some() {
+            return Ok(());
+        }
+        if block.config != self.config {
+            self.machine.configure(&block.config).map_err(|error| ReplayError::Config(block.first, error))?;
+            self.config.clone_from(&block.config);
+        }
+        self.found.divergence = self.begin(block, follows)?;
+        self.found.blocks += 1;
+        for row in &block.rows {
+            if self.found.divergence.is_some() {
+                break;
+            }
+            self.found.divergence = self.tick(row);
+        }
+        Ok(())
+    }
+
+    /// Puts the machine where the block begins, or compares it with that.
+    fn begin(&mut self, block: &Block, follows: bool) -> Result<Option<Divergence>, ReplayError> {
+        let differs =
+            |signal: String, recorded, replayed| Some(Divergence { tick: block.first, signal, recorded, replayed });
+        if !follows && let Err(error) = self.machine.load(&block.state) {
+            return match error {
+                SnapshotError::Word { index, word } => {
+                    Ok(differs(format!("state word {index} (no state holds it)"), word, 0))
+                }
+                SnapshotError::Length { given, expected } => {
+                    Ok(differs("number of state words".to_owned(), given as u64, expected as u64))
+                }
+                SnapshotError::Library(error) => Err(ReplayError::Controller(error)),
+            };
+        }
+        let state = self.machine.save().map_err(ReplayError::Controller)?;
+        if let Some(index) = (0..state.len()).find(|k| block.state.get(*k) != state.get(*k)) {
+            let recorded = block.state.get(index).copied().unwrap_or_default();
+            return Ok(differs(format!("state word {index} before it"), recorded, state[index]));
+        }
+        let digest = self.machine.digest();
+        Ok(if digest == block.digest {
+            None
+        } else {
+            differs("state_digest before it".to_owned(), block.digest, digest)
+        })
+    }
+
+    fn tick(&mut self, row: &Row) -> Option<Divergence> {
+        debug_assert_eq!(row.input.len(), self.input);
+        self.machine.step(&row.input, &mut self.output);
+        self.found.ticks += 1;
+        let description = crate::controller::TickController::description(self.machine.controller());
+        let word = |name: &str| description.output(name).ok().and_then(|place| self.output.get(place)).copied();
+        let differs = |signal: String, recorded: u64, replayed: u64| {
+            (recorded != replayed).then_some(Divergence { tick: row.tick, signal, recorded, replayed })
+        };
+        for (leg, code) in row.codes.iter().enumerate() {
+            let name = format!("dac_code[{leg}]");
+            let found = differs(name.clone(), u64::from(*code as u32), word(&name).unwrap_or(u64::MAX));
+            if found.is_some() {
+                return found;
+            }
+        }
+        let found = differs("status".to_owned(), u64::from(row.status), word("status").unwrap_or(u64::MAX));
+        if found.is_some() {
+            return found;
+        }
+        let supervisor = self.output.get(description.output_names.len() + SUPERVISOR).copied().unwrap_or(u64::MAX);
+        for (name, shift) in [("phase", 0), ("cause", 8), ("amplifiers_on", 16)] {
+            let part = |word: u64| word >> shift & 0xff;
+            let found = differs(name.to_owned(), part(u64::from(row.supervisor)), part(supervisor));
+            if found.is_some() {
+                return found;
+            }
+        }
+        let digest = row.digest?;
+        self.found.digests += 1;
+        differs("state_digest".to_owned(), digest, self.machine.digest())
+    }
+
+    fn note_phase(&mut self, row: &Row) {
+        let last = self.found.phases.last().map(|change| change.supervisor);
+        if last != Some(row.supervisor) {
+            self.found.phases.push(PhaseChange { tick: row.tick, supervisor: row.supervisor });
+        }
+    }
+}
