@@ -76,7 +76,7 @@ fn closed_loop(emitted: &Emitted) -> Vec<u8> {
     }
     assert_eq!(status & BUSY, 0, "at its bias pose");
     for tick in 0..TICKS {
-        let motion = wave.next().unwrap();
+        let motion = wave.advance().unwrap();
         let target = PoseTarget { pose: motion.pose, rate: motion.rate, acceleration: motion.acceleration };
         let seen = bench.tick(&Request::stream(target)).unwrap();
         assert_eq!(seen.status & 0x3_0000, 0, "tick {tick}: the wave is a stream that is believed");
@@ -84,7 +84,7 @@ fn closed_loop(emitted: &Emitted) -> Vec<u8> {
             bench.configure(&other).unwrap();
         }
     }
-    assert!(wave.next().is_none());
+    assert!(wave.advance().is_none());
     recorded.finish().unwrap_or_else(|ended| panic!("{ended:?}"));
     assert_eq!(recorder.lost(), 0);
     writer.finish().unwrap()

@@ -161,7 +161,7 @@ fn converge(
     let progress = |at: &crate::tuning::search::Progress| {
         // A run whose output is not looked at gets ten lines.
         let tenth = (at.all / 10).max(1);
-        if !ui.is_terminal() && at.done % tenth != 0 {
+        if !ui.is_terminal() && !at.done.is_multiple_of(tenth) {
             return;
         }
         ui.rate(&format!("  {} of {} strings, {:.0} s left", at.done, at.all, at.left.as_secs_f64()));

@@ -73,6 +73,7 @@ pub(super) fn moves_end(facts: &Facts, found: &mut Found) {
 }
 
 /// Speed, acceleration and jerk belong together: each is reached, and none at once.
+#[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
 pub(super) fn limits_bind(facts: &Facts, found: &mut Found) {
     let Some(rules) = rules(facts) else { return };
     let tick = facts.model.timing.period;
@@ -144,6 +145,7 @@ pub(super) fn stream_limit_binds(facts: &Facts, found: &mut Found) {
 }
 
 /// A bound that uses next to nothing of what the legs reach.
+#[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
 pub(super) fn workspace_is_used(facts: &Facts, found: &mut Found) {
     let Some(legs) = &facts.legs else { return };
     let stroke = facts.model.actuator.stroke;

@@ -90,6 +90,7 @@ fn larger(slot: &mut f64, value: f64) {
 type Matrix = [[f64; 6]; 6];
 
 /// Speeds and accelerations by differences: of leg displacements, whose curvature the poses do not have.
+#[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
 fn look(
     demand: &mut PathDemand,
     model: &Model,

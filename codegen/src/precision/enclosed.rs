@@ -72,8 +72,8 @@ impl<const SINGLE: bool> Add for Enclosed<SINGLE> {
     fn add(self, other: Self) -> Self {
         // Nothing is rounded where nothing is added.
         match (self.point(), other.point()) {
-            (Some(zero), _) if zero == 0.0 => other,
-            (_, Some(zero)) if zero == 0.0 => self,
+            (Some(0.0), _) => other,
+            (_, Some(0.0)) => self,
             _ => Self::rounded(self.low + other.low, self.high + other.high, self.error + other.error),
         }
     }
@@ -103,7 +103,7 @@ impl<const SINGLE: bool> Mul for Enclosed<SINGLE> {
     fn mul(self, other: Self) -> Self {
         for (a, b) in [(self, other), (other, self)] {
             match a.point() {
-                Some(zero) if zero == 0.0 => return a,
+                Some(0.0) => return a,
                 Some(factor) if is_power_of_two(factor) => {
                     let (x, y) = (b.low * factor, b.high * factor);
                     let (low, high) = if x < y { (x, y) } else { (y, x) };

@@ -138,13 +138,7 @@ fn wave(compiled: &Compiled, ticks: i32) -> Result<Wave<f64>, Failure> {
         for axis in 0..6 {
             let room = limits.high[axis] - settings.center[axis];
             let below = settings.center[axis] - limits.low[axis];
-            let room = if on_legs {
-                room
-            } else if room < below {
-                room
-            } else {
-                below
-            };
+            let room = if on_legs || room < below { room } else { below };
             let amplitude = share * SHARES[usize::from(axis != 2 && !on_legs)] * room;
             let tone = Tone { amplitude, phase: 0, step: step_of(FREQUENCIES[axis], period) };
             let offset = if on_legs { 0.4 * room } else { 0.0 };
