@@ -27,7 +27,10 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "-o", ""], "--output"),
         (&["legs.toml", "minimal.toml"], "one spec file is expected"),
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
-        (&["chek", "legs.toml"], "check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, dump-ir"),
+        (
+            &["chek", "legs.toml"],
+            "check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, dump-ir",
+        ),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
         (&["sim"], "<SPEC>"),

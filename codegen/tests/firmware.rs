@@ -31,7 +31,8 @@ fn fake_probe_rs(folder: &Folder, status: i32) -> OsString {
     folder.write("bin/probe-rs", script);
     fs::set_permissions(folder.path("bin/probe-rs"), fs::Permissions::from_mode(0o755)).unwrap();
     let path = std::env::var_os("PATH").unwrap_or_default();
-    let folders = std::iter::once(folder.path("bin")).chain(std::env::split_paths(&path).filter(|f| !f.join("probe-rs").exists()));
+    let folders = std::iter::once(folder.path("bin"))
+        .chain(std::env::split_paths(&path).filter(|f| !f.join("probe-rs").exists()));
     std::env::join_paths(folders).unwrap()
 }
 
@@ -48,7 +49,8 @@ fn with_budget(folder: &Folder, name: &str, old: &str, new: &str) {
 
 fn json(folder: &Folder, arguments: &[&str]) -> (i32, serde_json::Value) {
     let run = Run::of(folder.command().args(arguments).arg("--json"));
-    let value: serde_json::Value = serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("{error}: {run:#?}"));
+    let value: serde_json::Value =
+        serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("{error}: {run:#?}"));
     assert_eq!(run.stderr, "");
     (run.code, value)
 }
@@ -63,7 +65,13 @@ fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
     let build = ["build", "legs.toml", "--target", "qemu", "-o", "out", "--no-measure", "--target-dir", &dir];
     let run = folder.run(&build);
     assert_eq!(run.code, 0, "{run:#?}");
-    for word in ["legs → out/target/qemu.elf for mps2-an500", "flash by owner", "controller", "no panic, no allocation", "stack: "] {
+    for word in [
+        "legs → out/target/qemu.elf for mps2-an500",
+        "flash by owner",
+        "controller",
+        "no panic, no allocation",
+        "stack: ",
+    ] {
         assert!(run.stdout.contains(word), "no `{word}` in\n{}", run.stdout);
     }
     let (code, document) = json(&folder, &build);
@@ -101,10 +109,7 @@ fn flashing(folder: &Folder, image: &str) {
         Run::of(folder.command().env("PATH", path).args(["flash", image]).args(arguments))
     };
     let board = ["--target", "stm32h743", "--yes"];
-    let commands = [
-        format!("download --chip STM32H743ZITx --verify {image}"),
-        "reset --chip STM32H743ZITx".to_owned(),
-    ];
+    let commands = [format!("download --chip STM32H743ZITx --verify {image}"), "reset --chip STM32H743ZITx".to_owned()];
     // Nothing to flash with: what is missing, and the exact commands.
     let bare = without_probe_rs();
     let missing = flash(&bare, &board);
@@ -144,14 +149,17 @@ fn flashing(folder: &Folder, image: &str) {
 fn what_does_not_fit_together_is_refused_before_anything_is_built() {
     let folder = Folder::new();
     let before = folder.listing();
-    folder.run(&["build", "legs.toml", "--target", "esp32"]).says(2, &["esp32", "host, qemu, stm32h743, stm32f4, rt-pc"]);
+    folder
+        .run(&["build", "legs.toml", "--target", "esp32"])
+        .says(2, &["esp32", "host, qemu, stm32h743, stm32f4, rt-pc"]);
     folder.run(&["build"]).says(2, &["<SPEC>"]);
     folder.run(&["size"]).says(2, &["<SPEC|ELF>"]);
     folder.run(&["flash", "absent.toml", "--yes"]).says(1, &["E0101"]);
     // A board with another core than the spec's.
     let wrong = folder.run(&["build", "legs.toml", "--target", "stm32f4"]);
     wrong.says(1, &["E0333", "the spec is for mps2-an500 (cortex-m7)", "mcu = \"stm32f446re\"", "scalar = \"f32\""]);
-    let document = Document::of(&Run::of(folder.command().args(["build", "legs.toml", "--target", "stm32f4", "--json"])));
+    let document =
+        Document::of(&Run::of(folder.command().args(["build", "legs.toml", "--target", "stm32f4", "--json"])));
     assert!(document.finding("E0333")["line"].as_u64().unwrap() > 1);
     // What begins as an image and is none.
     folder.write("broken.elf", b"\x7fELF and no more");
@@ -166,5 +174,9 @@ fn an_image_of_this_machine_is_weighed_without_the_checks_of_another() {
     let own: PathBuf = std::env::current_exe().unwrap();
     let run = folder.run(&["size", &own.display().to_string()]);
     assert_eq!(run.code, 0, "{run:#?}");
-    assert!(run.stdout.contains("flash by owner") && run.stdout.contains("are for images of Cortex-M"), "{}", run.stdout);
+    assert!(
+        run.stdout.contains("flash by owner") && run.stdout.contains("are for images of Cortex-M"),
+        "{}",
+        run.stdout
+    );
 }

@@ -45,10 +45,7 @@ const F446: Board = Board {
     name: "board-f446",
     folder: "stm32f4",
     mcu: Mcu::Stm32F446Re,
-    edits: &[
-        ("mcu = \"mps2-an500\"", "mcu = \"stm32f446re\""),
-        ("scalar = \"f64\"", "scalar = \"f32\""),
-    ],
+    edits: &[("mcu = \"mps2-an500\"", "mcu = \"stm32f446re\""), ("scalar = \"f64\"", "scalar = \"f32\"")],
     link: ["USART2", "DMA1_STREAM5", "DMA1_STREAM6"],
 };
 
@@ -168,6 +165,9 @@ fn the_wiring_table_is_that_of_the_programs() {
         let driven = code.lines().find(|line| line.contains("let enable = ")).unwrap();
         assert_eq!(pins(driven), BTreeSet::from([pin.clone()]));
         let (port, bit) = (&pin[1..2], &pin[2..]);
-        assert!(off.contains(&format!("pac::GPIO{port}.bsrr()")) && off.contains(&format!("set_br({bit}, true)")), "{pin}");
+        assert!(
+            off.contains(&format!("pac::GPIO{port}.bsrr()")) && off.contains(&format!("set_br({bit}, true)")),
+            "{pin}"
+        );
     }
 }

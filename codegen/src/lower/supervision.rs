@@ -1,7 +1,7 @@
 //! The supervisor: times to ticks and samples, bounds to SI, and what cannot work.
 
-use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
 use super::kinematics::inverse_jacobian;
+use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::ir::{Actuation, Scalar, Supervision};
 use crate::model::Model;
@@ -188,7 +188,9 @@ fn tracking(model: &Model, noise: Option<&PoseNoise>, findings: &mut Vec<Diagnos
             model,
             codes::SUPERVISOR_BOUND,
             "tracking_error",
-            format!("a tracking error of {share} of the range is below what the gauges' noise makes of one axis, {least:.6}"),
+            format!(
+                "a tracking error of {share} of the range is below what the gauges' noise makes of one axis, {least:.6}"
+            ),
             format!("write tracking_error = {:.6} or more; the default is 0.2", above(least)),
         ));
     }

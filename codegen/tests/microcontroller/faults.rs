@@ -31,8 +31,7 @@ const PLANTED: &str = "
         (&raw mut HEAP).cast()
     }
     #[inline(never)] fn allocating(n: u32) -> f64 { malloc(n as usize) as usize as f64 }";
-const EXTRA: &str =
-    "{ let x = input.setpoint[0]; unbounded_index(x) + by_pointer(x as u32) + allocating(x as u32) }";
+const EXTRA: &str = "{ let x = input.setpoint[0]; unbounded_index(x) + by_pointer(x as u32) + allocating(x as u32) }";
 
 fn texts(checked: &Checked, rule: Rule) -> Vec<&str> {
     checked.faults.iter().filter(|fault| fault.rule == rule).map(|fault| fault.text.as_str()).collect()

@@ -50,7 +50,9 @@ fn begins(kind: Kind, mode: f64, more: &[(&str, &str)]) -> i64 {
             assert_eq!(bench.tick(RUN, 0).phase, RUNNING, "{kind:?} round {round}: {:x}", bench.conditions());
         }
     }
-    println!("{kind:?}, mode {mode}: held between codes {lowest} and {highest}; the first tick moves a leg by {most} codes at most");
+    println!(
+        "{kind:?}, mode {mode}: held between codes {lowest} and {highest}; the first tick moves a leg by {most} codes at most"
+    );
     assert!(highest - lowest > 3000, "{kind:?}: the holds were all in one place");
     most
 }

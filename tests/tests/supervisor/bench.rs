@@ -222,7 +222,11 @@ impl Bench {
                 return;
             }
         }
-        panic!("phase {phase} is not reached by request {request}: {:?}, conditions {:x}", self.word, self.conditions());
+        panic!(
+            "phase {phase} is not reached by request {request}: {:?}, conditions {:x}",
+            self.word,
+            self.conditions()
+        );
     }
 
     pub fn conditions(&self) -> u64 {

@@ -58,7 +58,8 @@ pub fn run(bench: &mut Bench, seed: u64, sequences: u32, mut each: impl FnMut(&B
                 bench.input[gauges + gauge] = bench.scalar.encode(amount);
             } else if wrong && kind == 4 {
                 let place = draw(bench.input.len() as u64) as usize;
-                let mask = if bench.scalar.bits() == 32 && place + 2 < bench.input.len() { 0xffff_ffff } else { u64::MAX };
+                let mask =
+                    if bench.scalar.bits() == 32 && place + 2 < bench.input.len() { 0xffff_ffff } else { u64::MAX };
                 bench.input[place] = draw(u64::MAX) & mask;
             }
             let before = bench.codes();
