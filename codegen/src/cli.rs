@@ -7,8 +7,10 @@ mod build;
 mod check;
 mod dynamics;
 mod file;
+mod firmware;
 mod identify;
 mod identify_rate;
+mod pil;
 mod robust;
 mod sim;
 mod tune;
@@ -57,12 +59,20 @@ struct Common {
 enum Command {
     /// Report every finding about a spec; write nothing.
     Check(check::Arguments),
+    /// Build for one target, check the image, hold it against the budget.
+    Build(firmware::Arguments),
+    /// Say who takes the memory of an image, and what its tick reaches.
+    Size(firmware::SizeArguments),
+    /// Build, check, and write the image to a board by probe-rs.
+    Flash(firmware::FlashArguments),
     /// Run the paper's experiments with the emitted controller against a simulated machine.
     Sim(sim::Arguments),
     /// Tune gains and weights on the simulated loop with the emitted controller.
     Tune(tune::Arguments),
     /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
     Robust(robust::Arguments),
+    /// Close the loop of a simulated machine with the program of a microcontroller, emulated or at a serial port.
+    Pil(pil::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
     /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
@@ -87,9 +97,13 @@ pub fn run() -> ExitCode {
     let done = match &cli.command {
         None => build::run(&cli.build, &mut ui),
         Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
+        Some(Command::Build(arguments)) => firmware::run(arguments, &mut ui),
+        Some(Command::Size(arguments)) => firmware::run_size(arguments, &mut ui),
+        Some(Command::Flash(arguments)) => firmware::run_flash(arguments, &mut ui),
         Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
         Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
         Some(Command::Robust(arguments)) => robust::run(arguments, &mut ui),
+        Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
         Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
@@ -107,7 +121,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, sim, tune, robust, dynamics, identify, forc, dump-ir) with its own arguments",
+            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, dump-ir) with its own arguments",
         ),
         _ => error,
     };

@@ -14,7 +14,7 @@ use crate::reach::{self, Reach};
 use crate::spec::{self, SpecSource};
 use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
-use crate::{waveform, workspace};
+use crate::{requirements, waveform, workspace};
 
 /// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
 /// factor, a wrong unit is 1000.
@@ -75,7 +75,11 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
     let stability = check_stability(&model).map_err(|found| findings.extend(found));
     let identified = identify_records(&source, &model).map_err(|found| findings.extend(found));
     let setpoints = lower_setpoints(&source, &model).map_err(|found| findings.extend(found));
-    let (Ok((margins, design)), Ok(mut identified), Ok(setpoints)) = (stability, identified, setpoints) else {
+    let too_coarse = requirements::check(&model);
+    let coarse = !too_coarse.is_empty();
+    findings.extend(too_coarse);
+    let (Ok((margins, design)), Ok(mut identified), Ok(setpoints), false) = (stability, identified, setpoints, coarse)
+    else {
         return Err(Refused { source: Some(source), findings });
     };
     findings.extend(identified.findings);
@@ -218,6 +222,9 @@ fn identify_records(source: &SpecSource, model: &Model) -> Result<IdentifiedReco
         match one {
             Ok((table, report, warnings)) => {
                 errors.extend(wrong_scale(model, name, &table));
+                if report.is_some() && matches!(model.hysteresis.rate, RateDependence::Creep(_)) {
+                    result.findings.push(static_table_with_creep(model, name));
+                }
                 result.tables.push(table);
                 result.reports.push(report);
                 result.findings.extend(warnings);
@@ -298,6 +305,21 @@ fn rate_not_in_stability(model: &Model) -> Diagnostic {
             "its inverse at most doubles the gain of fast corrections: let gain_ratio reach twice its upper end ({}), or simulate",
             2.0 * model.adaptation.gain_ratio[1]
         ),
+    }
+}
+
+fn static_table_with_creep(model: &Model, record: &str) -> Diagnostic {
+    let key = "hysteresis.records";
+    Diagnostic {
+        severity: Severity::Warning,
+        code: codes::STATIC_TABLE_WITH_CREEP,
+        key: key.to_owned(),
+        place: model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec),
+        message: format!(
+            "the table of `{record}` is fitted without creep, and the creep that is in it is compensated once more"
+        ),
+        help: "name the table that `specgen identify rate SLOW.csv FAST.csv -o NAME` writes to NAME-creep.csv"
+            .to_owned(),
     }
 }
 

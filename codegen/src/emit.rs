@@ -12,6 +12,7 @@ mod format;
 mod gauge_converter;
 mod hysteresis;
 mod identity;
+mod integrity;
 mod kinematics;
 mod legs;
 mod limits;
@@ -40,6 +41,7 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
         ("src/dynamics.rs", dynamics::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
+        ("src/integrity.rs", integrity::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
         ("src/supervision.rs", supervision::emit(ir)),

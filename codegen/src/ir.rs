@@ -83,6 +83,8 @@ pub struct Ir {
     /// Control in task space; none for six legs with their own gauges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub task_space: Option<TaskSpace>,
+    /// Settings and checksum for the check at start-up.
+    pub integrity: Integrity,
 }
 
 /// Leg kinematics in difference form.
@@ -286,6 +288,8 @@ pub struct Lead {
 /// Converter and limits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Actuation {
+    /// Bits of a code.
+    pub bits: u32,
     /// Voltage of code 0, V.
     pub volts_at_zero: f64,
     /// V per code.
@@ -403,4 +407,21 @@ pub enum Setpoint {
     Pose,
     /// Leg displacements.
     Leg,
+}
+
+/// What the controller checks itself by.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Integrity {
+    /// Compiler, platform and spec in one line, kept in every image.
+    pub identity: String,
+    /// The settings as words, in the order of the emitted `CONFIG_NAMES`.
+    #[serde(serialize_with = "as_hex")]
+    pub settings: Vec<u64>,
+    /// CRC-32 of identity, tables, trajectories and settings.
+    pub crc: u32,
+}
+
+/// Words in hexadecimal: as numbers, readers that know `f64` alone would round them.
+fn as_hex<S: serde::Serializer>(words: &[u64], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(words.iter().map(|word| format!("{word:#x}")))
 }

@@ -5,6 +5,7 @@
 //! ```
 //! Each phase is a module, and data flows one way. ARCHITECTURE.md has the invariants.
 
+pub mod budget;
 pub mod cli;
 pub mod compile;
 pub mod diagnostic;
@@ -16,8 +17,10 @@ pub mod lower;
 pub mod machine;
 pub mod model;
 pub mod numerics;
+pub mod pil;
 pub mod plot;
 pub mod reach;
+pub mod requirements;
 pub mod robust;
 pub mod spec;
 pub mod stability;

@@ -5,6 +5,7 @@
 mod actuation;
 mod dynamics;
 mod gauge_converter;
+mod integrity;
 mod kinematics;
 mod linear;
 mod rate;
@@ -14,6 +15,7 @@ mod supervision;
 mod task_space;
 
 pub use dynamics::{GRAVITY, platform};
+pub use integrity::IDENTITY_MARK;
 pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
 pub use sensing::{PoseNoise, pose_noise};
 
@@ -50,10 +52,35 @@ pub fn lower(
     let round = |value| scalar.round(value);
     let [tx, ty, tz] = model.workspace.translation;
     let [rx, ry, rz] = model.workspace.rotation;
+    let defaults = Defaults {
+        law: match model.adaptation.mode {
+            model::AdaptationMode::Invhys => Law::Invhys,
+            model::AdaptationMode::Ewma => Law::Ewma,
+            model::AdaptationMode::Pcc => Law::Pcc,
+        },
+        setpoint: match model.controller.setpoint {
+            model::SetpointKind::Pose => Setpoint::Pose,
+            model::SetpointKind::Leg => Setpoint::Leg,
+        },
+        level_weight: round(model.adaptation.level_weight),
+        drift_weight: round(model.adaptation.drift_weight),
+        run_interval: model.adaptation.run_interval,
+        max_step,
+        period: model.timing.period,
+        leg_gain: model.actuator.leg_gain(),
+    };
     let task_space = match (&model.task_space, task) {
         (Some(task), Some((design, setpoints))) => Some(task_space(model, task, scalar, design, setpoints)?),
         _ => None,
     };
+    let integrity = integrity::lower(
+        integrity::identity(&model.name, digest, scalar),
+        scalar,
+        &hysteresis,
+        &actuation,
+        &defaults,
+        task_space.as_ref(),
+    );
     let gauge_converter = gauge_converter::lower(model, task_space.as_ref().map(|task| &task.sensing), scalar);
     Ok(Ir {
         name: model.name.clone(),
@@ -71,24 +98,9 @@ pub fn lower(
             sensor: model.sensor.range.map(round),
         },
         gauge_converter,
-        defaults: Defaults {
-            law: match model.adaptation.mode {
-                model::AdaptationMode::Invhys => Law::Invhys,
-                model::AdaptationMode::Ewma => Law::Ewma,
-                model::AdaptationMode::Pcc => Law::Pcc,
-            },
-            setpoint: match model.controller.setpoint {
-                model::SetpointKind::Pose => Setpoint::Pose,
-                model::SetpointKind::Leg => Setpoint::Leg,
-            },
-            level_weight: round(model.adaptation.level_weight),
-            drift_weight: round(model.adaptation.drift_weight),
-            run_interval: model.adaptation.run_interval,
-            max_step,
-            period: model.timing.period,
-            leg_gain: model.actuator.leg_gain(),
-        },
+        defaults,
         task_space,
+        integrity,
     })
 }
 

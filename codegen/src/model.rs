@@ -2,8 +2,12 @@
 //!
 //! Vectors are in the base frame {B} or the platform frame {P} as stated; angles in rad.
 
+mod mcu;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
+
+pub use mcu::{Mcu, Part};
 
 /// A spec that passed every check that needs no computation.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +42,8 @@ pub struct Model {
     pub target: Target,
     /// The controller that sees the platform: a spec with `[control]`. None: six legs with a gauge each.
     pub task_space: Option<TaskSpace>,
+    /// Finest displacement that matters, m, if declared.
+    pub precision: Option<f64>,
     /// What the supervisor takes for a fault.
     pub supervisor: Supervisor,
     /// What `specgen robust` varies, and its gate; no constant of the controller comes from here.
@@ -314,15 +320,6 @@ pub struct ControllerOptions {
     pub scalar: Scalar,
     /// Meaning of the set-point at start-up.
     pub setpoint: SetpointKind,
-}
-
-/// A microcontroller that specgen can build for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mcu {
-    /// Cortex-M7 with double-precision FPU, emulated.
-    Mps2An500,
-    /// Cortex-M4F, single-precision FPU, emulated.
-    Mps2An386,
 }
 
 /// Where it runs, and what it may use there.

@@ -11,6 +11,7 @@
 
 pub mod build;
 pub mod callgraph;
+pub mod checks;
 pub mod emulator;
 pub mod error;
 pub mod host;
@@ -19,12 +20,15 @@ mod panics;
 mod process;
 pub mod provision;
 pub mod replay;
+pub mod size;
 pub mod stack;
+pub mod targets;
 mod thumb;
 pub mod toolchain;
 
-pub use build::{Image, build_image};
+pub use build::{Image, build_image, build_pil};
 pub use error::TargetError;
+pub use process::find_in_path as find_program;
 pub use replay::{ReplayResult, replay, replay_machine};
 
 /// Rust's name of the compilation target of every [`Mcu`](crate::model::Mcu) here.

@@ -11,12 +11,16 @@ use host_sim::controller::TickController;
 use host_sim::trace::{Trace, first_difference};
 use serde::Serialize;
 
+use crate::budget::Used;
 use crate::ir::Ir;
 use crate::model::Model;
-use crate::target::{self, Image, TargetError, image, stack};
+use crate::target::checks::{self, Checked, Rules};
+use crate::target::{self, Image, TargetError, image, size, stack};
 
 /// Seed of the noise in the exercise.
 const SEED: u64 = 1;
+/// The stage that is the whole tick.
+const WHOLE: &str = "step";
 /// Longest time the emulator may take, s.
 const LIMIT: Duration = Duration::from_secs(600);
 
@@ -63,6 +67,10 @@ pub struct Measurement {
     pub ticks: u64,
     /// First word that differs from the host's, in words.
     pub first_difference: Option<String>,
+    /// What the tick must not do, looked for in the image.
+    pub checks: Checked,
+    /// What a budget is held against.
+    pub used: Used,
 }
 
 /// Instructions of one stage.
@@ -96,6 +104,10 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measuremen
     let footprint = image::footprint(&image.elf)?;
     let bound = stack::bound(&image.elf, stack::STEP_SYMBOL)?;
     let (replayed, stats) = replay(image, config, host)?;
+    let rules = Rules { single: !image.mcu.part().double, whole_image: true };
+    let mut checks = checks::check(&image.elf, Some(stack::STEP_SYMBOL), rules)?;
+    checks.hold_against_painted(stats.painted_stack);
+    let used = used(image, &stats, &checks)?;
     let stages = stats.stages.iter().filter(|stage| stage.calls > 0).map(|stage| Stage {
         name: stage.name.clone(),
         calls: stage.calls,
@@ -118,7 +130,39 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measuremen
         stages: stages.collect(),
         ticks: stats.ticks,
         first_difference: first_difference(host, &replayed).map(|difference| difference.to_string()),
+        checks,
+        used,
     })
+}
+
+/// What the replay image uses, and who of it.
+fn used(image: &Image, stats: &target::replay::ReplayStats, checks: &Checked) -> Result<Used, TargetError> {
+    let size = size::size(&image.elf)?;
+    let stack = checks.stack.unwrap_or(0);
+    let mut ram_by = vec![
+        ("State".to_owned(), stats.state_bytes),
+        ("Config".to_owned(), stats.config_bytes),
+        ("stack of a tick".to_owned(), stack),
+    ];
+    ram_by.extend(size.variables.iter().cloned());
+    Ok(Used {
+        flash: size.flash(),
+        flash_by: size.owners.iter().map(|owner| (owner.name.clone(), owner.flash())).collect(),
+        ram: size.ram() + stats.state_bytes + stats.config_bytes + stack,
+        ram_by,
+        stack: checks.stack,
+        stack_by: checks.path.clone(),
+        instructions: stats.stage(WHOLE).map(|step| step.mean().ceil() as u64),
+        instructions_by: per_tick(stats),
+    })
+}
+
+/// Instructions of the stages over a whole tick: those of a leg count six times. Stages are measured on some ticks only, one
+/// that happens once a tick as often as any.
+fn per_tick(stats: &target::replay::ReplayStats) -> Vec<(String, u64)> {
+    let stages = || stats.stages.iter().filter(|stage| stage.name != WHOLE && stage.calls > 0);
+    let ticks = stages().map(|stage| stage.calls).min().unwrap_or(1);
+    stages().map(|stage| (stage.name.clone(), (stage.sum as f64 / ticks as f64).round() as u64)).collect()
 }
 
 /// The record's inputs on the emulated machine: its trace, and what was measured.

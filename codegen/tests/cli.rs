@@ -11,7 +11,8 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 7] = ["check", "sim", "tune", "dynamics", "identify", "forc", "dump-ir"];
+const COMMANDS: [&str; 11] =
+    ["check", "build", "size", "flash", "sim", "tune", "pil", "dynamics", "identify", "forc", "dump-ir"];
 
 #[test]
 fn arguments_that_make_no_sense_are_usage_errors() {
@@ -26,7 +27,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "-o", ""], "--output"),
         (&["legs.toml", "minimal.toml"], "one spec file is expected"),
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
-        (&["chek", "legs.toml"], "check, sim, tune, robust, dynamics, identify, forc, dump-ir"),
+        (&["chek", "legs.toml"], "check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, dump-ir"),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
         (&["sim"], "<SPEC>"),
@@ -50,6 +51,14 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["tune", "legs.toml", "--seconds", "nan"], "expected a time from 0.01 to 1000 s, found `nan`"),
         (&["tune", "legs.toml", "--trajectory", "case-1"], "--trajectory leg is for six legs"),
         (&["tune", "legs.toml", "--latency", "1"], "--latency is for a spec with [control]"),
+        (&["pil"], "<SPEC>"),
+        (&["pil", "legs.toml", "--scenario", "case-1"], "its one scenario is the leg trajectory"),
+        (&["pil", "legs.toml", "--mode", "pf-pcc"], "expected one of invhys, ewma, pcc"),
+        (&["pil", "legs.toml", "--seconds", "0"], "expected a time from 0.001 to 1000 s, found `0`"),
+        (&["pil", "legs.toml", "--baud", "9600"], "--port"),
+        (&["pil", "reference.toml", "--scenario", "case-3"], "there is no scenario `case-3`"),
+        (&["pil", "reference.toml", "--samples", "100"], "runs at its timing.period"),
+        (&["pil", "reference.toml", "--trajectory", "case-3"], "but not `case-3`"),
         (&["forc"], "--output"),
         (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),
         (&["identify", record], "--drive"),

@@ -9,7 +9,7 @@ use std::fs;
 
 use support::{Folder, repository};
 
-const DOCUMENTS: [&str; 8] = [
+const DOCUMENTS: [&str; 9] = [
     "README.md",
     "ARCHITECTURE.md",
     "docs/control-law.md",
@@ -18,6 +18,7 @@ const DOCUMENTS: [&str; 8] = [
     "docs/tuning.md",
     "docs/robustness.md",
     "docs/supervisor.md",
+    "docs/pil.md",
 ];
 
 fn read(name: &str) -> String {

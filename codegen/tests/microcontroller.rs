@@ -4,6 +4,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
+#[path = "microcontroller/faults.rs"]
+mod faults;
 #[path = "microcontroller/fixture.rs"]
 mod fixture;
 

@@ -233,6 +233,7 @@ fn limit_holds_in_simulation(
     println!("{what}: {found:.3}, confirmed within 5 %");
 }
 
+/// (8) on a platform with modes: where it is stable.
 #[test]
 fn predicted_limits_hold_in_a_fine_step_simulation() {
     let nominal = Conditions::NOMINAL;

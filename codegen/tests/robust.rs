@@ -1,4 +1,4 @@
-//! `specgen robust` as a user runs it: replay to the bit, threads, the gate, what it calls unstable, what it refuses.
+//! `specgen robust` as a user runs it: replay to the bit, threads, the gate, what it calls diverged, what it refuses.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
@@ -72,7 +72,7 @@ fn the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads() {
 }
 
 #[test]
-fn a_platform_beyond_the_gain_that_the_eigenvalues_allow_is_unstable_and_below_it_is_not() {
+fn a_platform_beyond_the_gain_that_the_eigenvalues_allow_diverges_and_below_it_is_not() {
     let folder = Folder::new();
     let compiled = compile(&folder.path("reference.toml")).unwrap();
     assert_eq!(compiled.model.adaptation.mode, AdaptationMode::Pcc);
@@ -84,10 +84,10 @@ fn a_platform_beyond_the_gain_that_the_eigenvalues_allow_is_unstable_and_below_i
         let run = folder.run(&arguments);
         if stable {
             assert_eq!(run.code, 0, "λ {gain:.2}: {run:#?}");
-            assert!(run.stdout.contains("gate: passed (all stable)"), "{}", run.stdout);
+            assert!(run.stdout.contains("gate: passed (none diverged)"), "{}", run.stdout);
         } else {
-            run.says(1, &["not robust: 1 of 1 runs are unstable, the first of them gain"]);
-            assert!(run.stdout.contains("unstable: error beyond 3000 nm after"), "{}", run.stdout);
+            run.says(1, &["not robust: 1 of 1 runs have diverged, the first of them gain"]);
+            assert!(run.stdout.contains("diverged: error beyond 3000 nm after"), "{}", run.stdout);
         }
     }
 }
@@ -126,7 +126,7 @@ fn the_gate_of_options_or_spec_fails_a_build_with_the_reason_and_the_figures() {
     with(&["--max-error", "1 nm", "--quantile", "95"]).says(1, &["95 % quantile of the rms error is"]);
     let passed = with(&["--max-error", "1 um"]);
     assert_eq!(passed.code, 0, "{passed:#?}");
-    assert!(passed.stdout.contains("gate: passed (all stable, largest rms error at most 1000.00 nm)"));
+    assert!(passed.stdout.contains("gate: passed (none diverged, largest rms error at most 1000.00 nm)"));
 
     // For programs the figures come along.
     let judged = with(&["--max-error", "1 nm", "--json"]);

@@ -28,9 +28,20 @@ pub fn repository() -> PathBuf {
     here.parent().unwrap_or(here).to_owned()
 }
 
-/// Where tests build.
+/// Where tests build: a folder for each test binary, as several run at once.
+///
+/// # Panics
+/// If the system cannot name the running binary.
 #[must_use]
 pub fn scratch() -> PathBuf {
+    let binary = std::env::current_exe().expect("a running binary has a name");
+    let stem = binary.file_stem().expect("and not only a folder").to_string_lossy().into_owned();
+    // Cargo appends a hash, which changes with the compiler.
+    builds().join(stem.rsplit_once('-').map_or(&*stem, |(name, _)| name))
+}
+
+/// Where the folders of all test binaries are, and what they share.
+fn builds() -> PathBuf {
     repository().join("target/tests")
 }
 
@@ -104,7 +115,8 @@ impl Emitted {
             panic!("{missing}");
         }
         let _one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(target::build_image(&self.dir, mcu, &scratch().join("build")).unwrap_or_else(|error| panic!("{error}")))
+        // Shared by all test binaries, so that `core` is compiled once; it is locked while one builds.
+        Some(target::build_image(&self.dir, mcu, &builds().join("build")).unwrap_or_else(|error| panic!("{error}")))
     }
 
     /// Input rows of every kind that a tick may meet, for leg or pose set-points.

@@ -151,6 +151,7 @@ fn to_single(motion: &Motion<f64>) -> Motion<f32> {
     Motion { pose: six(motion.pose), rate: six(motion.rate), acceleration: six(motion.acceleration) }
 }
 
+/// M, C, G and J, and with them every step from joint motions to leg forces: (3), (4), (AI.5)–(AI.17).
 #[test]
 fn every_field_agrees_with_the_reference_vectors_and_with_the_lagrangian_of_another_geometry() {
     let (other, states) = asymmetric();
@@ -251,7 +252,7 @@ fn unit(k: usize) -> [f64; 6] {
     std::array::from_fn(|j| if j == k { 1.0 } else { 0.0 })
 }
 
-/// C by Christoffel's symbols of M, so that Ṁ − 2 C is skew; and C ḣ is what the recursion gives.
+/// (AI.16): C by Christoffel's symbols of M, so that Ṁ − 2 C is skew; and C ḣ is what the recursion gives.
 #[test]
 fn the_mass_matrix_less_twice_coriolis_is_skew_and_coriolis_is_that_of_christoffel() {
     for (model, seed) in [(reference_model(), 1), (asymmetric().0, 2)] {
@@ -275,6 +276,7 @@ fn the_mass_matrix_less_twice_coriolis_is_skew_and_coriolis_is_that_of_christoff
     }
 }
 
+/// (4): M is the sum of platform and legs.
 #[test]
 fn the_mass_matrix_is_the_inverse_dynamics_of_unit_accelerations_symmetric_and_positive_definite() {
     for (model, seed) in [(reference_model(), 3), (asymmetric().0, 4)] {
@@ -295,6 +297,7 @@ fn the_mass_matrix_is_the_inverse_dynamics_of_unit_accelerations_symmetric_and_p
     }
 }
 
+/// The derivative of (AI.2), and with it the joint velocities (AI.5) along the legs.
 #[test]
 fn the_jacobian_is_the_derivative_of_the_leg_displacements() {
     for (model, seed) in [(reference_model(), 5), (asymmetric().0, 6)] {
@@ -330,6 +333,7 @@ fn potential(model: &Model, pose: &[f64; 6]) -> f64 {
     sum * GRAVITY
 }
 
+/// With (AI.9) and (AI.14): kinetic energy from M, potential energy from where the mass centres are.
 #[test]
 fn energy_of_free_motion_is_conserved_to_the_order_of_the_integrator() {
     let model = asymmetric().0;

@@ -124,6 +124,23 @@ fn units_and_swapped_columns_are_named_with_times() {
     })
     .unwrap_err();
     expect(&all, "E0604", "(at 16.008 s)");
+    // With a rest before the curves, as real records have, the drive looks like a stuck gauge first.
+    let all = with(|c| {
+        let rest = 4000;
+        let drive = std::mem::take(&mut c.drive);
+        let displacement = std::mem::take(&mut c.displacement);
+        let interval = c.time[1] - c.time[0];
+        c.time = (0..rest + drive.len()).map(|k| k as f64 * interval).collect();
+        // It creeps to its rest by a tenth of its range.
+        let creep = |k: usize| 5e-6 * (1.0 - k as f64 / rest as f64);
+        let noise = |k: usize| if k.is_multiple_of(2) { 2e-9 } else { -2e-9 };
+        c.drive = (0..rest).map(|k| (displacement[0] + creep(k) + noise(k)) * 1e6).collect();
+        c.drive.extend(displacement.iter().enumerate().map(|(k, y)| (y + noise(k)) * 1e6));
+        c.displacement = vec![drive[0] * 1e-6; rest];
+        c.displacement.extend(drive.iter().map(|u| u * 1e-6));
+    })
+    .unwrap_err();
+    expect(&all, "E0604", "from 0 s to");
     let all = with(|c| c.displacement.iter_mut().for_each(|y| *y = -*y)).unwrap_err();
     expect(&all, "E0514", "between 0 s and 16.008 s the drive goes from 0 V to 100 V");
 }

@@ -39,7 +39,7 @@ fn emitted(name: &str, edits: &[(&str, &str)], poses: &[[f64; 6]]) -> (Vec<[f64;
     (rounded, displacements)
 }
 
-/// |P + R P_i − B_i| − l₀ with R = Rz Ry Rx, in pairs.
+/// |P + R P_i − B_i| − l₀ with R = Rz Ry Rx, in pairs: (AI.1), (AI.2).
 fn textbook(pose: &[f64; 6], base: &[[f64; 3]; 6], platform: &[[f64; 3]; 6], height: f64) -> [f64; 6] {
     let r = Pair::rotation([pose[3], pose[4], pose[5]]);
     let rest = [0.0, 0.0, height];
@@ -62,6 +62,7 @@ fn worst(a: &[[f64; 6]], b: &[[f64; 6]]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).fold(0.0, |worst, (a, b)| f64::max(worst, (a - b).abs()))
 }
 
+/// (AI.1), (AI.2) in difference form.
 #[test]
 fn f64_is_exact_to_a_femtometre_and_f32_to_50_picometres() {
     let poses = poses();

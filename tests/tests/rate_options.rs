@@ -1,8 +1,10 @@
 //! Rate-dependent options of the emitted controller: equal bits on host and microcontroller, and what they are worth on the
 //! reference plant. `cargo test --release -p specgen-tests --test rate_options -- --nocapture` prints the table of
-//! `docs/hysteresis.md`.
+//! `docs/hysteresis.md`, and what a tick costs with each.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
+
+mod figures;
 
 use host_sim::controller::TickController;
 use host_sim::forc::ReversalExperiment;
@@ -14,10 +16,13 @@ use specgen::everett::EverettTable;
 use specgen::identify::rate::{RateIdentified, RateModel, RateOption, identify_rate, spec_lines, write_rate_csv};
 use specgen::identify::{Options, Record, identify, parse_record, write_table_csv};
 use specgen::model::Mcu;
+use specgen::target::Image;
 use specgen::verify;
 use specgen_tests::{Emitted, column, host_trace, integers};
 
 const TICKS: usize = 30_000;
+/// Ticks that instructions are counted over.
+const EXERCISE: u32 = 5000;
 const CREEP: &str = "memory  = 64\nrate = \"creep\"\ncreep_times = [\"2 s\", \"50 ms\", \"4 ms\"]\ncreep_weights = [0.03, 0.05, 0.08]\ndead_time = \"0.35 ms\"";
 const DYNAMIC: &str = "memory  = 8\nrate = \"dynamic-preisach\"\nrate_tables = [\"records/mu1.csv\"]";
 /// STATIC_INVERSE.
@@ -63,7 +68,42 @@ fn equal_bits(name: &str, spec: &str, edits: &[(&str, &str)], mcus: &[Mcu], dyna
         let difference = first_difference(&host, &target);
         assert!(difference.is_none(), "{name}, {mcu:?}: {}", difference.unwrap());
         println!("{name}, {mcu:?}: {TICKS} ticks, no differing word");
+        cost(name, &emitted, &image);
     }
+}
+
+/// What a tick of the exercise costs, against the committed figures in `tests/budgets/rate.json`; `SPECGEN_BLESS=1` renews
+/// them. The exercise is what the figures without the option are from.
+fn cost(name: &str, emitted: &Emitted, image: &Image) {
+    let mut controller = emitted.controller();
+    let (model, ir) = (&emitted.compiled.model, &emitted.compiled.ir);
+    let host = verify::exercise(&mut controller, model, ir, EXERCISE).unwrap();
+    let m = verify::measure(image, &controller.default_config(), &host).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(m.first_difference, None, "{name}");
+    assert_eq!(m.checks.faults, [], "{name}");
+    let (step, leg) = (m.stage("step").unwrap(), m.stage("actuate").unwrap());
+    let name = format!("{name}, {:?}", image.mcu);
+    let stack = m.checks.stack.unwrap();
+    println!(
+        "{name}: step {:.0} mean {} max, actuate {:.0} mean {} max, State {}, stack {stack}, flash {}",
+        step.mean, step.max, leg.mean, leg.max, m.state, m.flash
+    );
+    // Bounded, whatever the data: the inverse of (6) ends after a fixed number of steps.
+    assert!(step.max <= 6 * leg.max + 4500, "{name}: {} instructions at most", step.max);
+    let figures = [
+        ("instructions, step", step.mean.round()),
+        ("instructions, actuate", leg.mean.round()),
+        ("instructions, actuate at most", leg.max as f64),
+        ("bytes of State", m.state as f64),
+        ("bytes of stack", stack as f64),
+    ];
+    let figures = figures.map(|(what, value)| (what.to_owned(), value)).into();
+    figures::hold("rate.json", &name, &m.compiler, figures);
+    // The gate names who costs most.
+    let mut tight = model.target.clone();
+    tight.instructions = Some(m.used.instructions.unwrap() - 1);
+    let words = specgen::budget::over(&tight, &m.used).join("; ");
+    assert!(words.contains("shrink it by 1; most of it: "), "{words}");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use std::io;
 use std::path::Path;
 
 mod make;
+mod trace;
 
 /// Files by path relative to [`Generated::folder`], with `/` between the parts.
 pub type Files = BTreeMap<String, String>;
@@ -26,9 +27,10 @@ const GENERATED: &[Generated] = &[
     // Records first: what is compiled below reads them.
     Generated { folder: "specs/records", whole: true, make: make::records },
     Generated { folder: "specs", whole: false, make: make::schema },
-    Generated { folder: "docs", whole: false, make: make::docs },
     Generated { folder: "firmware/controller", whole: true, make: make::reference_controller },
     Generated { folder: "tests/golden", whole: true, make: make::goldens },
+    // Last: it names lines of the emitted files above.
+    Generated { folder: "docs", whole: false, make: make::docs },
 ];
 
 /// Compares every folder with what would be generated.

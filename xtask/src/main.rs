@@ -1,5 +1,6 @@
 //! Developer commands: `cargo xtask setup`, `cargo xtask test`, `cargo xtask bless`.
 
+mod binaries;
 mod generated;
 mod run;
 mod setup;

@@ -1,7 +1,7 @@
 //! What each command does, in order.
 
 use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::{generated, setup};
+use crate::{binaries, generated, setup};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -29,10 +29,7 @@ pub fn test(root: &Path) -> ExitCode {
     }
     report.step("formatting", || formatting(root));
     report.step("lints", || lints(root));
-    report.step("tests", || {
-        let tests = ["test", "--release", "--workspace", "--no-fail-fast"];
-        expect_success(cargo(root, &tests), "see the failed tests above")
-    });
+    report.step("tests", || binaries::test(root));
     report.step("documentation", || {
         let mut doc = cargo(root, &["doc", "--release", "--workspace", "--no-deps", "--quiet"]);
         doc.env("RUSTDOCFLAGS", "-D warnings");

@@ -10,13 +10,14 @@ use serde_json::json;
 
 use super::check::describe;
 use super::ui::{Failure, Ui};
+use crate::budget::{self, group};
 use crate::compile::{self, Compiled};
 use crate::target::{self, TargetError};
 use crate::verify::{self, Measurement};
 use crate::workspace;
 
 /// Ticks of the exercise that is run on host and emulated machine.
-const TICKS: u32 = 20_000;
+pub(super) const TICKS: u32 = 20_000;
 
 /// Arguments of the main job.
 #[derive(Args, Debug)]
@@ -204,43 +205,10 @@ impl Summary {
     }
 }
 
-/// What exceeds the spec's `[target.budget]`, in words.
+/// What exceeds the spec's `[target.budget]` or the part, and what the image must not do, in words.
 fn over_budget(compiled: &Compiled, summary: &Summary) -> Vec<String> {
     let Some(m) = &summary.measurement else { return Vec::new() };
-    let target = &compiled.model.target;
-    let step = m.stage("step").map(|stage| stage.mean.ceil() as u64);
-    let mut over: Vec<String> = [
-        ("flash", Some(m.flash), target.flash, "bytes"),
-        ("ram", Some(m.ram), target.ram, "bytes"),
-        ("stack", m.stack_bound, target.stack, "bytes"),
-        ("instructions", step, target.instructions, "per tick"),
-    ]
-    .into_iter()
-    .filter_map(|(what, used, budget, unit)| match (used, budget) {
-        (Some(used), Some(budget)) if used > budget => {
-            Some(format!("{what} takes {} {unit}, target.budget.{what} allows {}", group(used), group(budget)))
-        }
-        _ => None,
-    })
-    .collect();
-    if target.stack.is_some() && m.stack_bound.is_none() {
-        over.push("the stack of a tick cannot be bounded".to_owned());
-    }
-    if !m.forbidden_symbols.is_empty() {
-        over.push(format!("the image holds {}", m.forbidden_symbols.join(", ")));
-    }
+    let mut over = budget::over(&compiled.model.target, &m.used);
+    over.extend(m.checks.faults.iter().map(|fault| fault.text.clone()));
     over
-}
-
-/// A count with thousands separated.
-fn group(value: u64) -> String {
-    let digits = value.to_string();
-    let mut out = String::new();
-    for (k, digit) in digits.chars().enumerate() {
-        if k > 0 && (digits.len() - k).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(digit);
-    }
-    out
 }

@@ -19,7 +19,7 @@ use crate::spec::quantity::{self, Dimension};
 /// Set by Ctrl-C.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Part of the stroke beyond which an error counts as unstable, unless asked otherwise.
+/// Part of the stroke beyond which an error counts as diverged, unless asked otherwise.
 const BOUND: f64 = 0.05;
 /// Lines of progress of a run whose output is not looked at.
 const LINES: usize = 20;
@@ -56,9 +56,9 @@ pub struct Arguments {
     /// Quantile of the draws that the gate compares, %; the largest of draws and corners if not given.
     #[arg(long, value_name = "PERCENT", value_parser = percent, allow_negative_numbers = true)]
     quantile: Option<f64>,
-    /// Error beyond which a run counts as unstable; 5 % of the stroke if not given.
+    /// Error beyond which a run counts as diverged; 5 % of the stroke if not given.
     #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
-    unstable_above: Option<f64>,
+    diverged_above: Option<f64>,
     /// Worker threads; as many as the machine has if not given. The result does not depend on it.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         leg: &leg,
         trajectory: followed.choice,
         noise: !arguments.plant.no_noise,
-        bound: arguments.unstable_above.unwrap_or(BOUND * compiled.model.actuator.stroke),
+        bound: arguments.diverged_above.unwrap_or(BOUND * compiled.model.actuator.stroke),
     };
     // A second Ctrl-C while this one is heeded does nothing; without a handler the first would end it all.
     let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));

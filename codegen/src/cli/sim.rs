@@ -1,8 +1,8 @@
 //! `specgen sim`: the paper's experiments with the emitted controller; `specgen forc`: the experiment that records reversal
 //! curves. Both on simulated machines that are not of the controller's model class.
 
-mod legs;
-mod platform;
+pub(super) mod legs;
+pub(super) mod platform;
 
 use std::fmt::Display;
 use std::fs;

@@ -117,6 +117,14 @@ codes! {
         "The controller chooses among at most 32.";
     RATE_KEYS = "E0327", "keys that do not fit hysteresis.rate",
         "rate = \"dynamic-preisach\" takes rate_tables, rate = \"creep\" takes creep_times and creep_weights, one weight for each time and less than 1 in all. A key of another option would silently do nothing.";
+    SCALAR_WITHOUT_FPU = "E0330", "double precision on a single-precision FPU",
+        "The FPU of a Cortex-M4F computes `f32`. In `f64` every operation is a call of software, and a tick takes ten times as long. Choose `controller.scalar = \"f32\"`, whose figures are in the README, or a part with a double-precision FPU.";
+    BUDGET_BEYOND_PART = "E0331", "a budget larger than the part",
+        "The microcontroller has less memory than the budget allows, so the budget would let an image pass that does not fit. RAM is that of the region images are linked into.";
+    TOO_FEW_BITS = "E0332", "converter too coarse for the precision asked for",
+        "A code of `dac.bits` over `dac.range` moves the leg, or the platform, by more than `requirements.precision`. The help says how many bits would do. Feedback does not help: what lies between two codes cannot be reached, only crossed.";
+    WRONG_PART = "E0333", "firmware for another part than the spec's",
+        "Scalar, margins of time and memory belong to `target.mcu`. A board with another core is refused; one with the same core is built and said so.";
     UNSTABLE_STATIC = "E0401", "adaptation unstable on any leg",
         "With these weights and the declared gain_ratio the loop grows even on a leg without dynamics (Appendix B). The help names the largest weight that would do.";
     UNSTABLE_SAMPLED = "E0402", "adaptation unstable on this leg",
@@ -291,6 +299,8 @@ codes! {
         "A table named in hysteresis.rate_tables must have the cells of hysteresis.grid over the range of actuator.voltage: identify both tables with these.";
     RATE_NOT_IN_STABILITY = "W0643", "rate term not part of the stability check",
         "The stability of the adaptation was checked with the static inverse. The inverse of (6) can raise the gain of fast corrections, by a factor of two at most, before it falls back to the static one: keep gain_ratio wide enough for that.";
+    STATIC_TABLE_WITH_CREEP = "W0648", "static table beside creep terms",
+        "A table that is fitted to a record of reversal curves alone holds part of the creep, which the creep terms then compensate once more: take the table that was fitted together with them.";
     STIFFNESS_SIGN = "E0644", "negative stiffness",
         "Force counts positive where it pushes the displacement up.";
     STIFFNESS_DRIVE = "E0645", "drive that moves while the stiffness is measured",
@@ -317,8 +327,6 @@ codes! {
         "More than a hundredth of the range: probably a slip of the unit. The paper prints 2.2 um for 2.2 nm.";
     SENSOR_RANGE = "W0304", "gauge range does not fit the stroke",
         "The range leaves out the displacement at rest, or is far smaller or larger than the stroke.";
-    DOUBLE_ON_SINGLE = "W0305", "double precision on a single-precision FPU",
-        "The Cortex-M4F computes f64 in software, some twenty times slower.";
     GYRATION_ODD = "W0306", "mass and inertia fit the size badly",
         "The radius of gyration is unusual for the size of the platform, though possible.";
     UNUSED_WEIGHT = "W0307", "weight that the mode does not use",

@@ -110,7 +110,7 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
                 },
                 constants: quote! {
                     /// Creep of every leg over a tick of `timing.period`; from `hysteresis.creep_times` and `creep_weights`.
-                    static CREEP_OF_LEGS: Creep<Real, CREEP> = Creep {
+                    pub(crate) static CREEP_OF_LEGS: Creep<Real, CREEP> = Creep {
                         gains: [#gains],
                         weights: [#weights],
                         carried: [#carried],
@@ -146,7 +146,7 @@ fn statics(
         let nodes = literal::reals(scalar, nodes);
         quote! {
             #[doc = #doc]
-            static #name: [Real; NODES] = [#nodes];
+            pub(crate) static #name: [Real; NODES] = [#nodes];
         }
     });
     (statics.collect(), table_of_leg.iter().map(|k| names[*k].clone()).collect())

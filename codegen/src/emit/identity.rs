@@ -4,7 +4,7 @@ use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
 use super::literal;
-use crate::ir::Ir;
+use crate::ir::{Ir, Scalar};
 
 /// First line of the crate's documentation.
 pub fn title(ir: &Ir) -> String {
@@ -15,12 +15,15 @@ pub fn title(ir: &Ir) -> String {
 pub fn emit(ir: &Ir) -> TokenStream {
     let scalar = format_ident!("f{}", ir.scalar.bits().to_string());
     let bits = literal::count(ir.scalar.bits() as usize);
+    let period = literal::real(Scalar::F64, ir.defaults.period);
     let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
     quote! {
         /// Floating-point type of this controller; from `controller.scalar`.
         pub type Real = #scalar;
         /// Width of [`Real`].
         pub const SCALAR_BITS: u32 = #bits;
+        /// Control period, s; from `timing.period`.
+        pub const PERIOD_SECONDS: f64 = #period;
         /// Number of legs.
         pub const LEGS: usize = 6;
         /// Name of the platform.

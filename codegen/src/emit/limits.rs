@@ -14,6 +14,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let (cells_at_zero, cells_per_code, codes_per_cell) =
         (real(a.cells_at_zero), real(a.cells_per_code), real(a.codes_per_cell));
     let (code_min, code_max) = (literal::integer(a.code_min), literal::integer(a.code_max));
+    let dac_bits = literal::integer(a.bits.cast_signed());
     let codes_doc = format!(
         " Lowest and highest code whose voltage lies within {} V … {} V; from `actuator.voltage` and `dac`.",
         a.voltage[0], a.voltage[1]
@@ -63,6 +64,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
             cells_per_code: #cells_per_code,
             codes_per_cell: #codes_per_cell,
         };
+        /// Bits of a code; from `dac.bits`.
+        pub const DAC_BITS: u32 = #dac_bits;
         #[doc = #codes_doc]
         pub const CODES: [i32; 2] = [#code_min, #code_max];
         #of_legs

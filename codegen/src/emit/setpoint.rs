@@ -112,7 +112,7 @@ fn path(scalar: Scalar, index: usize, name: &str, path: &Path) -> (TokenStream, 
             (
                 quote! {
                     #[doc = #doc]
-                    static #constant: [Segment<Real>; #count] = [#(#segments),*];
+                    pub(crate) static #constant: [Segment<Real>; #count] = [#(#segments),*];
                 },
                 quote! {
                     Trajectory::Segments { start: [#start], segments: &#constant, ticks: #ticks, end: [#end] }
@@ -132,7 +132,7 @@ fn path(scalar: Scalar, index: usize, name: &str, path: &Path) -> (TokenStream, 
             (
                 quote! {
                     #[doc = #doc]
-                    static #constant: [Row<Real>; #count] = [#(#rows),*];
+                    pub(crate) static #constant: [Row<Real>; #count] = [#(#rows),*];
                 },
                 quote! {
                     Trajectory::Table(Table {

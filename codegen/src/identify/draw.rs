@@ -193,7 +193,12 @@ pub fn response(report: &ResponseReport) -> String {
         shown.iter().filter(|b| inside(b.frequency)).map(|b| size(b.h)).filter(|s| *s > 0.0).collect();
     let range = super::sanity::extent(&sizes);
     let mut magnitude = logarithmic(Panel::new("Magnitude", "frequency (Hz)", "|H| (µm/V)"), [range.0, range.1])
-        .with("measured H1", BLUE, Mark::Dots(1.6), shown.iter().map(|b| [b.frequency, size(b.h)]).collect())
+        .with(
+            "measured H1",
+            BLUE,
+            Mark::Dots(1.6),
+            shown.iter().filter(|b| inside(b.frequency)).map(|b| [b.frequency, size(b.h)]).collect(),
+        )
         .with("model", ORANGE, Mark::Line(1.6), modelled.iter().map(|m| [m.0, m.1 * 1e6]).collect());
     magnitude.y_scale = Scale::Log;
     // The measured phase is shown on the sheet nearest to the model's, which does not jump.

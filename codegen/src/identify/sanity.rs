@@ -10,6 +10,8 @@ pub const MIN_SAMPLES: usize = 100;
 const GAP: f64 = 10.0;
 /// The displacement may stay exactly equal while the drive travels this share of its range; longer is a stuck or limited sensor.
 const STUCK_TRAVEL: f64 = 0.05;
+/// White noise of a command, as a share of its range, is below this (rounding to five digits); of a gauge it is above.
+const COMMANDED_NOISE: f64 = 3e-6;
 /// A displacement range outside these bounds (m) is unusual for a piezo actuator and suggests another unit.
 pub(crate) const PLAUSIBLE_RANGE: [f64; 2] = [50e-9, 2e-3];
 
@@ -83,6 +85,7 @@ fn check_not_constant(time: &[f64], column: &[f64], name: &str, which: usize, fi
 fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
     let (low, high) = extent(drive);
     let (bottom, top) = extent(displacement);
+    let swapped = is_commanded(displacement) && !is_commanded(drive);
     let mut first = 0;
     while first < drive.len() {
         let value = displacement[first];
@@ -90,6 +93,16 @@ fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64
         let (run_low, run_high) = extent(&drive[first..first + run]);
         if run_high - run_low > STUCK_TRAVEL * (high - low) {
             let um = value * 1e6;
+            if swapped {
+                let message = format!(
+                    "from {} s to {} s `displacement_um` stands at {um:.4} while `drive_V` goes through {run_low} to {run_high} with noise on it",
+                    time[first],
+                    time[first + run - 1]
+                );
+                let help = "the columns `drive_V` and `displacement_um` seem to be swapped";
+                findings.error("E0604", Some(lines[first]), message, help);
+                return;
+            }
             let what = if value == bottom || value == top { "is limited at" } else { "is stuck at" };
             let message = format!(
                 "from {} s to {} s the displacement {what} {um} um for {run} samples while the drive goes through {run_low} V to {run_high} V",
@@ -105,6 +118,16 @@ fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64
         }
         first += run;
     }
+}
+
+/// Whether a column has the look of a command, not of a measurement: next to no noise. From fourth differences, which see
+/// nothing of a ramp and next to nothing of a sine.
+fn is_commanded(column: &[f64]) -> bool {
+    let (low, high) = extent(column);
+    let mut fourth: Vec<f64> =
+        column.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs()).collect();
+    // The median of |N(0, s)| is 0.6745 s; fourth differences of white noise have the variance 70 σ².
+    median(&mut fourth) / (0.674_489_75 * 70f64.sqrt()) < COMMANDED_NOISE * (high - low)
 }
 
 /// Displacement must grow with the drive: a Preisach model with non-negative weights cannot do otherwise.

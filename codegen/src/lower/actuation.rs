@@ -44,6 +44,7 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<(Actuation, i32), V
     }
     let max_step = if step >= f64::from(full_scale) { full_scale } else { step as i32 };
     let actuation = Actuation {
+        bits: model.dac.bits,
         volts_at_zero: scalar.round(volts_at_zero),
         volts_per_code: scalar.round(volts_per_code),
         cells_at_zero: scalar.round((volts_at_zero - volts_min) / cell),

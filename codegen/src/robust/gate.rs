@@ -28,7 +28,7 @@ impl Gate {
             .map(|(member, _)| member.name.as_str())
             .collect();
         if let Some(first) = lost.first() {
-            reasons.push(format!("{} of {} runs are unstable, the first of them {first}", lost.len(), runs.len()));
+            reasons.push(format!("{} of {} runs have diverged, the first of them {first}", lost.len(), runs.len()));
         }
         type Figure = fn(&Figures) -> f64;
         let looked_at: [(Option<f64>, &str, &str, Figure); 2] = [
@@ -48,9 +48,9 @@ impl Gate {
                 Some(found) => {
                     reasons.push(format!("{which} rms {what} is {found:.2} {unit}, above {limit:.2} {unit}"));
                 }
-                // Of unstable runs the first reason speaks.
+                // Of diverged runs the first reason speaks.
                 None if compared.is_empty() => reasons.push(format!("no draw to take the {which} rms {what} from")),
-                None => reasons.push(format!("{which} rms {what} falls on an unstable run")),
+                None => reasons.push(format!("{which} rms {what} falls on a run that diverged")),
             }
         }
         reasons
@@ -66,7 +66,7 @@ mod tests {
         let deviation = Deviation::common(Factor::nominal);
         let outcome = match error_nm {
             Some(error_nm) => Outcome::Ran(Figures { error_nm, ..Figures::default() }),
-            None => Outcome::Unstable { time: Some(0.1), reason: "test".to_owned(), limited_percent: 0.0 },
+            None => Outcome::Diverged { time: Some(0.1), reason: "test".to_owned(), limited_percent: 0.0 },
         };
         (Member { name: name.to_owned(), seed: 1, drawn, deviation }, outcome)
     }
@@ -83,11 +83,11 @@ mod tests {
     }
 
     #[test]
-    fn an_unstable_run_fails_whatever_is_asked_for() {
+    fn a_diverged_run_fails_whatever_is_asked_for() {
         let runs = [run("all-soft", false, None), run("7", true, Some(10.0))];
         for quantile in [None, Some(50.0)] {
             let gate = Gate { error_nm: None, orientation_nrad: None, quantile };
-            assert_eq!(gate.reasons(&runs), ["1 of 2 runs are unstable, the first of them all-soft"]);
+            assert_eq!(gate.reasons(&runs), ["1 of 2 runs have diverged, the first of them all-soft"]);
         }
         let gate = Gate { error_nm: Some(1e9), orientation_nrad: None, quantile: None };
         assert_eq!(gate.reasons(&runs).len(), 2);

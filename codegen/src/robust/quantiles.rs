@@ -1,4 +1,4 @@
-//! Quantiles of runs, some of which have no figure because they were unstable.
+//! Quantiles of runs, some of which have no figure because they diverged.
 
 /// The smallest figure that at least `percent` (0 to 100) of all runs do not exceed: nearest rank, so that it is the figure
 /// of a run. A run without one exceeds everything; none if the quantile falls on such a run, or there is no run.

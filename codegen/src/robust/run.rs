@@ -44,7 +44,7 @@ pub enum Outcome {
     /// It kept the bound.
     Ran(Figures),
     /// It did not, or never came to its bias pose.
-    Unstable {
+    Diverged {
         /// Since the start of the trajectory, s; none before it.
         time: Option<f64>,
         /// In words.
@@ -60,7 +60,7 @@ impl Outcome {
     pub fn figures(&self) -> Option<&Figures> {
         match self {
             Self::Ran(figures) => Some(figures),
-            Self::Unstable { .. } => None,
+            Self::Diverged { .. } => None,
         }
     }
 }
@@ -77,7 +77,7 @@ pub struct Study<'a> {
     pub trajectory: TrajectoryChoice,
     /// Whether there is noise.
     pub noise: bool,
-    /// Error beyond which a run counts as unstable, m; angles count with the radius of the platform joints.
+    /// Error beyond which a run counts as diverged, m; angles count with the radius of the platform joints.
     pub bound: f64,
 }
 
@@ -89,7 +89,7 @@ impl Study<'_> {
     pub fn run(&self, member: &Member) -> Result<Outcome, RunError> {
         match self.simulate(member) {
             Err(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. })) => {
-                Ok(Outcome::Unstable { time: None, reason: error.to_string(), limited_percent: 0.0 })
+                Ok(Outcome::Diverged { time: None, reason: error.to_string(), limited_percent: 0.0 })
             }
             other => other,
         }
@@ -144,7 +144,7 @@ impl Study<'_> {
         if let Some(time) = lost {
             let reason = format!("error beyond {:.0} nm", self.bound * 1e9);
             let limited_percent = figures.limited_percent;
-            return Ok(Outcome::Unstable { time: Some(time), reason, limited_percent });
+            return Ok(Outcome::Diverged { time: Some(time), reason, limited_percent });
         }
         let rms = |sum: f64| libm::sqrt(sum / ticks.max(1) as f64) * 1e9;
         figures.error_nm = rms(square);

@@ -59,6 +59,7 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
         },
         target: target(f)?,
         task_space: task_space::task_space(f)?,
+        precision: f.number("requirements.precision"),
         supervisor: supervisor(f)?,
         robust: robust(f),
         spans: f.spans(),
@@ -163,7 +164,7 @@ fn robust(f: &Fields) -> Robust {
 fn target(f: &Fields) -> Option<Target> {
     let bytes = |key: &str| f.number(key).map(|bytes| bytes as u64);
     Some(Target {
-        mcu: if f.choice("target.mcu")? == "mps2-an386" { Mcu::Mps2An386 } else { Mcu::Mps2An500 },
+        mcu: Mcu::named(f.choice("target.mcu")?)?,
         flash: bytes("target.budget.flash"),
         ram: bytes("target.budget.ram"),
         stack: bytes("target.budget.stack"),

@@ -11,6 +11,7 @@ mod mechanics;
 mod rate;
 mod records;
 mod robust;
+mod target;
 mod trajectories;
 
 use std::path::Path;
@@ -36,8 +37,9 @@ const CHECKS: &[Check] = &[
     electrical::stroke_fits_gain,
     electrical::resonance_below_tick_rate,
     electrical::sensor_fits,
-    electrical::scalar_fits_fpu,
-    electrical::budget_in_bytes,
+    target::scalar_fits_fpu,
+    target::budget_in_bytes,
+    target::budget_fits_part,
     adaptation::alternatives,
     adaptation::weights_for_mode,
     adaptation::bandwidths_fit_period,

@@ -1,12 +1,12 @@
 //! Jury tests of Appendix B for a leg without dynamics.
 
-/// λ below which EWMA is stable: 2/ω. (AII.18) prints 2, which is its ω = 1 case.
+/// λ below which EWMA is stable, from the pole 1 − λω of (AII.15): 2/ω. (AII.18) prints 2, which is its ω = 1 case.
 #[must_use]
 pub fn ewma_limit(weight: f64) -> f64 {
     2.0 / weight
 }
 
-/// λ below which PCC is stable: 4/(2ω_Σ − ω_Π), the third inequality of (AII.19); the others never bind for weights in (0, 1].
+/// λ below which PCC is stable, from the poles of (AII.17): 4/(2ω_Σ − ω_Π), the third inequality of (AII.19); the others never bind for weights in (0, 1].
 #[must_use]
 pub fn pcc_limit(level_weight: f64, drift_weight: f64) -> f64 {
     4.0 / (2.0 * (level_weight + drift_weight) - level_weight * drift_weight)
@@ -44,12 +44,14 @@ mod tests {
         disturbance_error.abs() < 1e-3
     }
 
+    /// (AII.18) corrected, (AII.19).
     #[test]
     fn the_paper_s_weights_have_the_limits_of_appendix_b() {
         assert!((ewma_limit(0.252) - 7.937).abs() < 1e-3);
         assert!((pcc_limit(0.252, 0.011) - 7.645).abs() < 1e-3);
     }
 
+    /// The poles of (AII.15) and (AII.17): (AII.18) corrected and (AII.19) against the loop itself.
     #[test]
     fn jury_predicts_whether_the_loop_settles() {
         for level in [0.05, 0.252, 0.6, 1.0] {

@@ -20,11 +20,16 @@ pub struct Image {
     pub mcu: Mcu,
     /// The ELF file.
     pub elf: Vec<u8>,
+    /// Where cargo left it; the next build into the same folder overwrites it.
+    pub path: PathBuf,
     /// `rustc --version` of the compiler that made it.
     pub compiler: String,
 }
 
-/// Builds `dir/qemu` for `mcu`, with the toolchain that [`toolchain::find`] finds.
+/// Folder of the image that runs in QEMU.
+pub const EMULATED: &str = "qemu";
+
+/// Builds `dir/qemu` for the core of `mcu`, with the toolchain that [`toolchain::find`] finds.
 ///
 /// `target_dir` keeps what can be used again: share it between builds. It is locked while one runs.
 /// `Cargo.lock` is respected; nothing is downloaded if the crates are in cargo's cache.
@@ -41,20 +46,59 @@ pub fn build_image(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, Tar
 /// # Errors
 /// As [`build_image`].
 pub fn build_image_with(toolchain: &Toolchain, dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
-    let package = dir.join("qemu");
-    let what = format!("{} for {}", package.display(), mcu.machine());
+    build_program(toolchain, dir, EMULATED, mcu, target_dir, &["--bin", "replay"])
+}
+
+/// Builds the image of `dir/qemu` that [`pil`](crate::pil) talks to, as [`build_image`] does that of the replay.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_pil(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
+    build_program(&toolchain::find()?, dir, EMULATED, mcu, target_dir, &["--bin", "pil", "--features", "pil"])
+}
+
+/// Builds the firmware in `dir/folder` for `mcu`.
+///
+/// # Errors
+/// As [`build_image`].
+pub fn build_folder(
+    toolchain: &Toolchain,
+    dir: &Path,
+    folder: &str,
+    mcu: Mcu,
+    target_dir: &Path,
+) -> Result<Image, TargetError> {
+    build_program(toolchain, dir, folder, mcu, target_dir, &[])
+}
+
+fn build_program(
+    toolchain: &Toolchain,
+    dir: &Path,
+    folder: &str,
+    mcu: Mcu,
+    target_dir: &Path,
+    program: &[&str],
+) -> Result<Image, TargetError> {
+    let package = dir.join(folder);
+    let place = if folder == EMULATED { mcu.machine() } else { mcu.part().name };
+    let what = format!("{} for {place}", package.display());
     // A folder per part: they differ in flags only, and cargo would build everything again at each change.
-    let target_dir = target_dir.join(mcu.machine());
+    let target_dir = target_dir.join(place);
     let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &[], locked: true };
+    let cpu = format!("-Ctarget-cpu={}", mcu.core());
+    // A package may have several images; the one that is meant comes last.
     let link = |command: &mut Command| {
         cargo_artifact(command, &request, &what, |message| message["executable"].as_str().map(PathBuf::from))
     };
-    let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
-    let executable = link(&mut command).map_err(|error| match error {
+    let cargo = || {
+        let mut command = toolchain.cargo_build(&[&cpu]);
+        command.args(program);
+        command
+    };
+    let executable = link(&mut cargo()).map_err(|error| match error {
         TargetError::PanicPath { what, text } => {
             // Once more without the proof, to see where the panic paths are.
-            let mut command = toolchain.cargo_build(&[mcu.target_cpu()]);
-            let traced = link(command.env("SPECGEN_LOCATE_PANICS", "1"));
+            let traced = link(cargo().env("SPECGEN_LOCATE_PANICS", "1"));
             let sites = traced.and_then(|image| panics::sites(&image.bytes));
             // The first error stands whether or not the search for its cause succeeds.
             let text = sites.map_or(text, |sites| sites.join("\n"));
@@ -62,33 +106,20 @@ pub fn build_image_with(toolchain: &Toolchain, dir: &Path, mcu: Mcu, target_dir:
         }
         other => other,
     })?;
-    Ok(Image { mcu, elf: executable.bytes, compiler: toolchain.version.clone() })
+    Ok(Image { mcu, elf: executable.bytes, path: executable.path, compiler: toolchain.version.clone() })
 }
 
 impl Mcu {
-    /// QEMU's name of the machine, which is also the folder name of its builds.
+    /// QEMU's name of the machine with this core, which is also the folder name of its builds.
     #[must_use]
     pub fn machine(self) -> &'static str {
-        match self {
-            Self::Mps2An500 => "mps2-an500",
-            Self::Mps2An386 => "mps2-an386",
-        }
+        self.part().machine
     }
 
     /// Name of the core, for the emulator.
     #[must_use]
     pub fn core(self) -> &'static str {
-        match self {
-            Self::Mps2An500 => "cortex-m7",
-            Self::Mps2An386 => "cortex-m4",
-        }
-    }
-
-    fn target_cpu(self) -> &'static str {
-        match self {
-            Self::Mps2An500 => "-Ctarget-cpu=cortex-m7",
-            Self::Mps2An386 => "-Ctarget-cpu=cortex-m4",
-        }
+        self.part().core
     }
 }
 

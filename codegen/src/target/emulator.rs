@@ -4,7 +4,7 @@ use super::build::Image;
 use super::error::TargetError;
 use super::process::{self, find_in_path, first_line};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, ExitStatus};
 use std::time::Duration;
 
 /// QEMU for ARM.
@@ -17,13 +17,14 @@ pub struct Emulator {
 }
 
 /// How the firmware says why it ended: the codes of `firmware/qemu/src/semihosting.rs`.
-const EXITS: [(i32, &str); 6] = [
+const EXITS: [(i32, &str); 7] = [
     (10, "the firmware cannot open config.bin"),
     (11, "config.bin does not hold as many words as the controller's Config"),
     (12, "the firmware cannot open input.bin"),
     (13, "input.bin ends within a row: rows must hold as many words as the controller's TickInput"),
     (14, "the firmware cannot write output.bin or stats.bin; is the disk full?"),
     (15, "the processor took a fault"),
+    (20, "tables or settings in the image are not what specgen wrote: it was changed after the link"),
 ];
 /// Statuses from here on name the word of the configuration that the controller refuses.
 const CONFIG_REFUSED: i32 = 64;
@@ -52,6 +53,20 @@ impl Emulator {
     /// [`TargetError::EmulatorTimeout`] at the limit, [`TargetError::EmulatorFailed`] for any other end than
     /// the firmware's own "done".
     pub fn run(&self, image: &Image, folder: &Path, limit: Duration) -> Result<(), TargetError> {
+        let mut command = self.command(image, folder)?;
+        let finished =
+            process::run(&mut command, folder, limit).map_err(|e| TargetError::io("running", &self.program, e))?;
+        let Some(status) = finished.status else {
+            return Err(TargetError::EmulatorTimeout { seconds: limit.as_secs() });
+        };
+        if status.success() {
+            return Ok(());
+        }
+        Err(TargetError::EmulatorFailed { text: ended(status, &finished.stderr) })
+    }
+
+    /// What starts the image with `folder` as its working folder.
+    pub(crate) fn command(&self, image: &Image, folder: &Path) -> Result<Command, TargetError> {
         let kernel = folder.join("image.elf");
         std::fs::write(&kernel, &image.elf).map_err(|e| TargetError::io("writing", &kernel, e))?;
         let mut command = Command::new(&self.program);
@@ -61,29 +76,26 @@ impl Emulator {
             .args(["-icount", "shift=10", "-semihosting-config", "enable=on,target=native"])
             .args(["-display", "none", "-monitor", "none", "-serial", "none"])
             .args(["-kernel", "image.elf"]);
-        let finished =
-            process::run(&mut command, folder, limit).map_err(|e| TargetError::io("running", &self.program, e))?;
-        let Some(status) = finished.status else {
-            return Err(TargetError::EmulatorTimeout { seconds: limit.as_secs() });
-        };
-        if status.success() {
-            return Ok(());
-        }
-        let mut text = match status.code() {
-            Some(code) if code >= CONFIG_REFUSED => format!(
-                "the controller refuses word {} of the configuration (see its CONFIG_NAMES and Config::from_words)",
-                code - CONFIG_REFUSED
-            ),
-            Some(code) => {
-                let words = EXITS.iter().find(|(known, _)| *known == code).map(|(_, words)| *words);
-                words.map_or_else(|| format!("{status}"), ToOwned::to_owned)
-            }
-            None => format!("{status}"),
-        };
-        let stderr = finished.stderr.trim();
-        if !stderr.is_empty() {
-            text = format!("{text}; it printed: {stderr}");
-        }
-        Err(TargetError::EmulatorFailed { text })
+        Ok(command)
     }
+}
+
+/// Why it ended, and what it printed.
+pub(crate) fn ended(status: ExitStatus, stderr: &str) -> String {
+    let mut text = match status.code() {
+        Some(code) if code >= CONFIG_REFUSED => format!(
+            "the controller refuses word {} of the configuration (see its CONFIG_NAMES and Config::from_words)",
+            code - CONFIG_REFUSED
+        ),
+        Some(code) => {
+            let words = EXITS.iter().find(|(known, _)| *known == code).map(|(_, words)| *words);
+            words.map_or_else(|| format!("{status}"), ToOwned::to_owned)
+        }
+        None => format!("{status}"),
+    };
+    let stderr = stderr.trim();
+    if !stderr.is_empty() {
+        text = format!("{text}; it printed: {stderr}");
+    }
+    text
 }

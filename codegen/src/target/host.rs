@@ -18,11 +18,7 @@ const LINK: [&str; 2] = ["-Clink-arg=-Wl,-z,defs", "-Clink-arg=-lc"];
 /// [`TargetError::MissingTool`] without cargo, [`TargetError::PanicPath`] if the controller can panic,
 /// [`TargetError::BuildFailed`] for everything else that cargo says.
 pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
-    let cargo = find_in_path("cargo").ok_or_else(|| TargetError::MissingTool {
-        tool: "cargo".into(),
-        looked: "cargo on PATH".into(),
-        command: "the commands at rustup.rs   (or, on Debian: apt-get install cargo-web)".into(),
-    })?;
+    let cargo = cargo()?;
     let package = dir.join("host");
     let target_dir = target_dir.join("host");
     let mut command = clean_command(cargo);
@@ -35,6 +31,31 @@ pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetErr
         is_library.then(|| PathBuf::from(file))
     })?;
     keep(&library.path, &library.bytes)
+}
+
+/// Builds the program in `dir/folder` for this machine and returns its path. Its dependencies are those of its lock file.
+///
+/// # Errors
+/// [`TargetError::MissingTool`] without cargo, [`TargetError::BuildFailed`] for everything that cargo says.
+pub fn build_program(dir: &Path, folder: &str, target_dir: &Path) -> Result<PathBuf, TargetError> {
+    let package = dir.join(folder);
+    let target_dir = target_dir.join(folder);
+    let mut command = clean_command(cargo()?);
+    command.args(["build", "--release"]);
+    let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &[], locked: true };
+    let program = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
+        message["executable"].as_str().map(PathBuf::from)
+    })?;
+    Ok(program.path)
+}
+
+/// The cargo of this machine.
+fn cargo() -> Result<PathBuf, TargetError> {
+    find_in_path("cargo").ok_or_else(|| TargetError::MissingTool {
+        tool: "cargo".into(),
+        looked: "cargo on PATH".into(),
+        command: "the commands at rustup.rs   (or, on Debian: apt-get install cargo-web)".into(),
+    })
 }
 
 /// Copies the library to a name that only this content has.

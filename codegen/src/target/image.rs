@@ -64,11 +64,11 @@ fn is_writable(flags: SectionFlags) -> bool {
     matches!(flags, SectionFlags::Elf { sh_flags, .. } if sh_flags.0 & object::elf::SHF_WRITE.0 != 0)
 }
 
-fn is_panic(name: &str) -> bool {
+pub(super) fn is_panic(name: &str) -> bool {
     name.contains("panicking") || name.contains("panic_path_remains") || name.contains("begin_unwind")
 }
 
-fn is_allocator(name: &str) -> bool {
+pub(super) fn is_allocator(name: &str) -> bool {
     ["__rust_alloc", "__rust_realloc", "__rg_alloc", "__rdl_alloc", "__rustc::__rust_alloc"]
         .iter()
         .any(|start| name.starts_with(start))

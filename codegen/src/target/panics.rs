@@ -50,19 +50,30 @@ fn machinery(graph: &CallGraph) -> BTreeSet<u64> {
     }
 }
 
-type DebugInfo<'a> = Context<EndianSlice<'a, LittleEndian>>;
+/// Line information of an image.
+pub(super) type DebugInfo<'a> = Context<EndianSlice<'a, LittleEndian>>;
 
 fn malformed(error: impl std::fmt::Display) -> TargetError {
     TargetError::MalformedImage { text: error.to_string() }
 }
 
-fn debug_info(elf: &[u8]) -> Result<DebugInfo<'_>, TargetError> {
+pub(super) fn debug_info(elf: &[u8]) -> Result<DebugInfo<'_>, TargetError> {
     let file = object::File::parse(elf).map_err(malformed)?;
     let section = |id: gimli::SectionId| {
         let data = file.section_by_name(id.name()).map_or(Ok(&[][..]), |section| section.data());
         data.map(|data| EndianSlice::new(data, LittleEndian)).map_err(malformed)
     };
     Context::from_dwarf(Dwarf::load(section)?).map_err(malformed)
+}
+
+/// The lines of some places in a function, each once.
+pub(super) fn lines<'a>(
+    debug: &DebugInfo<'_>,
+    function: &Function,
+    places: impl Iterator<Item = &'a u64>,
+) -> Result<Vec<String>, TargetError> {
+    let found: Result<BTreeSet<String>, TargetError> = places.map(|place| site(debug, function, *place)).collect();
+    Ok(found?.into_iter().collect())
 }
 
 fn site(debug: &DebugInfo<'_>, function: &Function, place: u64) -> Result<String, TargetError> {

@@ -417,3 +417,20 @@ impl Sums {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// (9) by hand: error h̃ = (3, 0, 0) µm and 40 µrad at a radius of 0.1 m, |h̃| = 5 µm, at 0.5 s; effort η = 2 µm.
+    #[test]
+    fn the_cost_is_the_time_weighted_error_and_the_square_of_the_effort() {
+        let mut sums = Sums::default();
+        sums.add(0.5, 9e-12, 1.6e-9, 0.1, 4e-12, 1e-4);
+        let expected = (0.998 * 0.5 * 5.0 + 0.002 * 4.0) * 1e-4;
+        assert!((sums.score().cost - expected).abs() < 1e-15, "{} {expected}", sums.score().cost);
+        sums.add(1.0, 9e-12, 1.6e-9, 0.1, 0.0, 1e-4);
+        assert!((sums.score().cost - expected - 0.998 * 5.0 * 1e-4).abs() < 1e-15);
+        assert!((sums.score().error_nm - 5000.0).abs() < 1e-9);
+    }
+}

@@ -1,12 +1,14 @@
 //! The folders that are copied verbatim into a workspace. Each is declared in a file of its own, with its list of files and
 //! what it needs beside it; a new target is one more file here and one more line in [`PARTS`].
 
+mod board;
 mod hal;
 mod host;
 mod link;
 mod qemu;
 mod rt_pc;
 mod runtime;
+mod stm32;
 mod stm32f4;
 mod stm32h743;
 
@@ -47,6 +49,8 @@ pub const PARTS: &[&Part] = &[
     &qemu::PART,
     &link::PART,
     &hal::PART,
+    &board::PART,
+    &stm32::PART,
     &stm32h743::PART,
     &stm32f4::PART,
     &rt_pc::PART,

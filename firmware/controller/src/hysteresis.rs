@@ -32,7 +32,7 @@ pub static TABLES: [Table; LEGS] = [
 ];
 
 /// Everett function of leg 0, 1, 2, 3, 4, 5, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.
-static EVERETT_0: [Real; NODES] = [
+pub(crate) static EVERETT_0: [Real; NODES] = [
     0.0, 1.168490620874922e-6, 0.0, 2.469716805819773e-6, 1.1688935888061297e-6, 0.0, 3.864490240078359e-6,
     2.4505392094163848e-6, 1.1557753347099783e-6, 0.0, 5.363996601715903e-6, 3.85356962116955e-6,
     2.4493973569880677e-6, 1.1518738620856844e-6, 0.0, 6.953570303340407e-6, 5.346250775957274e-6,

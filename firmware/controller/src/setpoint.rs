@@ -70,7 +70,7 @@ static TRAJECTORIES: [Trajectory<Real>; 3] = [
 ];
 
 /// Pieces of trajectory `case-1`.
-static SEGMENTS_0: [Segment<Real>; 2] = [
+pub(crate) static SEGMENTS_0: [Segment<Real>; 2] = [
     Segment {
         first: 0,
         per_tick: 0.0002,
@@ -166,7 +166,7 @@ static SEGMENTS_0: [Segment<Real>; 2] = [
 ];
 
 /// Pieces of trajectory `case-2`.
-static SEGMENTS_1: [Segment<Real>; 2] = [
+pub(crate) static SEGMENTS_1: [Segment<Real>; 2] = [
     Segment {
         first: 0,
         per_tick: 0.0002,
@@ -262,7 +262,7 @@ static SEGMENTS_1: [Segment<Real>; 2] = [
 ];
 
 /// Pieces of trajectory `machining`.
-static SEGMENTS_2: [Segment<Real>; 3] = [
+pub(crate) static SEGMENTS_2: [Segment<Real>; 3] = [
     Segment {
         first: 0,
         per_tick: 0.0002,

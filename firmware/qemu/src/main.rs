@@ -37,6 +37,9 @@ fn main() -> ! {
 
 /// The whole run: files in, files out.
 fn replay() -> Result<(), Exit> {
+    if !controller::integrity::intact() {
+        return Err(Exit::Corrupt);
+    }
     let timer = cortex_m::Peripherals::take().ok_or(Exit::Fault)?.SYST;
     let mut counter = InstructionCounter::new(timer);
     let self_test = counter.self_test();

@@ -23,6 +23,8 @@ pub enum Exit {
     CannotWrite,
     /// 15: the processor took a fault or an unexpected exception.
     Fault,
+    /// 20: tables or settings are not what specgen wrote.
+    Corrupt,
     /// 64 and more: `Config::from_words` refuses the word of that index, 0 to 63.
     ConfigRefused(u32),
 }
@@ -37,6 +39,7 @@ impl Exit {
             Self::InputSize => 13,
             Self::CannotWrite => 14,
             Self::Fault => 15,
+            Self::Corrupt => 20,
             // An exit status of the host has eight bits.
             Self::ConfigRefused(word) => 64 + word % 64,
         }

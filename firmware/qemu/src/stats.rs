@@ -60,10 +60,22 @@ impl Stage {
         }
     }
 
+    /// Its name.
+    #[allow(dead_code)] // `pil` says it over the link.
+    pub fn name(&self) -> &str {
+        let length = self.name.iter().position(|byte| *byte == 0).unwrap_or(self.name.len());
+        core::str::from_utf8(self.name.get(..length).unwrap_or_default()).unwrap_or_default()
+    }
+
+    /// Calls; fewest instructions of one, of all together, most of one.
+    pub fn counts(&self) -> [u64; 4] {
+        [self.calls, if self.calls == 0 { 0 } else { self.smallest }, self.sum, self.largest]
+    }
+
     fn words(&self) -> [u64; 6] {
         let name = u128::from_le_bytes(self.name);
-        let smallest = if self.calls == 0 { 0 } else { self.smallest };
-        [name as u64, (name >> 64) as u64, self.calls, smallest, self.sum, self.largest]
+        let [calls, smallest, sum, largest] = self.counts();
+        [name as u64, (name >> 64) as u64, calls, smallest, sum, largest]
     }
 }
 

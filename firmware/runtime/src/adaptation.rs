@@ -1,14 +1,14 @@
 //! Run-to-run adaptation of one leg: EWMA and PCC in the filter form of Fig. 5 with Ĝ_p = ρ̂.
 //!
 //! ```text
-//! m_n = Y_n − ρ̂ X_n                                                      model error of run n
+//! m_n = Y_n − ρ̂ X_n                                                      model error of run n, (AII.1)
 //! EWMA:  δ̂_n = ω m_n + (1−ω) δ̂_{n−1}                                      (AII.3)
 //! PCC:   δ̂_n = ω1 m_n + (1−ω1) δ̂_{n−1}                                    (AII.5)
 //!        φ̂_n = ω2 (m_n − δ̂_{n−1}) + (1−ω2) φ̂_{n−1}                       (AII.6), with the old δ̂
 //! next request: ρ̂ X_{n+1} = T_{n+1} − δ̂_n − φ̂_n                          (AII.2), (AII.4)
 //! ```
 //! ρ̂ X is the displacement really requested, after every limit: that is the anti-windup. The integrator form
-//! (AII.8), (AII.13) belongs to another error (Y − Ŷ); it must not be fed with m.
+//! (AII.7)–(AII.13) belongs to another error (Y − Ŷ); it must not be fed with m.
 
 use crate::digest::Digest;
 use crate::real::Real;

@@ -5,10 +5,10 @@
 //! ω = T(θ) θ̇, which the paper's (4) takes for θ̇.
 //!
 //! ```text
-//! Jᵀ f + w = M ḧ + C ḣ + G          J = ∂l/∂h;  f > 0 pushes the platform;  w: other forces on it
+//! Jᵀ f + w = M ḧ + C ḣ + G    (3)   J = ∂l/∂h;  f > 0 pushes the platform;  w: other forces on it, such as (5)
 //! ```
-//! M is never formed. Joints move with ṙ = v + ω × P and r̈ = a + (ω̇× + ω×ω×) P; the force on the leg at its platform
-//! joint (AI.17), in the consistent form of the errata, is
+//! M is never formed. Joints move with ṙ = v + ω × P (AI.5), (AI.6) and r̈ = a + (ω̇× + ω×ω×) P (AI.7); the force on the leg at
+//! its platform joint (AI.17), with (AI.8)–(AI.16) in the consistent form of the errata, is
 //!
 //! ```text
 //! F = m_e (r̈ + g) + y + (s·(F − m_e (r̈ + g)) − s·y) s          s = r/l, l̇ = s·ṙ

@@ -27,6 +27,7 @@
 //! | [`velocity`] | rate of the measured pose, filtered | (7), k_v |
 //! | [`dynamics`] | motion of the platform to leg forces and displacements | (4), (AI.1)–(AI.17) |
 //! | [`trig`] | sine and cosine by the same operations everywhere | |
+//! | [`crc`] | checksum of tables and settings in memory | |
 //! | [`supervisor`] | phases of the machine, causes of faults | |
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
@@ -36,6 +37,7 @@
 
 pub mod adaptation;
 pub mod attitude;
+pub mod crc;
 pub mod creep;
 pub mod dac;
 pub mod digest;
@@ -59,6 +61,7 @@ pub mod velocity;
 
 pub use adaptation::{Estimate, Law};
 pub use attitude::{Attitude, Series};
+pub use crc::Crc32;
 pub use creep::{Creep, CreepEverett, CreepMemory};
 pub use dac::{CodeLimits, Dac};
 pub use digest::Digest;

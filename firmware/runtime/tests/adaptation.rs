@@ -19,6 +19,7 @@ fn error_after(law: Law, gain_ratio: f64, runs: u32, t: impl Fn(f64) -> f64, d: 
     error
 }
 
+/// (AII.1)–(AII.3) and (AII.4)–(AII.6) on a leg of another gain; by (AII.15) and (AII.17) a step leaves nothing.
 #[test]
 fn a_step_disturbance_leaves_no_error() {
     for law in [Law::Ewma, Law::Pcc] {
@@ -29,6 +30,7 @@ fn a_step_disturbance_leaves_no_error() {
     }
 }
 
+/// The limits of (AII.15) and (AII.17) for a ramp.
 #[test]
 fn a_ramp_disturbance_leaves_slope_over_lambda_omega_under_ewma_and_nothing_under_pcc() {
     let slope = 1e-9;
@@ -41,6 +43,7 @@ fn a_ramp_disturbance_leaves_slope_over_lambda_omega_under_ewma_and_nothing_unde
     }
 }
 
+/// (AII.5) and (AII.6) by hand.
 #[test]
 fn the_drift_estimate_uses_the_old_level() {
     let mut estimate = Estimate { level: 3e-6_f64, drift: 0.5e-6 };
@@ -51,7 +54,7 @@ fn the_drift_estimate_uses_the_old_level() {
 
 #[test]
 fn the_filter_form_equals_the_integrator_form_while_nothing_saturates() {
-    // (AII.9), (AII.10) with e = Y − Ŷ, Ŷ = ρ̂X + δ̂ + φ̂.
+    // (AII.7) without φ̂, (AII.9), (AII.10) with e = Y − Ŷ, Ŷ = ρ̂X + δ̂ + φ̂.
     let mut filter = Estimate::<f64>::new();
     let (mut level, mut drift) = (0.0, 0.0);
     for n in 0..500 {

@@ -58,6 +58,7 @@ fn close(a: [f64; 3], b: [f64; 3], tolerance: f64) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= tolerance)
 }
 
+/// (AI.1), and the cross product (AI.6) behind it.
 #[test]
 fn rotation_less_identity_turns_vectors_as_quaternions_do() {
     let mut random = Random(1);

@@ -103,7 +103,7 @@ impl Contact {
         !self.part.one_sided || self.deflection(pose)[2] > 0.0
     }
 
-    /// What the closed contact does to the platform, whether or not it is closed.
+    /// (5): what the closed contact does to the platform, whether or not it is closed.
     #[must_use]
     pub fn wrench_when_closed(&self, pose: &Six) -> Wrench {
         let deflection = self.deflection(pose);
@@ -141,6 +141,7 @@ mod tests {
         pose
     }
 
+    /// (5), by hand.
     #[test]
     fn a_part_pushes_back_with_its_stiffness_and_turns_the_platform() {
         let contact = Contact::at(WorkPart::glass(), &HOME);

@@ -157,6 +157,7 @@ fn allowed(mode: u32, stem: &str) -> f64 {
     }
 }
 
+/// (7) and Fig. 5: force, feedback, (AII.3), (AII.5), (AII.6) and the inverse, tick by tick.
 #[test]
 fn every_tick_is_that_of_the_reference_controller() {
     let mut comparison = Comparison::new("tables-oracle");

@@ -1,6 +1,6 @@
 //! What the committed generated files ought to hold.
 
-use super::Files;
+use super::{Files, trace};
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
@@ -46,8 +46,9 @@ pub fn schema(_: &Path) -> Result<Files, String> {
 }
 
 /// References printed from the key table and the registry of findings.
-pub fn docs(_: &Path) -> Result<Files, String> {
+pub fn docs(root: &Path) -> Result<Files, String> {
     Ok(Files::from([
+        ("traceability.md".to_owned(), trace::markdown(root)?),
         ("spec-reference.md".to_owned(), spec::reference_markdown()),
         ("diagnostics.md".to_owned(), diagnostic::reference_markdown()),
     ]))

@@ -62,11 +62,11 @@ impl Report<'_> {
         chosen.map(|(_, outcome)| outcome.figures().map(row.of)).collect()
     }
 
-    fn unstable(&self) -> usize {
+    fn diverged(&self) -> usize {
         self.runs.iter().filter(|(_, outcome)| outcome.figures().is_none()).count()
     }
 
-    /// The run with the largest figure, unstable ones before all, the first of equals.
+    /// The run with the largest figure, diverged ones before all, the first of equals.
     fn worst(&self, row: &Row) -> Option<&(Member, Outcome)> {
         let key = |run: &(Member, Outcome)| run.1.figures().map_or(f64::INFINITY, row.of);
         let mut worst: Option<&(Member, Outcome)> = None;
@@ -80,7 +80,7 @@ impl Report<'_> {
 
     /// The command that runs one member alone.
     fn replay(&self, member: &Member) -> String {
-        let Arguments { spec, vary, trajectory, frequency, plant, unstable_above, .. } = self.arguments;
+        let Arguments { spec, vary, trajectory, frequency, plant, diverged_above, .. } = self.arguments;
         let mut out = format!("specgen robust {} --replay {}", quoted(&spec.display().to_string()), member.name);
         // Writing to a String cannot fail, here and below.
         if plant.seed != 1 {
@@ -95,8 +95,8 @@ impl Report<'_> {
         for given in vary {
             let _ = write!(out, " --vary {}={}:{}", given.factor, given.range[0], given.range[1]);
         }
-        if let Some(bound) = unstable_above {
-            let _ = write!(out, " --unstable-above '{bound:e} m'");
+        if let Some(bound) = diverged_above {
+            let _ = write!(out, " --diverged-above '{bound:e} m'");
         }
         if let Some(path) = &plant.plant {
             let _ = write!(out, " --plant {}", quoted(&path.display().to_string()));
@@ -123,8 +123,8 @@ impl Report<'_> {
                 }
                 out
             }
-            Outcome::Unstable { time, reason, limited_percent } => {
-                let mut out = format!("unstable: {reason}");
+            Outcome::Diverged { time, reason, limited_percent } => {
+                let mut out = format!("diverged: {reason}");
                 if let Some(time) = time {
                     let _ = write!(out, " after {time:.4} s");
                 }
@@ -162,7 +162,7 @@ impl Report<'_> {
             _ => self.table(&mut out),
         }
         let bound = self.study.bound * 1e9;
-        let _ = writeln!(out, "unstable, an error beyond {bound:.0} nm: {} of {}", self.unstable(), self.runs.len());
+        let _ = writeln!(out, "diverged, an error beyond {bound:.0} nm: {} of {}", self.diverged(), self.runs.len());
         if self.runs.len() == self.planned {
             if self.reasons.is_empty() {
                 let _ = writeln!(out, "gate: passed ({})", self.asked());
@@ -184,7 +184,7 @@ impl Report<'_> {
             let cell = |figures: &[Option<f64>], percent: f64| match quantile(figures, percent) {
                 Some(figure) => format!("{figure:.2}"),
                 None if figures.is_empty() => "-".to_owned(),
-                None => "unstable".to_owned(),
+                None => "diverged".to_owned(),
             };
             let drawn = self.figures(row, |member| member.drawn);
             let corners = self.figures(row, |member| !member.drawn);
@@ -211,7 +211,7 @@ impl Report<'_> {
 
     /// What the gate asks for.
     fn asked(&self) -> String {
-        let mut parts = vec!["all stable".to_owned()];
+        let mut parts = vec!["none diverged".to_owned()];
         let which = self.gate.quantile.map_or("largest".to_owned(), |percent| format!("{percent} % quantile of the"));
         if let Some(limit) = self.gate.error_nm {
             parts.push(format!("{which} rms error at most {limit:.2} nm"));
@@ -260,10 +260,10 @@ impl Report<'_> {
             "frequency": self.followed.frequency,
             "seed": self.arguments.plant.seed,
             "noise": self.study.noise,
-            "unstable_above_nm": self.study.bound * 1e9,
+            "diverged_above_nm": self.study.bound * 1e9,
             "factors": self.factors,
             "planned": self.planned,
-            "unstable": self.unstable(),
+            "diverged": self.diverged(),
             "table": table,
             "gate": { "asked": self.gate, "reasons": self.reasons, "complete": self.runs.len() == self.planned },
             "runs": runs,
@@ -272,7 +272,7 @@ impl Report<'_> {
 
     /// One line per run: every figure and every factor in full digits.
     pub(super) fn csv(&self) -> String {
-        let mut out = "name,seed,drawn,unstable,unstable_at_s".to_owned();
+        let mut out = "name,seed,drawn,diverged,diverged_at_s".to_owned();
         for row in self.rows() {
             let _ = write!(out, ",{}", row.key);
         }
@@ -284,9 +284,9 @@ impl Report<'_> {
         }
         out.push('\n');
         for (member, outcome) in self.runs {
-            let unstable = outcome.figures().is_none();
-            let _ = write!(out, "{},{},{},{unstable},", member.name, member.seed, member.drawn);
-            if let Outcome::Unstable { time: Some(time), .. } = outcome {
+            let diverged = outcome.figures().is_none();
+            let _ = write!(out, "{},{},{},{diverged},", member.name, member.seed, member.drawn);
+            if let Outcome::Diverged { time: Some(time), .. } = outcome {
                 let _ = write!(out, "{time}");
             }
             for row in self.rows() {

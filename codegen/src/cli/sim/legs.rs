@@ -73,7 +73,7 @@ pub(super) fn run(
 }
 
 /// The laws that the spec gives weights for: with a weight of zero a law adapts nothing, and its row would say nothing.
-fn modes(adaptation: &Adaptation) -> Vec<(&'static str, u32)> {
+pub(in crate::cli) fn modes(adaptation: &Adaptation) -> Vec<(&'static str, u32)> {
     let given = |mode: &str| match mode {
         "ewma" => adaptation.level_weight > 0.0,
         "pcc" => adaptation.level_weight > 0.0 && adaptation.drift_weight > 0.0,

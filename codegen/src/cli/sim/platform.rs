@@ -31,7 +31,7 @@ const MACHINING: [(&str, u32); 3] = [PLATFORM_MODES[0], PLATFORM_MODES[3], PLATF
 /// Frequency of the machining path, Hz.
 const MACHINING_FREQUENCY: f64 = 1.0;
 /// A trajectory on board that does not end is followed for this long, s.
-const PLAYED: f64 = 60.0;
+pub(in crate::cli) const PLAYED: f64 = 60.0;
 
 /// Refuses arguments that are for legs alone, and a trajectory that the spec does not have.
 pub(super) fn check(arguments: &Arguments, task: &TaskSpace) -> Result<(), Failure> {
@@ -50,7 +50,7 @@ pub(super) fn check(arguments: &Arguments, task: &TaskSpace) -> Result<(), Failu
 }
 
 /// Number of a trajectory of the spec.
-fn selector(task: &TaskSpace, name: &str) -> Result<u32, Failure> {
+pub(in crate::cli) fn selector(task: &TaskSpace, name: &str) -> Result<u32, Failure> {
     let names: Vec<&str> = task.trajectories.iter().map(|trajectory| trajectory.name.as_str()).collect();
     let place = names.iter().position(|known| *known == name);
     place.and_then(|place| u32::try_from(place).ok()).ok_or_else(|| {

@@ -36,6 +36,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         mod config;
         pub mod dynamics;
         pub mod hysteresis;
+        pub mod integrity;
         pub mod kinematics;
         pub mod limits;
         mod machine_words;

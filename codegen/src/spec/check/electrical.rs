@@ -1,4 +1,4 @@
-//! Actuator, amplifier, converter, gauge and target.
+//! Actuator, amplifier, converter and gauge.
 
 use super::in_order;
 use crate::diagnostic::codes;
@@ -139,38 +139,6 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
             ),
             "check the unit: nm or um".to_owned(),
         );
-    }
-    Some(())
-}
-
-pub(super) fn scalar_fits_fpu(f: &Fields, findings: &mut Findings) -> Option<()> {
-    if f.choice("target.mcu")? == "mps2-an386" && f.choice("controller.scalar")? == "f64" {
-        let path = if f.given("controller.scalar") { "controller.scalar" } else { "target.mcu" };
-        findings.warning(
-            codes::DOUBLE_ON_SINGLE,
-            path,
-            f.span(path),
-            "the Cortex-M4F of mps2-an386 computes f64 in software".to_owned(),
-            "write, in [controller]: scalar = \"f32\"; or choose mcu = \"mps2-an500\"".to_owned(),
-        );
-    }
-    Some(())
-}
-
-pub(super) fn budget_in_bytes(f: &Fields, findings: &mut Findings) -> Option<()> {
-    for path in ["target.budget.flash", "target.budget.ram", "target.budget.stack"] {
-        let Some(bytes) = f.number(path) else {
-            continue;
-        };
-        if bytes.fract() != 0.0 {
-            findings.error(
-                codes::BUDGET_NOT_WHOLE,
-                path,
-                f.span(path),
-                format!("`{path}` is {bytes} bytes, expected a whole number of bytes"),
-                format!("write \"{} B\", or another whole amount", bytes.round()),
-            );
-        }
     }
     Some(())
 }

@@ -177,7 +177,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "platform",
         kind: Kind::Plain,
-        doc: "The moving platform as a rigid body, in its own frame {P}, Table 4.",
+        doc: "The moving platform as a rigid body, in its own frame {P}, Table 4: its part of (4).",
         keys: &[
             row("mass", one(Dimension::MASS, BODY_MASS, "kg"), Required, "m", "\"1.195 kg\"", "Mass with everything that is mounted on it."),
             row("inertia", Shape::List(&[item(Dimension::INERTIA, MOMENT, "g mm^2"); 3]), Required, "I_xx I_yy I_zz", "[\"3.26e7 g mm^2\", \"3.26e7 g mm^2\", \"9.7e6 g mm^2\"]", "Moments of inertia about the centre of mass."),
@@ -188,7 +188,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "leg",
         kind: Kind::Plain,
-        doc: "The two parts of a leg, the same for all six, Table 4.",
+        doc: "The two parts of a leg, the same for all six, Table 4: masses and inertias of (AI.9) and (AI.12).",
         keys: &[
             row("fixed_mass", one(Dimension::MASS, BODY_MASS, "g"), Required, "m_s", "\"90.26 g\"", "Mass of the part at the base joint."),
             row("extensible_mass", one(Dimension::MASS, BODY_MASS, "g"), Required, "m_e", "\"73.62 g\"", "Mass of the part at the platform joint."),
@@ -204,7 +204,7 @@ pub const SECTIONS: &[Section] = &[
         doc: "The piezo stacks of a leg.",
         keys: &[
             row("stacks", integer(1, 1000), Required, "", "5", "Stacks in series in one leg."),
-            row("stack_gain", one(Dimension::PIEZO_GAIN, Range::closed(1e-12, 1e-4), "um/V"), Required, "rho", "\"0.1262 um/V\"", "Displacement per volt of one stack; a leg has `stacks` times that."),
+            row("stack_gain", one(Dimension::PIEZO_GAIN, Range::closed(1e-12, 1e-4), "um/V"), Required, "rho", "\"0.1262 um/V\"", "Displacement per volt of one stack; a leg has `stacks` times that: the gain of (AII.1)."),
             row("stroke", one(Dimension::LENGTH, Range::closed(1e-9, 0.01), "um"), Required, "", "\"60 um\"", "Free stroke of a leg."),
             row("voltage", Shape::List(&[VOLTS; 2]), Required, "", "[\"0 V\", \"100 V\"]", "Smallest and largest voltage that the controller may ask for."),
             row("slew_rate", one(Dimension::SLEW_RATE, Range::closed(1e-3, 1e12), "V/ms"), Required, "", "\"40 V/ms\"", "Fastest change of voltage that amplifier and stack stand."),
@@ -263,12 +263,12 @@ pub const SECTIONS: &[Section] = &[
         doc: "Run-to-run adaptation, Appendix B. A mode that uses a weight needs it, as weight per run or as bandwidth. With [control] both bandwidths are given, or neither: the compiler then derives them.",
         keys: &[
             row("mode", Shape::One(Item::Choice(&["invhys", "ewma", "pcc"])), Default("\"invhys\""), "", "\"pcc\"", "Inverse model alone; with the level estimate (AII.3); with level and drift (AII.5), (AII.6)."),
-            row("level_weight", WEIGHT, InsteadOf("level_bandwidth"), "omega_1", "0.252", "Weight of a new reading in the level estimate, per run."),
+            row("level_weight", WEIGHT, InsteadOf("level_bandwidth"), "omega_1", "0.252", "Weight of a new reading in the level estimate, per run: (AII.3), (AII.5)."),
             row("level_bandwidth", BANDWIDTH, InsteadOf("level_weight"), "", "\"450 rad/s\"", "The same as a bandwidth: weight = bandwidth x period x run_interval."),
-            row("drift_weight", WEIGHT, InsteadOf("drift_bandwidth"), "omega_2", "0.011", "Weight of a new reading in the drift estimate, per run."),
+            row("drift_weight", WEIGHT, InsteadOf("drift_bandwidth"), "omega_2", "0.011", "Weight of a new reading in the drift estimate, per run: (AII.6)."),
             row("drift_bandwidth", BANDWIDTH, InsteadOf("drift_weight"), "", "\"20 rad/s\"", "The same as a bandwidth."),
             row("run_interval", integer(1, 1_000_000), Default("1"), "", "1", "Control ticks per run."),
-            row("gain_ratio", Shape::List(&[RATIO; 2]), Default("[0.9, 1.1]"), "lambda", "[0.9, 1.1]", "Smallest and largest true gain over modelled gain for which the loop must be stable."),
+            row("gain_ratio", Shape::List(&[RATIO; 2]), Default("[0.9, 1.1]"), "lambda", "[0.9, 1.1]", "Smallest and largest true gain over modelled gain for which the loop must be stable: (AII.18), (AII.19)."),
         ],
     },
     Section {
@@ -281,7 +281,7 @@ pub const SECTIONS: &[Section] = &[
             row("notch", Shape::One(Item::Flag), Default("true"), "", "true", "Whether a modal notch stands in the feedback; without one the bandwidth falls to about a twelfth."),
             row("notch_damping", Shape::One(Item::Number(Range::above(0.0, 1.0))), Rule("1, with a notch"), "zeta_d", "1.0", "Damping ratio that the notch leaves of each mode, above `modal_damping`."),
             row("velocity_cutoff", BANDWIDTH, Rule("0.6 pi rad / period"), "", "\"9e3 rad/s\"", "First-order low-pass of the pose derivative, below half the tick rate (pi rad / period)."),
-            row("interaction", Shape::One(Item::Choice(&["none", "modelled", "measured"])), Default("\"none\""), "", "\"none\"", "Where the interaction force of the feed-forward comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words."),
+            row("interaction", Shape::One(Item::Choice(&["none", "modelled", "measured"])), Default("\"none\""), "", "\"none\"", "Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words."),
             row("lead", one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Default("\"0 ms\""), "", "\"0.2 ms\"", "Time by which the leg displacements are asked for early, in proportion to their rate: about the amplifier lag less one period. Takes out part of the lag of fast motion; a set-point that steps is overshot by step x lead / period for one tick."),
             row("transfer_time", one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("\"50 ms\""), "", "\"50 ms\"", "Time constant with which the offset fades that makes a change of mode bumpless."),
         ],
@@ -289,7 +289,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "control.environment",
         kind: Kind::Optional,
-        doc: "The work piece that the platform presses on, in the order x, y, z, theta_x, theta_y, theta_z at P_C.",
+        doc: "The work piece that the platform presses on, (5), in the order x, y, z, theta_x, theta_y, theta_z at P_C.",
         keys: &[
             row("stiffness", Shape::List(STIFFNESSES), Required, "K_e", "[\"0 N/m\", \"0 N/m\", \"3e6 N/m\", \"0 N m/rad\", \"0 N m/rad\", \"0 N m/rad\"]", "Diagonal of its stiffness."),
             row("rest", Shape::List(POSE), Default(NO_POSE), "h_e", NO_POSE, "Pose, from rest, at which it is unloaded."),
@@ -380,6 +380,12 @@ pub const SECTIONS: &[Section] = &[
         ],
     },
     Section {
+        name: "requirements",
+        kind: Kind::Optional,
+        doc: "What the platform is for. A spec that cannot meet it is refused.",
+        keys: &[row("precision", one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "\"50 nm\"", "Finest displacement that matters. No converter code may move a leg by more, nor half a code on every leg the platform along an axis.")],
+    },
+    Section {
         name: "supervisor",
         kind: Kind::Plain,
         doc: "What the supervisor in the controller takes for a fault, and for how long it must last; docs/supervisor.md. Gauges are looked at in turn, one a tick.",
@@ -402,7 +408,7 @@ pub const SECTIONS: &[Section] = &[
         name: "target",
         kind: Kind::Plain,
         doc: "What it runs on.",
-        keys: &[row("mcu", Shape::One(Item::Choice(&["mps2-an500", "mps2-an386"])), Default("\"mps2-an500\""), "", "\"mps2-an500\"", "Cortex-M7 with double-precision FPU, or Cortex-M4F with single precision.")],
+        keys: &[row("mcu", Shape::One(Item::Choice(&["mps2-an500", "mps2-an386", "stm32h743zi", "stm32f446re"])), Default("\"mps2-an500\""), "", "\"mps2-an500\"", "Microcontroller: `mps2-an500` and `stm32h743zi` are a Cortex-M7 with double-precision FPU, `mps2-an386` and `stm32f446re` a Cortex-M4F with single precision; the first of each is emulated.")],
     },
     Section {
         name: "target.budget",

@@ -1,4 +1,4 @@
-//! One tick of the closed loop as a matrix: the plant, sampled exactly, and the controller's tick, line by line.
+//! One tick of the closed loop (8) as a matrix: the plant, sampled exactly, and the controller's tick, line by line.
 //!
 //! Everything is in modal coordinates z = V⁻¹ x, where leg motions are V⁻¹ J⁻¹ of leg coordinates and a wrench w is
 //! V⁻¹ K⁻¹ w, the leg motion that it asks for. Set-point and load are zero: only what is fed back matters.

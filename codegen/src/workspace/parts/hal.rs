@@ -8,5 +8,11 @@ pub const PART: Part = Part {
     what: "gauges and amplifiers: traits and drivers",
     needs: "nothing",
     with: &[],
-    files: files! { "hal": },
+    files: files! { "hal":
+        "Cargo.toml",
+        "src/ad5686r.rs",
+        "src/ad7606.rs",
+        "src/fault.rs",
+        "src/lib.rs",
+    },
 };

@@ -8,5 +8,17 @@ pub const PART: Part = Part {
     what: "the protocol between a board and the host",
     needs: "nothing",
     with: &[],
-    files: files! { "link": },
+    files: files! { "link":
+        "Cargo.toml",
+        "src/bytes.rs",
+        "src/client.rs",
+        "src/counters.rs",
+        "src/endpoint.rs",
+        "src/frame.rs",
+        "src/lib.rs",
+        "src/lockstep.rs",
+        "src/message.rs",
+        "src/receiver.rs",
+        "src/silence.rs",
+    },
 };

@@ -7,7 +7,7 @@ pub const PART: Part = Part {
     member: false,
     what: "the same controller on an emulated Cortex-M: see its README",
     needs: "target `thumbv7em-none-eabihf`, QEMU",
-    with: &[],
+    with: &["link"],
     files: files! { "qemu":
         "Cargo.lock",
         "Cargo.toml",
@@ -18,9 +18,12 @@ pub const PART: Part = Part {
         "src/machine.rs",
         "src/main.rs",
         "src/panic.rs",
+        "src/pil.rs",
+        "src/pipe.rs",
         "src/semihosting.rs",
         "src/stack.rs",
         "src/stages.rs",
         "src/stats.rs",
+        "src/steps.rs",
     },
 };

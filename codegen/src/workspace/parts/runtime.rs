@@ -12,6 +12,7 @@ pub const PART: Part = Part {
         "Cargo.toml",
         "src/adaptation.rs",
         "src/attitude.rs",
+        "src/crc.rs",
         "src/creep.rs",
         "src/dac.rs",
         "src/digest.rs",

@@ -7,6 +7,15 @@ pub const PART: Part = Part {
     member: false,
     what: "firmware of the NUCLEO-F446RE (Cortex-M4F, `f32`)",
     needs: "target `thumbv7em-none-eabihf`",
-    with: &["hal", "link"],
-    files: files! { "stm32f4": },
+    with: &["board", "hal", "link", "stm32"],
+    files: files! { "stm32f4":
+        "Cargo.lock",
+        "Cargo.toml",
+        "build.rs",
+        "memory.x",
+        "src/clocks.rs",
+        "src/main.rs",
+        "src/pins.rs",
+        "src/safe.rs",
+    },
 };

@@ -7,6 +7,16 @@ pub const PART: Part = Part {
     member: false,
     what: "firmware of the NUCLEO-H743ZI2 (Cortex-M7)",
     needs: "target `thumbv7em-none-eabihf`",
-    with: &["hal", "link"],
-    files: files! { "stm32h743": },
+    with: &["board", "hal", "link", "stm32"],
+    files: files! { "stm32h743":
+        "Cargo.lock",
+        "Cargo.toml",
+        "build.rs",
+        "memory.x",
+        "src/caches.rs",
+        "src/clocks.rs",
+        "src/main.rs",
+        "src/pins.rs",
+        "src/safe.rs",
+    },
 };

@@ -32,7 +32,7 @@ pub static TABLES: [Table; LEGS] = [
 ];
 
 /// Everett function of leg 0, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.
-static EVERETT_0: [Real; NODES] = [
+pub(crate) static EVERETT_0: [Real; NODES] = [
     0.0, 5.0864332e-6, 0.0, 1.1615921e-5, 5.0158737e-6, 0.0, 1.9034373e-5, 1.1469057e-5, 4.9519035e-6, 0.0,
     2.6972188e-5, 1.879825e-5, 1.1326371e-5, 4.886339e-6, 0.0, 3.5209938e-5, 2.6646114e-5, 1.8572047e-5,
     1.1189585e-5, 4.825056e-6, 0.0, 4.3607055e-5, 3.478392e-5, 2.6323527e-5, 1.8345603e-5, 1.105138e-5,
@@ -42,7 +42,7 @@ static EVERETT_0: [Real; NODES] = [
 ];
 
 /// Everett function of leg 1, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.
-static EVERETT_1: [Real; NODES] = [
+pub(crate) static EVERETT_1: [Real; NODES] = [
     0.0, 5.5268156e-6, 0.0, 1.25913575e-5, 5.4368284e-6, 0.0, 2.063534e-5, 1.2431898e-5, 5.3627923e-6, 0.0,
     2.924715e-5, 2.038341e-5, 1.2280819e-5, 5.2992427e-6, 0.0, 3.8174407e-5, 2.8888195e-5, 2.0135994e-5,
     1.2129302e-5, 5.234421e-6, 0.0, 4.727256e-5, 3.7705857e-5, 2.8534107e-5, 1.98847e-5, 1.1973555e-5,
@@ -52,7 +52,7 @@ static EVERETT_1: [Real; NODES] = [
 ];
 
 /// Everett function of leg 2, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.
-static EVERETT_2: [Real; NODES] = [
+pub(crate) static EVERETT_2: [Real; NODES] = [
     0.0, 5.2499577e-6, 0.0, 1.1979818e-5, 5.174962e-6, 0.0, 1.9636602e-5, 1.1827104e-5, 5.107726e-6, 0.0,
     2.782429e-5, 1.93898e-5, 1.1680569e-5, 5.0406975e-6, 0.0, 3.632021e-5, 2.748314e-5, 1.9157342e-5,
     1.1535408e-5, 4.9786336e-6, 0.0, 4.4983426e-5, 3.5879428e-5, 2.7150669e-5, 1.8918845e-5, 1.1398615e-5,
@@ -62,7 +62,7 @@ static EVERETT_2: [Real; NODES] = [
 ];
 
 /// Everett function of leg 3, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.
-static EVERETT_3: [Real; NODES] = [
+pub(crate) static EVERETT_3: [Real; NODES] = [
     0.0, 5.6250374e-6, 0.0, 1.2838778e-5, 5.5419737e-6, 0.0, 2.1039512e-5, 1.2674646e-5, 5.4708044e-6, 0.0,
     2.9815586e-5, 2.0778838e-5, 1.2520264e-5, 5.4036427e-6, 0.0, 3.891403e-5, 2.9445768e-5, 2.0522988e-5,
     1.23671625e-5, 5.3283575e-6, 0.0, 4.819619e-5, 3.844352e-5, 2.909377e-5, 2.0276153e-5, 1.2209206e-5,
@@ -72,7 +72,7 @@ static EVERETT_3: [Real; NODES] = [
 ];
 
 /// Everett function of leg 4, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.
-static EVERETT_4: [Real; NODES] = [
+pub(crate) static EVERETT_4: [Real; NODES] = [
     0.0, 5.358114e-6, 0.0, 1.2227594e-5, 5.278794e-6, 0.0, 2.0035228e-5, 1.2069799e-5, 5.2117016e-6, 0.0,
     2.8386712e-5, 1.978177e-5, 1.1918445e-5, 5.1423967e-6, 0.0, 3.7052647e-5, 2.8041213e-5, 1.9541e-5,
     1.1771107e-5, 5.0748995e-6, 0.0, 4.590037e-5, 3.6611695e-5, 2.7705599e-5, 1.9310153e-5, 1.163014e-5,
@@ -82,7 +82,7 @@ static EVERETT_4: [Real; NODES] = [
 ];
 
 /// Everett function of leg 5, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.
-static EVERETT_5: [Real; NODES] = [
+pub(crate) static EVERETT_5: [Real; NODES] = [
     0.0, 5.1965685e-6, 0.0, 1.1861242e-5, 5.1239067e-6, 0.0, 1.943396e-5, 1.1709334e-5, 5.053464e-6, 0.0,
     2.754069e-5, 1.9192983e-5, 1.15697e-5, 4.992788e-6, 0.0, 3.5951973e-5, 2.7206703e-5, 1.8961377e-5,
     1.1422545e-5, 4.928852e-6, 0.0, 4.45215e-5, 3.5510744e-5, 2.6870714e-5, 1.8730037e-5, 1.1276039e-5,

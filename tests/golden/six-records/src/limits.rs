@@ -15,6 +15,9 @@ pub const DAC: Dac<Real> = Dac {
     codes_per_cell: 5461.25,
 };
 
+/// Bits of a code; from `dac.bits`.
+pub const DAC_BITS: u32 = 16;
+
 /// Lowest and highest code whose voltage lies within 0 V … 100 V; from `actuator.voltage` and `dac`.
 pub const CODES: [i32; 2] = [0, 43690];
 

@@ -32,7 +32,7 @@ pub static TABLES: [Table; LEGS] = [
 ];
 
 /// Everett function of leg 0, 1, 2, 3, 4, 5, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.
-static EVERETT_0: [Real; NODES] = [
+pub(crate) static EVERETT_0: [Real; NODES] = [
     0.0, 5.371117316813848e-6, 0.0, 1.2289036613688402e-5, 5.2959906207354135e-6, 0.0, 2.013299346500265e-5,
     1.2134702014269029e-5, 5.22639500789806e-6, 0.0, 2.8508537900908872e-5, 1.988627068967157e-5,
     1.1986792820512144e-5, 5.158428388467739e-6, 0.0, 3.719193766320455e-5, 2.816279665392578e-5,

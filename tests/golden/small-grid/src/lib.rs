@@ -26,6 +26,7 @@ mod config;
 
 pub mod dynamics;
 pub mod hysteresis;
+pub mod integrity;
 pub mod kinematics;
 pub mod limits;
 mod machine_words;
@@ -56,6 +57,9 @@ pub type Real = f64;
 
 /// Width of [`Real`].
 pub const SCALAR_BITS: u32 = 64;
+
+/// Control period, s; from `timing.period`.
+pub const PERIOD_SECONDS: f64 = 0.0002;
 
 /// Number of legs.
 pub const LEGS: usize = 6;

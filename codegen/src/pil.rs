@@ -1,0 +1,19 @@
+//! Processor in the loop: a simulated machine closes the loop with the very program that a microcontroller runs, and the host
+//! library runs the same inputs beside it, compared by bits in every tick.
+//!
+//! ```text
+//! scenario ─► Lockstep ─┬─ host library ────────────────────────────────┐
+//!    ▲                  └─ link ─► image in QEMU (pipes), board (serial) ┴─ equal? ─► voltages ─┐
+//!    └──────────────────────────────────────── plant ◄──────────────────────────────────────────┘
+//! ```
+
+mod difference;
+mod lockstep;
+mod pipes;
+mod serial;
+mod wait;
+
+pub use difference::Difference;
+pub use lockstep::{Cost, Lockstep, OpenError, Stop};
+pub use pipes::Pipes;
+pub use serial::{BAUD, SerialLine};

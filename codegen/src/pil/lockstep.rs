@@ -1,0 +1,347 @@
+//! Two controllers as one: the host library and a device behind the link, stepped with the same words and compared by bits.
+
+use std::fmt;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use host_sim::controller::{ControllerError, MachineWord, Supervised, TickController};
+use host_sim::description::Description;
+use serde::Serialize;
+use specgen_link::client::{Client, ClientError, Patience, Port};
+use specgen_link::{Counted, Identity, Reply, Request, WORDS, put_words};
+
+use super::difference::Difference;
+
+/// Ticks that arming may take.
+const ARMING: u64 = 100_000;
+/// Phases of the supervisor.
+const DISARMED: u8 = 0;
+const RUNNING: u8 = 2;
+/// Requests to it.
+const ARM: u64 = 1;
+const RUN: u64 = 2;
+
+/// Why a run ended early.
+#[derive(Debug)]
+pub enum Stop {
+    /// Host and device differ.
+    Difference(Difference),
+    /// The link failed.
+    Link(ClientError),
+    /// The supervisor does not reach the running phase, or left it.
+    Supervisor {
+        /// Tick since power-up.
+        tick: u64,
+        /// What it says.
+        word: MachineWord,
+    },
+    /// The host's controller refuses the settings.
+    Settings(ControllerError),
+    /// Ended from outside.
+    Interrupted,
+}
+
+impl fmt::Display for Stop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Difference(difference) => difference.fmt(f),
+            Self::Link(error) => error.fmt(f),
+            Self::Supervisor { tick, word } => write!(
+                f,
+                "tick {tick}: the supervisor is in phase {} by cause {} instead of running; host and device agree on it",
+                word.phase, word.cause
+            ),
+            Self::Settings(error) => error.fmt(f),
+            Self::Interrupted => f.write_str("interrupted"),
+        }
+    }
+}
+
+/// What a stage of the tick costs on the device.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cost {
+    /// `supervise` is the whole tick.
+    pub name: String,
+    /// Calls counted.
+    pub calls: u64,
+    /// Least.
+    pub min: u64,
+    /// Mean.
+    pub mean: f64,
+    /// Most.
+    pub max: u64,
+    /// For the whole tick: most stack seen in use, bytes; 0 if the device does not measure it.
+    pub stack: u32,
+}
+
+/// The host's controller with a device beside it. As a [`TickController`] it closes the loop of any scenario; after a reset the
+/// first tick is preceded by those that arm the machine, with the readings of that tick, for nothing moves meanwhile.
+///
+/// Where the two differ, the link fails or the supervisor leaves its running phase it gives voltages that are no numbers, which
+/// ends every scenario at once; [`Lockstep::stop`] then says why.
+pub struct Lockstep<P> {
+    host: Supervised,
+    client: Client<P>,
+    identity: Identity,
+    names: Vec<String>,
+    config: Vec<u64>,
+    input: Vec<u64>,
+    ours: Vec<u64>,
+    theirs: Vec<u64>,
+    bytes: [u8; WORDS * size_of::<u64>()],
+    /// The machine is at reset.
+    fresh: bool,
+    tick: u64,
+    total: u64,
+    stop: Option<Stop>,
+    interrupted: &'static AtomicBool,
+    waited: Duration,
+}
+
+/// Why there is no lock-step.
+#[derive(Debug)]
+pub enum OpenError {
+    /// The link does not open.
+    Link(ClientError),
+    /// There is something else at its other end.
+    Other(String),
+}
+
+impl fmt::Display for OpenError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Link(error) => error.fmt(f),
+            Self::Other(text) => f.write_str(text),
+        }
+    }
+}
+
+impl<P: Port> Lockstep<P> {
+    /// Opens the link and asks whether the device runs this very controller. Set, `interrupted` ends the run.
+    ///
+    /// # Errors
+    /// No answer, or the answer of another controller.
+    pub fn open(
+        host: Supervised,
+        port: P,
+        patience: Patience,
+        interrupted: &'static AtomicBool,
+    ) -> Result<Self, OpenError> {
+        // Another number in every run, so that frames of the last one are not taken for those of this.
+        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+        let session = (now.subsec_nanos() >> 8 ^ std::process::id()) as u16;
+        let (mut client, identity) = Client::open(port, session, patience).map_err(OpenError::Link)?;
+        let text = client.fetch(|offset| Request::Describe { offset }).map_err(OpenError::Link)?;
+        let text = String::from_utf8_lossy(&text).into_owned();
+        let theirs = Description::parse(&text).map_err(|error| OpenError::Other(error.to_string()))?;
+        let ours = host.controller().description();
+        if &theirs != ours {
+            return Err(OpenError::Other(format!(
+                "the device runs the controller `{}` of spec digest {}, specgen {}, f{}; expected `{}` of {}, specgen {}, f{}: \
+                 build and flash it from this spec",
+                theirs.name,
+                theirs.digest,
+                theirs.version,
+                theirs.scalar.bits(),
+                ours.name,
+                ours.digest,
+                ours.version,
+                ours.scalar.bits(),
+            )));
+        }
+        let config = host.controller().default_config();
+        let (inputs, names) = (host.input_names().len(), host.output_names());
+        let found = [identity.config_words, identity.input_words, identity.output_words].map(usize::from);
+        let expected = [config.len(), inputs, names.len()];
+        if found != expected {
+            return Err(OpenError::Other(format!(
+                "the device has {found:?} words of settings, inputs and outputs; expected {expected:?}: build and flash it with this specgen"
+            )));
+        }
+        Ok(Self {
+            input: vec![0; inputs],
+            ours: vec![0; names.len()],
+            theirs: vec![0; names.len()],
+            bytes: [0; WORDS * size_of::<u64>()],
+            host,
+            client,
+            identity,
+            names,
+            config,
+            fresh: false,
+            tick: 0,
+            total: 0,
+            stop: None,
+            interrupted,
+            waited: Duration::ZERO,
+        })
+    }
+
+    /// Why the run ended early, if it did. Forgotten at the next reset.
+    #[must_use]
+    pub fn stop(&self) -> Option<&Stop> {
+        self.stop.as_ref()
+    }
+
+    /// Takes it.
+    pub fn take_stop(&mut self) -> Option<Stop> {
+        self.stop.take()
+    }
+
+    /// Ticks that host and device computed alike, in all runs.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.total
+    }
+
+    /// Time spent waiting for the device.
+    #[must_use]
+    pub fn waited(&self) -> Duration {
+        self.waited
+    }
+
+    /// In what the device counts costs.
+    #[must_use]
+    pub fn counted(&self) -> Counted {
+        self.identity.counted
+    }
+
+    /// The line, and what came damaged over it.
+    pub fn line(&mut self) -> (&mut P, u32) {
+        let damaged = self.client.damaged();
+        (self.client.port(), damaged)
+    }
+
+    /// What the stages of a tick cost on the device since it started, the whole tick first.
+    ///
+    /// # Errors
+    /// As [`Client::ask`].
+    pub fn costs(&mut self) -> Result<Vec<Cost>, ClientError> {
+        let mut costs = Vec::new();
+        for index in 0..self.identity.stages {
+            let Reply::Stage(stage) = self.client.ask(&Request::LockstepStage { index })? else {
+                return Err(ClientError::Unexpected);
+            };
+            if stage.calls > 0 {
+                costs.push(Cost {
+                    name: stage.name.to_owned(),
+                    calls: stage.calls,
+                    min: stage.smallest,
+                    mean: stage.sum as f64 / stage.calls as f64,
+                    max: stage.largest,
+                    stack: stage.stack,
+                });
+            }
+        }
+        Ok(costs)
+    }
+
+    /// Sends the settings in force, with a reset or without.
+    fn settle(&mut self, reset: bool) -> Result<(), Stop> {
+        let words = put_words(&self.config, &mut self.bytes).ok_or(Stop::Link(ClientError::TooLong))?;
+        let request = if reset { Request::LockstepReset { config: words } } else { Request::WriteConfig { words } };
+        match self.client.ask(&request).map_err(Stop::Link)? {
+            Reply::Done => Ok(()),
+            _ => Err(Stop::Link(ClientError::Unexpected)),
+        }
+    }
+
+    /// One tick on both, with this request to the supervisor; what the supervisor says after it.
+    fn tick(&mut self, input: &[u64], request: u64) -> Result<MachineWord, Stop> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            return Err(Stop::Interrupted);
+        }
+        for (slot, word) in self.input.iter_mut().zip(input.iter().chain(&[request, 0])) {
+            *slot = *word;
+        }
+        let word = self.host.step(&self.input, &mut self.ours);
+        let digest = self.host.digest();
+
+        let start = Instant::now();
+        let input = put_words(&self.input, &mut self.bytes).ok_or(Stop::Link(ClientError::TooLong))?;
+        let reply = self.client.ask(&Request::LockstepStep { input }).map_err(Stop::Link)?;
+        let Reply::Stepped { digest: theirs, output, .. } = reply else {
+            return Err(Stop::Link(ClientError::Unexpected));
+        };
+        if !output.read_words(&mut self.theirs) {
+            return Err(Stop::Link(ClientError::Unexpected));
+        }
+        self.waited += start.elapsed();
+        let scalar = self.host.controller().description().scalar;
+        let (host, device) = ((&self.ours[..], digest), (&self.theirs[..], theirs));
+        if let Some(difference) = Difference::first(self.tick, &self.names, scalar, host, device) {
+            return Err(Stop::Difference(difference));
+        }
+        self.tick += 1;
+        self.total += 1;
+        Ok(word)
+    }
+
+    /// Arms the machine where it stands, at rest: the codes do not move, so neither do the readings.
+    fn arm(&mut self, input: &[u64]) -> Result<(), Stop> {
+        let mut word = self.tick(input, ARM)?;
+        while word.phase != RUNNING {
+            if self.tick >= ARMING {
+                return Err(Stop::Supervisor { tick: self.tick, word });
+            }
+            // Run is taken once it is armed.
+            word = self.tick(input, if word.phase == DISARMED { ARM } else { RUN })?;
+        }
+        Ok(())
+    }
+
+    fn advance(&mut self, input: &[u64]) -> Result<(), Stop> {
+        if self.fresh {
+            self.arm(input)?;
+            self.fresh = false;
+        }
+        let word = self.tick(input, RUN)?;
+        if word.phase == RUNNING { Ok(()) } else { Err(Stop::Supervisor { tick: self.tick - 1, word }) }
+    }
+}
+
+impl<P: Port> TickController for Lockstep<P> {
+    fn description(&self) -> &Description {
+        self.host.controller().description()
+    }
+
+    fn default_config(&self) -> Vec<u64> {
+        self.host.controller().default_config()
+    }
+
+    fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
+        self.host.configure(words)?;
+        self.config = words.to_vec();
+        // At reset they go with the next one.
+        if !self.fresh
+            && let Err(stop) = self.settle(false)
+        {
+            self.stop = Some(stop);
+        }
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.host.reset();
+        self.tick = 0;
+        self.stop = self.settle(true).err();
+        self.fresh = true;
+    }
+
+    fn step(&mut self, input: &[u64], output: &mut [u64]) {
+        if self.stop.is_none() {
+            self.stop = self.advance(input).err();
+        }
+        if self.stop.is_some() {
+            output.fill(u64::MAX);
+            return;
+        }
+        for (slot, word) in output.iter_mut().zip(&self.ours) {
+            *slot = *word;
+        }
+    }
+
+    fn state_digest(&self) -> u64 {
+        self.host.digest()
+    }
+}

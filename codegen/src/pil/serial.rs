@@ -1,0 +1,100 @@
+//! A serial line: raw bytes, no flow control, a limit on every wait.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::Path;
+use std::time::Duration;
+
+use rustix::event::PollFlags;
+use rustix::fs::OFlags;
+use rustix::termios::{ControlModes, OptionalActions, QueueSelector, ioctl_tiocexcl, tcflush, tcgetattr, tcsetattr};
+use specgen_link::client::Port;
+
+use super::wait::ready;
+
+/// Baud rate unless asked otherwise. A USB serial port of a board ignores it.
+pub const BAUD: u32 = 921_600;
+/// Longest wait for room to send.
+const SEND: Duration = Duration::from_secs(2);
+
+/// An open serial line, for nobody else.
+pub struct SerialLine {
+    file: File,
+}
+
+impl SerialLine {
+    /// Opens a serial device, 8 data bits, no parity, one stop bit.
+    ///
+    /// # Errors
+    /// In words: no such device, no permission, in use, no serial device, a rate that it does not do.
+    pub fn open(path: &Path, baud: u32) -> Result<Self, String> {
+        let name = path.display();
+        // O_NONBLOCK, so that a missing carrier does not hold us up; every wait is a poll.
+        let flags = (OFlags::NOCTTY | OFlags::NONBLOCK).bits();
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .custom_flags(flags.cast_signed())
+            .open(path)
+            .map_err(|error| format!("cannot open {name}: {}", advice(&error)))?;
+        let mut settings =
+            tcgetattr(&file).map_err(|_| format!("{name} is no serial device; expected one such as /dev/ttyACM0"))?;
+        ioctl_tiocexcl(&file).map_err(|error| format!("{name} cannot be had alone: {error}"))?;
+        settings.make_raw();
+        settings.control_modes |= ControlModes::CLOCAL | ControlModes::CREAD;
+        settings.control_modes -= ControlModes::CSTOPB | ControlModes::CRTSCTS;
+        settings.set_speed(baud).map_err(|_| format!("{name} does not do {baud} baud; name another with --baud"))?;
+        let set = tcsetattr(&file, OptionalActions::Now, &settings);
+        set.map_err(|error| format!("{name} does not take the settings of a raw line at {baud} baud: {error}"))?;
+        // What was on the line before is of no session of ours.
+        tcflush(&file, QueueSelector::IOFlush).map_err(|error| format!("{name}: {error}"))?;
+        Ok(Self { file })
+    }
+}
+
+fn advice(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::NotFound => "no such device; is the board plugged in? ls /dev/ttyACM* /dev/ttyUSB*".to_owned(),
+        ErrorKind::PermissionDenied => {
+            "no permission; add yourself to its group (often: sudo usermod -aG dialout $USER) and log in again"
+                .to_owned()
+        }
+        ErrorKind::ResourceBusy => "another program has it open; end that one first".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+impl Port for SerialLine {
+    fn send(&mut self, mut bytes: &[u8]) -> io::Result<()> {
+        while !bytes.is_empty() {
+            match self.file.write(bytes) {
+                Ok(count) => bytes = bytes.get(count..).unwrap_or_default(),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                    if !ready(&self.file, PollFlags::OUT, SEND)? {
+                        let text = format!("the line took no byte for {} s", SEND.as_secs());
+                        return Err(io::Error::new(ErrorKind::TimedOut, text));
+                    }
+                }
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], limit: Duration) -> io::Result<usize> {
+        if !ready(&self.file, PollFlags::IN, limit)? {
+            return Ok(0);
+        }
+        let gone = || io::Error::new(ErrorKind::UnexpectedEof, "the serial device is gone; was it unplugged?");
+        match self.file.read(buffer) {
+            Ok(0) => Err(gone()),
+            Ok(count) => Ok(count),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
+            // EIO: the other end is closed.
+            Err(error) if error.raw_os_error() == Some(rustix::io::Errno::IO.raw_os_error()) => Err(gone()),
+            Err(error) => Err(error),
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! What the controller runs on.
+
+use crate::diagnostic::codes;
+use crate::model::Mcu;
+use crate::spec::fields::Fields;
+use crate::spec::findings::Findings;
+
+/// In software a multiplication takes some thirty instructions, and a tick ten times as long.
+pub(super) fn scalar_fits_fpu(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let part = Mcu::named(f.choice("target.mcu")?)?.part();
+    if !part.double && f.choice("controller.scalar")? == "f64" {
+        let path = if f.given("target.mcu") { "target.mcu" } else { "controller.scalar" };
+        findings.error(
+            codes::SCALAR_WITHOUT_FPU,
+            path,
+            f.span(path),
+            format!(
+                "the FPU of {} ({}) has single precision, but controller.scalar is \"f64\"{}",
+                part.name,
+                part.core,
+                if f.given("controller.scalar") { "" } else { " by default" }
+            ),
+            format!(
+                "write, in [controller]: scalar = \"f32\"; or choose mcu = \"{}\"",
+                Mcu::doubles().join("\" or \"")
+            ),
+        );
+    }
+    Some(())
+}
+
+pub(super) fn budget_in_bytes(f: &Fields, findings: &mut Findings) -> Option<()> {
+    for path in ["target.budget.flash", "target.budget.ram", "target.budget.stack"] {
+        let Some(bytes) = f.number(path) else {
+            continue;
+        };
+        if bytes.fract() != 0.0 {
+            findings.error(
+                codes::BUDGET_NOT_WHOLE,
+                path,
+                f.span(path),
+                format!("`{path}` is {bytes} bytes, expected a whole number of bytes"),
+                format!("write \"{} B\", or another whole amount", bytes.round()),
+            );
+        }
+    }
+    Some(())
+}
+
+/// A budget that the part does not have would let an image pass that cannot be flashed.
+pub(super) fn budget_fits_part(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let part = Mcu::named(f.choice("target.mcu")?)?.part();
+    for (path, has, what) in [
+        ("target.budget.flash", part.flash, "flash"),
+        ("target.budget.ram", part.ram, "RAM"),
+        ("target.budget.stack", part.ram, "RAM"),
+    ] {
+        let Some(bytes) = f.number(path) else {
+            continue;
+        };
+        if bytes > has as f64 {
+            findings.error(
+                codes::BUDGET_BEYOND_PART,
+                path,
+                f.span(path),
+                format!("`{path}` is {bytes} bytes, but {} has {has} bytes of {what}", part.name),
+                format!("write at most \"{} KiB\", or choose a larger part in `target.mcu`", has / 1024),
+            );
+        }
+    }
+    Some(())
+}

@@ -1,0 +1,286 @@
+//! What the tick of an image must not do: panic, allocate, call through a register, recurse, or compute `f64` in software.
+//!
+//! Everything that the tick can reach is looked at, by its branches ([`CallGraph`](super::callgraph)); a finding names the
+//! function and, where the image has line information, the lines that call it.
+
+use super::callgraph::{CallGraph, Function};
+use super::error::TargetError;
+use super::panics::{self, DebugInfo};
+use super::{image, stack};
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Functions that are one tick, under the names that targets give them.
+pub const TICKS: [&str; 3] = ["specgen_tick", "specgen_supervise", stack::STEP_SYMBOL];
+/// As many places as a finding names.
+const NAMED: usize = 4;
+
+/// What is asked of an image beyond its tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Rules {
+    /// The core computes `f64` in software: then a tick must not.
+    pub single: bool,
+    /// No panic and no allocator anywhere, not only out of the tick's reach.
+    pub whole_image: bool,
+}
+
+/// A rule that is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rule {
+    /// A panic can be reached, or is in the image.
+    Panic,
+    /// An allocator can be reached, or is in the image.
+    Allocation,
+    /// A call or jump through a register: where it leads, nobody can tell.
+    IndirectCall,
+    /// `f64` in software.
+    SoftDouble,
+    /// A function that calls itself, or one that moves the stack pointer by what only a run can tell: no stack bound.
+    Unbounded,
+    /// A tick used more stack than the bound allows: the bound is wrong.
+    StackBound,
+}
+
+/// A broken rule and where.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Fault {
+    /// Which.
+    pub rule: Rule,
+    /// Function, way there, lines.
+    pub text: String,
+}
+
+/// What was found out about the tick of an image.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Checked {
+    /// The function that counts as one tick.
+    pub tick: String,
+    /// Functions that it can reach, itself included.
+    pub functions: usize,
+    /// Bytes of their code.
+    pub code: u64,
+    /// Static bound of its stack, bytes; none if there is no bound.
+    pub stack: Option<u64>,
+    /// The deepest path, each function with its frame, bytes.
+    pub path: Vec<(String, u64)>,
+    /// Broken rules; none in an image that may be flashed.
+    pub faults: Vec<Fault>,
+}
+
+/// Checks the tick of an image: `tick`, or the first of [`TICKS`] that it has.
+///
+/// # Errors
+/// [`TargetError::MalformedImage`] if the file is damaged or has no such function.
+pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<Checked, TargetError> {
+    let graph = CallGraph::read(elf)?;
+    let debug = panics::debug_info(elf)?;
+    let named = tick.or_else(|| TICKS.into_iter().find(|name| graph.symbols.contains_key(*name)));
+    let root = named.ok_or_else(|| TargetError::MalformedImage {
+        text: format!("it has none of the functions {}: which one is the tick?", TICKS.join(", ")),
+    })?;
+    let bound = stack::bound(elf, root)?;
+    let start = graph.symbols.get(root).copied().or_else(|| by_name(&graph, root));
+    let reach = Reach::from(&graph, start.unwrap_or_default());
+    let mut faults = Vec::new();
+    let mut add = |rule: Rule, text: String| faults.push(Fault { rule, text });
+    for (address, function) in reach.functions() {
+        let enters = |is: fn(&str) -> bool| is(&function.name) && reach.callers(address).any(|(_, f)| !is(&f.name));
+        if enters(image::is_panic) {
+            add(Rule::Panic, reach.words(&debug, "can panic", address)?);
+        }
+        if enters(image::is_allocator) {
+            add(Rule::Allocation, reach.words(&debug, "allocates", address)?);
+        }
+        if rules.single && enters(is_soft_double) {
+            add(Rule::SoftDouble, reach.words(&debug, "computes f64 in software", address)?);
+        }
+        if !function.indirect.is_empty() {
+            let lines = panics::lines(&debug, function, function.indirect.iter().take(NAMED))?;
+            add(Rule::IndirectCall, format!("{} calls through a register: {}", function.name, lines.join("; ")));
+        }
+    }
+    for cycle in &bound.recursion {
+        add(Rule::Unbounded, format!("{} call each other without end in sight", cycle.join(" and ")));
+    }
+    for name in &bound.unsized_functions {
+        add(Rule::Unbounded, format!("{name} moves the stack pointer by what only a run can tell"));
+    }
+    for name in &bound.strays {
+        add(Rule::Unbounded, format!("{name} branches to what is no function"));
+    }
+    if rules.whole_image {
+        let footprint = image::footprint(elf)?;
+        let reached = |rule: Rule, faults: &[Fault]| faults.iter().any(|fault| fault.rule == rule);
+        for (rule, symbols, what) in [
+            (Rule::Panic, footprint.panic_symbols, "panic"),
+            (Rule::Allocation, footprint.allocator_symbols, "allocator"),
+        ] {
+            if !symbols.is_empty() && !reached(rule, &faults) {
+                faults.push(Fault { rule, text: format!("the image holds the {what} {}", some(&symbols)) });
+            }
+        }
+    }
+    faults.sort_by_key(|fault| fault.rule);
+    Ok(Checked {
+        tick: root.to_owned(),
+        functions: reach.parents.len(),
+        code: bound.code_bytes,
+        stack: bound.is_complete().then_some(bound.bytes),
+        path: bound.path,
+        faults,
+    })
+}
+
+impl Checked {
+    /// Adds the fault of a tick that was seen to use more stack than the bound.
+    pub fn hold_against_painted(&mut self, painted: u64) {
+        if let Some(bound) = self.stack
+            && painted > bound
+        {
+            let text = format!("a tick used {painted} bytes of stack, and the static bound is {bound}");
+            self.faults.push(Fault { rule: Rule::StackBound, text });
+        }
+    }
+}
+
+/// Functions of `compiler_builtins` that do arithmetic or conversions of `f64`, by the names of the run-time ABI and by
+/// those of libgcc.
+fn is_soft_double(name: &str) -> bool {
+    let name = name.rsplit("::").next().unwrap_or(name);
+    if let Some(helper) = name.strip_prefix("__aeabi_") {
+        let arithmetic = ["dadd", "dsub", "drsub", "dmul", "ddiv", "dneg", "d2", "cd", "dcmp"];
+        return arithmetic.iter().any(|start| helper.starts_with(start))
+            || matches!(helper, "i2d" | "ui2d" | "l2d" | "ul2d" | "f2d" | "h2d");
+    }
+    let libgcc = name.starts_with("__") && (name.ends_with("df2") || name.ends_with("df3") || name.ends_with("df"));
+    libgcc || name.starts_with("__fixdf") || name.starts_with("__fixunsdf") || name.starts_with("__truncdf")
+}
+
+fn by_name(graph: &CallGraph, name: &str) -> Option<u64> {
+    graph.functions.iter().find(|(_, function)| function.name == name).map(|(address, _)| *address)
+}
+
+fn some(names: &[String]) -> String {
+    let more = names.len().saturating_sub(NAMED);
+    let list = names.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
+    if more == 0 { list } else { format!("{list} and {more} more") }
+}
+
+/// Everything that a function can reach.
+struct Reach<'a> {
+    graph: &'a CallGraph,
+    /// Each function that is reached, and the one that it was first reached from.
+    parents: BTreeMap<u64, Option<u64>>,
+}
+
+impl<'a> Reach<'a> {
+    /// Breadth first, so that the way there is a shortest one.
+    fn from(graph: &'a CallGraph, root: u64) -> Self {
+        let mut parents = BTreeMap::from([(root, None)]);
+        let mut ring = vec![root];
+        while !ring.is_empty() {
+            let mut next = Vec::new();
+            for address in ring {
+                let callees = graph.functions.get(&address).into_iter().flat_map(|function| function.calls.keys());
+                for callee in callees {
+                    if !parents.contains_key(callee) {
+                        parents.insert(*callee, Some(address));
+                        next.push(*callee);
+                    }
+                }
+            }
+            ring = next;
+        }
+        Self { graph, parents }
+    }
+
+    fn functions(&self) -> impl Iterator<Item = (u64, &'a Function)> {
+        self.parents.keys().filter_map(|address| Some((*address, self.graph.functions.get(address)?)))
+    }
+
+    fn callers(&self, callee: u64) -> impl Iterator<Item = (u64, &'a Function)> {
+        self.functions().filter(move |(_, function)| function.calls.contains_key(&callee))
+    }
+
+    /// Function, the way to it from the tick, the lines that call it.
+    fn words(&self, debug: &DebugInfo<'_>, what: &str, address: u64) -> Result<String, TargetError> {
+        let name = |address: u64| self.graph.functions.get(&address).map_or("?", |function| function.name.as_str());
+        let mut way = vec![name(address)];
+        let mut at = address;
+        while let Some(Some(parent)) = self.parents.get(&at) {
+            way.push(name(*parent));
+            at = *parent;
+        }
+        way.reverse();
+        let mut lines = BTreeSet::new();
+        for (_, caller) in self.callers(address).filter(|(_, caller)| caller.name != name(address)) {
+            let places = caller.calls.get(&address).into_iter().flatten();
+            lines.extend(panics::lines(debug, caller, places.take(NAMED))?);
+        }
+        let lines: Vec<String> = lines.into_iter().collect();
+        Ok(format!("the tick {what}: {}; called at {}", way.join(" → "), some(&lines)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn helpers_for_double_precision_are_told_from_others() {
+        let double = [
+            "__aeabi_dmul",
+            "__aeabi_dadd",
+            "__aeabi_drsub",
+            "__aeabi_cdcmple",
+            "__aeabi_dcmplt",
+            "__aeabi_d2f",
+            "__aeabi_d2iz",
+            "__aeabi_f2d",
+            "__aeabi_i2d",
+            "compiler_builtins::float::mul::__muldf3",
+            "__extendsfdf2",
+            "__truncdfsf2",
+            "__fixdfsi",
+            "__floatsidf",
+            "__gedf2",
+        ];
+        for name in double {
+            assert!(is_soft_double(name), "{name}");
+        }
+        let other = [
+            "__aeabi_fmul",
+            "__aeabi_f2iz",
+            "__aeabi_i2f",
+            "__aeabi_uldivmod",
+            "__aeabi_memcpy",
+            "__mulsf3",
+            "__floatsisf",
+            "memcpy",
+            "controller::step",
+            "__udivmoddi4",
+            "pdf",
+            "__aeabi_idiv",
+        ];
+        for name in other {
+            assert!(!is_soft_double(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_bound_below_what_was_painted_is_a_fault() {
+        let mut checked = Checked {
+            tick: "t".to_owned(),
+            functions: 1,
+            code: 2,
+            stack: Some(100),
+            path: Vec::new(),
+            faults: Vec::new(),
+        };
+        checked.hold_against_painted(100);
+        assert!(checked.faults.is_empty());
+        checked.hold_against_painted(104);
+        assert_eq!(checked.faults.first().map(|fault| fault.rule), Some(Rule::StackBound));
+    }
+}

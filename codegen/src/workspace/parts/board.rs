@@ -1,0 +1,21 @@
+//! The tick on real converters.
+
+use super::{Part, files};
+
+pub const PART: Part = Part {
+    folder: "board",
+    member: false,
+    what: "what all boards have in common: one tick on real converters, what is said over the link",
+    needs: "nothing",
+    with: &["hal", "link"],
+    files: files! { "board":
+        "Cargo.toml",
+        "src/cycle.rs",
+        "src/desk.rs",
+        "src/exchange.rs",
+        "src/health.rs",
+        "src/lib.rs",
+        "src/schedule.rs",
+        "src/words.rs",
+    },
+};

@@ -1,0 +1,19 @@
+//! What the STM32 boards have in common.
+
+use super::{Part, files};
+
+pub const PART: Part = Part {
+    folder: "stm32",
+    member: false,
+    what: "what the STM32 boards have in common",
+    needs: "nothing by itself",
+    with: &["board", "hal", "link"],
+    files: files! { "stm32":
+        "Cargo.toml",
+        "src/converters.rs",
+        "src/delay.rs",
+        "src/lib.rs",
+        "src/serial.rs",
+        "src/timer.rs",
+    },
+};

@@ -1,0 +1,170 @@
+//! `build`, `size` and `flash` as a user meets them, with a stand-in for probe-rs that says what it was asked.
+//!
+//! Needs a cross compiler; without one it fails, or skips if `SPECGEN_ALLOW_MISSING=1`.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+mod support;
+
+use std::ffi::OsString;
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+
+use specgen::target;
+use support::{Document, Folder, Run};
+
+/// Where images are built: kept between runs, so that `core` is compiled once.
+fn target_dir() -> String {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("images").display().to_string()
+}
+
+fn has_tools() -> bool {
+    let test = std::thread::current().name().unwrap_or_default().to_owned();
+    target::available_or_skip(&test).unwrap_or_else(|error| panic!("{error}")).is_some()
+}
+
+/// A folder in front of `PATH` with a `probe-rs` that writes its arguments to `asked.txt` and ends with `status`.
+fn fake_probe_rs(folder: &Folder, status: i32) -> OsString {
+    fs::create_dir_all(folder.path("bin")).unwrap();
+    let script = format!("#!/bin/sh\necho \"$@\" >> '{}'\nexit {status}\n", folder.path("asked.txt").display());
+    folder.write("bin/probe-rs", script);
+    fs::set_permissions(folder.path("bin/probe-rs"), fs::Permissions::from_mode(0o755)).unwrap();
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::iter::once(folder.path("bin")).chain(std::env::split_paths(&path).filter(|f| !f.join("probe-rs").exists()));
+    std::env::join_paths(folders).unwrap()
+}
+
+/// `PATH` without a `probe-rs`.
+fn without_probe_rs() -> OsString {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::join_paths(std::env::split_paths(&path).filter(|folder| !folder.join("probe-rs").exists())).unwrap()
+}
+
+/// Adds keys to the table `[target.budget]` of legs.toml.
+fn with_budget(folder: &Folder, name: &str, old: &str, new: &str) {
+    folder.spec(name, &[(old, new)]);
+}
+
+fn json(folder: &Folder, arguments: &[&str]) -> (i32, serde_json::Value) {
+    let run = Run::of(folder.command().args(arguments).arg("--json"));
+    let value: serde_json::Value = serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("{error}: {run:#?}"));
+    assert_eq!(run.stderr, "");
+    (run.code, value)
+}
+
+#[test]
+fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
+    if !has_tools() {
+        return;
+    }
+    let folder = Folder::new();
+    let dir = target_dir();
+    let build = ["build", "legs.toml", "--target", "qemu", "-o", "out", "--no-measure", "--target-dir", &dir];
+    let run = folder.run(&build);
+    assert_eq!(run.code, 0, "{run:#?}");
+    for word in ["legs → out/target/qemu.elf for mps2-an500", "flash by owner", "controller", "no panic, no allocation", "stack: "] {
+        assert!(run.stdout.contains(word), "no `{word}` in\n{}", run.stdout);
+    }
+    let (code, document) = json(&folder, &build);
+    let made = &document["result"];
+    assert_eq!((code, &made["failures"]), (0, &serde_json::json!([])));
+    let flash = made["used"]["flash"].as_u64().unwrap();
+    let owners = made["size"]["owners"].as_array().unwrap();
+    let sum: u64 = owners.iter().map(|o| o["code"].as_u64().unwrap() + o["constants"].as_u64().unwrap()).sum();
+    assert_eq!(sum, flash);
+
+    // The image says where it comes from, and the numbers are the same.
+    let image = "out/target/qemu.elf";
+    let size = folder.run(&["size", image]);
+    assert_eq!(size.code, 0, "{size:#?}");
+    let digest = made["digest"].as_str().unwrap();
+    let identity = format!("made by specgen {}, platform legs, f64, spec {digest}", env!("CARGO_PKG_VERSION"));
+    assert!(size.stdout.contains(&identity), "{}", size.stdout);
+    let (_, weighed) = json(&folder, &["size", image]);
+    assert_eq!(weighed["result"]["size"], made["size"]);
+    assert_eq!(weighed["result"]["checks"], made["checks"]);
+
+    // Over budget: who takes most, and by how much to shrink; nothing is flashed.
+    with_budget(&folder, "tight.toml", "flash        = \"128 KiB\"", &format!("flash = \"{} B\"", flash - 10));
+    let tight = ["build", "tight.toml", "--target", "qemu", "-o", "tight", "--no-measure", "--target-dir", &dir];
+    folder.run(&tight).says(1, &["target.budget.flash allows", "shrink it by 10", "most of it: "]);
+    let (code, document) = json(&folder, &tight);
+    assert_eq!((code, document["result"]["failures"].as_array().unwrap().len()), (1, 1), "{document:#}");
+
+    flashing(&folder, image);
+}
+
+/// The emulated machine's image stands in for a board's: to probe-rs it is a file.
+fn flashing(folder: &Folder, image: &str) {
+    let flash = |path: &OsString, arguments: &[&str]| {
+        Run::of(folder.command().env("PATH", path).args(["flash", image]).args(arguments))
+    };
+    let board = ["--target", "stm32h743", "--yes"];
+    let commands = [
+        format!("download --chip STM32H743ZITx --verify {image}"),
+        "reset --chip STM32H743ZITx".to_owned(),
+    ];
+    // Nothing to flash with: what is missing, and the exact commands.
+    let bare = without_probe_rs();
+    let missing = flash(&bare, &board);
+    missing.says(3, &["probe-rs is not installed", "cargo install probe-rs-tools", &commands[0], &commands[1]]);
+
+    let path = fake_probe_rs(folder, 0);
+    let asked = || fs::read_to_string(folder.path("asked.txt")).unwrap_or_default();
+    // Nobody says that the amplifiers are off; no board is named; the emulated machine is none.
+    flash(&path, &["--target", "stm32h743"]).says(2, &["switch the amplifiers off", "--yes"]);
+    flash(&path, &["--yes"]).says(2, &["name it by --target"]);
+    flash(&path, &["--yes", "--target", "qemu"]).says(2, &["name it by --target"]);
+    // A core without double precision: the image computes in f64 with an FPU that the board does not have, which the
+    // checks do not see; an image that fails a check is not flashed.
+    assert_eq!(asked(), "", "nothing may have been flashed so far");
+    let mut spoilt = fs::read(folder.path(image)).unwrap();
+    let mark = b"specgen-identity: ";
+    let place = spoilt.windows(mark.len()).position(|window| window == mark).unwrap();
+    spoilt[place] ^= 1;
+    folder.write("spoilt.elf", &spoilt);
+    let refused = Run::of(folder.command().env("PATH", &path).args(["flash", "spoilt.elf"]).args(board));
+    refused.says(1, &["holds no identity", "nothing was flashed"]);
+    assert_eq!(asked(), "");
+
+    let done = flash(&path, &board);
+    assert_eq!(done.code, 0, "{done:#?}");
+    assert!(done.stdout.contains("verified and restarted"), "{}", done.stdout);
+    assert_eq!(asked(), format!("{}\n{}\n", commands[0], commands[1]));
+    let probe = flash(&path, &[&board[..], &["--probe", "0483:374e:1"]].concat());
+    assert_eq!(probe.code, 0, "{probe:#?}");
+    assert!(asked().contains("--verify --probe 0483:374e:1 out/target/qemu.elf"), "{}", asked());
+    // It fails half-way: said, with what to run again.
+    let failing = fake_probe_rs(folder, 5);
+    flash(&failing, &board).says(3, &["probe-rs failed", "keep the amplifiers", &commands[0]]);
+}
+
+#[test]
+fn what_does_not_fit_together_is_refused_before_anything_is_built() {
+    let folder = Folder::new();
+    let before = folder.listing();
+    folder.run(&["build", "legs.toml", "--target", "esp32"]).says(2, &["esp32", "host, qemu, stm32h743, stm32f4, rt-pc"]);
+    folder.run(&["build"]).says(2, &["<SPEC>"]);
+    folder.run(&["size"]).says(2, &["<SPEC|ELF>"]);
+    folder.run(&["flash", "absent.toml", "--yes"]).says(1, &["E0101"]);
+    // A board with another core than the spec's.
+    let wrong = folder.run(&["build", "legs.toml", "--target", "stm32f4"]);
+    wrong.says(1, &["E0333", "the spec is for mps2-an500 (cortex-m7)", "mcu = \"stm32f446re\"", "scalar = \"f32\""]);
+    let document = Document::of(&Run::of(folder.command().args(["build", "legs.toml", "--target", "stm32f4", "--json"])));
+    assert!(document.finding("E0333")["line"].as_u64().unwrap() > 1);
+    // What begins as an image and is none.
+    folder.write("broken.elf", b"\x7fELF and no more");
+    folder.run(&["size", "broken.elf"]).says(3, &["cannot be analysed"]);
+    fs::remove_file(folder.path("broken.elf")).unwrap();
+    assert_eq!(folder.listing(), before);
+}
+
+#[test]
+fn an_image_of_this_machine_is_weighed_without_the_checks_of_another() {
+    let folder = Folder::new();
+    let own: PathBuf = std::env::current_exe().unwrap();
+    let run = folder.run(&["size", &own.display().to_string()]);
+    assert_eq!(run.code, 0, "{run:#?}");
+    assert!(run.stdout.contains("flash by owner") && run.stdout.contains("are for images of Cortex-M"), "{}", run.stdout);
+}

@@ -1,0 +1,162 @@
+//! One control tick on real converters.
+
+use controller::sensing::gauge_reading;
+use controller::supervised::{
+    CONVERTER, Cause, INTEGRITY, LINK_LOST, MACHINE_INPUT_WORDS, MISSED_TICK, Machine, MachineInput, Request, STOP,
+    supervise,
+};
+use controller::{INPUT_WORDS, Real};
+use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
+use specgen_runtime::Real as _;
+
+use crate::exchange::{Exchange, Orders, Report};
+use crate::words::{COMMAND_WORDS, GAUGE_BITS, GAUGES};
+
+/// What the target noticed since the last tick.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Noticed {
+    /// Ticks that never came.
+    pub missed: u32,
+    /// The emergency stop is open.
+    pub stop: bool,
+}
+
+/// The machine with its converters. Owned by the interrupt that ticks.
+#[derive(Debug)]
+pub struct Board<G, A> {
+    gauges: G,
+    amplifiers: A,
+    machine: Machine,
+    /// Whether tables and settings in flash are what the compiler wrote.
+    intact: bool,
+    /// Whether both converters were started and proved.
+    started: bool,
+    /// Events that came up after the supervisor had been called: for the next tick.
+    pending: u32,
+    /// The request of the last tick, to see a new one.
+    request: Request,
+}
+
+impl<G: Gauges, A: Amplifiers> Board<G, A> {
+    /// Bits that a code of the ADC has more than the controller expects.
+    const SPARE_BITS: u32 = {
+        assert!(GAUGE_BITS <= G::BITS, "sensor.bits of the spec is more than the ADC of this board has");
+        G::BITS - GAUGE_BITS
+    };
+    /// Codes go out as they are, so full scale of spec and DAC must be the same.
+    const SAME_CODES: () =
+        assert!(controller::limits::DAC_BITS == A::BITS, "dac.bits of the spec is not what the DAC of this board has");
+
+    /// At power-up, before [`Self::start`]. `intact`: the result of `controller::integrity`.
+    #[must_use]
+    pub const fn new(gauges: G, amplifiers: A, intact: bool) -> Self {
+        let () = Self::SAME_CODES;
+        Self { gauges, amplifiers, machine: Machine::new(), intact, started: false, pending: 0, request: Request::None }
+    }
+
+    /// Brings the converters into their working state, amplifiers disabled. May take a millisecond.
+    /// What fails stands in the report, and as an event of every tick until a start succeeds.
+    pub fn start(&mut self, report: &mut Report) {
+        // The line first, whatever the parts say, and both parts even if one fails.
+        let disabled = self.amplifiers.enable(false);
+        let amplifiers = self.amplifiers.start();
+        let gauges = self.gauges.start();
+        self.started = true;
+        for fault in [disabled, amplifiers, gauges].into_iter().filter_map(Result::err) {
+            self.started = false;
+            note(report, fault);
+        }
+    }
+
+    /// One tick. True if it started the converters again and so took longer than a tick may: then the schedule begins anew.
+    ///
+    /// Converters that failed are started again by a new request to acknowledge, while the amplifiers are off.
+    pub fn tick(&mut self, exchange: &mut Exchange, noticed: Noticed) -> bool {
+        let Exchange { orders, config, report, silence, .. } = exchange;
+        let acknowledged = orders.request == Request::Acknowledge && self.request != Request::Acknowledge;
+        self.request = orders.request;
+        let failed = !self.started || report.cause == Cause::Converter;
+        let restart = acknowledged && failed && !report.amplifier_on;
+        if restart {
+            self.start(report);
+        }
+
+        let mut events = self.pending;
+        self.pending = 0;
+        for (happened, event) in [
+            (noticed.missed > 0, MISSED_TICK),
+            (noticed.stop, STOP),
+            (silence.tick(), LINK_LOST),
+            (!self.intact, INTEGRITY),
+            (!self.started, CONVERTER),
+        ] {
+            if happened {
+                events |= event;
+            }
+        }
+        let readings = match self.gauges.read() {
+            Ok(codes) => codes.map(|code| gauge_reading(code >> Self::SPARE_BITS)),
+            Err(fault) => {
+                note(report, fault);
+                events |= CONVERTER;
+                // What was not read is not believed: no number stands for it.
+                [Real::from_f64(f64::NAN); CHANNELS]
+            }
+        };
+
+        let output = supervise(config, &mut self.machine, &input(orders, &readings, events));
+
+        // Off before the codes change, on only after they are out.
+        if !output.amplifier_on {
+            self.done(report, |amplifiers| amplifiers.enable(false));
+        }
+        self.done(report, |amplifiers| amplifiers.write(&output.tick.dac_code));
+        // Converters that did not answer do not get power, whatever the supervisor has not seen yet.
+        if output.amplifier_on && self.started {
+            self.done(report, |amplifiers| amplifiers.enable(true));
+        }
+
+        report.tick += 1;
+        report.phase = output.phase;
+        report.cause = output.cause;
+        report.amplifier_on = output.amplifier_on;
+        report.status = output.tick.status;
+        report.events |= events;
+        report.missed = report.missed.saturating_add(noticed.missed);
+        restart
+    }
+
+    /// What the controller remembers.
+    #[must_use]
+    pub const fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// Does something to the amplifiers; a fault is an event of the next tick.
+    fn done(&mut self, report: &mut Report, action: impl FnOnce(&mut A) -> Result<(), Fault>) {
+        if let Err(fault) = action(&mut self.amplifiers) {
+            note(report, fault);
+            self.pending |= CONVERTER;
+        }
+    }
+}
+
+/// Words of the command, the readings, and no number for what this board does not measure.
+fn input(orders: &Orders, readings: &[Real; GAUGES], events: u32) -> MachineInput {
+    let mut words = [Real::from_f64(f64::NAN).to_word(); MACHINE_INPUT_WORDS];
+    for (slot, word) in words.iter_mut().zip(orders.command) {
+        *slot = word;
+    }
+    for (slot, reading) in words.iter_mut().skip(COMMAND_WORDS).zip(readings) {
+        *slot = reading.to_word();
+    }
+    words[INPUT_WORDS] = orders.request.word();
+    words[INPUT_WORDS + 1] = u64::from(events);
+    MachineInput::from_words(&words)
+}
+
+/// Counts a fault of a converter.
+fn note(report: &mut Report, fault: Fault) {
+    report.converter_faults = report.converter_faults.saturating_add(1);
+    report.faults |= fault.bit();
+}

@@ -1,0 +1,29 @@
+//! What all boards have in common: one control tick on real converters, when it is due, and what is said over the link.
+//!
+//! ```text
+//! timer ─► Schedule ─missed─► Board::tick: Gauges ─codes─► supervise ─codes─► Amplifiers
+//!                                  ▲ orders      report ▼
+//! link  ◄─► Endpoint ◄─► Desk ◄── Exchange ──────────────┘
+//! ```
+//! The interrupt of the timer owns [`Board`], the background owns the link; [`Exchange`] lies between them, and is locked
+//! for as long as it takes to copy what changed. Every decision about control is the supervisor's: a board collects what
+//! went wrong and hands it over as events.
+//!
+//! Nothing here allocates, panics or loops without a bound.
+#![no_std]
+#![forbid(unsafe_code)]
+#![deny(missing_docs)]
+
+mod cycle;
+mod desk;
+mod exchange;
+mod health;
+mod schedule;
+mod words;
+
+pub use cycle::{Board, Noticed};
+pub use desk::Desk;
+pub use exchange::{Exchange, Orders, Report};
+pub use health::{BACKGROUND_SILENCE, Health};
+pub use schedule::{Due, Schedule};
+pub use words::{COMMAND_WORDS, GAUGE_BITS, PERIOD_NANOSECONDS};

@@ -1,0 +1,52 @@
+//! When ticks are due, by a free-running counter that wraps around.
+
+use core::num::NonZeroU32;
+
+/// A tick that is due now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Due {
+    /// Counts from when it was due until it began.
+    pub late: u32,
+    /// Ticks between the last and this one that never came.
+    pub missed: u32,
+    /// Counter value at which the next one is due: to go into the compare register.
+    pub next: u32,
+}
+
+/// Ticks at a fixed period of a counter of 32 bits. A tick that begins late does not move the later ones.
+#[derive(Debug, Clone, Copy)]
+pub struct Schedule {
+    period: NonZeroU32,
+    due: u32,
+}
+
+impl Schedule {
+    /// The first tick is due one period after `now`. `period` is in counts, less than 2³¹.
+    #[must_use]
+    pub const fn new(period: NonZeroU32, now: u32) -> Self {
+        Self { period, due: now.wrapping_add(period.get()) }
+    }
+
+    /// Counter value at which the next tick is due.
+    #[must_use]
+    pub const fn next(&self) -> u32 {
+        self.due
+    }
+
+    /// The tick begins at counter value `now`.
+    pub const fn begin(&mut self, now: u32) -> Due {
+        // Before its time, by a spurious interrupt, counts as in time.
+        let since = now.wrapping_sub(self.due);
+        let late = if since > u32::MAX / 2 { 0 } else { since };
+        // Divided by a number that is not zero.
+        let missed = late / self.period.get();
+        self.due = self.due.wrapping_add(self.period.get().wrapping_mul(missed)).wrapping_add(self.period.get());
+        Due { late: late - missed * self.period.get(), missed, next: self.due }
+    }
+
+    /// Begins anew: what passed since is not counted as missed. For a tick that had to take longer.
+    pub const fn restart(&mut self, now: u32) -> u32 {
+        self.due = now.wrapping_add(self.period.get());
+        self.due
+    }
+}

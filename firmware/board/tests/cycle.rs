@@ -1,0 +1,256 @@
+//! The tick against the controller called by hand, on converters that do as they are told, faults included.
+
+#![allow(clippy::unwrap_used)]
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use controller::sensing::gauge_reading;
+use controller::supervised::{
+    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Request, STOP, supervise,
+};
+use controller::{Command, CommandKind, Config, INPUT_WORDS, Real, Target, TickInput};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use specgen_board::{Board, COMMAND_WORDS, Exchange, GAUGE_BITS, Noticed};
+use specgen_hal::{Amplifiers, Fault, Gauges};
+
+/// What a board did to its amplifiers, in order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Done {
+    Start,
+    Enable(bool),
+    Write([i32; 6]),
+}
+
+/// What the converters answer next, and what they were told.
+#[derive(Default)]
+struct Bench {
+    codes: [i32; 6],
+    gauge_fault: Option<Fault>,
+    write_fault: Option<Fault>,
+    start_fault: Option<Fault>,
+    done: Vec<Done>,
+}
+
+#[derive(Clone, Default)]
+struct Parts(Rc<RefCell<Bench>>);
+
+impl Gauges for Parts {
+    /// One bit more than the reference's gauges.
+    const BITS: u32 = 18;
+
+    fn read(&mut self) -> Result<[i32; 6], Fault> {
+        let bench = self.0.borrow();
+        bench.gauge_fault.map_or(Ok(bench.codes), Err)
+    }
+}
+
+impl Amplifiers for Parts {
+    const BITS: u32 = 16;
+
+    fn start(&mut self) -> Result<(), Fault> {
+        let mut bench = self.0.borrow_mut();
+        bench.done.push(Done::Start);
+        bench.start_fault.map_or(Ok(()), Err)
+    }
+
+    fn write(&mut self, codes: &[i32; 6]) -> Result<(), Fault> {
+        let mut bench = self.0.borrow_mut();
+        bench.done.push(Done::Write(*codes));
+        bench.write_fault.map_or(Ok(()), Err)
+    }
+
+    fn enable(&mut self, on: bool) -> Result<(), Fault> {
+        self.0.borrow_mut().done.push(Done::Enable(on));
+        Ok(())
+    }
+}
+
+fn started(intact: bool) -> (Parts, Board<Parts, Parts>, Exchange) {
+    let parts = Parts::default();
+    parts.0.borrow_mut().codes = [1 << 17; 6];
+    let mut board = Board::new(parts.clone(), parts.clone(), intact);
+    let mut exchange = Exchange::new();
+    board.start(&mut exchange.report);
+    exchange.silence.heard();
+    parts.0.borrow_mut().done.clear();
+    (parts, board, exchange)
+}
+
+/// The controller by hand, from typed inputs instead of words.
+struct ByHand {
+    config: Config,
+    machine: Machine,
+}
+
+impl ByHand {
+    fn new() -> Self {
+        Self { config: Config::new(), machine: Machine::new() }
+    }
+
+    fn tick(&mut self, command: &[u64; COMMAND_WORDS], gauge: [Real; 6], request: Request, events: u32) -> MachineOutput {
+        let vector = |start: usize| core::array::from_fn(|k| Real::from_bits(command[start + k]));
+        let command = Command {
+            kind: CommandKind::from_word(command[0]),
+            selector: command[1] as u32,
+            sequence: command[2] as u32,
+            target: Target { pose: vector(3), rate: vector(9), acceleration: vector(15) },
+        };
+        let tick = TickInput { command, gauge, wrench: [Real::NAN; 6] };
+        supervise(&self.config, &mut self.machine, &MachineInput { tick, request, events })
+    }
+}
+
+const REQUESTS: [Request; 6] =
+    [Request::None, Request::Arm, Request::Run, Request::Hold, Request::RampDown, Request::Acknowledge];
+
+/// Random commands, requests, codes and faults: what goes out is what the controller says, and the line is switched off
+/// before and on after the codes.
+#[test]
+fn a_board_does_what_the_controller_says_whatever_happens() {
+    let mut random = ChaCha8Rng::seed_from_u64(7);
+    let (parts, mut board, mut exchange) = started(true);
+    let mut by_hand = ByHand::new();
+    let mut carried = 0;
+    let (mut faults, mut enabled) = (0, 0);
+    for tick in 0..20_000_u64 {
+        let mut chance = |one_in: u32| random.next_u32() % one_in == 0;
+        let (gauge_fails, write_fails, stop) = (chance(50), chance(50), chance(200));
+        let missed = if chance(40) { 1 + random.next_u32() % 3 } else { 0 };
+        if random.next_u32() % 20 == 0 {
+            exchange.orders.request = REQUESTS[random.next_u32() as usize % 6];
+            exchange.orders.command[0] = u64::from(random.next_u32() % 5);
+            exchange.orders.command[2] = tick;
+        }
+        exchange.silence.heard();
+        {
+            let mut bench = parts.0.borrow_mut();
+            for code in &mut bench.codes {
+                *code = ((1 << 17) + (random.next_u32() % 2000) as i32 - 1000).clamp(0, (1 << 18) - 1);
+            }
+            bench.gauge_fault = gauge_fails.then_some(Fault::Blank);
+            bench.write_fault = write_fails.then_some(Fault::ReadBack);
+        }
+        let (orders, codes) = (exchange.orders, parts.0.borrow().codes);
+        let restarted = board.tick(&mut exchange, Noticed { missed, stop });
+
+        let mut events = carried;
+        for (happened, event) in [(gauge_fails, CONVERTER), (missed > 0, MISSED_TICK), (stop, STOP)] {
+            events |= if happened { event } else { 0 };
+        }
+        let gauge = if gauge_fails { [Real::NAN; 6] } else { codes.map(|code| gauge_reading(code >> 1)) };
+        let output = by_hand.tick(&orders.command, gauge, orders.request, events);
+        let mut expected = if restarted { vec![Done::Enable(false), Done::Start] } else { Vec::new() };
+        if output.amplifier_on {
+            expected.extend([Done::Write(output.tick.dac_code), Done::Enable(true)]);
+            enabled += 1;
+        } else {
+            expected.extend([Done::Enable(false), Done::Write(output.tick.dac_code)]);
+        }
+        assert_eq!(std::mem::take(&mut parts.0.borrow_mut().done), expected, "tick {tick}");
+        assert_eq!(board.machine().digest(), by_hand.machine.digest(), "tick {tick}");
+        assert_eq!(exchange.report.phase, output.phase);
+        assert_eq!(exchange.report.cause, output.cause);
+        carried = if write_fails { CONVERTER } else { 0 };
+        faults += u32::from(gauge_fails) + u32::from(write_fails);
+        assert_eq!(exchange.report.converter_faults, faults);
+    }
+    assert_eq!(exchange.report.faults, Fault::Blank.bit() | Fault::ReadBack.bit());
+    assert!(enabled > 0, "the amplifiers were never on: this tested nothing");
+}
+
+/// The comparison above is able to fail: another shift of the codes is another machine.
+#[test]
+fn a_code_taken_with_another_shift_is_seen() {
+    let (parts, mut board, mut exchange) = started(true);
+    let mut by_hand = ByHand::new();
+    let mut differs = false;
+    for k in 0..50 {
+        parts.0.borrow_mut().codes = [(1 << 17) + 100 * k; 6];
+        exchange.orders.request = if k == 0 { Request::Arm } else { Request::Run };
+        exchange.silence.heard();
+        let orders = exchange.orders;
+        board.tick(&mut exchange, Noticed::default());
+        let codes = parts.0.borrow().codes;
+        by_hand.tick(&orders.command, codes.map(|code| gauge_reading((code + 2) >> 1)), orders.request, 0);
+        differs |= board.machine().digest() != by_hand.machine.digest();
+    }
+    assert!(differs);
+}
+
+#[test]
+fn a_link_that_was_never_heard_or_fell_silent_is_an_event() {
+    let parts = Parts::default();
+    let mut board = Board::new(parts.clone(), parts, true);
+    let mut exchange = Exchange::new();
+    board.start(&mut exchange.report);
+    board.tick(&mut exchange, Noticed::default());
+    assert_eq!(exchange.report.events & LINK_LOST, LINK_LOST);
+    exchange.silence.heard();
+    exchange.report.events = 0;
+    // 0.1 s at the reference's 100 µs.
+    for _ in 0..1000 {
+        board.tick(&mut exchange, Noticed::default());
+    }
+    assert_eq!(exchange.report.events & LINK_LOST, 0);
+    board.tick(&mut exchange, Noticed::default());
+    assert_eq!(exchange.report.events & LINK_LOST, LINK_LOST);
+}
+
+#[test]
+fn a_damaged_flash_is_an_event_of_every_tick() {
+    let (_, mut board, mut exchange) = started(false);
+    for _ in 0..3 {
+        exchange.report.events = 0;
+        board.tick(&mut exchange, Noticed::default());
+        assert_eq!(exchange.report.events & INTEGRITY, INTEGRITY);
+    }
+    let (_, mut whole, mut exchange) = started(true);
+    whole.tick(&mut exchange, Noticed::default());
+    assert_eq!(exchange.report.events & INTEGRITY, 0);
+}
+
+#[test]
+fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_starts_them() {
+    let parts = Parts::default();
+    parts.0.borrow_mut().start_fault = Some(Fault::ReadBack);
+    let mut board = Board::new(parts.clone(), parts.clone(), true);
+    let mut exchange = Exchange::new();
+    board.start(&mut exchange.report);
+    assert_eq!(exchange.report.faults, Fault::ReadBack.bit());
+    for request in [Request::Arm, Request::Run, Request::Acknowledge, Request::Acknowledge, Request::Run, Request::Run] {
+        exchange.silence.heard();
+        exchange.report.events = 0;
+        exchange.orders.request = request;
+        board.tick(&mut exchange, Noticed::default());
+        assert_eq!(exchange.report.events & CONVERTER, CONVERTER);
+    }
+    let starts = |parts: &Parts| parts.0.borrow().done.iter().filter(|&&done| done == Done::Start).count();
+    assert!(!parts.0.borrow().done.contains(&Done::Enable(true)));
+    // Once at power-up, once for the one acknowledgement that was given twice, if the supervisor had the amplifiers off.
+    let before = starts(&parts);
+    assert!(before <= 2, "{before}");
+
+    parts.0.borrow_mut().start_fault = None;
+    for request in [Request::RampDown, Request::None, Request::Acknowledge, Request::None] {
+        for _ in 0..20_000 {
+            exchange.silence.heard();
+            exchange.orders.request = request;
+            board.tick(&mut exchange, Noticed::default());
+        }
+    }
+    assert_eq!(starts(&parts), before + 1);
+    exchange.report.events = 0;
+    board.tick(&mut exchange, Noticed::default());
+    assert_eq!(exchange.report.events & CONVERTER, 0);
+}
+
+#[test]
+fn the_command_stands_before_the_gauges() {
+    assert_eq!(controller::INPUT_NAMES[COMMAND_WORDS], "gauge[0]");
+    assert_eq!(controller::INPUT_NAMES[COMMAND_WORDS + 5], "gauge[5]");
+    assert_eq!(COMMAND_WORDS + 12, INPUT_WORDS);
+    assert_eq!(GAUGE_BITS, 17);
+    assert_eq!(specgen_board::PERIOD_NANOSECONDS, 100_000);
+}

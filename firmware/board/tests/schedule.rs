@@ -1,0 +1,82 @@
+//! When ticks are due, and whether the watchdog is fed.
+
+#![allow(clippy::unwrap_used)]
+
+use std::num::NonZeroU32;
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use specgen_board::{BACKGROUND_SILENCE, Due, Health, Schedule};
+
+/// Against a counter that never wraps: the grid of due times is never left, and every grid point is a tick or is counted.
+#[test]
+fn every_due_time_is_a_tick_or_is_counted_as_missed() {
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    for period in [1_u32, 7, 20_000, 9_000, 1 << 20] {
+        // Close below the wrap.
+        let start = u64::from(u32::MAX) - 10 * u64::from(period);
+        let mut schedule = Schedule::new(NonZeroU32::new(period).unwrap(), start as u32);
+        let mut grid = start + u64::from(period);
+        let mut now = start;
+        let (mut ticks, mut missed) = (0_u64, 0_u64);
+        for _ in 0..2000 {
+            // Now and then long after it was due.
+            let delay = if random.next_u32() % 5 == 0 { random.next_u32() % (4 * period) } else { random.next_u32() % period };
+            now = now.max(grid) + u64::from(delay);
+            let due = schedule.begin(now as u32);
+            let skipped = (now - grid) / u64::from(period);
+            let expected = Due {
+                late: ((now - grid) % u64::from(period)) as u32,
+                missed: skipped as u32,
+                next: (grid + (skipped + 1) * u64::from(period)) as u32,
+            };
+            assert_eq!(due, expected);
+            grid += (skipped + 1) * u64::from(period);
+            ticks += 1;
+            missed += skipped;
+        }
+        assert_eq!(ticks + missed, (grid - start) / u64::from(period) - 1);
+        assert!(missed > 0);
+    }
+}
+
+#[test]
+fn a_tick_before_its_time_is_in_time_and_a_restart_counts_nothing() {
+    let mut schedule = Schedule::new(NonZeroU32::new(100).unwrap(), 0);
+    assert_eq!(schedule.begin(90), Due { late: 0, missed: 0, next: 200 });
+    assert_eq!(schedule.restart(1234), 1334);
+    assert_eq!(schedule.begin(1340), Due { late: 6, missed: 0, next: 1434 });
+    assert_eq!(schedule.begin(1734), Due { late: 0, missed: 3, next: 1834 });
+}
+
+#[test]
+fn the_watchdog_is_starved_by_a_silent_background_but_not_while_the_amplifiers_are_on() {
+    let mut health = Health::new();
+    for beat in 0..3 * BACKGROUND_SILENCE {
+        assert!(health.tick(1 + beat / 100, 0, false));
+    }
+    let beat = 77;
+    assert!(health.tick(beat, 0, true));
+    for _ in 0..2 * BACKGROUND_SILENCE {
+        assert!(health.tick(beat, 0, true));
+    }
+    assert!(!health.tick(beat, 0, false));
+    assert!(health.tick(beat + 1, 0, false));
+    for silent in 1..BACKGROUND_SILENCE {
+        assert!(health.tick(beat + 1, 0, false), "{silent}");
+    }
+    assert!(!health.tick(beat + 1, 0, false));
+}
+
+#[test]
+fn the_watchdog_is_starved_by_a_controller_that_is_too_slow_for_good() {
+    let mut health = Health::new();
+    for beat in 0..63 {
+        assert!(health.tick(beat, 1, true));
+    }
+    assert!(health.tick(100, 0, true));
+    for beat in 0..63 {
+        assert!(health.tick(beat, 1, true));
+    }
+    assert!(!health.tick(200, 1, true));
+}

@@ -1,0 +1,179 @@
+//! AD7606, AD7606B (16 bits), AD7608, AD7606C-18 (18 bits): eight channels sampled at once, read over SPI.
+//!
+//! From the data sheets (AD7606 Rev. F, AD7608 Rev. B); hardware mode, one serial data line.
+//!
+//! | what | as used here |
+//! | --- | --- |
+//! | interface | PAR/SER/BYTE SEL high, DB15/BYTE SEL low: serial; all channels on DOUTA, V1 first |
+//! | SPI | mode 2 (SCLK idles high): CS falling puts out the MSB, SCLK falling samples, rising brings the next bit |
+//! | SCLK | at most 23.5 MHz at VDRIVE above 4.75 V, 17 MHz at 3.3 V: 12.5 MHz or less is used |
+//! | start | CONVST A and B together: low for 25 ns or more, then the rising edge samples all channels |
+//! | BUSY | high within 45 ns of that edge, low when all are converted: 4.2 µs at most (AD7608: 4.2 µs) without oversampling |
+//! | code | two's complement of 16 or 18 bits, MSB first, no gap between the channels |
+//! | RANGE | low ±5 V, high ±10 V on all channels |
+//! | OS0–2 | low: no oversampling |
+//! | RESET | high for 50 ns (AD7606B: 3 µs) after power-up, then 300 µs until the first start |
+//!
+//! V1 to V6 are the gauges. V8 sees the 2.5 V reference of the DACs: with it a part that answers, but not with what its
+//! inputs are, is found in the tick. V7 is left for the loop-back of bring-up.
+
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{InputPin, OutputPin};
+use embedded_hal::spi::SpiDevice;
+
+use crate::{CHANNELS, Fault, Gauges};
+
+/// Inputs of the part.
+pub const INPUTS: usize = 8;
+/// CONVST low, ns.
+pub const CONVST_LOW: u32 = 100;
+/// From the rising edge of CONVST until BUSY is looked at first, ns.
+pub const BUSY_DELAY: u32 = 100;
+/// Between two looks at BUSY, ns.
+pub const POLL: u32 = 100;
+/// Looks at BUSY until it is given up: 10 µs, more than twice the longest conversion.
+pub const POLLS: u32 = 100;
+/// RESET high, ns.
+pub const RESET_HIGH: u32 = 4_000;
+/// From the end of RESET until the first start, ns.
+pub const RESET_WAIT: u32 = 300_000;
+
+/// What V8 must show, as codes of the part: 0 at the lowest input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// Lowest code.
+    pub low: i32,
+    /// Highest code.
+    pub high: i32,
+}
+
+impl Window {
+    /// `millivolts` ± `tolerance` at an input range of ±`range`, all mV and below 20 V, in codes of `bits` (16 or 18).
+    #[must_use]
+    pub const fn around(millivolts: i32, tolerance: i32, range: i32, bits: u32) -> Self {
+        Self { low: code_of(millivolts - tolerance, range, bits), high: code_of(millivolts + tolerance, range, bits) }
+    }
+}
+
+/// The code of an input of so many mV at a range of ±`range` mV.
+const fn code_of(millivolts: i32, range: i32, bits: u32) -> i32 {
+    // In 64 bits: 40 V in mV times 2^18. Cast back it is below 2^19, for an input within twice the range.
+    ((((millivolts + range) as i64) << bits) / (2 * range as i64)) as i32
+}
+
+/// The part on its pins. `BITS` is 16 or 18: a frame of eight channels has as many bytes.
+#[derive(Debug)]
+pub struct Ad7606<const BITS: usize, SPI, START, BUSY, RESET, DELAY> {
+    spi: SPI,
+    start: START,
+    busy: BUSY,
+    reset: RESET,
+    delay: DELAY,
+    window: Window,
+}
+
+impl<const BITS: usize, SPI, START, BUSY, RESET, DELAY> Ad7606<BITS, SPI, START, BUSY, RESET, DELAY>
+where
+    SPI: SpiDevice,
+    START: OutputPin,
+    BUSY: InputPin,
+    RESET: OutputPin,
+    DELAY: DelayNs,
+{
+    const WIDTH: () = assert!(BITS == 16 || BITS == 18, "AD7606 family: codes of 16 or 18 bits");
+
+    /// Takes the pins. `start` is CONVST A and B; nothing is driven until [`Gauges::start`].
+    pub const fn new(spi: SPI, start: START, busy: BUSY, reset: RESET, delay: DELAY, window: Window) -> Self {
+        let () = Self::WIDTH;
+        Self { spi, start, busy, reset, delay, window }
+    }
+
+    /// Samples and reads all eight inputs: V1 to V8, 0 to 2^BITS − 1. Takes 4 µs and the transfer, 15 µs at most before it
+    /// gives up.
+    ///
+    /// # Errors
+    /// Every [`Fault`] but [`Fault::ReadBack`] and [`Fault::Code`]; [`Fault::Reference`] only after the rest was found good.
+    pub fn sample(&mut self) -> Result<[i32; INPUTS], Fault> {
+        self.convert()?;
+        // Zeros are sent: SDI of the parts that have one ignores them in hardware mode.
+        let mut frame = [0; BITS];
+        self.spi.transfer_in_place(&mut frame).map_err(|_| Fault::Bus)?;
+        if frame.iter().all(|&byte| byte == 0) || frame.iter().all(|&byte| byte == 0xff) {
+            return Err(Fault::Blank);
+        }
+        let codes = unpack(&frame);
+        let [.., reference] = codes;
+        if reference < self.window.low || reference > self.window.high {
+            return Err(Fault::Reference);
+        }
+        Ok(codes)
+    }
+
+    /// From the start of the conversion to its end.
+    fn convert(&mut self) -> Result<(), Fault> {
+        self.start.set_low().map_err(|_| Fault::Pin)?;
+        self.delay.delay_ns(CONVST_LOW);
+        self.start.set_high().map_err(|_| Fault::Pin)?;
+        self.delay.delay_ns(BUSY_DELAY);
+        if !self.busy.is_high().map_err(|_| Fault::Pin)? {
+            return Err(Fault::NotStarted);
+        }
+        for _ in 0..POLLS {
+            self.delay.delay_ns(POLL);
+            if self.busy.is_low().map_err(|_| Fault::Pin)? {
+                return Ok(());
+            }
+        }
+        Err(Fault::NotEnded)
+    }
+
+    /// Gives the pins back, in the order of [`Self::new`].
+    pub fn release(self) -> (SPI, START, BUSY, RESET, DELAY) {
+        (self.spi, self.start, self.busy, self.reset, self.delay)
+    }
+}
+
+impl<const BITS: usize, SPI, START, BUSY, RESET, DELAY> Gauges for Ad7606<BITS, SPI, START, BUSY, RESET, DELAY>
+where
+    SPI: SpiDevice,
+    START: OutputPin,
+    BUSY: InputPin,
+    RESET: OutputPin,
+    DELAY: DelayNs,
+{
+    const BITS: u32 = BITS as u32;
+
+    /// Resets the part, as it must be after power-up, and samples once. Takes 0.3 ms.
+    fn start(&mut self) -> Result<(), Fault> {
+        self.start.set_high().map_err(|_| Fault::Pin)?;
+        self.reset.set_high().map_err(|_| Fault::Pin)?;
+        self.delay.delay_ns(RESET_HIGH);
+        self.reset.set_low().map_err(|_| Fault::Pin)?;
+        self.delay.delay_ns(RESET_WAIT);
+        self.sample().map(|_| ())
+    }
+
+    fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {
+        let [v1, v2, v3, v4, v5, v6, _, _] = self.sample()?;
+        Ok([v1, v2, v3, v4, v5, v6])
+    }
+}
+
+/// Eight codes in two's complement, most significant bit first and without gaps, as codes from 0 on.
+fn unpack<const BITS: usize>(frame: &[u8; BITS]) -> [i32; INPUTS] {
+    let mut codes = [0; INPUTS];
+    let mut bytes = frame.iter();
+    let (mut bits, mut held) = (0_u32, 0);
+    for code in &mut codes {
+        while held < BITS {
+            // Eight codes of BITS bits are BITS bytes: none is missing.
+            bits = bits << 8 | u32::from(bytes.next().copied().unwrap_or_default());
+            held += 8;
+        }
+        held -= BITS;
+        let value = bits >> held & ((1 << BITS) - 1);
+        // The sign bit turned over: the lowest input, −2^(BITS−1), becomes 0. At most 18 bits.
+        *code = (value ^ 1 << (BITS - 1)) as i32;
+    }
+    codes
+}

@@ -1,0 +1,218 @@
+//! The DAC driver against words of the data sheet, and against parts that do not answer as it says.
+
+use embedded_hal::spi::ErrorKind;
+use embedded_hal_mock::eh1::delay::NoopDelay;
+use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction as PinStep};
+use embedded_hal_mock::eh1::spi::{Mock as Spi, Transaction as SpiStep};
+use specgen_hal::ad5686r::{Ad5686rPair, Channel, Command};
+use specgen_hal::{Amplifiers, Fault};
+
+type Word = [u8; 3];
+type Pair = Ad5686rPair<Spi<u8>, Spi<u8>, Pin, Pin, NoopDelay>;
+
+/// A frame of the data sheet, and what the part sends back meanwhile.
+fn frames(pairs: &[(Word, Word)]) -> Vec<SpiStep<u8>> {
+    pairs
+        .iter()
+        .flat_map(|(sent, answer)| {
+            [
+                SpiStep::transaction_start(),
+                SpiStep::transfer_in_place(sent.to_vec(), answer.to_vec()),
+                SpiStep::transaction_end(),
+            ]
+        })
+        .collect()
+}
+
+const NONE: Word = [0xff, 0xff, 0xff];
+
+/// Power-up as the module's table has it; channel D gives back what `answers` says.
+fn start_words(answers: [u16; 3]) -> Vec<(Word, Word)> {
+    let mut words: Vec<(Word, Word)> = [
+        [0x60, 0x00, 0x00], // software reset
+        [0x80, 0x00, 0x00], // DCEN = 0
+        [0x70, 0x00, 0x00], // reference on
+        [0x50, 0x00, 0x00], // LDAC mask = 0
+        [0x4f, 0x00, 0x00], // all channels normal
+        [0x3f, 0x00, 0x00], // all to zero
+    ]
+    .map(|word| (word, NONE))
+    .to_vec();
+    for (pattern, answer) in [[0xa5, 0x5a], [0x5a, 0xa5], [0x00, 0x00]].into_iter().zip(answers) {
+        let [high, low] = answer.to_be_bytes();
+        words.push(([0x38, pattern[0], pattern[1]], NONE));
+        words.push(([0x98, 0x00, 0x00], NONE));
+        // The upper eight bits of an answer are undefined.
+        words.push(([0x00, 0x00, 0x00], [0x5c, high, low]));
+    }
+    words
+}
+
+const GOOD: [u16; 3] = [0xa55a, 0x5aa5, 0x0000];
+
+/// A write tick of one part: what channel is read back, what it answers, the three codes.
+fn write_words(address: u8, answer: u16, codes: [u16; 3]) -> Vec<(Word, Word)> {
+    let [high, low] = answer.to_be_bytes();
+    let mut words = vec![([0x90 | address, 0, 0], NONE)];
+    for (channel, (code, answer)) in
+        [0x11, 0x12, 0x14].into_iter().zip(codes.into_iter().zip([[0, high, low], NONE, NONE]))
+    {
+        let [code_high, code_low] = code.to_be_bytes();
+        words.push(([channel, code_high, code_low], answer));
+    }
+    words
+}
+
+fn pair(first: &[(Word, Word)], second: &[(Word, Word)], ldac: &[PinStep], enable: &[PinStep]) -> Pair {
+    Ad5686rPair::new(Spi::new(&frames(first)), Spi::new(&frames(second)), Pin::new(ldac), Pin::new(enable), NoopDelay)
+}
+
+fn done(pair: Pair) {
+    let (mut first, mut second, mut ldac, mut enable, _) = pair.release();
+    first.done();
+    second.done();
+    ldac.done();
+    enable.done();
+}
+
+fn low() -> PinStep {
+    PinStep::set(State::Low)
+}
+
+fn high() -> PinStep {
+    PinStep::set(State::High)
+}
+
+/// Table 7 and Table 8 of the data sheet, written out.
+#[test]
+fn words_are_those_of_the_data_sheet() {
+    let table: [(Command, u32); 12] = [
+        (Command::NoOperation, 0x000000),
+        (Command::WriteInput(Channel::A, 0x1234), 0b0001_0001_0001_0010_0011_0100),
+        (Command::WriteInput(Channel::B, 0xffff), 0b0001_0010_1111_1111_1111_1111),
+        (Command::WriteInput(Channel::C, 0x0001), 0b0001_0100_0000_0000_0000_0001),
+        (Command::WriteThrough(Channel::D, 0x8000), 0b0011_1000_1000_0000_0000_0000),
+        (Command::WriteThroughAll(0), 0x3f0000),
+        (Command::PowerUp, 0x4f0000),
+        (Command::LdacUnmasked, 0x500000),
+        (Command::Reset, 0x600000),
+        (Command::ReferenceOn, 0x700000),
+        (Command::NoDaisyChain, 0x800000),
+        (Command::ReadBack(Channel::C), 0x940000),
+    ];
+    for (command, word) in table {
+        assert_eq!(command.frame(), word.to_be_bytes()[1..], "{command:?}");
+    }
+}
+
+#[test]
+fn start_disables_the_amplifiers_first_and_proves_both_parts() {
+    let words = start_words(GOOD);
+    let mut dacs = pair(&words, &words, &[high()], &[low()]);
+    assert_eq!(dacs.start(), Ok(()));
+    done(dacs);
+}
+
+#[test]
+fn a_part_that_gives_nothing_back_is_found_at_start_and_the_other_is_at_zero_all_the_same() {
+    // SDO open: all ones. The first pattern differs at once.
+    let silent = &start_words([0xffff; 3])[..9];
+    let mut dacs = pair(silent, &start_words(GOOD), &[high()], &[low()]);
+    assert_eq!(dacs.start(), Err(Fault::ReadBack));
+    done(dacs);
+    // One bit of one pattern.
+    let one_bit = &start_words([0xa55a, 0x5aa4, 0])[..12];
+    let mut dacs = pair(&start_words(GOOD), one_bit, &[high()], &[low()]);
+    assert_eq!(dacs.start(), Err(Fault::ReadBack));
+    done(dacs);
+}
+
+#[test]
+fn six_codes_and_one_ldac_and_each_channel_read_back_within_three_ticks() {
+    let mut first = start_words(GOOD);
+    let mut second = start_words(GOOD);
+    let codes = |tick: u16| [1, 2, 3, 4, 5, 6].map(|leg| 0x100 * leg + tick);
+    let mut expected = [0; 6];
+    for tick in 0..4 {
+        let address = [1, 2, 4][tick % 3];
+        let [a, b, c, d, e, f] = codes(tick as u16);
+        first.extend(write_words(address, expected[tick % 3], [a, b, c]));
+        second.extend(write_words(address, expected[3 + tick % 3], [d, e, f]));
+        expected = codes(tick as u16);
+    }
+    let ldac: Vec<PinStep> = std::iter::once(high()).chain((0..4).flat_map(|_| [low(), high()])).collect();
+    let mut dacs = pair(&first, &second, &ldac, &[low(), high(), low()]);
+    assert_eq!(dacs.start(), Ok(()));
+    assert_eq!(dacs.enable(true), Ok(()));
+    for tick in 0..4 {
+        assert_eq!(dacs.write(&codes(tick).map(i32::from)), Ok(()));
+    }
+    assert_eq!(dacs.enable(false), Ok(()));
+    done(dacs);
+}
+
+#[test]
+fn a_code_that_comes_back_changed_is_a_fault_and_the_codes_go_out_all_the_same() {
+    for bit in 0..16 {
+        let mut first = start_words(GOOD);
+        first.extend(write_words(1, 0, [7, 7, 7]));
+        first.extend(write_words(2, 7 ^ (1 << bit), [8, 8, 8]));
+        // What stands in the registers is known again, so the next tick checks again.
+        first.extend(write_words(4, 8, [9, 9, 9]));
+        let mut second = start_words(GOOD);
+        second.extend(write_words(1, 0, [7, 7, 7]));
+        second.extend(write_words(2, 7, [8, 8, 8]));
+        second.extend(write_words(4, 8, [9, 9, 9]));
+        let ldac: Vec<PinStep> = std::iter::once(high()).chain((0..3).flat_map(|_| [low(), high()])).collect();
+        let mut dacs = pair(&first, &second, &ldac, &[low()]);
+        assert_eq!(dacs.start(), Ok(()));
+        assert_eq!(dacs.write(&[7; 6]), Ok(()));
+        assert_eq!(dacs.write(&[8; 6]), Err(Fault::ReadBack), "bit {bit}");
+        assert_eq!(dacs.write(&[9; 6]), Ok(()));
+        done(dacs);
+    }
+}
+
+#[test]
+fn a_code_out_of_range_is_a_fault_and_nothing_is_written() {
+    for bad in [-1, 0x1_0000, i32::MIN, i32::MAX] {
+        for leg in 0..6 {
+            let mut codes = [0x8000; 6];
+            codes[leg] = bad;
+            let mut dacs = pair(&[], &[], &[], &[]);
+            assert_eq!(dacs.write(&codes), Err(Fault::Code));
+            done(dacs);
+        }
+    }
+}
+
+/// An SPI that reports errors, and counts how often it was asked.
+struct Broken(u32);
+
+impl embedded_hal::spi::ErrorType for Broken {
+    type Error = ErrorKind;
+}
+
+impl embedded_hal::spi::SpiDevice for Broken {
+    fn transaction(&mut self, _: &mut [embedded_hal::spi::Operation<'_, u8>]) -> Result<(), ErrorKind> {
+        self.0 += 1;
+        Err(ErrorKind::Overrun)
+    }
+}
+
+#[test]
+fn an_error_of_the_bus_is_a_fault_and_the_other_part_still_gets_its_codes() {
+    let mut second = start_words(GOOD);
+    // The registers of the first part are unknown, so nothing is read back.
+    second.extend(write_words(0, 0, [4, 5, 6]).split_off(1));
+    let ldac = [high(), low(), high()];
+    let mut dacs =
+        Ad5686rPair::new(Broken(0), Spi::new(&frames(&second)), Pin::new(&ldac), Pin::new(&[low()]), NoopDelay);
+    assert_eq!(dacs.start(), Err(Fault::Bus));
+    assert_eq!(dacs.write(&[1, 2, 3, 4, 5, 6]), Err(Fault::Bus));
+    let (first, mut second, mut ldac, mut enable, _) = dacs.release();
+    assert_eq!(first.0, 2);
+    second.done();
+    ldac.done();
+    enable.done();
+}

@@ -1,0 +1,71 @@
+//! Words of a controller in a message: 64 bits each, little endian, as in `controller::INPUT_NAMES` and its like.
+
+use core::fmt;
+
+use serde::de::{Deserialize, Deserializer, Error, Visitor};
+use serde::ser::{Serialize, Serializer};
+
+/// Most words that a message holds: more than any controller has of inputs, outputs or settings.
+pub const WORDS: usize = 120;
+const WORD: usize = size_of::<u64>();
+
+/// Bytes that a message carries as they are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Bytes<'a>(pub &'a [u8]);
+
+impl<'a> Bytes<'a> {
+    /// Words, if the bytes are `count` of them.
+    #[must_use]
+    pub fn words(self, count: usize) -> Option<impl Iterator<Item = u64> + 'a> {
+        let (words, rest) = self.0.as_chunks::<WORD>();
+        (rest.is_empty() && words.len() == count).then(|| words.iter().map(|word| u64::from_le_bytes(*word)))
+    }
+
+    /// Fills `words`; false, with nothing written, if the bytes are not as many words.
+    #[must_use]
+    pub fn read_words(self, words: &mut [u64]) -> bool {
+        let Some(values) = self.words(words.len()) else { return false };
+        for (slot, value) in words.iter_mut().zip(values) {
+            *slot = value;
+        }
+        true
+    }
+}
+
+/// `words` as bytes, in `buffer`; none if they do not fit.
+#[must_use]
+pub fn put_words<'a>(words: &[u64], buffer: &'a mut [u8]) -> Option<Bytes<'a>> {
+    let buffer = buffer.get_mut(..size_of_val(words))?;
+    for (slot, word) in buffer.chunks_exact_mut(WORD).zip(words) {
+        for (byte, value) in slot.iter_mut().zip(word.to_le_bytes()) {
+            *byte = value;
+        }
+    }
+    Some(Bytes(buffer))
+}
+
+impl Serialize for Bytes<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_bytes(self.0)
+    }
+}
+
+impl<'de: 'a, 'a> Deserialize<'de> for Bytes<'a> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_bytes(Borrowed)
+    }
+}
+
+struct Borrowed;
+
+impl<'de> Visitor<'de> for Borrowed {
+    type Value = Bytes<'de>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("bytes")
+    }
+
+    fn visit_borrowed_bytes<E: Error>(self, bytes: &'de [u8]) -> Result<Self::Value, E> {
+        Ok(Bytes(bytes))
+    }
+}

@@ -1,0 +1,292 @@
+//! The host's side of the link.
+
+use std::fmt;
+use std::io;
+use std::string::String;
+use std::time::{Duration, Instant};
+use std::vec::Vec;
+
+use crate::frame::{self, Frame, Header, Kind, VERSION};
+use crate::message::{Identity, Refusal, Reply, Request, Status};
+use crate::receiver::Receiver;
+
+/// A line that carries bytes both ways.
+pub trait Port {
+    /// Sends all of them.
+    ///
+    /// # Errors
+    /// What the system says.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Waits for bytes, at most `limit`; how many there are in `buffer`, 0 if none came in time.
+    ///
+    /// # Errors
+    /// What the system says; `UnexpectedEof` if the other side is gone.
+    fn receive(&mut self, buffer: &mut [u8], limit: Duration) -> io::Result<usize>;
+}
+
+impl<P: Port + ?Sized> Port for std::boxed::Box<P> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        (**self).send(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], limit: Duration) -> io::Result<usize> {
+        (**self).receive(buffer, limit)
+    }
+}
+
+/// How long a client waits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Patience {
+    /// For an answer.
+    pub limit: Duration,
+    /// How often a request is sent, at most.
+    pub attempts: u32,
+}
+
+impl Patience {
+    /// For a serial line: an answer comes within milliseconds, and noise may eat a frame.
+    pub const SERIAL: Self = Self { limit: Duration::from_millis(250), attempts: 8 };
+    /// For a pipe, which loses nothing: an answer comes, or the other side hangs.
+    pub const PIPE: Self = Self { limit: Duration::from_secs(10), attempts: 1 };
+}
+
+/// Why there is no answer.
+#[derive(Debug)]
+pub enum ClientError {
+    /// Nothing came, or nothing whole.
+    Silent {
+        /// How long in all.
+        waited: Duration,
+        /// How often the request was sent.
+        attempts: u32,
+        /// Frames that came damaged meanwhile.
+        damaged: u32,
+    },
+    /// The line broke.
+    Port(io::Error),
+    /// The device speaks another version of the protocol.
+    Version {
+        /// Its version.
+        found: u8,
+    },
+    /// The device does not do it.
+    Refused(Refusal),
+    /// An answer to something else.
+    Unexpected,
+    /// The request is longer than a message can be.
+    TooLong,
+}
+
+impl fmt::Display for ClientError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Silent { waited, attempts, damaged } => {
+                write!(f, "no answer within {:.1} s ({attempts} attempts)", waited.as_secs_f64())?;
+                if *damaged > 0 {
+                    write!(f, "; {damaged} frames came damaged: check baud rate, cable and ground")?;
+                }
+                Ok(())
+            }
+            Self::Port(error) => error.fmt(f),
+            Self::Version { found } => write!(
+                f,
+                "the device speaks version {found} of the link, expected {VERSION}: build and flash it with this specgen"
+            ),
+            Self::Refused(refusal) => write!(f, "the device refuses: {}", words(*refusal)),
+            Self::Unexpected => f.write_str("the device answers something else: build and flash it with this specgen"),
+            Self::TooLong => f.write_str("the request is longer than a message of the link can be"),
+        }
+    }
+}
+
+impl std::error::Error for ClientError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Port(error) => Some(error),
+            _ => None,
+        }
+    }
+}
+
+fn words(refusal: Refusal) -> String {
+    use std::format;
+    match refusal {
+        Refusal::Unsupported => "it does not do that; flash an image that does".into(),
+        Refusal::NoSession => "no session is open; it restarted, or another host talks to it".into(),
+        Refusal::Sequence => "requests came out of order; does another host talk to it?".into(),
+        Refusal::Version => "another version of the link".into(),
+        Refusal::Message => "it cannot read the message; flash an image of this specgen".into(),
+        Refusal::Length { expected } => format!("expected {expected} words; is it the controller of this spec?"),
+        Refusal::Word { index } => format!("word {index} is out of its range"),
+        Refusal::State => "not in its present state".into(),
+        Refusal::TooLong => "its answer does not fit into a message".into(),
+    }
+}
+
+/// Asks a device, one request at a time.
+pub struct Client<P> {
+    port: P,
+    patience: Patience,
+    receiver: Receiver,
+    session: u16,
+    sequence: u16,
+    request: Frame,
+    answer: Vec<u8>,
+    damaged: u32,
+    telemetry: Option<Status>,
+}
+
+impl<P: Port> Client<P> {
+    /// Opens a session; `session` is best another number than last time. Who is there.
+    ///
+    /// # Errors
+    /// As [`Client::ask`].
+    pub fn open(port: P, session: u16, patience: Patience) -> Result<(Self, Identity), ClientError> {
+        let mut client = Self {
+            port,
+            patience,
+            receiver: Receiver::new(),
+            session,
+            sequence: 0,
+            request: Frame::EMPTY,
+            answer: Vec::new(),
+            damaged: 0,
+            telemetry: None,
+        };
+        // Ends whatever the line has made up before.
+        client.port.send(&[0]).map_err(ClientError::Port)?;
+        let identity = match client.hello() {
+            // The device's last session had, by chance, the same number.
+            Err(ClientError::Refused(Refusal::Sequence)) => {
+                client.session = client.session.wrapping_add(1);
+                client.hello()?
+            }
+            other => other?,
+        };
+        Ok((client, identity))
+    }
+
+    fn hello(&mut self) -> Result<Identity, ClientError> {
+        match self.ask(&Request::Hello)? {
+            Reply::Identity(identity) => Ok(identity),
+            _ => Err(ClientError::Unexpected),
+        }
+    }
+
+    /// Sends a request, again if need be, and waits for its answer.
+    ///
+    /// # Errors
+    /// No answer, a broken line, another version, or a refusal.
+    pub fn ask(&mut self, request: &Request<'_>) -> Result<Reply<'_>, ClientError> {
+        let header = Header { version: VERSION, kind: Kind::Request, session: self.session, sequence: self.sequence };
+        if !self.request.set(&header, request) {
+            return Err(ClientError::TooLong);
+        }
+        let start = Instant::now();
+        let before = self.damaged;
+        let mut came = false;
+        for _ in 0..self.patience.attempts {
+            self.port.send(self.request.bytes()).map_err(ClientError::Port)?;
+            if self.wait(&header)? {
+                came = true;
+                break;
+            }
+        }
+        if !came {
+            let (attempts, damaged) = (self.patience.attempts, self.damaged - before);
+            return Err(ClientError::Silent { waited: start.elapsed(), attempts, damaged });
+        }
+        match frame::message::<Reply<'_>>(&self.answer).ok_or(ClientError::Unexpected)? {
+            // Not carried out, so the number was not used.
+            Reply::Refused(
+                refusal @ (Refusal::NoSession | Refusal::Sequence | Refusal::Version | Refusal::Message),
+            ) => Err(ClientError::Refused(refusal)),
+            Reply::Refused(refusal) => {
+                self.sequence = self.sequence.wrapping_add(1);
+                Err(ClientError::Refused(refusal))
+            }
+            reply => {
+                self.sequence = self.sequence.wrapping_add(1);
+                Ok(reply)
+            }
+        }
+    }
+
+    /// Keeps the message of the answer to a request; false if it does not come in time.
+    fn wait(&mut self, asked: &Header) -> Result<bool, ClientError> {
+        let start = Instant::now();
+        let mut buffer = [0; 4096];
+        loop {
+            let left = self.patience.limit.saturating_sub(start.elapsed());
+            let count = self.port.receive(&mut buffer, left).map_err(ClientError::Port)?;
+            // What follows an answer is of no request that is still open.
+            for byte in &buffer[..count] {
+                match self.receiver.push(*byte) {
+                    None => {}
+                    Some(Err(_)) => self.damaged = self.damaged.saturating_add(1),
+                    Some(Ok((header, _))) if header.version != VERSION => {
+                        return Err(ClientError::Version { found: header.version });
+                    }
+                    Some(Ok((header, message))) if header.kind == Kind::Telemetry => {
+                        self.telemetry = frame::message(message).or(self.telemetry);
+                    }
+                    Some(Ok((header, message))) if header == (Header { kind: Kind::Reply, ..*asked }) => {
+                        self.answer.clear();
+                        self.answer.extend_from_slice(message);
+                        return Ok(true);
+                    }
+                    // Of an earlier request, late.
+                    Some(Ok(_)) => {}
+                }
+            }
+            if left.is_zero() {
+                return Ok(false);
+            }
+        }
+    }
+
+    /// The whole of something that comes in pieces: `request` makes the request for the piece at an offset.
+    ///
+    /// # Errors
+    /// As [`Client::ask`], and if the pieces do not make a whole.
+    pub fn fetch(&mut self, request: impl Fn(u32) -> Request<'static>) -> Result<Vec<u8>, ClientError> {
+        let mut whole = Vec::new();
+        loop {
+            let wanted = u32::try_from(whole.len()).map_err(|_| ClientError::TooLong)?;
+            let Reply::Chunk { offset, total, bytes } = self.ask(&request(wanted))? else {
+                return Err(ClientError::Unexpected);
+            };
+            whole.extend_from_slice(bytes.0);
+            let complete = whole.len() == total as usize;
+            if offset != wanted || whole.len() > total as usize || (bytes.0.is_empty() && !complete) {
+                return Err(ClientError::Unexpected);
+            }
+            if complete {
+                return Ok(whole);
+            }
+        }
+    }
+
+    /// What the device said last of itself, unasked.
+    #[must_use]
+    pub fn telemetry(&self) -> Option<&Status> {
+        self.telemetry.as_ref()
+    }
+
+    /// Frames from the device that came damaged.
+    #[must_use]
+    pub fn damaged(&self) -> u32 {
+        self.damaged
+    }
+
+    /// Waits differently from here on.
+    pub fn set_patience(&mut self, patience: Patience) {
+        self.patience = patience;
+    }
+
+    /// The line.
+    pub fn port(&mut self) -> &mut P {
+        &mut self.port
+    }
+}

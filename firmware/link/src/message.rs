@@ -1,0 +1,254 @@
+//! What host and device say to each other. The order of the variants is the format: new ones go to the end, and a change
+//! of an old one is another [`VERSION`](crate::VERSION).
+
+use serde::{Deserialize, Serialize};
+
+use crate::bytes::Bytes;
+use crate::counters::Counters;
+
+/// From the host.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Request<'a> {
+    /// Opens a session. Answered by [`Reply::Identity`]; nothing else is answered before it.
+    Hello,
+    /// The controller's own description from this byte on. Answered by [`Reply::Chunk`].
+    Describe {
+        /// First byte wanted.
+        offset: u32,
+    },
+    /// Answered by [`Reply::Status`].
+    Status,
+    /// What the supervisor is asked for from now on: the number of `supervisor::Request`. It holds as long as the link
+    /// does. Answered by [`Reply::Done`].
+    Supervise {
+        /// 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge.
+        request: u8,
+    },
+    /// What the controller is asked for from the next tick on: the input words that are no measurements, in their order.
+    /// Answered by [`Reply::Done`].
+    Setpoint {
+        /// The words.
+        #[serde(borrow)]
+        words: Bytes<'a>,
+    },
+    /// Answered by [`Reply::Config`].
+    ReadConfig,
+    /// Settings, all at once, from the next tick on. Answered by [`Reply::Done`], or [`Refusal::Word`] and nothing changed.
+    WriteConfig {
+        /// The words.
+        #[serde(borrow)]
+        words: Bytes<'a>,
+    },
+    /// Lock-step: the machine as at power-up, with these settings. Answered by [`Reply::Done`].
+    LockstepReset {
+        /// Words of the settings.
+        #[serde(borrow)]
+        config: Bytes<'a>,
+    },
+    /// Lock-step: one tick. Answered by [`Reply::Stepped`].
+    LockstepStep {
+        /// Input words of the machine.
+        #[serde(borrow)]
+        input: Bytes<'a>,
+    },
+    /// Lock-step: what a stage has cost since the device started. Answered by [`Reply::Stage`].
+    LockstepStage {
+        /// Number of the stage; the first is the whole tick.
+        index: u8,
+    },
+    /// Answered by [`Reply::Recorder`].
+    Recorder {
+        /// What the recorder is to do.
+        action: RecorderAction,
+    },
+    /// The record, as the bytes of its file, from this one on. Answered by [`Reply::Chunk`].
+    Download {
+        /// First byte wanted.
+        offset: u32,
+    },
+    /// Answered by [`Reply::Done`].
+    Wave {
+        /// What the wave generator is to do.
+        action: WaveAction,
+        /// Words of its settings, for [`WaveAction::Start`].
+        #[serde(borrow)]
+        words: Bytes<'a>,
+    },
+}
+
+/// What a recorder is to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RecorderAction {
+    /// Only say how it stands.
+    Look,
+    /// Forget what there is and record anew, until so many ticks after the trigger.
+    Arm {
+        /// Ticks after the trigger.
+        after: u32,
+    },
+    /// Trigger now.
+    Trigger,
+    /// Stop at once; what there is stays.
+    Stop,
+}
+
+/// What a wave generator is to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum WaveAction {
+    /// Start the wave of the words.
+    Start,
+    /// Come to rest.
+    Stop,
+}
+
+/// From the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Reply<'a> {
+    /// Not done, and nothing changed.
+    Refused(Refusal),
+    /// Done.
+    Done,
+    /// Who is there.
+    Identity(Identity),
+    /// How it stands.
+    Status(Status),
+    /// Settings in force.
+    Config {
+        /// The words.
+        #[serde(borrow)]
+        words: Bytes<'a>,
+    },
+    /// What a tick gave.
+    Stepped {
+        /// What it cost, in the unit of [`Identity::counted`]; 0 if it was not counted.
+        cost: u32,
+        /// Digest of the machine after the tick.
+        digest: u64,
+        /// Output words of the machine.
+        #[serde(borrow)]
+        output: Bytes<'a>,
+    },
+    /// What a stage has cost.
+    #[serde(borrow)]
+    Stage(Stage<'a>),
+    /// How the recorder stands.
+    Recorder(RecorderStatus),
+    /// A piece of something longer.
+    Chunk {
+        /// Place of its first byte.
+        offset: u32,
+        /// Length of the whole, bytes.
+        total: u32,
+        /// The piece; empty at or beyond the end.
+        #[serde(borrow)]
+        bytes: Bytes<'a>,
+    },
+}
+
+/// Why a request was not carried out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Refusal {
+    /// This device does not do that.
+    Unsupported,
+    /// No session is open, or another one: say [`Request::Hello`].
+    NoSession,
+    /// Not the next sequence number: requests were lost, or two hosts talk at once.
+    Sequence,
+    /// Another version of the protocol; the header of this reply has the device's.
+    Version,
+    /// A message that the device cannot read.
+    Message,
+    /// The number of words is not the controller's.
+    Length {
+        /// What it has.
+        expected: u16,
+    },
+    /// A word is out of its range.
+    Word {
+        /// Its place, counted from 0.
+        index: u16,
+    },
+    /// Not in this state: say [`Request::Status`].
+    State,
+    /// The answer does not fit into a message.
+    TooLong,
+}
+
+/// What a device counts where it says what something cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Counted {
+    /// Nothing.
+    Nothing,
+    /// Instructions.
+    Instructions,
+    /// Cycles of the core.
+    Cycles,
+}
+
+/// Who is there. Numbers of words are those of the emitted controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Settings.
+    pub config_words: u16,
+    /// Inputs of the machine: those of a tick, then request and events.
+    pub input_words: u16,
+    /// Outputs of the machine: those of a tick, then what the supervisor says.
+    pub output_words: u16,
+    /// Stages that are counted, the whole tick included.
+    pub stages: u8,
+    /// In what.
+    pub counted: Counted,
+    /// Bytes of the controller's description.
+    pub description: u32,
+}
+
+/// How a device stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Status {
+    /// Ticks since power-up.
+    pub tick: u64,
+    /// Number of `supervisor::Phase`.
+    pub phase: u8,
+    /// Number of `supervisor::Cause`.
+    pub cause: u8,
+    /// Whether the amplifiers are enabled.
+    pub amplifier_on: bool,
+    /// The controller's status word.
+    pub status: u32,
+    /// Events seen since the status was asked for last.
+    pub events: u32,
+    /// Ticks that came late since power-up.
+    pub late: u32,
+    /// What the link has counted; filled in by the endpoint.
+    pub link: Counters,
+}
+
+/// What a stage has cost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stage<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// Calls counted.
+    pub calls: u64,
+    /// Least of a call.
+    pub smallest: u64,
+    /// All calls together.
+    pub sum: u64,
+    /// Most of a call.
+    pub largest: u64,
+    /// For the whole tick: most stack seen in use, bytes; 0 if it is not measured.
+    pub stack: u32,
+}
+
+/// How a recorder stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RecorderStatus {
+    /// Whether it records.
+    pub running: bool,
+    /// Whether the trigger was seen.
+    pub triggered: bool,
+    /// Ticks that it holds.
+    pub ticks: u32,
+    /// Most that it can hold.
+    pub capacity: u32,
+}

@@ -1,0 +1,72 @@
+//! Processor in the loop: the controller on an emulated Cortex-M, tick by tick as a host asks for it over the link.
+//!
+//! The frames of `../link` come through the named pipe `pil.in` of the emulator's working folder and go through `pil.out`.
+//! It is the very link that a board speaks over a serial line. No control decision is made here.
+
+#![no_std]
+#![no_main]
+
+mod instructions;
+mod panic;
+mod pipe;
+#[allow(dead_code)] // The files are `replay`'s.
+mod semihosting;
+mod stack;
+mod stages;
+#[allow(dead_code)] // The file of figures is `replay`'s.
+mod stats;
+mod steps;
+
+use cortex_m_rt::{ExceptionFrame, entry, exception};
+use instructions::InstructionCounter;
+use pipe::Pipe;
+use semihosting::{Exit, exit};
+use specgen_link::lockstep::Lockstep;
+use specgen_link::{Endpoint, FRAME};
+use steps::Steps;
+
+#[entry]
+fn main() -> ! {
+    exit(match serve() {
+        Ok(()) => Exit::Done,
+        Err(code) => code,
+    })
+}
+
+/// Answers the host until it closes the pipe.
+fn serve() -> Result<(), Exit> {
+    let timer = cortex_m::Peripherals::take().ok_or(Exit::Fault)?.SYST;
+    let mut counter = InstructionCounter::new(timer);
+    let exact = counter.self_test() == [0, 1, 100, 1000];
+    let mut device = Lockstep::new(Steps::new(counter, exact));
+    let mut endpoint = Endpoint::new();
+    // In this order the host opens its ends.
+    let input = Pipe::reader(b"pil.in\0").ok_or(Exit::NoInput)?;
+    let output = Pipe::writer(b"pil.out\0").ok_or(Exit::CannotWrite)?;
+    let mut bytes = [0; FRAME];
+    loop {
+        let count = input.receive(&mut bytes);
+        if count == 0 {
+            return Ok(());
+        }
+        for byte in bytes.iter().take(count) {
+            if let Some(reply) = endpoint.push(*byte, &mut device)
+                && !output.send(reply)
+            {
+                return Err(Exit::CannotWrite);
+            }
+        }
+    }
+}
+
+#[exception]
+#[allow(unsafe_code)] // cortex-m-rt wants it so.
+unsafe fn HardFault(_: &ExceptionFrame) -> ! {
+    exit(Exit::Fault)
+}
+
+#[exception]
+#[allow(unsafe_code)] // cortex-m-rt wants it so.
+unsafe fn DefaultHandler(_: i16) {
+    exit(Exit::Fault)
+}

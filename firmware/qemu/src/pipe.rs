@@ -1,0 +1,46 @@
+//! Named pipes of the emulator's working folder, with the host at their other ends.
+//!
+//! A read waits until the host has sent something. Meanwhile the processor stands still, and so does virtual time: the run
+//! is in lock-step with the host, and its instruction counts do not depend on how long that takes.
+
+#![allow(unsafe_code)] // A semihosting call passes raw addresses to the emulator.
+
+use cortex_m_semihosting::{nr, syscall};
+
+/// An open pipe.
+pub struct Pipe {
+    handle: usize,
+}
+
+impl Pipe {
+    /// Opens the end that bytes come out of; `name` ends with a zero byte. Waits for the host.
+    pub fn reader(name: &'static [u8]) -> Option<Self> {
+        Self::open(name, nr::open::R_BINARY)
+    }
+
+    /// Opens the end that bytes go into; `name` ends with a zero byte. Waits for the host.
+    pub fn writer(name: &'static [u8]) -> Option<Self> {
+        Self::open(name, nr::open::W_TRUNC_BINARY)
+    }
+
+    fn open(name: &'static [u8], mode: usize) -> Option<Self> {
+        let length = name.len().saturating_sub(1);
+        // SAFETY: SYS_OPEN reads `length` bytes and the zero byte at `name`.
+        let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, length) };
+        (handle != usize::MAX).then_some(Self { handle })
+    }
+
+    /// Waits for bytes and takes those that are there; how many. 0: the host has closed its end.
+    pub fn receive(&self, bytes: &mut [u8]) -> usize {
+        let size = bytes.len();
+        // SAFETY: at most `size` bytes are written, all within `bytes`.
+        let missing = unsafe { syscall!(READ, self.handle, bytes.as_mut_ptr(), size) };
+        size.saturating_sub(missing)
+    }
+
+    /// Sends all of the bytes; false if the host has closed its end.
+    pub fn send(&self, bytes: &[u8]) -> bool {
+        // SAFETY: SYS_WRITE reads the bytes.
+        unsafe { syscall!(WRITE, self.handle, bytes.as_ptr(), bytes.len()) == 0 }
+    }
+}

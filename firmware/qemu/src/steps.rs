@@ -1,0 +1,150 @@
+//! The supervised controller as a machine that a host steps, with what each tick costs.
+
+use controller::supervised::{
+    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, MachineOutput, machine_output_words, supervise,
+};
+use controller::{CONFIG_WORDS, Config, DESCRIPTION};
+use core::mem::MaybeUninit;
+use specgen_link::{Counted, Stage, WORDS, lockstep};
+
+use crate::instructions::InstructionCounter;
+use crate::stack;
+use crate::stages::Stages;
+
+const _: () = assert!(CONFIG_WORDS <= WORDS && MACHINE_INPUT_WORDS <= WORDS && MACHINE_OUTPUT_WORDS <= WORDS);
+
+/// Name of the whole tick.
+const WHOLE: &str = "supervise";
+
+/// A machine with its settings.
+pub struct Steps {
+    counter: InstructionCounter,
+    /// Whether the counter counts: false without `-icount shift=10`.
+    exact: bool,
+    config: Config,
+    machine: Machine,
+    stages: Stages,
+    /// Ticks since the last reset.
+    ticks: u64,
+    /// Most stack that a tick was seen to use, bytes.
+    deepest: usize,
+}
+
+impl Steps {
+    /// At power-up, with the spec's settings.
+    pub const fn new(counter: InstructionCounter, exact: bool) -> Self {
+        Self {
+            counter,
+            exact,
+            config: Config::new(),
+            machine: Machine::new(),
+            stages: Stages::new(),
+            ticks: 0,
+            deepest: 0,
+        }
+    }
+}
+
+impl lockstep::Machine for Steps {
+    fn description(&self) -> &str {
+        DESCRIPTION
+    }
+
+    fn words(&self) -> [usize; 3] {
+        [CONFIG_WORDS, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS]
+    }
+
+    fn stages(&self) -> usize {
+        self.stages.all().len()
+    }
+
+    fn counted(&self) -> Counted {
+        if self.exact { Counted::Instructions } else { Counted::Nothing }
+    }
+
+    fn configure(&mut self, config: &[u64]) -> Result<(), usize> {
+        let words = config.first_chunk().ok_or(CONFIG_WORDS)?;
+        self.config = Config::from_words(words).map_err(|error| error.word)?;
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.machine = Machine::new();
+        self.ticks = 0;
+    }
+
+    fn step(&mut self, input: &[u64], output: &mut [u64]) -> (u64, u32) {
+        // The link has checked the lengths.
+        let row = input.first_chunk().unwrap_or(&[0; MACHINE_INPUT_WORDS]);
+        let input = MachineInput::from_words(row);
+        let due = is_due(self.ticks);
+        if due {
+            self.stages.measure(&mut self.counter, &self.config, &self.machine.state, &input.tick);
+        }
+        let (result, instructions, depth) = tick(&mut self.counter, &self.config, &mut self.machine, &input, due);
+        self.stages.add_step(instructions);
+        if depth > self.deepest {
+            self.deepest = depth;
+        }
+        self.ticks += 1;
+        for (slot, word) in output.iter_mut().zip(machine_output_words(&result, &self.machine)) {
+            *slot = word;
+        }
+        (self.machine.digest(), instructions)
+    }
+
+    fn stage(&self, index: usize) -> Option<Stage<'_>> {
+        let stage = self.stages.all().get(index)?;
+        let (name, stack) = if index == 0 { (WHOLE, self.deepest as u32) } else { (stage.name(), 0) };
+        let [calls, smallest, sum, largest] = stage.counts();
+        Some(Stage { name, calls, smallest, sum, largest, stack })
+    }
+}
+
+/// Ticks that the stages and the stack are measured on, for that takes far longer than the tick.
+const fn is_due(tick: u64) -> bool {
+    tick.is_multiple_of(32)
+}
+
+/// One tick with its instructions and, if it is to be `painted`, its stack, bytes; else 0. In a frame of its own, so
+/// that the stack pointer stands still around the call.
+#[inline(never)]
+#[allow(unsafe_code)] // The tick is called from assembly that counts it.
+fn tick(
+    counter: &mut InstructionCounter,
+    config: &Config,
+    machine: &mut Machine,
+    input: &MachineInput,
+    painted: bool,
+) -> (MachineOutput, u32, usize) {
+    let mut output = MaybeUninit::<MachineOutput>::uninit();
+    let arguments = [
+        (&raw mut output) as usize,
+        (&raw const *config) as usize,
+        (&raw mut *machine) as usize,
+        (&raw const *input) as usize,
+    ];
+    // SAFETY: C passes the address of a result this large first, then the three references; the tick writes it.
+    unsafe {
+        let tick = specgen_supervise as *const ();
+        let (instructions, depth) = if painted {
+            stack::measure_depth(|| counter.measure_call(tick, arguments))
+        } else {
+            (counter.measure_call(tick, arguments), 0)
+        };
+        (output.assume_init(), instructions, depth)
+    }
+}
+
+/// C returns what is larger through memory of the caller, whatever its fields.
+const LARGEST_RESULT_IN_REGISTERS: usize = 32;
+const _: () = assert!(size_of::<MachineOutput>() > LARGEST_RESULT_IN_REGISTERS);
+
+/// What the instruction count, the painted stack and the static stack bound all refer to.
+#[unsafe(no_mangle)]
+#[inline(never)]
+#[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
+#[allow(improper_ctypes_definitions)] // Caller and callee are compiled together; only the registers matter.
+extern "C" fn specgen_supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
+    supervise(config, machine, input)
+}

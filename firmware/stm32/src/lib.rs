@@ -1,0 +1,12 @@
+//! What the STM32 boards have in common, on `embassy-stm32` as HAL. The part is a cargo feature that the board's program
+//! chooses; pins, clocks and interrupts are the program's, too.
+#![no_std]
+#![deny(missing_docs)]
+#![deny(unsafe_code)]
+
+pub mod converters;
+mod delay;
+pub mod serial;
+pub mod timer;
+
+pub use delay::CycleDelay;

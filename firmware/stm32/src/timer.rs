@@ -1,0 +1,59 @@
+//! TIM2 as a free-running counter of 32 bits whose first compare channel says when a tick is due.
+
+use core::num::NonZeroU32;
+
+use embassy_stm32::pac::TIM2;
+use embassy_stm32::peripherals;
+use embassy_stm32::rcc;
+use specgen_board::{PERIOD_NANOSECONDS, Schedule};
+
+/// Counts in a control period at a timer clock of so many MHz.
+#[must_use]
+pub const fn period(megahertz: u32) -> NonZeroU32 {
+    let counts = PERIOD_NANOSECONDS as u64 * megahertz as u64 / 1000;
+    assert!(counts < 1 << 31, "timing.period is too long for the timer of this board");
+    match NonZeroU32::new(counts as u32) {
+        Some(counts) => counts,
+        None => panic!("timing.period is shorter than a count of the timer"),
+    }
+}
+
+/// Starts the counter; the first interrupt comes one period later. False if the timer's clock is not `megahertz`.
+#[must_use]
+pub fn start(schedule: &mut Schedule, megahertz: u32) -> bool {
+    rcc::enable_and_reset::<peripherals::TIM2>();
+    TIM2.psc().write_value(0);
+    TIM2.arr().write_value(u32::MAX);
+    arm(schedule.restart(now()));
+    acknowledge();
+    TIM2.dier().write(|w| w.set_ccie(0, true));
+    TIM2.cr1().write(|w| w.set_cen(true));
+    rcc::frequency::<peripherals::TIM2>().0 == megahertz * 1_000_000
+}
+
+/// The counter.
+#[inline]
+#[must_use]
+pub fn now() -> u32 {
+    TIM2.cnt().read()
+}
+
+/// The next interrupt comes at this counter value, or at once if it has passed.
+#[inline]
+pub fn arm(next: u32) {
+    TIM2.ccr(0).write_value(next);
+    // Passed meanwhile: the comparison would come true one turn of the counter later.
+    if now().wrapping_sub(next) < u32::MAX / 2 {
+        TIM2.egr().write(|w| w.set_ccg(0, true));
+    }
+}
+
+/// Takes the interrupt back.
+#[inline]
+pub fn acknowledge() {
+    // Written zeros clear, ones leave alone.
+    TIM2.sr().write(|w| {
+        w.0 = u32::MAX;
+        w.set_ccif(0, false);
+    });
+}

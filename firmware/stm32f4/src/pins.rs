@@ -1,0 +1,64 @@
+//! The wiring: which pin goes where. The table in docs/bring-up.md is this file in words.
+
+use embassy_stm32::Peripherals;
+use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
+use embassy_stm32::mode::Async;
+use embassy_stm32::peripherals::{IWDG, USART2};
+use embassy_stm32::spi::Spi;
+use embassy_stm32::usart::{ConfigError, Uart};
+use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals, usart};
+use specgen_stm32::converters::{AdcPins, DacPins, adc_spi, dac_spi};
+use specgen_stm32::serial;
+
+bind_interrupts!(
+    /// Interrupts of the link.
+    pub struct Irqs {
+        USART2 => usart::InterruptHandler<USART2>;
+        DMA1_STREAM6 => dma::InterruptHandler<peripherals::DMA1_CH6>;
+        DMA1_STREAM5 => dma::InterruptHandler<peripherals::DMA1_CH5>;
+    }
+);
+
+/// All that the program uses.
+pub struct Wiring {
+    /// ADC.
+    pub adc: AdcPins,
+    /// DACs and amplifiers.
+    pub dac: DacPins,
+    /// Emergency stop: a closed contact to ground; open is stop.
+    pub stop: Input<'static>,
+    /// Virtual COM port of the ST-LINK.
+    pub uart: Result<Uart<'static, Async>, ConfigError>,
+    /// Watchdog.
+    pub watchdog: Peri<'static, IWDG>,
+}
+
+/// Takes the pins. The enable line comes first and is driven low.
+pub fn take(p: Peripherals) -> Wiring {
+    let enable = Output::new(p.PC9, Level::Low, Speed::Low);
+    let high = Level::High;
+    Wiring {
+        adc: AdcPins {
+            spi: Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, adc_spi()),
+            select: Output::new(p.PB6, high, Speed::VeryHigh),
+            start: Output::new(p.PC7, high, Speed::VeryHigh),
+            busy: Input::new(p.PA9, Pull::Up),
+            reset: Output::new(p.PB10, Level::Low, Speed::Low),
+        },
+        dac: DacPins {
+            spi: Spi::new_blocking(p.SPI3, p.PC10, p.PC12, p.PC11, dac_spi()),
+            select: [Output::new(p.PD2, high, Speed::VeryHigh), Output::new(p.PC8, high, Speed::VeryHigh)],
+            load: Output::new(p.PC6, high, Speed::VeryHigh),
+            enable,
+        },
+        stop: Input::new(p.PA8, Pull::Up),
+        uart: Uart::new(p.USART2, p.PA3, p.PA2, p.DMA1_CH6, p.DMA1_CH5, Irqs, serial::config()),
+        watchdog: p.IWDG,
+    }
+}
+
+/// Disables the amplifiers, whatever state the program is in.
+pub fn amplifiers_off() {
+    // PC9 low, by the register that needs no reading.
+    pac::GPIOC.bsrr().write(|w| w.set_br(9, true));
+}

@@ -1,0 +1,173 @@
+//! The firmware of the boards, from a spec to its ELF file: it builds, fits, and its tick cannot panic, allocate, call through
+//! a register, recurse, or compute `f64` in software on a core that has none.
+//!
+//! No board is here: what runs is the emulated image (`bit_identity`, `platform_bits`) and the parts on the host
+//! (`firmware/hal`, `firmware/board`). One build for each family; `-- --nocapture` prints the figures.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::sync::Mutex;
+
+use specgen::emit;
+use specgen::model::Mcu;
+use specgen::target::callgraph::CallGraph;
+use specgen::target::checks::{self, Rule, Rules};
+use specgen::target::{build, image, stack, toolchain};
+use specgen::workspace;
+use specgen_tests::{compile_edited, repository, scratch};
+
+/// Bytes of flash that an image may take.
+const FLASH: u64 = 96 * 1024;
+/// Bytes of RAM, the stack's reserve included, without the buffer of a recorder.
+const RAM: u64 = 24 * 1024;
+/// Bytes that memory.x reserves for the stack, below everything else.
+const STACK: u64 = 8 * 1024;
+/// An exception frame with the registers of the FPU, and its alignment.
+const EXCEPTION: u64 = 26 * 4 + 4;
+
+struct Board {
+    name: &'static str,
+    folder: &'static str,
+    mcu: Mcu,
+    edits: &'static [(&'static str, &'static str)],
+    /// Interrupts of the link: USART and both DMA streams.
+    link: [&'static str; 3],
+}
+
+const H743: Board = Board {
+    name: "board-h743",
+    folder: "stm32h743",
+    mcu: Mcu::Stm32H743Zi,
+    edits: &[("mcu = \"mps2-an500\"", "mcu = \"stm32h743zi\"")],
+    link: ["USART3", "DMA1_STREAM0", "DMA1_STREAM1"],
+};
+const F446: Board = Board {
+    name: "board-f446",
+    folder: "stm32f4",
+    mcu: Mcu::Stm32F446Re,
+    edits: &[
+        ("mcu = \"mps2-an500\"", "mcu = \"stm32f446re\""),
+        ("scalar = \"f64\"", "scalar = \"f32\""),
+    ],
+    link: ["USART2", "DMA1_STREAM5", "DMA1_STREAM6"],
+};
+
+/// One build at a time.
+static BUILD: Mutex<()> = Mutex::new(());
+
+/// The image; none, and a line that says so, without a cross compiler where that is permitted.
+fn image_of(board: &Board) -> Option<Vec<u8>> {
+    let _one = BUILD.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let toolchain = match toolchain::find() {
+        Ok(toolchain) => toolchain,
+        Err(missing) if std::env::var_os("SPECGEN_ALLOW_MISSING").is_some_and(|value| value == "1") => {
+            println!("skipped: {missing}");
+            return None;
+        }
+        Err(missing) => panic!("{missing}"),
+    };
+    let compiled = compile_edited(board.name, "reference.toml", board.edits, &[]);
+    let dir = scratch().join(board.name);
+    let _ = fs::remove_dir_all(&dir);
+    let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[board.folder]);
+    workspace::write(&dir, &files).unwrap();
+    let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu, &scratch().join("boards"));
+    Some(built.unwrap_or_else(|error| panic!("{error}")).elf)
+}
+
+fn check(board: &Board) {
+    let Some(elf) = image_of(board) else { return };
+    let single = board.mcu == Mcu::Stm32F446Re;
+    let rules = Rules { single, whole_image: false };
+
+    // The whole interrupt, not only the tick that it calls.
+    let checked = checks::check(&elf, Some("TIM2"), rules).unwrap();
+    assert!(checked.faults.is_empty(), "{}: {:#?}", board.name, checked.faults);
+    let tick = checked.stack.expect("a bound: nothing above says otherwise");
+
+    // Startup, link, interrupts of the link and the tick, one on top of the other. Wakers are called through a register and
+    // are not in these bounds; they do nothing but set bits.
+    let deepest = |root: &str| stack::bound(&elf, root).unwrap().bytes;
+    let link = board.link.map(deepest).into_iter().max().unwrap_or_default();
+    let all = deepest("main") + deepest("CEC") + link + tick + 3 * EXCEPTION;
+    let footprint = image::footprint(&elf).unwrap();
+    let ram = footprint.ram + STACK;
+    println!(
+        "{}: flash {} B, RAM {ram} B with {STACK} B of stack; tick: {} functions, {} B of code, stack {tick} B; all {all} B",
+        board.name, footprint.flash, checked.functions, checked.code
+    );
+    assert!(footprint.flash <= FLASH, "{}: {} B of flash", board.name, footprint.flash);
+    assert!(ram <= RAM, "{}: {ram} B of RAM", board.name);
+    assert!(all <= STACK, "{}: {all} B of stack", board.name);
+    assert!(footprint.allocator_symbols.is_empty(), "{:?}", footprint.allocator_symbols);
+
+    stack_lies_below_all_variables(board, &elf);
+    // The check is able to find: initialisation can panic, and wakers are called through a register.
+    let whole = checks::check(&elf, Some("main"), Rules { single, whole_image: true }).unwrap();
+    assert!(whole.faults.iter().any(|fault| fault.rule == Rule::Panic), "{:#?}", whole.faults);
+    assert!(!CallGraph::read(&elf).unwrap().functions.is_empty());
+}
+
+/// An overflow runs out of memory instead of into a variable.
+fn stack_lies_below_all_variables(board: &Board, elf: &[u8]) {
+    use object::{Object, ObjectSection, ObjectSymbol};
+    let file = object::File::parse(elf).unwrap();
+    let symbol = |name: &str| file.symbol_by_name(name).unwrap_or_else(|| panic!("{name}")).address();
+    let (start, end) = (symbol("_stack_start"), symbol("_stack_end"));
+    assert_eq!((start, end), (0x2000_0000 + STACK, 0x2000_0000), "{}", board.name);
+    for name in [".data", ".bss", ".uninit"] {
+        let section = file.section_by_name(name).unwrap_or_else(|| panic!("{name}"));
+        assert!(section.address() >= start, "{}: {name} at {:#x}", board.name, section.address());
+    }
+}
+
+#[test]
+fn the_stm32h743_image_fits_and_its_tick_cannot_fail() {
+    check(&H743);
+}
+
+#[test]
+fn the_stm32f446_image_fits_and_its_tick_cannot_fail_nor_compute_doubles() {
+    check(&F446);
+}
+
+/// Names of pins of an STM32 (`PA5`) in a text, in order.
+fn pins(text: &str) -> BTreeSet<String> {
+    let words = text.split(|c: char| !c.is_ascii_alphanumeric());
+    let is_pin = |word: &&str| {
+        let mut letters = word.chars();
+        letters.next() == Some('P')
+            && letters.next().is_some_and(|port| ('A'..='I').contains(&port))
+            && !letters.as_str().is_empty()
+            && letters.as_str().chars().all(|c| c.is_ascii_digit())
+    };
+    words.filter(is_pin).map(str::to_owned).collect()
+}
+
+/// What an engineer wires by is what the program drives, in both directions; the line that switches the amplifiers off in a
+/// fault handler is the one that is called enable.
+#[test]
+fn the_wiring_table_is_that_of_the_programs() {
+    let page = fs::read_to_string(repository().join("docs/bring-up.md")).unwrap();
+    let table: Vec<Vec<&str>> = page
+        .lines()
+        .skip_while(|line| !line.starts_with("| signal |"))
+        .skip(2)
+        .take_while(|line| line.starts_with('|'))
+        .map(|line| line.split('|').map(str::trim).collect())
+        .collect();
+    assert_eq!(table.len(), 17);
+    for (board, column) in [(&H743, 3), (&F446, 4)] {
+        let source = repository().join("firmware").join(board.folder).join("src/pins.rs");
+        let program = fs::read_to_string(source).unwrap();
+        let wired: BTreeSet<String> = table.iter().flat_map(|row| pins(row[column])).collect();
+        let (code, off) = program.split_once("pub fn amplifiers_off").unwrap();
+        assert_eq!(wired, pins(&code.replace("p.", " ")), "{}", board.folder);
+        let enable = table.iter().find(|row| row[1] == "**ENABLE**").unwrap();
+        let pin = pins(enable[column]).pop_first().unwrap();
+        let driven = code.lines().find(|line| line.contains("let enable = ")).unwrap();
+        assert_eq!(pins(driven), BTreeSet::from([pin.clone()]));
+        let (port, bit) = (&pin[1..2], &pin[2..]);
+        assert!(off.contains(&format!("pac::GPIO{port}.bsrr()")) && off.contains(&format!("set_br({bit}, true)")), "{pin}");
+    }
+}
