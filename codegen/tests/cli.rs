@@ -45,11 +45,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
         (
             &["chek", "legs.toml"],
-<<<<<<< HEAD
             "check, build, size, flash, sim, tune, robust, report, reproduce, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir",
-=======
-            "check, build, size, flash, sim, tune, robust, pil, dynamics, identify, forc, dump-ir",
->>>>>>> lint
         ),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),

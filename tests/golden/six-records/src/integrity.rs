@@ -21,10 +21,7 @@ pub static SETTINGS: [u64; CONFIG_WORDS] = [
 /// `Config` can hold give `Config::new()`; then [`intact`] is false.
 #[must_use]
 pub fn config() -> Config {
-    match Config::from_words(black_box(&SETTINGS)) {
-        Ok(config) => config,
-        Err(_) => Config::new(),
-    }
+    Config::from_words(black_box(&SETTINGS)).unwrap_or_default()
 }
 
 /// Where this controller comes from, in one line. It lies in every image whose target asks [`intact`], and
