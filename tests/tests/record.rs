@@ -280,7 +280,7 @@ fn on_the_microcontroller(emitted: &Emitted, bytes: &[u8]) {
 /// Random ticks of every kind on a machine: commands, readings, requests, events.
 fn hostile(names: &[String], rng: &mut ChaCha8Rng, single: bool) -> Vec<u64> {
     let real = |value: f64| if single { u64::from((value as f32).to_bits()) } else { value.to_bits() };
-    let odd = rng.next_u32() % 100 == 0;
+    let odd = rng.next_u32().is_multiple_of(100);
     let share = |rng: &mut ChaCha8Rng| f64::from(rng.next_u32()) / f64::from(u32::MAX) - 0.5;
     names
         .iter()
@@ -289,8 +289,8 @@ fn hostile(names: &[String], rng: &mut ChaCha8Rng, single: bool) -> Vec<u64> {
             "selector" => u64::from(rng.next_u32() % 4),
             "sequence" => u64::from(rng.next_u32() % 3),
             "request" => [3, 4, 5, 1].get(rng.next_u32() as usize % 60).copied().unwrap_or(2),
-            "events" => u64::from(rng.next_u32() % 1000 == 0) << (rng.next_u32() % 5),
-            _ if odd && rng.next_u32() % 4 == 0 => rng.next_u64() >> if single { 32 } else { 0 },
+            "events" => u64::from(rng.next_u32().is_multiple_of(1000)) << (rng.next_u32() % 5),
+            _ if odd && rng.next_u32().is_multiple_of(4) => rng.next_u64() >> if single { 32 } else { 0 },
             "displacement" => real((share(rng) + 0.5) * 2e-7),
             "setpoint" if name.ends_with("[0]") && names.len() < 20 => real((share(rng) + 0.5) * 6e-5),
             "gauge" => real(share(rng) * 2e-7),
