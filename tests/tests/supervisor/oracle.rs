@@ -167,6 +167,7 @@ impl Oracle {
 
     /// What a tick shows: the gauges' words and values, the model's displacement and the demand before the tick, the codes
     /// before and after it, its status.
+    #[allow(clippy::too_many_arguments)] // What a tick shows, one by one.
     pub fn observe(
         &mut self,
         words: &[u64],
@@ -186,7 +187,7 @@ impl Oracle {
             if !reading.is_finite() {
                 self.seen.push(1);
                 believed = false;
-            } else if reading < GAUGE_RANGE[0] || reading > GAUGE_RANGE[1] {
+            } else if !(GAUGE_RANGE[0]..=GAUGE_RANGE[1]).contains(&reading) {
                 self.seen.push(2);
                 believed = false;
             }

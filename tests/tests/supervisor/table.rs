@@ -59,7 +59,7 @@ fn inject(bench: &mut Bench, cause: u8, tick: u32, request: u64) -> u8 {
         }
         7 => {
             // To and fro faster than the slew rate goes.
-            let up = tick % 2 == 0;
+            let up = tick.is_multiple_of(2);
             bench.setpoint = [if up { 38e-6 } else { 2e-6 }; 6];
             bench.prepare(request, 0);
         }
@@ -99,7 +99,7 @@ fn applies(kind: Kind, cause: u8, phase: u8) -> bool {
     // Set-points and gauges against the model say nothing where the law does not run or the codes move.
     let of_the_law = matches!(cause, 3 | 5 | 6 | 7);
     let watched = of_the_law || cause == 4;
-    !slew && !(watched && matches!(phase, DISARMED | RAMPING | FAULTED))
+    !(slew || watched && matches!(phase, DISARMED | RAMPING | FAULTED))
 }
 
 fn table(kind: Kind) {
