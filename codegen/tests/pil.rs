@@ -202,7 +202,7 @@ fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
     let pipes = Pipes::start(&emulator, &nonsense).unwrap();
     let patience = Patience { limit: Duration::from_secs(20), attempts: 1 };
     let error = Lockstep::open(supervised(&folder), pipes, patience, &NEVER).err().unwrap().to_string();
-    assert!(error.contains("the emulator ended: ") && error.contains("image.elf"), "{error}");
+    assert!(error.contains("the emulator ended: "), "{error}");
 }
 
 #[test]

@@ -26,6 +26,7 @@ struct Bench {
     library: PathBuf,
     plant: Child,
     name: String,
+    spec: PathBuf,
 }
 
 impl Bench {
@@ -65,7 +66,7 @@ impl Bench {
         let plant = plant(if granted.is_ok_and(|status| status.success()) { &["--priority", "50"] } else { &[] });
         let place = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
         wait_for("the machine", || place.exists());
-        Self { binary: kept.join("release/rt-pc"), folder, library, plant, name }
+        Self { binary: kept.join("release/rt-pc"), folder, library, plant, name, spec: spec_file }
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -162,7 +163,19 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
     words[tick * width + output_place + 3] ^= 1;
     let flipped = Trace::from_words(trace.description().clone(), words).unwrap();
     let name = trace.description().output_names[3].clone();
-    assert_eq!(bench.first_difference(&flipped), Some((tick, name)));
+    assert_eq!(bench.first_difference(&flipped), Some((tick, name.clone())));
+
+    // As a user does it.
+    let replay = |record: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
+        command.arg("replay").arg(bench.path(record)).arg("--spec").arg(&bench.spec).output().unwrap()
+    };
+    let good = replay("a.trace");
+    assert!(good.status.success() && String::from_utf8_lossy(&good.stdout).contains("bit-equal"), "{good:?}");
+    fs::write(bench.path("b.trace"), flipped.to_bytes()).unwrap();
+    let bad = replay("b.trace");
+    let text = String::from_utf8_lossy(&bad.stderr);
+    assert!(bad.status.code() == Some(1) && text.contains(&format!("number {tick} ")) && text.contains(&name), "{bad:?}");
 
     // With time that waits it runs on any computer. SIGTERM: down, and off.
     let mut command = bench.command("b.trace");

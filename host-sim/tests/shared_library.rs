@@ -12,7 +12,7 @@ use host_sim::controller::{Controller, ControllerError, TickController};
 const SOURCE: &str = r#"
 static TEXT: &str = "name=toy\ndigest=ab\nversion=0.1.0\nscalar_bits=64\nconfig_names=gain,limit\n\
 input_names=setpoint[0]\noutput_names=voltage[0],status\n\
-state_bytes=32\nstate_align=16\nconfig_bytes=8\nconfig_align=8\nmachine_bytes=48\nmachine_align=16\n";
+state_bytes=32\nstate_align=16\nconfig_bytes=8\nconfig_align=8\nmachine_bytes=48\nmachine_align=16\nmachine_words=6\n";
 #[unsafe(no_mangle)] extern "C" fn specgen_abi_version() -> u32 { ABI }
 #[unsafe(no_mangle)] unsafe extern "C" fn specgen_describe(s: *mut *const u8, n: *mut usize) { unsafe { *s = TEXT.as_ptr(); *n = TEXT.len() } }
 #[unsafe(no_mangle)] unsafe extern "C" fn specgen_config_default(w: *mut u64) { unsafe { *w = 2.0f64.to_bits(); *w.add(1) = 7 } }

@@ -241,6 +241,13 @@ fn rounding_errors_stay_within_their_bound_and_near_it() {
                 let (bound, sampled) = (figures.bound[axis], figures.sampled[axis]);
                 println!("{name:<32} {what:<10} {bound:>9.2e} {sampled:>9.2e} {:>6.1}", bound / sampled);
                 assert!(sampled > 0.0 && bound >= sampled, "{name} {what} {axis}: {bound:e} {sampled:e}");
+                // What the passes of the measured pose leave out is known as a length and an angle, not axis by axis.
+                let (bound, sampled) = if what == "measured" {
+                    let of = |values: &[f64; 6]| values[axis / 3 * 3..][..3].iter().fold(0.0, |m, v| f64::max(m, *v));
+                    (of(&figures.bound), of(&figures.sampled))
+                } else {
+                    (bound, sampled)
+                };
                 assert!(bound <= 20.0 * sampled, "{name} {what} {axis}: {bound:e} {sampled:e}");
             }
             if let Some(against) = figures.against_f64 {

@@ -1,5 +1,7 @@
 //! `specgen replay`: a record run again on the host, tick by tick, by bits.
 
+mod trace;
+
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write as _};
@@ -7,13 +9,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::controller::{MachineWord, Supervised};
+use host_sim::description::Description;
 use host_sim::record::{self, Block, Header, Piece, Reader, Replay, ReplayError};
 use serde_json::{Value, json};
 
 use super::file::PendingFile;
 use super::sim;
 use super::ui::{Failure, Ui};
-use crate::compile;
+use crate::compile::{self, Compiled};
 
 /// Changes of the phase that are shown.
 const SHOWN: usize = 20;
@@ -38,7 +41,7 @@ const CAUSES: [&str; 13] = [
 /// Arguments of `replay`.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// The record: from a target, or from `specgen sim --record`.
+    /// The record: from a target, from `specgen sim --record` or from `rt-pc --record`.
     record: PathBuf,
     /// The spec that the target was built from. Without it the record can only be exported.
     #[arg(long, value_name = "SPEC", required_unless_present = "csv")]
@@ -51,6 +54,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.record.display();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
+    if trace::is_trace(&arguments.record) {
+        return run_trace(arguments, ui);
+    }
     let mut reader = open(&arguments.record)?;
     let mut csv = arguments.csv.as_deref().map(Csv::new).transpose()?;
     let Some(spec) = &arguments.spec else {
@@ -62,18 +68,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = compile::compile(spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     // Before the library is built: a wrong spec is told at once.
-    let recorded = &reader.header().description;
-    let version = env!("CARGO_PKG_VERSION");
-    if recorded.digest != compiled.ir.digest || recorded.version != version {
-        return Err(Failure::Gate(format!(
-            "{shown} is of spec digest {}, specgen {}; {} gives {}, specgen {version}: name the spec that the target was built \
-             from, and use the specgen that built it",
-            recorded.digest,
-            recorded.version,
-            spec.display(),
-            compiled.ir.digest,
-        )));
-    }
+    same_build(arguments, &reader.header().description, &compiled)?;
     let controller = sim::emitted(&compiled, ui)?;
     let mut machine = Supervised::new(controller).map_err(sim::environment)?;
     ui.progress("running the record again");
@@ -110,6 +105,39 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             Err(Failure::Judged { message: format!("{shown}: {message}"), result })
         }
     }
+}
+
+/// The same for the record of a real-time PC.
+fn run_trace(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let trace = trace::read(&arguments.record)?;
+    if let Some(csv) = &arguments.csv {
+        let rows = trace::export(&trace, csv)?;
+        if arguments.spec.is_none() {
+            let text = format!("{}: {rows} rows exported\n", arguments.record.display());
+            ui.result(&text, json!({ "rows": rows }));
+        }
+    }
+    let Some(spec) = &arguments.spec else { return Ok(()) };
+    let compiled = compile::compile(spec)?;
+    ui.findings(Some(&compiled.source), &compiled.findings);
+    trace::run(arguments, &trace, &compiled, ui)
+}
+
+/// Refuses the record of another spec or of another version of specgen.
+fn same_build(arguments: &Arguments, recorded: &Description, compiled: &Compiled) -> Result<(), Failure> {
+    let version = env!("CARGO_PKG_VERSION");
+    if recorded.digest == compiled.ir.digest && recorded.version == version {
+        return Ok(());
+    }
+    Err(Failure::Gate(format!(
+        "{} is of spec digest {}, specgen {}; {} gives {}, specgen {version}: name the spec that the target was built from, and \
+         use the specgen that built it",
+        arguments.record.display(),
+        recorded.digest,
+        recorded.version,
+        arguments.spec.as_ref().map_or_else(String::new, |spec| spec.display().to_string()),
+        compiled.ir.digest,
+    )))
 }
 
 fn open(path: &Path) -> Result<Reader<BufReader<File>>, Failure> {

@@ -30,6 +30,7 @@ impl Workspace {
         put(root, "host/src/lib.rs", HOST);
         let repository = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
         copy(&repository.join("firmware/qemu"), &root.join("qemu"));
+        copy(&repository.join("firmware/link"), &root.join("link"));
         // The repository's stages measure parts that only an emitted controller has.
         put(root, "qemu/src/stages.rs", STAGES);
         // The committed lock names the real controller; only the path packages are put in its place.
