@@ -172,10 +172,13 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
     };
     let good = replay("a.trace");
     assert!(good.status.success() && String::from_utf8_lossy(&good.stdout).contains("bit-equal"), "{good:?}");
-    fs::write(bench.path("b.trace"), flipped.to_bytes()).unwrap();
-    let bad = replay("b.trace");
+    fs::write(bench.path("flipped.trace"), flipped.to_bytes()).unwrap();
+    let bad = replay("flipped.trace");
     let text = String::from_utf8_lossy(&bad.stderr);
-    assert!(bad.status.code() == Some(1) && text.contains(&format!("number {tick} ")) && text.contains(&name), "{bad:?}");
+    assert!(
+        bad.status.code() == Some(1) && text.contains(&format!("number {tick} ")) && text.contains(&name),
+        "{bad:?}"
+    );
 
     // With time that waits it runs on any computer. SIGTERM: down, and off.
     let mut command = bench.command("b.trace");

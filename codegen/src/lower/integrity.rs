@@ -7,7 +7,7 @@ use crate::ir::{
     Scalar, Segment, Setpoint, TaskSpace,
 };
 
-/// What every line that [`identity`] makes begins with: images are searched for it.
+/// What every line that `identity` makes begins with: images are searched for it.
 pub const IDENTITY_MARK: &str = "specgen-identity: ";
 
 /// One line about where a controller comes from.

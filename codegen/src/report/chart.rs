@@ -32,7 +32,7 @@ pub enum Values {
 }
 
 impl Values {
-    /// With [`STEPS`] over the largest magnitude.
+    /// With `STEPS` over the largest magnitude.
     #[must_use]
     pub fn scaled(values: &[f64]) -> Self {
         let largest = values.iter().fold(0.0, |largest: f64, v| if v.abs() > largest { v.abs() } else { largest });

@@ -33,6 +33,7 @@ impl Workspace {
         copy(&repository.join("firmware/link"), &root.join("link"));
         // The repository's stages measure parts that only an emitted controller has.
         put(root, "qemu/src/stages.rs", STAGES);
+        put(root, "qemu/src/machine.rs", MACHINE);
         // The committed lock names the real controller; only the path packages are put in its place.
         let status = Command::new(&tools.toolchain.cargo)
             .env("RUSTC", &tools.toolchain.rustc)
@@ -120,6 +121,14 @@ impl Stages {
     pub fn all(&self) -> &[Stage] { &self.counts }
 }
 extern "C" fn add_one(setpoint: &[f64; 6], sums: &mut [f64; 6]) { *sums = setpoint.map(|x| x + 1.0); }
+"#;
+
+/// The stand-in has no supervisor.
+const MACHINE: &str = r#"
+use crate::instructions::{InstructionCounter, SelfTest};
+use crate::semihosting::{Exit, File};
+use controller::Config;
+pub fn replay(_: &mut InstructionCounter, _: SelfTest, _: &Config, _: &File) -> Result<(), Exit> { Err(Exit::Fault) }
 "#;
 
 const HOST_MANIFEST: &str = r#"

@@ -73,8 +73,7 @@ pub fn replay(
             return Err(Exit::CannotWrite);
         }
     }
-    let sizes =
-        [CONFIG_WORDS, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, size_of::<Machine>(), size_of::<Config>()];
+    let sizes = [CONFIG_WORDS, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, size_of::<Machine>(), size_of::<Config>()];
     let summary = Summary {
         ticks,
         sizes: sizes.map(|n| n as u64),

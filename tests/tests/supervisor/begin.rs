@@ -48,8 +48,14 @@ fn begins(kind: Kind, mode: f64, more: &[(&str, &str)]) -> i64 {
             highest = if *held > highest { *held } else { highest };
         }
         // Long enough to get there.
-        for _ in 0..1500 {
-            assert_eq!(bench.tick(RUN, 0).phase, RUNNING, "{kind:?} round {round}: {:x}", bench.conditions());
+        for tick in 0..1500 {
+            assert_eq!(
+                bench.tick(RUN, 0).phase,
+                RUNNING,
+                "{kind:?} round {round} tick {tick}: {:x} {:?}",
+                bench.conditions(),
+                bench.codes()
+            );
         }
     }
     println!(
@@ -68,7 +74,9 @@ fn six_legs_begin_without_a_jump() {
 
 #[test]
 fn a_platform_begins_without_a_jump() {
+    // On its way from rest to the bias a platform may want legs shorter than they get.
+    let patient = [("voltage_time      = \"2 ms\"", "voltage_time      = \"500 ms\"")];
     for mode in [1.0, 3.0, 6.0] {
-        assert!(begins(Kind::Platform, mode, &[]) <= MOST_CODES);
+        assert!(begins(Kind::Platform, mode, &patient) <= MOST_CODES);
     }
 }

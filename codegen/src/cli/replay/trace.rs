@@ -28,7 +28,9 @@ pub(super) fn read(path: &Path) -> Result<Trace, Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{}: {error}", path.display()));
     let bytes = fs::read(path).map_err(|error| refuse(&format_args!("cannot be read: {error}")))?;
     Trace::from_bytes(&bytes).map_err(|error| {
-        refuse(&format_args!("{error}; a run that was killed leaves its record without an end: end runs by SIGINT or SIGTERM"))
+        refuse(&format_args!(
+            "{error}; a run that was killed leaves its record without an end: end runs by SIGINT or SIGTERM"
+        ))
     })
 }
 
@@ -75,14 +77,20 @@ pub(super) fn run(arguments: &Arguments, trace: &Trace, compiled: &Compiled, ui:
         "bit_equal": difference.is_none() && !trace.is_empty(),
         "first_difference": difference.as_ref().map(|(tick, what)| json!({ "tick": tick, "what": what })),
     });
-    let head = format!("{shown}: {}\n  {} ticks from power-up; every output and digest of the machine compared\n", compiled.ir.name, trace.len());
+    let head = format!(
+        "{shown}: {}\n  {} ticks from power-up; every output and digest of the machine compared\n",
+        compiled.ir.name,
+        trace.len()
+    );
     let message = match difference {
         None if !trace.is_empty() => {
             ui.result(&format!("{head}  bit-equal\n"), result);
             return Ok(());
         }
         None => "there is no tick in it; record again".to_owned(),
-        Some((tick, what)) => format!("the first tick that differs is number {tick} of the record (host a is the record): {what}"),
+        Some((tick, what)) => {
+            format!("the first tick that differs is number {tick} of the record (host a is the record): {what}")
+        }
     };
     if !ui.is_json() {
         ui.out(&head);
