@@ -253,11 +253,8 @@ fn rounding_errors_stay_within_their_bound_and_near_it() {
             }
             if let Some(against) = figures.against_f64 {
                 // Doubles are as good as exact for singles.
-                for axis in 0..6 {
-                    assert!(
-                        (against[axis] - figures.sampled[axis]).abs() < 0.05 * figures.sampled[axis],
-                        "{name} {what}"
-                    );
+                for (value, sampled) in against.iter().zip(&figures.sampled) {
+                    assert!((value - sampled).abs() < 0.05 * sampled, "{name} {what}");
                 }
             }
         }
