@@ -52,6 +52,7 @@ fn every_shape() -> Settings<f64> {
 }
 
 #[test]
+#[allow(clippy::needless_range_loop)] // Ticks by number: the time is computed from them.
 fn shapes_are_those_of_the_textbook() {
     let settings = every_shape();
     let all = run(&settings, wide());
