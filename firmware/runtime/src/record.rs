@@ -27,6 +27,8 @@
 //! (`key=value` lines: what the controller says of itself), the CRC-32 of all that as a word of 64 bits, then blocks, each
 //! followed by its CRC-32 as a word. A file that is cut off loses no more than its last block.
 
+use crate::crc::Crc32;
+
 /// First bytes of a file.
 pub const FILE_MAGIC: [u8; 8] = *b"SPGRECRD";
 /// Version of the format.
@@ -109,15 +111,13 @@ impl Layout {
     }
 }
 
-/// CRC-32 (IEEE 802.3) of words in little-endian order, as it follows a block in a file. Not for the tick: it takes some
+/// [`Crc32`] of words in little-endian order, as it follows a block in a file. Not for the tick: it takes some
 /// 100 instructions a word.
 #[must_use]
 pub fn checksum(words: &[u64]) -> u64 {
-    let mut crc = Crc::new();
-    for word in words {
-        crc.bytes(&word.to_le_bytes());
-    }
-    crc.finish()
+    let mut crc = Crc32::new();
+    crc.words(words);
+    u64::from(crc.finish())
 }
 
 /// The beginning of a file for the text `description`, without the padding that the text needs: call `out` with the pieces.
@@ -129,68 +129,10 @@ pub fn write_header<E>(description: &str, mut out: impl FnMut(&[u8]) -> Result<(
     let text = description.as_bytes();
     let padding = PADDING.get(..text.len().wrapping_neg() % 8).unwrap_or_default();
     let length = (text.len() + padding.len()) as u32;
-    let mut crc = Crc::new();
+    let mut crc = Crc32::new();
     for piece in [&FILE_MAGIC[..], &FORMAT.to_le_bytes()[..], &length.to_le_bytes()[..], text, padding] {
         crc.bytes(piece);
         out(piece)?;
     }
-    out(&crc.finish().to_le_bytes())
-}
-
-/// Running CRC-32, by half bytes: a table of 64 bytes.
-struct Crc(u32);
-
-impl Crc {
-    const TABLE: [u32; 16] = {
-        let mut table = [0; 16];
-        let mut index = 0;
-        while index < 16 {
-            let mut value = index as u32;
-            let mut bit = 0;
-            while bit < 4 {
-                value = if value & 1 == 1 { value >> 1 ^ 0xedb8_8320 } else { value >> 1 };
-                bit += 1;
-            }
-            table[index] = value;
-            index += 1;
-        }
-        table
-    };
-
-    const fn new() -> Self {
-        Self(u32::MAX)
-    }
-
-    fn bytes(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.0 ^= u32::from(*byte);
-            self.0 = self.0 >> 4 ^ Self::TABLE[(self.0 & 15) as usize];
-            self.0 = self.0 >> 4 ^ Self::TABLE[(self.0 & 15) as usize];
-        }
-    }
-
-    fn finish(&self) -> u64 {
-        u64::from(!self.0)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_checksum_is_the_usual_one() {
-        let mut crc = Crc::new();
-        crc.bytes(b"123456789");
-        assert_eq!(crc.finish(), 0xcbf4_3926);
-        assert_eq!(checksum(&[u64::from_le_bytes(*b"12345678")]), 0x9ae0_daaf);
-    }
-
-    #[test]
-    fn reasons_read_back() {
-        for word in 0..3 {
-            assert_eq!(Reason::from_word(word).map(Reason::word), Some(word));
-        }
-        assert_eq!(Reason::from_word(3), None);
-    }
+    out(&u64::from(crc.finish()).to_le_bytes())
 }
