@@ -89,8 +89,8 @@ pub fn lower(
         scalar,
         kinematics: kinematics::lower(model, scalar)?,
         dynamics: dynamics::lower(model, scalar)?,
+        supervision: supervision::lower(model, &hysteresis, &actuation, max_step, scalar)?,
         hysteresis,
-        supervision: supervision::lower(model, &actuation, max_step, scalar)?,
         actuation,
         bounds: Bounds {
             pose: [tx, ty, tz, rx, ry, rz].map(round),

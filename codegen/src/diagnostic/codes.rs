@@ -196,6 +196,8 @@ codes! {
         "A bound that the noise of the gauges, or a step of their converter, passes by itself would stop a sound machine.";
     SUPERVISOR_RAMP = "E0472", "a ramp to rest faster than the slew rate",
         "Voltages go to rest no faster than amplifier and stack stand.";
+    SUPERVISOR_REST = "E0473", "a rest voltage beyond the limits",
+        "The legs stand at supervisor.rest_voltage while they are disarmed: it lies within actuator.voltage.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",
@@ -350,6 +352,8 @@ codes! {
         "More than a hundredth of the voltage range, or less than two ten-millionths: probably a slip of the unit.";
     CONVERTER_COARSE = "W0808", "converter step large against the stroke",
         "One code moves a leg by more than a thousandth of its stroke.";
+    REST_NOT_ZERO = "W0817", "a rest that amplifiers do not keep when they are off",
+        "A stack whose amplifier is off discharges to 0 V. Where the legs rest at another voltage although 0 V is permitted, the amplifiers make a jump when they are switched on, and one when they are switched off.";
     LEG_PART_SMALL = "W0810", "mass and inertia of a leg part do not fit the leg",
         "The radius of gyration of a part is less than a fiftieth of the leg.";
     CENTRE_AT_JOINT = "W0811", "mass centre in the joint",

@@ -136,6 +136,7 @@ pub(super) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
 fn supervisor(f: &Fields) -> Option<Supervisor> {
     let number = |key: &str| f.number(&format!("supervisor.{key}"));
     Some(Supervisor {
+        rest_voltage: number("rest_voltage"),
         arm_time: number("arm_time"),
         ramp_rate: number("ramp_rate"),
         gauge_time: number("gauge_time"),
