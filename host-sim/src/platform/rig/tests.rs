@@ -1,9 +1,10 @@
 use super::*;
-use crate::closed_loop::Preparation;
-use crate::controller::ControllerError;
+use crate::closed_loop::{Preparation, RunError};
+use crate::controller::{ControllerError, TickController};
 use crate::description::Description;
 use crate::plant::LegParameters;
-use crate::platform::PlatformParameters;
+use crate::platform::{PlatformParameters, WorkPart};
+use crate::trajectory::{PoseTarget, PoseTrajectory};
 
 const INTERVAL: f64 = 1e-4;
 

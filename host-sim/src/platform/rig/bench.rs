@@ -1,0 +1,290 @@
+//! A rig and a controller that run together, tick by tick.
+//!
+//! At tick n (time t_n) the controller gets the set-point for the end of the coming interval, the gauge readings and the
+//! wrench of t_n; its voltages are held until t_{n+1}, where the pose is scored. With latency they are held one or more
+//! intervals later.
+
+use std::collections::VecDeque;
+
+use super::PlatformRig;
+use crate::closed_loop::{RunError, ticks_within};
+use crate::controller::TickController;
+use crate::description::DescriptionError;
+use crate::platform::contact::Wrench;
+use crate::platform::linear::Six;
+use crate::trace::Trace;
+use crate::trajectory::PoseTarget;
+use crate::word::Scalar;
+
+/// Status bit of a generator that is busy with bias, move or trajectory.
+pub const BUSY: u32 = 1 << 18;
+
+/// What the controller is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Command {
+    /// Stay.
+    #[default]
+    Hold,
+    /// Follow the set-points of the words.
+    Stream,
+    /// Go to the set-point.
+    Move,
+    /// Run the trajectory of the selector.
+    Trajectory,
+}
+
+impl Command {
+    /// Its word.
+    #[must_use]
+    pub fn word(self) -> u64 {
+        match self {
+            Self::Hold => 0,
+            Self::Stream => 1,
+            Self::Move => 2,
+            Self::Trajectory => 3,
+        }
+    }
+}
+
+/// The command words of one tick.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Request {
+    /// What is asked for.
+    pub command: Command,
+    /// Number of the trajectory.
+    pub selector: u32,
+    /// Whether the set-point is a new one: the stream counter then moves on.
+    pub fresh: bool,
+    /// The set-point.
+    pub target: PoseTarget,
+}
+
+impl Request {
+    /// The next set-point of a stream.
+    #[must_use]
+    pub fn stream(target: PoseTarget) -> Self {
+        Self { command: Command::Stream, selector: 0, fresh: true, target }
+    }
+}
+
+/// One tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tick {
+    /// Status word.
+    pub status: u32,
+    /// The controller's target at the end of the tick, with the bias.
+    pub target: Six,
+    /// The pose that the controller found at the beginning of the tick.
+    pub measured: Six,
+    /// Its voltages, V.
+    pub voltage: Six,
+    /// True pose at the end of the tick, from rest.
+    pub pose: Six,
+    /// True wrench on the platform at the end of the tick.
+    pub wrench: Wrench,
+}
+
+/// Where a bench stopped: what [`Bench::resume`] needs besides rig and controller.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::platform) struct Paused {
+    sequence: u64,
+    ticks: usize,
+    underway: VecDeque<Six>,
+}
+
+/// A rig and a controller that run together.
+pub struct Bench<'a> {
+    rig: &'a mut PlatformRig,
+    controller: &'a mut dyn TickController,
+    interval: f64,
+    wiring: Wiring,
+    scalar: Scalar,
+    input: Vec<u64>,
+    output: Vec<u64>,
+    sequence: u64,
+    ticks: usize,
+    /// Voltages on their way to the amplifiers.
+    underway: VecDeque<Six>,
+    trace: Option<Trace>,
+}
+
+impl<'a> Bench<'a> {
+    /// Resets `controller` to power-up. Voltages reach the amplifiers `latency` intervals (s) late.
+    ///
+    /// # Errors
+    /// If the controller lacks a word of the platform interface.
+    pub fn new(
+        rig: &'a mut PlatformRig,
+        controller: &'a mut dyn TickController,
+        interval: f64,
+        latency: usize,
+    ) -> Result<Self, RunError> {
+        controller.reset();
+        let underway = VecDeque::from(vec![[rig.rest_voltage; 6]; latency]);
+        Self::resume(rig, controller, interval, &Paused { sequence: 0, ticks: 0, underway })
+    }
+
+    /// Goes on from where a bench stopped, with clones of its rig and controller.
+    pub(in crate::platform) fn resume(
+        rig: &'a mut PlatformRig,
+        controller: &'a mut dyn TickController,
+        interval: f64,
+        paused: &Paused,
+    ) -> Result<Self, RunError> {
+        let wiring = Wiring::of(controller)?;
+        let description = controller.description();
+        Ok(Self {
+            wiring,
+            scalar: description.scalar,
+            input: vec![0; description.input_names.len()],
+            output: vec![0; description.output_names.len()],
+            rig,
+            controller,
+            interval,
+            sequence: paused.sequence,
+            ticks: paused.ticks,
+            underway: paused.underway.clone(),
+            trace: None,
+        })
+    }
+
+    /// Where it stands.
+    pub(in crate::platform) fn pause(self) -> Paused {
+        Paused { sequence: self.sequence, ticks: self.ticks, underway: self.underway }
+    }
+
+    /// Keeps every word from here on.
+    pub fn record(&mut self) {
+        self.trace = Some(Trace::new(self.controller.description().clone()));
+    }
+
+    /// The words kept.
+    #[must_use]
+    pub fn into_trace(self) -> Option<Trace> {
+        self.trace
+    }
+
+    /// The rig.
+    pub fn rig(&mut self) -> &mut PlatformRig {
+        self.rig
+    }
+
+    /// The output words of the last tick.
+    #[must_use]
+    pub fn output(&self) -> &[u64] {
+        &self.output
+    }
+
+    /// Changes the settings, from the next tick on.
+    ///
+    /// # Errors
+    /// If the controller refuses them.
+    pub fn configure(&mut self, words: &[u64]) -> Result<(), RunError> {
+        Ok(self.controller.configure(words)?)
+    }
+
+    /// Runs one tick.
+    ///
+    /// # Errors
+    /// If a voltage is not finite.
+    pub fn tick(&mut self, request: &Request) -> Result<Tick, RunError> {
+        let scalar = self.scalar;
+        if request.fresh {
+            self.sequence = (self.sequence + 1) & u64::from(u32::MAX);
+        }
+        let (gauge, wrench) = (self.rig.read_gauges(), self.rig.read_wrench());
+        self.input[self.wiring.command] = request.command.word();
+        self.input[self.wiring.selector] = u64::from(request.selector);
+        self.input[self.wiring.sequence] = self.sequence;
+        for k in 0..6 {
+            self.input[self.wiring.pose[k]] = scalar.encode(request.target.pose[k]);
+            self.input[self.wiring.rate[k]] = scalar.encode(request.target.rate[k]);
+            self.input[self.wiring.acceleration[k]] = scalar.encode(request.target.acceleration[k]);
+            self.input[self.wiring.gauge[k]] = scalar.encode(gauge[k]);
+            self.input[self.wiring.wrench[k]] = scalar.encode(wrench[k]);
+        }
+        self.controller.step(&self.input, &mut self.output);
+        if let Some(trace) = &mut self.trace {
+            trace.push(&self.input, &self.output, self.controller.state_digest());
+        }
+        let six = |places: &[usize; 6]| places.map(|place| scalar.decode(self.output[place]));
+        let voltage = six(&self.wiring.voltage);
+        if let Some(leg) = voltage.iter().position(|v| !v.is_finite()) {
+            return Err(RunError::NotFinite { tick: self.ticks, leg });
+        }
+        let (target, measured) = (six(&self.wiring.target), six(&self.wiring.measured));
+        self.underway.push_back(voltage);
+        let held = self.underway.pop_front().unwrap_or(voltage);
+        self.rig.hold(&held, self.interval);
+        self.ticks += 1;
+        Ok(Tick {
+            status: self.output[self.wiring.status] as u32,
+            target,
+            measured,
+            voltage,
+            pose: self.rig.machine.pose(),
+            wrench: self.rig.machine.wrench(),
+        })
+    }
+
+    /// Holds until the controller is at its bias pose, at most `limit` (s); returns how long that took, s.
+    ///
+    /// # Errors
+    /// If it takes longer, or as [`Bench::tick`].
+    pub fn arm(&mut self, limit: f64) -> Result<f64, RunError> {
+        let ticks = ticks_within(limit, self.interval)?;
+        let mut status = 0;
+        for tick in 1..=ticks {
+            status = self.tick(&Request::default())?.status;
+            if status & BUSY == 0 {
+                return Ok(tick as f64 * self.interval);
+            }
+        }
+        Err(RunError::NotReady { limit, status })
+    }
+}
+
+/// Places of the words that the bench connects.
+struct Wiring {
+    command: usize,
+    selector: usize,
+    sequence: usize,
+    pose: [usize; 6],
+    rate: [usize; 6],
+    acceleration: [usize; 6],
+    gauge: [usize; 6],
+    wrench: [usize; 6],
+    voltage: [usize; 6],
+    target: [usize; 6],
+    measured: [usize; 6],
+    status: usize,
+}
+
+impl Wiring {
+    fn of(controller: &dyn TickController) -> Result<Self, DescriptionError> {
+        let description = controller.description();
+        let six = |stem: &str, find: &dyn Fn(&str) -> Result<usize, DescriptionError>| {
+            let mut places = [0; 6];
+            for (k, place) in places.iter_mut().enumerate() {
+                *place = find(&format!("{stem}[{k}]"))?;
+            }
+            Ok::<_, DescriptionError>(places)
+        };
+        let input = |name: &str| description.input(name);
+        let output = |name: &str| description.output(name);
+        Ok(Self {
+            command: input("command")?,
+            selector: input("selector")?,
+            sequence: input("sequence")?,
+            pose: six("setpoint", &input)?,
+            rate: six("setpoint_rate", &input)?,
+            acceleration: six("setpoint_acceleration", &input)?,
+            gauge: six("gauge", &input)?,
+            wrench: six("wrench", &input)?,
+            voltage: six("voltage", &output)?,
+            target: six("target", &output)?,
+            measured: six("pose", &output)?,
+            status: output("status")?,
+        })
+    }
+}

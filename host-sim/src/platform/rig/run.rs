@@ -1,0 +1,211 @@
+//! A trajectory run by a rig and a controller, scored against the true pose.
+
+use std::fmt::Write as _;
+
+use super::{BUSY, Bench, Command, GaugeFault, PlatformRig, Request, Tick};
+use crate::closed_loop::{RunError, ticks_within};
+use crate::controller::TickController;
+use crate::platform::contact::WorkPart;
+use crate::platform::frames::UserFrames;
+use crate::platform::linear::Six;
+use crate::platform::study::pose_of;
+use crate::platform::table::PoseErrors;
+use crate::trace::Trace;
+use crate::trajectory::PoseTrajectory;
+
+/// What a run keeps besides its errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Record {
+    /// Nothing.
+    #[default]
+    Errors,
+    /// A sample per tick of the trajectory.
+    Samples,
+    /// Samples, and every word from power-up on.
+    Trace,
+}
+
+/// How a trajectory is run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunOptions {
+    /// Control interval, s.
+    pub interval: f64,
+    /// Bias pose of the controller: true poses are scored against this plus the trajectory.
+    pub bias: Six,
+    /// Frames of the controller, in which the trajectory is given; none: parallel to {B}, about P_C.
+    pub frames: Option<UserFrames>,
+    /// How long the controller may take to its bias pose, s.
+    pub arming: f64,
+    /// Rest between that and the trajectory, s.
+    pub settle: f64,
+    /// Intervals by which voltages come late.
+    pub latency: usize,
+    /// Touched, unloaded, when the trajectory starts.
+    pub part: Option<WorkPart>,
+    /// Gauge faults: gauge, from and to time of the trajectory (s), kind.
+    pub faults: Vec<(usize, f64, f64, GaugeFault)>,
+    /// What is kept.
+    pub record: Record,
+}
+
+impl RunOptions {
+    /// Free motion at a control interval (s) with a bias pose.
+    #[must_use]
+    pub fn new(interval: f64, bias: Six) -> Self {
+        Self {
+            interval,
+            bias,
+            frames: None,
+            arming: 60.0,
+            settle: 0.2,
+            latency: 0,
+            part: None,
+            faults: Vec::new(),
+            record: Record::Errors,
+        }
+    }
+}
+
+/// The end of one tick of a trajectory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseSample {
+    /// Since the start of the trajectory, s.
+    pub time: f64,
+    /// Bias and trajectory.
+    pub target: Six,
+    /// The tick.
+    pub tick: Tick,
+}
+
+/// A run of a platform.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlatformRun {
+    /// True pose against bias and trajectory.
+    pub errors: PoseErrors,
+    /// One per tick of the trajectory, if they are kept.
+    pub samples: Vec<PoseSample>,
+    /// Every word, if it is kept.
+    pub trace: Option<Trace>,
+    /// Status bits seen during the trajectory.
+    pub status: u32,
+    /// How long the way to the bias pose took, s.
+    pub arming: f64,
+}
+
+impl PlatformRig {
+    /// Runs `controller`, reset to power-up: way to the bias pose, rest, contact, then `trajectory` as a stream.
+    ///
+    /// # Errors
+    /// If the controller lacks a word, does not come to its bias pose, gives a voltage that is not finite, or there would
+    /// be no tick.
+    pub fn run(
+        &mut self,
+        controller: &mut dyn TickController,
+        trajectory: &dyn PoseTrajectory,
+        options: &RunOptions,
+    ) -> Result<PlatformRun, RunError> {
+        let interval = options.interval;
+        let ticks = ticks_within(trajectory.duration(), interval)?;
+        let (mut bench, arming) = self.ready(controller, options)?;
+        let mut errors = PoseErrors::default();
+        let mut samples = Vec::new();
+        let mut seen = 0;
+        for tick in 0..ticks {
+            for &(gauge, from, to, fault) in &options.faults {
+                let now = tick as f64 * interval;
+                bench.rig().set_fault(gauge, (now >= from && now < to).then_some(fault));
+            }
+            let time = (tick + 1) as f64 * interval;
+            let wanted = trajectory.target(time);
+            let tick = bench.tick(&Request::stream(wanted))?;
+            let target = pose_of(options, &wanted);
+            errors.add(&std::array::from_fn(|k| target[k] - tick.pose[k]));
+            seen |= tick.status;
+            if options.record != Record::Errors {
+                samples.push(PoseSample { time, target, tick });
+            }
+        }
+        Ok(PlatformRun { errors, samples, trace: bench.into_trace(), status: seen, arming })
+    }
+
+    /// Runs `controller` likewise, but lets it play its own trajectory `selector`, move to the start included, until it
+    /// stands or for `limit` (s). True poses are scored against its own targets.
+    ///
+    /// # Errors
+    /// As [`PlatformRig::run`].
+    pub fn play(
+        &mut self,
+        controller: &mut dyn TickController,
+        selector: u32,
+        options: &RunOptions,
+        limit: f64,
+    ) -> Result<PlatformRun, RunError> {
+        let interval = options.interval;
+        let ticks = ticks_within(limit, interval)?;
+        let (mut bench, arming) = self.ready(controller, options)?;
+        let request = Request { command: Command::Trajectory, selector, ..Request::default() };
+        let mut errors = PoseErrors::default();
+        let mut samples = Vec::new();
+        let mut seen = 0;
+        for tick in 0..ticks {
+            let time = (tick + 1) as f64 * interval;
+            let tick = bench.tick(&request)?;
+            seen |= tick.status & !BUSY;
+            if tick.status & BUSY == 0 {
+                break;
+            }
+            errors.add(&std::array::from_fn(|k| tick.target[k] - tick.pose[k]));
+            if options.record != Record::Errors {
+                samples.push(PoseSample { time, target: tick.target, tick });
+            }
+        }
+        Ok(PlatformRun { errors, samples, trace: bench.into_trace(), status: seen, arming })
+    }
+
+    /// A bench with the controller at its bias pose, rested, in contact; and how long the way took, s.
+    pub(in crate::platform) fn ready<'a>(
+        &'a mut self,
+        controller: &'a mut dyn TickController,
+        options: &RunOptions,
+    ) -> Result<(Bench<'a>, f64), RunError> {
+        let mut bench = Bench::new(self, controller, options.interval, options.latency)?;
+        if options.record == Record::Trace {
+            bench.record();
+        }
+        let arming = bench.arm(options.arming)?;
+        if options.settle >= options.interval {
+            for _ in 0..ticks_within(options.settle, options.interval)? {
+                bench.tick(&Request::default())?;
+            }
+        }
+        if let Some(part) = options.part {
+            bench.rig().machine_mut().touch(part);
+        }
+        Ok((bench, arming))
+    }
+}
+
+impl PlatformRun {
+    /// CSV, one line per tick that was kept: what was wanted, where it was, what the controller saw and did. SI units.
+    #[must_use]
+    pub fn to_csv(&self) -> String {
+        let six = |stem: &str| (0..6).map(|k| format!(",{stem}[{k}]")).collect::<String>();
+        let mut out = String::from("time_s");
+        for stem in ["target", "pose", "measured", "voltage"] {
+            out.push_str(&six(stem));
+        }
+        out.push_str(",status\n");
+        for PoseSample { time, target, tick } in &self.samples {
+            // Writing to a String cannot fail, here and below.
+            let _ = write!(out, "{time:.6}");
+            for value in [target, &tick.pose, &tick.measured].into_iter().flatten() {
+                let _ = write!(out, ",{value:.4e}");
+            }
+            for value in tick.voltage {
+                let _ = write!(out, ",{value:.4}");
+            }
+            let _ = writeln!(out, ",{}", tick.status);
+        }
+        out
+    }
+}
