@@ -81,6 +81,10 @@ pub fn lower(
         &defaults,
         task_space.as_ref(),
     );
+    let unseen = gauge_converter::unseen(model, task_space.as_ref().map(|task| &task.sensing));
+    if !unseen.is_empty() {
+        return Err(unseen);
+    }
     let gauge_converter = gauge_converter::lower(model, task_space.as_ref().map(|task| &task.sensing), scalar);
     Ok(Ir {
         name: model.name.clone(),

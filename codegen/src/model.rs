@@ -243,6 +243,8 @@ pub struct Sensor {
     pub noise: f64,
     /// Resolution of its converter over the range.
     pub bits: u32,
+    /// With a calibration: voltage at code 0 and at full scale, V; ±10 V without the key.
+    pub input_range: Option<[f64; 2]>,
 }
 
 /// Preisach grid and the records that identify it.

@@ -198,6 +198,10 @@ codes! {
         "Voltages go to rest no faster than amplifier and stack stand.";
     SUPERVISOR_REST = "E0473", "a rest voltage beyond the limits",
         "The legs stand at supervisor.rest_voltage while they are disarmed: it lies within actuator.voltage.";
+    GAUGE_INPUT = "E0474", "a converter that does not see a gauge at rest",
+        "With a calibration a gauge's words are volts, and its converter takes in sensor.input_range, ±10 V without that key. Where the reading zero lies beyond, no reading would ever be believed.";
+    INPUT_WITHOUT_CALIBRATION = "E0475", "an input range in volts for a gauge in metres",
+        "sensor.input_range is the converter's range of a gauge with a calibration. Without one, sensor.range is what code 0 and full scale mean.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",

@@ -48,6 +48,7 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
             range: f.list("sensor.range")?,
             noise: f.number("sensor.noise")?,
             bits: f.whole("sensor.bits")?,
+            input_range: f.list("sensor.input_range"),
         },
         hysteresis: Hysteresis {
             grid: f.whole("hysteresis.grid")?,

@@ -25,10 +25,7 @@ pub(super) fn beyond(model: &Model) -> Option<Diagnostic> {
         codes::SUPERVISOR_REST,
         "rest_voltage",
         format!("the legs would rest at {rest} V, beyond `actuator.voltage`, {low} V to {high} V"),
-        format!(
-            "write rest_voltage = \"{} V\" or a voltage within the limits",
-            Model::nearest_to_zero(low, high)
-        ),
+        format!("write rest_voltage = \"{} V\" or a voltage within the limits", Model::nearest_to_zero(low, high)),
     ))
 }
 

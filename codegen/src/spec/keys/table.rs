@@ -242,6 +242,7 @@ pub const SECTIONS: &[Section] = &[
             row("range", Shape::List(&[READING; 2]), Required, "", "[\"-2 um\", \"48 um\"]", "Smallest and largest displacement that it can report."),
             row("noise", one(Dimension::LENGTH, Range::closed(0.0, 1e-3), "nm"), Default("\"0 nm\""), "", "\"2.2 nm\"", "Noise, rms."),
             row("bits", integer(8, 32), Required, "", "16", "Resolution of its converter over the range."),
+            row("input_range", Shape::List(&[VOLTS; 2]), Rule("[\"-10 V\", \"10 V\"]"), "", "[\"0 V\", \"10 V\"]", "With a calibration: voltage of its converter at code 0 and at full scale."),
             row("calibration", CALIBRATION, Rule("the gauge words are metres"), "", "[\"-2 um\", \"5 um/V\"]", "With [control]: displacement as a polynomial of the gauge's voltage, lowest power first; the gauge words are then volts. For all six gauges; a gauge may have its own."),
         ],
     },
