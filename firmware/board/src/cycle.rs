@@ -36,6 +36,8 @@ pub struct Board<'m, G, A> {
     pending: u32,
     /// The request of the last tick, to see a new one.
     request: Request,
+    /// What the last tick read. Here and not on the stack, which the law needs.
+    input: Option<MachineInput>,
 }
 
 impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
@@ -52,7 +54,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     #[must_use]
     pub const fn new(gauges: G, amplifiers: A, machine: &'m mut Machine, intact: bool) -> Self {
         let () = Self::SAME_CODES;
-        Self { gauges, amplifiers, machine, intact, started: false, pending: 0, request: Request::None }
+        Self { gauges, amplifiers, machine, intact, started: false, pending: 0, request: Request::None, input: None }
     }
 
     /// Brings the converters into their working state, amplifiers disabled. May take a millisecond.
@@ -111,7 +113,8 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
             }
         };
 
-        let output = supervise(config, self.machine, &input(orders, &readings, events));
+        let input = take(&mut self.input, orders, &readings, events);
+        let output = supervise(config, self.machine, input);
 
         // Off before the codes change, on only after they are out.
         if !output.amplifier_on {
@@ -148,10 +151,15 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     }
 }
 
-/// Words of the command, the readings, and no number for what this board does not measure. In a frame of its own: the words
+/// Puts the command, the readings, and no number for what this board does not measure into `slot`. In a frame of its own: words
 /// are done with before the law needs the stack.
 #[inline(never)]
-fn input(orders: &Orders, readings: &[Real; GAUGES], events: u32) -> MachineInput {
+fn take<'a>(
+    slot: &'a mut Option<MachineInput>,
+    orders: &Orders,
+    readings: &[Real; GAUGES],
+    events: u32,
+) -> &'a MachineInput {
     let mut words = [Real::from_f64(f64::NAN).to_word(); MACHINE_INPUT_WORDS];
     for (slot, word) in words.iter_mut().zip(orders.command) {
         *slot = word;
@@ -161,7 +169,7 @@ fn input(orders: &Orders, readings: &[Real; GAUGES], events: u32) -> MachineInpu
     }
     words[INPUT_WORDS] = orders.request.word();
     words[INPUT_WORDS + 1] = u64::from(events);
-    MachineInput::from_words(&words)
+    slot.insert(MachineInput::from_words(&words))
 }
 
 /// Counts a fault of a converter.
