@@ -7,7 +7,6 @@ use host_sim::closed_loop::LEGS;
 use host_sim::controller::{Controller, TickController};
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::Noise;
-use host_sim::scenario::LegScenario;
 use serde_json::json;
 
 use super::check::describe;
@@ -220,7 +219,7 @@ fn of_legs(
     let leg = LegParameters::reference();
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs: [LegParameters; LEGS] = std::array::from_fn(|_| leg.clone());
-    let scenario = LegScenario::new(&legs, &leg.noise, SEED, reproduce::legs::SAMPLES);
+    let scenario = machine::legs(model, &legs, &leg.noise, SEED, reproduce::legs::SAMPLES);
     let sim = format!("specgen sim {name} -o DIR");
     ui.progress("leg tracking, linear relation, error budget, stability region");
     let tracking = legs::section(&scenario, controller, &sim).map_err(environment)?;
