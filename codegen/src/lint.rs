@@ -20,7 +20,7 @@ mod motion;
 pub mod paths;
 mod timing;
 
-pub use budget::least;
+pub use budget::{estimated, least};
 
 use specgen_runtime::Platform;
 

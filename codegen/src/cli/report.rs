@@ -13,7 +13,7 @@ use super::check::describe;
 use super::file::write_file;
 use super::sim::{emitted, environment};
 use super::ui::{Failure, Ui};
-use crate::compile::{self, Compiled};
+use crate::compile::{self, Compiled, Refused};
 use crate::model::TaskSpace;
 use crate::paper::convergence;
 use crate::report::evidence::Bits;
@@ -24,7 +24,7 @@ use crate::report::{evidence, hysteresis, legs, linear, machining, motion, noise
 use crate::spec::SpecSource;
 use crate::target::TargetError;
 use crate::verify::{self, Measurement};
-use crate::{lower, machine, reproduce, target, workspace};
+use crate::{lower, machine, precision, reproduce, target, workspace};
 
 /// Seed of machine, noise and strings.
 const SEED: u64 = 1;
@@ -77,6 +77,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     sections.extend(simulated);
     sections.extend(converged);
     sections.push(evidence::margins(&compiled, &check));
+    let rounding = precision::of(&compiled.model, &compiled.ir)
+        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
+    sections.push(evidence::rounding(&rounding, compiled.ir.scalar, &check));
     sections.push(evidence::budget(&compiled.model.target, measured, &main));
     let bits = Bits { ticks: built.ticks, trace: built.trace, state: built.state, measured };
     sections.push(evidence::digests(&compiled, &bits, &main));

@@ -430,6 +430,10 @@ codes! {
         "Somewhere in the workspace a joint of a leg turns further than leg.joint_angle.";
     CONDITION_POOR = "W0861", "legs that hold the platform badly",
         "Somewhere in the declared workspace the condition number of J may exceed 30: forces and errors along one motion are that many times those along another.";
+    LEGS_CUT_SHORT = "N0862", "a workspace beyond the strokes of the legs",
+        "Without [control] the workspace bounds what is accepted as a set-point. Where no pose reaches a bound, set-points near it are accepted and the legs stop at the ends of their strokes.";
+    GAUGE_SHORT_OF_STROKE = "N0863", "a gauge that ends before its leg does",
+        "A leg may go where its own gauge cannot see it, which is a gauge fault. The gauge of the paper ends at 48 um, its legs at 60 um.";
     BUDGET_IMPOSSIBLE = "E0870", "a budget below what the tables take",
         "The constants alone do not fit: the unit is wrong, or grid and memory are too large.";
     BUDGET_LOOSE = "W0871", "a budget that checks nothing",
