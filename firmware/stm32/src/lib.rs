@@ -8,6 +8,7 @@ pub mod converters;
 pub mod cycles;
 mod delay;
 pub mod serial;
+mod silent;
 pub mod timer;
 
 pub use delay::CycleDelay;
