@@ -8,7 +8,7 @@
 //! snapshot of the machine, so that every block that is left can be replayed by itself.
 //!
 //! A target calls [`Recorder::opens`] before a tick and, if it says so, [`Recorder::open`] with the machine as it is then;
-//! after the tick [`Recorder::push`]. The emitted controller does all three (`recording::supervise`).
+//! after the tick [`Recorder::push`]. The emitted controller does all three (`snapshot::supervise_recorded`).
 
 mod ring;
 
@@ -179,6 +179,17 @@ impl<'m> Recorder<'m> {
         }
     }
 
+    /// The next row is that of `tick`, and a block begins with it; where that is not the tick after the last one, the block
+    /// does not continue what was before. For a recorder that is handed from one place to another, or misses ticks.
+    pub fn begin(&mut self, tick: u64) {
+        if tick != self.tick {
+            self.tick = tick;
+            self.due = Some(Reason::Started);
+        } else if self.due.is_none() {
+            self.due = Some(Reason::Continued);
+        }
+    }
+
     /// What it does.
     #[must_use]
     pub fn activity(&self) -> Activity {
@@ -280,6 +291,18 @@ impl<'m> Recorder<'m> {
             slots.push(digest());
         }
         slots.finish(which);
+    }
+
+    /// Rows in memory, those of the open block included.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.ring.rows()
+    }
+
+    /// Rows that fit whatever changes in them; there is room for more where less changes.
+    #[must_use]
+    pub fn capacity(&self) -> usize {
+        self.ring.capacity()
     }
 
     /// Blocks that can be fetched: closed ones, and the open one where recording has ended.

@@ -4,6 +4,7 @@ use crate::record::{BLOCK_MAGIC, HEADER_WORDS, Layout, NO_TRIGGER};
 
 /// Places in a block's header.
 const WORDS: usize = 1;
+const ROWS: usize = 2;
 const TRIGGER: usize = 7;
 
 #[derive(Debug)]
@@ -45,6 +46,21 @@ impl<'m> Ring<'m> {
 
     pub(super) fn lost(&self) -> u32 {
         self.lost
+    }
+
+    /// Rows of all blocks that are held.
+    pub(super) fn rows(&self) -> u64 {
+        let mut rows: u64 = 0;
+        for k in 0..self.held {
+            rows += self.at(k).and_then(|block| block.get(ROWS)).copied().unwrap_or_default();
+        }
+        rows
+    }
+
+    /// Rows of the longest kind that fit into all blocks.
+    pub(super) fn capacity(&self) -> usize {
+        let room = self.size.saturating_sub(self.layout.preamble());
+        self.blocks * (room / self.layout.longest_row())
     }
 
     /// The open block has room for the longest row.
