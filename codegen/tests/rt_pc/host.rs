@@ -5,8 +5,8 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use host_sim::record::{Piece, Reader, Replay, Row, replay};
 use host_sim::controller::Supervised;
+use host_sim::record::{Piece, Reader, Replay, Row, replay};
 use specgen_link::client::{Client, ClientError, Patience, Port};
 use specgen_link::{Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Status};
 use specgen_runtime::record::checksum;

@@ -1,7 +1,6 @@
 //! What is answered over the link.
 
-use controller::snapshot::MACHINE_STATE_WORDS;
-use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Request as Wanted};
+use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION, Real};
 use specgen_link::{
     Bytes, Counted, Counters, Device, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Status,
@@ -14,7 +13,7 @@ use crate::console::{Console, No};
 
 /// Bytes of a piece of something longer.
 const CHUNK: usize = 960;
-const _: () = assert!(MACHINE_STATE_WORDS > 0 && CHUNK < specgen_link::MESSAGE - 24);
+const _: () = assert!(CHUNK + 24 < specgen_link::MESSAGE);
 
 /// The console as the device of a link.
 pub struct Desk<'a> {
@@ -43,15 +42,16 @@ impl<'a> Desk<'a> {
 
     fn status(&mut self) -> Reply<'static> {
         let events = self.console.take_events();
-        let Some(said) = &self.console.said else { return Reply::Refused(Refusal::State) };
+        // Before the first tick it is as at power-up.
+        let said = self.console.said.as_ref();
         Reply::Status(Status {
-            tick: said.tick + 1,
-            phase: said.phase.word() as u8,
-            cause: said.cause.word() as u8,
-            amplifier_on: said.on,
-            status: said.status,
+            tick: said.map_or(0, |said| said.tick + 1),
+            phase: said.map_or(Phase::Disarmed, |said| said.phase).word() as u8,
+            cause: said.map_or(Cause::None, |said| said.cause).word() as u8,
+            amplifier_on: said.is_some_and(|said| said.on),
+            status: said.map_or(0, |said| said.status),
             events,
-            late: u32::try_from(said.late).unwrap_or(u32::MAX),
+            late: said.map_or(0, |said| u32::try_from(said.late).unwrap_or(u32::MAX)),
             // The endpoint fills it in.
             link: Counters::NONE,
         })
