@@ -283,7 +283,7 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     wide.axes[2].offset = 1.0;
     let request = |words| Request::Wave { action: WaveAction::Start, words: Bytes(words) };
     let words = start(&wide);
-    assert_eq!(host.refused(&request(&words)), Refusal::Word { index: 6 + 7 * 2 + 2 });
+    assert_eq!(host.refused(&request(&words)), Refusal::Word { index: 6 + 7 * 2 + 1 });
     let words = start(&wave);
     host.done(&request(&words));
     assert_eq!(host.refused(&request(&words)), Refusal::State, "one wave at a time");
@@ -321,7 +321,10 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     drop(host);
     wait_for("the loss", || lines.ask("status").contains("phase=Holding cause=LinkLost"));
     assert_eq!(lines.ask("ramp-down"), "ok");
-    wait_for("the way down", || lines.ask("status").contains("phase=Disarmed"));
+    // For a cause it ends faulted, until that is acknowledged.
+    wait_for("the way down", || lines.ask("status").contains("phase=Faulted cause=LinkLost amplifiers=0"));
+    assert_eq!((lines.ask("none").as_str(), lines.ask("acknowledge").as_str()), ("ok", "ok"));
+    wait_for("the acknowledgement", || lines.ask("status").contains("phase=Disarmed"));
     let output = running.end("TERM");
     let (summary, record) = bench.check(&output, "b.rec");
     assert_eq!((&summary["last_phase"], &summary["skipped"]), (&"Disarmed".into(), &0.into()), "{summary}");

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use controller::waves::{self, Wave};
 use controller::{Config, Real};
-use specgen_runtime::wave::{Refused, Settings};
+use specgen_runtime::wave::Settings;
 
 use crate::capture::{CAPACITY, Capture};
 use crate::handover::{Order, Row};
@@ -107,7 +107,7 @@ impl Console {
         let limits = waves::limits(&self.config);
         let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
         let Some(said) = running.filter(|_| self.wave.is_none()) else { return Err(No::State) };
-        Wave::new(limits).set(settings).map_err(no)?;
+        Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(No::State, No::Word))?;
         waves::may_begin(said.status, self.operator.words(), &settings.center, &limits).map_err(|_| No::State)?;
         // What is wanted when it is over goes first.
         self.operator.rest_at(&settings.center);
@@ -162,14 +162,5 @@ impl Console {
     pub fn outgoing(&mut self) -> (&mut VecDeque<Order>, u32) {
         let first = self.number.wrapping_sub(self.orders.len() as u32).wrapping_add(1);
         (&mut self.orders, first)
-    }
-}
-
-/// The words of a wave are its center, then seven for each axis, amplitude third.
-fn no(refused: Refused) -> No {
-    match refused {
-        Refused::Busy => No::State,
-        Refused::Word(word) => No::Word(word),
-        Refused::Range(axis) | Refused::Rate(axis) | Refused::Acceleration(axis) => No::Word(6 + 7 * axis + 2),
     }
 }

@@ -69,8 +69,8 @@ impl<D: Device> Loop<'_, D> {
         scheduling::touch_stack();
         let mut machine = Machine::new();
         let mut setpoints = Setpoints::new(&self.config);
-        let Inner { rows, snapshots, tapes, mut orders } = self.rings;
-        let mut keeper = Keeper::new((rows, snapshots, tapes), self.tape.take(), self.shared, (&machine, &self.config));
+        let Inner { outlets, mut orders } = self.rings;
+        let mut keeper = Keeper::new(outlets, self.tape.take(), self.shared, (&machine, &self.config));
         let mut phase = Phase::Disarmed;
         let mut codes = [0; LEGS];
         let mut enabled = false;

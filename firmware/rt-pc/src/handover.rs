@@ -108,25 +108,31 @@ pub struct Shared {
     pub device_faults: AtomicU64,
 }
 
-/// The loop's ends of the rings.
-pub struct Inner {
+/// The loop's ends of the rings that lead out.
+pub struct Outlets {
     /// What was done.
     pub rows: Producer<Row>,
     /// States for the record of the run; none if there is no such record.
     pub snapshots: Option<Producer<Snapshot>>,
     /// Recorders that have what they were to record, and the orders that had been taken when they were handed over.
     pub tapes: Producer<(Tape, u32)>,
+}
+
+/// The loop's ends of the rings.
+pub struct Inner {
+    /// See there.
+    pub outlets: Outlets,
     /// What is wanted.
     pub orders: Consumer<Order>,
 }
 
 /// The service's ends.
 pub struct Outer {
-    /// See [`Inner`].
+    /// See [`Outlets`].
     pub rows: Consumer<Row>,
-    /// See [`Inner`].
+    /// See [`Outlets`].
     pub snapshots: Consumer<Snapshot>,
-    /// See [`Inner`].
+    /// See [`Outlets`].
     pub tapes: Consumer<(Tape, u32)>,
     /// See [`Inner`].
     pub orders: Producer<Order>,
@@ -140,7 +146,7 @@ pub fn rings(records: bool) -> (Inner, Outer) {
     let (tapes, tapes_out) = RingBuffer::new(2);
     let (orders, orders_in) = RingBuffer::new(ORDERS);
     (
-        Inner { rows, snapshots: records.then_some(snapshots), tapes, orders: orders_in },
+        Inner { outlets: Outlets { rows, snapshots: records.then_some(snapshots), tapes }, orders: orders_in },
         Outer { rows: rows_out, snapshots: snapshots_out, tapes: tapes_out, orders },
     )
 }

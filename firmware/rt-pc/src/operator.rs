@@ -443,4 +443,35 @@ mod tests {
         assert!(operator.obey("set setpoint[0]=5e-6 setpoint[1]=x", 0).is_err());
         assert!(operator.wish().is_none());
     }
+
+    #[test]
+    fn a_host_has_the_orders_while_it_is_heard_and_lines_may_only_slow_the_machine_down() {
+        let mut operator = operator();
+        operator.heard(0);
+        operator.left(None);
+        assert!(operator.obey("arm", 1).is_ok() && operator.link_number() == 0, "one that only looks has no orders");
+        assert!(operator.take_for_link(10));
+        operator.ask_by_link(Request::Run);
+        assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run.word());
+        for line in ["arm", "run", "none", "acknowledge", "set setpoint[0]=0"] {
+            assert!(operator.obey(line, 10 + PATIENCE).unwrap_err().contains("a host over the link has the orders"));
+        }
+        assert!(operator.obey("hold", 20).is_ok() && operator.linked(20));
+        operator.heard(200);
+        // Gone while something moves: it is missed until lines take over.
+        operator.left(Some(&said(Phase::Running, true)));
+        assert!(operator.linked(200 + PATIENCE) && !operator.linked(201 + PATIENCE) && operator.link_number() > 0);
+        assert!(!operator.take_evicted());
+        assert!(operator.obey("ramp-down", 500).is_ok() && operator.take_evicted() && operator.link_number() == 0);
+        // Gone while nothing can move: not missed.
+        assert!(operator.take_for_link(600));
+        operator.left(Some(&said(Phase::Disarmed, false)));
+        assert_eq!(operator.link_number(), 0);
+        operator.go_down(700);
+        assert!(
+            !operator.take_for_link(701)
+                && operator.obey("run", 701).is_err()
+                && operator.obey("ramp-down", 701).is_ok()
+        );
+    }
 }

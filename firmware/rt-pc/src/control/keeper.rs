@@ -9,15 +9,12 @@ use controller::Config;
 use controller::snapshot::MACHINE_STATE_WORDS;
 use controller::snapshot::recorder::{Activity, Settings};
 use controller::supervised::Machine;
-use rtrb::Producer;
 
-use crate::handover::{Row, SNAPSHOT_EVERY, Shared, Snapshot, Tape};
+use crate::handover::{Outlets, Row, SNAPSHOT_EVERY, Shared, Snapshot, Tape};
 
 /// The loop's recorder, and its ends of the rings that lead out.
 pub struct Keeper<'a> {
-    rows: Producer<Row>,
-    snapshots: Option<Producer<Snapshot>>,
-    tapes: Producer<(Tape, u32)>,
+    outlets: Outlets,
     tape: Option<Tape>,
     /// Orders taken so far.
     taken: u32,
@@ -33,20 +30,19 @@ pub struct Keeper<'a> {
 impl<'a> Keeper<'a> {
     /// With the state of a `machine` at power-up as the beginning of the record.
     pub fn new(
-        (rows, snapshots, tapes): (Producer<Row>, Option<Producer<Snapshot>>, Producer<(Tape, u32)>),
+        outlets: Outlets,
         tape: Option<Tape>,
         shared: &'a Shared,
         (machine, config): (&Machine, &Config),
     ) -> Self {
-        let mut keeper =
-            Self { rows, snapshots, tapes, tape, taken: 0, shared, opens: false, lost: false, since: SNAPSHOT_EVERY };
+        let mut keeper = Self { outlets, tape, taken: 0, shared, opens: false, lost: false, since: SNAPSHOT_EVERY };
         keeper.prepare(machine, config, 0, false);
         keeper
     }
 
     /// Whether rows need the digest of the machine.
     pub fn wants_digest(&self) -> bool {
-        self.snapshots.is_some() || self.tape.is_some()
+        self.outlets.snapshots.is_some() || self.tape.is_some()
     }
 
     /// An order was taken.
@@ -58,7 +54,7 @@ impl<'a> Keeper<'a> {
     pub fn take(&mut self, mut tape: Tape, count: u64) {
         tape.begin(count);
         if let Some(other) = self.tape.replace(tape)
-            && let Err(rtrb::PushError::Full(other)) = self.tapes.push((other, self.taken))
+            && let Err(rtrb::PushError::Full(other)) = self.outlets.tapes.push((other, self.taken))
         {
             // Not reached: there is one tape. Released here it would be by the real-time thread.
             core::mem::forget(other);
@@ -96,7 +92,7 @@ impl<'a> Keeper<'a> {
         }
         (row.opens, row.orders) = (self.opens, self.taken);
         self.since += 1;
-        if self.lost || self.rows.push(row).is_err() {
+        if self.lost || self.outlets.rows.push(row).is_err() {
             self.shared.lost_rows.fetch_add(1, Ordering::Relaxed);
             // What follows a gap begins with a state.
             self.since = SNAPSHOT_EVERY;
@@ -115,11 +111,11 @@ impl<'a> Keeper<'a> {
             }
         }
         (self.opens, self.lost) = (false, false);
-        if let Some(snapshots) = &mut self.snapshots
+        if let Some(snapshots) = &mut self.outlets.snapshots
             && (changed || self.since >= SNAPSHOT_EVERY)
         {
             // With room for both the row cannot fail to follow.
-            if self.rows.slots() > 0 && snapshots.slots() > 0 {
+            if self.outlets.rows.slots() > 0 && snapshots.slots() > 0 {
                 let mut snapshot = Snapshot { count, digest: machine.digest(), state: [0; MACHINE_STATE_WORDS] };
                 machine.save(&mut snapshot.state);
                 self.opens = snapshots.push(snapshot).is_ok();
@@ -131,7 +127,7 @@ impl<'a> Keeper<'a> {
 
     fn give_back(&mut self) {
         if let Some(tape) = self.tape.take_if(|tape| matches!(tape.activity(), Activity::Complete | Activity::Stopped))
-            && let Err(rtrb::PushError::Full((tape, _))) = self.tapes.push((tape, self.taken))
+            && let Err(rtrb::PushError::Full((tape, _))) = self.outlets.tapes.push((tape, self.taken))
         {
             // With the next tick.
             self.tape = Some(tape);
@@ -142,5 +138,58 @@ impl<'a> Keeper<'a> {
     pub fn finish(mut self) {
         self.stop();
         self.give_back();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Writer;
+    use controller::snapshot::recorder;
+    use rtrb::RingBuffer;
+
+    fn row(count: u64, digest: u64) -> Row {
+        let output = recorder::Row { codes: [0; 6], status: 0, supervisor: 0 };
+        let input = [count; controller::supervised::MACHINE_INPUT_WORDS];
+        let (opens, waving, triggered) = (false, false, false);
+        Row { tick: count, count, input, output, digest, late: 0, orders: 0, opens, waving, recorded: None, triggered }
+    }
+
+    #[test]
+    fn rows_that_find_no_room_are_counted_and_the_record_goes_on_behind_them_with_a_state() {
+        let (machine, config, shared) = (Machine::new(), Config::new(), Shared::default());
+        let (rows, mut taken) = RingBuffer::new(4);
+        let (snapshots, mut states) = RingBuffer::new(2);
+        let (tapes, _tapes) = RingBuffer::new(1);
+        let outlets = Outlets { rows, snapshots: Some(snapshots), tapes };
+        let mut keeper = Keeper::new(outlets, None, &shared, (&machine, &config));
+        let path = std::env::temp_dir().join(format!("rt-pc-gap-{}.rec", std::process::id()));
+        let mut writer = Writer::create(&path, &config).unwrap();
+        for count in 0..14 {
+            if count == 10 {
+                while let Ok(row) = taken.pop() {
+                    writer.add(&row, &mut states).unwrap();
+                }
+            }
+            keeper.keep(row(count, machine.digest()));
+            keeper.prepare(&machine, &config, count + 1, false);
+        }
+        // Of number 10 it was known before it that there was no room.
+        assert_eq!(shared.lost_rows.load(Ordering::Relaxed), 7);
+        while let Ok(row) = taken.pop() {
+            writer.add(&row, &mut states).unwrap();
+        }
+        assert_eq!(writer.finish().unwrap(), 7);
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        let word = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap());
+        let mut at = 16 + word(8).checked_shr(32).unwrap() as usize + 8;
+        let mut blocks = Vec::new();
+        while at < bytes.len() {
+            // Rows, first tick, why it begins.
+            blocks.push([word(at + 16), word(at + 24), word(at + 32) & 0xffff_ffff]);
+            at += (word(at + 8) as usize + 1) * 8;
+        }
+        assert_eq!(blocks, [[4, 0, 0], [3, 11, 0]]);
     }
 }

@@ -102,10 +102,8 @@ impl<'a> Desk<'a> {
         if !words.read_words(&mut settings) {
             return Err(Refusal::Length { expected: wave::WORDS as u16 });
         }
-        let settings = Settings::<Real>::from_words(&settings).map_err(|refused| match refused {
-            wave::Refused::Word(index) => Refusal::Word { index: index as u16 },
-            _ => Refusal::State,
-        })?;
+        let settings = Settings::<Real>::from_words(&settings)
+            .map_err(|refused| refused.word().map_or(Refusal::State, |index| Refusal::Word { index: index as u16 }))?;
         self.console.start_wave(&settings).map_err(refusal)
     }
 

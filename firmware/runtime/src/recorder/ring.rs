@@ -60,13 +60,19 @@ impl<'m> Ring<'m> {
     /// Rows of the longest kind that fit into all blocks.
     pub(super) fn capacity(&self) -> usize {
         let room = self.size.saturating_sub(self.layout.preamble());
-        self.blocks * (room / self.layout.longest_row())
+        self.blocks * room.checked_div(self.layout.longest_row()).unwrap_or_default()
     }
 
     /// The open block has room for the longest row.
     #[inline]
     pub(super) fn has_room(&self) -> bool {
-        self.used > 0 && self.used + self.layout.longest_row() <= self.size
+        self.has_room_for(1)
+    }
+
+    /// The open block has room for so many of the longest rows.
+    #[inline]
+    pub(super) fn has_room_for(&self, rows: usize) -> bool {
+        self.used > 0 && self.used + rows * self.layout.longest_row() <= self.size
     }
 
     /// Index of the `k`-th held block.
