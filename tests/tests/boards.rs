@@ -94,9 +94,9 @@ fn check(board: &Board) {
     let footprint = image::footprint(&elf).unwrap();
     let ram = footprint.ram + STACK;
     println!(
-        "{}: flash {} B, RAM {ram} B with {STACK} B of stack; tick: {} functions, {} B of code, \
+        "{}: flash {} B, RAM {ram} B with {STACK} B of stack, {} B of recorder; tick: {} functions, {} B of code, \
          {tick} B of stack; stack at startup {} B, running {running} B",
-        board.name, footprint.flash, checked.functions, checked.code, startup.bytes
+        board.name, footprint.flash, footprint.recorder, checked.functions, checked.code, startup.bytes
     );
     assert!(footprint.flash <= board.flash, "{}: {} B of flash", board.name, footprint.flash);
     assert!(ram <= RAM, "{}: {ram} B of RAM", board.name);

@@ -10,6 +10,7 @@ use host_sim::controller::{MachineWord, Supervised};
 use host_sim::description::Description;
 use host_sim::record::{self, Block, Header, Piece, Reader, Replay, ReplayError};
 use serde_json::{Value, json};
+use specgen_runtime::supervisor::{Cause, Phase};
 
 use super::file::PendingFile;
 use super::sim;
@@ -18,24 +19,6 @@ use crate::compile::{self, Compiled};
 
 /// Changes of the phase that are shown.
 const SHOWN: usize = 20;
-/// Phases and causes by their words.
-const PHASES: [&str; 6] = ["disarmed", "arming", "running", "holding", "ramping down", "faulted"];
-const CAUSES: [&str; 13] = [
-    "",
-    "gauge not finite",
-    "gauge out of range",
-    "gauge stuck",
-    "gauges disagree",
-    "tracking error",
-    "voltage saturation",
-    "slew saturation",
-    "missed tick",
-    "link lost",
-    "integrity",
-    "converter",
-    "emergency stop",
-];
-
 /// Arguments of `replay`.
 #[derive(Args, Debug)]
 pub struct Arguments {
@@ -185,11 +168,15 @@ fn text(found: &Replay, period: f64) -> String {
 /// Phase and cause in words.
 fn name(supervisor: u32) -> String {
     let MachineWord { phase, cause, amplifier_on } = MachineWord::of(u64::from(supervisor));
-    let of = |names: &[&str], word: u8| {
-        names.get(usize::from(word)).map_or_else(|| format!("{word}"), |name| (*name).to_owned())
-    };
-    let cause = if cause == 0 { String::new() } else { format!(": {}", of(&CAUSES, cause)) };
-    format!("{}{cause}, amplifiers {}", of(&PHASES, phase), if amplifier_on { "on" } else { "off" })
+    format!("{}, amplifiers {}", says(phase, cause), if amplifier_on { "on" } else { "off" })
+}
+
+/// Phase and cause in words, by their numbers.
+pub(super) fn says(phase: u8, cause: u8) -> String {
+    let named = |name: Option<&str>, word: u8| name.map_or_else(|| word.to_string(), str::to_owned);
+    let of_phase = named(Phase::from_word(u64::from(phase)).map(Phase::name), phase);
+    let of_cause = named(Cause::from_word(u64::from(cause)).map(Cause::name), cause);
+    if of_cause.is_empty() { of_phase } else { format!("{of_phase}: {of_cause}") }
 }
 
 fn document(found: &Replay, period: f64) -> Value {
