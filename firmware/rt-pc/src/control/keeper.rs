@@ -6,7 +6,7 @@
 use core::sync::atomic::Ordering;
 
 use controller::Config;
-use controller::snapshot::MACHINE_STATE_WORDS;
+use controller::snapshot::{MACHINE_STATE_WORDS, record_before};
 use controller::snapshot::recorder::{Activity, Settings};
 use controller::supervised::Machine;
 
@@ -106,9 +106,7 @@ impl<'a> Keeper<'a> {
             if changed {
                 tape.settings_changed();
             }
-            if tape.opens() {
-                tape.open(&config.to_words(), machine.digest(), |words| machine.save_into(words));
-            }
+            record_before(config, machine, tape);
         }
         (self.opens, self.lost) = (false, false);
         if let Some(snapshots) = &mut self.outlets.snapshots
