@@ -40,6 +40,7 @@ const CAUSES: [&str; 13] = [
 
 /// Arguments of `replay`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::REPLAY)]
 pub struct Arguments {
     /// The record: from a target, from `specgen sim --record` or from `rt-pc --record`.
     record: PathBuf,
