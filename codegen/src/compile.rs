@@ -96,10 +96,9 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
     findings.extend(setpoints.warnings.iter().cloned());
     identified.texts.extend(setpoints.texts.iter().cloned());
     let (reach, demands) = match check_reach(&model, &setpoints, &identified.tables) {
-        Ok(None) => (None, Vec::new()),
-        Ok(Some((reach, demands, found))) => {
+        Ok((reach, demands, found)) => {
             findings.extend(found);
-            (Some(reach), demands)
+            (reach, demands)
         }
         Err(found) => {
             findings.extend(found);
@@ -144,20 +143,19 @@ pub(crate) fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<
 }
 
 /// Reach, what each trajectory asks of the legs, and warnings.
-type Reached = (Reach, Vec<PathDemand>, Vec<Diagnostic>);
+type Reached = (Option<Reach>, Vec<PathDemand>, Vec<Diagnostic>);
 
 /// Where the legs reach, and that trajectories stay there: as far as both the data sheet's stroke and every leg's table
 /// allow. And that stacks and amplifiers make them.
-fn check_reach(
-    model: &Model,
-    lowered: &LoweredSetpoints,
-    tables: &[EverettTable],
-) -> Result<Option<Reached>, Vec<Diagnostic>> {
-    let (Some(task), Some(setpoints)) = (&model.task_space, &lowered.setpoints) else {
-        return Ok(None);
-    };
+fn check_reach(model: &Model, lowered: &LoweredSetpoints, tables: &[EverettTable]) -> Result<Reached, Vec<Diagnostic>> {
     let largest = tables.iter().map(|table| table.node(table.grid, 0));
     let stroke = largest.fold(model.actuator.stroke, |a, b| if b < a { b } else { a });
+    let (Some(task), Some(setpoints)) = (&model.task_space, &lowered.setpoints) else {
+        // Legs may be driven one by one where they do not hold a platform: then there is no pose to look at.
+        let legs = platform(model).ok().map(|platform| reach::check_legs(model, &platform, stroke));
+        let (reach, found) = legs.map_or_else(|| (None, Vec::new()), |(reach, found)| (Some(reach), found));
+        return Ok((reach, Vec::new(), found));
+    };
     let platform = platform(model)?;
     let mut errors = Vec::new();
     let reach = reach::check(model, task, &platform, stroke).map_err(|found| errors.extend(found));
@@ -175,7 +173,7 @@ fn check_reach(
     match reach {
         Ok((reach, mut found)) if !refused => {
             found.extend(asked);
-            Ok(Some((reach, demands, found)))
+            Ok((Some(reach), demands, found))
         }
         _ => Err(errors.into_iter().chain(asked).collect()),
     }

@@ -20,6 +20,7 @@ mod literal;
 mod machine_words;
 mod manifest;
 mod platform;
+mod rest;
 mod sensing;
 mod setpoint;
 mod snapshot;
@@ -82,7 +83,7 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
         ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
         ("src/snapshot.rs", platform::snapshot::emit()),
         ("src/stages.rs", platform::stages::emit()),
-        ("src/state.rs", platform::state::emit()),
+        ("src/state.rs", platform::state::emit(ir)),
         ("src/step.rs", platform::step::emit(ir)),
         ("src/supervised.rs", platform::supervised::emit()),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),

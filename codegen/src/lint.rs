@@ -20,7 +20,7 @@ mod motion;
 pub mod paths;
 mod timing;
 
-pub use budget::least;
+pub use budget::{estimated, least};
 
 use specgen_runtime::Platform;
 
@@ -48,6 +48,7 @@ const RULES: &[Rule] = &[
     electronics::current_fits_slew,
     electronics::amplifier_noise,
     electronics::converter_step,
+    electronics::rest_without_power,
     gauges::noise_of_a_step,
     gauges::range_centred,
     gauges::step_against_stroke,

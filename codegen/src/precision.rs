@@ -1,18 +1,18 @@
 //! What the scalar of the controller costs: rounding errors of leg displacements and of the measured pose, in nanometres per
 //! axis, by analysis and by trial.
 //!
-//! The analysis runs the controller's own kernels on [`Enclosed`] numbers over the whole workspace at once. The trial runs them
-//! in the controller's scalar at corners and random poses of the workspace, against the same kernels on 106 bits
+//! The analysis runs the controller's own kernels on numbers that remember what was rounded where (`traced`), over the whole
+//! workspace in 64 parts. The trial runs them in the controller's scalar at corners and random poses of the workspace, against the same kernels on 106 bits
 //! ([`Double`]) with constants, series and passes that are exact there. Both count the rounding of constants and the terms and
 //! steps that are left out. Not counted: the set-point generator, calibration of gauges, and the inverse of the
 //! hysteresis, whose voltage leaves the controller in steps of the converter.
 
 mod double;
-mod enclosed;
+mod form;
 mod kinematics;
 mod sensing;
-
-use std::fmt::Write as _;
+mod table;
+mod traced;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
@@ -24,7 +24,7 @@ use crate::lower::PoseNoise;
 use crate::model::Model;
 
 pub use double::Double;
-pub use enclosed::Enclosed;
+pub use table::{Row, describe, rows};
 
 /// Random poses beside the corners of the workspace.
 const SAMPLES: usize = 3000;
@@ -51,6 +51,19 @@ pub struct Figures {
     pub against_f64: Option<[f64; 6]>,
 }
 
+impl Figures {
+    /// Before any sample. `single`: doubles are another measure.
+    fn none(bound: [f64; 6], single: bool) -> Self {
+        Self { bound, sampled: [0.0; 6], against_f64: single.then_some([0.0; 6]) }
+    }
+
+    /// Bound over largest found of each number; none where nothing was found.
+    #[must_use]
+    pub fn ratio(&self) -> [Option<f64>; 6] {
+        core::array::from_fn(|k| (self.sampled[k] > 0.0).then(|| self.bound[k] / self.sampled[k]))
+    }
+}
+
 /// Largest magnitudes so far.
 fn keep(largest: &mut [f64; 6], errors: [f64; 6]) {
     for (largest, error) in largest.iter_mut().zip(errors) {
@@ -65,7 +78,15 @@ fn keep(largest: &mut [f64; 6], errors: [f64; 6]) {
 /// # Errors
 /// As lowering: none for a model that was lowered.
 pub fn of(model: &Model, ir: &Ir) -> Result<Precision, Vec<Diagnostic>> {
-    let poses = poses(model, ir.scalar);
+    tried(model, ir, 0, SAMPLES)
+}
+
+/// The same with `samples` random poses from `seed` beside the corners.
+///
+/// # Errors
+/// As [`of`].
+pub fn tried(model: &Model, ir: &Ir, seed: u64, samples: usize) -> Result<Precision, Vec<Diagnostic>> {
+    let poses = poses(model, ir.scalar, seed, samples);
     let (legs, commanded) = kinematics::figures(model, &ir.kinematics, ir.scalar, &poses);
     let measured = match (&model.task_space, &ir.task_space) {
         (Some(task), Some(lowered)) => {
@@ -77,15 +98,22 @@ pub fn of(model: &Model, ir: &Ir) -> Result<Precision, Vec<Diagnostic>> {
 }
 
 /// Corners of the workspace and seeded random poses in it, as numbers of the scalar.
-fn poses(model: &Model, scalar: Scalar) -> Vec<[f64; 6]> {
+fn poses(model: &Model, scalar: Scalar, seed: u64, samples: usize) -> Vec<[f64; 6]> {
     let bounds = bounds(model);
     let corners = (0..64_u32)
         .map(|corner| core::array::from_fn(|axis| if corner >> axis & 1 == 0 { -bounds[axis] } else { bounds[axis] }));
-    let mut random = ChaCha8Rng::seed_from_u64(0);
-    let inside = (0..SAMPLES)
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let inside = (0..samples)
         .map(|_| bounds.map(|bound| bound * (2.0 * f64::from(random.next_u32()) / f64::from(u32::MAX) - 1.0)))
         .collect::<Vec<[f64; 6]>>();
     corners.chain(inside).map(|pose: [f64; 6]| pose.map(|value| scalar.round(value))).collect()
+}
+
+/// The 64 parts of the workspace in which no coordinate changes its sign.
+fn boxes(bounds: &[f64; 6]) -> impl Iterator<Item = [[f64; 2]; 6]> {
+    (0..64_u32).map(|part| {
+        core::array::from_fn(|axis| if part >> axis & 1 == 0 { [-bounds[axis], 0.0] } else { [0.0, bounds[axis]] })
+    })
 }
 
 fn bounds(model: &Model) -> [f64; 6] {
@@ -121,34 +149,4 @@ pub fn findings(model: &Model, precision: &Precision, noise: Option<&PoseNoise>)
         ),
         "write scalar = \"f64\", or reduce [workspace]".to_owned(),
     )]
-}
-
-/// The precision as text for `specgen check`.
-#[must_use]
-pub fn describe(precision: &Precision, scalar: Scalar) -> String {
-    let mut text = String::new();
-    let list = |values: &[f64]| values.iter().map(|value| format!("{:.1e}", value * 1e9)).collect::<Vec<_>>().join(" ");
-    // Writing to a String cannot fail.
-    let _ = writeln!(
-        text,
-        "  rounding of f{} over the workspace, bound | largest of {} poses (x y z nm, θx θy θz nrad)",
-        scalar.bits(),
-        SAMPLES + 64
-    );
-    let mut line = |what: &str, figures: &Figures| {
-        let (bound, sampled) = (figures.bound, figures.sampled);
-        let _ = writeln!(
-            text,
-            "    {what:<16} {}; {} | {}; {}",
-            list(&bound[..3]),
-            list(&bound[3..]),
-            list(&sampled[..3]),
-            list(&sampled[3..])
-        );
-    };
-    line("pose asked for", &precision.commanded);
-    if let Some(measured) = &precision.measured {
-        line("pose measured", measured);
-    }
-    text
 }

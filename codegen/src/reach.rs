@@ -60,7 +60,7 @@ pub struct AxisReach {
     pub declared: f64,
     /// Lowest and highest value from the middle of all strokes, m or rad from rest.
     pub from_middle: [f64; 2],
-    /// The same from the bias.
+    /// The same from the bias; from rest where there is none.
     pub from_bias: [f64; 2],
 }
 
@@ -86,22 +86,43 @@ pub fn check(
     platform: &Platform<f64>,
     stroke: f64,
 ) -> Result<(Reach, Vec<Diagnostic>), Vec<Diagnostic>> {
-    let bounds = bounds(model);
     let bias = task.setpoint.bias;
+    let reach = measure(model, platform, stroke, &bias);
+    let legs = travel::Legs { platform, stroke };
+    let found = findings::of(model, &reach, &legs.shift(core::iter::once(bias)));
+    if found.iter().any(|one| one.severity == crate::diagnostic::Severity::Error) {
+        return Err(found);
+    }
+    Ok((reach, found))
+}
+
+/// Looks at the workspace of `model`, whose legs have gauges of their own and no bias: set-points count from rest, where the
+/// legs stand at the lower end of their strokes. `stroke`: what every leg can do, m.
+///
+/// Nothing is refused here: legs are limited one by one, so a pose beyond reach is approached, not refused.
+#[must_use]
+pub fn check_legs(model: &Model, platform: &Platform<f64>, stroke: f64) -> (Reach, Vec<Diagnostic>) {
+    let reach = measure(model, platform, stroke, &[0.0; 6]);
+    let found = findings::of_legs(model, &reach);
+    (reach, found)
+}
+
+/// What is reached, with set-points about `bias`.
+fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose) -> Reach {
+    let bounds = bounds(model);
     let legs = travel::Legs { platform, stroke };
     let lengths = rest_lengths(model);
     let middle = legs.middle();
     let from = |pose: &Pose, axis: usize| [legs.travel(pose, axis, -1.0), legs.travel(pose, axis, 1.0)];
-    let axes: [AxisReach; 6] = core::array::from_fn(|axis| AxisReach {
-        declared: bounds[axis],
-        from_middle: from(&middle, axis),
-        from_bias: from(&bias, axis),
-    });
-    let reach = Reach {
+    Reach {
         stroke,
-        axes,
-        at_bias: legs.span(&bias),
-        share: legs.share(&bias, &bounds),
+        axes: core::array::from_fn(|axis| AxisReach {
+            declared: bounds[axis],
+            from_middle: from(&middle, axis),
+            from_bias: from(bias, axis),
+        }),
+        at_bias: legs.span(bias),
+        share: legs.share(bias, &bounds),
         demanded: travel::samples(&bounds).map(|pose| legs.span(&pose)).fold([0.0, 0.0], wider),
         demanded_bound: legs.bound(&bounds, &lengths, model.geometry.joint_radius()),
         conditioning: Conditioning::over(
@@ -113,12 +134,7 @@ pub fn check(
         .bounded(&bounds, shortest(&lengths), model.geometry.joint_radius()),
         joint_angles: joints::angles(&model.geometry, &bounds),
         boxes: Boxes::of(&legs, middle, &bounds),
-    };
-    let found = findings::of(model, &reach, &legs.shift(core::iter::once(bias)));
-    if found.iter().any(|one| one.severity == crate::diagnostic::Severity::Error) {
-        return Err(found);
     }
-    Ok((reach, found))
 }
 
 /// Checks the poses of a declared path, bias included. `key`: where the path stands in the spec; `name`: what users call it.

@@ -3,15 +3,13 @@
 //! Not a plausible machine: smooth motion, white steps, demands beyond both limits, reversals on grid thresholds,
 //! and numbers that no sensor gives (±0, subnormals, NaN with several payloads, ±∞, the largest finite ones).
 
+mod draw;
 pub mod platform;
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
+use draw::Draw;
 
 use crate::closed_loop::LEGS;
 use crate::description::{Description, DescriptionError};
-use crate::noise::unit;
-use crate::word::Scalar;
 
 /// What the six set-point words are.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,9 +72,6 @@ const CYCLE: [Kind; 7] =
 /// Shortest and longest stretch, rows.
 const STRETCH: (u64, u64) = (20, 200);
 
-/// In a stretch of special numbers, one word in this many is special.
-const SPECIAL_SHARE: u64 = 16;
-
 /// Makes `rows` rows for a controller from `seed`.
 ///
 /// # Errors
@@ -102,14 +97,14 @@ pub fn record(
     for row in words.chunks_exact_mut(width.max(1)) {
         if left == 0 {
             kind = stretches.next().copied().unwrap_or(kind);
-            left = STRETCH.0 + generator.below(STRETCH.1 - STRETCH.0);
+            left = STRETCH.0 + generator.draw.below(STRETCH.1 - STRETCH.0);
             generator.begin(kind);
         }
         left -= 1;
         let (setpoint, displacement) = generator.row(kind);
         for leg in 0..LEGS {
-            row[places[0][leg]] = generator.word(description.scalar, kind, setpoint[leg]);
-            row[places[1][leg]] = generator.word(description.scalar, kind, displacement[leg]);
+            row[places[0][leg]] = generator.draw.word(description.scalar, kind == Kind::Special, setpoint[leg]);
+            row[places[1][leg]] = generator.draw.word(description.scalar, kind == Kind::Special, displacement[leg]);
         }
     }
     Ok(InputRecording { width, words })
@@ -117,7 +112,7 @@ pub fn record(
 
 /// State of the generator within and between stretches.
 struct Generator<'a> {
-    rng: ChaCha8Rng,
+    draw: Draw,
     setpoints: &'a Setpoints,
     /// Centre and half-width of each set-point word.
     center: [f64; LEGS],
@@ -139,7 +134,7 @@ impl<'a> Generator<'a> {
             Setpoints::Pose { bounds, stroke } => ([0.0; LEGS], *bounds, 0.5 * stroke),
         };
         Self {
-            rng: ChaCha8Rng::seed_from_u64(seed),
+            draw: Draw::new(seed),
             setpoints,
             center,
             half,
@@ -151,20 +146,11 @@ impl<'a> Generator<'a> {
         }
     }
 
-    fn below(&mut self, bound: u64) -> u64 {
-        self.rng.next_u64() % bound
-    }
-
-    /// Uniform in [−1, 1).
-    fn symmetric(&mut self) -> f64 {
-        2.0 * unit(&mut self.rng) - 1.0
-    }
-
     fn begin(&mut self, kind: Kind) {
         if kind == Kind::Smooth {
             for leg in 0..LEGS {
                 // 10 to 1000 rows per period.
-                self.speed[leg] = core::f64::consts::TAU / libm::exp(2.3 + 4.6 * unit(&mut self.rng));
+                self.speed[leg] = core::f64::consts::TAU / libm::exp(2.3 + 4.6 * self.draw.unit());
             }
         }
         if kind == Kind::Thresholds {
@@ -180,8 +166,8 @@ impl<'a> Generator<'a> {
                     self.phase[leg] += self.speed[leg];
                     self.center[leg] + 0.9 * self.half[leg] * libm::sin(self.phase[leg])
                 }
-                Kind::White | Kind::Special => self.center[leg] + self.half[leg] * self.symmetric(),
-                Kind::Saturating => self.center[leg] + 4.0 * self.half[leg] * self.symmetric(),
+                Kind::White | Kind::Special => self.center[leg] + self.half[leg] * self.draw.symmetric(),
+                Kind::Saturating => self.center[leg] + 4.0 * self.half[leg] * self.draw.symmetric(),
                 Kind::Thresholds => self.threshold(leg),
                 Kind::Hold => self.last[leg],
             };
@@ -189,8 +175,8 @@ impl<'a> Generator<'a> {
         // A reading near what was asked for one row ago, as a leg gives, so that the adaptation stays small.
         let reading = match self.setpoints {
             Setpoints::Leg { .. } if kind == Kind::Thresholds => before,
-            Setpoints::Leg { .. } => before.map(|q| q + 0.01 * self.half_stroke * self.symmetric()),
-            Setpoints::Pose { .. } => std::array::from_fn(|_| self.half_stroke * (1.0 + 0.9 * self.symmetric())),
+            Setpoints::Leg { .. } => before.map(|q| q + 0.01 * self.half_stroke * self.draw.symmetric()),
+            Setpoints::Pose { .. } => std::array::from_fn(|_| self.half_stroke * (1.0 + 0.9 * self.draw.symmetric())),
         };
         (self.last, reading)
     }
@@ -204,23 +190,13 @@ impl<'a> Generator<'a> {
         };
         if grid == 0 {
             // A pose meets no threshold exactly: its bounds and its centre stand in.
-            return self.center[leg] + self.half[leg] * (self.below(3) as f64 - 1.0);
+            return self.center[leg] + self.half[leg] * (self.draw.below(3) as f64 - 1.0);
         }
-        let pick = self.below(grid as u64) as usize;
+        let pick = self.draw.below(grid as u64) as usize;
         match self.setpoints {
             Setpoints::Leg { everett, .. } => self.walks[leg].reverse(pick, everett),
             Setpoints::Pose { .. } => 0.0,
         }
-    }
-
-    /// Word of `value`, or now and then of a special number.
-    fn word(&mut self, scalar: Scalar, kind: Kind, value: f64) -> u64 {
-        if kind == Kind::Special && self.below(SPECIAL_SHARE) == 0 {
-            let specials = specials(scalar);
-            let pick = self.below(specials.len() as u64) as usize;
-            return specials[pick];
-        }
-        scalar.encode(value)
     }
 }
 
@@ -260,46 +236,14 @@ impl Walk {
     }
 }
 
-/// Bit patterns that no sensor gives.
-fn specials(scalar: Scalar) -> [u64; 20] {
-    // Fraction bits and exponent of all ones, shifted into place.
-    let (fraction, sign) = match scalar {
-        Scalar::F32 => (23, 1_u64 << 31),
-        Scalar::F64 => (52, 1_u64 << 63),
-    };
-    let infinity = (sign >> fraction).wrapping_sub(1) << fraction;
-    let quiet = 1_u64 << (fraction - 1);
-    let one_fraction = (1_u64 << fraction) - 1;
-    [
-        0,                              // +0
-        sign,                           // −0
-        1,                              // smallest subnormal
-        sign | 1,                       // its negative
-        one_fraction,                   // largest subnormal
-        sign | one_fraction,            // its negative
-        quiet,                          // a subnormal in between
-        1 << fraction,                  // smallest normal
-        sign | 1 << fraction,           // its negative
-        infinity,                       // +∞
-        sign | infinity,                // −∞
-        infinity - 1,                   // largest finite
-        sign | (infinity - 1),          // its negative
-        infinity - (1 << fraction),     // 2^1023, or 2^127
-        infinity | quiet,               // default NaN of ARM
-        sign | infinity | quiet,        // default NaN of x86
-        infinity | quiet | 0x2a,        // quiet with a payload
-        infinity | 1,                   // signalling
-        sign | infinity | (quiet - 1),  // signalling, all payload bits
-        sign | infinity | one_fraction, // all ones
-    ]
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeSet;
 
+    use super::draw::specials;
     use super::*;
     use crate::description::tests::six_legs;
+    use crate::word::Scalar;
 
     /// N = 32; E depends on d = i − j alone: d (32 + d)/2048 of 60 µm.
     fn everett() -> Vec<Vec<f64>> {

@@ -8,7 +8,6 @@ use serde_json::json;
 
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled, Refused};
-use crate::diagnostic::{Diagnostic, Severity, codes};
 use crate::{lint, precision, reach, stability};
 
 /// Arguments of `check`.
@@ -25,7 +24,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
     let mut findings = compiled.findings.clone();
     findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
-    findings.extend(estimated(&compiled));
+    findings.extend(lint::estimated(&compiled.model));
     ui.findings(Some(&compiled.source), &findings);
     let text = format!(
         "{} is good\n{}{}",
@@ -33,26 +32,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         describe(&compiled),
         precision::describe(&precision, compiled.ir.scalar)
     );
-    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "reach": compiled.reach, "pose_noise": compiled.pose_noise, "records": compiled.records, "trajectories": compiled.demands, "precision": precision }));
+    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "reach": compiled.reach, "pose_noise": compiled.pose_noise, "records": compiled.records, "trajectories": compiled.demands, "precision": precision, "precision_ratio": {
+        "legs": precision.legs.ratio(),
+        "commanded": precision.commanded.ratio(),
+        "measured": precision.measured.map(|figures| figures.ratio()),
+    } }));
     Ok(())
-}
-
-/// Says what of a declared budget only a build can tell.
-fn estimated(compiled: &Compiled) -> Option<Diagnostic> {
-    let target = &compiled.model.target;
-    if [target.flash, target.ram, target.stack, target.instructions] == [None; 4] {
-        return None;
-    }
-    let [tables, memory] = lint::least(&compiled.model);
-    Some(Diagnostic::at(
-        &compiled.model.spans,
-        &["target.budget"],
-        (Severity::Note, codes::ESTIMATED),
-        format!(
-            "tables take {tables} B of flash, reversal memories {memory} B of RAM; the rest of the budget is not checked here"
-        ),
-        "`specgen SPEC -o DIR` builds the controller and measures flash, RAM, stack and instructions".to_owned(),
-    ))
 }
 
 /// What identification and the stability check found, a line each.
@@ -77,7 +62,7 @@ pub fn describe(compiled: &Compiled) -> String {
         text.push_str(&stability::platform::describe(design));
     }
     if let Some(reach) = &compiled.reach {
-        text.push_str(&reach::describe(reach));
+        text.push_str(&reach::describe(reach, compiled.design.is_some()));
     }
     for demand in &compiled.demands {
         let current = demand.current.map_or_else(String::new, |amperes| format!(", {:.3} A", amperes));

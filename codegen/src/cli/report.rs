@@ -7,14 +7,14 @@ use host_sim::closed_loop::LEGS;
 use host_sim::controller::{Controller, TickController};
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::Noise;
-use host_sim::scenario::{LegScenario, MODES, select};
+use host_sim::scenario::{MODES, select};
 use serde_json::json;
 
 use super::check::describe;
 use super::file::write_file;
 use super::sim::{emitted, environment};
 use super::ui::{Failure, Ui};
-use crate::compile::{self, Compiled};
+use crate::compile::{self, Compiled, Refused};
 use crate::model::TaskSpace;
 use crate::paper::convergence;
 use crate::report::evidence::Bits;
@@ -26,7 +26,7 @@ use crate::report::{evidence, hysteresis, legs, linear, machining, motion, noise
 use crate::spec::SpecSource;
 use crate::target::TargetError;
 use crate::verify::{self, Measurement};
-use crate::{lower, machine, reproduce, target, workspace};
+use crate::{lower, machine, precision, reproduce, target, workspace};
 
 /// Seed of machine, noise and strings.
 const SEED: u64 = 1;
@@ -80,6 +80,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     sections.extend(simulated);
     sections.extend(converged);
     sections.push(evidence::margins(&compiled, &check));
+    let rounding = precision::of(&compiled.model, &compiled.ir)
+        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
+    sections.push(evidence::rounding(&rounding, compiled.ir.scalar, &check));
     sections.push(evidence::budget(&compiled.model.target, measured, &main));
     let bits = Bits { ticks: built.ticks, trace: built.trace, state: built.state, measured };
     sections.push(evidence::digests(&compiled, &bits, &main));
@@ -220,7 +223,7 @@ fn of_legs(
     let leg = LegParameters::reference();
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs: [LegParameters; LEGS] = std::array::from_fn(|_| leg.clone());
-    let scenario = LegScenario::new(&legs, &leg.noise, SEED, reproduce::legs::SAMPLES);
+    let scenario = machine::legs(model, &legs, &leg.noise, SEED, reproduce::legs::SAMPLES);
     let sim = format!("specgen sim {name} -o DIR");
     ui.progress("leg tracking, linear relation, error budget, stability region");
     let adaptation = &model.adaptation;

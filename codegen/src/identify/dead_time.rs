@@ -4,7 +4,7 @@
 //! record holds branches of different rates; on a record of one rate, creep and hysteresis would be mistaken for it,
 //! and the estimate is refused.
 
-use nalgebra::{Cholesky, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::branches::Branch;
 use super::normal::{Weighting, accumulate};
@@ -43,19 +43,10 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
     };
     let mut normal = accumulate(plane, record, first, branches, Weighting::Even, tried.len(), fill);
     prior::add(plane.grid, &mut normal.gram);
-    let Some(factor) = Cholesky::new(normal.gram) else {
+    let Some(residual) = residuals(normal.gram, &normal.rhs, &normal.energy) else {
         return (0.0, "not identifiable: the record does not determine the table".to_owned());
     };
-    let residual: Vec<f64> = normal
-        .rhs
-        .iter()
-        .zip(&normal.energy)
-        .map(|(rhs, energy)| {
-            let rhs = DVector::from_column_slice(rhs);
-            energy - factor.solve(&rhs).dot(&rhs)
-        })
-        .collect();
-    let best = (0..tried.len()).fold(0, |best, k| if residual[k] < residual[best] { k } else { best });
+    let best = smallest(&residual);
     let gain = 1.0 - (residual[best] / residual[0]).sqrt();
     if best + 1 == tried.len() {
         return (0.0, format!("not credible: the fit still improves at {} s", tried[best]));
@@ -63,10 +54,28 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
     if best == 0 || gain.is_nan() || gain < WORTHWHILE {
         return (0.0, format!("none: the best one lowers the residual by less than {:.0} %", WORTHWHILE * 100.0));
     }
-    // Vertex of the parabola through the best one and its neighbours.
-    let (a, b, c) = (residual[best - 1], residual[best], residual[best + 1]);
-    let tau = tried[best] + 0.5 * step * (a - c) / (a - 2.0 * b + c);
+    let tau = tried[best] + vertex([residual[best - 1], residual[best], residual[best + 1]], step);
     (tau, format!("estimated: lowers the residual of the branches by {:.0} %", gain * 100.0))
+}
+
+/// What the best fit leaves of each target, Σ of squares; `None` if the Gram matrix is not positive definite.
+pub(super) fn residuals(gram: DMatrix<f64>, rhs: &[Vec<f64>], energy: &[f64]) -> Option<Vec<f64>> {
+    let factor = Cholesky::new(gram)?;
+    let left = rhs.iter().zip(energy).map(|(rhs, energy)| {
+        let rhs = DVector::from_column_slice(rhs);
+        energy - factor.solve(&rhs).dot(&rhs)
+    });
+    Some(left.collect())
+}
+
+/// Place of the smallest.
+pub(super) fn smallest(residual: &[f64]) -> usize {
+    (0..residual.len()).fold(0, |best, k| if residual[k] < residual[best] { k } else { best })
+}
+
+/// Vertex of the parabola through three values at a distance of `step`, from the middle one.
+pub(super) fn vertex([a, b, c]: [f64; 3], step: f64) -> f64 {
+    0.5 * step * (a - c) / (a - 2.0 * b + c)
 }
 
 /// 10 % and 90 % quantile of the mean rates of the branches, V/s.

@@ -3,6 +3,8 @@
 //! Each branch has a free offset of its own, which is projected out by centring the branch.
 //! Slow drift and creep between the curves then cannot bend the table.
 
+mod sums;
+
 use nalgebra::DMatrix;
 
 use super::branches::Branch;
@@ -11,7 +13,10 @@ use super::regressor::{Plane, Term};
 use super::staircase::Staircase;
 use crate::everett::EverettTable;
 
-/// Σ over the samples of φφᵀ, φ·y and y², each centred in its branch. φ_c is the displacement of a unit weight in cell c.
+pub(super) use sums::Sums;
+
+/// Σ over the samples of φφᵀ, φ·y and y², each centred in its branch. φ_c is the displacement of a unit weight in cell c;
+/// with a second table, its cells come behind those of the first.
 #[derive(Debug, Clone)]
 pub struct Normal {
     /// Gram matrix over weights, symmetric.
@@ -110,141 +115,7 @@ pub fn accumulate(
             }
         }
     });
-    sums.close_branch();
-    let Sums { mut gram, mut rhs, energy, samples, .. } = sums;
-    mirror(&mut gram);
-    for column in 0..nodes {
-        nodes_to_weights(plane.grid, gram.column_mut(column).as_mut_slice());
-    }
-    gram.transpose_mut();
-    for column in 0..nodes {
-        nodes_to_weights(plane.grid, gram.column_mut(column).as_mut_slice());
-    }
-    for b in &mut rhs {
-        nodes_to_weights(plane.grid, b);
-    }
-    Normal { gram, rhs, energy, samples }
-}
-
-/// Running sums over Everett nodes.
-struct Sums {
-    /// Lower triangle.
-    gram: DMatrix<f64>,
-    rhs: Vec<Vec<f64>>,
-    energy: Vec<f64>,
-    samples: usize,
-    branch: BranchSums,
-}
-
-/// Sums of the branch under way.
-struct BranchSums {
-    samples: usize,
-    weight: f64,
-    row: Vec<f64>,
-    touched: Vec<usize>,
-    /// First value of each target in the branch; targets are taken relative to it, which keeps the sums small.
-    origin: Vec<f64>,
-    target: Vec<f64>,
-}
-
-impl Sums {
-    fn new(nodes: usize, targets: usize) -> Self {
-        let branch = BranchSums {
-            samples: 0,
-            weight: 0.0,
-            row: vec![0.0; nodes],
-            touched: Vec::new(),
-            origin: vec![0.0; targets],
-            target: vec![0.0; targets],
-        };
-        Self {
-            gram: DMatrix::zeros(nodes, nodes),
-            rhs: vec![vec![0.0; nodes]; targets],
-            energy: vec![0.0; targets],
-            samples: 0,
-            branch,
-        }
-    }
-
-    fn add(&mut self, row: &[Term], targets: &[f64], weight: f64) {
-        let branch = &mut self.branch;
-        for (k, &target) in targets.iter().enumerate() {
-            if branch.samples == 0 {
-                branch.origin[k] = target;
-            }
-            let y = target - branch.origin[k];
-            branch.target[k] += weight * y;
-            self.energy[k] += weight * y * y;
-            for &(node, c) in row {
-                self.rhs[k][node] += weight * c * y;
-            }
-        }
-        branch.samples += 1;
-        branch.weight += weight;
-        for &(a, ca) in row {
-            if branch.row[a] == 0.0 {
-                branch.touched.push(a);
-            }
-            branch.row[a] += weight * ca;
-            for &(b, cb) in row {
-                if a >= b {
-                    self.gram[(a, b)] += weight * ca * cb;
-                }
-            }
-        }
-    }
-
-    /// Subtracts the mean of the branch: Σw(x − x̄)(y − ȳ) = Σwxy − ΣwxΣwy/Σw.
-    fn close_branch(&mut self) {
-        let branch = &mut self.branch;
-        if branch.samples == 0 {
-            return;
-        }
-        branch.touched.sort_unstable();
-        branch.touched.dedup();
-        let share = 1.0 / branch.weight;
-        for (k, &sum) in branch.target.iter().enumerate() {
-            self.energy[k] -= sum * sum * share;
-            for &node in &branch.touched {
-                self.rhs[k][node] -= branch.row[node] * sum * share;
-            }
-        }
-        for &a in &branch.touched {
-            for &b in branch.touched.iter().take_while(|b| **b <= a) {
-                self.gram[(a, b)] -= branch.row[a] * branch.row[b] * share;
-            }
-        }
-        for &node in &branch.touched {
-            branch.row[node] = 0.0;
-        }
-        branch.touched.clear();
-        branch.target.fill(0.0);
-        branch.weight = 0.0;
-        self.samples += branch.samples;
-        branch.samples = 0;
-    }
-}
-
-fn mirror(gram: &mut DMatrix<f64>) {
-    for column in 0..gram.ncols() {
-        for row in 0..column {
-            gram[(row, column)] = gram[(column, row)];
-        }
-    }
-}
-
-/// Gradient over nodes to gradient over weights, in place: the weight of cell (a, b) adds to every node with up ≥ a, down ≤ b.
-fn nodes_to_weights(grid: usize, values: &mut [f64]) {
-    for up in 1..=grid {
-        for down in 1..up {
-            values[EverettTable::index(up, down)] += values[EverettTable::index(up, down - 1)];
-        }
-    }
-    for up in (1..grid).rev() {
-        for down in 0..up {
-            values[EverettTable::index(up, down)] += values[EverettTable::index(up + 1, down)];
-        }
-    }
+    sums.over_weights(plane)
 }
 
 /// Cell weights to Everett nodes, in place: E(i, j) is the sum of the weights with up ≤ i, down ≥ j.

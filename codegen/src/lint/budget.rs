@@ -1,7 +1,7 @@
 //! Memory that the constants take whatever the code does.
 
 use super::{Facts, Found, figure};
-use crate::diagnostic::codes;
+use crate::diagnostic::{Diagnostic, Severity, codes};
 use crate::model::{Model, Scalar};
 
 /// Least stack of a tick, bytes: six legs and a pose in flight.
@@ -23,6 +23,24 @@ pub fn least(model: &Model) -> [u64; 2] {
     // Each reversal is an extremum; six legs remember their own.
     let memory = 6 * model.hysteresis.memory * scalar;
     [table as u64, memory as u64]
+}
+
+/// Says what of a declared budget only a build can tell.
+pub fn estimated(model: &Model) -> Option<Diagnostic> {
+    let target = &model.target;
+    if [target.flash, target.ram, target.stack, target.instructions] == [None; 4] {
+        return None;
+    }
+    let [tables, memory] = least(model);
+    Some(Diagnostic::at(
+        &model.spans,
+        &["target.budget"],
+        (Severity::Note, codes::ESTIMATED),
+        format!(
+            "tables take {tables} B of flash, reversal memories {memory} B of RAM; the rest of the budget is not checked here"
+        ),
+        "`specgen SPEC -o DIR` builds the controller and measures flash, RAM, stack and instructions".to_owned(),
+    ))
 }
 
 /// A budget below what the tables take, or so far above it that it checks nothing.

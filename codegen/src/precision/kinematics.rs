@@ -2,7 +2,8 @@
 
 use specgen_runtime::{Legs, Real, Series};
 
-use super::{Double, Enclosed, Figures, bounds, keep};
+use super::traced::{Traced, trace};
+use super::{Double, Figures, bounds, boxes, keep};
 use crate::ir::{Kinematics, Scalar};
 use crate::model::{Geometry, Model};
 
@@ -101,58 +102,120 @@ impl FromReal<Self> for f64 {
     }
 }
 
+/// A constant of the controller, with what it leaves out of what it stands for.
+pub(super) fn kept<const SINGLE: bool>(kept: f64, exact: Double) -> Traced<SINGLE> {
+    Traced::constant(kept, [(Double::from(kept) - exact).value(); 2])
+}
+
+/// A series cut after the terms that are kept. What is left out, at arguments of which the square is at most `square`, counts
+/// as an error of its last coefficient: terms get smaller, so it lies between nothing and their first over 1 − `square`.
+pub(super) fn cut<const SINGLE: bool>(coefficients: &[f64], exact: &[Double], square: f64) -> Vec<Traced<SINGLE>> {
+    // Without any term that of the first is zero.
+    let last = if coefficients.is_empty() { 0 } else { coefficients.len() - 1 };
+    (0..=last)
+        .map(|k| {
+            let value = coefficients.get(k).copied().unwrap_or(0.0);
+            let off = (Double::from(value) - exact[k]).value();
+            let beyond = if k == last { exact[k + 1].value() * square / (1.0 - square) } else { 0.0 };
+            let (low, high) = if beyond > 0.0 { (off - beyond, off) } else { (off, off - beyond) };
+            Traced::constant(value, [low, high])
+        })
+        .collect()
+}
+
+/// The legs in numbers that remember their rounding.
+pub(super) struct TracedLegs<const SINGLE: bool> {
+    sine: Vec<Traced<SINGLE>>,
+    versine: Vec<Traced<SINGLE>>,
+}
+
+impl<const SINGLE: bool> TracedLegs<SINGLE> {
+    /// For angles up to `largest`, rad.
+    pub(super) fn of(constants: &Kinematics, exact: &Exact, largest: f64) -> Self {
+        let square = largest * largest;
+        Self {
+            sine: cut(&constants.sine, &exact.sine, square),
+            versine: cut(&constants.versine, &exact.versine, square),
+        }
+    }
+
+    pub(super) fn series(&self) -> Series<'_, Traced<SINGLE>> {
+        Series { sine: &self.sine, versine: &self.versine }
+    }
+}
+
 /// Errors of the legs, and of the pose that they make.
 pub(super) fn figures(model: &Model, constants: &Kinematics, scalar: Scalar, poses: &[[f64; 6]]) -> (Figures, Figures) {
     let exact = Exact::of(&model.geometry);
     let single = scalar == Scalar::F32;
-    let bound = if single {
-        bound::<true>(model, constants, &exact, scalar)
-    } else {
-        bound::<false>(model, constants, &exact, scalar)
-    };
     let inverse = crate::lower::inverse_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
+    let (of_legs, of_pose) = if single {
+        bound::<true>(model, constants, &exact, &inverse)
+    } else {
+        bound::<false>(model, constants, &exact, &inverse)
+    };
     let to_pose = |legs: &[f64; 6]| inverse.map(|row| (0..6).fold(0.0, |sum, leg| sum + row[leg] * legs[leg]));
-    let (mut of_legs, mut of_pose) = ([0.0; 6], [0.0; 6]);
-    let (mut legs_f64, mut pose_f64) = ([0.0; 6], [0.0; 6]);
+    let mut legs = Figures::none(of_legs, single);
+    let mut whole = Figures::none(of_pose, single);
     for pose in poses {
         let found = if single { displacements::<f32>(constants, pose) } else { displacements::<f64>(constants, pose) };
         let wanted = exact.displacements(pose);
         let error: [f64; 6] = core::array::from_fn(|leg| (Double::from(found[leg]) - wanted[leg]).value());
-        keep(&mut of_legs, error);
-        keep(&mut of_pose, to_pose(&error));
-        let in_f64 = displacements::<f64>(constants, pose);
-        let error: [f64; 6] = core::array::from_fn(|leg| found[leg] - in_f64[leg]);
-        keep(&mut legs_f64, error);
-        keep(&mut pose_f64, to_pose(&error));
+        keep(&mut legs.sampled, error);
+        keep(&mut whole.sampled, to_pose(&error));
+        if let (Some(legs), Some(whole)) = (&mut legs.against_f64, &mut whole.against_f64) {
+            let in_f64 = displacements::<f64>(constants, pose);
+            let error: [f64; 6] = core::array::from_fn(|leg| found[leg] - in_f64[leg]);
+            keep(legs, error);
+            keep(whole, to_pose(&error));
+        }
     }
-    let pose_bound = inverse.map(|row| (0..6).fold(0.0, |sum, leg| sum + row[leg].abs() * bound[leg]));
-    (
-        Figures { bound, sampled: of_legs, against_f64: single.then_some(legs_f64) },
-        Figures { bound: pose_bound, sampled: of_pose, against_f64: single.then_some(pose_f64) },
-    )
+    (legs, whole)
 }
 
-/// No leg displacement in the workspace is off by more.
-fn bound<const SINGLE: bool>(model: &Model, constants: &Kinematics, exact: &Exact, scalar: Scalar) -> [f64; 6] {
-    let of =
-        |kept: f64, exact: &Double| Enclosed::<SINGLE>::constant(kept, (Double::from(kept) - *exact).value().abs());
-    let list = |kept: &[f64], exact: &[Double]| {
-        kept.iter().zip(exact).map(|(kept, exact)| of(*kept, exact)).collect::<Vec<_>>()
-    };
-    let (sine, versine) = (list(&constants.sine, &exact.sine), list(&constants.versine, &exact.versine));
-    let three = |kept: &[[f64; 3]; 6], exact: &[[Double; 3]; 6]| {
-        core::array::from_fn(|leg| core::array::from_fn(|k| of(kept[leg][k], &exact[leg][k])))
-    };
-    let legs = Legs {
-        rest_leg: three(&constants.rest_leg, &exact.rest_leg),
-        platform_joint: three(&constants.platform_joint, &exact.platform_joint),
-        rest_length: core::array::from_fn(|leg| of(constants.rest_length[leg], &exact.rest_length[leg])),
-        series: Series { sine: &sine, versine: &versine },
-        newton_steps: constants.newton_steps as usize,
-    };
+/// No leg displacement in the workspace is off by more, and no pose that the legs make.
+fn bound<const SINGLE: bool>(
+    model: &Model,
+    constants: &Kinematics,
+    exact: &Exact,
+    inverse: &[[f64; 6]; 6],
+) -> ([f64; 6], [f64; 6]) {
     let bounds = bounds(model);
-    let found = legs.displacements(&bounds.map(|bound| Enclosed::input(-bound, bound)));
-    // Terms and steps that are left out: a quarter of a last bit of the angle and of the displacement each.
-    let turn = (bounds[3] + bounds[4] + bounds[5]) * model.geometry.joint_radius();
-    found.map(|leg| leg.error() + 0.25 * scalar.epsilon() * (2.0 * turn + leg.magnitude()))
+    let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
+    let (mut of_legs, mut of_pose) = ([0.0; 6], [0.0; 6]);
+    for corner in boxes(&bounds) {
+        let (found, record) = trace(|| {
+            let series = TracedLegs::<SINGLE>::of(constants, exact, largest);
+            let three = |kept_rows: &[[f64; 3]; 6], exact: &[[Double; 3]; 6]| {
+                core::array::from_fn(|leg| core::array::from_fn(|k| kept(kept_rows[leg][k], exact[leg][k])))
+            };
+            let legs = Legs {
+                rest_leg: three(&constants.rest_leg, &exact.rest_leg),
+                platform_joint: three(&constants.platform_joint, &exact.platform_joint),
+                rest_length: core::array::from_fn(|leg| kept(constants.rest_length[leg], exact.rest_length[leg])),
+                series: series.series(),
+                newton_steps: constants.newton_steps as usize,
+            };
+            let found = legs.displacements(&core::array::from_fn(|axis| {
+                Traced::coordinate(axis, corner[axis][0], corner[axis][1])
+            }));
+            core::array::from_fn::<_, 6, _>(|leg| {
+                let left = left_by_newton(constants.newton_steps, found[leg].magnitude(), constants.rest_length[leg]);
+                found[leg].off_by([-left, left])
+            })
+        });
+        keep(&mut of_legs, core::array::from_fn(|leg| record.error(&[(found[leg], 1.0)])));
+        keep(
+            &mut of_pose,
+            inverse.map(|row| record.error(&core::array::from_fn::<_, 6, _>(|leg| (found[leg], row[leg])))),
+        );
+    }
+    (of_legs, of_pose)
+}
+
+/// What Newton's steps leave of a displacement, m: of the first guess s/(2 l) = Δ + Δ²/(2 l), each step leaves its square over
+/// 2 (l + Δ).
+fn left_by_newton(steps: u32, displacement: f64, length: f64) -> f64 {
+    let twice = 2.0 * (length - displacement);
+    (0..steps).fold(displacement * displacement / twice, |left, _| left * left / (twice - 2.0 * left))
 }

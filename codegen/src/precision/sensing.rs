@@ -2,8 +2,10 @@
 
 use specgen_runtime::{Gauges, Real};
 
-use super::kinematics::{Exact as ExactLegs, FromReal};
-use super::{Double, Enclosed, Figures, bounds, keep};
+use super::form::magnitude;
+use super::kinematics::{Exact as ExactLegs, FromReal, TracedLegs, cut, kept};
+use super::traced::{Trace, Traced, trace};
+use super::{Double, Figures, bounds, boxes, keep};
 use crate::diagnostic::Diagnostic;
 use crate::ir::{Kinematics, Scalar, Sensing};
 use crate::lower;
@@ -141,70 +143,135 @@ pub(super) fn figures(
     let legs = ExactLegs::of(&model.geometry);
     let gauges = exact.gauges();
     let single = scalar == Scalar::F32;
-    let (mut sampled, mut against_f64) = ([0.0; 6], [0.0; 6]);
-    let mut largest = [0.0; 6];
+    let bound = if single {
+        bound::<true>(model, kinematics, constants, &exact, &legs)
+    } else {
+        bound::<false>(model, kinematics, constants, &exact, &legs)
+    };
+    let mut figures = Figures::none(bound, single);
     for given in poses {
         let readings = gauges.readings(&legs.series(), &given.map(Double::from)).map(|y| scalar.round(y.value()));
-        keep(&mut largest, readings);
         let found = if single { pose::<f32>(constants, &readings) } else { pose::<f64>(constants, &readings) };
         let wanted = gauges.pose(&readings.map(Double::from));
-        keep(&mut sampled, core::array::from_fn(|axis| (Double::from(found[axis]) - wanted[axis]).value()));
-        let in_f64 = pose::<f64>(constants, &readings);
-        keep(&mut against_f64, core::array::from_fn(|axis| found[axis] - in_f64[axis]));
+        keep(&mut figures.sampled, core::array::from_fn(|axis| (Double::from(found[axis]) - wanted[axis]).value()));
+        if let Some(against) = &mut figures.against_f64 {
+            let in_f64 = pose::<f64>(constants, &readings);
+            keep(against, core::array::from_fn(|axis| found[axis] - in_f64[axis]));
+        }
     }
-    let bound = if single {
-        bound::<true>(model, kinematics, constants, &exact, scalar, largest)
-    } else {
-        bound::<false>(model, kinematics, constants, &exact, scalar, largest)
-    };
-    Ok(Figures { bound, sampled, against_f64: single.then_some(against_f64) })
+    Ok(figures)
 }
 
-/// No pose in the workspace is off by more. `largest`: readings at the corners, where they are largest.
+/// No pose in the workspace is off by more.
 fn bound<const SINGLE: bool>(
     model: &Model,
     kinematics: &Kinematics,
     constants: &Sensing,
     exact: &Exact,
-    scalar: Scalar,
-    largest: [f64; 6],
+    legs: &ExactLegs,
 ) -> [f64; 6] {
-    let of =
-        |kept: f64, exact: &Double| Enclosed::<SINGLE>::constant(kept, (Double::from(kept) - *exact).value().abs());
-    let vectors = |kept: &[[f64; 3]; 6], exact: &Vectors| {
-        core::array::from_fn(|k| core::array::from_fn(|j| of(kept[k][j], &exact[k][j])))
-    };
-    let matrix = |kept: &[[f64; 6]; 6], exact: &Matrix| {
-        core::array::from_fn(|k| core::array::from_fn(|j| of(kept[k][j], &exact[k][j])))
-    };
-    let list = |kept: &[f64], exact: &[Double]| {
-        kept.iter().zip(exact).map(|(kept, exact)| of(*kept, exact)).collect::<Vec<_>>()
-    };
-    let (arc_sine, arc_tangent) =
-        (list(&constants.arc_sine, &exact.arc_sine), list(&constants.arc_tangent, &exact.arc_tangent));
-    let gauges = Gauges {
-        direction: vectors(&constants.direction, &exact.direction),
-        normal: vectors(&constants.normal, &exact.normal),
-        skew: vectors(&constants.skew, &exact.skew),
-        pierced: vectors(&constants.pierced, &exact.pierced),
-        inverse: matrix(&constants.inverse, &exact.inverse),
-        curvature: matrix(&constants.curvature, &exact.curvature),
-        passes: constants.passes as usize,
-        arc_sine: &arc_sine,
-        arc_tangent: &arc_tangent,
-    };
     let bounds = bounds(model);
-    let turn = bounds[3] + bounds[4] + bounds[5];
-    // Readings are linear in the pose but for the square of the turn, and largest at a corner but for that.
-    let size =
-        exact.pierced.iter().flatten().map(|part| part.value().abs()).fold(0.0, |a: f64, b| if b > a { b } else { a });
-    let more = turn * turn * (size + kinematics.largest_displacement);
-    let readings = largest.map(|reading| Enclosed::input(-(reading + more), reading + more));
-    let found = gauges.pose(&readings);
-    core::array::from_fn(|axis| {
-        let left_out = constants.remainder[axis / 3];
-        found[axis].error()
-            + 2.0 * left_out
-            + 0.25 * scalar.epsilon() * if axis < 3 { 0.0 } else { found[axis].magnitude() }
+    let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
+    let mut bound = [0.0; 6];
+    for corner in boxes(&bounds) {
+        let (found, record) = trace(|| {
+            let gauges = Constants::<SINGLE>::of(constants, exact, largest);
+            let gauges = gauges.gauges();
+            let series = TracedLegs::of(kinematics, legs, largest);
+            let pose = core::array::from_fn(|axis| Traced::coordinate(axis, corner[axis][0], corner[axis][1]));
+            // Readings are given numbers, of which it only counts where they lie.
+            let readings = gauges.readings(&series.series(), &pose).map(Traced::given);
+            let guess = gauges.guess(&readings);
+            let start = start(&gauges, &readings, &guess);
+            gauges.pose_from(&readings, &guess, start)
+        });
+        keep(&mut bound, found.map(|axis| record.error(&[(axis, 1.0)])));
+    }
+    bound
+}
+
+/// The first guess of the turn, which the fixed point of the passes is known to lie near.
+///
+/// All passes from the fixed point would leave it where it is: what finitely many leave is what they carry of the distance
+/// between the two. With ψ₁ one pass from ψ₀, and passes that contract by κ about there, ψ∞ − ψ₀ is off ψ₁ − ψ₀ by
+/// κ/(1 − κ) of that at most.
+fn start<const SINGLE: bool>(
+    gauges: &Gauges<'_, Traced<SINGLE>>,
+    readings: &[Traced<SINGLE>; 6],
+    guess: &[Traced<SINGLE>; 6],
+) -> [Traced<SINGLE>; 3] {
+    let psi = [guess[3], guess[4], guess[5]];
+    let next = gauges.next_turn(readings, guess, &psi);
+    // As it would be without rounding.
+    let step: [Traced<SINGLE>; 3] = core::array::from_fn(|k| (next[k] - psi[k]).given());
+    let longest = step.iter().fold(0.0, |a: f64, step| if step.magnitude() > a { step.magnitude() } else { a });
+    // Where all passes lie if κ is below a half.
+    let around = psi.map(|psi| psi.widened(2.0 * longest).given());
+    let after = gauges.next_turn(readings, guess, &around);
+    // The constants of the controller contract as those without rounding do, but for their last bits.
+    let contraction = 1.001
+        * Trace::peek(|record| {
+            after.iter().fold(0.0, |largest: f64, row| {
+                let sum = around.iter().fold(0.0, |sum, psi| sum + magnitude(record.derivative(&[(*row, 1.0)], *psi)));
+                if sum > largest { sum } else { largest }
+            })
+        });
+    let more = if contraction < 0.5 { longest * contraction / (1.0 - contraction) } else { f64::INFINITY };
+    core::array::from_fn(|k| {
+        let [low, high] = step[k].range();
+        // The fixed point is the guess plus the step: the guess is off by the opposite.
+        psi[k].off_by([-high - more, more - low])
     })
+}
+
+/// Constants of the controller that remember what they leave out.
+struct Constants<const SINGLE: bool> {
+    direction: [[Traced<SINGLE>; 3]; 6],
+    normal: [[Traced<SINGLE>; 3]; 6],
+    skew: [[Traced<SINGLE>; 3]; 6],
+    pierced: [[Traced<SINGLE>; 3]; 6],
+    inverse: [[Traced<SINGLE>; 6]; 6],
+    curvature: [[Traced<SINGLE>; 6]; 6],
+    passes: usize,
+    arc_sine: Vec<Traced<SINGLE>>,
+    arc_tangent: Vec<Traced<SINGLE>>,
+}
+
+impl<const SINGLE: bool> Constants<SINGLE> {
+    /// For angles up to `largest`, rad.
+    fn of(constants: &Sensing, exact: &Exact, largest: f64) -> Self {
+        let vectors = |rows: &[[f64; 3]; 6], exact: &Vectors| {
+            core::array::from_fn(|k| core::array::from_fn(|j| kept(rows[k][j], exact[k][j])))
+        };
+        let matrix = |rows: &[[f64; 6]; 6], exact: &Matrix| {
+            core::array::from_fn(|k| core::array::from_fn(|j| kept(rows[k][j], exact[k][j])))
+        };
+        // Room for readings that are rounded.
+        let square = |x: f64| x * x * (1.0 + 1e-6);
+        Self {
+            direction: vectors(&constants.direction, &exact.direction),
+            normal: vectors(&constants.normal, &exact.normal),
+            skew: vectors(&constants.skew, &exact.skew),
+            pierced: vectors(&constants.pierced, &exact.pierced),
+            inverse: matrix(&constants.inverse, &exact.inverse),
+            curvature: matrix(&constants.curvature, &exact.curvature),
+            passes: constants.passes as usize,
+            arc_sine: cut(&constants.arc_sine, &exact.arc_sine, square(libm::sin(largest))),
+            arc_tangent: cut(&constants.arc_tangent, &exact.arc_tangent, square(libm::tan(largest))),
+        }
+    }
+
+    fn gauges(&self) -> Gauges<'_, Traced<SINGLE>> {
+        Gauges {
+            direction: self.direction,
+            normal: self.normal,
+            skew: self.skew,
+            pierced: self.pierced,
+            inverse: self.inverse,
+            curvature: self.curvature,
+            passes: self.passes,
+            arc_sine: &self.arc_sine,
+            arc_tangent: &self.arc_tangent,
+        }
+    }
 }

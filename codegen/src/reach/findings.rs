@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{PathReach, ROOM, Reach};
 use crate::diagnostic::{Diagnostic, Severity, codes};
-use crate::model::Model;
+use crate::model::{Model, SetpointKind};
 
 const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 /// Unit and factor of an axis in messages.
@@ -21,6 +21,73 @@ pub(super) fn of(model: &Model, reach: &Reach, bias: &PathReach) -> Vec<Diagnost
     }
     findings.extend(of_condition(model, reach));
     findings
+}
+
+/// Findings about legs with their own gauges.
+pub(super) fn of_legs(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
+    let mut findings = Vec::new();
+    if model.controller.setpoint == SetpointKind::Pose {
+        findings.extend(of_furthest_axis(model, reach));
+    }
+    findings.extend(of_gauge_ends(model, reach));
+    findings.extend(of_condition(model, reach));
+    findings
+}
+
+/// The bound that lies furthest beyond what its axis reaches.
+fn of_furthest_axis(model: &Model, reach: &Reach) -> Option<Diagnostic> {
+    let furthest = |axis: usize| {
+        let [low, high] = reach.axes[axis].from_middle;
+        if -low > high { -low } else { high }
+    };
+    let beyond = |axis: usize| reach.axes[axis].declared / furthest(axis);
+    let worst = (1..6).fold(0, |worst, axis| if beyond(axis) > beyond(worst) { axis } else { worst });
+    if beyond(worst).is_nan() || beyond(worst) <= 1.0 + 1e-9 {
+        return None;
+    }
+    let (table, item) = if worst < 3 { ("workspace.translation", worst) } else { ("workspace.rotation", worst - 3) };
+    let (unit, scale) = unit(worst);
+    let [low, high] = reach.axes[worst].from_middle;
+    Some(finding(
+        model,
+        Severity::Note,
+        codes::LEGS_CUT_SHORT,
+        &[&format!("{table}[{item}]"), table, "workspace"],
+        format!(
+            "no pose reaches |{}| = {:.2} {unit}: from the middle of the strokes, at z = {:.1} um, this axis alone goes from {:.2} to {:.2} {unit}",
+            AXES[worst],
+            reach.axes[worst].declared * scale,
+            reach.boxes.centre[2] * 1e6,
+            low * scale,
+            high * scale
+        ),
+        format!(
+            "set-points beyond are accepted and each leg stops at the end of its stroke; to have them refused, declare at most {:.2} {unit}",
+            libm::floor(furthest(worst) * scale * 100.0) / 100.0
+        ),
+    ))
+}
+
+/// A leg that goes where its gauge does not see it.
+fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
+    let [low, high] = model.sensor.range;
+    if low <= 0.0 && high >= reach.stroke {
+        return None;
+    }
+    let item = usize::from(low <= 0.0);
+    Some(finding(
+        model,
+        Severity::Note,
+        codes::GAUGE_SHORT_OF_STROKE,
+        &[&format!("sensor.range[{item}]"), "sensor.range", "sensor"],
+        format!(
+            "the gauge of a leg reads {:.3} um to {:.3} um, but the leg moves from 0 to {:.3} um",
+            low * 1e6,
+            high * 1e6,
+            reach.stroke * 1e6
+        ),
+        "a leg beyond the end of its gauge is a gauge fault: keep set-points within the gauge, or take one that sees the whole stroke".to_owned(),
+    ))
 }
 
 /// Above this condition number one motion is held thirty times worse than another.
@@ -139,15 +206,16 @@ fn advice(path: &PathReach, what: &str) -> String {
     }
 }
 
-/// The reach as text for `specgen check`.
+/// The reach as text for `specgen check`. `biased`: set-points count from a bias, else from rest.
 #[must_use]
-pub fn describe(reach: &Reach) -> String {
+pub fn describe(reach: &Reach, biased: bool) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = writeln!(
         text,
-        "  reach of one axis alone, um and urad ({:.1} um legs): from the middle of the strokes | from the bias",
-        reach.stroke * 1e6
+        "  reach of one axis alone, um and urad ({:.1} um legs): from the middle of the strokes | from {}",
+        reach.stroke * 1e6,
+        if biased { "the bias" } else { "rest" }
     );
     for (axis, one) in reach.axes.iter().enumerate() {
         let scale = unit(axis).1;
@@ -162,13 +230,15 @@ pub fn describe(reach: &Reach) -> String {
             one.declared * scale
         );
     }
-    let _ = writeln!(
-        text,
-        "  at the bias the legs stand at {:.1} to {:.1} um; {:.1} % of the declared workspace around it is reached corner by corner",
-        reach.at_bias[0] * 1e6,
-        reach.at_bias[1] * 1e6,
-        reach.share * 100.0
-    );
+    if biased {
+        let _ = writeln!(
+            text,
+            "  at the bias the legs stand at {:.1} to {:.1} um; {:.1} % of the declared workspace around it is reached corner by corner",
+            reach.at_bias[0] * 1e6,
+            reach.at_bias[1] * 1e6,
+            reach.share * 100.0
+        );
+    }
     let conditioning = &reach.conditioning;
     let _ = writeln!(
         text,

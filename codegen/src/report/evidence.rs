@@ -5,7 +5,9 @@ use core::f64::consts::TAU;
 use super::section::{Grid, Section};
 use crate::compile::Compiled;
 use crate::diagnostic::to_json;
+use crate::ir::Scalar;
 use crate::model::Target;
+use crate::precision::{self, Precision};
 use crate::reproduce::write::digits;
 use crate::verify::Measurement;
 
@@ -22,7 +24,7 @@ pub fn summary(compiled: &Compiled, described: &str, command: &str) -> Section {
         .text("Six legs with their own gauges: the leg feed-forward.")
         .text(
             "The spec has no [control], so that there is nothing here of position control of the platform: free motion \
-             (Figs 11 to 22, Tables 5 to 8), machining (Figs 23 to 28, Table 9), modes, gains, reach and pose noise.",
+             (Figs 11 to 22, Tables 5 to 8), machining (Figs 23 to 28, Table 9), modes, gains and pose noise.",
         )
         .lines(described.trim_end())
 }
@@ -98,6 +100,25 @@ pub fn margins(compiled: &Compiled, command: &str) -> Section {
         table.push(vec![what.to_owned(), value]);
     }
     section.table(table)
+}
+
+/// Rounding errors of the scalar, axis by axis.
+#[must_use]
+pub fn rounding(rounding: &Precision, scalar: Scalar, command: &str) -> Section {
+    let single = rounding.commanded.against_f64.is_some();
+    let mut head = vec!["pose", "axis", "unit", "bound by analysis", "largest found", "bound / found"];
+    head.extend(single.then_some("largest against f64"));
+    let mut table = Grid::new(&format!("Rounding errors of f{} over the declared workspace", scalar.bits()), &head);
+    for row in precision::rows(rounding) {
+        let texts = [row.what, row.axis, row.unit].map(str::to_owned);
+        let small = |value: f64| format!("{value:.2e}");
+        let mut numbers = vec![small(row.bound), small(row.sampled), row.ratio.map_or_else(String::new, digits)];
+        numbers.extend(row.against_f64.map(small));
+        table.push([texts.to_vec(), numbers].concat());
+    }
+    Section::new("precision", "Rounding errors", command)
+        .text("What the number format of the controller costs. The bound holds at every pose of the workspace; the largest error found is that of trials against 106 bits.")
+        .table(table)
 }
 
 /// Time and memory on the emulated machine, or why they were not measured.

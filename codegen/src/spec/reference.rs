@@ -11,8 +11,8 @@ const HEAD: &str = "\
 # Spec reference
 
 A spec is one TOML file. A value with a dimension is a text with number and unit: `\"1.195 kg\"`, `\"3.26e7 g mm^2\"`,
-`\"0.012 pi rad\"`, `\"40 V/ms\"`, `\"12 N m/rad\"`. Units are m, g, s, min, V, N, Hz, rad, deg, arcmin, arcsec, Pa, J, W, A, F
-and B with the prefixes f p n u (also µ) m c d k M G T; bytes take k M G T and Ki Mi Gi. A space, `*` or `·` multiplies,
+`\"0.012 pi rad\"`, `\"40 V/ms\"`, `\"12 N m/rad\"`. Units are m, g, s, min, V, N, Hz, rad, deg, arcmin, arcsec, Pa, J, W, A, F and B
+with the prefixes f p n u (also µ) m c d k M G T; bytes take k M G T and Ki Mi Gi. A space, `*` or `·` multiplies,
 `/` divides by the one unit that follows (group several: `N/(m s)`), `^` raises to a power.
 Radians count as a unit: a rotational stiffness is in N m/rad, a bandwidth in rad/s and not in Hz.
 A conversion to SI rounds once, so that `\"150 mm\"` is the double nearest to 0.15.

@@ -60,13 +60,19 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     pub fn start(&mut self, report: &mut Report) {
         // The line first, whatever the parts say, and both parts even if one fails.
         let disabled = self.amplifiers.enable(false);
-        let amplifiers = self.amplifiers.start();
+        let amplifiers = self.amplifiers.start().and_then(|()| self.rest());
         let gauges = self.gauges.start();
         self.started = true;
         for fault in [disabled, amplifiers, gauges].into_iter().filter_map(Result::err) {
             self.started = false;
             note(report, fault);
         }
+    }
+
+    /// The codes that the machine holds, at once: a DAC starts at code 0, which need not be where the legs rest.
+    fn rest(&mut self) -> Result<(), Fault> {
+        let codes = self.machine.state.legs.each_ref().map(|leg| leg.code);
+        if codes == [0; CHANNELS] { Ok(()) } else { self.amplifiers.write(&codes) }
     }
 
     /// One tick. True if it started the converters again and so took longer than a tick may: then the schedule begins anew.
@@ -142,7 +148,9 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     }
 }
 
-/// Words of the command, the readings, and no number for what this board does not measure.
+/// Words of the command, the readings, and no number for what this board does not measure. In a frame of its own: the words
+/// are done with before the law needs the stack.
+#[inline(never)]
 fn input(orders: &Orders, readings: &[Real; GAUGES], events: u32) -> MachineInput {
     let mut words = [Real::from_f64(f64::NAN).to_word(); MACHINE_INPUT_WORDS];
     for (slot, word) in words.iter_mut().zip(orders.command) {

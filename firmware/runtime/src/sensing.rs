@@ -69,14 +69,34 @@ impl<T: Real> Gauges<'_, T> {
     #[inline]
     #[must_use]
     pub fn pose(&self, readings: &[T; 6]) -> [T; 6] {
-        let guess = each(|row| dot6(&self.inverse[row], readings));
-        let mut psi = [guess[3], guess[4], guess[5]];
+        let guess = self.guess(readings);
+        self.pose_from(readings, &guess, [guess[3], guess[4], guess[5]])
+    }
+
+    /// J⁻¹ of `readings` (m): [u; ψ] but for terms of second degree, m and 1.
+    #[inline]
+    #[must_use]
+    pub fn guess(&self, readings: &[T; 6]) -> [T; 6] {
+        each(|row| dot6(&self.inverse[row], readings))
+    }
+
+    /// A pass: ψ from one that is off by more, for `guess` of `readings` (m).
+    #[inline]
+    #[must_use]
+    pub fn next_turn(&self, readings: &[T; 6], guess: &[T; 6], psi: &[T; 3]) -> [T; 3] {
+        let terms = self.terms(readings, psi);
+        [self.row(3, guess, &terms), self.row(4, guess, &terms), self.row(5, guess, &terms)]
+    }
+
+    /// The pose for `guess` of `readings` (m), all passes done from the turn ψ that is given.
+    #[inline]
+    #[must_use]
+    pub fn pose_from(&self, readings: &[T; 6], guess: &[T; 6], mut psi: [T; 3]) -> [T; 6] {
         for _ in 1..self.passes {
-            let terms = self.terms(readings, &psi);
-            psi = [self.row(3, &guess, &terms), self.row(4, &guess, &terms), self.row(5, &guess, &terms)];
+            psi = self.next_turn(readings, guess, &psi);
         }
         let terms = self.terms(readings, &psi);
-        let [x, y, z, a, b, c] = each(|row| self.row(row, &guess, &terms));
+        let [x, y, z, a, b, c] = each(|row| self.row(row, guess, &terms));
         self.coordinates([x, y, z], [a, b, c])
     }
 

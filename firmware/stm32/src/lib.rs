@@ -7,6 +7,7 @@
 pub mod converters;
 mod delay;
 pub mod serial;
+mod silent;
 pub mod timer;
 
 pub use delay::CycleDelay;

@@ -3,13 +3,9 @@
 
 use core::f64::consts::TAU;
 
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
-
-use super::{InputRecording, SPECIAL_SHARE, STRETCH, specials};
+use super::draw::Draw;
+use super::{InputRecording, STRETCH};
 use crate::description::{Description, DescriptionError};
-use crate::noise::unit;
-use crate::word::Scalar;
 
 /// Words of the command.
 const COMMAND: [&str; 3] = ["command", "selector", "sequence"];
@@ -92,7 +88,7 @@ pub fn record(
     for row in words.chunks_exact_mut(width.max(1)) {
         if left == 0 {
             kind = stretches.next().copied().unwrap_or(kind);
-            left = STRETCH.0 + generator.below(STRETCH.1 - STRETCH.0);
+            left = STRETCH.0 + generator.draw.below(STRETCH.1 - STRETCH.0);
             // A move or a trajectory takes its time.
             if matches!(kind, Kind::Move | Kind::Trajectory | Kind::Smooth) {
                 left *= 8;
@@ -102,11 +98,11 @@ pub fn record(
         left -= 1;
         let made = generator.row(kind);
         for (place, word) in command.iter().zip(made.command) {
-            row[*place] = generator.integer(kind, word);
+            row[*place] = generator.draw.integer(kind == Kind::Special, word);
         }
         for (places, vector) in vectors.iter().zip(made.vectors) {
             for (place, value) in places.iter().zip(vector) {
-                row[*place] = generator.word(description.scalar, kind, value);
+                row[*place] = generator.draw.word(description.scalar, kind == Kind::Special, value);
             }
         }
     }
@@ -114,7 +110,7 @@ pub fn record(
 }
 
 struct Generator<'a> {
-    rng: ChaCha8Rng,
+    draw: Draw,
     inputs: &'a PlatformInputs,
     sequence: u64,
     /// Smooth motion: amplitude, angular frequency (rad/s), phase of each axis.
@@ -132,7 +128,7 @@ struct Generator<'a> {
 impl<'a> Generator<'a> {
     fn new(inputs: &'a PlatformInputs, seed: u64) -> Self {
         Self {
-            rng: ChaCha8Rng::seed_from_u64(seed),
+            draw: Draw::new(seed),
             inputs,
             sequence: 0,
             amplitude: [0.0; 6],
@@ -145,15 +141,6 @@ impl<'a> Generator<'a> {
         }
     }
 
-    fn below(&mut self, bound: u64) -> u64 {
-        self.rng.next_u64() % bound.max(1)
-    }
-
-    /// Uniform in [−1, 1).
-    fn symmetric(&mut self) -> f64 {
-        2.0 * unit(&mut self.rng) - 1.0
-    }
-
     /// Room on either side of the bias.
     fn room(&self, axis: usize) -> f64 {
         self.inputs.bounds[axis] - self.inputs.bias[axis].abs()
@@ -162,13 +149,13 @@ impl<'a> Generator<'a> {
     fn begin(&mut self) {
         for axis in 0..6 {
             // 1 to 30 Hz, and a phase that begins at the bias so that the stream can be joined.
-            self.frequency[axis] = TAU * libm::exp(3.4 * unit(&mut self.rng));
-            self.amplitude[axis] = 0.3 * self.room(axis) * unit(&mut self.rng);
+            self.frequency[axis] = TAU * libm::exp(3.4 * self.draw.unit());
+            self.amplitude[axis] = 0.3 * self.room(axis) * self.draw.unit();
             self.phase[axis] = 0.0;
-            self.goal[axis] = 0.5 * self.room(axis) * self.symmetric();
-            self.wrench[axis] = 3.0 * self.symmetric();
+            self.goal[axis] = 0.5 * self.room(axis) * self.draw.symmetric();
+            self.wrench[axis] = 3.0 * self.draw.symmetric();
         }
-        self.selector = self.below(u64::from(self.inputs.trajectories) + 1);
+        self.selector = self.draw.below(u64::from(self.inputs.trajectories) + 1);
     }
 
     fn row(&mut self, kind: Kind) -> Row {
@@ -179,14 +166,16 @@ impl<'a> Generator<'a> {
         let smooth = self.smooth();
         let (command, [pose, rate, acceleration]) = match kind {
             Kind::Smooth | Kind::Dry => (1, smooth),
-            Kind::Jumping => (1, [0, 1, 2].map(|_| std::array::from_fn(|axis| self.room(axis) * self.symmetric()))),
+            Kind::Jumping => {
+                (1, [0, 1, 2].map(|_| std::array::from_fn(|axis| self.room(axis) * self.draw.symmetric())))
+            }
             Kind::Beyond => {
-                (1, [0, 1, 2].map(|_| std::array::from_fn(|axis| 6.0 * self.room(axis) * self.symmetric())))
+                (1, [0, 1, 2].map(|_| std::array::from_fn(|axis| 6.0 * self.room(axis) * self.draw.symmetric())))
             }
             Kind::Move => (2, [self.goal, [0.0; 6], [0.0; 6]]),
             Kind::Trajectory => (3, smooth),
             Kind::Hold => (0, smooth),
-            Kind::Special => (self.below(5), smooth),
+            Kind::Special => (self.draw.below(5), smooth),
         };
         Row {
             command: [command, self.selector, self.sequence],
@@ -211,29 +200,17 @@ impl<'a> Generator<'a> {
         let [low, high] = self.inputs.gauge;
         let span = high - low;
         for axis in 0..6 {
-            let next = self.gauge[axis] + 2e-3 * span * self.symmetric();
+            let next = self.gauge[axis] + 2e-3 * span * self.draw.symmetric();
             let inside = (low - 1e-3 * span..=high + 1e-3 * span).contains(&next);
             self.gauge[axis] = if inside { next } else { 0.5 * (low + high) };
         }
-    }
-
-    fn word(&mut self, scalar: Scalar, kind: Kind, value: f64) -> u64 {
-        if kind == Kind::Special && self.below(SPECIAL_SHARE) == 0 {
-            let specials = specials(scalar);
-            let pick = self.below(specials.len() as u64) as usize;
-            return specials[pick];
-        }
-        scalar.encode(value)
-    }
-
-    fn integer(&mut self, kind: Kind, value: u64) -> u64 {
-        if kind == Kind::Special && self.below(SPECIAL_SHARE) == 0 { self.rng.next_u64() } else { value }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::word::Scalar;
 
     fn description() -> Description {
         let six = |stem: &str| (0..6).map(|k| format!("{stem}[{k}]")).collect::<Vec<_>>();

@@ -2,6 +2,8 @@
 
 pub mod mutants;
 pub mod plausible;
+pub mod rules;
+pub mod slips;
 
 use std::fs;
 use std::path::Path;

@@ -15,20 +15,20 @@ pub struct Mutant {
 }
 
 /// A number in the text: its place, what follows it, and the key it belongs to.
-struct Value {
-    start: usize,
-    end: usize,
-    number: f64,
+pub struct Value {
+    pub start: usize,
+    pub end: usize,
+    pub number: f64,
     /// Text between the number and the closing quote; none for a bare number.
-    unit: Option<String>,
-    key: String,
+    pub unit: Option<String>,
+    pub key: String,
     /// Which value of its key.
     item: usize,
-    of: usize,
+    pub of: usize,
 }
 
 /// Every number of a spec, in the order of the file.
-fn values(text: &str) -> Vec<Value> {
+pub fn values(text: &str) -> Vec<Value> {
     let mut found = Vec::new();
     let mut section = String::new();
     let mut tables: Vec<(String, usize)> = Vec::new();
@@ -103,7 +103,8 @@ fn numbers(code: &str, offset: usize, key: &str, found: &mut Vec<Value>) {
 }
 
 impl Value {
-    fn path(&self) -> String {
+    /// With the index of a list's item.
+    pub fn path(&self) -> String {
         if self.of > 1 { format!("{}[{}]", self.key, self.item) } else { self.key.clone() }
     }
 
@@ -118,7 +119,8 @@ impl Value {
     }
 }
 
-fn shown(number: f64) -> String {
+/// A number as people write it.
+pub fn shown(number: f64) -> String {
     let plain = format!("{number}");
     if plain.len() < 12 { plain } else { format!("{number:e}") }
 }

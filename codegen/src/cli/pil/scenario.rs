@@ -7,7 +7,7 @@ use host_sim::platform::rig::{Noise, PlatformRun};
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select as select_platform};
 use host_sim::platform::table::{AXES, MachiningTable, PoseRow};
 use host_sim::platform::{PlatformScenario, WorkPart};
-use host_sim::scenario::{LegScenario, MODES, select as select_legs};
+use host_sim::scenario::{MODES, select as select_legs};
 use host_sim::table::TrackingRow;
 use host_sim::trajectory::{LegTrajectory, PaperLeg, PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
 use specgen_link::client::Port;
@@ -125,7 +125,7 @@ impl Plan {
     ) -> Result<(), Broken> {
         match self {
             Self::Legs { modes, frequency, samples } => {
-                legs(modes, *frequency, *samples, lockstep, report, arguments, ui)
+                legs(modes, *frequency, *samples, lockstep, report, compiled, arguments, ui)
             }
             Self::Path { name, path, part, modes, frequency } => {
                 let trajectory = PaperPose { path: *path, reading: Reading::Corrected, frequency: *frequency };
@@ -181,6 +181,7 @@ fn legs<P: Port>(
     samples: u32,
     lockstep: &mut Lockstep<P>,
     report: &mut Report,
+    compiled: &Compiled,
     arguments: &Arguments,
     ui: &Ui,
 ) -> Result<(), Broken> {
@@ -188,7 +189,7 @@ fn legs<P: Port>(
     let noise = if arguments.plant.no_noise { NoiseParameters::NONE } else { parameters.noise };
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs = std::array::from_fn(|_| parameters.clone());
-    let mut scenario = LegScenario::new(&legs, &noise, arguments.plant.seed, samples);
+    let mut scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, samples);
     let trajectory = Start::of(PaperLeg { frequency }, arguments.seconds);
     report.interval = 1.0 / frequency / f64::from(samples);
     for &(mode, word) in modes {

@@ -1,11 +1,10 @@
 //! Fits of the options to several records at once.
 
-use nalgebra::{Cholesky, DVector};
-
 use super::normal::{Normal, accumulate};
 use super::prepare::Prepared;
 use super::{RateModel, creep, mixed};
 use crate::everett::EverettTable;
+use crate::identify::dead_time;
 use crate::identify::findings::Findings;
 use crate::identify::nnls::{self, Failure};
 use crate::identify::normal::weights_to_nodes;
@@ -76,23 +75,12 @@ fn dead_time(plane: &Plane, records: &[&Prepared]) -> Result<f64, Failure> {
     });
     let mut normal = each.reduce(|sum, more| sum.add(&more)).ok_or(Failure::Singular)?;
     prior::add(plane.grid, &mut normal.gram);
-    let factor = Cholesky::new(normal.gram).ok_or(Failure::Singular)?;
-    let residual: Vec<f64> = normal
-        .rhs
-        .iter()
-        .zip(&normal.energy)
-        .map(|(rhs, energy)| {
-            let rhs = DVector::from_column_slice(rhs);
-            energy - factor.solve(&rhs).dot(&rhs)
-        })
-        .collect();
-    let best = (0..tried.len()).fold(0, |best, k| if residual[k] < residual[best] { k } else { best });
+    let residual = dead_time::residuals(normal.gram, &normal.rhs, &normal.energy).ok_or(Failure::Singular)?;
+    let best = dead_time::smallest(&residual);
     if best == 0 || best + 1 == tried.len() {
         return Ok(tried[best]);
     }
-    // Vertex of the parabola through the best one and its neighbours.
-    let (a, b, c) = (residual[best - 1], residual[best], residual[best + 1]);
-    Ok(tried[best] + 0.5 * step * (a - c) / (a - 2.0 * b + c))
+    Ok(tried[best] + dead_time::vertex([residual[best - 1], residual[best], residual[best + 1]], step))
 }
 
 /// (6): μ₀ ≥ 0 and μ₁ of either sign in one fit.

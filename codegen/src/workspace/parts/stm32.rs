@@ -14,6 +14,7 @@ pub const PART: Part = Part {
         "src/delay.rs",
         "src/lib.rs",
         "src/serial.rs",
+        "src/silent.rs",
         "src/timer.rs",
     },
 };

@@ -1,10 +1,5 @@
 //! The platform of the study: geometry A with k_a = 1e7 N/m, M and J at rest from the published vectors.
 
-#![allow(dead_code)] // Each test file uses its part.
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
-pub mod simulation;
-
 use std::path::Path;
 
 use specgen::model::{ControlMode, Environment, Frames, Interaction, Model, Probe, SetpointRules, TaskSpace};

@@ -1,15 +1,17 @@
-//! The set-point generator: what it does on command, what it refuses, and what it promises whatever the command.
+//! The set-point generator: what it does on command and what it refuses; in [`promises`] what it promises whatever the
+//! command, in [`frames`] the user's frames.
 
+#[path = "../common/mod.rs"]
 mod common;
-mod setpoint_support;
+mod frames;
+mod promises;
+mod support;
 
 use common::Random;
-use setpoint_support::*;
-use specgen_runtime::Real;
 use specgen_runtime::setpoint::{
-    BUSY, Command, CommandKind, Frames, Generator, MoveLimits, Parallel, Plan, Profile, REFUSED, STALE, Target, Tool,
-    Work,
+    BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Plan, Profile, REFUSED, STALE, Target,
 };
+use support::*;
 
 type Plan64 = Plan<f64, Parallel>;
 
@@ -395,128 +397,6 @@ fn a_stream_that_pauses_is_continued_then_stale_and_comes_back_near_where_it_sto
     assert!((back.pose[0] - target.pose[0] - 0.1e-6).abs() < 1e-18);
 }
 
-/// Any word that a link may deliver: mostly plausible, now and then anything.
-fn random_command<T: Real>(random: &mut Random, last: &Target<T>, previous: &Command<T>) -> Command<T> {
-    if random.unit() < 0.9 {
-        // A user keeps to one thing for a while, and a stream goes on from where it is.
-        let mut command = *previous;
-        if command.kind == CommandKind::Stream {
-            command.sequence = command.sequence.wrapping_add(u32::from(random.unit() < 0.9));
-            for axis in 0..6 {
-                let step =
-                    STREAM_SPEED[axis] * PERIOD * (2.2 * random.unit() - 1.1) * if axis == 2 { 1.0 } else { 0.3 };
-                command.target.pose[axis] = last.pose[axis] - T::from_f64(BIAS[axis]) + T::from_f64(step);
-                command.target.rate[axis] = T::from_f64(STREAM_SPEED[axis] * (2.05 * random.unit() - 1.025));
-            }
-        }
-        return command;
-    }
-    let mut target = Target::new();
-    for numbers in [&mut target.pose, &mut target.rate, &mut target.acceleration] {
-        for (axis, number) in numbers.iter_mut().enumerate() {
-            *number = match random.below(40) {
-                0 => T::from_word(random.next() << 33 | random.next()),
-                1 => T::from_f64(f64::NAN),
-                2 => T::from_f64(f64::NEG_INFINITY),
-                _ => T::from_f64(BOUND[axis] * 1.1 * (2.0 * random.unit() - 1.0)),
-            };
-        }
-    }
-    Command {
-        kind: CommandKind::from_word(random.below(5) as u64),
-        selector: random.below(5) as u32,
-        sequence: random.below(1 << 30) as u32,
-        target,
-    }
-}
-
-/// Ticks under random commands; what is broken first, and how often each status bit was seen.
-fn hammer<T: Real + Into<f64> + std::fmt::Debug, F: Frames<T>>(
-    plan: &Plan<T, F>,
-    step: [f64; 6],
-    rate: [f64; 6],
-    ticks: u32,
-) -> (Option<String>, [u32; 4]) {
-    let mut random = Random(11);
-    let mut generator = Generator::<T>::new();
-    let mut watch = Watch::new([0.0; 6], step, rate);
-    let mut previous = hold();
-    let mut last = Target::<T>::new();
-    let mut seen = [0; 4];
-    for tick in 0..ticks {
-        previous = random_command(&mut random, &last, &previous);
-        let (target, status) = generator.next(plan, &previous);
-        if let Some(broken) = watch.broken(&target) {
-            return (Some(format!("tick {tick}: {broken} after {previous:?}")), seen);
-        }
-        for (count, bit) in seen.iter_mut().zip([0, REFUSED, STALE, BUSY]) {
-            *count += u32::from(if bit == 0 { status == 0 } else { status & bit != 0 });
-        }
-        last = target;
-    }
-    (None, seen)
-}
-
-fn either(a: [f64; 6], b: [f64; 6]) -> [f64; 6] {
-    std::array::from_fn(|axis| f64::max(a[axis], b[axis]))
-}
-
-#[test]
-fn no_command_makes_it_leave_the_workspace_jump_or_say_anything_that_is_not_a_number() {
-    let rate = either(SPEED, STREAM_SPEED);
-    let step = rate.map(|v| v * PERIOD * (1.0 + 1e-5));
-    let (broken, seen) = hammer(&plan64(), step, rate, 1_000_000);
-    println!("f64: clear, refused, stale, busy {seen:?}");
-    assert_eq!(broken, None);
-    assert!(seen.iter().all(|count| *count > 10_000), "{seen:?}");
-    let single = plan::<f32, _>(Parallel, vec![spiral(), ring(false), ring(true)]);
-    let (broken, seen) = hammer(&single, step, rate, 1_000_000);
-    println!("f32: clear, refused, stale, busy {seen:?}");
-    assert_eq!(broken, None);
-    assert!(seen.iter().all(|count| *count > 10_000), "{seen:?}");
-}
-
-#[test]
-fn frames_keep_the_workspace_and_the_numbers_too() {
-    // Speeds along other axes and about another point: looser steps, the same walls.
-    let rate = either(SPEED, STREAM_SPEED).map(|_| 0.2);
-    let step = rate.map(|v| v * PERIOD);
-    let trajectories = || vec![spiral(), ring(false), ring(true)];
-    let tool = Tool { point: [0.0, 5e-3, 40e-3], largest_angle: 1e-3 };
-    let (broken, seen) = hammer(&plan(tool, trajectories()), step, rate, 200_000);
-    assert_eq!(broken, None);
-    assert!(seen.iter().all(|count| *count > 1000), "{seen:?}");
-    let work = Work {
-        axes: rotation([0.3, -0.2, 0.7]).map(|row| row.map(|x| x as f32)),
-        point: [0.0, 5e-3, 40e-3],
-        largest_angle: 1e-3,
-    };
-    let single = plan::<f32, _>(work, vec![spiral(), ring(false), ring(true)]);
-    let (broken, seen) = hammer(&single, step, rate, 200_000);
-    assert_eq!(broken, None);
-    assert!(seen.iter().all(|count| *count > 1000), "{seen:?}");
-}
-
-#[test]
-fn the_watch_sees_a_step_an_ulp_too_large_a_pose_outside_and_a_nan() {
-    let watch = || Watch::new([0.0; 6], [1e-6; 6], [1e-3; 6]);
-    let at = |x: f64| Target::at([x, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    assert_eq!(watch().broken(&at(1e-6)), None);
-    assert!(watch().broken(&at(1.000_001e-6)).is_some());
-    assert!(watch().broken(&at(f64::NAN)).is_some());
-    let mut wide = Watch::new([0.0; 6], [1.0; 6], [1e-3; 6]);
-    assert!(wide.broken(&at(BOUND[0])).is_none() && wide.broken(&at(BOUND[0] * (1.0 + 1e-15))).is_some());
-    // A plan whose walls are too wide, or whose stream may jump, is caught by the random commands.
-    let rate = either(SPEED, STREAM_SPEED);
-    let step = rate.map(|v| v * PERIOD * (1.0 + 1e-5));
-    let mut wide = plan64();
-    wide.bound[2] *= 1.02;
-    assert!(hammer(&wide, step, rate, 400_000).0.is_some());
-    let mut fast = plan64();
-    fast.stream_step[2] *= 1.02;
-    assert!(hammer(&fast, step, rate, 400_000).0.is_some());
-}
-
 #[test]
 fn equal_commands_give_equal_digests_and_any_difference_of_state_another() {
     let plan = plan64();
@@ -532,130 +412,4 @@ fn equal_commands_give_equal_digests_and_any_difference_of_state_another() {
     assert_eq!(digest(10, 5e-6), digest(10, 5e-6));
     assert_ne!(digest(10, 5e-6), digest(11, 5e-6));
     assert_ne!(digest(10, 5e-6), digest(10, f64::from_bits(5e-6_f64.to_bits() + 1)));
-}
-
-fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
-}
-
-fn transpose(a: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
-}
-
-/// Rz Ry Rx, factor by factor.
-fn rotation(angles: [f64; 3]) -> [[f64; 3]; 3] {
-    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(f64::sin_cos);
-    let x = [[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]];
-    let y = [[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]];
-    let z = [[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]];
-    product(&product(&z, &y), &x)
-}
-
-const POINT: [f64; 3] = [7e-3, -5e-3, 40e-3];
-const AXES: [f64; 3] = [0.4, -0.3, 1.1];
-
-fn work() -> Work<f64> {
-    Work { axes: rotation(AXES), point: POINT, largest_angle: 0.26 }
-}
-
-/// Pose of P_C by the definition: where the tool point is, which way the platform is turned.
-fn by_definition(user: [f64; 6]) -> [f64; 6] {
-    let w = rotation(AXES);
-    let r = product(&product(&w, &rotation([user[3], user[4], user[5]])), &transpose(&w));
-    let moved = |row: usize| (0..3).map(|k| w[row][k] * user[k]).sum::<f64>();
-    let turned = |row: usize| (0..3).map(|k| r[row][k] * POINT[k]).sum::<f64>();
-    let t: [f64; 3] = std::array::from_fn(|row| moved(row) + POINT[row] - turned(row));
-    [t[0], t[1], t[2], r[2][1].atan2(r[2][2]), (-r[2][0]).asin(), r[1][0].atan2(r[0][0])]
-}
-
-#[test]
-fn work_frames_place_the_tool_point_and_turn_about_it() {
-    let mut random = Random(23);
-    let mut worst = 0.0_f64;
-    for _ in 0..5000 {
-        let size = if random.unit() < 0.5 { 1e-3 } else { 0.25 };
-        let user: [f64; 6] =
-            std::array::from_fn(|axis| (if axis < 3 { 50e-6 } else { size }) * (2.0 * random.unit() - 1.0));
-        let pose = work().to_platform(&Target::at(user)).unwrap().pose;
-        let expected = by_definition(user);
-        for axis in 0..6 {
-            worst = worst.max((pose[axis] - expected[axis]).abs());
-        }
-    }
-    println!("f64 against the definition: {worst:.1e} m, rad");
-    // The definition itself cancels: eps of 40 mm, of a radian.
-    assert!(worst < 4e-16, "{worst:e}");
-    let tool = Tool { point: POINT, largest_angle: 0.26 };
-    let straight = Work { axes: rotation([0.0; 3]), ..work() };
-    let user = Target {
-        pose: [1e-6, 2e-6, 3e-6, 0.1, -0.2, 0.05],
-        rate: [0.1; 6],
-        acceleration: [0.3, 1.0, -2.0, 0.4, 0.5, 0.6],
-    };
-    let (a, b) = (tool.to_platform(&user).unwrap(), straight.to_platform(&user).unwrap());
-    for (a, b) in [(a.pose, b.pose), (a.rate, b.rate), (a.acceleration, b.acceleration)] {
-        for axis in 0..6 {
-            assert!((a[axis] - b[axis]).abs() < 1e-15, "{a:?} {b:?}");
-        }
-    }
-}
-
-#[test]
-fn rates_and_accelerations_through_frames_are_the_derivatives_of_the_pose() {
-    // A smooth motion of large angles; differences of the platform's coordinates in time.
-    let user = |t: f64| {
-        let phase = |axis: usize| 3.0 * t + 0.7 * axis as f64;
-        let size = |axis: usize| if axis < 3 { 1e-3 } else { 0.2 };
-        Target {
-            pose: std::array::from_fn(|axis| size(axis) * phase(axis).sin()),
-            rate: std::array::from_fn(|axis| 3.0 * size(axis) * phase(axis).cos()),
-            acceleration: std::array::from_fn(|axis| -9.0 * size(axis) * phase(axis).sin()),
-        }
-    };
-    let h = 1e-4;
-    for k in 0..300 {
-        let t = 0.01 * f64::from(k);
-        let [before, here, after] = [t - h, t, t + h].map(|t| work().to_platform(&user(t)).unwrap());
-        for axis in 0..6 {
-            let rate = (after.pose[axis] - before.pose[axis]) / (2.0 * h);
-            let acceleration = (after.rate[axis] - before.rate[axis]) / (2.0 * h);
-            assert!((rate - here.rate[axis]).abs() < 1e-7, "axis {axis}: {rate} {}", here.rate[axis]);
-            assert!((acceleration - here.acceleration[axis]).abs() < 3e-7, "axis {axis}");
-        }
-    }
-}
-
-#[test]
-fn frames_in_single_precision_keep_a_tenth_of_a_nanometre() {
-    let mut random = Random(29);
-    let single = Work {
-        axes: work().axes.map(|row| row.map(|x| x as f32)),
-        point: POINT.map(|x| x as f32),
-        largest_angle: 0.01,
-    };
-    let exact = Work {
-        axes: single.axes.map(|row| row.map(f64::from)),
-        point: single.point.map(f64::from),
-        largest_angle: 0.01,
-    };
-    let mut worst = [0.0_f64; 2];
-    for _ in 0..5000 {
-        let user: [f32; 6] =
-            std::array::from_fn(|axis| ((if axis < 3 { 50e-6 } else { 0.4e-3 }) * (2.0 * random.unit() - 1.0)) as f32);
-        let a = single.to_platform(&Target::at(user)).unwrap().pose;
-        let b = exact.to_platform(&Target::at(user.map(f64::from))).unwrap().pose;
-        for axis in 0..6 {
-            let worst = &mut worst[axis / 3];
-            *worst = worst.max((f64::from(a[axis]) - b[axis]).abs());
-        }
-    }
-    println!("f32 frames against f64: {:.1e} m, {:.1e} rad", worst[0], worst[1]);
-    assert!(worst[0] < 0.02e-9 && worst[1] < 0.2e-9, "{worst:?}");
-}
-
-#[test]
-fn an_angle_beyond_what_is_meant_is_refused() {
-    for bad in [0.27, -0.27, 6.3, 1e300, f64::NAN, f64::INFINITY] {
-        assert!(work().to_platform(&Target::at([0.0, 0.0, 0.0, 0.0, bad, 0.0])).is_none(), "{bad}");
-    }
 }

@@ -1,0 +1,390 @@
+//! Numbers that remember how they were made: the kernels of the controller, run on them, give a bound on their own rounding
+//! errors over a box of poses.
+//!
+//! Each operation leaves a [`Node`]: what it may round off itself, and by how much its result moves with its operands. What
+//! the controller computes, less what it would compute without rounding, is the sum over all nodes of their own error times
+//! the result's derivative by that node. Both are known as ranges over the box, so one sweep backwards bounds the error, and an
+//! error that reaches the result by several ways counts once, with its sign. Derivatives are those of the numbers as computed;
+//! what is left, products of two errors, is part of the nodes' own errors: nothing is neglected.
+
+use core::cmp::Ordering;
+use core::ops::{Add, Div, Mul, Neg, Sub};
+use std::cell::RefCell;
+
+use specgen_runtime::Real;
+
+use super::form::{Form, magnitude, times};
+
+/// What is computed lies in `form`; without any rounding it would differ by `error` at most.
+///
+/// `SINGLE`: the controller computes in `f32`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Traced<const SINGLE: bool> {
+    form: Form,
+    error: f64,
+    /// Its node; none for what is exact.
+    node: Option<u32>,
+}
+
+/// One operation.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    /// Operands that may be off, with the derivative of the result by each.
+    by: [Option<(u32, [f64; 2])>; 2],
+    /// Largest own error, of either sign.
+    own: f64,
+    /// Own error that is known: that of a rounded constant.
+    known: [f64; 2],
+}
+
+thread_local! {
+    /// [`Real`] is `Copy + 'static`, so the numbers cannot carry a reference to their record.
+    static NODES: RefCell<Vec<Node>> = const { RefCell::new(Vec::new()) };
+}
+
+/// The record of a computation.
+pub(super) struct Trace(Vec<Node>);
+
+/// Runs a computation and keeps its record.
+pub(super) fn trace<R>(run: impl FnOnce() -> R) -> (R, Trace) {
+    NODES.with(|nodes| nodes.borrow_mut().clear());
+    let result = run();
+    (result, Trace(NODES.with(RefCell::take)))
+}
+
+fn record(node: Node) -> Option<u32> {
+    NODES.with(|nodes| {
+        let mut nodes = nodes.borrow_mut();
+        let id = u32::try_from(nodes.len()).ok();
+        nodes.push(node);
+        id
+    })
+}
+
+/// The bounds themselves are computed in doubles: a part in 10¹³ covers that.
+const ROUND_UP: f64 = 1.0 + 1e-13;
+/// Exponent bits of a double: what is left of a positive number is the power of two below it.
+const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+
+impl Trace {
+    /// The record so far, while it is being made.
+    pub(super) fn peek<R>(look: impl FnOnce(&Self) -> R) -> R {
+        let record = Self(NODES.with(|nodes| nodes.borrow().clone()));
+        look(&record)
+    }
+
+    /// How much Σ `weights`·results may be off.
+    pub(super) fn error<const SINGLE: bool>(&self, results: &[(Traced<SINGLE>, f64)]) -> f64 {
+        let derivatives = self.derivatives(results);
+        let mut own = 0.0;
+        let mut known = [0.0; 2];
+        for (node, derivative) in self.0.iter().zip(&derivatives) {
+            own += node.own * magnitude(*derivative);
+            let [low, high] = times(node.known, *derivative);
+            known = [known[0] + low, known[1] + high];
+        }
+        (own + magnitude(known)) * ROUND_UP
+    }
+
+    /// Range of the derivative of Σ `weights`·results by `number`.
+    pub(super) fn derivative<const SINGLE: bool>(
+        &self,
+        results: &[(Traced<SINGLE>, f64)],
+        number: Traced<SINGLE>,
+    ) -> [f64; 2] {
+        let derivatives = self.derivatives(results);
+        number.node.and_then(|node| derivatives.get(node as usize).copied()).unwrap_or([0.0; 2])
+    }
+
+    /// By every node.
+    fn derivatives<const SINGLE: bool>(&self, results: &[(Traced<SINGLE>, f64)]) -> Vec<[f64; 2]> {
+        let mut derivatives = vec![[0.0; 2]; self.0.len()];
+        for (result, weight) in results {
+            if let Some(node) = result.node {
+                let at = &mut derivatives[node as usize];
+                *at = [at[0] + weight, at[1] + weight];
+            }
+        }
+        // Operands come before what is made of them.
+        for id in (0..self.0.len()).rev() {
+            let derivative = derivatives[id];
+            for (operand, by) in self.0[id].by.into_iter().flatten() {
+                let [low, high] = times(by, derivative);
+                let at = &mut derivatives[operand as usize];
+                *at = [at[0] + low, at[1] + high];
+            }
+        }
+        derivatives
+    }
+}
+
+impl<const SINGLE: bool> Traced<SINGLE> {
+    /// Half a last bit of 1.
+    const UNIT: f64 = if SINGLE { 5.960_464_477_539_063e-8 } else { 1.110_223_024_625_156_5e-16 };
+
+    /// Coordinate `axis` of the pose, anywhere from `low` to `high`, exact.
+    pub(super) fn coordinate(axis: usize, low: f64, high: f64) -> Self {
+        Self { form: Form::coordinate(axis, [low, high]), error: 0.0, node: None }
+    }
+
+    /// A constant of the controller; what it stands for is smaller by something from `low` to `high`.
+    pub(super) fn constant(value: f64, [low, high]: [f64; 2]) -> Self {
+        Self::exact(Form::constant(value)).off_by([low, high])
+    }
+
+    /// The same, counted as exact: an input of what follows. It keeps a node, to take derivatives by.
+    pub(super) fn given(self) -> Self {
+        Self::exact(self.form.widened(self.error)).noted()
+    }
+
+    /// A number that an exact one is `low` to `high` below.
+    pub(super) fn off_by(self, known: [f64; 2]) -> Self {
+        if known == [0.0; 2] {
+            return self;
+        }
+        let by = [self.node.map(|node| (node, [1.0; 2])), None];
+        Self {
+            form: self.form,
+            error: self.error + magnitude(known) * ROUND_UP,
+            node: record(Node { by, own: 0.0, known }),
+        }
+    }
+
+    /// Anywhere up to `more` from where it was.
+    pub(super) fn widened(self, more: f64) -> Self {
+        Self { form: self.form.widened(more), ..self }
+    }
+
+    const fn exact(form: Form) -> Self {
+        Self { form, error: 0.0, node: None }
+    }
+
+    fn noted(self) -> Self {
+        Self { node: record(Node { by: [None; 2], own: 0.0, known: [0.0; 2] }), ..self }
+    }
+
+    /// Smallest and largest value.
+    pub(super) const fn range(self) -> [f64; 2] {
+        self.form.range()
+    }
+
+    /// Largest magnitude.
+    pub(super) fn magnitude(self) -> f64 {
+        self.form.magnitude()
+    }
+
+    /// Whether the controller adds nothing here.
+    fn nothing(self) -> bool {
+        self.form.point() == Some(0.0) && self.error == 0.0
+    }
+
+    /// The result of an operation. `most`: no more than this is rounded off. `crossed`: product of the errors of two operands.
+    fn rounded(form: Form, by: [(Self, [f64; 2]); 2], most: f64, crossed: f64) -> Self {
+        // Half a last bit is the same all over a binade: that of its lower end.
+        let largest = form.magnitude() * ROUND_UP;
+        let half_bit = Self::UNIT * f64::from_bits(largest.to_bits() & EXPONENT);
+        let rounding = if half_bit < most { half_bit } else { most };
+        let carried = by.iter().fold(0.0, |sum, (operand, by)| sum + operand.error * magnitude(*by));
+        let own = rounding + crossed;
+        let by = by.map(|(operand, by)| operand.node.map(|node| (node, by)));
+        let node = if own == 0.0 && by == [None; 2] { None } else { record(Node { by, own, known: [0.0; 2] }) };
+        Self { form: form.widened(rounding), error: (carried + own) * ROUND_UP, node }
+    }
+}
+
+impl<const SINGLE: bool> Add for Traced<SINGLE> {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        if self.nothing() {
+            return other;
+        }
+        if other.nothing() {
+            return self;
+        }
+        // Rounding moves a sum less than its smaller part: keeping the larger would be as near.
+        let (a, b) = (self.magnitude(), other.magnitude());
+        let most = if a < b { a } else { b };
+        Self::rounded(self.form.plus(other.form), [(self, [1.0; 2]), (other, [1.0; 2])], most, 0.0)
+    }
+}
+
+impl<const SINGLE: bool> Neg for Traced<SINGLE> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        let by = [self.node.map(|node| (node, [-1.0; 2])), None];
+        let node = self.node.and_then(|_| record(Node { by, own: 0.0, known: [0.0; 2] }));
+        Self { form: self.form.negative(), error: self.error, node }
+    }
+}
+
+impl<const SINGLE: bool> Sub for Traced<SINGLE> {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+/// A factor by which products are exact.
+fn is_power_of_two(value: f64) -> bool {
+    value.is_normal() && value.to_bits().trailing_zeros() >= 52
+}
+
+impl<const SINGLE: bool> Mul for Traced<SINGLE> {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        // ã b̃ − a b = ã δb + b̃ δa − δa δb.
+        let by = [(self, other.range()), (other, self.range())];
+        let crossed = self.error * other.error;
+        for (a, b) in [(self, other), (other, self)] {
+            if let Some(factor) = a.form.point().filter(|factor| *factor == 0.0 || is_power_of_two(*factor)) {
+                return Self::rounded(b.form.scaled(factor), by, 0.0, crossed);
+            }
+        }
+        Self::rounded(self.form.product(other.form), by, f64::INFINITY, crossed)
+    }
+}
+
+impl<const SINGLE: bool> Div for Traced<SINGLE> {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        let nearest = other.form.nearest();
+        if nearest <= other.error || nearest == 0.0 {
+            let everything = Form::constant(0.0).widened(f64::INFINITY);
+            return Self { form: everything, error: f64::INFINITY, node: None };
+        }
+        // With q = a/b: ã/b̃ − q = (δa − q δb)/b̃, and q = ã/b̃ less the error of the quotient.
+        let inverse = other.form.inverse();
+        let quotient = self.form.product(inverse);
+        let [low, high] = times(quotient.range(), inverse.range());
+        let by = [(self, inverse.range()), (other, [-high, -low])];
+        let off = (self.error + quotient.magnitude() * other.error) / (nearest - other.error);
+        let most = match other.form.point() {
+            Some(divisor) if is_power_of_two(divisor) => 0.0,
+            _ => f64::INFINITY,
+        };
+        Self::rounded(quotient, by, most, off * other.error / nearest)
+    }
+}
+
+impl<const SINGLE: bool> PartialEq for Traced<SINGLE> {
+    /// The kernels that are run on this type compare with zero constants only.
+    fn eq(&self, other: &Self) -> bool {
+        self.error == 0.0
+            && other.error == 0.0
+            && self.form.point().is_some()
+            && self.form.point() == other.form.point()
+    }
+}
+
+impl<const SINGLE: bool> PartialOrd for Traced<SINGLE> {
+    /// By ranges that do not overlap.
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        let ([low, high], [other_low, other_high]) = (self.range(), other.range());
+        if self == other {
+            Some(Ordering::Equal)
+        } else if high < other_low {
+            Some(Ordering::Less)
+        } else if low > other_high {
+            Some(Ordering::Greater)
+        } else {
+            None
+        }
+    }
+}
+
+impl<const SINGLE: bool> Real for Traced<SINGLE> {
+    const ZERO: Self = Self::exact(Form::constant(0.0));
+    const HALF: Self = Self::exact(Form::constant(0.5));
+    const ONE: Self = Self::exact(Form::constant(1.0));
+    const SINGLE: bool = SINGLE;
+
+    fn from_f64(value: f64) -> Self {
+        let kept = if SINGLE { f64::from(value as f32) } else { value };
+        Self::constant(kept, [kept - value; 2])
+    }
+    fn truncate(self) -> i32 {
+        self.range()[0] as i32
+    }
+    fn from_i32(value: i32) -> Self {
+        Self::from_f64(f64::from(value))
+    }
+    fn is_finite(self) -> bool {
+        self.magnitude().is_finite() && self.error.is_finite()
+    }
+    fn abs(self) -> Self {
+        match self.partial_cmp(&Self::ZERO) {
+            Some(Ordering::Less) => -self,
+            Some(_) => self,
+            // Of either sign: the derivative is somewhere from −1 to 1.
+            None => {
+                let half = 0.5 * self.magnitude();
+                let form = Form::constant(half).widened(half);
+                Self::rounded(form, [(self, [-1.0, 1.0]), (Self::ZERO, [0.0; 2])], 0.0, 0.0)
+            }
+        }
+    }
+    fn to_word(self) -> u64 {
+        self.range()[0].to_bits()
+    }
+    fn from_word(word: u64) -> Self {
+        Self::from_f64(f64::from_bits(word))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Single = Traced<true>;
+
+    /// Bound of what `run` makes of two coordinates from 1 to 1.001.
+    fn bound(run: impl Fn(Single, Single) -> Single) -> f64 {
+        let (result, trace) = trace(|| run(Single::coordinate(0, 1.0, 1.001), Single::coordinate(1, 1.0, 1.001)));
+        trace.error(&[(result, 1.0)])
+    }
+
+    #[test]
+    fn single_precision_stays_within_its_bound_and_near_it() {
+        // x² − y² where much cancels, over x + y: f32 against f64.
+        let bound = bound(|x, y| (x * x - y * y) / (x + y));
+        let mut worst = 0.0_f64;
+        for k in 0..20_000_u32 {
+            let a = (1.0 + 0.001 * f64::from(k) / 20_000.0) as f32;
+            let b = (1.001 - 0.001 * f64::from(k * 7 % 20_000) / 20_000.0) as f32;
+            let (x, y) = (f64::from(a), f64::from(b));
+            worst = worst.max((f64::from((a * a - b * b) / (a + b)) - (x * x - y * y) / (x + y)).abs());
+        }
+        assert!(worst <= bound && bound < 2.0 * worst, "{worst:e} {bound:e}");
+    }
+
+    #[test]
+    fn an_error_that_comes_twice_counts_with_its_sign() {
+        // The same product taken and given back: nothing of its rounding is left but that of the sum.
+        let twice = bound(|x, y| {
+            let product = x * y;
+            (product + x) - product
+        });
+        let once = bound(|x, y| x * y + x);
+        assert!(twice < 1.5 * once, "{twice:e} {once:e}");
+        let apart = bound(|x, y| (x * y + x) - y * x);
+        assert!(apart > twice, "{apart:e} {twice:e}");
+    }
+
+    #[test]
+    fn a_divisor_that_may_be_zero_has_no_bound() {
+        let (quotient, _) = trace(|| Single::ONE / Single::coordinate(0, -1.0, 1.0));
+        assert!(!quotient.is_finite());
+        let (good, _) = trace(|| Single::ONE / Single::coordinate(0, 2.0, 4.0));
+        assert!(good.is_finite() && good.magnitude() >= 0.5);
+    }
+
+    #[test]
+    fn exact_operations_have_no_error_and_constants_theirs() {
+        assert_eq!(bound(|x, _| x * Single::HALF), 0.0);
+        assert_eq!(bound(|x, _| x + Single::ZERO), 0.0);
+        assert!(bound(|x, _| x + x) > 0.0);
+        let kept = f64::from(0.1_f32) - 0.1;
+        let found = bound(|_, _| Single::from_f64(0.1) + Single::from_f64(0.1));
+        assert!(found >= 2.0 * kept.abs());
+    }
+}
