@@ -9,18 +9,23 @@ use std::fs;
 
 use support::{Folder, repository};
 
-const DOCUMENTS: [&str; 11] = [
+const DOCUMENTS: [&str; 16] = [
     "README.md",
     "ARCHITECTURE.md",
+    "docs/bring-up.md",
     "docs/control-law.md",
+    "docs/guide.md",
     "docs/hysteresis.md",
     "docs/identification.md",
+    "docs/images.md",
     "docs/tuning.md",
     "docs/robustness.md",
     "docs/report.md",
     "docs/pil.md",
     "docs/supervisor.md",
     "docs/recorder.md",
+    "docs/rt-pc.md",
+    "docs/spec-reference.md",
 ];
 
 fn read(name: &str) -> String {

@@ -163,12 +163,7 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
         assert!(printed.contains(text), "{printed}");
     }
     let script = ["reference.toml", "arm", "wait arming 20", "run", "wait running 20", "wait 30"];
-    let running = board
-        .operate(&folder, &script)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let running = board.operate(&folder, &script).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait(&board, Phase::Running);
     board.fails.store(true, Ordering::Relaxed);
     let output = running.wait_with_output().unwrap();
@@ -182,8 +177,7 @@ fn ctrl_c_ramps_down_and_waits() {
     let folder = Folder::new();
     let board = Served::new(&folder);
     let script = ["reference.toml", "arm", "wait arming 20", "run", "wait running 20", "wait 60"];
-    let running =
-        board.operate(&folder, &script).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let running = board.operate(&folder, &script).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait(&board, Phase::Running);
     let process = rustix::process::Pid::from_raw(running.id().cast_signed()).unwrap();
     rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();

@@ -21,6 +21,7 @@ use crate::compile::{self, Compiled};
 const SHOWN: usize = 20;
 /// Arguments of `replay`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::REPLAY)]
 pub struct Arguments {
     /// The record: from a target, from `specgen sim --record` or from `rt-pc --record`.
     record: PathBuf,
