@@ -1,81 +1,30 @@
-//! A board, its tick, its recorder and its waves, through the frames of the link: what is downloaded replays bit for bit on the
-//! host, whatever happens to the line; a lock-step computes what the host computes and moves nothing.
+//! What a board recorded, through the frames of the link: what is downloaded replays bit for bit on the host, whatever happens
+//! to the line, to the settings, or to the machine in between.
 
 mod board_support;
 
 use std::io::Cursor;
 
-use board_support::Line;
-use controller::supervised::{MACHINE_INPUT_WORDS, Machine, MachineInput, Phase, machine_output_words, supervise};
-use controller::{CONFIG_WORDS, Config, ControlMode};
+use board_support::{Line, bytes, done, refused, running, wait, wave};
+use controller::supervised::Phase;
+use controller::{Config, ControlMode};
 use host_sim::controller::Supervised;
 use host_sim::record::{Reader, Replay, replay};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen_board::COMMAND_WORDS;
-use specgen_link::client::{Client, ClientError};
+use specgen_link::client::Client;
 use specgen_link::{Bytes, RecorderAction, RecorderStatus, Refusal, Reply, Request, WaveAction};
-use specgen_runtime::wave::{AxisWave, Refused, Settings, Shape, Tone, step_of};
 use specgen_tests::Emitted;
 
 /// Words of the recorder's memory: eight blocks of some 200 ticks.
 const RECORD: usize = 40_000;
-const PERIOD: f64 = controller::PERIOD_SECONDS;
-
-fn bytes(words: &[u64]) -> Vec<u8> {
-    words.iter().flat_map(|word| word.to_le_bytes()).collect()
-}
-
-fn done(client: &mut Client<Line>, request: &Request<'_>) {
-    assert_eq!(client.ask(request).unwrap(), Reply::Done, "{request:?}");
-}
-
-fn refused(client: &mut Client<Line>, request: &Request<'_>) -> Refusal {
-    match client.ask(request) {
-        Err(ClientError::Refused(refusal)) => refusal,
-        other => panic!("{request:?}: {other:?}"),
-    }
-}
 
 fn record(client: &mut Client<Line>, action: RecorderAction) -> RecorderStatus {
     match client.ask(&Request::Recorder { action }).unwrap() {
         Reply::Recorder(status) => status,
         other => panic!("{other:?}"),
     }
-}
-
-/// Asks for status until the machine is where it is to be.
-fn wait(line: &Line, client: &mut Client<Line>, what: &str, mut there: impl FnMut(&Line) -> bool) {
-    for _ in 0..20_000 {
-        client.ask(&Request::Status).unwrap();
-        if there(line) {
-            return;
-        }
-    }
-    panic!("{what}: still {:?}", line.with(|rig| rig.exchange.report));
-}
-
-/// Armed, running, at the bias pose.
-fn running(line: &Line, client: &mut Client<Line>) {
-    line.with(|rig| rig.pace = 50);
-    done(client, &Request::Supervise { request: 1 });
-    wait(line, client, "arming", |line| line.phase() == Phase::Arming);
-    done(client, &Request::Supervise { request: 2 });
-    wait(line, client, "running", |line| line.phase() == Phase::Running);
-    let busy = |line: &Line| line.with(|rig| rig.exchange.report.status & controller::GENERATOR_BUSY != 0);
-    wait(line, client, "bias", |line| !busy(line));
-    line.with(|rig| rig.pace = 3);
-}
-
-fn wave(amplitude: f64, frequency: f64) -> Settings<f64> {
-    let mut settings = Settings::still();
-    for (axis, wave) in settings.axes.iter_mut().enumerate() {
-        let scale = if axis < 3 { 1.0 } else { 10.0 };
-        let tone = Tone { amplitude: amplitude * scale, phase: 0, step: step_of(frequency + axis as f64, PERIOD) };
-        *wave = AxisWave { offset: 0.0, shape: Shape::Sine { tone } };
-    }
-    settings.ramp_ticks = 300;
-    settings
 }
 
 fn again(bytes: &[u8], machine: &mut Supervised) -> Replay {
@@ -164,106 +113,23 @@ fn what_a_board_recorded_is_downloaded_and_replays_bit_for_bit() {
     assert!(!status.running && status.triggered, "{status:?}");
     let found = again(&download(&mut client), &mut machine);
     assert_eq!((found.divergence, found.triggers.len()), (None, 1));
-}
 
-#[test]
-fn a_wave_is_refused_with_its_reason_and_a_host_that_falls_silent_ends_it() {
-    let line = Line::new(RECORD);
-    let mut client = line.client(2);
-    let start = |client: &mut Client<Line>, settings: &Settings<f64>| {
-        let words = bytes(&settings.to_words());
-        match client.ask(&Request::Wave { action: WaveAction::Start, words: Bytes(&words) }) {
-            Ok(Reply::Done) => None,
-            Err(ClientError::Refused(refusal)) => Some(refusal),
-            other => panic!("{other:?}"),
-        }
-    };
-    client.ask(&Request::Status).unwrap();
-    assert_eq!(start(&mut client, &wave(1e-6, 5.0)), Some(Refusal::State), "not running");
-    running(&line, &mut client);
-    let mut far = wave(1e-6, 5.0);
-    far.axes[2].offset = 1e-3;
-    let why = |refusal: Option<Refusal>| match refusal {
-        Some(Refusal::Word { index }) => Refused::of_word(usize::from(index)),
-        other => panic!("{other:?}"),
-    };
-    assert_eq!(why(start(&mut client, &far)), Refused::Range(2));
-    assert_eq!(why(start(&mut client, &wave(2e-5, 60.0))), Refused::Rate(0));
-    assert_eq!(why(start(&mut client, &wave(5e-7, 1590.0))), Refused::Acceleration(0));
-    assert!(!line.with(|rig| rig.exchange.waves()));
-    assert_eq!(start(&mut client, &wave(1e-6, 5.0)), None);
+    // A lock-step in between resets the machine: what comes after it is a record of its own, and replays as well.
+    line.parts(|parts| parts.fails = false);
+    line.tick(10);
+    for request in [4, 5] {
+        done(&mut client, &Request::Supervise { request });
+        line.tick(100);
+    }
+    wait(&line, &mut client, "rest", |line| line.phase() == Phase::Disarmed);
+    record(&mut client, RecorderAction::Arm { after: 100 });
     line.tick(100);
-    let waving = line.with(|rig| (rig.exchange.waves(), rig.exchange.report.status));
-    assert_eq!((waving.0, waving.1 & controller::SETPOINT_FAULT), (true, 0));
-    // 0.1 s of silence: the supervisor holds.
-    line.tick(1100);
-    assert!(!line.with(|rig| rig.exchange.waves()));
-    assert_eq!(line.phase(), Phase::Holding);
-}
-
-/// Random inputs of a lock-step, those that arm the machine before them.
-fn inputs(random: &mut ChaCha8Rng, tick: u32) -> [u64; MACHINE_INPUT_WORDS] {
-    let mut words = [0; MACHINE_INPUT_WORDS];
-    for word in &mut words[21..27] {
-        *word = ((f64::from(random.next_u32()) / f64::from(u32::MAX) - 0.5) * 4e-9).to_bits();
-    }
-    words[0] = u64::from(random.next_u32() % 4);
-    words[MACHINE_INPUT_WORDS - 2] = if tick < 10 { 1 } else { 2 };
-    words
-}
-
-#[test]
-fn a_lock_step_computes_what_the_host_computes_and_moves_nothing() {
-    let line = Line::new(RECORD);
-    let mut client = line.client(3);
-    line.with(|rig| rig.pace = 1);
-    client.ask(&Request::Status).unwrap();
-    let at_rest = line.parts(|parts| parts.written).unwrap();
-    let config = Config::new().with_mode(ControlMode::from_word(3).unwrap());
-    let words = bytes(&config.to_words());
-    assert_eq!(words.len(), CONFIG_WORDS * 8);
-    done(&mut client, &Request::LockstepReset { config: Bytes(&words) });
-    let mut random = ChaCha8Rng::seed_from_u64(9);
-    let (mut machine, mut moved) = (Machine::new(), 0);
-    for tick in 0..2500 {
-        let input = inputs(&mut random, tick);
-        let output = supervise(&config, &mut machine, &MachineInput::from_words(&input));
-        let (digest, words) = match client.ask(&Request::LockstepStep { input: Bytes(&bytes(&input)) }).unwrap() {
-            Reply::Stepped { digest, output, .. } => (digest, output.0.to_vec()),
-            other => panic!("{other:?}"),
-        };
-        assert_eq!(digest, machine.digest(), "tick {tick}");
-        assert!(words == bytes(&machine_output_words(&output, &machine)), "tick {tick}");
-        moved += u32::from(output.amplifier_on && output.tick.dac_code != at_rest);
-    }
-    assert!(moved > 100, "the machine in lock-step went nowhere: this tested nothing");
-    line.parts(|parts| assert_eq!((parts.written, parts.switched_on), (Some(at_rest), 0)));
-    // Nobody gives other orders meanwhile.
-    assert_eq!(refused(&mut client, &Request::Supervise { request: 1 }), Refusal::State);
-    let settings = wave(1e-6, 5.0).to_words();
-    let start = Request::Wave { action: WaveAction::Start, words: Bytes(&bytes(&settings)) };
-    assert_eq!(refused(&mut client, &start), Refusal::State);
-    // Two seconds of silence give the machine back, as at power-up.
-    line.tick(19_990);
-    assert!(line.with(|rig| rig.exchange.lockstep.is_some()));
-    line.tick(20);
-    let input = bytes(&inputs(&mut random, 0));
-    assert_eq!(refused(&mut client, &Request::LockstepStep { input: Bytes(&input) }), Refusal::State);
-    line.with(|rig| assert_eq!(rig.exchange.config.to_words(), Config::new().to_words()));
-    // So does a host that comes anew, and then the platform can be run; a host that wants a lock-step then cannot have it.
-    done(&mut client, &Request::LockstepReset { config: Bytes(&words) });
-    let mut client = line.client(4);
-    assert_eq!(refused(&mut client, &Request::LockstepStep { input: Bytes(&input) }), Refusal::State);
-    assert!(line.with(|rig| rig.exchange.lockstep.is_none()));
-    running(&line, &mut client);
-    assert_eq!(refused(&mut client, &Request::LockstepReset { config: Bytes(&words) }), Refusal::State);
-    assert_eq!(line.phase(), Phase::Running);
-    // The record goes on over it: two pieces, each of which replays.
-    line.with(|rig| rig.pace = 1);
+    done(&mut client, &Request::LockstepReset { config: Bytes(&bytes(&Config::new().to_words())) });
+    line.tick(10);
+    let mut client = line.client(7);
+    line.tick(100);
     record(&mut client, RecorderAction::Stop);
-    let bytes = download(&mut client);
-    let emitted = Emitted::new("board-link", "reference.toml", &[]);
-    let found = again(&bytes, &mut Supervised::new(emitted.controller()).unwrap());
+    let found = again(&download(&mut client), &mut machine);
     assert_eq!((found.divergence, found.damaged.len()), (None, 0));
-    assert!(found.ticks > 1000, "{}", found.ticks);
+    assert!(found.blocks >= 2 && found.ticks > 190, "{} ticks in {} blocks", found.ticks, found.blocks);
 }

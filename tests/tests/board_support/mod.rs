@@ -19,7 +19,9 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen_board::{Board, Desk, Exchange, Noticed, Uncounted, Visit, recorder};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::Endpoint;
-use specgen_link::client::{Client, Patience, Port};
+use specgen_link::client::{Client, ClientError, Patience, Port};
+use specgen_link::{Refusal, Reply, Request};
+use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
 /// Converters: codes of the gauges, and what the amplifiers were told last.
 #[derive(Clone, Default)]
@@ -180,4 +182,53 @@ impl Port for Line {
         }
         Ok(count)
     }
+}
+
+pub fn bytes(words: &[u64]) -> Vec<u8> {
+    words.iter().flat_map(|word| word.to_le_bytes()).collect()
+}
+
+pub fn done(client: &mut Client<Line>, request: &Request<'_>) {
+    assert_eq!(client.ask(request).unwrap(), Reply::Done, "{request:?}");
+}
+
+pub fn refused(client: &mut Client<Line>, request: &Request<'_>) -> Refusal {
+    match client.ask(request) {
+        Err(ClientError::Refused(refusal)) => refusal,
+        other => panic!("{request:?}: {other:?}"),
+    }
+}
+
+/// Asks for status until the machine is where it is to be.
+pub fn wait(line: &Line, client: &mut Client<Line>, what: &str, mut there: impl FnMut(&Line) -> bool) {
+    for _ in 0..20_000 {
+        client.ask(&Request::Status).unwrap();
+        if there(line) {
+            return;
+        }
+    }
+    panic!("{what}: still {:?}", line.with(|rig| rig.exchange.report));
+}
+
+/// Armed, running, at the bias pose.
+pub fn running(line: &Line, client: &mut Client<Line>) {
+    line.with(|rig| rig.pace = 50);
+    done(client, &Request::Supervise { request: 1 });
+    wait(line, client, "arming", |line| line.phase() == Phase::Arming);
+    done(client, &Request::Supervise { request: 2 });
+    wait(line, client, "running", |line| line.phase() == Phase::Running);
+    let busy = |line: &Line| line.with(|rig| rig.exchange.report.status & controller::GENERATOR_BUSY != 0);
+    wait(line, client, "bias", |line| !busy(line));
+    line.with(|rig| rig.pace = 3);
+}
+
+pub fn wave(amplitude: f64, frequency: f64) -> Settings<f64> {
+    let mut settings = Settings::still();
+    for (axis, wave) in settings.axes.iter_mut().enumerate() {
+        let scale = if axis < 3 { 1.0 } else { 10.0 };
+        let tone = Tone { amplitude: amplitude * scale, phase: 0, step: step_of(frequency + axis as f64, controller::PERIOD_SECONDS) };
+        *wave = AxisWave { offset: 0.0, shape: Shape::Sine { tone } };
+    }
+    settings.ramp_ticks = 300;
+    settings
 }
