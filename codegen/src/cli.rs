@@ -13,6 +13,7 @@ mod file;
 mod firmware;
 mod identify;
 mod identify_rate;
+mod operate;
 mod pil;
 mod plant;
 mod replay;
@@ -79,6 +80,8 @@ enum Command {
     Reproduce(reproduce::Arguments),
     /// Close the loop of a simulated machine with the program of a microcontroller, emulated or at a serial port.
     Pil(pil::Arguments),
+    /// Operate a machine over the link: arm, run, set-points, settings, waves, records; from a script or line by line.
+    Operate(operate::Arguments),
     /// Run a record of a target again on the host and compare every tick by bits; export it as CSV.
     Replay(replay::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
@@ -127,6 +130,7 @@ pub fn run() -> ExitCode {
         Some(Command::Report(arguments)) => report::run(arguments, &mut ui),
         Some(Command::Reproduce(arguments)) => reproduce::run(arguments, &mut ui),
         Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
+        Some(Command::Operate(arguments)) => operate::run(arguments, &mut ui),
         Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
@@ -151,7 +155,7 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
             ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, report, reproduce, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir, completions) with its own arguments",
+            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, report, reproduce, pil, operate, replay, dynamics, identify, forc, plant, doctor, dump-ir, completions) with its own arguments",
         ),
         _ => error,
     };

@@ -11,7 +11,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 18] = [
+const COMMANDS: [&str; 19] = [
     "check",
     "build",
     "size",
@@ -22,6 +22,7 @@ const COMMANDS: [&str; 18] = [
     "report",
     "reproduce",
     "pil",
+    "operate",
     "replay",
     "dynamics",
     "identify",
@@ -47,7 +48,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
         (
             &["chek", "legs.toml"],
-            "check, build, size, flash, sim, tune, robust, report, reproduce, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir, completions",
+            "check, build, size, flash, sim, tune, robust, report, reproduce, pil, operate, replay, dynamics, identify, forc, plant, doctor, dump-ir, completions",
         ),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
@@ -80,6 +81,12 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["pil", "reference.toml", "--scenario", "case-3"], "there is no scenario `case-3`"),
         (&["pil", "reference.toml", "--samples", "100"], "runs at its timing.period"),
         (&["pil", "reference.toml", "--trajectory", "case-3"], "but not `case-3`"),
+        (&["operate"], "--port"),
+        (&["operate", "--port", "x", "--socket", "y"], "cannot be used with"),
+        (&["operate", "--socket", "y", "--baud", "9600"], "--port"),
+        (&["operate", "--socket", "y", "legs.toml", "go"], "`go` is none of: status, arm"),
+        (&["operate", "--socket", "y", "--script", "none.txt"], "could not read `none.txt`"),
+        (&["operate", "--socket", "y", "--script", "none.txt", "arm"], "exclude each other"),
         (&["forc"], "--output"),
         (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),
         (&["plant"], "<SPEC>"),
