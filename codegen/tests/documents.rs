@@ -48,7 +48,13 @@ fn links_lead_somewhere() {
             let target = part.split(')').next().unwrap();
             if !target.contains("://") {
                 links += 1;
-                assert!(folder.join(target).exists(), "{name} links to {target}");
+                let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+                assert!(folder.join(file).exists(), "{name} links to {target}");
+                let is_heading = |line: &str| {
+                    line.starts_with('#') && line.to_lowercase().replace(' ', "-").ends_with(&format!("#-{anchor}"))
+                };
+                let found = anchor.is_empty() || fs::read_to_string(folder.join(file)).unwrap().lines().any(is_heading);
+                assert!(found, "{name} links to {target}");
             }
         }
     }

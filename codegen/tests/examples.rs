@@ -13,9 +13,6 @@ use std::time::Instant;
 use support::commands::{Line, blocks, shell};
 use support::{Folder, repository};
 
-/// Commands that documents speak of and that this program has not yet: their lines are looked at as soon as it has them.
-const COMING: [&str; 1] = ["operate"];
-
 /// Every command with its path, such as `specgen identify linear`, and the examples below its help.
 fn examples() -> Vec<(String, Vec<Line>)> {
     fn walk(path: &str, command: &clap::Command, found: &mut Vec<(String, Vec<Line>)>) {
@@ -135,9 +132,7 @@ fn commands_of(name: &str, text: &str) -> Vec<(String, Line)> {
     for block in blocks(text) {
         let joined = block.body.replace("\\\n", " ");
         let found = joined.lines().filter_map(|line| Line::of(&format!("{name}:{}", block.line), line));
-        for line in found.filter(|line| !COMING.contains(&line.words[1].as_str()) || is_known(&line.words[1])) {
-            lines.push((block.language.clone(), line));
-        }
+        lines.extend(found.map(|line| (block.language.clone(), line)));
     }
     lines
 }
@@ -172,9 +167,6 @@ fn commands_within_sentences_are_those_of_the_program() {
         for quoted in plain.split('`').skip(1).step_by(2).filter(|quoted| !quoted.contains(['[', '|', '…', '\n'])) {
             let Some(line) = Line::of(&name, quoted) else { continue };
             let [_, first, ..] = line.words.as_slice() else { continue };
-            if COMING.contains(&first.as_str()) && !is_known(first) {
-                continue;
-            }
             // Whatever is no command is taken for a spec.
             assert!(is_known(first) || first.contains(".toml") || first == "SPEC", "{name}: `{quoted}`");
             let parsed = specgen::cli::command().try_get_matches_from(&line.words);

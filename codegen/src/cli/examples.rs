@@ -76,6 +76,18 @@ Examples:
   specgen pil platform.toml --mode pf-pcc                  # (minutes)
   specgen pil platform.toml --port /dev/ttyACM0            # (board) a board instead of QEMU";
 
+pub const OPERATE: &str = "\
+Examples:
+  specgen operate --port /dev/ttyACM0 platform.toml status     # (board) phase, cause, late ticks
+  specgen operate --port /dev/ttyACM0 platform.toml            # (board) line by line from the keyboard
+  specgen operate --port /dev/ttyACM0 platform.toml acknowledge arm \"wait arming\" run \"wait running 20\"  # (board)
+  specgen operate --socket rt.sock platform.toml --script run.txt  # (board) a real-time PC, from a file
+
+Commands: status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, wait PHASE|SECONDS [TIMEOUT], config,
+  config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop
+
+The link lives as long as this command does; without it the machine holds after 0.1 s. Ctrl-C ramps down first.";
+
 pub const REPLAY: &str = "\
 Examples:
   specgen replay run.rec --spec platform.toml              # bit-equal, or the first tick that differs

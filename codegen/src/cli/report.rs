@@ -230,7 +230,15 @@ fn of_legs(
     let mode = usize::from(adaptation.level_weight > 0.0) + usize::from(adaptation.drift_weight > 0.0);
     select(controller, MODES[mode].1).map_err(environment)?;
     let played = scenario.run(controller, 1.0).map_err(environment)?;
-    let tracking = legs::section(&scenario, controller, &sim).map_err(environment)?;
+    let mut tracking = legs::section(&scenario, controller, &sim).map_err(environment)?;
+    // A law without its weight is the one before it.
+    let same = [
+        "The spec gives no weights: EWMA and PCC are here the inverse model alone, and no reproduction of the paper's.",
+        "The spec gives no drift weight: PCC is here EWMA, and no reproduction of the paper's.",
+    ];
+    if let Some(text) = same.get(mode) {
+        tracking = tracking.text(text);
+    }
     let lines = linear::of_legs(&scenario, controller, &model.actuator, &sim).map_err(environment)?;
     let budget = noise::of_legs(&leg, mode, Pair { own: controller, fine }, SEED).map_err(environment)?;
     let region = region::section(compiled, Some(controller)).map_err(environment)?;
