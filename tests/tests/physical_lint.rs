@@ -36,7 +36,9 @@ const SECOND_BASES: [&str; 7] = [
     "features/platform-f32.toml",
 ];
 const SECOND_SEED: u64 = 411;
-const SECOND_LEAST: f64 = 0.0;
+/// 241 of 300 before any rule was changed for what this set showed, 254 after. Most of the rest are values in each other's place
+/// that are nearly alike, and a digit too many where both values are plausible.
+const SECOND_LEAST: f64 = 0.83;
 
 /// A key without the indices of list items: `gauge[2].point[1]` → `gauge[2].point`.
 fn list(key: &str) -> &str {
@@ -360,14 +362,18 @@ fn the_judgement_of_bounds_can_fail() {
     assert!(near("shrunk", &real).is_err());
 }
 
-/// Findings of `check`: those of the compiler, of rounding, and of what only a build can tell.
-fn checked(text: &str, dir: &Path) -> Vec<Diagnostic> {
+/// Findings of `check`: those of the compiler, of what only a build can tell, and, where it is asked for, of rounding.
+fn checked(text: &str, dir: &Path, rounding: bool) -> Vec<Diagnostic> {
     let source = SpecSource { display_name: "platform.toml".to_owned(), text: text.to_owned(), dir: dir.to_path_buf() };
     match specgen::compile::compile_source(source) {
         Ok(compiled) => {
-            let precision = precision::of(&compiled.model, &compiled.ir).expect("lowered before");
-            let rounding = precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref());
-            compiled.findings.into_iter().chain(rounding).chain(specgen::lint::estimated(&compiled.model)).collect()
+            let mut findings = compiled.findings;
+            if rounding {
+                let precision = precision::of(&compiled.model, &compiled.ir).expect("lowered before");
+                findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
+            }
+            findings.extend(specgen::lint::estimated(&compiled.model));
+            findings
         }
         Err(refused) => refused.findings,
     }
@@ -381,10 +387,11 @@ fn replaced(text: &str, from: &str, to: &str) -> String {
 /// What is wrong with a rule of the table, if anything.
 fn broken(rule: &Rule, dir: &Path) -> Option<String> {
     let base = rule.with.iter().fold(spec(rule.base), |text, (from, to)| replaced(&text, from, to));
+    let rounding = rule.code == specgen::diagnostic::codes::PRECISION_POOR;
     let known: BTreeSet<(String, String)> =
-        checked(&base, dir).into_iter().map(|one| (one.code.to_owned(), one.key)).collect();
+        checked(&base, dir, rounding).into_iter().map(|one| (one.code.to_owned(), one.key)).collect();
     let new = |text: &str| {
-        let mut found = checked(text, dir);
+        let mut found = checked(text, dir, rounding);
         found.retain(|one| {
             !known.contains(&(one.code.to_owned(), one.key.clone()))
                 && (one.severity > Severity::Note || one.code == rule.code)
@@ -449,7 +456,6 @@ fn a_step_in_a_table_of_poses_stands_out_from_four_times_its_neighbours() {
         "kind      = \"case-1\"\nfrequency = \"1 Hz\"",
         "kind = \"waveform\"\nfile = \"path.csv\"\nperiod = \"1 ms\"",
     );
-    let base = base.replace("records/", &format!("{}/", "records"));
     std::fs::create_dir(folder.path().join("records")).expect("a folder");
     let record = specgen_tests::repository().join("specs/records/reference-forc.csv");
     std::fs::copy(record, folder.path().join("records/reference-forc.csv")).expect("a record");
@@ -458,7 +464,7 @@ fn a_step_in_a_table_of_poses_stands_out_from_four_times_its_neighbours() {
         let rows: Vec<String> =
             (0..40).map(|k| format!("{:.4}", 0.01 * f64::from(k) + if k >= 20 { step - 0.01 } else { 0.0 })).collect();
         std::fs::write(folder.path().join("path.csv"), format!("x_um\n{}\n", rows.join("\n"))).expect("written");
-        let found = checked(&base, folder.path());
+        let found = checked(&base, folder.path(), false);
         found.into_iter().find(|one| one.code == "W0855")
     };
     let raised = steps(0.0402).expect("a finding");

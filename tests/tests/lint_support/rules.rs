@@ -34,6 +34,12 @@ const RULE: Rule = Rule {
     also: &[],
 };
 
+/// Set-points that may move as fast as a test needs them to.
+const FAST_STREAM: (&str, &str) = (
+    "stream_speed = [\"5 mm/s\", \"5 mm/s\", \"5 mm/s\", \"50 mrad/s\", \"50 mrad/s\", \"50 mrad/s\"]",
+    "stream_speed = [\"0.9 m/s\", \"0.9 m/s\", \"0.9 m/s\", \"6 rad/s\", \"6 rad/s\", \"6 rad/s\"]",
+);
+
 /// In the order of the codes.
 pub const RULES: &[Rule] = &[
     // Those that the data of the paper break.
@@ -51,7 +57,7 @@ pub const RULES: &[Rule] = &[
         text: "\"1.195 kg\"",
         raises: "\"32.5 g\"",
         passes: "\"32.7 g\"",
-        also: &["W0814", "W0834", "W0854"],
+        also: &["W0812", "W0814", "W0834"],
         ..RULE
     },
     Rule {
@@ -69,6 +75,7 @@ pub const RULES: &[Rule] = &[
         text: "\"2.2 nm\"",
         raises: "\"1.11 um\"",
         passes: "\"1.09 um\"",
+        also: &["E0471"],
         ..RULE
     },
     // The lint.
@@ -87,7 +94,7 @@ pub const RULES: &[Rule] = &[
         text: "\"60 um\"",
         raises: "\"3.33 mm\"",
         passes: "\"3.31 mm\"",
-        also: &["E0801"],
+        also: &["E0801", "W0304"],
         ..RULE
     },
     Rule {
@@ -203,6 +210,26 @@ pub const RULES: &[Rule] = &[
         ..RULE
     },
     Rule {
+        code: "W0817",
+        key: "geometry.height",
+        base: "legs.toml",
+        text: "\"180 mm\"",
+        raises: "\"613 mm\"",
+        passes: "\"612 mm\"",
+        ..RULE
+    },
+    Rule {
+        code: "W0818",
+        key: "geometry.platform_joints[4]",
+        base: "features/platform-joints.toml",
+        text: "    [\"-46 mm\", \"-84 mm\", \"-9 mm\"],\n    [\"98 mm\", \"-3 mm\", \"-10 mm\"],",
+        raises: "    [\"98 mm\", \"-3 mm\", \"-10 mm\"],\n    [\"-46 mm\", \"-84 mm\", \"-9 mm\"],",
+        passes: "    [\"-46 mm\", \"-84 mm\", \"-9 mm\"],\n    [\"97 mm\", \"-3 mm\", \"-10 mm\"],",
+        line: Some(""),
+        also: &["E0441"],
+        ..RULE
+    },
+    Rule {
         code: "W0820",
         key: "sensor.noise",
         text: "\"2.2 nm\"",
@@ -212,7 +239,7 @@ pub const RULES: &[Rule] = &[
     },
     Rule {
         code: "W0821",
-        key: "sensor.range[1]",
+        key: "sensor.range[0]",
         text: "\"55 um\"]",
         raises: "\"5510 um\"]",
         passes: "\"5490 um\"]",
@@ -246,11 +273,11 @@ pub const RULES: &[Rule] = &[
     },
     Rule {
         code: "W0826",
-        key: "gauge[3].point",
+        key: "gauge[3].direction",
         text: "point     = [\"-80 mm\"",
         raises: "point     = [\"20 mm\"",
         passes: "point     = [\"-20 mm\"",
-        line: Some("[[gauge]]"),
+        line: Some("direction = [0, 1, 0]"),
         ..RULE
     },
     Rule {
@@ -320,6 +347,7 @@ pub const RULES: &[Rule] = &[
         text: "\"200 us\"",
         raises: "\"0.7 ms\"",
         passes: "\"0.69 ms\"",
+        also: &["W0302"],
         ..RULE
     },
     Rule {
@@ -400,17 +428,18 @@ pub const RULES: &[Rule] = &[
     Rule {
         code: "W0853",
         key: "trajectory[0].frequency",
-        with: &[("\"40 V/ms\"", "\"430 V/ms\"")],
+        with: &[("\"40 V/ms\"", "\"430 V/ms\""), FAST_STREAM],
         text: "kind      = \"case-1\"\nfrequency = \"1 Hz\"",
-        raises: "kind      = \"case-1\"\nfrequency = \"350 Hz\"",
-        passes: "kind      = \"case-1\"\nfrequency = \"330 Hz\"",
+        raises: "kind      = \"case-1\"\nfrequency = \"336 Hz\"",
+        passes: "kind      = \"case-1\"\nfrequency = \"332 Hz\"",
         also: &["W0854"],
-        line: Some("frequency = \"350 Hz\""),
+        line: Some("frequency = \"336 Hz\""),
         ..RULE
     },
     Rule {
         code: "W0854",
         key: "trajectory[0].frequency",
+        with: &[FAST_STREAM],
         text: "kind      = \"case-1\"\nfrequency = \"1 Hz\"",
         raises: "kind      = \"case-1\"\nfrequency = \"73 Hz\"",
         passes: "kind      = \"case-1\"\nfrequency = \"72 Hz\"",
@@ -428,6 +457,7 @@ pub const RULES: &[Rule] = &[
     },
     Rule {
         code: "W0861",
+        base: "legs.toml",
         key: "geometry.height",
         text: "base_angle      = \"0.012 pi rad\"",
         raises: "base_angle      = \"2 rad\"",
@@ -436,11 +466,41 @@ pub const RULES: &[Rule] = &[
         ..RULE
     },
     Rule {
+        code: "N0862",
+        key: "workspace.rotation[0]",
+        base: "legs.toml",
+        with: &[("[\"0.6 mrad\", \"0.6 mrad\", \"0.6 mrad\"]", "[\"0.3 mrad\", \"0.3 mrad\", \"0.3 mrad\"]")],
+        text: "[\"0.3 mrad\"",
+        raises: "[\"0.4215 mrad\"",
+        passes: "[\"0.4205 mrad\"",
+        ..RULE
+    },
+    Rule {
+        code: "N0863",
+        key: "sensor.range[1]",
+        base: "legs.toml",
+        with: &[("\"48 um\"", "\"65 um\"")],
+        text: "\"65 um\"",
+        raises: "\"59.9 um\"",
+        passes: "\"60.1 um\"",
+        ..RULE
+    },
+    Rule {
+        code: "W0304",
+        key: "sensor.range[1]",
+        base: "legs.toml",
+        text: "\"48 um\"",
+        raises: "\"29.9 um\"",
+        passes: "\"30.1 um\"",
+        ..RULE
+    },
+    Rule {
         code: "E0870",
         key: "target.budget.flash",
         text: "\"128 KiB\"",
         raises: "\"4487 B\"",
         passes: "\"4488 B\"",
+        also: &["W0873"],
         ..RULE
     },
     Rule {
@@ -459,6 +519,25 @@ pub const RULES: &[Rule] = &[
         raises: "[target.budget]\nflash = \"128 KiB\"\n\n[timing]",
         passes: "[target]\nmcu = \"mps2-an500\"\n\n[timing]",
         line: Some("[target.budget]"),
+        ..RULE
+    },
+    Rule {
+        code: "W0873",
+        key: "target.budget.ram",
+        text: "\"32 KiB\"",
+        raises: "\"129 KiB\"",
+        passes: "\"128 KiB\"",
+        ..RULE
+    },
+    Rule {
+        code: "W0880",
+        key: "controller.scalar",
+        base: "features/platform-f32.toml",
+        with: &[("bits  = 17", "bits  = 20")],
+        text: "\"2.2 nm\"",
+        raises: "\"0.21 nm\"",
+        passes: "\"0.25 nm\"",
+        line: Some("scalar"),
         ..RULE
     },
 ];
