@@ -27,6 +27,7 @@ mod snapshot;
 mod stage_type;
 mod supervised;
 mod supervision;
+mod waves;
 
 use std::collections::BTreeMap;
 
@@ -47,6 +48,7 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
         ("src/supervision.rs", supervision::emit(ir)),
+        ("src/waves.rs", waves::emit(ir)),
     ];
     match &ir.task_space {
         None => sources.extend(legs_sources(ir)),

@@ -12,6 +12,7 @@ use specgen_link::client::{Client, ClientError, Patience, Port};
 use specgen_link::{Counted, Identity, Reply, Request, WORDS, put_words};
 
 use super::difference::Difference;
+use super::session::session_number;
 
 /// Ticks that arming may take.
 const ARMING: u64 = 100_000;
@@ -130,10 +131,7 @@ impl<P: Port> Lockstep<P> {
         patience: Patience,
         interrupted: &'static AtomicBool,
     ) -> Result<Self, OpenError> {
-        // Another number in every run, so that frames of the last one are not taken for those of this.
-        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
-        let session = (now.subsec_nanos() >> 8 ^ std::process::id()) as u16;
-        let (mut client, identity) = Client::open(port, session, patience).map_err(OpenError::Link)?;
+        let (mut client, identity) = Client::open(port, session_number(), patience).map_err(OpenError::Link)?;
         let text = client.fetch(|offset| Request::Describe { offset }).map_err(OpenError::Link)?;
         let text = String::from_utf8_lossy(&text).into_owned();
         let theirs = Description::parse(&text).map_err(|error| OpenError::Other(error.to_string()))?;

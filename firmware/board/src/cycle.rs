@@ -1,15 +1,16 @@
 //! One control tick on real converters.
 
 use controller::sensing::gauge_reading;
+use controller::snapshot::{record_after, record_before};
 use controller::supervised::{
     CONVERTER, Cause, INTEGRITY, LINK_LOST, MACHINE_INPUT_WORDS, MISSED_TICK, Machine, MachineInput, Request, STOP,
-    supervise,
 };
 use controller::{INPUT_WORDS, Real};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
+use specgen_link::Silence;
 use specgen_runtime::Real as _;
 
-use crate::exchange::{Exchange, Orders, Report};
+use crate::exchange::{self, Exchange, Orders, Report};
 use crate::words::{COMMAND_WORDS, GAUGE_BITS, GAUGES};
 
 /// What the target noticed since the last tick.
@@ -38,6 +39,8 @@ pub struct Board<'m, G, A> {
     request: Request,
     /// What the last tick read. Here and not on the stack, which the law needs.
     input: Option<MachineInput>,
+    /// Codes that went out last; none before the first tick.
+    codes: Option<[i32; CHANNELS]>,
 }
 
 impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
@@ -54,7 +57,17 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     #[must_use]
     pub const fn new(gauges: G, amplifiers: A, machine: &'m mut Machine, intact: bool) -> Self {
         let () = Self::SAME_CODES;
-        Self { gauges, amplifiers, machine, intact, started: false, pending: 0, request: Request::None, input: None }
+        Self {
+            gauges,
+            amplifiers,
+            machine,
+            intact,
+            started: false,
+            pending: 0,
+            request: Request::None,
+            input: None,
+            codes: None,
+        }
     }
 
     /// Brings the converters into their working state, amplifiers disabled. May take a millisecond.
@@ -81,7 +94,12 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     ///
     /// Converters that failed are started again by a new request to acknowledge, while the amplifiers are off.
     pub fn tick(&mut self, exchange: &mut Exchange, noticed: Noticed) -> bool {
-        let Exchange { orders, config, report, silence, .. } = exchange;
+        if exchange.lockstep.is_some() {
+            self.stand_by(exchange, noticed);
+            return false;
+        }
+        exchange.advance_wave();
+        let Exchange { orders, config, report, silence, recorder, .. } = exchange;
         let acknowledged = orders.request == Request::Acknowledge && self.request != Request::Acknowledge;
         self.request = orders.request;
         let failed = !self.started || report.cause == Cause::Converter;
@@ -114,12 +132,19 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         };
 
         let input = take(&mut self.input, orders, &readings, events);
-        let output = supervise(config, self.machine, input);
+        if let Some(recorder) = recorder {
+            record_before(config, self.machine, recorder);
+        }
+        let output = exchange::step(config, self.machine, input);
+        if let Some(recorder) = recorder {
+            record_after(self.machine, input, &output, recorder);
+        }
 
         // Off before the codes change, on only after they are out.
         if !output.amplifier_on {
             self.done(report, |amplifiers| amplifiers.enable(false));
         }
+        self.codes = Some(output.tick.dac_code);
         self.done(report, |amplifiers| amplifiers.write(&output.tick.dac_code));
         // Converters that did not answer do not get power, whatever the supervisor has not seen yet.
         if output.amplifier_on && self.started {
@@ -136,9 +161,32 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         restart
     }
 
+    /// A tick while the host steps the machine: amplifiers off, codes as they are, which is at rest. A host that falls silent
+    /// gives the machine back.
+    fn stand_by(&mut self, exchange: &mut Exchange, noticed: Noticed) {
+        let report = &mut exchange.report;
+        self.done(report, |amplifiers| amplifiers.enable(false));
+        if let Some(codes) = self.codes {
+            self.done(report, |amplifiers| amplifiers.write(&codes));
+        }
+        report.tick += 1;
+        report.missed = report.missed.saturating_add(noticed.missed);
+        if noticed.stop {
+            report.events |= STOP;
+        }
+        if exchange.lockstep.as_mut().is_none_or(Silence::tick) {
+            exchange.leave_lockstep(self.machine);
+        }
+    }
+
     /// What the controller remembers.
     #[must_use]
     pub const fn machine(&self) -> &Machine {
+        self.machine
+    }
+
+    /// The same, for a host that steps it.
+    pub const fn machine_mut(&mut self) -> &mut Machine {
         self.machine
     }
 

@@ -5,6 +5,7 @@
 #![deny(unsafe_code)]
 
 pub mod converters;
+pub mod cycles;
 mod delay;
 pub mod serial;
 mod silent;
