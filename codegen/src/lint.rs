@@ -35,6 +35,8 @@ const RULES: &[Rule] = &[
     layout::joints_apart,
     layout::joints_turn,
     layout::base_is_wider,
+    layout::proportions,
+    layout::legs_cross,
     bodies::leg_parts_have_size,
     bodies::mass_centres_off_the_joints,
     bodies::moments_of_each_axis,

@@ -21,12 +21,7 @@ use machine::{Ended, Machine};
 #[derive(Args, Debug)]
 #[command(
     group(ArgGroup::new("line").required(true).args(["port", "socket"])),
-    after_help = "Commands: status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, wait PHASE|SECONDS [TIMEOUT], config,\n  \
-                  config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop\n\n\
-                  Examples:\n  specgen operate --port /dev/ttyACM0 platform.toml\n  \
-                  specgen operate --port /dev/ttyACM0 platform.toml acknowledge arm \"wait arming\" run \"wait running 20\"\n  \
-                  specgen operate --socket rt.sock platform.toml --script run.txt\n\n\
-                  The link lives as long as this command does; without it the machine holds after 0.1 s. Ctrl-C ramps down first."
+    after_help = super::examples::OPERATE
 )]
 pub struct Arguments {
     /// A board at this serial port.

@@ -26,6 +26,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Arguments of `plant`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::PLANT)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,

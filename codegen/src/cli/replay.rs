@@ -1,7 +1,5 @@
 //! `specgen replay`: a record run again on the host, tick by tick, by bits.
 
-mod trace;
-
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write as _};
@@ -23,6 +21,7 @@ use crate::compile::{self, Compiled};
 const SHOWN: usize = 20;
 /// Arguments of `replay`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::REPLAY)]
 pub struct Arguments {
     /// The record: from a target, from `specgen sim --record` or from `rt-pc --record`.
     record: PathBuf,
@@ -37,9 +36,6 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.record.display();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
-    if trace::is_trace(&arguments.record) {
-        return run_trace(arguments, ui);
-    }
     let mut reader = open(&arguments.record)?;
     let mut csv = arguments.csv.as_deref().map(Csv::new).transpose()?;
     let Some(spec) = &arguments.spec else {
@@ -88,22 +84,6 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             Err(Failure::Judged { message: format!("{shown}: {message}"), result })
         }
     }
-}
-
-/// The same for the record of a real-time PC.
-fn run_trace(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let trace = trace::read(&arguments.record)?;
-    if let Some(csv) = &arguments.csv {
-        let rows = trace::export(&trace, csv)?;
-        if arguments.spec.is_none() {
-            let text = format!("{}: {rows} rows exported\n", arguments.record.display());
-            ui.result(&text, json!({ "rows": rows }));
-        }
-    }
-    let Some(spec) = &arguments.spec else { return Ok(()) };
-    let compiled = compile::compile(spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
-    trace::run(arguments, &trace, &compiled, ui)
 }
 
 /// Refuses the record of another spec or of another version of specgen.

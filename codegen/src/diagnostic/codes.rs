@@ -372,6 +372,10 @@ codes! {
         "Two joints of one body are nearer to each other than two thousandths of its radius.";
     PLATFORM_WIDER = "W0816", "platform wider than its base",
         "Possible, but most hexapods stand on the wider side: are the two in each other's place?";
+    OUT_OF_PROPORTION = "W0817", "radii and height out of proportion",
+        "Of the radii of base and platform and the height one is five times larger or smaller than what lies between the other two: probably a slip of the unit.";
+    LEGS_CROSS = "W0818", "legs that cross",
+        "Two legs would be shorter with each other's joints. Both lists of joints go in the order of the legs; a layout with crossed legs is possible, and rare.";
     SLEW_TOO_SLOW = "W0809", "a slew rate that leaves the legs standing",
         "The voltage takes more than a second over its range.";
     GAUGE_QUIET = "W0820", "gauge noise far below its step",
@@ -438,6 +442,8 @@ codes! {
         "The constants alone do not fit: the unit is wrong, or grid and memory are too large.";
     BUDGET_LOOSE = "W0871", "a budget that checks nothing",
         "It is hundreds of times what the tables take.";
+    BUDGET_SWAPPED = "W0873", "more RAM than flash",
+        "Parts have more flash than RAM, and controllers need more of it.";
     PRECISION_POOR = "W0880", "arithmetic too coarse for the gauges",
         "The rounding errors of the chosen scalar may exceed the noise of the gauges. f64, or a smaller workspace, mends it.";
     ESTIMATED = "N0872", "memory and time are measured by a build",

@@ -34,10 +34,7 @@ pub fn emit(inputs: &[String], outputs: &[String]) -> TokenStream {
             #[must_use]
             pub fn from_words(words: &[u64; MACHINE_INPUT_WORDS]) -> Self {
                 // The law's words stand first, and nobody is to copy them: there always are so many.
-                let tick = match words.first_chunk() {
-                    Some(tick) => tick,
-                    None => &[0; INPUT_WORDS],
-                };
+                let tick = words.first_chunk().unwrap_or(&[0; INPUT_WORDS]);
                 Self {
                     tick: TickInput::from_words(tick),
                     request: Request::from_word(words[INPUT_WORDS]),

@@ -75,6 +75,16 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
             );
         }
     }
+    if let (Some(flash), Some(ram)) = (target.flash, target.ram)
+        && ram > flash
+    {
+        found.warning(
+            codes::BUDGET_SWAPPED,
+            "target.budget.ram",
+            format!("a budget of {ram} B of RAM and {flash} B of flash"),
+            "code and tables are in flash, which is the larger on every part: are `target.budget.flash` and `target.budget.ram` in each other's place?",
+        );
+    }
     if let Some(declared) = target.instructions
         && declared < LEAST_INSTRUCTIONS
     {

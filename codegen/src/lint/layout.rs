@@ -6,6 +6,10 @@ use crate::reach::joints;
 
 /// Two joints of one body nearer than this share of its radius cannot be built: they would be one.
 const NEAREST: f64 = 2e-3;
+/// Base, platform and height are of one size: none is so many times larger or smaller than what lies between the others.
+const OUT_OF_PROPORTION: f64 = 5.0;
+/// Legs that would be shorter by more than this share with each other's joints cross.
+const CROSSED: f64 = 1e-3;
 
 /// The joints of a pair are two parts that stand beside each other.
 pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
@@ -95,4 +99,68 @@ pub(super) fn base_is_wider(facts: &Facts, found: &mut Found) {
             "check that `{key}` and `{other}` are not in each other's place; a platform wider than its base is possible"
         ),
     );
+}
+
+/// Radii and height of a hexapod are of one size.
+pub(super) fn proportions(facts: &Facts, found: &mut Found) {
+    let geometry = &facts.model.geometry;
+    let radius = |joints: &[[f64; 3]; 6]| {
+        joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a: f64, b| if b > a { b } else { a })
+    };
+    let keys = if found.model.spans.contains_key("geometry.base_radius") {
+        ["geometry.base_radius", "geometry.platform_radius", "geometry.height"]
+    } else {
+        ["geometry.base_joints", "geometry.platform_joints", "geometry.height"]
+    };
+    let sizes = [radius(&geometry.base_joints), radius(&geometry.platform_joints), geometry.height];
+    // Against the geometric mean of the two others.
+    let apart: [f64; 3] = core::array::from_fn(|k| {
+        let (a, b) = (sizes[(k + 1) % 3], sizes[(k + 2) % 3]);
+        libm::fabs(libm::log(sizes[k] / libm::sqrt(a * b)))
+    });
+    let odd = (1..3).fold(0, |odd, k| if apart[k] > apart[odd] { k } else { odd });
+    // A platform in the plane of its base is found where the legs are.
+    if !apart[odd].is_finite() || apart[odd] <= libm::log(OUT_OF_PROPORTION) {
+        return;
+    }
+    found.warning(
+        codes::OUT_OF_PROPORTION,
+        keys[odd],
+        format!(
+            "joints are {} mm from the axis on the base and {} mm on the platform, at a height of {} mm",
+            figure(sizes[0] * 1e3),
+            figure(sizes[1] * 1e3),
+            figure(sizes[2] * 1e3)
+        ),
+        &format!("check the unit of `{}`: the three are of one size on most hexapods", keys[odd]),
+    );
+}
+
+/// Legs do not cross. Joints on circles are paired by rule; those of a list may be in another order on one body.
+pub(super) fn legs_cross(facts: &Facts, found: &mut Found) {
+    let geometry = &facts.model.geometry;
+    if !["base", "platform"].iter().any(|body| found.model.spans.contains_key(&format!("geometry.{body}_joints"))) {
+        return;
+    }
+    let length = |base: usize, platform: usize| {
+        let (b, p) = (&geometry.base_joints[base], &geometry.platform_joints[platform]);
+        libm::hypot(libm::hypot(p[0] - b[0], p[1] - b[1]), geometry.height + p[2] - b[2])
+    };
+    for (i, j) in (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j))) {
+        let (now, exchanged) = (length(i, i) + length(j, j), length(i, j) + length(j, i));
+        if exchanged >= now * (1.0 - CROSSED) {
+            continue;
+        }
+        found.warning(
+            codes::LEGS_CROSS,
+            &format!("geometry.platform_joints[{i}]"),
+            format!(
+                "legs {i} and {j} cross: together they are {} mm long, and {} mm if each went to the other's joint",
+                figure(now * 1e3),
+                figure(exchanged * 1e3)
+            ),
+            "`geometry.base_joints` and `geometry.platform_joints` list the legs in the same order: check it on both bodies",
+        );
+        return;
+    }
 }

@@ -68,6 +68,9 @@ fn of_furthest_axis(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     ))
 }
 
+/// A gauge that sees less than this share of its leg's stroke is hardly meant.
+const LEAST_SEEN: f64 = 0.5;
+
 /// A leg that goes where its gauge does not see it.
 fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     let [low, high] = model.sensor.range;
@@ -75,10 +78,17 @@ fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
         return None;
     }
     let item = usize::from(low <= 0.0);
+    let seen = if high < reach.stroke { high } else { reach.stroke } - if low > 0.0 { low } else { 0.0 };
+    // The paper's gauge sees four fifths; one that sees little is in another unit.
+    let grade = if seen < LEAST_SEEN * reach.stroke {
+        (Severity::Warning, codes::SENSOR_RANGE)
+    } else {
+        (Severity::Note, codes::GAUGE_SHORT_OF_STROKE)
+    };
     Some(finding(
         model,
-        Severity::Note,
-        codes::GAUGE_SHORT_OF_STROKE,
+        grade.0,
+        grade.1,
         &[&format!("sensor.range[{item}]"), "sensor.range", "sensor"],
         format!(
             "the gauge of a leg reads {:.3} um to {:.3} um, but the leg moves from 0 to {:.3} um",

@@ -19,7 +19,8 @@ const VERSION: &str = "1";
 
 /// The place of one artifact, held while this lives: nobody else makes it meanwhile.
 pub(super) struct Slot {
-    artifact: PathBuf,
+    /// Holds the artifact under its own name.
+    folder: PathBuf,
     _lock: File,
 }
 
@@ -37,18 +38,34 @@ impl Slot {
         }
     }
 
-    fn within(folder: &Path, command: &Command, package: &Path, rustc_args: &[&str]) -> Result<Self, TargetError> {
-        let artifact = folder.join(key(command, package, rustc_args)?);
-        fs::create_dir_all(folder).map_err(|e| TargetError::io("creating", folder, e))?;
-        let lock_path = artifact.with_extension("lock");
+    fn within(cache: &Path, command: &Command, package: &Path, rustc_args: &[&str]) -> Result<Self, TargetError> {
+        let folder = cache.join(key(command, package, rustc_args)?);
+        fs::create_dir_all(cache).map_err(|e| TargetError::io("creating", cache, e))?;
+        let lock_path = folder.with_extension("lock");
         let lock = File::create(&lock_path).map_err(|e| TargetError::io("creating", &lock_path, e))?;
         lock.lock().map_err(|e| TargetError::io("locking", &lock_path, e))?;
-        Ok(Self { artifact, _lock: lock })
+        Ok(Self { folder, _lock: lock })
     }
 
-    /// What was made earlier, if it was.
-    pub fn kept(&self) -> Option<(PathBuf, Vec<u8>)> {
-        fs::read(&self.artifact).ok().map(|bytes| (self.artifact.clone(), bytes))
+    /// What was made earlier, if it was, put into `target_dir` under its own name: path and bytes.
+    ///
+    /// # Errors
+    /// [`TargetError::Io`] if it cannot be put there.
+    pub fn fetch(&self, target_dir: &Path) -> Result<Option<(PathBuf, Vec<u8>)>, TargetError> {
+        let Some(kept) = fs::read_dir(&self.folder).ok().and_then(|mut entries| entries.next()?.ok()) else {
+            return Ok(None);
+        };
+        let kept = kept.path();
+        let bytes = fs::read(&kept).map_err(|e| TargetError::io("reading", &kept, e))?;
+        let path = target_dir.join(kept.file_name().unwrap_or_default());
+        if path.exists() {
+            fs::remove_file(&path).map_err(|e| TargetError::io("removing", &path, e))?;
+        }
+        // A link first: a program that was just written by this process may be refused as busy. Between disks, a copy.
+        fs::hard_link(&kept, &path)
+            .or_else(|_| fs::copy(&kept, &path).map(|_| ()))
+            .map_err(|e| TargetError::io("writing", &path, e))?;
+        Ok(Some((path, bytes)))
     }
 
     /// Keeps a copy, which stays executable.
@@ -57,9 +74,11 @@ impl Slot {
     /// [`TargetError::Io`] if it cannot be written.
     pub fn keep(&self, built: &Path) -> Result<(), TargetError> {
         // Copied beside and renamed, so that a copy that was cut off is never taken for the whole.
-        let partial = self.artifact.with_extension("part");
-        fs::copy(built, &partial).map_err(|e| TargetError::io("writing", &partial, e))?;
-        fs::rename(&partial, &self.artifact).map_err(|e| TargetError::io("renaming", &partial, e))
+        let partial = self.folder.with_extension("part");
+        fs::create_dir_all(&partial).map_err(|e| TargetError::io("creating", &partial, e))?;
+        let copy = partial.join(built.file_name().unwrap_or_default());
+        fs::copy(built, &copy).map_err(|e| TargetError::io("writing", &copy, e))?;
+        fs::rename(&partial, &self.folder).map_err(|e| TargetError::io("renaming", &partial, e))
     }
 }
 
@@ -205,15 +224,19 @@ mod tests {
     fn what_was_kept_is_found_again_and_nothing_else() {
         let dir = tempfile::tempdir().unwrap();
         let package = workspace(&dir.path().join("w"), "a", "x");
-        let cache = dir.path().join("cache");
-        let built = dir.path().join("built");
+        let (cache, target) = (dir.path().join("cache"), dir.path().join("target"));
+        fs::create_dir(&target).unwrap();
+        let built = dir.path().join("program");
         fs::write(&built, b"artifact").unwrap();
         let slot = |flag: &str| Slot::within(&cache, Command::new("cargo").arg(flag), &package, &[]).unwrap();
-        assert!(slot("build").kept().is_none());
+        assert_eq!(slot("build").fetch(&target).unwrap(), None);
         slot("build").keep(&built).unwrap();
-        let (path, bytes) = slot("build").kept().unwrap();
-        assert!(path.starts_with(&cache));
-        assert_eq!(bytes, b"artifact");
-        assert!(slot("rustc").kept().is_none());
+        // Twice: the second finds the first one's file in its way.
+        for _ in 0..2 {
+            let found = slot("build").fetch(&target).unwrap();
+            assert_eq!(found, Some((target.join("program"), b"artifact".to_vec())));
+            assert_eq!(fs::read(target.join("program")).unwrap(), b"artifact");
+        }
+        assert_eq!(slot("rustc").fetch(&target).unwrap(), None);
     }
 }

@@ -37,6 +37,8 @@ pub struct Board<'m, G, A> {
     pending: u32,
     /// The request of the last tick, to see a new one.
     request: Request,
+    /// What the last tick read. Here and not on the stack, which the law needs.
+    input: Option<MachineInput>,
     /// Codes that went out last; none before the first tick.
     codes: Option<[i32; CHANNELS]>,
 }
@@ -55,7 +57,17 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     #[must_use]
     pub const fn new(gauges: G, amplifiers: A, machine: &'m mut Machine, intact: bool) -> Self {
         let () = Self::SAME_CODES;
-        Self { gauges, amplifiers, machine, intact, started: false, pending: 0, request: Request::None, codes: None }
+        Self {
+            gauges,
+            amplifiers,
+            machine,
+            intact,
+            started: false,
+            pending: 0,
+            request: Request::None,
+            input: None,
+            codes: None,
+        }
     }
 
     /// Brings the converters into their working state, amplifiers disabled. May take a millisecond.
@@ -119,13 +131,13 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
             }
         };
 
-        let input = input(orders, &readings, events);
+        let input = take(&mut self.input, orders, &readings, events);
         if let Some(recorder) = recorder {
             record_before(config, self.machine, recorder);
         }
-        let output = exchange::step(config, self.machine, &input);
+        let output = exchange::step(config, self.machine, input);
         if let Some(recorder) = recorder {
-            record_after(self.machine, &input, &output, recorder);
+            record_after(self.machine, input, &output, recorder);
         }
 
         // Off before the codes change, on only after they are out.
@@ -187,10 +199,15 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     }
 }
 
-/// Words of the command, the readings, and no number for what this board does not measure. In a frame of its own: the words
+/// Puts the command, the readings, and no number for what this board does not measure into `slot`. In a frame of its own: words
 /// are done with before the law needs the stack.
 #[inline(never)]
-fn input(orders: &Orders, readings: &[Real; GAUGES], events: u32) -> MachineInput {
+fn take<'a>(
+    slot: &'a mut Option<MachineInput>,
+    orders: &Orders,
+    readings: &[Real; GAUGES],
+    events: u32,
+) -> &'a MachineInput {
     let mut words = [Real::from_f64(f64::NAN).to_word(); MACHINE_INPUT_WORDS];
     for (slot, word) in words.iter_mut().zip(orders.command) {
         *slot = word;
@@ -200,7 +217,7 @@ fn input(orders: &Orders, readings: &[Real; GAUGES], events: u32) -> MachineInpu
     }
     words[INPUT_WORDS] = orders.request.word();
     words[INPUT_WORDS + 1] = u64::from(events);
-    MachineInput::from_words(&words)
+    slot.insert(MachineInput::from_words(&words))
 }
 
 /// Counts a fault of a converter.

@@ -184,6 +184,18 @@ impl<'m> Recorder<'m> {
         }
     }
 
+    /// The next row is that of `tick`, and a block begins with it; where that is not the tick after the last one, the block
+    /// does not continue what was before. For a recorder that is handed from one place to another, or misses ticks.
+    pub fn begin(&mut self, tick: u64) {
+        if tick != self.tick {
+            self.tick = tick;
+            self.due = Some(Reason::Started);
+            self.digest = None;
+        } else if self.due.is_none() {
+            self.due = Some(Reason::Continued);
+        }
+    }
+
     /// What it does.
     #[must_use]
     pub fn activity(&self) -> Activity {

@@ -5,15 +5,16 @@ use super::bench::*;
 /// What the section of `bench` makes of a spec.
 #[derive(Debug, Clone)]
 pub struct Bounds {
-    arm_ticks: u32,
+    /// Ticks of `arm_time` and the others of its kind.
+    pub arm_ticks: u32,
     pub gauge_ticks: i64,
-    voltage_ticks: i64,
-    slew_ticks: i64,
-    samples: i64,
-    ticks_per_second: i64,
+    pub voltage_ticks: i64,
+    pub slew_ticks: i64,
+    pub samples: i64,
+    pub ticks_per_second: i64,
     /// Of each axis, or of each leg: m, rad.
-    tracking: [f64; 6],
-    gauge_range: [f64; 2],
+    pub tracking: [f64; 6],
+    pub gauge_range: [f64; 2],
 }
 
 const DISAGREEMENT: f64 = 20e-6;

@@ -188,7 +188,10 @@ pub(super) fn bias_inside_workspace(f: &Fields, findings: &mut Findings) -> Opti
                 number(value * scale),
                 number(bound * scale)
             ),
-            "the workspace counts from rest with the bias in it: widen [workspace] or reduce the bias".to_owned(),
+            format!(
+                "the workspace counts from rest with the bias in it: widen `workspace.{}` or reduce the bias; check the units of both",
+                if axis < 3 { "translation" } else { "rotation" }
+            ),
         );
     }
     Some(())

@@ -3,6 +3,7 @@
 pub mod mutants;
 pub mod plausible;
 pub mod rules;
+mod rules_of_control;
 pub mod slips;
 
 use std::fs;
