@@ -5,12 +5,15 @@
 
 mod build;
 mod check;
+mod completions;
 mod doctor;
 mod dynamics;
+mod examples;
 mod file;
 mod firmware;
 mod identify;
 mod identify_rate;
+mod operate;
 mod pil;
 mod plant;
 mod replay;
@@ -36,12 +39,7 @@ use ui::{Failure, Ui};
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     override_usage = "specgen [OPTIONS] <SPEC>\n       specgen <COMMAND>",
-    after_help = "Examples:\n  specgen platform.toml -o controller    compile, write a workspace, build and measure it\n  \
-                  specgen check platform.toml            every finding, nothing written\n  \
-                  specgen sim platform.toml              the paper's experiments with the emitted controller\n  \
-                  specgen tune platform.toml --write     gains from the simulated loop, into the spec\n  \
-                  specgen identify record.csv --drive -90:90\n  specgen identify linear 0.1hz.csv 1hz.csv 10hz.csv\n\n\
-                  Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment, 130 interrupted with a result."
+    after_help = examples::MAIN
 )]
 struct Cli {
     #[command(subcommand)]
@@ -82,6 +80,8 @@ enum Command {
     Reproduce(reproduce::Arguments),
     /// Close the loop of a simulated machine with the program of a microcontroller, emulated or at a serial port.
     Pil(pil::Arguments),
+    /// Operate a machine over the link: arm, run, set-points, settings, waves, records; from a script or line by line.
+    Operate(operate::Arguments),
     /// Run a record of a target again on the host and compare every tick by bits; export it as CSV.
     Replay(replay::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
@@ -95,10 +95,19 @@ enum Command {
     /// Measure how well this computer keeps time, and say what to change for real time.
     Doctor(doctor::Arguments),
     /// Print the intermediate representation of a spec: every constant of its controller.
+    #[command(after_help = examples::DUMP_IR)]
     DumpIr {
         /// The spec file.
         spec: PathBuf,
     },
+    /// Print a script that completes commands, options and files in a shell.
+    Completions(completions::Arguments),
+}
+
+/// The command line as clap sees it: commands, options and their help.
+#[must_use]
+pub fn command() -> clap::Command {
+    Cli::command()
 }
 
 /// Runs the command that the process was started with.
@@ -121,6 +130,7 @@ pub fn run() -> ExitCode {
         Some(Command::Report(arguments)) => report::run(arguments, &mut ui),
         Some(Command::Reproduce(arguments)) => reproduce::run(arguments, &mut ui),
         Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
+        Some(Command::Operate(arguments)) => operate::run(arguments, &mut ui),
         Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
@@ -128,6 +138,10 @@ pub fn run() -> ExitCode {
         Some(Command::Plant(arguments)) => plant::run(arguments, &mut ui),
         Some(Command::Doctor(arguments)) => doctor::run(arguments, &mut ui),
         Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),
+        Some(Command::Completions(arguments)) => {
+            completions::run(arguments, command(), &ui);
+            Ok(())
+        }
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -139,10 +153,13 @@ pub fn run() -> ExitCode {
 fn refuse_arguments(error: clap::Error) -> ExitCode {
     let error = match error.kind() {
         // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
-        ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => Cli::command().error(
-            ErrorKind::ArgumentConflict,
-            "one spec file is expected, or a command (check, build, size, flash, sim, tune, robust, report, reproduce, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir) with its own arguments",
-        ),
+        ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => {
+            let mut command = command();
+            let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+            let message =
+                format!("one spec file is expected, or a command ({}) with its own arguments", names.join(", "));
+            command.error(ErrorKind::ArgumentConflict, message)
+        }
         _ => error,
     };
     // Nothing was parsed, so the arguments are asked themselves.

@@ -20,12 +20,14 @@ mod literal;
 mod machine_words;
 mod manifest;
 mod platform;
+mod rest;
 mod sensing;
 mod setpoint;
 mod snapshot;
 mod stage_type;
 mod supervised;
 mod supervision;
+mod waves;
 
 use std::collections::BTreeMap;
 
@@ -46,6 +48,7 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
         ("src/supervision.rs", supervision::emit(ir)),
+        ("src/waves.rs", waves::emit(ir)),
     ];
     match &ir.task_space {
         None => sources.extend(legs_sources(ir)),
@@ -82,7 +85,7 @@ fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream
         ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
         ("src/snapshot.rs", platform::snapshot::emit()),
         ("src/stages.rs", platform::stages::emit()),
-        ("src/state.rs", platform::state::emit()),
+        ("src/state.rs", platform::state::emit(ir)),
         ("src/step.rs", platform::step::emit(ir)),
         ("src/supervised.rs", platform::supervised::emit()),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),

@@ -339,6 +339,9 @@ pub struct Supervision {
     pub arm_ticks: u32,
     /// Code at rest.
     pub rest: i32,
+    /// How the legs stand there; none at the lowest voltage, where every history is forgotten.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub risen: Option<Rest>,
     /// Codes of a step of a ramp.
     pub ramp_step: i32,
     /// Ticks from one to the next.
@@ -364,6 +367,17 @@ pub struct Supervision {
     pub readings_per_leg: Option<[[f64; 6]; LEGS]>,
     /// What is left of the way to the set-point after a tick, where there is no generator.
     pub approach_keep: f64,
+}
+
+/// The legs at rest above the lowest voltage, risen to it from there.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rest {
+    /// Cells of the Everett grid.
+    pub drive: f64,
+    /// E(`drive`, 0) of each leg, m.
+    pub displacement: [f64; LEGS],
+    /// The same of the second weight of (6), m per cell a tick; zero in other models.
+    pub rate: [f64; LEGS],
 }
 
 /// Config at start-up.

@@ -19,6 +19,7 @@ pub mod lower;
 pub mod machine;
 pub mod model;
 pub mod numerics;
+pub mod operate;
 pub mod paper;
 pub mod pil;
 pub mod plot;

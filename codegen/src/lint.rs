@@ -50,6 +50,7 @@ const RULES: &[Rule] = &[
     electronics::current_fits_slew,
     electronics::amplifier_noise,
     electronics::converter_step,
+    electronics::rest_without_power,
     gauges::noise_of_a_step,
     gauges::range_centred,
     gauges::step_against_stroke,

@@ -81,6 +81,10 @@ pub fn lower(
         &defaults,
         task_space.as_ref(),
     );
+    let unseen = gauge_converter::unseen(model, task_space.as_ref().map(|task| &task.sensing));
+    if !unseen.is_empty() {
+        return Err(unseen);
+    }
     let gauge_converter = gauge_converter::lower(model, task_space.as_ref().map(|task| &task.sensing), scalar);
     Ok(Ir {
         name: model.name.clone(),
@@ -89,8 +93,8 @@ pub fn lower(
         scalar,
         kinematics: kinematics::lower(model, scalar)?,
         dynamics: dynamics::lower(model, scalar)?,
+        supervision: supervision::lower(model, &hysteresis, &actuation, max_step, scalar)?,
         hysteresis,
-        supervision: supervision::lower(model, &actuation, max_step, scalar)?,
         actuation,
         bounds: Bounds {
             pose: [tx, ty, tz, rx, ry, rz].map(round),

@@ -5,9 +5,11 @@
 
 use core::array::from_fn;
 
+use host_sim::closed_loop::LEGS;
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::rig::{Noise, PlatformRig, RunOptions};
 use host_sim::platform::{GaugeSignal, Joints, PlatformParameters, PlatformScenario, Probe, Specimen, UserFrames};
+use host_sim::scenario::LegScenario;
 
 use crate::model::{Model, TaskSpace};
 
@@ -19,6 +21,19 @@ const STEPS_PER_PERIOD: f64 = 60.0;
 const STEPS: [f64; 2] = [1e-7, 2e-5];
 /// Rest at the bias pose before a run, s.
 const SETTLE: f64 = 0.2;
+
+/// Six legs of these parameters under the voltages of the spec, prepared.
+#[must_use]
+pub fn legs(
+    model: &Model,
+    parameters: &[LegParameters; LEGS],
+    noise: &NoiseParameters,
+    seed: u64,
+    samples_per_period: u32,
+) -> LegScenario {
+    let voltages = [model.actuator.voltage[0], model.rest_voltage()];
+    LegScenario::resting(parameters, noise, seed, samples_per_period, voltages)
+}
 
 /// A machine of the spec with tolerances of `seed` (legs ± 10 %, stiffness ± 5 %), or as its data sheet with none. `leg`
 /// gives the shape of the hysteresis.
@@ -114,7 +129,8 @@ fn nominal(model: &Model, task: &TaskSpace) -> PlatformParameters {
         modal_damping: task.modal_damping,
         // The amplifier is as fast as the spec says, no faster.
         amplifier_current_a: model.actuator.slew_rate * reference.stack_capacitance_f,
-        rest_voltage_v: model.actuator.voltage[0],
+        lowest_voltage_v: model.actuator.voltage[0],
+        rest_voltage_v: model.rest_voltage(),
         probes: from_fn(|k| Probe {
             point: task.probes[k].point,
             direction: task.probes[k].direction,

@@ -82,6 +82,8 @@ pub struct Robust {
 /// What the supervisor takes for a fault; none where the rule of the key holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Supervisor {
+    /// V.
+    pub rest_voltage: Option<f64>,
     /// Time without any condition that arming takes, s.
     pub arm_time: Option<f64>,
     /// V/s.
@@ -106,6 +108,27 @@ pub struct Supervisor {
     pub slew_time: Option<f64>,
     /// Within a second.
     pub missed_ticks: u32,
+}
+
+impl Model {
+    /// Voltage at which the legs stand while disarmed, V; within the limits of a spec that compiles.
+    #[must_use]
+    pub fn rest_voltage(&self) -> f64 {
+        let [low, high] = self.actuator.voltage;
+        self.supervisor.rest_voltage.unwrap_or_else(|| Self::nearest_to_zero(low, high))
+    }
+
+    /// The voltage from `low` to `high` (V) nearest to that of a stack whose amplifier is off.
+    #[must_use]
+    pub fn nearest_to_zero(low: f64, high: f64) -> f64 {
+        if low > 0.0 {
+            low
+        } else if high < 0.0 {
+            high
+        } else {
+            0.0
+        }
+    }
 }
 
 /// Joints of base and platform, and the pose at rest. Radii and angles of a spec, (1) and (2), are joints here already.
@@ -220,6 +243,8 @@ pub struct Sensor {
     pub noise: f64,
     /// Resolution of its converter over the range.
     pub bits: u32,
+    /// With a calibration: voltage at code 0 and at full scale, V; ±10 V without the key.
+    pub input_range: Option<[f64; 2]>,
 }
 
 /// Preisach grid and the records that identify it.

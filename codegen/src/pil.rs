@@ -11,9 +11,11 @@ mod difference;
 mod lockstep;
 mod pipes;
 mod serial;
-mod wait;
+mod session;
+pub(crate) mod wait;
 
 pub use difference::Difference;
 pub use lockstep::{Cost, Lockstep, OpenError, Stop};
 pub use pipes::Pipes;
 pub use serial::{BAUD, SerialLine};
+pub use session::session_number;

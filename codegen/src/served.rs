@@ -64,7 +64,8 @@ impl Served {
     /// The machine of a spec, with amplifiers off.
     #[must_use]
     pub fn new(machine: Machine, model: &Model, ir: &Ir) -> Self {
-        let rest = model.actuator.voltage[0];
+        let [low, high] = model.actuator.voltage;
+        let rest = Model::nearest_to_zero(low, high);
         Self {
             machine,
             gauges: ir.gauge_converter.clone(),

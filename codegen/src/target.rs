@@ -10,6 +10,7 @@
 //! Nothing here knows TOML, the IR or the control law; the words it moves are opaque.
 
 pub mod build;
+pub mod cache;
 pub mod callgraph;
 pub mod checks;
 pub mod emulator;

@@ -11,16 +11,18 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 16] = [
+const COMMANDS: [&str; 19] = [
     "check",
     "build",
     "size",
     "flash",
     "sim",
     "tune",
+    "robust",
     "report",
     "reproduce",
     "pil",
+    "operate",
     "replay",
     "dynamics",
     "identify",
@@ -28,6 +30,7 @@ const COMMANDS: [&str; 16] = [
     "plant",
     "doctor",
     "dump-ir",
+    "completions",
 ];
 
 #[test]
@@ -45,7 +48,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
         (
             &["chek", "legs.toml"],
-            "check, build, size, flash, sim, tune, robust, report, reproduce, pil, replay, dynamics, identify, forc, plant, doctor, dump-ir",
+            "check, build, size, flash, sim, tune, robust, report, reproduce, pil, operate, replay, dynamics, identify, forc, plant, doctor, dump-ir, completions",
         ),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),
@@ -78,6 +81,12 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["pil", "reference.toml", "--scenario", "case-3"], "there is no scenario `case-3`"),
         (&["pil", "reference.toml", "--samples", "100"], "runs at its timing.period"),
         (&["pil", "reference.toml", "--trajectory", "case-3"], "but not `case-3`"),
+        (&["operate"], "--port"),
+        (&["operate", "--port", "x", "--socket", "y"], "cannot be used with"),
+        (&["operate", "--socket", "y", "--baud", "9600"], "--port"),
+        (&["operate", "--socket", "y", "legs.toml", "go"], "`go` is none of: status, arm"),
+        (&["operate", "--socket", "y", "--script", "none.txt"], "could not read `none.txt`"),
+        (&["operate", "--socket", "y", "--script", "none.txt", "arm"], "exclude each other"),
         (&["forc"], "--output"),
         (&["forc", "-o", "x.csv", "--grid", "1"], "--grid"),
         (&["plant"], "<SPEC>"),
@@ -127,7 +136,8 @@ fn every_command_explains_itself() {
         assert!(text.contains(&format!("Usage: specgen {command}")) && text.contains("--json"), "{text}");
         // Every option and argument has a sentence, beside it or below; deeper lines are the rest of one.
         let depth = |line: &str| line.len() - line.trim_start().len();
-        let lines: Vec<&str> = text.lines().chain([""]).collect();
+        let (options, _) = text.split_once("\nExamples:\n").unwrap();
+        let lines: Vec<&str> = options.lines().chain([""]).collect();
         for (line, next) in lines.iter().zip(&lines[1..]).filter(|(line, _)| (2..=6).contains(&depth(line))) {
             let beside = line.trim().split_once("  ").is_some_and(|(_, text)| text.trim().len() > 4);
             let explained = beside || (depth(next) == 10 && next.trim().len() > 4);

@@ -9,18 +9,23 @@ use std::fs;
 
 use support::{Folder, repository};
 
-const DOCUMENTS: [&str; 11] = [
+const DOCUMENTS: [&str; 16] = [
     "README.md",
     "ARCHITECTURE.md",
+    "docs/bring-up.md",
     "docs/control-law.md",
+    "docs/guide.md",
     "docs/hysteresis.md",
     "docs/identification.md",
+    "docs/images.md",
     "docs/tuning.md",
     "docs/robustness.md",
     "docs/report.md",
     "docs/pil.md",
     "docs/supervisor.md",
     "docs/recorder.md",
+    "docs/rt-pc.md",
+    "docs/spec-reference.md",
 ];
 
 fn read(name: &str) -> String {
@@ -43,7 +48,13 @@ fn links_lead_somewhere() {
             let target = part.split(')').next().unwrap();
             if !target.contains("://") {
                 links += 1;
-                assert!(folder.join(target).exists(), "{name} links to {target}");
+                let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+                assert!(folder.join(file).exists(), "{name} links to {target}");
+                let is_heading = |line: &str| {
+                    line.starts_with('#') && line.to_lowercase().replace(' ', "-").ends_with(&format!("#-{anchor}"))
+                };
+                let found = anchor.is_empty() || fs::read_to_string(folder.join(file)).unwrap().lines().any(is_heading);
+                assert!(found, "{name} links to {target}");
             }
         }
     }

@@ -1,5 +1,6 @@
-//! The real-time target as a user runs it: the emitted workspace built, its binary in closed loop with `specgen plant`, its record
-//! replayed by the host library. Nothing here asserts times: only that every tick is accounted for, and bits.
+//! The real-time target as a user runs it: the emitted workspace built, its binary in closed loop with `specgen plant`, asked over
+//! link and lines, its records replayed by the host library. Nothing here asserts times: only that every tick is accounted for,
+//! and bits.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 #![cfg(target_os = "linux")]
@@ -11,13 +12,30 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use host_sim::controller::{Controller, Supervised};
-use host_sim::trace::Trace;
+use host_sim::controller::{Controller, Supervised, TickController};
 use serde_json::Value;
 use specgen::{compile, emit, target, workspace};
+use specgen_link::client::ClientError;
+use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
+use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
+
+#[path = "rt_pc/host.rs"]
+mod host;
+use host::{Host, Record};
 
 /// Length of the platform's run, s, where another than that of CI is wanted.
 const SECONDS: &str = "SPECGEN_RT_SECONDS";
+
+/// Phases of the supervisor, and its cause of a silent link.
+const DISARMED: u8 = 0;
+const RUNNING: u8 = 2;
+const HOLDING: u8 = 3;
+const LINK_LOST: u8 = 9;
+/// Requests to it.
+const ARM: u8 = 1;
+const RUN: u8 = 2;
+/// Bit of a platform's status: it goes to its bias pose, or plays.
+const BUSY: u32 = 1 << 18;
 
 /// A spec's workspace with the built binary, the host library and a running machine.
 struct Bench {
@@ -80,27 +98,13 @@ impl Bench {
         command
     }
 
-    /// The first row of a record that the host's own build does not repeat, as tick and name of the word.
-    fn first_difference(&self, trace: &Trace) -> Option<(usize, String)> {
-        let mut host = Supervised::new(Controller::load(&self.library).unwrap()).unwrap();
-        let (inputs, outputs) = (host.input_names(), host.output_names());
-        assert_eq!((&trace.description().input_names, &trace.description().output_names), (&inputs, &outputs));
-        let mut output = vec![0; outputs.len()];
-        for (tick, row) in trace.rows().enumerate() {
-            let (input, rest) = row.split_at(inputs.len());
-            host.step(input, &mut output);
-            if let Some(place) = (0..outputs.len()).find(|k| output[*k] != rest[*k]) {
-                return Some((tick, outputs[place].clone()));
-            }
-            if host.digest() != rest[outputs.len()] {
-                return Some((tick, "digest".to_owned()));
-            }
-        }
-        None
+    /// The host's own build of the same controller.
+    fn machine(&self) -> Supervised {
+        Supervised::new(Controller::load(&self.library).unwrap()).unwrap()
     }
 
     /// Checks what holds of every run, whatever the machine did and however loaded this computer is.
-    fn check(&self, output: &Output, record: &str) -> (Value, Trace) {
+    fn check(&self, output: &Output, record: &str) -> (Value, Record) {
         let text = String::from_utf8_lossy(&output.stdout);
         let summary: Value = serde_json::from_str(&text).unwrap_or_else(|error| {
             panic!("{error}: {text}\n{}", String::from_utf8_lossy(&output.stderr));
@@ -112,14 +116,21 @@ impl Bench {
         let sum = |key: &str| causes.iter().map(|cause| cause[key].as_u64().unwrap()).sum::<u64>();
         assert_eq!((sum("late"), sum("skipped")), (count("late"), count("skipped")), "every one has a cause: {text}");
         assert_eq!((count("allocations"), count("waiting_ticks"), count("lost_rows")), (0, 0, 0), "{text}");
-        let trace = Trace::from_bytes(&fs::read(self.path(record)).unwrap()).unwrap();
-        assert_eq!(trace.len() as u64, count("on_time") + count("late"), "a row for every tick that was run");
+        let record = Record::new(fs::read(self.path(record)).unwrap());
+        assert_eq!(record.rows.len() as u64, count("on_time") + count("late"), "a row for every tick that was run");
         // A tick after skipped ones says so, and no other.
-        let events = trace.description().input_names.iter().position(|name| name == "events").unwrap();
-        let missed = trace.rows().filter(|row| row[events] & 1 == 1).count() as u64;
+        let events = record.place("events");
+        let missed = record.rows.iter().filter(|row| row.input[events] & 1 == 1).count() as u64;
         assert!(missed <= count("skipped") && (missed > 0) == (count("skipped") > 0), "{missed}: {text}");
-        assert_eq!(self.first_difference(&trace), None);
-        (summary, trace)
+        let replay = record.replay(&mut self.machine());
+        assert_eq!((&replay.divergence, replay.gaps.len(), replay.digests), (&None, 0, record.rows.len() as u64));
+        (summary, record)
+    }
+
+    /// As a user does it.
+    fn replay(&self, record: &str) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
+        command.arg("replay").arg(self.path(record)).arg("--spec").arg(&self.spec).output().unwrap()
     }
 }
 
@@ -143,62 +154,212 @@ fn signal(process: &Child, name: &str) {
     assert!(Command::new("kill").args([&format!("-{name}"), &process.id().to_string()]).status().unwrap().success());
 }
 
+/// A run that goes on until it is told, or until the test fails.
+struct Running(Option<Child>);
+
+impl Running {
+    fn new(command: &mut Command) -> Self {
+        Self(Some(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()))
+    }
+
+    /// Sends it a signal and waits for its end.
+    fn end(mut self, name: &str) -> Output {
+        let mut running = self.0.take().unwrap();
+        assert!(running.try_wait().unwrap().is_none(), "it runs until it is told");
+        signal(&running, name);
+        running.wait_with_output().unwrap()
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(running) = &mut self.0 {
+            let _ = running.kill();
+            let _ = running.wait();
+        }
+    }
+}
+
+/// The socket of lines.
+struct Lines(BufReader<UnixStream>);
+
+impl Lines {
+    fn new(path: &Path) -> Self {
+        let stream = UnixStream::connect(path).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        Self(BufReader::new(stream))
+    }
+
+    fn ask(&mut self, line: &str) -> String {
+        self.0.get_mut().write_all(format!("{line}\n").as_bytes()).unwrap();
+        let mut answer = String::new();
+        self.0.read_line(&mut answer).unwrap();
+        answer.trim().to_owned()
+    }
+}
+
 #[test]
 fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_bit() {
     let bench = Bench::new("reference.toml");
     let seconds: f64 = std::env::var(SECONDS).map_or(2.5, |text| text.parse().expect("a number of seconds"));
     let output =
-        bench.command("a.trace").args(["--seconds", &seconds.to_string(), "--set", "command=3"]).output().unwrap();
-    let (summary, trace) = bench.check(&output, "a.trace");
+        bench.command("a.rec").args(["--seconds", &seconds.to_string(), "--set", "command=3"]).output().unwrap();
+    let (summary, record) = bench.check(&output, "a.rec");
     // At 10 kHz; the ramp down comes after.
     assert!(summary["planned"].as_f64().unwrap() > 1e4 * (seconds - 0.1), "{summary}");
     println!("{summary:#}");
-    println!("{} ticks replayed on the host, outputs and digests equal to the bit", trace.len());
+    println!("{} ticks replayed on the host, outputs and digests equal to the bit", record.rows.len());
     assert_eq!(output.status.code(), Some(i32::from(!summary["failure"].is_null())), "{summary}");
 
-    // The comparison notices one bit in one word.
-    let mut words = trace.words().to_vec();
-    let (width, output_place) = (trace.width(), trace.description().input_names.len());
-    let tick = trace.len() / 2;
-    words[tick * width + output_place + 3] ^= 1;
-    let flipped = Trace::from_words(trace.description().clone(), words).unwrap();
-    let name = trace.description().output_names[3].clone();
-    assert_eq!(bench.first_difference(&flipped), Some((tick, name.clone())));
-
-    // As a user does it.
-    let replay = |record: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
-        command.arg("replay").arg(bench.path(record)).arg("--spec").arg(&bench.spec).output().unwrap()
-    };
-    let good = replay("a.trace");
+    // One bit in one word is noticed.
+    let good = bench.replay("a.rec");
     assert!(good.status.success() && String::from_utf8_lossy(&good.stdout).contains("bit-equal"), "{good:?}");
-    fs::write(bench.path("flipped.trace"), flipped.to_bytes()).unwrap();
-    let bad = replay("flipped.trace");
-    let text = String::from_utf8_lossy(&bad.stderr);
+    fs::write(bench.path("flipped.rec"), record.flipped()).unwrap();
+    let bad = bench.replay("flipped.rec");
+    let (text, tick) = (String::from_utf8_lossy(&bad.stderr), record.rows.len() - 1);
     assert!(
-        bad.status.code() == Some(1) && text.contains(&format!("number {tick} ")) && text.contains(&name),
+        bad.status.code() == Some(1) && text.contains(&format!("tick {tick}")) && text.contains("dac_code[0]"),
         "{bad:?}"
     );
 
-    // With time that waits it runs on any computer. SIGTERM: down, and off.
-    let mut command = bench.command("b.trace");
-    command
-        .args(["--elastic", "--patience", "5000", "--set", "command=3"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    let mut running = command.spawn().unwrap();
-    wait_for("the record", || fs::metadata(bench.path("b.trace")).is_ok_and(|file| file.len() > 4_000_000));
-    assert!(running.try_wait().unwrap().is_none(), "it runs until it is told");
-    signal(&running, "TERM");
-    let output = running.wait_with_output().unwrap();
-    let (summary, trace) = bench.check(&output, "b.trace");
-    assert_eq!((&summary["last_phase"], &summary["skipped"]), (&"Disarmed".into(), &0.into()), "{summary}");
-    let supervisor = width - 1 - 2;
-    assert!(trace.rows().any(|row| row[supervisor] & 0xff == 2), "it ran");
-    assert_eq!(trace.rows().last().unwrap()[supervisor] >> 16, 0, "amplifiers off in the last tick");
-    assert_eq!(output.status.code(), Some(0), "{summary}");
-
+    a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(&bench);
+    a_record_that_finds_no_room_brings_the_machine_down(&bench);
     a_card_is_read_driven_and_switched_off(&bench);
+}
+
+/// With time that waits, so that it runs on any computer.
+fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
+    let [socket, link] = ["socket", "link"].map(|name| bench.path(name));
+    let mut command = bench.command("b.rec");
+    command.args(["--elastic", "--patience", "5000", "--link-silence", "1000", "--socket"]).arg(&socket);
+    command.arg("--link").arg(&link).arg("--capture").arg(bench.path("capture.rec"));
+    let running = Running::new(&mut command);
+    wait_for("the link", || link.exists());
+    let mut lines = Lines::new(&socket);
+
+    let mut host = Host::open(&link, 1).unwrap();
+    let machine = bench.machine();
+    let description = host.fetch(|offset| Request::Describe { offset });
+    // The host library adds sizes of its own to it.
+    assert!(machine.controller().text().as_bytes().starts_with(&description) && description.len() > 100);
+    host.wait("a tick", |status| status.tick > 0 && status.phase == DISARMED);
+    assert!(matches!(Host::open(&link, 2), Err(ClientError::Refused(Refusal::Busy))), "one host at a time");
+    for request in [Request::LockstepReset { config: Bytes(&[]) }, Request::LockstepStage { index: 0 }] {
+        assert_eq!(host.refused(&request), Refusal::Unsupported);
+    }
+    assert_eq!(host.refused(&Request::Supervise { request: 6 }), Refusal::Word { index: 0 });
+    let command = vec![0; 8 * machine.input_names().iter().position(|name| name == "gauge[0]").unwrap()];
+    assert_eq!(host.refused(&Request::Setpoint { words: Bytes(&command[8..]) }), Refusal::Length { expected: 21 });
+
+    host.done(&Request::Supervise { request: ARM });
+    host.wait("armed", |status| status.phase == HOLDING);
+    // A line may slow it down, but the orders are the host's.
+    assert!(lines.ask("run").starts_with("error: a host over the link has the orders"));
+    assert_eq!(lines.ask("hold"), "ok");
+    host.done(&Request::Supervise { request: RUN });
+    host.wait("at its bias pose", |status| status.phase == RUNNING && status.status & BUSY == 0);
+
+    // Other settings, all at once or not at all.
+    let mut config = host.config();
+    assert_eq!(config, machine.controller().default_config());
+    let bytes = |words: &[u64]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>();
+    let mode = machine.controller().description().config_names.iter().position(|name| name == "mode").unwrap();
+    config[mode] = 99;
+    assert_eq!(
+        host.refused(&Request::WriteConfig { words: Bytes(&bytes(&config)) }),
+        Refusal::Word { index: mode as u16 }
+    );
+    config[mode] = 5;
+    host.done(&Request::WriteConfig { words: Bytes(&bytes(&config)) });
+    assert_eq!(host.config(), config);
+
+    // A wave of 1 µm along z.
+    let mut wave = Settings::<f64>::still();
+    let tone = Tone { amplitude: 1e-6, phase: 0, step: step_of(20.0, 1e-4) };
+    wave.axes[2] = AxisWave { offset: 0.0, shape: Shape::Sine { tone } };
+    (wave.ramp_ticks, wave.ticks) = (500, 4000);
+    let start = |wave: &Settings<f64>| bytes(&wave.to_words());
+    let mut wide = wave;
+    wide.axes[2].offset = 1.0;
+    let request = |words| Request::Wave { action: WaveAction::Start, words: Bytes(words) };
+    let words = start(&wide);
+    assert_eq!(host.refused(&request(&words)), Refusal::Word { index: 6 + 7 * 2 + 1 });
+    let words = start(&wave);
+    host.done(&request(&words));
+    assert_eq!(host.refused(&request(&words)), Refusal::State, "one wave at a time");
+    assert_eq!(host.refused(&Request::Setpoint { words: Bytes(&command) }), Refusal::State);
+    assert!(lines.ask("set command=0").starts_with("error: "));
+    let tick = host.status().tick;
+    host.wait("the wave", |status| status.tick > tick + 1000);
+
+    // What the recorder has kept since power-up, as the file that it writes.
+    assert_eq!(host.refused(&Request::Download { offset: 0 }), Refusal::State, "it records");
+    let standing = host.recorder(RecorderAction::Look);
+    assert!(standing.running && !standing.triggered && standing.ticks > 1000, "{standing:?}");
+    host.recorder(RecorderAction::Arm { after: 1000 });
+    host.wait("rows before the trigger", |status| status.tick > tick + 2000);
+    host.recorder(RecorderAction::Trigger);
+    wait_for("the end of the recording", || !host.recorder(RecorderAction::Look).running);
+    let standing = host.recorder(RecorderAction::Look);
+    let download = Record::new(host.fetch(|offset| Request::Download { offset }));
+    assert!(
+        standing.triggered && standing.ticks > 1000 && download.rows.len() == standing.ticks as usize,
+        "{standing:?}"
+    );
+    assert_eq!(fs::read(bench.path("capture.rec")).unwrap(), download.bytes);
+    let replay = download.replay(&mut bench.machine());
+    assert_eq!((&replay.divergence, replay.triggers.len(), replay.ticks), (&None, 1, u64::from(standing.ticks)));
+    host.recorder(RecorderAction::Arm { after: 1 });
+
+    // Set-points are taken again once the wave is over.
+    host.wait("the end of the wave", |status| status.tick > tick + 6000);
+    host.done(&Request::Setpoint { words: Bytes(&command) });
+
+    // What is no frame is counted; a host that is killed is missed, and then lines have the orders.
+    host.line().write_all(&[1, 2, 3, 0, 255, 255, 0]).unwrap();
+    assert!(host.status().link.errors() >= 2);
+    drop(host);
+    wait_for("the loss", || lines.ask("status").contains("phase=Holding cause=LinkLost"));
+    assert_eq!(lines.ask("ramp-down"), "ok");
+    // For a cause it ends faulted, until that is acknowledged.
+    wait_for("the way down", || lines.ask("status").contains("phase=Faulted cause=LinkLost amplifiers=0"));
+    assert_eq!((lines.ask("none").as_str(), lines.ask("acknowledge").as_str()), ("ok", "ok"));
+    wait_for("the acknowledgement", || lines.ask("status").contains("phase=Disarmed"));
+    let output = running.end("TERM");
+    let (summary, record) = bench.check(&output, "b.rec");
+    assert_eq!((&summary["last_phase"], &summary["skipped"]), (&"Disarmed".into(), &0.into()), "{summary}");
+    assert_eq!((output.status.code(), &summary["link"]["refused_hosts"]), (Some(1), &1.into()), "{summary}");
+    assert!(
+        summary["link"]["errors"].as_u64().unwrap() >= 2 && summary["failure"].as_str().unwrap().contains("LinkLost")
+    );
+    let [setpoint, command] = ["setpoint[2]", "command"].map(|name| record.place(name));
+    let waved = record.rows.iter().filter(|row| row.input[command] == 1);
+    let highest = waved.clone().map(|row| f64::from_bits(row.input[setpoint])).fold(0.0, f64::max);
+    assert!(waved.count() == 4000 && (highest - 1e-6).abs() < 1e-9, "{highest:e}");
+    assert_eq!(record.rows.last().unwrap().supervisor >> 16, 0, "amplifiers off in the last tick");
+    assert!(record.rows.iter().any(|row| row.supervisor >> 8 & 0xff == u32::from(LINK_LOST)));
+}
+
+/// What a file may be long is limited, as on a full disk.
+fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
+    let script = "ulimit -f 800; trap '' XFSZ; exec \"$@\"";
+    let mut command = Command::new("sh");
+    command.args(["-c", script, "sh"]).arg(&bench.binary).args(["--sim", &bench.name, "--allow-no-rt", "--json"]);
+    command.args(["--elastic", "--patience", "5000", "--set", "command=3", "--record"]).arg(bench.path("cut.rec"));
+    let output = command.output().unwrap();
+    let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let failure = summary["failure"].as_str().unwrap();
+    assert!(
+        output.status.code() == Some(1) && failure.contains("cut.rec: the record is not whole: File too large"),
+        "{summary}"
+    );
+    assert_eq!((&summary["last_phase"], &summary["lost_rows"]), (&"Disarmed".into(), &0.into()), "{summary}");
+    let cut = bench.replay("cut.rec");
+    let text = String::from_utf8_lossy(&cut.stdout);
+    assert!(
+        cut.status.success() && text.contains("the file ends within a block") && text.contains("bit-equal"),
+        "{cut:?}"
+    );
 }
 
 /// The same binary on a library that stands in for comedilib.
@@ -212,11 +373,11 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
     let run = |variables: &[(&str, &str)], arguments: &[&str]| {
         let mut command = Command::new(&bench.binary);
         command.args(["--allow-no-rt", "--json", "--seconds", "0.4", "--arm", "--comedi-library"]).arg(&library);
-        command.args(["--comedi", "/dev/fake1"]).args(arguments).arg("--record").arg(bench.path("card.trace"));
+        command.args(["--comedi", "/dev/fake1"]).args(arguments).arg("--record").arg(bench.path("card.rec"));
         command.env("FAKE_LOG", bench.path("card.log")).envs(variables.iter().copied()).output().unwrap()
     };
     // Whether the amplifiers were ever to be on.
-    let was_on = |trace: &Trace| trace.rows().any(|row| row[trace.width() - 3] >> 16 & 1 == 1);
+    let was_on = |record: &Record| record.rows.iter().any(|row| row.supervisor >> 16 & 1 == 1);
     let log = || {
         let text = fs::read_to_string(bench.path("card.log")).unwrap();
         let field = |key: &str| text.lines().find_map(|line| line.strip_prefix(key)).unwrap().to_owned();
@@ -227,18 +388,19 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
 
     let two = ["--comedi-out", "/dev/fake1", "--comedi-out", "/dev/fake2"];
     let output = run(&[], &two);
-    let (_, trace) = bench.check(&output, "card.trace");
+    let (_, record) = bench.check(&output, "card.rec");
     let ([reads, first, second, _, highest], line, sound) = log();
-    assert_eq!(reads, 6 * trace.len() as u64);
-    assert_eq!((first, second), (4 * trace.len() as u64, 2 * trace.len() as u64));
+    let ticks = record.rows.len() as u64;
+    assert_eq!(reads, 6 * ticks);
+    assert_eq!((first, second), (4 * ticks, 2 * ticks));
     assert!(sound && highest <= 43_690);
-    assert!(line.starts_with('0') && line.ends_with('0') && line.contains('1') == was_on(&trace), "{line}");
+    assert!(line.starts_with('0') && line.ends_with('0') && line.contains('1') == was_on(&record), "{line}");
 
     // A card that fails in the middle: counted, told to the supervisor, off at the end.
-    let (summary, trace) = bench.check(&run(&[("FAKE_FAIL_AFTER", "600")], &two), "card.trace");
-    let events = trace.description().input_names.iter().position(|name| name == "events").unwrap();
-    let broken = trace.rows().filter(|row| row[events] & 8 != 0).count() as u64;
-    assert!(broken > 0 && broken == trace.len() as u64 - 100, "{broken} of {}", trace.len());
+    let (summary, record) = bench.check(&run(&[("FAKE_FAIL_AFTER", "600")], &two), "card.rec");
+    let (events, ticks) = (record.place("events"), record.rows.len());
+    let broken = record.rows.iter().filter(|row| row.input[events] & 8 != 0).count();
+    assert!(broken > 0 && broken == ticks - 100, "{broken} of {ticks}");
     assert_eq!(summary["device_faults"], broken);
     assert!(log().1.ends_with('0'));
 
@@ -259,18 +421,12 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
 fn legs_are_moved_by_lines_and_a_machine_that_is_killed_is_a_converter_that_does_not_answer() {
     let mut bench = Bench::new("legs.toml");
     let socket = bench.path("socket");
-    let mut command = bench.command("legs.trace");
+    let mut command = bench.command("legs.rec");
     command.args(["--elastic", "--patience", "1000", "--socket"]).arg(&socket);
-    let running = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    wait_for("the socket", || UnixStream::connect(&socket).is_ok());
-    let mut lines = BufReader::new(UnixStream::connect(&socket).unwrap());
-    lines.get_ref().set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-    let mut ask = |line: &str| {
-        lines.get_mut().write_all(format!("{line}\n").as_bytes()).unwrap();
-        let mut answer = String::new();
-        lines.read_line(&mut answer).unwrap();
-        answer.trim().to_owned()
-    };
+    let running = Running::new(&mut command);
+    wait_for("the socket", || socket.exists());
+    let mut lines = Lines::new(&socket);
+    let mut ask = |line: &str| lines.ask(line);
     wait_for("a tick", || ask("status").contains("phase=Disarmed"));
     assert!(ask("set request=1").starts_with("error: `request`"));
     assert!(ask("fly").starts_with("error: `fly` is none of"));
@@ -289,13 +445,13 @@ fn legs_are_moved_by_lines_and_a_machine_that_is_killed_is_a_converter_that_does
     std::thread::sleep(Duration::from_millis(1_000));
     let start = tick(&ask("status"));
     wait_for("ticks without a machine", || tick(&ask("status")) > start + 100);
-    signal(&running, "INT");
-    let (summary, trace) = bench.check(&running.wait_with_output().unwrap(), "legs.trace");
+    let output = running.end("INT");
+    let (summary, record) = bench.check(&output, "legs.rec");
     assert!(summary["device_faults"].as_u64().unwrap() > 0, "{summary}");
-    let inputs = &trace.description().input_names;
-    let place = |name: &str| inputs.iter().position(|known| known == name).unwrap();
-    let (events, setpoint, measured) = (place("events"), place("setpoint[2]"), place("displacement[2]"));
-    assert_ne!(trace.rows().last().unwrap()[events] & 8, 0, "the supervisor was told");
-    let moved = trace.rows().filter(|row| row[setpoint] != 0 && row[events] & 8 == 0).last().unwrap();
-    assert!(f64::from_bits(moved[measured]) > 1e-6, "the leg went: {:e}", f64::from_bits(moved[measured]));
+    assert!(output.status.code() == Some(1) && summary["failure"].as_str().unwrap().contains("Converter"), "{summary}");
+    let [events, setpoint, measured] = ["events", "setpoint[2]", "displacement[2]"].map(|name| record.place(name));
+    assert_ne!(record.rows.last().unwrap().input[events] & 8, 0, "the supervisor was told");
+    let moved = record.rows.iter().rev().find(|row| row.input[setpoint] != 0 && row.input[events] & 8 == 0).unwrap();
+    let measured = f64::from_bits(moved.input[measured]);
+    assert!(measured > 1e-6, "the leg went: {measured:e}");
 }

@@ -26,7 +26,7 @@ fn least(mut part: impl FnMut(usize)) -> f64 {
 fn main() {
     let specimen = Specimen::reference();
     let mut rig = PlatformRig::new(&specimen, &Noise::of(&specimen), 1);
-    rig.prepare(&Preparation { peak: 100.0, rate: 200.0, settle: 0.2, update: 5e-5 });
+    rig.prepare(&Preparation { peak: 100.0, rate: 200.0, settle: 0.2, update: 5e-5, rest: 0.0 });
     let voltages = |tick: usize| std::array::from_fn(|leg| 40.0 + 0.01 * ((tick * (leg + 3)) % 500) as f64);
     for whole in [false, true] {
         let mut rig = rig.clone();

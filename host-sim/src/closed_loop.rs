@@ -33,6 +33,9 @@ struct Channel<P> {
 pub struct Rig<P> {
     channels: [Channel<P>; LEGS],
     latency: usize,
+    /// Voltage from which drives count, and at which the legs stand, V.
+    lowest: f64,
+    rest: f64,
 }
 
 /// What is done to the legs before the gauges are zeroed.
@@ -46,6 +49,8 @@ pub struct Preparation {
     pub settle: f64,
     /// Longest time a drive value is held while ramping, s.
     pub update: f64,
+    /// Drive at which the legs then stand, V, ≥ 0.
+    pub rest: f64,
 }
 
 /// What the legs did, in metres.
@@ -175,12 +180,19 @@ impl<P: Plant> Rig<P> {
             index += 1;
             channel
         });
-        Self { channels, latency: 0 }
+        Self { channels, latency: 0, lowest: 0.0, rest: 0.0 }
     }
 
-    /// Pre-cycle, rest, then zeroes the gauges.
+    /// Makes voltages count from `lowest` (V), which is then no drive.
+    pub fn set_lowest_voltage(&mut self, lowest: f64) {
+        self.lowest = lowest;
+        self.rest = lowest;
+    }
+
+    /// Pre-cycle, rest, then zeroes the gauges; from there to the drive at which the legs are to stand.
     pub fn prepare(&mut self, preparation: &Preparation) {
-        let Preparation { peak, rate, settle, update } = *preparation;
+        let Preparation { peak, rate, settle, update, rest } = *preparation;
+        self.rest = self.lowest + rest;
         for Channel { leg, gauge, .. } in &mut self.channels {
             leg.ramp(0.0, peak, peak / rate, update);
             leg.ramp(peak, 0.0, peak / rate, update);
@@ -188,6 +200,12 @@ impl<P: Plant> Rig<P> {
                 leg.hold(0.0, settle);
             }
             gauge.zero_at(leg.displacement());
+            if rest > 0.0 {
+                leg.ramp(0.0, rest, rest / rate, update);
+                if settle > 0.0 {
+                    leg.hold(rest, settle);
+                }
+            }
         }
     }
 
@@ -212,7 +230,7 @@ impl<P: Plant> Rig<P> {
         Ok(Run { trace, tracking: Tracking { interval, samples } })
     }
 
-    /// Makes voltages come `ticks` control intervals late, in every run from here on; 0 V before the first.
+    /// Makes voltages come `ticks` control intervals late, in every run from here on; that of rest before the first.
     pub fn set_latency(&mut self, ticks: usize) {
         self.latency = ticks;
     }
@@ -243,7 +261,7 @@ impl<P: Plant> Rig<P> {
         let mut input = vec![0; controller.description().input_names.len()];
         let mut output = vec![0; controller.description().output_names.len()];
         controller.reset();
-        let mut underway = VecDeque::from(vec![[0.0; LEGS]; self.latency]);
+        let mut underway = VecDeque::from(vec![[self.rest; LEGS]; self.latency]);
         let mut measured = self.read();
         for tick in 0..ticks {
             let time = (tick + 1) as f64 * interval;
@@ -274,7 +292,7 @@ impl<P: Plant> Rig<P> {
     /// Holds six voltages (V) for `interval` (s), each with the noise of its amplifier.
     pub fn hold(&mut self, voltages: &[f64; LEGS], interval: f64) {
         for (channel, voltage) in self.channels.iter_mut().zip(voltages) {
-            channel.leg.hold(voltage + channel.amplifier.draw(), interval);
+            channel.leg.hold(voltage - self.lowest + channel.amplifier.draw(), interval);
         }
     }
 
@@ -398,7 +416,7 @@ mod tests {
 
     fn rig() -> Rig<Spring> {
         let mut rig = Rig::new(std::array::from_fn(|_| Spring::default()), &NoiseParameters::NONE, 1);
-        rig.prepare(&Preparation { peak: 100.0, rate: 20.0, settle: 0.7, update: 1e-2 });
+        rig.prepare(&Preparation { peak: 100.0, rate: 20.0, settle: 0.7, update: 1e-2, rest: 0.0 });
         rig
     }
 

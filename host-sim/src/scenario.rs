@@ -32,13 +32,28 @@ impl LegScenario {
     /// `samples_per_period` is N_s (≥ 1): the control interval is 1/(N_s f).
     #[must_use]
     pub fn new(legs: &[LegParameters; LEGS], noise: &NoiseParameters, seed: u64, samples_per_period: u32) -> Self {
+        Self::resting(legs, noise, seed, samples_per_period, [0.0; 2])
+    }
+
+    /// As [`LegScenario::new`] with another lowest voltage than 0 V, at which the gauges are zeroed and from which the legs'
+    /// drive counts, and a rest above it, at which the legs stand before a run; V.
+    #[must_use]
+    pub fn resting(
+        legs: &[LegParameters; LEGS],
+        noise: &NoiseParameters,
+        seed: u64,
+        samples_per_period: u32,
+        [lowest, rest]: [f64; 2],
+    ) -> Self {
         let first = &legs[0];
         let mut prepared = Rig::new(legs.each_ref().map(LegPlant::new), noise, seed);
+        prepared.set_lowest_voltage(lowest);
         prepared.prepare(&Preparation {
             peak: first.u_max,
             rate: first.forc_rate_v_per_s,
             settle: first.settle_s,
             update: first.step_s,
+            rest: rest - lowest,
         });
         Self { prepared, samples_per_period: samples_per_period.max(1) }
     }

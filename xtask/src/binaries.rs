@@ -11,15 +11,32 @@ use std::time::{Duration, Instant};
 
 use crate::run::{Outcome, cargo, expect_success};
 
+/// Those that take longest, the longest first: one that comes last would run alone.
+const SLOWEST: [&str; 6] = [
+    "tests platform_tables",
+    "tests platform_bits",
+    "codegen robust",
+    "tests rate_options",
+    "tests boards",
+    "codegen pil",
+];
+
 /// Compiles them all, runs them, then the examples of the documentation.
 pub fn test(root: &Path) -> Outcome {
     let binaries = match compile(root) {
         Ok(binaries) => binaries,
         Err(why) => return Outcome::Failed(why),
     };
+    // Many tests build the same controller: once in a run is enough. What an earlier run left is not trusted.
+    let kept = root.join("target/tests/kept");
+    if let Err(error) = std::fs::remove_dir_all(&kept)
+        && error.kind() != std::io::ErrorKind::NotFound
+    {
+        return Outcome::Failed(format!("removing {}: {error}", kept.display()));
+    }
     let workers = std::thread::available_parallelism().map_or(1, usize::from);
     println!("{} test binaries, {workers} at a time", binaries.len());
-    let failed = run(&binaries, workers);
+    let failed = run(&binaries, workers, &kept);
     if !failed.is_empty() {
         return Outcome::Failed(format!("see the failed tests above, of {}", failed.join(", ")));
     }
@@ -47,7 +64,8 @@ fn compile(root: &Path) -> Result<Vec<Binary>, String> {
         return Err(format!("{}; see the errors above", output.status));
     }
     let mut binaries: Vec<Binary> = String::from_utf8_lossy(&output.stdout).lines().filter_map(binary).collect();
-    binaries.sort_by(|a, b| a.name.cmp(&b.name));
+    let place = |binary: &Binary| SLOWEST.iter().position(|name| *name == binary.name).unwrap_or(SLOWEST.len());
+    binaries.sort_by(|a, b| (place(a), &a.name).cmp(&(place(b), &b.name)));
     if binaries.is_empty() {
         return Err("cargo named no test binary".to_owned());
     }
@@ -70,7 +88,7 @@ fn binary(line: &str) -> Option<Binary> {
 }
 
 /// Runs them and prints what each says when it ends. Returns the names of those that failed.
-fn run(binaries: &[Binary], workers: usize) -> Vec<String> {
+fn run(binaries: &[Binary], workers: usize, kept: &Path) -> Vec<String> {
     let next = AtomicUsize::new(0);
     let failed = Mutex::new(Vec::new());
     let work = || {
@@ -80,6 +98,7 @@ fn run(binaries: &[Binary], workers: usize) -> Vec<String> {
             let ended = Command::new(&binary.executable)
                 .current_dir(&binary.folder)
                 .env("CARGO_MANIFEST_DIR", &binary.folder)
+                .env("SPECGEN_BUILD_CACHE", kept)
                 .stdin(Stdio::null())
                 .output();
             let (good, text) = match ended {

@@ -12,6 +12,7 @@ use crate::{lint, precision, reach, stability};
 
 /// Arguments of `check`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::CHECK)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,

@@ -18,6 +18,7 @@ const PERIOD: u64 = 100_000;
 
 /// Arguments of `doctor`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::DOCTOR)]
 pub struct Arguments {
     /// A spec, whose period the computer is judged by; 100 µs without one.
     spec: Option<PathBuf>,

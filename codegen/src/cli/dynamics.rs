@@ -25,6 +25,7 @@ const LARGEST: u64 = 64 << 20;
 
 /// Arguments of `dynamics`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::DYNAMICS)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,

@@ -49,6 +49,7 @@ pub struct Common {
 
 /// Arguments of `build`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::BUILD)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,

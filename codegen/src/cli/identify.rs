@@ -24,7 +24,8 @@ pub(super) use everett::{grid, range};
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    override_usage = "specgen identify [OPTIONS] --drive <MIN:MAX> <RECORD>\n       specgen identify <COMMAND>"
+    override_usage = "specgen identify [OPTIONS] --drive <MIN:MAX> <RECORD>\n       specgen identify <COMMAND>",
+    after_help = super::examples::IDENTIFY
 )]
 pub struct Arguments {
     #[command(subcommand)]

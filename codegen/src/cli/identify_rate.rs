@@ -15,6 +15,7 @@ use crate::identify::{Options, read_record, write_table_csv};
 
 /// Arguments of `identify rate`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::RATE)]
 pub struct Arguments {
     /// Records of one leg at different rates, at least two: CSV with columns time_s, drive_V, displacement_um.
     #[arg(required = true, value_name = "RECORD")]

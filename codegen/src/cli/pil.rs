@@ -26,6 +26,7 @@ use report::Report;
 
 /// Arguments of `pil`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::PIL)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,

@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 use host_sim::platform::rig::Noise;
-use host_sim::scenario::LegScenario;
 use serde_json::json;
 use specgen_rt::clock::{self, SECOND};
 use specgen_rt::exchange::{self, OpenError, Server};
@@ -27,6 +26,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Arguments of `plant`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::PLANT)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,
@@ -122,7 +122,7 @@ fn prepared(arguments: &Arguments, compiled: &Compiled, ui: &Ui) -> Result<Machi
         None => {
             let (leg, noise) = arguments.plant.read()?;
             let legs = std::array::from_fn(|_| leg.clone());
-            Machine::Legs(Box::new(LegScenario::new(&legs, &noise, seed, NO_TRAJECTORY).rig().clone()))
+            Machine::Legs(Box::new(machine::legs(&compiled.model, &legs, &noise, seed, NO_TRAJECTORY).rig().clone()))
         }
     })
 }

@@ -1,7 +1,5 @@
 //! `specgen replay`: a record run again on the host, tick by tick, by bits.
 
-mod trace;
-
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write as _};
@@ -12,6 +10,7 @@ use host_sim::controller::{MachineWord, Supervised};
 use host_sim::description::Description;
 use host_sim::record::{self, Block, Header, Piece, Reader, Replay, ReplayError};
 use serde_json::{Value, json};
+use specgen_runtime::supervisor::{Cause, Phase};
 
 use super::file::PendingFile;
 use super::sim;
@@ -20,26 +19,9 @@ use crate::compile::{self, Compiled};
 
 /// Changes of the phase that are shown.
 const SHOWN: usize = 20;
-/// Phases and causes by their words.
-const PHASES: [&str; 6] = ["disarmed", "arming", "running", "holding", "ramping down", "faulted"];
-const CAUSES: [&str; 13] = [
-    "",
-    "gauge not finite",
-    "gauge out of range",
-    "gauge stuck",
-    "gauges disagree",
-    "tracking error",
-    "voltage saturation",
-    "slew saturation",
-    "missed tick",
-    "link lost",
-    "integrity",
-    "converter",
-    "emergency stop",
-];
-
 /// Arguments of `replay`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::REPLAY)]
 pub struct Arguments {
     /// The record: from a target, from `specgen sim --record` or from `rt-pc --record`.
     record: PathBuf,
@@ -54,9 +36,6 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.record.display();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
-    if trace::is_trace(&arguments.record) {
-        return run_trace(arguments, ui);
-    }
     let mut reader = open(&arguments.record)?;
     let mut csv = arguments.csv.as_deref().map(Csv::new).transpose()?;
     let Some(spec) = &arguments.spec else {
@@ -105,22 +84,6 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             Err(Failure::Judged { message: format!("{shown}: {message}"), result })
         }
     }
-}
-
-/// The same for the record of a real-time PC.
-fn run_trace(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let trace = trace::read(&arguments.record)?;
-    if let Some(csv) = &arguments.csv {
-        let rows = trace::export(&trace, csv)?;
-        if arguments.spec.is_none() {
-            let text = format!("{}: {rows} rows exported\n", arguments.record.display());
-            ui.result(&text, json!({ "rows": rows }));
-        }
-    }
-    let Some(spec) = &arguments.spec else { return Ok(()) };
-    let compiled = compile::compile(spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
-    trace::run(arguments, &trace, &compiled, ui)
 }
 
 /// Refuses the record of another spec or of another version of specgen.
@@ -206,11 +169,15 @@ fn text(found: &Replay, period: f64) -> String {
 /// Phase and cause in words.
 fn name(supervisor: u32) -> String {
     let MachineWord { phase, cause, amplifier_on } = MachineWord::of(u64::from(supervisor));
-    let of = |names: &[&str], word: u8| {
-        names.get(usize::from(word)).map_or_else(|| format!("{word}"), |name| (*name).to_owned())
-    };
-    let cause = if cause == 0 { String::new() } else { format!(": {}", of(&CAUSES, cause)) };
-    format!("{}{cause}, amplifiers {}", of(&PHASES, phase), if amplifier_on { "on" } else { "off" })
+    format!("{}, amplifiers {}", says(phase, cause), if amplifier_on { "on" } else { "off" })
+}
+
+/// Phase and cause in words, by their numbers.
+pub(super) fn says(phase: u8, cause: u8) -> String {
+    let named = |name: Option<&str>, word: u8| name.map_or_else(|| word.to_string(), str::to_owned);
+    let of_phase = named(Phase::from_word(u64::from(phase)).map(Phase::name), phase);
+    let of_cause = named(Cause::from_word(u64::from(cause)).map(Cause::name), cause);
+    if of_cause.is_empty() { of_phase } else { format!("{of_phase}: {of_cause}") }
 }
 
 fn document(found: &Replay, period: f64) -> Value {

@@ -7,7 +7,7 @@ use host_sim::closed_loop::LEGS;
 use host_sim::controller::{Controller, TickController};
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::Noise;
-use host_sim::scenario::LegScenario;
+use host_sim::scenario::{MODES, select};
 use serde_json::json;
 
 use super::check::describe;
@@ -21,6 +21,7 @@ use crate::report::evidence::Bits;
 use crate::report::noise::{FINE_BITS, Pair};
 use crate::report::page::{self, Head};
 use crate::report::section::{Part, Section};
+use crate::report::view::Motion;
 use crate::report::{evidence, hysteresis, legs, linear, machining, motion, noise, region, view};
 use crate::spec::SpecSource;
 use crate::target::TargetError;
@@ -34,6 +35,7 @@ const TICKS: u32 = 20_000;
 
 /// Arguments of `report`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::REPORT)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,
@@ -201,7 +203,8 @@ fn of_platform(
     let lines = linear::of_platform(&scenario, controller, &platform, &model.actuator, "").map_err(environment)?;
     let budget =
         noise::of_platform(model, task, &specimen, Pair { own: controller, fine }, SEED).map_err(environment)?;
-    let mut sections = vec![view::section(model, Some(&platform), shown.as_ref(), model.timing.period), budget];
+    let played = shown.as_ref().map(|run| Motion::of_platform(&platform, run, model.timing.period));
+    let mut sections = vec![view::section(model, played.as_ref()), budget];
     sections.extend(motions);
     sections.push(machined);
     sections.push(hysteresis::section(&specimen.legs[0], model.actuator.voltage[0]));
@@ -220,17 +223,27 @@ fn of_legs(
     let leg = LegParameters::reference();
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs: [LegParameters; LEGS] = std::array::from_fn(|_| leg.clone());
-    let scenario = LegScenario::new(&legs, &leg.noise, SEED, reproduce::legs::SAMPLES);
+    let scenario = machine::legs(model, &legs, &leg.noise, SEED, reproduce::legs::SAMPLES);
     let sim = format!("specgen sim {name} -o DIR");
     ui.progress("leg tracking, linear relation, error budget, stability region");
-    let tracking = legs::section(&scenario, controller, &sim).map_err(environment)?;
-    let lines = linear::of_legs(&scenario, controller, &model.actuator, &sim).map_err(environment)?;
     let adaptation = &model.adaptation;
     let mode = usize::from(adaptation.level_weight > 0.0) + usize::from(adaptation.drift_weight > 0.0);
+    select(controller, MODES[mode].1).map_err(environment)?;
+    let played = scenario.run(controller, 1.0).map_err(environment)?;
+    let mut tracking = legs::section(&scenario, controller, &sim).map_err(environment)?;
+    // A law without its weight is the one before it.
+    let same = [
+        "The spec gives no weights: EWMA and PCC are here the inverse model alone, and no reproduction of the paper's.",
+        "The spec gives no drift weight: PCC is here EWMA, and no reproduction of the paper's.",
+    ];
+    if let Some(text) = same.get(mode) {
+        tracking = tracking.text(text);
+    }
+    let lines = linear::of_legs(&scenario, controller, &model.actuator, &sim).map_err(environment)?;
     let budget = noise::of_legs(&leg, mode, Pair { own: controller, fine }, SEED).map_err(environment)?;
     let region = region::section(compiled, Some(controller)).map_err(environment)?;
     Ok(vec![
-        view::section(model, None, None, model.timing.period),
+        view::section(model, Motion::of_legs(model, &played.tracking).as_ref()),
         budget,
         tracking,
         hysteresis::section(&leg, model.actuator.voltage[0]),
@@ -239,7 +252,7 @@ fn of_legs(
     ])
 }
 
-/// The genetic algorithm; none if it is left out, or the spec's mode has nothing to tune.
+/// The genetic algorithm, or why it was not run: left out, or the spec's mode has nothing to tune.
 fn converge(
     compiled: &Compiled,
     controller: &Controller,
@@ -247,8 +260,10 @@ fn converge(
     name: &str,
     ui: &Ui,
 ) -> Result<Option<Section>, Failure> {
+    let absent =
+        |why: &str| Some(Section::new("convergence", "Genetic algorithm", "").text(&format!("Not run: {why}")));
     if generations == 0 {
-        return Ok(None);
+        return Ok(absent("left out by --generations 0."));
     }
     ui.progress(&format!("the genetic algorithm, {generations} generations"));
     let leg = LegParameters::reference();
@@ -257,9 +272,7 @@ fn converge(
             let command = format!("specgen tune {name} --optimiser genetic --evaluations {}", 100 * generations);
             Ok(Some(crate::report::convergence::section(&found, &command)))
         }
-        Err(convergence::ConvergenceError::NothingToTune(why)) => {
-            Ok(Some(Section::new("convergence", "Genetic algorithm", "").text(&format!("Not run: {why}"))))
-        }
+        Err(convergence::ConvergenceError::NothingToTune(why)) => Ok(absent(&format!("{why}."))),
         Err(convergence::ConvergenceError::Run(error)) => Err(environment(error)),
     }
 }

@@ -31,6 +31,7 @@ const GENERATION: f64 = 1.2;
 
 /// Arguments of `reproduce`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::REPRODUCE)]
 pub struct Arguments {
     /// Folder for reproduction.md, reproduction.csv, reproduction.json and convergence.csv.
     #[arg(short, long, value_name = "DIR", default_value = "reproduction")]

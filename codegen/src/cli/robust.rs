@@ -26,6 +26,7 @@ const LINES: usize = 20;
 
 /// Arguments of `robust`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::ROBUST)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,

@@ -24,6 +24,7 @@ use crate::workspace;
 
 /// Arguments of `sim`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::SIM)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,
@@ -127,6 +128,7 @@ pub(super) fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controlle
 
 /// Arguments of `forc`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::FORC)]
 pub struct ForcArguments {
     /// File to write: CSV with time_s, drive_V, displacement_um.
     #[arg(short, long, value_name = "FILE")]

@@ -34,6 +34,7 @@ static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Arguments of `tune`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::TUNE)]
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,

@@ -196,6 +196,12 @@ codes! {
         "A bound that the noise of the gauges, or a step of their converter, passes by itself would stop a sound machine.";
     SUPERVISOR_RAMP = "E0472", "a ramp to rest faster than the slew rate",
         "Voltages go to rest no faster than amplifier and stack stand.";
+    SUPERVISOR_REST = "E0473", "a rest voltage beyond the limits",
+        "The legs stand at supervisor.rest_voltage while they are disarmed: it lies within actuator.voltage.";
+    GAUGE_INPUT = "E0474", "a converter that does not see a gauge at rest",
+        "With a calibration a gauge's words are volts, and its converter takes in sensor.input_range, ±10 V without that key. Where the reading zero lies beyond, no reading would ever be believed.";
+    INPUT_WITHOUT_CALIBRATION = "E0475", "an input range in volts for a gauge in metres",
+        "sensor.input_range is the converter's range of a gauge with a calibration. Without one, sensor.range is what code 0 and full scale mean.";
     RECORD_IO = "E0501", "a record cannot be opened",
         "The CSV file does not exist or may not be read.";
     RECORD_TOO_LARGE = "E0502", "a record is too large",
@@ -350,6 +356,8 @@ codes! {
         "More than a hundredth of the voltage range, or less than two ten-millionths: probably a slip of the unit.";
     CONVERTER_COARSE = "W0808", "converter step large against the stroke",
         "One code moves a leg by more than a thousandth of its stroke.";
+    REST_NOT_ZERO = "W0817", "a rest that amplifiers do not keep when they are off",
+        "A stack whose amplifier is off discharges to 0 V. Where the legs rest at another voltage although 0 V is permitted, the amplifiers make a jump when they are switched on, and one when they are switched off.";
     LEG_PART_SMALL = "W0810", "mass and inertia of a leg part do not fit the leg",
         "The radius of gyration of a part is less than a fiftieth of the leg.";
     CENTRE_AT_JOINT = "W0811", "mass centre in the joint",

@@ -44,7 +44,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         /// J⁻¹ of the legs at rest: pose coordinates (rows) per leg displacement (columns), m/m and rad/m; J = ∂l/∂h.
         pub const INVERSE_JACOBIAN: [[Real; LEGS]; 6] = #inverse;
         /// Largest |x|, |y|, |z| (m) and |θx|, |θy|, |θz| (rad) accepted; from `workspace`.
-        const POSE_BOUND: [Real; 6] = [#pose_bound];
+        pub(crate) const POSE_BOUND: [Real; 6] = [#pose_bound];
         /// Corrections of the forward kinematics: what they leave over the declared workspace is below 1e-13 m and rad, or
         /// the last bit.
         const CORRECTIONS: usize = #corrections;

@@ -87,10 +87,28 @@ pub fn emit(imports: &TokenStream, input: &TokenStream, leg: &Leg, state: &Token
             input: &MachineInput,
             recorder: &mut Recorder<'_>,
         ) -> MachineOutput {
-            if recorder.opens() {
-                recorder.open(&config.to_words(), machine.digest(), |words| machine.save_into(words));
-            }
+            record_before(config, machine, recorder);
             let output = supervise(config, machine, input);
+            record_after(machine, input, &output, recorder);
+            output
+        }
+
+        /// What a recorder keeps before a tick under these settings.
+        #[inline]
+        pub fn record_before(config: &Config, machine: &Machine, recorder: &mut Recorder<'_>) {
+            if recorder.opens() {
+                recorder.open_with(&config.to_words(), || machine.digest(), |words| machine.save_into(words));
+            }
+        }
+
+        /// What it keeps after the tick.
+        #[inline]
+        pub fn record_after(
+            machine: &Machine,
+            input: &MachineInput,
+            output: &MachineOutput,
+            recorder: &mut Recorder<'_>,
+        ) {
             let row = Row {
                 codes: output.tick.dac_code,
                 status: output.tick.status,
@@ -99,7 +117,6 @@ pub fn emit(imports: &TokenStream, input: &TokenStream, leg: &Leg, state: &Token
                     | (output.amplifier_on as u32) << 16,
             };
             recorder.push(&input.to_words(), &row, || machine.digest());
-            output
         }
 
         impl Snapshot for LegState {

@@ -9,7 +9,7 @@ pub struct Parts {
     pub imports: TokenStream,
     /// The functions `begin`, `stand`, `expectation`, `look`.
     pub functions: TokenStream,
-    /// Call of the control law.
+    /// The control law: what binds `status`.
     pub law: TokenStream,
     /// Field of the input with the gauges' words.
     pub gauges: TokenStream,
@@ -28,10 +28,10 @@ pub fn emit(Parts { imports, functions, law, gauges }: &Parts) -> TokenStream {
         pub use crate::machine_words::{
             MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS, machine_output_words,
         };
-        use crate::step::{GAUGE_FAULT, LEG_LIMITED};
+        use crate::step::{GAUGE_FAULT, LEG_LIMITED, advance, outputs};
         use crate::supervision::PLAN;
         #imports
-        use crate::{Config, LEGS, Real, State, TickInput, TickOutput, step};
+        use crate::{Config, LEGS, Real, State, TickInput, TickOutput};
 
         /// State of the supervisor in this controller's arithmetic.
         pub type Supervisor = supervisor::Supervisor<Real>;
@@ -106,25 +106,38 @@ pub fn emit(Parts { imports, functions, law, gauges }: &Parts) -> TokenStream {
             let channel = supervisor.watch.take_turn();
             let (expected, target) = expectation(state, channel);
             let (phase, cause) = (supervisor.phase, supervisor.cause);
-            if phase != Phase::Running {
-                let tick = stand(config, state, supervisor, &input.tick, channel, expected);
-                return MachineOutput { tick, phase, cause, amplifier_on: phase.is_powered() };
-            }
+            let status = if phase == Phase::Running {
+                run(config, state, supervisor, &input.tick, channel, [expected, target])
+            } else {
+                stand(config, state, supervisor, &input.tick, channel, expected)
+            };
+            // Of the state and at the end: what is as large as an output is slow to move.
+            MachineOutput { tick: outputs(state, status), phase, cause, amplifier_on: phase.is_powered() }
+        }
+
+        /// The law at work; returns its status. Of the channel: what is `expected`, and its `target`.
+        #[inline]
+        fn run(
+            config: &Config,
+            state: &mut State,
+            supervisor: &mut Supervisor,
+            input: &TickInput,
+            channel: usize,
+            [expected, target]: [Real; 2],
+        ) -> u32 {
             let before = codes(state);
-            // In its place at once: the output of a tick is as large as a copy is slow.
-            let output = MachineOutput { tick: #law, phase, cause, amplifier_on: true };
-            let status = output.tick.status;
+            #law
             if status & GAUGE_FAULT == 0 {
-                look(state, supervisor, &input.tick, channel, expected, target);
+                look(state, supervisor, input, channel, expected, target);
             }
             if status & (GAUGE_FAULT | LEG_LIMITED) == 0 {
                 supervisor.seen = 0;
             } else {
                 let (faults, limited) = ((status & GAUGE_FAULT) >> 8, status & LEG_LIMITED);
                 let moved = moved(state, &before);
-                supervisor.see(faults, limited, &input.tick.#gauges, &moved, config.code_limits().max_step);
+                supervisor.see(faults, limited, &input.#gauges, &moved, config.code_limits().max_step);
             }
-            output
+            status
         }
 
         #functions

@@ -2,6 +2,7 @@
 
 use super::{Facts, Found, figure};
 use crate::diagnostic::codes;
+use crate::model::Model;
 
 /// Largest slew rate of a first-order lag is range over time constant; what is declared may exceed it by this.
 const LAG_SLACK: f64 = 3.0;
@@ -98,5 +99,26 @@ pub(super) fn converter_step(facts: &Facts, found: &mut Found) {
             figure(actuator.stroke * 1e6)
         ),
         "a converter of 16 bits or more is usual; check `dac.range` and `dac.bits` too: the range is in volts at the stack",
+    );
+}
+
+/// Amplifiers that are off leave the stacks at 0 V.
+pub(super) fn rest_without_power(facts: &Facts, found: &mut Found) {
+    let model = facts.model;
+    let [low, high] = model.actuator.voltage;
+    let rest = model.rest_voltage();
+    let off = Model::nearest_to_zero(low, high);
+    if rest == off {
+        return;
+    }
+    found.warning(
+        codes::REST_NOT_ZERO,
+        "supervisor.rest_voltage",
+        format!(
+            "the legs rest at {} V, but stacks whose amplifiers are off stand at 0 V: {} um that a leg jumps when they are switched on",
+            figure(rest),
+            figure((rest - off).abs() * model.actuator.leg_gain() * 1e6)
+        ),
+        "leave `supervisor.rest_voltage` out, unless the amplifiers switch on and off slowly by themselves",
     );
 }

@@ -1,9 +1,11 @@
 //! The supervisor: times to ticks and samples, bounds to SI, and what cannot work.
 
+mod rest;
+
 use super::kinematics::inverse_jacobian;
 use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
-use crate::ir::{Actuation, Scalar, Supervision};
+use crate::ir::{Actuation, Hysteresis, Scalar, Supervision};
 use crate::model::Model;
 use crate::numerics::multiply6;
 
@@ -30,6 +32,7 @@ const MISSED_WINDOW: f64 = 1.0;
 /// A time that is shorter than it can be seen, a bound below the noise, a ramp faster than the slew rate.
 pub(super) fn lower(
     model: &Model,
+    hysteresis: &Hysteresis,
     actuation: &Actuation,
     max_step: i32,
     scalar: Scalar,
@@ -56,13 +59,16 @@ pub(super) fn lower(
         (Some(gauges), Some(legs)) => Some(multiply6(&gauges, &legs)),
         _ => None,
     };
+    let rest = rest::code(model, actuation);
+    findings.extend(rest::beyond(model));
     if !findings.is_empty() {
         return Err(findings);
     }
     let round = |value: f64| scalar.round(value);
     Ok(Supervision {
         arm_ticks,
-        rest: actuation.code_min,
+        rest,
+        risen: rest::risen(rest, hysteresis, actuation, scalar),
         ramp_step,
         ramp_every,
         patience: [gauge, gauge, voltage, slew, missed, gauge],

@@ -4,6 +4,7 @@ use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use host_sim::closed_loop::LEGS;
 use host_sim::controller::{ControllerError, MachineWord, Supervised, TickController};
 use host_sim::description::Description;
 use serde::Serialize;
@@ -11,12 +12,15 @@ use specgen_link::client::{Client, ClientError, Patience, Port};
 use specgen_link::{Counted, Identity, Reply, Request, WORDS, put_words};
 
 use super::difference::Difference;
+use super::session::session_number;
 
 /// Ticks that arming may take.
 const ARMING: u64 = 100_000;
 /// Phases of the supervisor.
 const DISARMED: u8 = 0;
 const RUNNING: u8 = 2;
+/// `setpoint_kind` of six legs' settings: leg displacements.
+const SETPOINT_LEG: u64 = 1;
 /// Requests to it.
 const ARM: u64 = 1;
 const RUN: u64 = 2;
@@ -127,10 +131,7 @@ impl<P: Port> Lockstep<P> {
         patience: Patience,
         interrupted: &'static AtomicBool,
     ) -> Result<Self, OpenError> {
-        // Another number in every run, so that frames of the last one are not taken for those of this.
-        let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
-        let session = (now.subsec_nanos() >> 8 ^ std::process::id()) as u16;
-        let (mut client, identity) = Client::open(port, session, patience).map_err(OpenError::Link)?;
+        let (mut client, identity) = Client::open(port, session_number(), patience).map_err(OpenError::Link)?;
         let text = client.fetch(|offset| Request::Describe { offset }).map_err(OpenError::Link)?;
         let text = String::from_utf8_lossy(&text).into_owned();
         let theirs = Description::parse(&text).map_err(|error| OpenError::Other(error.to_string()))?;
@@ -278,7 +279,12 @@ impl<P: Port> Lockstep<P> {
     }
 
     /// Arms the machine where it stands, at rest: the codes do not move, so neither do the readings.
+    ///
+    /// Six legs are asked for where they stand until they run, so that what follows is the trajectory from its first tick on:
+    /// the supervisor would lead them from where they stand to its first point for as long as a period takes, which is not what
+    /// the run measures.
     fn arm(&mut self, input: &[u64]) -> Result<(), Stop> {
+        let input = &self.stays(input);
         let mut word = self.tick(input, ARM)?;
         while word.phase != RUNNING {
             if self.tick >= ARMING {
@@ -288,6 +294,26 @@ impl<P: Port> Lockstep<P> {
             word = self.tick(input, if word.phase == DISARMED { ARM } else { RUN })?;
         }
         Ok(())
+    }
+
+    /// The row with the gauges' words as the set-point, where that is one of leg displacements.
+    fn stays(&self, input: &[u64]) -> Vec<u64> {
+        let description = self.host.controller().description();
+        let mut row = input.to_vec();
+        let of_legs = description.config_names.iter().position(|name| name == "setpoint_kind");
+        if of_legs.and_then(|place| self.config.get(place)) != Some(&SETPOINT_LEG) {
+            return row;
+        }
+        for leg in 0..LEGS {
+            let places = ["setpoint", "displacement"].map(|stem| description.input(&format!("{stem}[{leg}]")));
+            if let [Ok(setpoint), Ok(gauge)] = places
+                && let Some(reading) = input.get(gauge)
+                && let Some(slot) = row.get_mut(setpoint)
+            {
+                *slot = *reading;
+            }
+        }
+        row
     }
 
     fn advance(&mut self, input: &[u64]) -> Result<(), Stop> {

@@ -15,12 +15,18 @@ use crate::verify::Measurement;
 #[must_use]
 pub fn summary(compiled: &Compiled, described: &str, command: &str) -> Section {
     let section = Section::new("summary", "Summary", command);
-    let kind = if compiled.design.is_some() {
-        "A platform that six gauges see, with the task-space controller."
-    } else {
-        "Six legs with their own gauges: the leg feed-forward."
-    };
-    section.text(kind).lines(described.trim_end())
+    if compiled.design.is_some() {
+        return section
+            .text("A platform that six gauges see, with the task-space controller.")
+            .lines(described.trim_end());
+    }
+    section
+        .text("Six legs with their own gauges: the leg feed-forward.")
+        .text(
+            "The spec has no [control], so that there is nothing here of position control of the platform: free motion \
+             (Figs 11 to 22, Tables 5 to 8), machining (Figs 23 to 28, Table 9), modes, gains and pose noise.",
+        )
+        .lines(described.trim_end())
 }
 
 /// Findings with their places.

@@ -48,6 +48,7 @@ pub(super) fn model(f: &Fields) -> Option<Model> {
             range: f.list("sensor.range")?,
             noise: f.number("sensor.noise")?,
             bits: f.whole("sensor.bits")?,
+            input_range: f.list("sensor.input_range"),
         },
         hysteresis: Hysteresis {
             grid: f.whole("hysteresis.grid")?,
@@ -136,6 +137,7 @@ pub(super) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
 fn supervisor(f: &Fields) -> Option<Supervisor> {
     let number = |key: &str| f.number(&format!("supervisor.{key}"));
     Some(Supervisor {
+        rest_voltage: number("rest_voltage"),
         arm_time: number("arm_time"),
         ramp_rate: number("ramp_rate"),
         gauge_time: number("gauge_time"),

@@ -57,6 +57,7 @@ const CHECKS: &[Check] = &[
     gauges::six,
     gauges::directions,
     gauges::calibrated_alike,
+    gauges::input_of_calibrated,
     robust::ranges_in_order,
     trajectories::keys_of_kind,
     trajectories::names_differ,

@@ -17,7 +17,8 @@ with the prefixes f p n u (also µ) m c d k M G T; bytes take k M G T and Ki Mi 
 Radians count as a unit: a rotational stiffness is in N m/rad, a bandwidth in rad/s and not in Hz.
 A conversion to SI rounds once, so that `\"150 mm\"` is the double nearest to 0.15.
 
-Ranges are those of a single value; `docs/diagnostics.md` lists what is checked across values.
+The column *example* shows the form of a value with its unit; any other unit of the same dimension will do. Ranges are those of a single
+value; `docs/diagnostics.md` lists what is checked across values, and a finding names the keys that it is about.
 File names are relative to the spec and use forward slashes.
 ";
 
@@ -35,7 +36,7 @@ pub fn reference_markdown() -> String {
         // Writing to a String cannot fail.
         let _ = write!(
             text,
-            "\n## {title}\n\n{}{optional}\n\n| key | value | range | if left out | meaning |\n| --- | --- | --- | --- | --- |\n",
+            "\n## {title}\n\n{}{optional}\n\n| key | example | range | if left out | meaning |\n| --- | --- | --- | --- | --- |\n",
             section.doc
         );
         for key in section.keys {
@@ -74,8 +75,10 @@ fn range(key: &Key) -> String {
             format!("each {}", ranges.join(", then "))
         }
         Shape::Leading(least, items) => {
-            let ranges: Vec<String> = items.iter().map(|item| range_of(*item)).collect();
-            format!("{least} to {} values: {}", items.len(), ranges.join(", then "))
+            let mut ranges: Vec<String> = items.iter().map(|item| range_of(*item)).collect();
+            ranges.dedup();
+            let each = if ranges.len() == 1 { "each " } else { "" };
+            format!("{least} to {} values: {each}{}", items.len(), ranges.join(", then "))
         }
         Shape::Records => "1 or 6 files".to_owned(),
     }

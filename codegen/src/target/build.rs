@@ -1,5 +1,6 @@
 //! Builds DIR/qemu of an emitted workspace into an image.
 
+use super::cache;
 use super::error::TargetError;
 use super::panics;
 use super::process::{self, Finished};
@@ -125,7 +126,7 @@ impl Mcu {
 
 /// A file that cargo built.
 pub(super) struct Artifact {
-    /// Where cargo left it. Another build into the same folder overwrites it.
+    /// Where cargo left it, or where what was [kept](cache) was put. Another build into the same folder overwrites it.
     pub path: PathBuf,
     /// Its content, read before any other build could.
     pub bytes: Vec<u8>,
@@ -151,11 +152,15 @@ pub(super) fn cargo_artifact(
     pick: impl Fn(&serde_json::Value) -> Option<PathBuf>,
 ) -> Result<Artifact, TargetError> {
     let (package, target_dir) = (request.package, request.target_dir);
+    let slot = cache::Slot::of(command, package, request.rustc_args)?;
     fs::create_dir_all(target_dir).map_err(|e| TargetError::io("creating", target_dir, e))?;
     let lock_path = target_dir.join("specgen.lock");
     let lock = File::create(&lock_path).map_err(|e| TargetError::io("creating", &lock_path, e))?;
     // Cargo's own lock ends with cargo; this one lasts until the artifact is read. Dropping the file frees it.
     lock.lock().map_err(|e| TargetError::io("locking", &lock_path, e))?;
+    if let Some((path, bytes)) = slot.as_ref().map(|slot| slot.fetch(target_dir)).transpose()?.flatten() {
+        return Ok(Artifact { path, bytes });
+    }
     let scratch = tempfile::tempdir().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
 
     command
@@ -186,6 +191,9 @@ pub(super) fn cargo_artifact(
             text: "cargo reports success, but no artifact of the expected kind".into(),
         })?;
     let bytes = fs::read(&path).map_err(|e| TargetError::io("reading", &path, e))?;
+    if let Some(slot) = slot {
+        slot.keep(&path)?;
+    }
     Ok(Artifact { path, bytes })
 }
 

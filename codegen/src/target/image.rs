@@ -3,6 +3,9 @@
 use super::error::TargetError;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind};
 
+/// Section of the memory that a board's recorder has: what is left over, and no part of what the program needs.
+pub const RECORDER: &str = ".record";
+
 /// Memory of an image.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Footprint {
@@ -12,8 +15,11 @@ pub struct Footprint {
     pub code: u64,
     /// Of these, constants: the tables of the controller, for the greatest part.
     pub constants: u64,
-    /// Bytes of RAM that are taken statically. The state and the buffers of the replay live on the stack.
+    /// Bytes of RAM that are taken statically, the memory of a recorder left out. The state and the buffers of the replay live
+    /// on the stack.
     pub ram: u64,
+    /// Bytes of the memory of a recorder.
+    pub recorder: u64,
     /// Symbols of the panic machinery, demangled; empty in an image that cannot panic.
     pub panic_symbols: Vec<String>,
     /// Symbols of an allocator, demangled; empty in an image that does not allocate.
@@ -27,11 +33,19 @@ pub struct Footprint {
 pub fn footprint(elf: &[u8]) -> Result<Footprint, TargetError> {
     let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
     let file = object::File::parse(elf).map_err(malformed)?;
-    let mut result =
-        Footprint { flash: 0, code: 0, constants: 0, ram: 0, panic_symbols: Vec::new(), allocator_symbols: Vec::new() };
+    let mut result = Footprint {
+        flash: 0,
+        code: 0,
+        constants: 0,
+        ram: 0,
+        recorder: 0,
+        panic_symbols: Vec::new(),
+        allocator_symbols: Vec::new(),
+    };
     for section in file.sections().filter(|section| is_loaded(section.flags())) {
         match section.kind() {
             SectionKind::Text => result.code += section.size(),
+            SectionKind::UninitializedData if section.name() == Ok(RECORDER) => result.recorder += section.size(),
             SectionKind::UninitializedData => result.ram += section.size(),
             // Writable: its values are copied from flash at the start.
             _ if is_writable(section.flags()) => {

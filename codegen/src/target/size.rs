@@ -5,6 +5,7 @@
 
 use super::checks;
 use super::error::TargetError;
+use super::image::RECORDER;
 use super::panics::{self, DebugInfo};
 use crate::lower::IDENTITY_MARK;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
@@ -72,10 +73,20 @@ impl Size {
         self.sections.iter().filter(|section| section.flash).map(|section| section.bytes).sum()
     }
 
-    /// Bytes of RAM that are taken statically.
+    /// Bytes of RAM that are taken statically, the memory of a recorder left out.
     #[must_use]
     pub fn ram(&self) -> u64 {
-        self.sections.iter().filter(|section| section.ram).map(|section| section.bytes).sum()
+        self.sections
+            .iter()
+            .filter(|section| section.ram && section.name != RECORDER)
+            .map(|section| section.bytes)
+            .sum()
+    }
+
+    /// Bytes of the memory of a recorder.
+    #[must_use]
+    pub fn recorder(&self) -> u64 {
+        self.sections.iter().filter(|section| section.name == RECORDER).map(|section| section.bytes).sum()
     }
 }
 

@@ -5,7 +5,7 @@
 //! 2. the `rustc` on `PATH` has its sources (`rustup component add rust-src`): `core` is built from them;
 //! 3. Debian's `rustc-web cargo-web rust-web-src` in `/usr`: the same way.
 //!
-//! Building `core` and `-Z emit-stack-sizes` are not stable, so `RUSTC_BOOTSTRAP=1` is set for these builds
+//! Building `core`, `-Z emit-stack-sizes` and `-Z location-detail` are not stable, so `RUSTC_BOOTSTRAP=1` is set for these builds
 //! alone. The linker is `rust-lld` of that compiler, of the one on `PATH`, or LLVM's `ld.lld`.
 
 use super::TRIPLE;
@@ -154,6 +154,8 @@ impl Toolchain {
     pub fn cargo_build(&self, rustflags: &[&str]) -> Command {
         let mut flags: Vec<String> = rustflags.iter().map(|&flag| flag.to_owned()).collect();
         flags.push("-Zemit-stack-sizes".into());
+        // Nobody reads where a panic is from on a microcontroller, and paths of this machine do not belong into its flash.
+        flags.push("-Zlocation-detail=none".into());
         if let Some(linker) = &self.linker {
             flags.push(format!("-Clinker={}", linker.display()));
             flags.push("-Clinker-flavor=ld.lld".into());
@@ -162,6 +164,8 @@ impl Toolchain {
         command
             .env("RUSTC", &self.rustc)
             .env("RUSTC_BOOTSTRAP", "1")
+            // See `firmware/stm32/src/silent.rs`.
+            .env("DEFMT_LOG", "off")
             // Encoded, so that a path with a space stays one flag.
             .env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"))
             .args(["build", "--release", "--target", TRIPLE]);

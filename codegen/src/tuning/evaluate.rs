@@ -177,7 +177,7 @@ impl Case {
         conditions: &Conditions,
     ) -> Result<Self, RunError> {
         let noise = if conditions.noise.is_some() { legs[0].noise } else { NoiseParameters::NONE };
-        let mut scenario = LegScenario::new(legs, &noise, conditions.noise.unwrap_or_default(), 1);
+        let mut scenario = machine::legs(model, legs, &noise, conditions.noise.unwrap_or_default(), 1);
         let trajectory: Box<dyn LegTrajectory + Sync + Send> = match conditions.trajectory {
             TrajectoryChoice::Paper { frequency, .. } => Box::new(PaperLeg { frequency }),
             TrajectoryChoice::Multisine { frequency, seconds, seed, corners } => {

@@ -25,6 +25,17 @@ pub enum What {
     All,
 }
 
+impl What {
+    /// As `--what` has it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Gains => "gains",
+            Self::Weights => "weights",
+            Self::All => "all",
+        }
+    }
+}
+
 /// What a parameter is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Role {
@@ -144,7 +155,7 @@ impl Space {
                 if mode.is_some() { "this mode of the platform controller" } else { "this spec without [control]" };
             return Err(refuse(
                 codes::TUNE_NOTHING,
-                format!("{kind} uses none of the numbers that are asked for ({what:?})"),
+                format!("{kind} uses none of the numbers that are asked for (--what {})", what.name()),
                 "weights need adaptation.mode = \"ewma\" or \"pcc\" and control.mode other than \"p\"; gains need [control] \
                  with mode = \"p\" or \"p/f\"; or tune what there is, with --what all",
             ));

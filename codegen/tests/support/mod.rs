@@ -3,6 +3,7 @@
 #![allow(dead_code)] // Each test file uses its part.
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
+pub mod commands;
 pub mod unprivileged;
 
 use std::collections::BTreeMap;

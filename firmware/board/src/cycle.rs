@@ -1,15 +1,16 @@
 //! One control tick on real converters.
 
 use controller::sensing::gauge_reading;
+use controller::snapshot::{record_after, record_before};
 use controller::supervised::{
     CONVERTER, Cause, INTEGRITY, LINK_LOST, MACHINE_INPUT_WORDS, MISSED_TICK, Machine, MachineInput, Request, STOP,
-    supervise,
 };
 use controller::{INPUT_WORDS, Real};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
+use specgen_link::Silence;
 use specgen_runtime::Real as _;
 
-use crate::exchange::{Exchange, Orders, Report};
+use crate::exchange::{self, Exchange, Orders, Report};
 use crate::words::{COMMAND_WORDS, GAUGE_BITS, GAUGES};
 
 /// What the target noticed since the last tick.
@@ -36,6 +37,10 @@ pub struct Board<'m, G, A> {
     pending: u32,
     /// The request of the last tick, to see a new one.
     request: Request,
+    /// What the last tick read. Here and not on the stack, which the law needs.
+    input: Option<MachineInput>,
+    /// Codes that went out last; none before the first tick.
+    codes: Option<[i32; CHANNELS]>,
 }
 
 impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
@@ -52,7 +57,17 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     #[must_use]
     pub const fn new(gauges: G, amplifiers: A, machine: &'m mut Machine, intact: bool) -> Self {
         let () = Self::SAME_CODES;
-        Self { gauges, amplifiers, machine, intact, started: false, pending: 0, request: Request::None }
+        Self {
+            gauges,
+            amplifiers,
+            machine,
+            intact,
+            started: false,
+            pending: 0,
+            request: Request::None,
+            input: None,
+            codes: None,
+        }
     }
 
     /// Brings the converters into their working state, amplifiers disabled. May take a millisecond.
@@ -60,7 +75,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     pub fn start(&mut self, report: &mut Report) {
         // The line first, whatever the parts say, and both parts even if one fails.
         let disabled = self.amplifiers.enable(false);
-        let amplifiers = self.amplifiers.start();
+        let amplifiers = self.amplifiers.start().and_then(|()| self.rest());
         let gauges = self.gauges.start();
         self.started = true;
         for fault in [disabled, amplifiers, gauges].into_iter().filter_map(Result::err) {
@@ -69,11 +84,22 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         }
     }
 
+    /// The codes that the machine holds, at once: a DAC starts at code 0, which need not be where the legs rest.
+    fn rest(&mut self) -> Result<(), Fault> {
+        let codes = self.machine.state.legs.each_ref().map(|leg| leg.code);
+        if codes == [0; CHANNELS] { Ok(()) } else { self.amplifiers.write(&codes) }
+    }
+
     /// One tick. True if it started the converters again and so took longer than a tick may: then the schedule begins anew.
     ///
     /// Converters that failed are started again by a new request to acknowledge, while the amplifiers are off.
     pub fn tick(&mut self, exchange: &mut Exchange, noticed: Noticed) -> bool {
-        let Exchange { orders, config, report, silence, .. } = exchange;
+        if exchange.lockstep.is_some() {
+            self.stand_by(exchange, noticed);
+            return false;
+        }
+        exchange.advance_wave();
+        let Exchange { orders, config, report, silence, recorder, .. } = exchange;
         let acknowledged = orders.request == Request::Acknowledge && self.request != Request::Acknowledge;
         self.request = orders.request;
         let failed = !self.started || report.cause == Cause::Converter;
@@ -105,12 +131,20 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
             }
         };
 
-        let output = supervise(config, self.machine, &input(orders, &readings, events));
+        let input = take(&mut self.input, orders, &readings, events);
+        if let Some(recorder) = recorder {
+            record_before(config, self.machine, recorder);
+        }
+        let output = exchange::step(config, self.machine, input);
+        if let Some(recorder) = recorder {
+            record_after(self.machine, input, &output, recorder);
+        }
 
         // Off before the codes change, on only after they are out.
         if !output.amplifier_on {
             self.done(report, |amplifiers| amplifiers.enable(false));
         }
+        self.codes = Some(output.tick.dac_code);
         self.done(report, |amplifiers| amplifiers.write(&output.tick.dac_code));
         // Converters that did not answer do not get power, whatever the supervisor has not seen yet.
         if output.amplifier_on && self.started {
@@ -127,9 +161,32 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         restart
     }
 
+    /// A tick while the host steps the machine: amplifiers off, codes as they are, which is at rest. A host that falls silent
+    /// gives the machine back.
+    fn stand_by(&mut self, exchange: &mut Exchange, noticed: Noticed) {
+        let report = &mut exchange.report;
+        self.done(report, |amplifiers| amplifiers.enable(false));
+        if let Some(codes) = self.codes {
+            self.done(report, |amplifiers| amplifiers.write(&codes));
+        }
+        report.tick += 1;
+        report.missed = report.missed.saturating_add(noticed.missed);
+        if noticed.stop {
+            report.events |= STOP;
+        }
+        if exchange.lockstep.as_mut().is_none_or(Silence::tick) {
+            exchange.leave_lockstep(self.machine);
+        }
+    }
+
     /// What the controller remembers.
     #[must_use]
     pub const fn machine(&self) -> &Machine {
+        self.machine
+    }
+
+    /// The same, for a host that steps it.
+    pub const fn machine_mut(&mut self) -> &mut Machine {
         self.machine
     }
 
@@ -142,8 +199,15 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     }
 }
 
-/// Words of the command, the readings, and no number for what this board does not measure.
-fn input(orders: &Orders, readings: &[Real; GAUGES], events: u32) -> MachineInput {
+/// Puts the command, the readings, and no number for what this board does not measure into `slot`. In a frame of its own: words
+/// are done with before the law needs the stack.
+#[inline(never)]
+fn take<'a>(
+    slot: &'a mut Option<MachineInput>,
+    orders: &Orders,
+    readings: &[Real; GAUGES],
+    events: u32,
+) -> &'a MachineInput {
     let mut words = [Real::from_f64(f64::NAN).to_word(); MACHINE_INPUT_WORDS];
     for (slot, word) in words.iter_mut().zip(orders.command) {
         *slot = word;
@@ -153,7 +217,7 @@ fn input(orders: &Orders, readings: &[Real; GAUGES], events: u32) -> MachineInpu
     }
     words[INPUT_WORDS] = orders.request.word();
     words[INPUT_WORDS + 1] = u64::from(events);
-    MachineInput::from_words(&words)
+    slot.insert(MachineInput::from_words(&words))
 }
 
 /// Counts a fault of a converter.

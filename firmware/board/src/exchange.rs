@@ -1,13 +1,18 @@
 //! What lies between the tick and the background.
 
 use controller::Config;
-use controller::supervised::{Cause, Phase, Request};
+use controller::snapshot::recorder::Recorder;
+use controller::supervised::{Cause, Machine, MachineInput, MachineOutput, Phase, Request, supervise};
+use controller::waves::{self, Wave};
 use specgen_link::Silence;
+use specgen_runtime::wave::Stage;
 
 use crate::words::{COMMAND_WORDS, PERIOD_NANOSECONDS};
 
 /// The link is lost after so long without a request, ns: 0.1 s.
 const LINK_TIMEOUT: u32 = 100_000_000;
+/// A lock-step is over after so long without a request, ns: 2 s, for its host also computes, and nothing moves meanwhile.
+const LOCKSTEP_TIMEOUT: u32 = 2_000_000_000;
 
 /// What the background wants of the ticks to come.
 #[derive(Debug, Clone, Copy)]
@@ -75,7 +80,7 @@ impl Report {
 }
 
 /// Orders one way, reports the other. Whoever holds it holds off the tick: copy and let go.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub struct Exchange {
     /// What is wanted.
     pub orders: Orders,
@@ -87,6 +92,12 @@ pub struct Exchange {
     pub beat: u32,
     /// Whether the host is still there.
     pub silence: Silence,
+    /// Keeps what the ticks do, where a memory was given for it.
+    pub recorder: Option<Recorder<'static>>,
+    /// Makes the set-points while it is under way.
+    pub wave: Option<Wave>,
+    /// The host steps the machine, and the ticks do not: how long it has been silent.
+    pub lockstep: Option<Silence>,
 }
 
 impl Default for Exchange {
@@ -96,7 +107,7 @@ impl Default for Exchange {
 }
 
 impl Exchange {
-    /// At power-up: nothing wanted, the spec's settings, the link lost until the host is heard.
+    /// At power-up: nothing wanted, the spec's settings, the link lost until the host is heard, nothing recorded.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -105,6 +116,79 @@ impl Exchange {
             report: Report::NONE,
             beat: 0,
             silence: Silence::new(LINK_TIMEOUT.div_ceil(PERIOD_NANOSECONDS)),
+            recorder: None,
+            wave: None,
+            lockstep: None,
         }
     }
+
+    /// A request of the host was carried out or refused.
+    pub fn hear(&mut self) {
+        self.silence.heard();
+        if let Some(silence) = &mut self.lockstep {
+            silence.heard();
+        }
+    }
+
+    /// Whether a wave is under way.
+    #[must_use]
+    pub fn waves(&self) -> bool {
+        self.wave.as_ref().is_some_and(|wave| wave.stage() != Stage::Idle)
+    }
+
+    /// Writes the set-point of a wave into the command, from where it stays when the wave has ended; only a running machine
+    /// follows one.
+    pub(crate) fn advance_wave(&mut self) {
+        let Some(wave) = &mut self.wave else { return };
+        if self.report.phase != Phase::Running {
+            self.wave = None;
+            return;
+        }
+        match wave.advance() {
+            Some(motion) => waves::write(&motion, wave.sequence(), &mut self.orders.command),
+            None => self.wave = None,
+        }
+    }
+
+    /// The host steps the machine from here on. Only while nothing can move: false, and nothing changed, if something can.
+    pub(crate) fn enter_lockstep(&mut self) -> bool {
+        let at_rest = self.report.tick > 0 && self.report.phase == Phase::Disarmed && !self.report.amplifier_on;
+        if at_rest && self.lockstep.is_none() {
+            let mut silence = Silence::new(LOCKSTEP_TIMEOUT.div_ceil(PERIOD_NANOSECONDS));
+            silence.heard();
+            self.lockstep = Some(silence);
+            self.orders.request = Request::None;
+            self.wave = None;
+        }
+        at_rest
+    }
+
+    /// Ends a lock-step, if there is one: machine and settings are as at power-up, and the recorder is told.
+    pub(crate) fn leave_lockstep(&mut self, machine: &mut Machine) {
+        if self.lockstep.take().is_some() {
+            self.config = Config::new();
+            if let Some(recorder) = &mut self.recorder {
+                recorder.restarted();
+            }
+            reset(machine);
+        }
+    }
+}
+
+/// As at power-up.
+pub(crate) fn reset(machine: &mut Machine) {
+    *machine = at_reset();
+}
+
+/// A function of its own, so that it fills the memory of its caller: made in place, a machine would first lie on the stack.
+/// `tests/tests/boards.rs` adds that up.
+#[inline(never)]
+fn at_reset() -> Machine {
+    Machine::new()
+}
+
+/// The supervised tick, for ticks and lock-step alike. A function of its own, so that its code is there once.
+#[inline(never)]
+pub(crate) fn step(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
+    supervise(config, machine, input)
 }

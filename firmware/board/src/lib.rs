@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! timer ─► Schedule ─missed─► Board::tick: Gauges ─codes─► supervise ─codes─► Amplifiers
-//!                                  ▲ orders      report ▼
-//! link  ◄─► Endpoint ◄─► Desk ◄── Exchange ──────────────┘
+//!                                  ▲ orders, wave │ report, record ▼
+//! link  ◄─► Endpoint ◄─► Desk ◄── Exchange ────────────────────────┘
 //! ```
 //! The interrupt of the timer owns [`Board`], the background owns the link; [`Exchange`] lies between them, and is locked
 //! for as long as it takes to copy what changed. Every decision about control is the supervisor's: a board collects what
@@ -16,14 +16,19 @@
 
 mod cycle;
 mod desk;
+mod download;
 mod exchange;
 mod health;
+mod recording;
 mod schedule;
+mod stepper;
 mod words;
 
 pub use cycle::{Board, Noticed};
-pub use desk::Desk;
+pub use desk::{Desk, Visit};
 pub use exchange::{Exchange, Orders, Report};
 pub use health::{BACKGROUND_SILENCE, Health};
+pub use recording::recorder;
 pub use schedule::{Due, Schedule};
+pub use stepper::{Stopwatch, Uncounted};
 pub use words::{COMMAND_WORDS, GAUGE_BITS, PERIOD_NANOSECONDS};

@@ -117,12 +117,9 @@ impl MachineInput {
     /// From words in the order of [`MACHINE_INPUT_NAMES`].
     #[must_use]
     pub fn from_words(words: &[u64; MACHINE_INPUT_WORDS]) -> Self {
-        let mut tick = [0; INPUT_WORDS];
-        for (slot, word) in tick.iter_mut().zip(words) {
-            *slot = *word;
-        }
+        let tick = words.first_chunk().unwrap_or(&[0; INPUT_WORDS]);
         Self {
-            tick: TickInput::from_words(&tick),
+            tick: TickInput::from_words(tick),
             request: Request::from_word(words[INPUT_WORDS]),
             events: words[INPUT_WORDS + 1] as u32,
         }

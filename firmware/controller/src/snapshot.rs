@@ -96,15 +96,33 @@ pub fn supervise_recorded(
     input: &MachineInput,
     recorder: &mut Recorder<'_>,
 ) -> MachineOutput {
+    record_before(config, machine, recorder);
+    let output = supervise(config, machine, input);
+    record_after(machine, input, &output, recorder);
+    output
+}
+
+/// What a recorder keeps before a tick under these settings.
+#[inline]
+pub fn record_before(config: &Config, machine: &Machine, recorder: &mut Recorder<'_>) {
     if recorder.opens() {
         recorder
-            .open(
+            .open_with(
                 &config.to_words(),
-                machine.digest(),
+                || machine.digest(),
                 |words| machine.save_into(words),
             );
     }
-    let output = supervise(config, machine, input);
+}
+
+/// What it keeps after the tick.
+#[inline]
+pub fn record_after(
+    machine: &Machine,
+    input: &MachineInput,
+    output: &MachineOutput,
+    recorder: &mut Recorder<'_>,
+) {
     let row = Row {
         codes: output.tick.dac_code,
         status: output.tick.status,
@@ -112,7 +130,6 @@ pub fn supervise_recorded(
             | (output.amplifier_on as u32) << 16,
     };
     recorder.push(&input.to_words(), &row, || machine.digest());
-    output
 }
 
 impl Snapshot for LegState {

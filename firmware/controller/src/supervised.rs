@@ -15,16 +15,15 @@ pub use crate::machine_words::{
     MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS,
     machine_output_words,
 };
-use crate::step::{GAUGE_FAULT, LEG_LIMITED};
+use crate::step::{GAUGE_FAULT, LEG_LIMITED, advance, outputs};
 use crate::supervision::PLAN;
-use specgen_runtime::linear::each;
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::{Estimate, Integral, NotchState, Real as _, Transfer};
 use crate::setpoint::PLAN as SETPOINTS;
 use crate::step::sense;
 use crate::supervision::READINGS_PER_LEG;
 use crate::{kinematics, sensing};
-use crate::{Config, LEGS, Real, State, TickInput, TickOutput, step};
+use crate::{Config, LEGS, Real, State, TickInput, TickOutput};
 
 /// State of the supervisor in this controller's arithmetic.
 pub type Supervisor = supervisor::Supervisor<Real>;
@@ -107,25 +106,35 @@ pub fn supervise(
     let channel = supervisor.watch.take_turn();
     let (expected, target) = expectation(state, channel);
     let (phase, cause) = (supervisor.phase, supervisor.cause);
-    if phase != Phase::Running {
-        let tick = stand(config, state, supervisor, &input.tick, channel, expected);
-        return MachineOutput {
-            tick,
-            phase,
-            cause,
-            amplifier_on: phase.is_powered(),
-        };
-    }
-    let before = codes(state);
-    let output = MachineOutput {
-        tick: step(config, state, &input.tick),
+    let status = if phase == Phase::Running {
+        run(config, state, supervisor, &input.tick, channel, [expected, target])
+    } else {
+        stand(config, state, supervisor, &input.tick, channel, expected)
+    };
+    MachineOutput {
+        tick: outputs(state, status),
         phase,
         cause,
-        amplifier_on: true,
-    };
-    let status = output.tick.status;
+        amplifier_on: phase.is_powered(),
+    }
+}
+
+/// The law at work; returns its status. Of the channel: what is `expected`, and its `target`.
+#[inline]
+fn run(
+    config: &Config,
+    state: &mut State,
+    supervisor: &mut Supervisor,
+    input: &TickInput,
+    channel: usize,
+    [expected,
+    target,
+    ]: [Real; 2],
+) -> u32 {
+    let before = codes(state);
+    let status = advance(config, state, input);
     if status & GAUGE_FAULT == 0 {
-        look(state, supervisor, &input.tick, channel, expected, target);
+        look(state, supervisor, input, channel, expected, target);
     }
     if status & (GAUGE_FAULT | LEG_LIMITED) == 0 {
         supervisor.seen = 0;
@@ -133,15 +142,9 @@ pub fn supervise(
         let (faults, limited) = ((status & GAUGE_FAULT) >> 8, status & LEG_LIMITED);
         let moved = moved(state, &before);
         supervisor
-            .see(
-                faults,
-                limited,
-                &input.tick.gauge,
-                &moved,
-                config.code_limits().max_step,
-            );
+            .see(faults, limited, &input.gauge, &moved, config.code_limits().max_step);
     }
-    output
+    status
 }
 
 /// Puts the law where the machine is. No leg moves in the first tick: a mode that begins takes over what is held.
@@ -192,7 +195,7 @@ fn look(
     supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
 }
 
-/// Codes held or on their way to rest, the law suspended; pose and rate are still measured.
+/// Codes held or on their way to rest, the law suspended; pose and rate are still measured. Returns the status.
 #[cold]
 #[inline(never)]
 fn stand(
@@ -202,7 +205,7 @@ fn stand(
     input: &TickInput,
     channel: usize,
     expected: Real,
-) -> TickOutput {
+) -> u32 {
     move_codes(config, state, supervisor);
     for leg in &mut state.legs {
         leg.requested = leg.memory.displacement();
@@ -212,12 +215,7 @@ fn stand(
         supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, None));
     }
     supervisor.see(faults, 0, &input.gauge, &[0; LEGS], 1);
-    let legs = &state.legs;
-    TickOutput {
-        voltage: each(|leg| DAC.voltage(legs[leg].code)),
-        dac_code: each(|leg| legs[leg].code),
-        status: faults << 8,
-    }
+    faults << 8
 }
 
 /// What a gauge ought to read by the codes sent over the interval that has ended and the known load, m; and the set-point

@@ -35,20 +35,97 @@ pub trait Machine {
     fn stage(&self, index: usize) -> Option<Stage<'_>>;
 }
 
+/// What a lock-step keeps besides the machine, for one of up to N words of settings, inputs and outputs each.
+#[derive(Debug)]
+pub struct Session<const N: usize = WORDS> {
+    /// Words of a request, then those of the answer.
+    words: [u64; N],
+    bytes: [[u8; size_of::<u64>()]; N],
+    /// Whether it was put at reset: before that there are no settings to step with.
+    ready: bool,
+}
+
+impl<const N: usize> Default for Session<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const N: usize> Session<N> {
+    /// Waits for the first reset.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { words: [0; N], bytes: [[0; size_of::<u64>()]; N], ready: false }
+    }
+
+    /// Steps are refused until the next reset.
+    pub const fn end(&mut self) {
+        self.ready = false;
+    }
+
+    /// Room for the bytes of an answer, while it is made.
+    pub const fn buffer(&mut self) -> &mut [u8] {
+        self.bytes.as_flattened_mut()
+    }
+
+    /// Words as the bytes of an answer; none if there are more than there is room for.
+    pub fn answer(&mut self, words: &[u64]) -> Option<Bytes<'_>> {
+        put_words(words, self.bytes.as_flattened_mut())
+    }
+
+    /// [`Request::WriteConfig`].
+    pub fn configure(&mut self, machine: &mut impl Machine, config: Bytes<'_>) -> Reply<'static> {
+        let [count, ..] = machine.words();
+        let Some(words) = self.words.get_mut(..count) else { return Reply::Refused(Refusal::TooLong) };
+        if !config.read_words(words) {
+            return Reply::Refused(Refusal::Length { expected: count as u16 });
+        }
+        match machine.configure(words) {
+            Ok(()) => Reply::Done,
+            Err(index) => Reply::Refused(Refusal::Word { index: index as u16 }),
+        }
+    }
+
+    /// [`Request::LockstepReset`].
+    pub fn reset(&mut self, machine: &mut impl Machine, config: Bytes<'_>) -> Reply<'static> {
+        let reply = self.configure(machine, config);
+        if reply == Reply::Done {
+            machine.reset();
+            self.ready = true;
+        }
+        reply
+    }
+
+    /// [`Request::LockstepStep`].
+    pub fn step(&mut self, machine: &mut impl Machine, input: Bytes<'_>) -> Reply<'_> {
+        if !self.ready {
+            return Reply::Refused(Refusal::State);
+        }
+        let [_, inputs, outputs] = machine.words();
+        let mut row = [0; N];
+        let Some(row) = row.get_mut(..inputs) else { return Reply::Refused(Refusal::TooLong) };
+        if !input.read_words(row) {
+            return Reply::Refused(Refusal::Length { expected: inputs as u16 });
+        }
+        let Some(words) = self.words.get_mut(..outputs) else { return Reply::Refused(Refusal::TooLong) };
+        let (digest, cost) = machine.step(row, words);
+        match put_words(words, self.bytes.as_flattened_mut()) {
+            Some(output) => Reply::Stepped { cost, digest, output },
+            None => Reply::Refused(Refusal::TooLong),
+        }
+    }
+}
+
 /// Carries out the requests of a lock-step on a machine; refuses all others.
 pub struct Lockstep<M> {
     machine: M,
-    /// Words of a request, then those of the answer.
-    words: [u64; WORDS],
-    bytes: [u8; WORDS * size_of::<u64>()],
-    /// Whether it was put at reset: before that there are no settings to step with.
-    ready: bool,
+    session: Session,
 }
 
 impl<M: Machine> Lockstep<M> {
     /// Waits for the first reset.
     pub const fn new(machine: M) -> Self {
-        Self { machine, words: [0; WORDS], bytes: [0; WORDS * size_of::<u64>()], ready: false }
+        Self { machine, session: Session::new() }
     }
 
     /// The machine.
@@ -72,45 +149,6 @@ impl<M: Machine> Lockstep<M> {
             description: self.machine.description().len() as u32,
         }
     }
-
-    fn configure(&mut self, config: Bytes<'_>) -> Reply<'static> {
-        let [count, ..] = self.machine.words();
-        let Some(words) = self.words.get_mut(..count) else { return Reply::Refused(Refusal::TooLong) };
-        if !config.read_words(words) {
-            return Reply::Refused(Refusal::Length { expected: count as u16 });
-        }
-        match self.machine.configure(words) {
-            Ok(()) => Reply::Done,
-            Err(index) => Reply::Refused(Refusal::Word { index: index as u16 }),
-        }
-    }
-
-    fn reset(&mut self, config: Bytes<'_>) -> Reply<'static> {
-        let reply = self.configure(config);
-        if reply == Reply::Done {
-            self.machine.reset();
-            self.ready = true;
-        }
-        reply
-    }
-
-    fn step(&mut self, input: Bytes<'_>) -> Reply<'_> {
-        if !self.ready {
-            return Reply::Refused(Refusal::State);
-        }
-        let [_, inputs, outputs] = self.machine.words();
-        let mut row = [0; WORDS];
-        let Some(row) = row.get_mut(..inputs) else { return Reply::Refused(Refusal::TooLong) };
-        if !input.read_words(row) {
-            return Reply::Refused(Refusal::Length { expected: inputs as u16 });
-        }
-        let Some(words) = self.words.get_mut(..outputs) else { return Reply::Refused(Refusal::TooLong) };
-        let (digest, cost) = self.machine.step(row, words);
-        match put_words(words, &mut self.bytes) {
-            Some(output) => Reply::Stepped { cost, digest, output },
-            None => Reply::Refused(Refusal::TooLong),
-        }
-    }
 }
 
 /// Bytes of a text that one answer carries.
@@ -121,9 +159,9 @@ impl<M: Machine> Device for Lockstep<M> {
         match *request {
             Request::Hello => Reply::Identity(self.identity()),
             Request::Describe { offset } => piece(self.machine.description().as_bytes(), offset),
-            Request::WriteConfig { words } => self.configure(words),
-            Request::LockstepReset { config } => self.reset(config),
-            Request::LockstepStep { input } => self.step(input),
+            Request::WriteConfig { words } => self.session.configure(&mut self.machine, words),
+            Request::LockstepReset { config } => self.session.reset(&mut self.machine, config),
+            Request::LockstepStep { input } => self.session.step(&mut self.machine, input),
             Request::LockstepStage { index } => {
                 self.machine.stage(usize::from(index)).map_or(Reply::Refused(Refusal::Unsupported), Reply::Stage)
             }

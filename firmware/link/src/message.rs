@@ -172,6 +172,8 @@ pub enum Refusal {
     State,
     /// The answer does not fit into a message.
     TooLong,
+    /// Another host has the device.
+    Busy,
 }
 
 /// What a device counts where it says what something cost.

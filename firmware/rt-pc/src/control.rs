@@ -3,20 +3,25 @@
 //! No control decision is made here: what a missed tick, a silent gauge or an operator who is gone means is the supervisor's
 //! business, which is told by event bits.
 
-use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+mod keeper;
+mod setpoints;
 
+use core::sync::atomic::Ordering;
+
+use controller::snapshot::recorder;
 use controller::supervised::{
-    CONVERTER, INTEGRITY, LINK_LOST, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, MISSED_TICK, Machine, MachineInput,
-    machine_output_words, supervise,
+    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, supervise,
 };
 use controller::{Config, LEGS};
-use rtrb::{Consumer, Producer};
-use specgen_rt::account::{Account, Stamps, Verdict};
+use specgen_rt::account::{Account, Stamps};
 use specgen_rt::clock::{self, Usage};
 use specgen_rt::{allocation, scheduling};
 
 use crate::devices::Device;
-use crate::words::{Places, Words};
+use crate::handover::{Inner, Order, Row, Shared, Tape};
+use crate::words::Places;
+use keeper::Keeper;
+use setpoints::Setpoints;
 
 /// From the start of the loop to its first tick, ns.
 const LEAD: u64 = 20_000_000;
@@ -25,45 +30,6 @@ const SLEPT: u64 = 1_000_000;
 /// Without a sign of life of the service for so long the operator's link is lost, ns. The service gives one every few ms.
 const SERVICE_PATIENCE: u64 = 2_000_000_000;
 
-/// One tick, as it is handed over.
-#[derive(Debug, Clone, Copy)]
-pub struct Row {
-    /// Number of the tick; skipped ones are left out.
-    pub tick: u64,
-    /// What went in.
-    pub input: Words,
-    /// What came out.
-    pub output: [u64; MACHINE_OUTPUT_WORDS],
-    /// Digest of the machine after the tick.
-    pub digest: u64,
-    /// Whether it was on time.
-    pub verdict: Verdict,
-}
-
-/// What the operator wants from the next tick on: the words that are his, and the request.
-#[derive(Debug, Clone, Copy)]
-pub struct Wish {
-    /// Input words; those that are measured are left out of account.
-    pub words: Words,
-    /// Number of the request.
-    pub request: u64,
-}
-
-/// What both threads see.
-#[derive(Debug, Default)]
-pub struct Shared {
-    /// The loop is to end.
-    pub stop: AtomicBool,
-    /// The loop has ended.
-    pub ended: AtomicBool,
-    /// Last sign of life of the service, ns of [`clock::now`].
-    pub service_alive: AtomicU64,
-    /// Ticks whose rows found no room.
-    pub lost_rows: AtomicU64,
-    /// Readings or outputs that the device did not make.
-    pub device_faults: AtomicU64,
-}
-
 /// Where and how fast the loop runs.
 #[derive(Debug, Clone, Copy)]
 pub struct Timing {
@@ -71,6 +37,8 @@ pub struct Timing {
     pub period: u64,
     /// Outputs later than this after the planned time are late, ns.
     pub limit: u64,
+    /// Ticks without a request after which a link is lost.
+    pub silence: u64,
     /// Time waits for the loop: no tick is skipped, the next one is planned for when it can be. For machines that are simulated.
     pub elastic: bool,
 }
@@ -85,10 +53,10 @@ pub struct Loop<'a, D> {
     pub places: Places,
     /// Event bits that hold for the whole run, such as a failed integrity check.
     pub standing_events: u32,
-    /// What the operator wants.
-    pub wishes: Consumer<Wish>,
-    /// What was done.
-    pub rows: Producer<Row>,
+    /// Its ends of the rings.
+    pub rings: Inner,
+    /// The recorder, started.
+    pub tape: Option<Tape>,
     /// Flags and counters.
     pub shared: &'a Shared,
     /// When.
@@ -100,10 +68,14 @@ impl<D: Device> Loop<'_, D> {
     pub fn run(mut self, account: &mut Account) {
         scheduling::touch_stack();
         let mut machine = Machine::new();
-        let mut words = [0; MACHINE_INPUT_WORDS];
-        let mut request = 0;
+        let mut setpoints = Setpoints::new(&self.config);
+        let Inner { outlets, mut orders } = self.rings;
+        let mut keeper = Keeper::new(outlets, self.tape.take(), self.shared, (&machine, &self.config));
+        let mut phase = Phase::Disarmed;
         let mut codes = [0; LEGS];
         let mut enabled = false;
+        let mut link = Link { number: 0, heard: 0, silence: self.timing.silence };
+        let mut count = 0;
         let Timing { period, elastic, .. } = self.timing;
         let mut planned = clock::now() + LEAD;
         let mut tick = 0;
@@ -119,16 +91,12 @@ impl<D: Device> Loop<'_, D> {
             planned += over * period;
             tick += over;
 
-            if let Ok(wish) = self.wishes.pop() {
-                words = wish.words;
-                request = wish.request;
-            }
             let mut events = self.standing_events;
             if over > 0 {
                 events |= MISSED_TICK;
             }
             let silence = woken.saturating_sub(self.shared.service_alive.load(Ordering::Relaxed));
-            if silence > SERVICE_PATIENCE {
+            if silence > SERVICE_PATIENCE || link.is_lost(self.shared.link.load(Ordering::Relaxed), tick) {
                 events |= LINK_LOST;
             }
 
@@ -145,8 +113,9 @@ impl<D: Device> Loop<'_, D> {
             if broken {
                 events |= CONVERTER;
             }
+            let mut words = setpoints.next(phase, &self.config);
             self.places.put_readings(&mut words, &codes, &self.device.wrench());
-            self.places.put_supervision(&mut words, request, events);
+            self.places.put_supervision(&mut words, setpoints.request(), events);
             let output = supervise(&self.config, &mut machine, &MachineInput::from_words(&words));
             let computed = clock::now();
 
@@ -165,19 +134,40 @@ impl<D: Device> Loop<'_, D> {
                 self.shared.device_faults.fetch_add(1, Ordering::Relaxed);
             }
 
-            let mut row = Row {
+            phase = output.phase;
+            let digest = if keeper.wants_digest() { machine.digest() } else { 0 };
+            keeper.keep(Row {
                 tick,
+                count,
                 input: words,
-                output: machine_output_words(&output, &machine),
-                digest: machine.digest(),
-                verdict: Verdict::OnTime,
-            };
+                output: row_of(&output),
+                digest,
+                late: account.late().iter().sum(),
+                orders: 0,
+                opens: false,
+                waving: setpoints.waving(),
+                recorded: None,
+                triggered: false,
+            });
+            count += 1;
+            let mut configured = false;
+            if let Ok(order) = orders.pop() {
+                keeper.ordered();
+                match order {
+                    Order::Wish(wish) => setpoints.wish(wish),
+                    Order::Configure(config) => (self.config, configured) = (config, true),
+                    Order::Wave(settings) => setpoints.start(&settings, &self.config),
+                    Order::StopWave => setpoints.stop(),
+                    Order::Tape(tape) => keeper.take(tape, count),
+                    Order::Record(settings) => keeper.record(settings, count),
+                    Order::Trigger => keeper.trigger(),
+                    Order::StopRecorder => keeper.stop(),
+                }
+            }
+            keeper.prepare(&machine, &self.config, count, configured);
             let usage = Usage::of_this_thread().since(usage);
             let done = clock::now();
-            row.verdict = account.tick(&Stamps { planned, woken, read, computed, written, done }, &usage, suspended);
-            if self.rows.push(row).is_err() {
-                self.shared.lost_rows.fetch_add(1, Ordering::Relaxed);
-            }
+            account.tick(&Stamps { planned, woken, read, computed, written, done }, &usage, suspended);
             planned += period;
             if elastic && planned < done {
                 planned = done;
@@ -186,8 +176,40 @@ impl<D: Device> Loop<'_, D> {
         }
         // Twice: a bus that failed once may work now. There is nobody left to tell.
         let _ = self.device.enable(false).or_else(|_| self.device.enable(false));
+        keeper.finish();
         allocation::leave();
         self.shared.ended.store(true, Ordering::Release);
+    }
+}
+
+/// Whether the host at the other end of a link is still there.
+struct Link {
+    /// Number of the last request seen; 0 where nobody's silence matters.
+    number: u64,
+    /// Tick in which it was.
+    heard: u64,
+    /// Ticks of silence that are none yet.
+    silence: u64,
+}
+
+impl Link {
+    /// `number` is that of the last request, `tick` is now: skipped ticks are silence, too.
+    fn is_lost(&mut self, number: u64, tick: u64) -> bool {
+        if number != self.number {
+            (self.number, self.heard) = (number, tick);
+        }
+        number != 0 && tick - self.heard > self.silence
+    }
+}
+
+/// What a record keeps of a tick's outputs.
+fn row_of(output: &MachineOutput) -> recorder::Row {
+    recorder::Row {
+        codes: output.tick.dac_code,
+        status: output.tick.status,
+        supervisor: output.phase.word() as u32
+            | (output.cause.word() as u32) << 8
+            | u32::from(output.amplifier_on) << 16,
     }
 }
 

@@ -1,16 +1,19 @@
 //! The emitted controller on a Linux PC, in real time.
 //!
 //! ```text
-//! real-time thread   sleep to the tick → gauges → supervise → amplifiers → hand over     control.rs
-//!        │ rows (ring, never waits)            ▲ wishes (ring, never waits)
+//! real-time thread   sleep to the tick → gauges → supervise → amplifiers → hand over     control.rs, control/
+//!        │ rows, states, recorder              ▲ orders              rings, never wait    handover.rs
 //!        ▼                                     │
-//! main thread        record to a file, lines from a socket, plan, signals                service.rs, operator.rs
+//! main thread        record to a file, lines, link, plan, signals                        service.rs, console.rs, operator.rs
 //! ```
 //! The machine outside is a data acquisition card or a simulated one (devices/). What is late is entered in a book and
 //! has a cause; the summary shows it.
 
+mod capture;
+mod console;
 mod control;
 mod devices;
+mod handover;
 mod operator;
 mod options;
 mod record;
@@ -30,12 +33,15 @@ use specgen_rt::allocation::Watched;
 use specgen_rt::scheduling::{self, AwakeProcessors, Refused};
 use specgen_rt::{clock, exchange};
 
-use control::{Loop, Shared, Timing};
+use capture::Capture;
+use console::Console;
+use control::{Loop, Timing};
 use devices::Device;
 use devices::simulated::Simulated;
+use handover::Shared;
 use operator::Operator;
 use options::{Asked, Options};
-use service::{Service, Socket};
+use service::{Link, Service, Socket};
 use summary::Summary;
 use words::Places;
 
@@ -43,9 +49,6 @@ use words::Places;
 #[global_allocator]
 static ALLOCATOR: Watched = Watched;
 
-/// Rows between the threads: 0.8 s at 10 kHz.
-const ROWS: usize = 8192;
-const WISHES: usize = 16;
 /// Bytes of the real-time thread's stack.
 const STACK: usize = 2 * scheduling::STACK + (1 << 20);
 
@@ -108,11 +111,16 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     let environment = |error: String| Failure::Environment(error);
     let config = configure(&options.config).map_err(usage)?;
     let period = words::period().ok_or_else(|| environment("the controller does not state its period".to_owned()))?;
-    let timing = Timing { period, limit: (period as f64 * options.late_after) as u64, elastic: options.elastic };
+    let timing = Timing {
+        period,
+        limit: (period as f64 * options.late_after) as u64,
+        silence: options.link_silence.div_ceil(period),
+        elastic: options.elastic,
+    };
     let places = Places::find().map_err(|error| environment(error.to_string()))?;
     // Somebody or something is there to end it.
-    let attended = options.socket.is_some() || options.duration.is_some();
-    let mut operator = Operator::new(places.clone(), attended);
+    let attended = options.socket.is_some() || options.link.is_some() || options.duration.is_some();
+    let mut operator = Operator::new(places.clone(), attended, options.link_silence);
     if options.arm {
         operator.plan(&options.set, clock::now()).map_err(|error| usage(format!("--set: {error}")))?;
     }
@@ -125,14 +133,17 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     let named = |path: &std::path::Path, error: std::io::Error| environment(format!("{}: {error}", path.display()));
     let socket = options.socket.as_deref().map(|path| Socket::listen(path).map_err(|error| named(path, error)));
     let socket = socket.transpose()?;
-    let recorder = options.record.as_deref().map(|path| {
-        let recorder = record::Recorder::create(path).map_err(|error| named(path, error))?;
-        Ok::<_, Failure>((path.to_owned(), recorder))
+    let link = options.link.as_deref().map(|path| Link::listen(path).map_err(|error| named(path, error)));
+    let link = link.transpose()?;
+    let record = options.record.as_deref().map(|path| {
+        let writer = record::Writer::create(path, &config).map_err(environment)?;
+        Ok::<_, Failure>((path.to_owned(), writer))
     });
-    let recorder = recorder.transpose()?;
+    let record = record.transpose()?;
+    let (capture, tape) = Capture::new(options.capture.as_deref()).map_err(environment)?;
+    let console = Console::new(operator, capture, places.clone(), config);
 
-    let (row_producer, row_consumer) = rtrb::RingBuffer::new(ROWS);
-    let (wish_producer, wish_consumer) = rtrb::RingBuffer::new(WISHES);
+    let (inner, outer) = handover::rings(record.is_some());
     let shared = Shared::default();
     shared.service_alive.store(clock::now(), Ordering::Relaxed);
     let description = device.describe();
@@ -144,8 +155,8 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         config,
         places,
         standing_events: control::integrity_event(controller::integrity::intact()),
-        wishes: wish_consumer,
-        rows: row_producer,
+        rings: inner,
+        tape: Some(tape),
         shared: &shared,
         timing,
     };
@@ -176,17 +187,8 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         }
         let until = options.duration.map(|duration| clock::now() + duration);
         let _ = go.send(());
-        let service = Service {
-            rows: row_consumer,
-            wishes: wish_producer,
-            shared: &shared,
-            operator,
-            recorder,
-            socket,
-            signal,
-            signals: 0,
-            until,
-        };
+        let service =
+            Service { rings: outer, shared: &shared, console, record, socket, link, signal, signals: 0, until };
         Ok(service.run())
     })?;
 

@@ -1,11 +1,12 @@
-//! What is asked of the machine, and when: by the command line's plan, by lines on a socket, by signals.
+//! What is asked of the machine, and when: by the command line's plan, by lines on a socket, over a link, by signals.
 //!
-//! An operator only asks. Whether a request is granted is the supervisor's business, and each step here waits for what it says.
+//! There is one state of it, whoever asks. A host that has ordered something over a link has the orders for as long as it is
+//! heard; lines may then only slow the machine down. An operator only asks. Whether a request is granted is the supervisor's business, and each step here waits for what it says.
 
 use controller::supervised::{Cause, MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, Phase, Request};
 use specgen_rt::clock::SECOND;
 
-use crate::control::Wish;
+use crate::handover::Wish;
 use crate::words::{Places, Words, place, word_of};
 
 /// How long a step of the plan may take before it is given up, ns.
@@ -26,6 +27,21 @@ pub struct Said {
     pub status: u32,
     /// Tick of these.
     pub tick: u64,
+    /// Orders that the loop had taken by then.
+    pub orders: u32,
+    /// The set-point was a wave's.
+    pub waving: bool,
+    /// Ticks that were late so far.
+    pub late: u64,
+}
+
+/// Who gave the last order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Owner {
+    /// The plan, or lines.
+    Here,
+    /// A host over a link, which was last heard at this time, ns.
+    Link(u64),
 }
 
 /// Where the plan stands.
@@ -58,14 +74,22 @@ pub struct Operator {
     /// Why the plan could not be carried out.
     pub complaint: Option<String>,
     changed: bool,
+    owner: Owner,
+    /// Requests over the link.
+    requests: u64,
+    /// Lines took the orders from a silent host.
+    evicted: bool,
+    /// A host may be silent for so long, ns.
+    patience: u64,
     /// After a fault the loop goes on, for somebody will look at it or end it.
     attended: bool,
 }
 
 impl Operator {
-    /// An operator without a plan. If the plan fails the loop goes on where it is `attended`, else it ends.
+    /// An operator without a plan. If the plan fails the loop goes on where it is `attended`, else it ends. A host over a link
+    /// may be silent for `patience`, ns.
     #[must_use]
-    pub fn new(places: Places, attended: bool) -> Self {
+    pub fn new(places: Places, attended: bool, patience: u64) -> Self {
         Self {
             places,
             words: [0; MACHINE_INPUT_WORDS],
@@ -75,6 +99,10 @@ impl Operator {
             play: Vec::new(),
             complaint: None,
             changed: true,
+            owner: Owner::Here,
+            requests: 0,
+            evicted: false,
+            patience,
             attended,
         }
     }
@@ -93,7 +121,7 @@ impl Operator {
 
     /// Asks to ramp down; then the loop may end.
     pub fn go_down(&mut self, now: u64) {
-        if !matches!(self.step, Step::GoingDown | Step::Over) {
+        if !self.is_ending() {
             self.go(Step::GoingDown, Request::RampDown, now);
         }
     }
@@ -109,7 +137,7 @@ impl Operator {
         let waited = now.saturating_sub(self.since);
         match (self.step, said.phase) {
             (Step::Arming | Step::Starting | Step::Playing, Phase::Faulted) => {
-                self.complain(format!("the machine faulted at tick {}: {:?}", said.tick, said.cause), now);
+                self.give_up(format!("the machine faulted at tick {}: {:?}", said.tick, said.cause), now);
             }
             (Step::Arming, Phase::Running) | (Step::Starting, Phase::Running) => {
                 for (place, word) in std::mem::take(&mut self.play) {
@@ -119,7 +147,7 @@ impl Operator {
             }
             (Step::Arming, Phase::Arming | Phase::Holding) => self.go(Step::Starting, Request::Run, now),
             (Step::Arming | Step::Starting, _) if waited > STEP_LIMIT => {
-                self.complain(format!("the machine is still {:?} after {} s", said.phase, STEP_LIMIT / SECOND), now);
+                self.give_up(format!("the machine is still {:?} after {} s", said.phase, STEP_LIMIT / SECOND), now);
             }
             (Step::GoingDown, Phase::Disarmed | Phase::Faulted) if !said.on => self.go(Step::Over, Request::None, now),
             (Step::GoingDown, _) if waited > DOWN_LIMIT => {
@@ -133,6 +161,9 @@ impl Operator {
     }
 
     /// A line from the socket: its answer.
+    ///
+    /// # Errors
+    /// In words: it is none, or it is not for lines to say now.
     pub fn obey(&mut self, line: &str, now: u64) -> Result<String, String> {
         let mut parts = line.split_whitespace();
         let verb = parts.next().unwrap_or_default();
@@ -145,6 +176,7 @@ impl Operator {
             "ramp-down" => Request::RampDown,
             "acknowledge" => Request::Acknowledge,
             "set" if !rest.is_empty() => {
+                self.take(verb, now)?;
                 let words = rest.iter().map(|text| self.assignment(text)).collect::<Result<Vec<_>, _>>()?;
                 for (place, word) in words {
                     self.words[place] = word;
@@ -165,13 +197,129 @@ impl Operator {
         if !rest.is_empty() {
             return Err(format!("`{verb}` takes nothing more, found `{}`", rest.join(" ")));
         }
-        // By hand from here on, but for the way down.
-        if self.step != Step::GoingDown && self.step != Step::Over {
+        self.take(verb, now)?;
+        self.ask(request);
+        Ok("ok".to_owned())
+    }
+
+    /// Lines get the orders for `verb`. What slows the machine down is obeyed whoever has them.
+    fn take(&mut self, verb: &str, now: u64) -> Result<(), String> {
+        if self.is_ending() && verb != "ramp-down" {
+            return Err("the program is ramping down to end".to_owned());
+        }
+        let linked = self.linked(now);
+        if linked && !matches!(verb, "hold" | "ramp-down") {
+            return Err(format!(
+                "a host over the link has the orders; `{verb}` is for it to say, hold, ramp-down and stop are for all"
+            ));
+        }
+        if !linked {
+            self.evicted |= self.is_links();
+            self.owner = Owner::Here;
+        }
+        Ok(())
+    }
+
+    /// Asks for something by hand: a plan is over, but for the way down.
+    fn ask(&mut self, request: Request) {
+        if !self.is_ending() {
             self.step = Step::Free;
         }
-        self.request = request;
+        (self.request, self.changed) = (request, true);
+    }
+
+    /// Whether it only waits for the end.
+    #[must_use]
+    pub fn is_ending(&self) -> bool {
+        matches!(self.step, Step::GoingDown | Step::Over)
+    }
+
+    /// Whether a host over a link has the orders and is there.
+    #[must_use]
+    pub fn linked(&self, now: u64) -> bool {
+        matches!(self.owner, Owner::Link(heard) if now.saturating_sub(heard) <= self.patience)
+    }
+
+    /// Whether the silence of the link matters: its host has ordered something.
+    #[must_use]
+    pub fn is_links(&self) -> bool {
+        matches!(self.owner, Owner::Link(_))
+    }
+
+    /// Whether lines took the orders from a silent host since this was asked last.
+    pub fn take_evicted(&mut self) -> bool {
+        std::mem::take(&mut self.evicted)
+    }
+
+    /// Another number with every request, where the silence of the link matters; else 0.
+    #[must_use]
+    pub fn link_number(&self) -> u64 {
+        if self.is_links() { self.requests } else { 0 }
+    }
+
+    /// A host over the link was heard.
+    pub fn heard(&mut self, now: u64) {
+        self.requests += 1;
+        if self.is_links() {
+            self.owner = Owner::Link(now);
+        }
+    }
+
+    /// A host over the link comes anew: if the last one had the orders, nothing is asked for.
+    pub fn greeted(&mut self) {
+        if self.is_links() && !self.is_ending() {
+            self.ask(Request::None);
+        }
+    }
+
+    /// The host over the link has gone. A machine that is off does not miss it.
+    pub fn left(&mut self, last: Option<&Said>) {
+        if last.is_none_or(|said| said.phase == Phase::Disarmed && !said.on) {
+            self.owner = Owner::Here;
+        }
+    }
+
+    /// The host over the link gets the orders, if there are any to give.
+    pub fn take_for_link(&mut self, now: u64) -> bool {
+        if !self.is_ending() {
+            self.owner = Owner::Link(now);
+            self.step = Step::Free;
+        }
+        !self.is_ending()
+    }
+
+    /// The host over the link asks; it has the orders.
+    pub fn ask_by_link(&mut self, request: Request) {
+        self.ask(request);
+    }
+
+    /// The words that are no measurements, in their order, from the link; false if `words` are not as many.
+    pub fn set_by_link(&mut self, words: specgen_link::Bytes<'_>) -> bool {
+        let places: Vec<usize> = self.places.free().collect();
+        let Some(words) = words.words(places.len()) else { return false };
+        for (place, word) in places.into_iter().zip(words) {
+            self.words[place] = word;
+        }
         self.changed = true;
-        Ok("ok".to_owned())
+        true
+    }
+
+    /// How many words are no measurements.
+    #[must_use]
+    pub fn free_words(&self) -> usize {
+        self.places.free().count()
+    }
+
+    /// The words as they are wanted.
+    #[must_use]
+    pub fn words(&self) -> &Words {
+        &self.words
+    }
+
+    /// What is wanted once a wave about `center` has come to rest: to stay there.
+    pub fn rest_at(&mut self, center: &[controller::Real; 6]) {
+        self.places.rest_at(center, &mut self.words);
+        self.changed = true;
     }
 
     /// What is to be sent to the loop, if it changed since the last call.
@@ -179,16 +327,12 @@ impl Operator {
         std::mem::take(&mut self.changed).then(|| Wish { words: self.words, request: self.request.word() })
     }
 
-    /// The last wish found no room: it is to be sent again.
-    pub fn repeat(&mut self) {
-        self.changed = true;
-    }
-
     fn go(&mut self, step: Step, request: Request, now: u64) {
         (self.step, self.request, self.since, self.changed) = (step, request, now, true);
     }
 
-    fn complain(&mut self, text: String, now: u64) {
+    /// Why it cannot go on: ramp down, and end where nobody attends.
+    pub fn give_up(&mut self, text: String, now: u64) {
         self.complaint.get_or_insert(text);
         if self.attended {
             self.go(Step::Free, Request::RampDown, now);
@@ -203,8 +347,7 @@ impl Operator {
             text.split_once('=').ok_or_else(|| format!("expected NAME=VALUE such as `command=3`, found `{text}`"))?;
         let place = place(name).map_err(|error| error.to_string())?;
         if !self.places.is_free(place) {
-            let free = (0..MACHINE_INPUT_WORDS).filter(|k| self.places.is_free(*k));
-            let free: Vec<&str> = free.map(|k| MACHINE_INPUT_NAMES[k]).collect();
+            let free: Vec<&str> = self.places.free().map(|k| MACHINE_INPUT_NAMES[k]).collect();
             return Err(format!("`{name}` is measured or has a request of its own; free are {}", free.join(", ")));
         }
         let number: f64 = value.parse().map_err(|_| format!("`{name}`: expected a number, found `{value}`"))?;
@@ -218,12 +361,14 @@ impl Operator {
 mod tests {
     use super::*;
 
+    const PATIENCE: u64 = 100;
+
     fn said(phase: Phase, on: bool) -> Said {
-        Said { phase, cause: Cause::None, on, status: 0, tick: 7 }
+        Said { phase, cause: Cause::None, on, status: 0, tick: 7, orders: 0, waving: false, late: 0 }
     }
 
     fn operator() -> Operator {
-        Operator::new(Places::find().unwrap(), false)
+        Operator::new(Places::find().unwrap(), false, PATIENCE)
     }
 
     #[test]
@@ -263,7 +408,7 @@ mod tests {
 
     #[test]
     fn where_somebody_looks_a_fault_does_not_end_the_loop() {
-        let mut operator = Operator::new(Places::find().unwrap(), true);
+        let mut operator = Operator::new(Places::find().unwrap(), true, PATIENCE);
         operator.plan(&[], 0).unwrap();
         operator.hear(&said(Phase::Faulted, false), 1);
         operator.hear(&said(Phase::Faulted, false), 2);
@@ -297,5 +442,36 @@ mod tests {
         // Half of a line is not obeyed.
         assert!(operator.obey("set setpoint[0]=5e-6 setpoint[1]=x", 0).is_err());
         assert!(operator.wish().is_none());
+    }
+
+    #[test]
+    fn a_host_has_the_orders_while_it_is_heard_and_lines_may_only_slow_the_machine_down() {
+        let mut operator = operator();
+        operator.heard(0);
+        operator.left(None);
+        assert!(operator.obey("arm", 1).is_ok() && operator.link_number() == 0, "one that only looks has no orders");
+        assert!(operator.take_for_link(10));
+        operator.ask_by_link(Request::Run);
+        assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run.word());
+        for line in ["arm", "run", "none", "acknowledge", "set setpoint[0]=0"] {
+            assert!(operator.obey(line, 10 + PATIENCE).unwrap_err().contains("a host over the link has the orders"));
+        }
+        assert!(operator.obey("hold", 20).is_ok() && operator.linked(20));
+        operator.heard(200);
+        // Gone while something moves: it is missed until lines take over.
+        operator.left(Some(&said(Phase::Running, true)));
+        assert!(operator.linked(200 + PATIENCE) && !operator.linked(201 + PATIENCE) && operator.link_number() > 0);
+        assert!(!operator.take_evicted());
+        assert!(operator.obey("ramp-down", 500).is_ok() && operator.take_evicted() && operator.link_number() == 0);
+        // Gone while nothing can move: not missed.
+        assert!(operator.take_for_link(600));
+        operator.left(Some(&said(Phase::Disarmed, false)));
+        assert_eq!(operator.link_number(), 0);
+        operator.go_down(700);
+        assert!(
+            !operator.take_for_link(701)
+                && operator.obey("run", 701).is_err()
+                && operator.obey("ramp-down", 701).is_ok()
+        );
     }
 }

@@ -33,12 +33,16 @@ Operation
   --set NAME=VALUE     once running, set an input word, such as command=3 or setpoint[2]=1e-6; implies --arm
   --config NAME=VALUE  a setting for this run, such as mode=6
   --socket PATH        listen for lines: status, set, arm, run, hold, ramp-down, acknowledge, stop
-  --record FILE        write every tick to FILE, for replay
+  --link PATH          answer the link protocol of boards, for `specgen operate --socket PATH`
+  --link-silence MS    a host that ordered something over the link and is silent for so long is lost (default 100)
+  --record FILE        write every tick of the run to FILE, for `specgen replay`
+  --capture FILE       write what the recorder kept around a fault, or a trigger over the link, to FILE
   --json               print the summary as JSON
   --help, --version
 
 SIGINT or SIGTERM ramps down and ends; a second one ends at once with the amplifiers off.
-Exit codes: 0 good, 1 the machine faulted or the book does not balance, 2 usage, 3 environment.
+Exit codes: 0 good, 1 the machine faulted or held for a cause, a record is not whole or the book does not balance, 2 usage,
+3 environment.
 ";
 
 /// Which machine.
@@ -84,8 +88,14 @@ pub struct Options {
     pub config: Vec<String>,
     /// Socket of the operator.
     pub socket: Option<PathBuf>,
+    /// Socket of the link.
+    pub link: Option<PathBuf>,
+    /// ns.
+    pub link_silence: u64,
     /// File of the record.
     pub record: Option<PathBuf>,
+    /// File of the recorder.
+    pub capture: Option<PathBuf>,
     /// Summary as JSON.
     pub json: bool,
 }
@@ -124,7 +134,10 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
         set: Vec::new(),
         config: Vec::new(),
         socket: None,
+        link: None,
+        link_silence: 100_000_000,
         record: None,
+        capture: None,
         json: false,
     };
     let mut parser = lexopt::Parser::from_iter(arguments);
@@ -158,6 +171,11 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             }
             Long("config") => options.config.push(parser.value()?.string()?),
             Long("socket") => options.socket = Some(parser.value()?.into()),
+            Long("link") => options.link = Some(parser.value()?.into()),
+            Long("link-silence") => {
+                options.link_silence = (number(&mut parser, "--link-silence", 1.0, 60_000.0)? * 1e6) as u64;
+            }
+            Long("capture") => options.capture = Some(parser.value()?.into()),
             Long("record") => options.record = Some(parser.value()?.into()),
             Long("json") => options.json = true,
             _ => return Err(argument.unexpected()),
@@ -205,6 +223,7 @@ mod tests {
             ("--seconds", "missing argument"),
             ("--seconds nan", "from 0.01 to 10000000, found `nan`"),
             ("--priority 0", "from 1 to 99, found `0`"),
+            ("--link-silence 0", "from 1 to 60000, found `0`"),
             ("--late-after 2", "from 0.01 to 1, found `2`"),
             ("--comedi-range 10:-10", "two voltages such as -10:10, found `10:-10`"),
             ("--cpu x", "cannot parse"),

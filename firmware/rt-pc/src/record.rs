@@ -1,80 +1,129 @@
-//! The record of a run: every word that went in and came out, streamed to a file that the host replays.
+//! The record of a whole run: what comes through the ring, in the format of recorders, block by block into a file.
 //!
-//! The format is that of traces (`SPGTRACE`, see host-sim): a description, the number of rows, rows of input words, output
-//! words and the digest of the machine. Ticks that were skipped have no row; the tick after them carries the event.
+//! The blocks are made here, so that the loop spends no more on them than a state now and then. Ticks that were skipped have no
+//! row; the tick after them carries the event. Rows that were lost are a gap, behind which the record goes on with a state.
 
+use std::collections::VecDeque;
 use std::fs::File;
-use std::io::{self, BufWriter, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-use controller::DESCRIPTION;
-use controller::supervised::{MACHINE_INPUT_NAMES, MACHINE_OUTPUT_NAMES};
+use controller::snapshot::RECORD_LAYOUT;
+use controller::snapshot::recorder::{Recorder, Settings};
+use controller::{CONFIG_WORDS, Config, DESCRIPTION};
+use rtrb::Consumer;
+use specgen_runtime::record::{write_block, write_header};
 
-use crate::control::Row;
+use crate::handover::{Row, SNAPSHOT_EVERY, Snapshot};
 
-/// A record that is being written. Without [`Recorder::finish`] its number of rows is 0.
-pub struct Recorder {
+/// One block that is filled, and one that is written.
+const BLOCKS: usize = 2;
+/// Words of a block: its rows always fit.
+const BLOCK: usize = RECORD_LAYOUT.preamble() + SNAPSHOT_EVERY as usize * RECORD_LAYOUT.longest_row();
+
+/// Writes the beginning of a record of this controller.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn begin(out: &mut impl Write) -> io::Result<()> {
+    write_header(DESCRIPTION, |piece| out.write_all(piece))
+}
+
+/// Writes a block.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn add(out: &mut impl Write, block: &[u64]) -> io::Result<()> {
+    write_block(block, |piece| out.write_all(piece))
+}
+
+/// A recorder whose memory is there for as long as the program runs, so that it can be handed from thread to thread.
+///
+/// # Errors
+/// In words, if the memory is too small for this controller.
+pub fn recorder(blocks: usize, words: usize) -> Result<Recorder<'static>, String> {
+    let memory = vec![0; blocks * words].leak();
+    Recorder::new(memory, blocks, RECORD_LAYOUT).map_err(|unfit| format!("no recorder for this controller: {unfit:?}"))
+}
+
+/// A record that is being written.
+pub struct Writer {
     file: BufWriter<File>,
-    /// Where the number of rows stands.
-    count_at: u64,
+    recorder: Recorder<'static>,
+    /// Settings that are or will be in force, by the number of orders that were taken before their first tick.
+    configs: VecDeque<(u32, [u64; CONFIG_WORDS])>,
+    /// Settings of the open block.
+    config: [u64; CONFIG_WORDS],
     rows: u64,
 }
 
-impl Recorder {
+impl Writer {
     /// A new file; one of this name is replaced.
     ///
     /// # Errors
-    /// If it cannot be written.
-    pub fn create(path: &Path) -> io::Result<Self> {
-        let mut file = BufWriter::with_capacity(1 << 20, File::create(path)?);
-        let description = description();
-        file.write_all(b"SPGTRACE")?;
-        file.write_all(&1_u32.to_le_bytes())?;
-        file.write_all(&(description.len() as u32).to_le_bytes())?;
-        file.write_all(description.as_bytes())?;
-        file.write_all(&0_u64.to_le_bytes())?;
-        Ok(Self { file, count_at: 16 + description.len() as u64, rows: 0 })
+    /// In words, if it cannot be written.
+    pub fn create(path: &Path, config: &Config) -> Result<Self, String> {
+        let named = |error: io::Error| format!("{}: {error}", path.display());
+        let mut file = BufWriter::with_capacity(1 << 16, File::create(path).map_err(named)?);
+        // At once, so that a disk without room is known before anything moves.
+        begin(&mut file).and_then(|()| file.flush()).map_err(named)?;
+        let mut recorder = recorder(BLOCKS, BLOCK)?;
+        recorder.start(Settings::STREAM);
+        Ok(Self { file, recorder, configs: VecDeque::new(), config: config.to_words(), rows: 0 })
+    }
+
+    /// Order number `order` brings other settings.
+    pub fn configured(&mut self, order: u32, config: &Config) {
+        self.configs.push_back((order, config.to_words()));
     }
 
     /// Adds a tick.
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn add(&mut self, row: &Row) -> io::Result<()> {
-        for word in row.input.iter().chain(&row.output).chain([&row.digest]) {
-            self.file.write_all(&word.to_le_bytes())?;
+    pub fn add(&mut self, row: &Row, snapshots: &mut Consumer<Snapshot>) -> io::Result<()> {
+        if row.opens {
+            let Some(snapshot) = snapshots.pop().ok().filter(|snapshot| snapshot.count == row.count) else {
+                return Err(io::Error::other("a block came without its state: report this as a defect of specgen"));
+            };
+            let mut changed = false;
+            // Order numbers wrap around.
+            let taken = |order: u32| row.orders.wrapping_sub(order).cast_signed() >= 0;
+            while let Some((_, config)) = self.configs.pop_front_if(|(order, _)| taken(*order)) {
+                (self.config, changed) = (config, true);
+            }
+            if changed {
+                self.recorder.settings_changed();
+            }
+            self.recorder.begin(row.count);
+            self.recorder.open(&self.config, snapshot.digest, |words| words.copy_from_slice(&snapshot.state));
+            self.drain()?;
         }
+        self.recorder.push(&row.input, &row.output, || row.digest);
         self.rows += 1;
         Ok(())
     }
 
-    /// Writes what is left and the number of rows; returns it.
+    fn drain(&mut self) -> io::Result<()> {
+        while let Some(block) = self.recorder.block(0) {
+            add(&mut self.file, block)?;
+            self.recorder.release();
+        }
+        Ok(())
+    }
+
+    /// Writes what is left; returns the number of ticks.
     ///
     /// # Errors
     /// If it cannot be written.
     pub fn finish(mut self) -> io::Result<u64> {
+        self.recorder.stop();
+        self.drain()?;
         self.file.flush()?;
-        let file = self.file.get_mut();
-        file.seek(SeekFrom::Start(self.count_at))?;
-        file.write_all(&self.rows.to_le_bytes())?;
-        file.sync_all()?;
-        Ok(self.rows)
-    }
-}
-
-/// The controller's description with the words of the supervised tick, padded to a multiple of eight bytes.
-fn description() -> String {
-    let mut text = String::new();
-    for line in DESCRIPTION.lines() {
-        match line.split_once('=') {
-            Some(("input_names", _)) => text += &format!("input_names={}", MACHINE_INPUT_NAMES.join(",")),
-            Some(("output_names", _)) => text += &format!("output_names={}", MACHINE_OUTPUT_NAMES.join(",")),
-            _ => text += line,
+        // A pipe or a device cannot be synchronised, and need not be.
+        match self.file.get_ref().sync_all() {
+            Err(error) if error.kind() != io::ErrorKind::InvalidInput => Err(error),
+            _ => Ok(self.rows),
         }
-        text.push('\n');
     }
-    while !text.len().is_multiple_of(8) {
-        text.push('\n');
-    }
-    text
 }

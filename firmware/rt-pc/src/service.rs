@@ -1,41 +1,44 @@
 //! The thread beside the loop, without a deadline: writes the record, hears operators, carries the plan on.
 
+mod desk;
+mod link;
+mod listener;
 mod socket;
 
 use core::sync::atomic::{AtomicBool, Ordering};
-use core::time::Duration;
 use std::io;
+use std::os::fd::BorrowedFd;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use controller::OUTPUT_WORDS;
 use controller::supervised::{Cause, Phase};
-use rtrb::{Consumer, Producer};
-use specgen_rt::account::Verdict;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use specgen_rt::clock;
 
-use crate::control::{Row, Shared, Wish};
-use crate::operator::{Operator, Said};
-use crate::record::Recorder;
+use crate::console::Console;
+use crate::handover::{Order, Outer, Row, Shared};
+use crate::operator::Said;
+use crate::record;
+pub use link::{Link, Traffic};
 pub use socket::Socket;
 
-/// Between two rounds: the ring holds many times what comes in it.
-const ROUND: Duration = Duration::from_millis(2);
+/// Between two rounds, unless somebody says something: the ring holds many times what comes in it.
+const ROUND: Timespec = Timespec { tv_sec: 0, tv_nsec: 2_000_000 };
 
 /// What the service works with.
 pub struct Service<'a> {
-    /// What the loop did.
-    pub rows: Consumer<Row>,
-    /// What it is to do.
-    pub wishes: Producer<Wish>,
+    /// Its ends of the rings.
+    pub rings: Outer,
     /// Flags and counters.
     pub shared: &'a Shared,
-    /// Who asks.
-    pub operator: Operator,
+    /// What may be asked.
+    pub console: Console,
     /// Where ticks are written, if anywhere.
-    pub recorder: Option<(PathBuf, Recorder)>,
+    pub record: Option<(PathBuf, record::Writer)>,
     /// Where lines come from, if anywhere.
     pub socket: Option<Socket>,
+    /// Where frames come from, if anywhere.
+    pub link: Option<Link>,
     /// Set by a signal, taken back here.
     pub signal: Arc<AtomicBool>,
     /// Signals that came.
@@ -44,17 +47,30 @@ pub struct Service<'a> {
     pub until: Option<u64>,
 }
 
+/// Something that the supervisor did for a cause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Incident {
+    /// First tick of it.
+    pub tick: u64,
+    /// Phase that it led to.
+    pub phase: Phase,
+    /// Cause.
+    pub cause: Cause,
+}
+
 /// What is known at the end.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Outcome {
     /// What the supervisor said last.
     pub last: Option<Said>,
-    /// Causes of faults seen, in order.
-    pub faults: Vec<(u64, Cause)>,
+    /// Faults, and holds for a cause, in order.
+    pub incidents: Vec<Incident>,
     /// The record's rows, or why it is not whole.
     pub record: Option<(PathBuf, io::Result<u64>)>,
-    /// Late ticks among the rows.
-    pub late_rows: u64,
+    /// The last file of the recorder, and its ticks or why it could not be written.
+    pub capture: Option<(PathBuf, io::Result<u64>)>,
+    /// What came over the link, if there was one.
+    pub link: Option<Traffic>,
     /// Rows seen.
     pub rows: u64,
     /// Why the plan was given up.
@@ -64,62 +80,108 @@ pub struct Outcome {
 impl Service<'_> {
     /// Works until the loop has ended and every row is written.
     pub fn run(mut self) -> Outcome {
-        let mut outcome =
-            Outcome { last: None, faults: Vec::new(), record: None, late_rows: 0, rows: 0, complaint: None };
+        let mut outcome = Outcome::default();
         loop {
             // Asked before the rows are drained: none can come after it.
             let ended = self.shared.ended.load(Ordering::Acquire);
             let now = clock::now();
             self.shared.service_alive.store(now, Ordering::Relaxed);
-            self.drain(&mut outcome);
+            self.drain(&mut outcome, now);
             if ended {
                 break;
             }
-            if let Some(said) = &outcome.last {
-                self.operator.hear(said, now);
+            if let Some(said) = self.console.said {
+                self.console.operator.hear(&said, now);
             }
-            if let Some(socket) = &mut self.socket {
-                socket.serve(&mut self.operator, outcome.last.as_ref(), now);
-            }
+            self.serve(now);
             self.signals += u32::from(self.signal.swap(false, Ordering::Relaxed));
             if self.signals > 0 || self.until.is_some_and(|until| now >= until) {
-                self.operator.go_down(now);
+                self.console.operator.go_down(now);
             }
-            if self.operator.is_over() || self.signals > 1 {
+            if self.console.operator.is_over() || self.signals > 1 {
                 self.shared.stop.store(true, Ordering::Relaxed);
             }
-            if let Some(wish) = self.operator.wish()
-                && self.wishes.push(wish).is_err()
-            {
-                self.operator.repeat();
-            }
-            std::thread::sleep(ROUND);
+            self.send();
+            self.wait();
         }
-        if let Some((path, recorder)) = self.recorder.take() {
-            outcome.record = Some((path, recorder.finish()));
+        if let Some((path, writer)) = self.record.take() {
+            outcome.record = Some((path, writer.finish()));
         }
-        outcome.complaint = self.operator.complaint.take();
+        outcome.last = self.console.said;
+        outcome.complaint = self.console.operator.complaint.take();
+        outcome.capture = self.console.capture.written.take();
+        outcome.link = self.link.map(|link| link.traffic());
         outcome
     }
 
-    fn drain(&mut self, outcome: &mut Outcome) {
-        while let Ok(row) = self.rows.pop() {
+    /// Hears who wants something.
+    fn serve(&mut self, now: u64) {
+        if let Some(socket) = &mut self.socket {
+            socket.serve(&mut self.console, now);
+        }
+        if let Some(link) = &mut self.link {
+            link.serve(&mut self.console, now);
+        }
+        let number = self.console.operator.link_number();
+        self.shared.link.store(number, Ordering::Relaxed);
+    }
+
+    /// Sends what was asked for, as far as there is room.
+    fn send(&mut self) {
+        self.console.wish();
+        let (orders, mut number) = self.console.outgoing();
+        while self.rings.orders.slots() > 0
+            && let Some(order) = orders.pop_front()
+        {
+            if let (Order::Configure(config), Some((_, writer))) = (&order, &mut self.record) {
+                writer.configured(number, config);
+            }
+            number = number.wrapping_add(1);
+            // There is room, and nobody else puts anything there.
+            let _ = self.rings.orders.push(order);
+        }
+    }
+
+    /// Until somebody says something, or for a round.
+    fn wait(&self) {
+        let lines = self.socket.iter().flat_map(Socket::descriptors);
+        let links = self.link.iter().flat_map(Link::descriptors);
+        let all: Vec<BorrowedFd<'_>> = lines.chain(links).collect();
+        let mut files: Vec<PollFd<'_>> = all.iter().map(|file| PollFd::new(file, PollFlags::IN)).collect();
+        // A signal ends it early, and whatever else it says there is a next round.
+        let _ = poll(&mut files, Some(&ROUND));
+    }
+
+    fn drain(&mut self, outcome: &mut Outcome, now: u64) {
+        while let Ok(row) = self.rings.rows.pop() {
             outcome.rows += 1;
-            if row.verdict != Verdict::OnTime {
-                outcome.late_rows += 1;
-            }
             let said = said(&row);
-            let was = outcome.last.map(|last| last.phase);
-            if said.phase == Phase::Faulted && was != Some(Phase::Faulted) {
-                outcome.faults.push((said.tick, said.cause));
+            let before = self.console.said.map_or((Phase::Disarmed, Cause::None), |said| (said.phase, said.cause));
+            let faulted = said.phase == Phase::Faulted && before.0 != Phase::Faulted;
+            let held = said.phase == Phase::Holding && said.cause != Cause::None && (said.phase, said.cause) != before;
+            if faulted || held {
+                outcome.incidents.push(Incident { tick: said.tick, phase: said.phase, cause: said.cause });
             }
-            outcome.last = Some(said);
-            if let Some((path, mut recorder)) = self.recorder.take() {
-                match recorder.add(&row) {
-                    Ok(()) => self.recorder = Some((path, recorder)),
-                    // The machine goes on; the record ends here, which the summary says.
-                    Err(error) => outcome.record = Some((path, Err(error))),
+            self.console.hear(&row, said);
+            if let Some((path, mut writer)) = self.record.take() {
+                match writer.add(&row, &mut self.rings.snapshots) {
+                    Ok(()) => self.record = Some((path, writer)),
+                    Err(error) => {
+                        self.console
+                            .operator
+                            .give_up(format!("{}: the record is not whole: {error}", path.display()), now);
+                        outcome.record = Some((path, Err(error)));
+                    }
                 }
+            } else if row.opens {
+                // Of a record that ended: its states must not block the ring.
+                let _ = self.rings.snapshots.pop();
+            }
+        }
+        // After the rows: what they say of the recorder is older.
+        while let Ok((tape, taken)) = self.rings.tapes.pop() {
+            if let Some(order) = self.console.capture.receive(tape, taken) {
+                self.console.order(order);
             }
         }
     }
@@ -127,13 +189,15 @@ impl Service<'_> {
 
 /// The supervisor's part of a row.
 fn said(row: &Row) -> Said {
-    let word = row.output[OUTPUT_WORDS];
+    let word = u64::from(row.output.supervisor);
     Said {
         phase: Phase::from_word(word & 0xff).unwrap_or(Phase::Faulted),
         cause: Cause::from_word(word >> 8 & 0xff).unwrap_or(Cause::None),
         on: word >> 16 & 1 == 1,
-        // The status is the control law's last word.
-        status: row.output[OUTPUT_WORDS - 1] as u32,
+        status: row.output.status,
         tick: row.tick,
+        orders: row.orders,
+        waving: row.waving,
+        late: row.late,
     }
 }

@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 
+use controller::supervised::Phase;
 use specgen_rt::account::{Account, Cause as Late};
 use specgen_rt::allocation;
 
-use crate::service::Outcome;
+use crate::service::{Incident, Outcome, Traffic};
 
 /// A run that is over.
 pub struct Summary<'a> {
@@ -55,7 +56,10 @@ impl Summary<'_> {
         if let Some(complaint) = &outcome.complaint {
             return Some(complaint.clone());
         }
-        outcome.faults.first().map(|(tick, cause)| format!("the machine faulted at tick {tick}: {cause:?}"))
+        if let Some((path, Err(error))) = &outcome.capture {
+            return Some(format!("{}: what the recorder kept could not be written: {error}", path.display()));
+        }
+        outcome.incidents.first().map(words)
     }
 
     /// For people.
@@ -75,17 +79,21 @@ impl Summary<'_> {
             self.lost_rows,
             self.device_faults
         );
-        for (tick, cause) in &self.outcome.faults {
-            let _ = writeln!(text, "fault at tick {tick}: {cause:?}");
+        for incident in &self.outcome.incidents {
+            let _ = writeln!(text, "{}", words(incident));
         }
-        match &self.outcome.record {
-            Some((path, Ok(rows))) => {
-                let _ = writeln!(text, "record: {rows} ticks in {}", path.display());
-            }
-            Some((path, Err(error))) => {
-                let _ = writeln!(text, "record: {} is not whole: {error}", path.display());
-            }
-            None => {}
+        for (name, file) in [("record", &self.outcome.record), ("recorder", &self.outcome.capture)] {
+            let _ = match file {
+                Some((path, Ok(rows))) => writeln!(text, "{name}: {rows} ticks in {}", path.display()),
+                Some((path, Err(error))) => writeln!(text, "{name}: {} is not whole: {error}", path.display()),
+                None => Ok(()),
+            };
+        }
+        if let Some(Traffic { hosts, requests, errors, refused }) = &self.outcome.link {
+            let _ = writeln!(
+                text,
+                "link: {requests} requests of {hosts} hosts, {errors} frames not believed, {refused} hosts refused beside another"
+            );
         }
         text
     }
@@ -120,19 +128,28 @@ impl Summary<'_> {
                 )
             })
             .collect();
-        let faults: Vec<String> = self
+        let incidents: Vec<String> = self
             .outcome
-            .faults
+            .incidents
             .iter()
-            .map(|(tick, cause)| format!("{{ \"tick\": {tick}, \"cause\": {} }}", quoted(&format!("{cause:?}"))))
+            .map(|Incident { tick, phase, cause }| {
+                let [phase, cause] = [format!("{phase:?}"), format!("{cause:?}")].map(|text| quoted(&text));
+                format!("{{ \"tick\": {tick}, \"phase\": {phase}, \"cause\": {cause} }}")
+            })
             .collect();
+        let link = self.outcome.link.map_or_else(
+            || "null".to_owned(),
+            |Traffic { hosts, requests, errors, refused }| {
+                format!("{{ \"hosts\": {hosts}, \"requests\": {requests}, \"errors\": {errors}, \"refused_hosts\": {refused} }}")
+            },
+        );
         let missing: Vec<String> = self.missing_rights.iter().map(|text| quoted(text)).collect();
-        let record = match &self.outcome.record {
+        let [record, capture] = [&self.outcome.record, &self.outcome.capture].map(|file| match file {
             Some((path, Ok(rows))) => {
                 format!("{{ \"file\": {}, \"ticks\": {rows} }}", quoted(&path.display().to_string()))
             }
             _ => "null".to_owned(),
-        };
+        });
         let phase = self.outcome.last.map_or_else(|| "null".to_owned(), |said| quoted(&format!("{:?}", said.phase)));
         format!(
             "{{
@@ -152,9 +169,11 @@ impl Summary<'_> {
   \"waiting_ticks\": {},
   \"lost_rows\": {},
   \"device_faults\": {},
-  \"faults\": [{}],
+  \"incidents\": [{}],
+  \"link\": {link},
   \"last_phase\": {phase},
   \"record\": {record},
+  \"recorder\": {capture},
   \"failure\": {}
 }}
 ",
@@ -176,10 +195,16 @@ impl Summary<'_> {
             account.blocked(),
             self.lost_rows,
             self.device_faults,
-            faults.join(", "),
+            incidents.join(", "),
             self.failure().map_or_else(|| "null".to_owned(), |text| quoted(&text)),
         )
     }
+}
+
+fn words(incident: &Incident) -> String {
+    let Incident { tick, phase, cause } = incident;
+    let did = if *phase == Phase::Faulted { "faulted" } else { "held" };
+    format!("the machine {did} at tick {tick}: {cause:?}")
 }
 
 fn hertz(period: u64) -> f64 {

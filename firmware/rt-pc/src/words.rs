@@ -20,7 +20,12 @@ pub struct Places {
     wrench: Option<[usize; CHANNELS]>,
     request: usize,
     events: usize,
+    /// The command of a platform; legs have none.
+    command: Option<usize>,
 }
+
+/// Word of the command to hold.
+const HOLD: u64 = 0;
 
 /// Why the words of a controller are not what this target expects.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,6 +49,7 @@ impl Places {
             wrench: six("wrench").ok(),
             request: place("request")?,
             events: place("events")?,
+            command: place("command").ok(),
         })
     }
 
@@ -52,6 +58,24 @@ impl Places {
     pub fn is_free(&self, index: usize) -> bool {
         let measured = self.gauge.contains(&index) || self.wrench.is_some_and(|wrench| wrench.contains(&index));
         !measured && index != self.request && index != self.events && index < MACHINE_INPUT_WORDS
+    }
+
+    /// Places of the words that the operator may set, in order.
+    pub fn free(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..MACHINE_INPUT_WORDS).filter(|index| self.is_free(*index))
+    }
+
+    /// A command to stay at a set-point that was reached by a wave about `center`, m and rad: on a platform to hold, for legs the
+    /// set-point itself.
+    pub fn rest_at(&self, center: &[Real; CHANNELS], words: &mut Words) {
+        match self.command {
+            Some(place) => words[place] = HOLD,
+            None => {
+                for (place, value) in self.free().zip(center) {
+                    words[place] = word(*value);
+                }
+            }
+        }
     }
 
     /// Puts readings in. `wrench` is in N and N m.
@@ -64,6 +88,12 @@ impl Places {
                 words[*place] = word(*value as Real);
             }
         }
+    }
+
+    /// Event bits of a tick's words.
+    #[must_use]
+    pub fn events(&self, words: &Words) -> u32 {
+        words[self.events] as u32
     }
 
     /// Puts the request and what happened since the last tick in.

@@ -62,6 +62,15 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
         Self { memory: ReversalMemory::new(), states: [T::ZERO; K], displacement: T::ZERO }
     }
 
+    /// Just risen to a drive, see [`ReversalMemory::risen`]: the creep of it is to come.
+    #[must_use]
+    pub const fn risen(drive: T, displacement: T) -> Self {
+        let mut memory = Self::new();
+        memory.memory = ReversalMemory::risen(drive, displacement);
+        memory.displacement = displacement;
+        memory
+    }
+
     /// The drive last applied, cells.
     #[inline]
     #[must_use]

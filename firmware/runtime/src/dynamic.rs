@@ -76,6 +76,16 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         }
     }
 
+    /// At rest at a drive that was risen to, see [`ReversalMemory::risen`], with Γ₁ = `rate` there, m per cell a tick.
+    #[must_use]
+    pub const fn risen(drive: T, displacement: T, rate: T) -> Self {
+        let mut memory = Self::new();
+        memory.memory = ReversalMemory::risen(drive, displacement);
+        memory.rate = rate;
+        memory.displacement = displacement;
+        memory
+    }
+
     /// The drive last applied, cells.
     #[inline]
     #[must_use]

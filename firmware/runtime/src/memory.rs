@@ -78,6 +78,15 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         }
     }
 
+    /// Risen from negative saturation to `drive` (cells, 0..=N), where the model gives `displacement` = E(`drive`, 0), m.
+    #[must_use]
+    pub const fn risen(drive: T, displacement: T) -> Self {
+        let mut memory = Self::new();
+        memory.drive = drive;
+        memory.displacement = displacement;
+        memory
+    }
+
     /// The drive last applied, cells.
     #[inline]
     #[must_use]

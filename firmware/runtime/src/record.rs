@@ -136,3 +136,14 @@ pub fn write_header<E>(description: &str, mut out: impl FnMut(&[u8]) -> Result<(
     }
     out(&u64::from(crc.finish()).to_le_bytes())
 }
+
+/// A block of a file with its checksum: call `out` with the pieces.
+///
+/// # Errors
+/// Whatever `out` says, at the first piece that it does not take.
+pub fn write_block<E>(block: &[u64], mut out: impl FnMut(&[u8]) -> Result<(), E>) -> Result<(), E> {
+    for word in block {
+        out(&word.to_le_bytes())?;
+    }
+    out(&checksum(block).to_le_bytes())
+}

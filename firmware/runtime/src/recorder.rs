@@ -8,7 +8,7 @@
 //! snapshot of the machine, so that every block that is left can be replayed by itself.
 //!
 //! A target calls [`Recorder::opens`] before a tick and, if it says so, [`Recorder::open`] with the machine as it is then;
-//! after the tick [`Recorder::push`]. The emitted controller does all three (`recording::supervise`).
+//! after the tick [`Recorder::push`]. The emitted controller does all three (`snapshot::supervise_recorded`).
 
 mod ring;
 
@@ -112,6 +112,8 @@ pub struct Recorder<'m> {
     phase: u32,
     /// Input of the last row, by which the next is told.
     last: [u64; LARGEST_INPUT],
+    /// Digest of the machine as it is, where the last row has it.
+    digest: Option<u64>,
 }
 
 impl<'m> Recorder<'m> {
@@ -140,6 +142,7 @@ impl<'m> Recorder<'m> {
             asked: false,
             phase: 0,
             last: [0; LARGEST_INPUT],
+            digest: None,
         })
     }
 
@@ -152,6 +155,7 @@ impl<'m> Recorder<'m> {
         self.digest_in = 0;
         self.asked = false;
         self.due = Some(Reason::Started);
+        self.digest = None;
     }
 
     /// Ends the recording; what there is stays to be fetched.
@@ -170,12 +174,25 @@ impl<'m> Recorder<'m> {
     /// The controller was reset: a block that does not continue the last one begins with the next row.
     pub fn restarted(&mut self) {
         self.due = Some(Reason::Started);
+        self.digest = None;
     }
 
     /// The settings of the controller changed: a block with the new ones begins with the next row.
     pub fn settings_changed(&mut self) {
         if self.due.is_none() {
             self.due = Some(Reason::Settings);
+        }
+    }
+
+    /// The next row is that of `tick`, and a block begins with it; where that is not the tick after the last one, the block
+    /// does not continue what was before. For a recorder that is handed from one place to another, or misses ticks.
+    pub fn begin(&mut self, tick: u64) {
+        if tick != self.tick {
+            self.tick = tick;
+            self.due = Some(Reason::Started);
+            self.digest = None;
+        } else if self.due.is_none() {
+            self.due = Some(Reason::Continued);
         }
     }
 
@@ -211,9 +228,20 @@ impl<'m> Recorder<'m> {
     /// Begins a block, before a tick, with the settings that the tick runs under, the digest of the machine as it is, and its
     /// state, which `save` writes.
     pub fn open(&mut self, config: &[u64], digest: u64, save: impl FnOnce(&mut [u64])) {
+        self.open_with(config, || digest, save);
+    }
+
+    /// The same with a digest that is asked for only where the row before has none. The last row of a full block has one, so that
+    /// not everything falls into one tick.
+    pub fn open_with(&mut self, config: &[u64], digest: impl FnOnce() -> u64, save: impl FnOnce(&mut [u64])) {
         let reason = self.due.take().unwrap_or(Reason::Continued).word() | u64::from(self.settings.decimation) << 32;
+        let digest = self.digest.take().unwrap_or_else(digest);
         self.ring.open([self.tick, reason, digest], config, save, self.settings.streaming);
         self.last = [0; LARGEST_INPUT];
+        // What the block begins with is as good as a digest of its first row.
+        if self.settings.digest_every > 1 {
+            self.digest_in = self.settings.digest_every - 1;
+        }
     }
 
     /// After a tick: its input words and what came out. `digest` gives that of the machine, where one is due.
@@ -221,6 +249,7 @@ impl<'m> Recorder<'m> {
     pub fn push(&mut self, input: &[u64], row: &Row, digest: impl FnOnce() -> u64) {
         let tick = self.tick;
         self.tick += 1;
+        self.digest = None;
         if !self.records() {
             return;
         }
@@ -258,8 +287,10 @@ impl<'m> Recorder<'m> {
 
     #[inline]
     fn write(&mut self, input: &[u64], row: &Row, digest: impl FnOnce() -> u64) {
-        let has_digest = self.settings.digest_every > 0 && self.digest_in == 0;
-        self.digest_in = if has_digest { self.settings.digest_every - 1 } else { self.digest_in.saturating_sub(1) };
+        let every = self.settings.digest_every;
+        let full = !self.ring.has_room_for(2);
+        let has_digest = every > 0 && (self.digest_in == 0 || full);
+        self.digest_in = if has_digest { every - 1 } else { self.digest_in.saturating_sub(1) };
         let Some(mut slots) = self.ring.row() else { return };
         let mut which = if has_digest { HAS_DIGEST } else { 0 };
         let mut bit = 1;
@@ -277,9 +308,23 @@ impl<'m> Recorder<'m> {
         slots.push(e | f << 32);
         slots.push(u64::from(row.status) | u64::from(row.supervisor) << 32);
         if has_digest {
-            slots.push(digest());
+            let digest = digest();
+            slots.push(digest);
+            self.digest = Some(digest);
         }
         slots.finish(which);
+    }
+
+    /// Rows in memory, those of the open block included.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.ring.rows()
+    }
+
+    /// Rows that fit whatever changes in them; there is room for more where less changes.
+    #[must_use]
+    pub fn capacity(&self) -> usize {
+        self.ring.capacity()
     }
 
     /// Blocks that can be fetched: closed ones, and the open one where recording has ended.

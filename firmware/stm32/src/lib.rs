@@ -5,8 +5,10 @@
 #![deny(unsafe_code)]
 
 pub mod converters;
+pub mod cycles;
 mod delay;
 pub mod serial;
+mod silent;
 pub mod timer;
 
 pub use delay::CycleDelay;

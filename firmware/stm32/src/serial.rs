@@ -5,7 +5,8 @@
 
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{Config, RingBufferedUartRx, UartTx};
-use specgen_board::{Desk, Exchange};
+use controller::supervised::Machine;
+use specgen_board::{Desk, Exchange, Stopwatch, Visit};
 use specgen_link::{Endpoint, FRAME};
 
 /// Of the link, with 8 data bits, no parity, one stop bit.
@@ -23,32 +24,25 @@ pub fn config() -> Config {
     config
 }
 
-/// Answers requests for ever. `with` gives access to the exchange, with the tick held off.
+/// Answers requests for ever. `with` gives access to the exchange and the machine, with the tick held off.
 pub async fn serve(
     receiver: &mut RingBufferedUartRx<'static>,
     sender: &mut UartTx<'static, Async>,
     endpoint: &mut Endpoint,
-    desk: &mut Desk,
+    desk: &mut Desk<impl Stopwatch>,
     answer: &mut [u8; ANSWER],
-    mut with: impl FnMut(&mut dyn FnMut(&mut Exchange)),
+    mut with: impl FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine)),
 ) -> ! {
     let mut bytes = [0; 64];
     loop {
         // After an error (noise, overrun) reception begins anew with the next read; the frame is lost, and counted by its CRC.
         let Ok(count) = receiver.read(&mut bytes).await else { continue };
-        with(&mut |exchange| desk.fetch(exchange));
         for &byte in bytes.iter().take(count) {
-            let Some(reply) = endpoint.push(byte, desk) else { continue };
+            let Some(reply) = endpoint.push(byte, &mut Visit { desk: &mut *desk, with: &mut with }) else { continue };
             // Copied to where the DMA can reach it.
             let length = reply.len();
             for (slot, value) in answer.iter_mut().zip(reply) {
                 *slot = *value;
-            }
-            if desk.has_news() {
-                with(&mut |exchange| {
-                    desk.publish(exchange);
-                    desk.fetch(exchange);
-                });
             }
             // What does not go out the host asks for again.
             let _ = sender.write(answer.get(..length).unwrap_or_default()).await;

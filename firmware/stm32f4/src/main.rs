@@ -27,6 +27,9 @@ fn specgen_tick(board: &mut Board, exchange: &mut Exchange, noticed: Noticed) ->
     board.tick(exchange, noticed)
 }
 
+/// Words of the recorder: what the 128 KiB of RAM have besides the 24 KiB of the rest and some in reserve, 80 KiB.
+const RECORD: usize = 80 * 1024 / size_of::<u64>();
+
 /// Of the watchdog, µs: some hundred ticks, and starting the converters anew.
 const WATCHDOG: u32 = 20_000;
 
@@ -41,21 +44,22 @@ mod app {
     use embassy_stm32::peripherals::IWDG;
     use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
     use embassy_stm32::wdg::IndependentWatchdog;
-    use specgen_board::{Desk, Exchange, Health, Noticed, Schedule};
+    use specgen_board::{Desk, Exchange, Health, Noticed, Schedule, recorder};
     use specgen_link::Endpoint;
     use specgen_stm32::converters::BusCell;
+    use specgen_stm32::cycles::{self, Cycles};
     use specgen_stm32::{converters, serial, timer};
 
-    use crate::{Board, WATCHDOG, clocks, pins};
+    use crate::{Board, RECORD, WATCHDOG, clocks, pins};
 
     #[shared]
     struct Shared {
         exchange: &'static mut Exchange,
+        board: Board,
     }
 
     #[local]
     struct Local {
-        board: Board,
         schedule: Schedule,
         health: Health,
         watchdog: IndependentWatchdog<'static, IWDG>,
@@ -70,8 +74,11 @@ mod app {
         machine: MaybeUninit<Machine> = MaybeUninit::uninit(),
         exchange: Exchange = Exchange::new(),
         ring: [u8; serial::RING] = [0; serial::RING],
+        #[unsafe(link_section = ".record.memory")]
+        record: [u64; RECORD] = [0; RECORD],
     ])]
-    fn init(context: init::Context) -> (Shared, Local) {
+    fn init(mut context: init::Context) -> (Shared, Local) {
+        cycles::start(&mut context.core.DCB, &mut context.core.DWT);
         let wiring = pins::take(embassy_stm32::init(clocks::config()));
         let mut watchdog = IndependentWatchdog::new(wiring.watchdog, WATCHDOG);
         // From here on a start that does not come to its end is a reset.
@@ -79,6 +86,7 @@ mod app {
 
         let intact = controller::integrity::intact();
         let exchange = context.local.exchange;
+        exchange.recorder = recorder(context.local.record);
         let machine = converters::at_reset(context.local.machine);
         let board = converters::board(wiring.adc, wiring.dac, context.local.dac_bus, machine, intact);
         let (Some(mut board), Ok(uart)) = (board, wiring.uart) else { crate::safe::stop() };
@@ -94,22 +102,22 @@ mod app {
         }
         watchdog.pet();
         (
-            Shared { exchange },
-            Local { board, schedule, health: Health::new(), watchdog, stop: wiring.stop, receiver, sender },
+            Shared { exchange, board },
+            Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, receiver, sender },
         )
     }
 
     /// One control tick.
-    #[task(binds = TIM2, priority = 16, shared = [exchange], local = [board, schedule, health, watchdog, stop])]
-    fn tick(mut context: tick::Context) {
+    #[task(binds = TIM2, priority = 16, shared = [exchange, board], local = [schedule, health, watchdog, stop])]
+    fn tick(context: tick::Context) {
         let local = context.local;
         let begin = timer::now();
         timer::acknowledge();
         let due = local.schedule.begin(begin);
         timer::arm(due.next);
         let noticed = Noticed { missed: due.missed, stop: local.stop.is_high() };
-        context.shared.exchange.lock(|exchange| {
-            if crate::specgen_tick(local.board, exchange, noticed) {
+        (context.shared.exchange, context.shared.board).lock(|exchange, board| {
+            if crate::specgen_tick(board, exchange, noticed) {
                 timer::arm(local.schedule.restart(timer::now()));
             }
             exchange.report.took(due.late, timer::now().wrapping_sub(begin));
@@ -122,18 +130,19 @@ mod app {
     /// Requests of the host.
     #[task(
         priority = 1,
-        shared = [exchange],
+        shared = [exchange, board],
         local = [
             receiver, sender,
             endpoint: Endpoint = Endpoint::new(),
-            desk: Desk = Desk::new(&Exchange::new()),
+            desk: Desk<Cycles> = Desk::new(Cycles),
             answer: [u8; serial::ANSWER] = [0; serial::ANSWER],
         ]
     )]
-    async fn link(mut context: link::Context) {
+    async fn link(context: link::Context) {
         let local = context.local;
+        let mut shared = (context.shared.exchange, context.shared.board);
         serial::serve(local.receiver, local.sender, local.endpoint, local.desk, local.answer, |action| {
-            context.shared.exchange.lock(|exchange| action(exchange));
+            shared.lock(|exchange, board| action(exchange, board.machine_mut()));
         })
         .await;
     }

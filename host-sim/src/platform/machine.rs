@@ -43,7 +43,7 @@ impl Actuator {
 
 /// A platform that takes six held voltages and moves.
 ///
-/// Poses count from rest: where it stands with the legs at 0 V when [`Machine::prepare`] ends.
+/// Poses count from where it stands without drive after the pre-cycle of [`Machine::prepare`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
     actuators: [Actuator; 6],
@@ -100,11 +100,11 @@ impl Machine {
     }
 
     /// Pre-cycle of the free legs, all at once, and rest; then the platform stands still at the pose from which poses
-    /// count. The peak is held to each leg's own full drive.
+    /// count, and goes from there to the drive at which it is to stand. The peak is held to each leg's own full drive.
     ///
     /// Quasi-static for the structure, which follows the legs without error: it is put to rest at the end.
     pub fn prepare(&mut self, preparation: &Preparation) {
-        let Preparation { peak, rate, settle, update } = *preparation;
+        let Preparation { peak, rate, settle, update, rest } = *preparation;
         self.step_small();
         for actuator in &mut self.actuators {
             let peak = if peak < actuator.peak { peak } else { actuator.peak };
@@ -125,6 +125,15 @@ impl Machine {
         self.step = 0.0;
         self.structure.release();
         self.structure.set_state(&[0.0; 6], &[0.0; 6], &[0.0; 6]);
+        if rest > 0.0 {
+            let steps = steps_within(rest / rate, update);
+            for step in 1..=steps {
+                self.hold(&[rest * f64::from(step) / f64::from(steps); 6], rest / rate / f64::from(steps));
+            }
+            for _ in 0..steps_within(settle, update) {
+                self.hold(&[rest; 6], update);
+            }
+        }
     }
 
     /// Holds six voltages (V, at the amplifier inputs) for `interval` (s, > 0).

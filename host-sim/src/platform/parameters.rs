@@ -77,7 +77,10 @@ pub struct PlatformParameters {
     pub stack_capacitance_f: f64,
     /// Largest current of an amplifier, A: the stack voltage changes by no more than this over the capacitance.
     pub amplifier_current_a: f64,
-    /// Voltage at which the legs rest, V: their own drive counts from there.
+    /// Lowest voltage, V: the legs' own drive counts from there, and gauges are zeroed there.
+    #[serde(default)]
+    pub lowest_voltage_v: f64,
+    /// Voltage at which the legs stand before a run, V, not below the lowest.
     #[serde(default)]
     pub rest_voltage_v: f64,
     /// The six gauges.
@@ -202,7 +205,8 @@ impl PlatformParameters {
             expect("base_angle_over_pi", self.base_angle_over_pi, AtLeast(0.0), Below(2.0 / 3.0));
             expect("platform_angle_over_pi", self.platform_angle_over_pi, AtLeast(0.0), Below(2.0 / 3.0));
         }
-        expect("rest_voltage_v", self.rest_voltage_v, AtLeast(-1e4), AtMost(1e4));
+        expect("lowest_voltage_v", self.lowest_voltage_v, AtLeast(-1e4), AtMost(1e4));
+        expect("rest_voltage_v", self.rest_voltage_v, AtLeast(self.lowest_voltage_v), AtMost(1e4));
         expect("modal_damping", self.modal_damping, AtLeast(0.0), Below(0.5));
         expect("step_s", self.step_s, AtLeast(1e-7), AtMost(2e-5));
         expect("gauge_range_m[0]", self.gauge_range_m[0], AtLeast(-1.0), Below(0.0));

@@ -57,6 +57,8 @@ pub enum GaugeFault {
 pub struct PlatformRig {
     machine: Machine,
     height: f64,
+    /// Voltage from which the drive of the legs counts, V.
+    lowest_voltage: f64,
     /// Voltage at which the legs rest, V.
     rest_voltage: f64,
     probes: [Probe; 6],
@@ -79,6 +81,7 @@ impl PlatformRig {
         Self {
             machine: Machine::new(specimen),
             height: nominal.height_m,
+            lowest_voltage: nominal.lowest_voltage_v,
             rest_voltage: nominal.rest_voltage_v,
             probes: nominal.probes,
             rest_distances: nominal.probes.map(|probe| probe.distance(nominal.height_m, &[0.0; 6])),
@@ -172,7 +175,7 @@ impl PlatformRig {
     pub fn hold(&mut self, voltages: &Six, interval: f64) {
         let mut inputs = *voltages;
         for (input, noise) in inputs.iter_mut().zip(&mut self.amplifiers) {
-            *input += noise.draw() - self.rest_voltage;
+            *input += noise.draw() - self.lowest_voltage;
         }
         self.machine.hold(&inputs, interval);
     }

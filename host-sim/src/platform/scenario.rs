@@ -48,6 +48,7 @@ impl PlatformScenario {
             rate: first.forc_rate_v_per_s,
             settle: first.settle_s,
             update: first.step_s,
+            rest: specimen.nominal.rest_voltage_v - specimen.nominal.lowest_voltage_v,
         });
         Self { prepared, options }
     }

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use specgen_runtime::record::{checksum, write_header};
+use specgen_runtime::record::{write_block, write_header};
 use specgen_runtime::recorder::Recorder;
 
 /// Something that takes closed blocks.
@@ -54,9 +54,11 @@ impl<W: Write> Writer<W> {
 impl<W: Write> Taker for Writer<W> {
     fn take(&mut self, block: &[u64]) -> io::Result<()> {
         let mut bytes = Vec::with_capacity(block.len() * 8 + 8);
-        for word in block.iter().chain(std::iter::once(&checksum(block))) {
-            bytes.extend_from_slice(&word.to_le_bytes());
-        }
+        // Into memory, which takes everything: a sink that is a file is asked once.
+        let Ok(()) = write_block(block, |piece| {
+            bytes.extend_from_slice(piece);
+            Ok::<(), std::convert::Infallible>(())
+        });
         self.sink.write_all(&bytes)
     }
 }

@@ -75,9 +75,11 @@ pub struct Bench {
     pub offset: [f64; 6],
     /// Readings that stay as they are.
     pub frozen: [bool; 6],
-    readings_per_leg: Option<[[f64; 6]; 6]>,
+    pub readings_per_leg: Option<[[f64; 6]; 6]>,
     limits: [f64; 2],
     max_step: i64,
+    /// Code at rest.
+    pub rest: i64,
     config: Vec<u64>,
 }
 
@@ -92,11 +94,16 @@ impl Bench {
         let mut machine = Supervised::new(controller).expect("a library with the supervised tick");
         machine.configure(&config).expect("permitted settings");
         let ir = &emitted.compiled.ir;
+        let rest = i64::from(ir.supervision.rest);
+        let mut output = vec![0; machine.output_names().len()];
+        let first = machine.output_names().iter().position(|name| name == "dac_code[0]").expect("an output word");
+        output[first..first + 6].fill(rest as u64);
         Self {
             kind,
             scalar: description.scalar,
             input: vec![0; machine.input_names().len()],
-            output: vec![0; machine.output_names().len()],
+            output,
+            rest,
             machine,
             word: MachineWord::of(0),
             tick: 0,
@@ -126,13 +133,23 @@ impl Bench {
     }
 
     pub fn six(&self, name: &str) -> [f64; 6] {
+        self.six_of(&self.output, name)
+    }
+
+    /// Six numbers of a row of output.
+    pub fn six_of(&self, row: &[u64], name: &str) -> [f64; 6] {
         let first = self.at(&format!("{name}[0]"));
-        std::array::from_fn(|leg| self.scalar.decode(self.output[first + leg]))
+        std::array::from_fn(|leg| self.scalar.decode(row[first + leg]))
     }
 
     pub fn codes(&self) -> [i64; 6] {
+        self.codes_of(&self.output)
+    }
+
+    /// Codes of a row of output.
+    pub fn codes_of(&self, row: &[u64]) -> [i64; 6] {
         let first = self.at("dac_code[0]");
-        std::array::from_fn(|leg| self.output[first + leg] as i64)
+        std::array::from_fn(|leg| row[first + leg] as i64)
     }
 
     /// First word of the gauges.

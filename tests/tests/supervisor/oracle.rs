@@ -1,20 +1,55 @@
-//! The state machine once more, in other words: from `docs/supervisor.md`, not from the runtime. For six legs, where the
-//! displacement that the model gives of each leg is an output word.
+//! The state machine once more, in other words: from `docs/supervisor.md`, not from the runtime.
 
 use super::bench::*;
 
-/// What the section of `bench` makes of a period of 200 µs.
-const ARM_TICKS: u32 = 10;
-const GAUGE_TICKS: i64 = 5;
-const VOLTAGE_TICKS: i64 = 10;
-const SLEW_TICKS: i64 = 5;
-const SAMPLES: i64 = 3;
-const TICKS_PER_SECOND: i64 = 5000;
+/// What the section of `bench` makes of a spec.
+#[derive(Debug, Clone)]
+pub struct Bounds {
+    /// Ticks of `arm_time` and the others of its kind.
+    pub arm_ticks: u32,
+    pub gauge_ticks: i64,
+    pub voltage_ticks: i64,
+    pub slew_ticks: i64,
+    pub samples: i64,
+    pub ticks_per_second: i64,
+    /// Of each axis, or of each leg: m, rad.
+    pub tracking: [f64; 6],
+    pub gauge_range: [f64; 2],
+}
+
 const DISAGREEMENT: f64 = 20e-6;
-const TRACKING: f64 = 6e-6;
 /// Ten times the noise of 2.2 nm, which is more than ten steps of the converter.
 const STUCK_MOTION: f64 = 22e-9;
-const GAUGE_RANGE: [f64; 2] = [-2e-6, 48e-6];
+
+impl Bounds {
+    /// Six legs of a stroke of 60 µm at a period of 200 µs.
+    pub fn legs() -> Self {
+        Self {
+            arm_ticks: 10,
+            gauge_ticks: 5,
+            voltage_ticks: 10,
+            slew_ticks: 5,
+            samples: 3,
+            ticks_per_second: 5000,
+            tracking: [6e-6; 6],
+            gauge_range: [-2e-6, 48e-6],
+        }
+    }
+
+    /// The reference platform at 100 µs; a tenth of what its workspace is, and its gauges' range.
+    pub fn platform(workspace: [f64; 6], gauge_range: [f64; 2]) -> Self {
+        Self {
+            arm_ticks: 20,
+            gauge_ticks: 10,
+            voltage_ticks: 20,
+            slew_ticks: 10,
+            samples: 6,
+            ticks_per_second: 10_000,
+            tracking: workspace.map(|full| 0.1 * full),
+            gauge_range,
+        }
+    }
+}
 
 /// What is done about a cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -40,9 +75,12 @@ struct Channel {
     present: [bool; 3],
 }
 
-/// The supervisor of six legs.
+/// The supervisor.
 #[derive(Debug, Clone)]
 pub struct Oracle {
+    bounds: Bounds,
+    /// Armed since it last ran.
+    fresh: bool,
     pub phase: u8,
     pub cause: u8,
     request: u64,
@@ -57,8 +95,10 @@ pub struct Oracle {
 }
 
 impl Oracle {
-    pub fn new() -> Self {
+    pub fn new(bounds: Bounds) -> Self {
         Self {
+            bounds,
+            fresh: true,
             phase: DISARMED,
             cause: 0,
             request: 0,
@@ -90,10 +130,10 @@ impl Oracle {
         let mut lasted = std::mem::take(&mut self.lasted);
         for cause in [1, 2, 6, 7, 8, 11_u8] {
             let (limit, weight) = match cause {
-                6 => (VOLTAGE_TICKS, 1),
-                7 => (SLEW_TICKS, 1),
-                8 => (TICKS_PER_SECOND + 1, TICKS_PER_SECOND),
-                _ => (GAUGE_TICKS, 1),
+                6 => (self.bounds.voltage_ticks, 1),
+                7 => (self.bounds.slew_ticks, 1),
+                8 => (self.bounds.ticks_per_second + 1, self.bounds.ticks_per_second),
+                _ => (self.bounds.gauge_ticks, 1),
             };
             let count = &mut self.counts[usize::from(cause)];
             *count = if present.contains(&cause) { (*count + weight).min(limit) } else { (*count - 1).max(0) };
@@ -122,7 +162,7 @@ impl Oracle {
             ARMING if request == RAMP_DOWN => self.enter(RAMPING, 0),
             ARMING => {
                 self.good = if well { self.good + 1 } else { 0 };
-                if self.good == ARM_TICKS {
+                if self.good == self.bounds.arm_ticks {
                     self.enter(if request == RUN { RUNNING } else { HOLDING }, 0);
                 }
             }
@@ -155,6 +195,7 @@ impl Oracle {
     }
 
     fn enter(&mut self, phase: u8, cause: u8) {
+        self.fresh |= phase == ARMING;
         self.phase = phase;
         self.cause = cause;
         self.good = 0;
@@ -165,15 +206,20 @@ impl Oracle {
         }
     }
 
-    /// What a tick shows: the gauges' words and values, the model's displacement and the demand before the tick, the codes
-    /// before and after it, its status.
+    /// Whether the law begins with this phase, and anew: armed since it last ran.
+    pub fn begins_anew(&mut self, ran: bool) -> bool {
+        !ran && self.phase == RUNNING && std::mem::take(&mut self.fresh)
+    }
+
+    /// What a tick shows: the gauges' words and values, what the gauges ought to read, how far each axis or leg is from its
+    /// set-point, the codes before and after the tick, its status.
     #[allow(clippy::too_many_arguments)] // What a tick shows, one by one.
     pub fn observe(
         &mut self,
         words: &[u64],
         readings: &[f64; 6],
-        modelled: &[f64; 6],
-        demand: &[f64; 6],
+        expected: &[f64; 6],
+        errors: &[f64; 6],
         codes: [&[i64; 6]; 2],
         status: u64,
         max_step: i64,
@@ -187,7 +233,7 @@ impl Oracle {
             if !reading.is_finite() {
                 self.seen.push(1);
                 believed = false;
-            } else if !(GAUGE_RANGE[0]..=GAUGE_RANGE[1]).contains(&reading) {
+            } else if !(self.bounds.gauge_range[0]..=self.bounds.gauge_range[1]).contains(&reading) {
                 self.seen.push(2);
                 believed = false;
             }
@@ -204,20 +250,20 @@ impl Oracle {
             channel.word = Some(words[turn]);
             channel.expected.clear();
         }
-        channel.expected.push(modelled[turn]);
+        channel.expected.push(expected[turn]);
         let least = channel.expected.iter().copied().fold(f64::INFINITY, f64::min);
         let most = channel.expected.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let tracks = self.phase == RUNNING && (demand[turn] - readings[turn]).abs() > TRACKING;
-        let present = [most - least > STUCK_MOTION, (readings[turn] - modelled[turn]).abs() > DISAGREEMENT, tracks];
+        let tracks = self.phase == RUNNING && errors[turn].abs() > self.bounds.tracking[turn];
+        let present = [most - least > STUCK_MOTION, (readings[turn] - expected[turn]).abs() > DISAGREEMENT, tracks];
         for (kind, (present, cause)) in present.into_iter().zip([3, 4, 5]).enumerate() {
             let count = &mut channel.counts[kind];
             *count = match (present, kind) {
-                (true, _) => (*count + 1).min(SAMPLES),
+                (true, _) => (*count + 1).min(self.bounds.samples),
                 (false, 0) => 0,
                 (false, _) => (*count - 1).max(0),
             };
             channel.present[kind] = present;
-            if present && *count == SAMPLES {
+            if present && *count == self.bounds.samples {
                 self.lasted.push(cause);
             }
         }

@@ -39,14 +39,66 @@ fn what_cannot_work_is_refused_with_a_mend_that_works() {
         ("reference.toml", "tracking_error = 0.0002", "E0471"),
         ("legs.toml", "tracking_error = 0.0001", "E0471"),
         ("legs.toml", "ramp_rate = \"41 V/ms\"", "E0472"),
+        ("legs.toml", "rest_voltage = \"101 V\"", "E0473"),
+        ("reference.toml", "rest_voltage = \"-1 V\"", "E0473"),
     ];
     for (spec, line, code) in cases {
         let (found, help) = verdict(spec, line).expect_err(line);
         assert_eq!(found, code, "{line}: {help}");
         // "write key = value or more; …"
         let mend = help.strip_prefix("write ").expect("a mend");
-        let end = [" or more", " or less"].iter().filter_map(|word| mend.find(word)).min().expect("an amount");
+        let end = [" or more", " or less", " or a voltage"]
+            .iter()
+            .filter_map(|word| mend.find(word))
+            .min()
+            .expect("an amount");
         println!("{line}: {help}");
         assert_eq!(verdict(spec, &mend[..end]), Ok(()), "{line}: mended by {}", &mend[..end]);
+    }
+}
+
+/// Between −20 V and 80 V legs rest at 0 V; where 0 V is not permitted, at the limit nearest to it; else where they are told to.
+#[test]
+fn legs_rest_where_amplifiers_that_are_off_leave_them() {
+    let record = fs::read_to_string(repository().join("specs/records/reference-forc.csv")).expect("a record");
+    let shifted = |by: f64| {
+        let mut column = None;
+        let lines = record.lines().map(|line| {
+            let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+            match column {
+                None if !line.starts_with('#') => column = cells.iter().position(|name| name.starts_with("drive")),
+                Some(at) => cells[at] = format!("{:?}", cells[at].trim().parse::<f64>().expect("a number") + by),
+                None => {}
+            }
+            cells.join(",") + "\n"
+        });
+        lines.collect::<String>()
+    };
+    for (low, key, rest) in
+        [(-20.0, "", 0.0), (10.0, "", 10.0), (-110.0, "", -10.0), (-20.0, "rest_voltage = \"30 V\"", 30.0)]
+    {
+        let high = low + 100.0;
+        let voltage = format!("voltage         = [\"{low} V\", \"{high} V\"]");
+        let range = format!("range = [\"{} V\", \"{} V\"]", low - 10.0, high + 40.0);
+        let edits = [
+            ("voltage         = [\"0 V\", \"100 V\"]", voltage.as_str()),
+            ("range = [\"0 V\", \"150 V\"]", range.as_str()),
+            ("reference-forc.csv", "shifted.csv"),
+            ("[timing]\n", &format!("[supervisor]\n{key}\n\n[timing]\n")),
+        ];
+        let records = [("shifted.csv", shifted(low))];
+        for spec in ["legs.toml", "reference.toml"] {
+            let compiled = specgen_tests::compile_edited("supervisor-bipolar", spec, &edits, &records);
+            let actuation = &compiled.ir.actuation;
+            let code = compiled.ir.supervision.rest;
+            let volts = actuation.volts_at_zero + f64::from(code) * actuation.volts_per_code;
+            assert!(
+                (volts - rest).abs() <= 0.5 * actuation.volts_per_code + 1e-9,
+                "{spec}, {low} V: rests at {volts} V"
+            );
+            assert!((actuation.code_min..=actuation.code_max).contains(&code));
+            let odd = compiled.findings.iter().any(|found| found.code == "W0817");
+            assert_eq!(odd, !key.is_empty(), "{spec}, {low} V: {:?}", compiled.findings);
+        }
     }
 }

@@ -87,7 +87,7 @@ impl Choice {
             ("hysteresis", _) if key.name == "rate_tables" => self.dynamic,
             ("hysteresis", _) if key.name.starts_with("creep_") => !self.dynamic,
             ("hysteresis", _) if key.name == "dead_time" => !self.control,
-            ("sensor", _) if key.name == "calibration" => self.control,
+            ("sensor", _) if matches!(key.name, "calibration" | "input_range") => self.control,
             ("trajectory", Presence::Rule(_)) => of_waveform == self.waveform,
             _ => true,
         }

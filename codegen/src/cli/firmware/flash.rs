@@ -23,6 +23,7 @@ const INSTALL: &str = "cargo install probe-rs-tools --locked";
 
 /// Arguments of `flash`.
 #[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::FLASH)]
 pub struct Arguments {
     /// A spec, which is built first, or an ELF image that `specgen build` made.
     #[arg(value_name = "SPEC|ELF")]

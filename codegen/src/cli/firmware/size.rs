@@ -14,6 +14,7 @@ use crate::target::size::{has_tick, size};
 
 /// Arguments of `size`.
 #[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::SIZE)]
 pub struct Arguments {
     /// A spec, which is built first, or an ELF image.
     #[arg(value_name = "SPEC|ELF")]

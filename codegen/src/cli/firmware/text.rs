@@ -89,7 +89,11 @@ pub fn sections(size: &Size) -> String {
     if let Some(identity) = &size.identity {
         let _ = writeln!(out, "  made by {identity}");
     }
-    let _ = writeln!(out, "  flash {} bytes, RAM {} bytes static", group(size.flash()), group(size.ram()));
+    let recorder = match size.recorder() {
+        0 => String::new(),
+        bytes => format!(", and {} bytes for the recorder", group(bytes)),
+    };
+    let _ = writeln!(out, "  flash {} bytes, RAM {} bytes static{recorder}", group(size.flash()), group(size.ram()));
     for section in &size.sections {
         let place = match (section.flash, section.ram) {
             (true, true) => "flash and RAM",

@@ -15,6 +15,7 @@ use crate::identify::gauge;
 
 /// Arguments of `identify gauge`.
 #[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::GAUGE)]
 pub struct Arguments {
     /// CSV with columns gauge_V and reference_um, and time_s if there is one.
     record: PathBuf,

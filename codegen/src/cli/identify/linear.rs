@@ -20,6 +20,7 @@ const PAPER: [f64; 2] = [0.252, 0.011];
 
 /// Arguments of `identify linear`.
 #[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::LINEAR)]
 pub struct Arguments {
     /// Records at one frequency each: CSV with columns time_s, drive_V, displacement_um. The drive may be that of an
     /// inverse hysteresis model, as in the paper.

@@ -14,6 +14,7 @@ use crate::identify::response::{self, Estimate};
 
 /// Arguments of `identify response`.
 #[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::RESPONSE)]
 pub struct Arguments {
     /// Swept sine, multisine or noise: CSV with columns time_s, drive_V, displacement_um, evenly sampled.
     record: PathBuf,

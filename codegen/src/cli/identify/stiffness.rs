@@ -13,6 +13,7 @@ use crate::identify::stiffness;
 
 /// Arguments of `identify stiffness`.
 #[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::STIFFNESS)]
 pub struct Arguments {
     /// CSV with columns time_s, force_N (positive where it pushes the displacement up), displacement_um, and drive_V if
     /// there is one, which must be constant.

@@ -2,12 +2,13 @@
 
 use std::fmt::Write as _;
 
-use host_sim::plant::NoiseParameters;
+use host_sim::closed_loop::Rig;
+use host_sim::plant::{LegPlant, NoiseParameters};
 use host_sim::platform::rig::{Noise, PlatformRun};
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select as select_platform};
 use host_sim::platform::table::{AXES, MachiningTable, PoseRow};
 use host_sim::platform::{PlatformScenario, WorkPart};
-use host_sim::scenario::{LegScenario, MODES, select as select_legs};
+use host_sim::scenario::{MODES, select as select_legs};
 use host_sim::table::TrackingRow;
 use host_sim::trajectory::{LegTrajectory, PaperLeg, PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
 use specgen_link::client::Port;
@@ -125,7 +126,19 @@ impl Plan {
     ) -> Result<(), Broken> {
         match self {
             Self::Legs { modes, frequency, samples } => {
-                legs(modes, *frequency, *samples, lockstep, report, arguments, ui)
+                let rig = legs(compiled, *samples, arguments, ui)?;
+                let trajectory = Start::of(PaperLeg { frequency: *frequency }, arguments.seconds);
+                let interval = 1.0 / frequency / f64::from(*samples);
+                report.interval = interval;
+                for &(mode, word) in modes {
+                    ui.progress(&format!("leg trajectory at {frequency} Hz, {mode}"));
+                    select_legs(lockstep, word).map_err(host_sim::closed_loop::RunError::from)?;
+                    let mut rig = rig.clone();
+                    let run = timed(&mut report.seconds, || rig.run(lockstep, &trajectory, interval))?;
+                    report.tracking.rows.push(TrackingRow::of(mode, *frequency, &run.tracking));
+                }
+                report.errors = format!("tracking error of the leg trajectory, T − Y\n{}", report.tracking.to_text());
+                Ok(())
             }
             Self::Path { name, path, part, modes, frequency } => {
                 let trajectory = PaperPose { path: *path, reading: Reading::Corrected, frequency: *frequency };
@@ -175,32 +188,14 @@ fn mode(name: &str, known: &[(&'static str, u32)]) -> Result<(&'static str, u32)
     })
 }
 
-fn legs<P: Port>(
-    modes: &[(&'static str, u32)],
-    frequency: f64,
-    samples: u32,
-    lockstep: &mut Lockstep<P>,
-    report: &mut Report,
-    arguments: &Arguments,
-    ui: &Ui,
-) -> Result<(), Broken> {
+/// Six legs at rest, with their gauges zeroed.
+fn legs(compiled: &Compiled, samples: u32, arguments: &Arguments, ui: &Ui) -> Result<Rig<LegPlant>, Broken> {
     let parameters = arguments.plant.leg()?;
     let noise = if arguments.plant.no_noise { NoiseParameters::NONE } else { parameters.noise };
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs = std::array::from_fn(|_| parameters.clone());
-    let mut scenario = LegScenario::new(&legs, &noise, arguments.plant.seed, samples);
-    let trajectory = Start::of(PaperLeg { frequency }, arguments.seconds);
-    report.interval = 1.0 / frequency / f64::from(samples);
-    for &(mode, word) in modes {
-        ui.progress(&format!("leg trajectory at {frequency} Hz, {mode}"));
-        select_legs(lockstep, word).map_err(host_sim::closed_loop::RunError::from)?;
-        let mut rig = scenario.rig_mut().clone();
-        let interval = report.interval;
-        let run = timed(&mut report.seconds, || rig.run(lockstep, &trajectory, interval))?;
-        report.tracking.rows.push(TrackingRow::of(mode, frequency, &run.tracking));
-    }
-    report.errors = format!("tracking error of the leg trajectory, T − Y\n{}", report.tracking.to_text());
-    Ok(())
+    let mut scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, samples);
+    Ok(scenario.rig_mut().clone())
 }
 
 fn platform(compiled: &Compiled, arguments: &Arguments, ui: &Ui) -> Result<PlatformScenario, Broken> {

@@ -3,13 +3,14 @@
 use std::fmt::Write as _;
 
 use host_sim::controller::Controller;
-use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, TRACKING_FREQUENCIES, select};
+use host_sim::scenario::{LINEARITY_FREQUENCIES, MODES, TRACKING_FREQUENCIES, select};
 use host_sim::table::{LinearityTable, TrackingTable};
 use serde_json::json;
 
 use super::{Arguments, environment, write_folder};
 use crate::cli::ui::{Failure, Ui};
 use crate::compile::Compiled;
+use crate::machine;
 use crate::model::Adaptation;
 use crate::paper::printed;
 
@@ -35,7 +36,8 @@ pub(super) fn run(
     let (parameters, noise) = arguments.plant.read()?;
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs = std::array::from_fn(|_| parameters.clone());
-    let scenario = LegScenario::new(&legs, &noise, arguments.plant.seed, arguments.samples.unwrap_or(SAMPLES));
+    let samples = arguments.samples.unwrap_or(SAMPLES);
+    let scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, samples);
     let modes = modes(&compiled.model.adaptation);
     ui.progress("Table 2: every law that the spec gives weights for, at three frequencies");
     let tracking = scenario.tracking(controller, &modes, &TRACKING_FREQUENCIES).map_err(environment)?;

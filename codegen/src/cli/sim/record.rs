@@ -9,7 +9,7 @@ use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, Supervised, TickController};
 use host_sim::platform::rig::{Bench, Noise, Request};
 use host_sim::record::{Ended, Recorded, Writer};
-use host_sim::scenario::{LegScenario, select};
+use host_sim::scenario::select;
 use host_sim::trajectory::{LegTrajectory, PoseTarget};
 use serde_json::json;
 use specgen_runtime::record::Layout;
@@ -193,7 +193,7 @@ fn legs(
     let (parameters, noise) = (host_sim::plant::LegParameters::reference(), host_sim::plant::NoiseParameters::NONE);
     let noise = if arguments.plant.no_noise { noise } else { parameters.noise };
     let legs = std::array::from_fn(|_| parameters.clone());
-    let scenario = LegScenario::new(&legs, &noise, arguments.plant.seed, 1);
+    let scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, 1);
     let law = controller.default_config().first().copied().unwrap_or_default();
     select(controller, u32::try_from(law).unwrap_or_default())?;
     let wave = LegWave { wave: RefCell::new(wave), seconds };

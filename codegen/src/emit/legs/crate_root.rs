@@ -47,6 +47,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         mod step;
         pub mod supervised;
         pub mod supervision;
+        pub mod waves;
         mod words;
 
         pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};

@@ -3,6 +3,7 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
+use crate::emit::rest::{self, AtRest};
 use crate::ir::Ir;
 
 pub fn emit(ir: &Ir) -> TokenStream {
@@ -17,13 +18,31 @@ pub fn emit(ir: &Ir) -> TokenStream {
             quote! { digest.real(leg.lead); },
         ),
     };
+    let leg = |AtRest { memory, code, .. }: AtRest| {
+        quote! { LegState { memory: #memory, estimate: Estimate::new(), code: #code, #no_lead } }
+    };
+    let reset = match rest::emit(ir) {
+        Err(alike) => {
+            let leg = leg(alike);
+            quote! {
+                let leg = #leg;
+                Self { legs: [leg; LEGS], demand: [0.0; LEGS], ticks_in_run: 0 }
+            }
+        }
+        Ok(each) => {
+            let legs = each.map(leg);
+            quote! { Self { legs: [#(#legs),*], demand: [0.0; LEGS], ticks_in_run: 0 } }
+        }
+    };
+    let reset_doc = rest::doc(ir);
+    let limits = ir.supervision.risen.is_none().then(|| quote! { , limits });
     quote! {
         #![doc = " What the controller remembers from tick to tick. No NaN or infinity is ever stored here."]
 
         use specgen_runtime::{Digest, Estimate};
 
         use crate::hysteresis::Memory;
-        use crate::{LEGS, Real, limits};
+        use crate::{LEGS, Real #limits};
 
         /// State of one leg.
         #[derive(Debug, Clone, Copy)]
@@ -55,11 +74,10 @@ pub fn emit(ir: &Ir) -> TokenStream {
         }
 
         impl State {
-            /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there, no correction.
+            #[doc = #reset_doc]
             #[must_use]
             pub const fn new() -> Self {
-                let leg = LegState { memory: Memory::new(), estimate: Estimate::new(), code: limits::CODES[0], #no_lead };
-                Self { legs: [leg; LEGS], demand: [0.0; LEGS], ticks_in_run: 0 }
+                #reset
             }
 
             /// Fingerprint of everything that later ticks depend on, for comparing two machines bit for bit.

@@ -14,6 +14,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![doc = " At time t_n the interval that voltage u_n was held over has just ended and Y_n is read; the set-point is that of the"]
         #![doc = " END of the interval that begins now, T_{n+1}, and the voltages that come out are held over it."]
 
+        use specgen_runtime::linear::each;
         use specgen_runtime::{Law, Real as _};
 
         use crate::hysteresis::{#imports TABLES, Table};
@@ -59,18 +60,16 @@ pub fn emit(ir: &Ir) -> TokenStream {
 
         /// One control tick. See the module for the timing.
         pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
+            let status = advance(config, state, input);
+            outputs(state, status)
+        }
+
+        /// The work of a tick; returns its status.
+        pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> u32 {
             #demand_before
             let accepted = take_setpoint(config, state, input);
             let run_ends = count_run(config, state);
-            let mut output = TickOutput {
-                voltage: [0.0; LEGS],
-                requested: [0.0; LEGS],
-                demand: state.demand,
-                level: [0.0; LEGS],
-                drift: [0.0; LEGS],
-                dac_code: [0; LEGS],
-                status: if accepted { 0 } else { SETPOINT_FAULT },
-            };
+            let mut status = if accepted { 0 } else { SETPOINT_FAULT };
             for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
                 let gauge = input.displacement[index];
                 let gauge_good = limits::gauge_is_accepted(gauge);
@@ -79,14 +78,24 @@ pub fn emit(ir: &Ir) -> TokenStream {
                 }
                 #take_lead
                 let limited = actuate(config, leg, table, state.demand[index]);
-                output.voltage[index] = DAC.voltage(leg.code);
-                output.requested[index] = #requested;
-                output.level[index] = leg.estimate.level;
-                output.drift[index] = leg.estimate.drift;
-                output.dac_code[index] = leg.code;
-                output.status |= (limited as u32) << index | (!gauge_good as u32) << (8 + index) #status;
+                status |= (limited as u32) << index | (!gauge_good as u32) << (8 + index) #status;
             }
-            output
+            status
+        }
+
+        /// What goes out, and what the state is that the tick left.
+        #[inline]
+        pub(crate) fn outputs(state: &State, status: u32) -> TickOutput {
+            let legs = &state.legs;
+            TickOutput {
+                voltage: each(|leg| DAC.voltage(legs[leg].code)),
+                requested: each(|leg| #requested),
+                demand: state.demand,
+                level: each(|leg| legs[leg].estimate.level),
+                drift: each(|leg| legs[leg].estimate.drift),
+                dac_code: each(|leg| legs[leg].code),
+                status,
+            }
         }
 
         /// T = Δl(h_d), or T itself. A set-point that is not accepted leaves the last demand standing.
@@ -158,7 +167,7 @@ impl Variant {
             status: quote! {},
             demand_before: quote! {},
             take_lead: quote! {},
-            requested: quote! { leg.memory.displacement() },
+            requested: quote! { legs[leg].memory.displacement() },
             model: quote! { leg.memory.displacement() },
             out_of_reach: quote! { !(request >= Real::ZERO && request <= table.full_displacement()) },
             request: quote! { demand },
@@ -184,7 +193,7 @@ impl Variant {
                 );
             };
             // The leg is asked for the lead so that it arrives in time: it is no part of what it is to show.
-            variant.requested = quote! { leg.memory.displacement() - leg.lead };
+            variant.requested = quote! { legs[leg].memory.displacement() - legs[leg].lead };
             variant.model = quote! { (leg.memory.displacement() - leg.lead) };
             variant.request = quote! { (demand + leg.lead) };
         }

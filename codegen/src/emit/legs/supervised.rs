@@ -15,6 +15,13 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use crate::{SetpointKind, kinematics};
     };
     let no_lead = ir.hysteresis.lead.as_ref().map(|_| quote! { leg.lead = 0.0; });
+    let no_leads = ir.hysteresis.lead.as_ref().map(|_| {
+        quote! {
+            for leg in &mut state.legs {
+                leg.lead = 0.0;
+            }
+        }
+    });
     let functions = quote! {
         /// Puts the law where the machine is: the demand on a leg is where its gauge shows it, and its level estimate is what the
         /// model lacks to that, so that the code held stays what the law asks for. Without adaptation, or where the gauge is not
@@ -66,7 +73,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
             supervisor.look(&PLAN, channel, &Sample { word: reading, reading, expected, error });
         }
 
-        /// Codes held or on their way to rest, the law suspended.
+        /// Codes held or on their way to rest, the law suspended. Returns the status.
         #[cold]
         #[inline(never)]
         fn stand(
@@ -76,32 +83,19 @@ pub fn emit(ir: &Ir) -> TokenStream {
             input: &TickInput,
             channel: usize,
             expected: Real,
-        ) -> TickOutput {
+        ) -> u32 {
             move_codes(config, state, supervisor);
-            let mut output = TickOutput {
-                voltage: [0.0; LEGS],
-                requested: [0.0; LEGS],
-                demand: state.demand,
-                level: [0.0; LEGS],
-                drift: [0.0; LEGS],
-                dac_code: codes(state),
-                status: 0,
-            };
             let mut faults = 0;
-            for (index, leg) in state.legs.iter().enumerate() {
-                faults |= (!gauge_is_accepted(input.displacement[index]) as u32) << index;
-                output.voltage[index] = DAC.voltage(leg.code);
-                output.requested[index] = leg.memory.displacement();
-                output.level[index] = leg.estimate.level;
-                output.drift[index] = leg.estimate.drift;
+            for (index, reading) in input.displacement.iter().enumerate() {
+                faults |= (!gauge_is_accepted(*reading) as u32) << index;
             }
-            output.status = faults << 8;
+            #no_leads
             if faults == 0 && compares(supervisor.phase) {
                 let reading = component(&input.displacement, channel);
                 supervisor.look(&PLAN, channel, &Sample { word: reading, reading, expected, error: None });
             }
             supervisor.see(faults, 0, &input.displacement, &[0; LEGS], 1);
-            output
+            faults << 8
         }
 
         /// What a leg ought to show by the code sent over the interval that has ended, and the demand on it, m.
@@ -125,11 +119,14 @@ pub fn emit(ir: &Ir) -> TokenStream {
         imports,
         functions,
         law: quote! {
-            if supervisor.approach.is_done() {
-                step(config, state, &input.tick)
+            let approached;
+            let given = if supervisor.approach.is_done() {
+                input
             } else {
-                step(config, state, &approaching(config, supervisor, &input.tick))
-            }
+                approached = approaching(config, supervisor, input);
+                &approached
+            };
+            let status = advance(config, state, given);
         },
         gauges: quote! { displacement },
     })

@@ -52,6 +52,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod supervised;
         pub mod supervision;
         pub mod task_space;
+        pub mod waves;
         mod words;
 
         pub use config::{Config, ConfigError, Environment, LARGEST_GAIN, LARGEST_REST, LEG_GAIN};

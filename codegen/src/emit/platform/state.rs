@@ -3,7 +3,25 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-pub fn emit() -> TokenStream {
+use crate::emit::rest::{self, AtRest};
+use crate::ir::Ir;
+
+pub fn emit(ir: &Ir) -> TokenStream {
+    let leg = |AtRest { memory, displacement, code }: AtRest| {
+        quote! { LegState { memory: #memory, requested: #displacement, excess: 0.0, code: #code } }
+    };
+    let (leg, legs) = match rest::emit(ir) {
+        Err(alike) => {
+            let leg = leg(alike);
+            (quote! { let leg = #leg; }, quote! { [leg; LEGS] })
+        }
+        Ok(each) => {
+            let legs = each.map(leg);
+            (quote! {}, quote! { [#(#legs),*] })
+        }
+    };
+    let reset_doc = rest::doc(ir);
+    let limits = ir.supervision.risen.is_none().then(|| quote! { , limits });
     quote! {
         #![doc = " What the controller remembers from tick to tick. No NaN or infinity is ever stored here."]
 
@@ -12,7 +30,7 @@ pub fn emit() -> TokenStream {
 
         use crate::config::Environment;
         use crate::hysteresis::Memory;
-        use crate::{LEGS, Real, limits};
+        use crate::{LEGS, Real #limits};
 
         /// State of one leg.
         #[derive(Debug, Clone, Copy)]
@@ -75,17 +93,12 @@ pub fn emit() -> TokenStream {
         }
 
         impl State {
-            /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there, no correction.
+            #[doc = #reset_doc]
             #[must_use]
             pub const fn new() -> Self {
-                let leg = LegState {
-                    memory: Memory::new(),
-                    requested: 0.0,
-                    excess: 0.0,
-                    code: limits::CODES[0],
-                };
+                #leg
                 Self {
-                    legs: [leg; LEGS],
+                    legs: #legs,
                     pose: [0.0; 6],
                     rate: Rate::new(),
                     generator: Generator::new(),

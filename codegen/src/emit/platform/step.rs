@@ -120,6 +120,12 @@ pub fn emit(ir: &Ir) -> TokenStream {
 
         /// One control tick. See the module for the timing.
         pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
+            let status = advance(config, state, input);
+            outputs(state, status)
+        }
+
+        /// The work of a tick; returns its status.
+        pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> u32 {
             let entered = enter_mode(config, state);
             let gauge_faults = sense(config, state, &input.gauge);
             if gauge_faults == 0 {
@@ -162,11 +168,17 @@ pub fn emit(ir: &Ir) -> TokenStream {
             }
             state.limited = limited != 0;
             #find_static
+            #status limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT }
+        }
+
+        /// What goes out, of the state that the tick left.
+        #[inline]
+        pub(crate) fn outputs(state: &State, status: u32) -> TickOutput {
             let legs = &state.legs;
             TickOutput {
                 voltage: each(|leg| DAC.voltage(legs[leg].code)),
                 dac_code: each(|leg| legs[leg].code),
-                status: #status limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT },
+                status,
             }
         }
 

@@ -7,7 +7,6 @@ use crate::emit::supervised::{self, Parts};
 
 pub fn emit() -> TokenStream {
     let imports = quote! {
-        use specgen_runtime::linear::each;
         use specgen_runtime::setpoint::Generator;
         use specgen_runtime::{Estimate, Integral, NotchState, Real as _, Transfer};
 
@@ -60,7 +59,7 @@ pub fn emit() -> TokenStream {
             supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
         }
 
-        /// Codes held or on their way to rest, the law suspended; pose and rate are still measured.
+        /// Codes held or on their way to rest, the law suspended; pose and rate are still measured. Returns the status.
         #[cold]
         #[inline(never)]
         fn stand(
@@ -70,7 +69,7 @@ pub fn emit() -> TokenStream {
             input: &TickInput,
             channel: usize,
             expected: Real,
-        ) -> TickOutput {
+        ) -> u32 {
             move_codes(config, state, supervisor);
             for leg in &mut state.legs {
                 leg.requested = leg.memory.displacement();
@@ -80,12 +79,7 @@ pub fn emit() -> TokenStream {
                 supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, None));
             }
             supervisor.see(faults, 0, &input.gauge, &[0; LEGS], 1);
-            let legs = &state.legs;
-            TickOutput {
-                voltage: each(|leg| DAC.voltage(legs[leg].code)),
-                dac_code: each(|leg| legs[leg].code),
-                status: faults << 8,
-            }
+            faults << 8
         }
 
         /// What a gauge ought to read by the codes sent over the interval that has ended and the known load, m; and the set-point
@@ -117,7 +111,7 @@ pub fn emit() -> TokenStream {
     supervised::emit(&Parts {
         imports,
         functions,
-        law: quote! { step(config, state, &input.tick) },
+        law: quote! { let status = advance(config, state, input); },
         gauges: quote! { gauge },
     })
 }

@@ -17,12 +17,13 @@
   for (const figure of document.querySelectorAll("figure[data-chart]")) new Chart(figure, data[figure.dataset.chart]);
   for (const figure of document.querySelectorAll("figure[data-view]")) new View(figure, data[figure.dataset.view]);
   for (const table of document.querySelectorAll("table")) {
+    const name = table.caption.textContent.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60);
     const button = html("button", table.caption, "CSV", "tool");
     table.caption.insertBefore(document.createTextNode(" "), button);
     button.addEventListener("click", () => {
       const quoted = cell => { const text = cell.textContent; return /[",\n]/.test(text) ? '"' + text.replace(/"/g, '""') + '"' : text; };
       const rows = [...table.rows].map(row => [...row.cells].map(quoted).join(","));
-      download("table.csv", rows.join("\n") + "\n");
+      download(name + ".csv", rows.join("\n") + "\n");
     });
   }
 })();

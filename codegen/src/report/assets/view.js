@@ -6,9 +6,12 @@ class View {
     this.turn = [-0.6, 0.42];
     this.frame = 0;
     this.playing = false;
-    this.svg = element("svg", { viewBox: "0 0 960 460", role: "img", "aria-label": "the platform" }, figure);
+    // Without a motion there are no bars on the right.
+    const still = data.poses.length < 2;
+    if (still) figure.classList.add("still");
+    this.svg = element("svg", { viewBox: still ? "0 0 600 460" : "0 0 960 460", role: "img", "aria-label": "the platform" }, figure);
     const bar = html("div", figure, "", "bar");
-    if (data.poses.length > 1) {
+    if (!still) {
       const controls = html("span", bar, "", "controls bar");
       this.button = html("button", controls, "play");
       this.button.addEventListener("click", () => this.play(!this.playing));

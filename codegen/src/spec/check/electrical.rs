@@ -10,7 +10,7 @@ use crate::spec::text::number;
 const LARGEST_MISMATCH: f64 = 4.0;
 
 pub(super) fn limits_in_order(f: &Fields, findings: &mut Findings) -> Option<()> {
-    for path in ["actuator.voltage", "dac.range", "sensor.range"] {
+    for path in ["actuator.voltage", "dac.range", "sensor.range", "sensor.input_range"] {
         // A list that is missing has its own finding; the others are still checked.
         let _ = in_order(f, findings, path, false);
     }

@@ -87,3 +87,20 @@ pub(super) fn calibrated_alike(f: &Fields, findings: &mut Findings) -> Option<()
     );
     Some(())
 }
+
+/// `sensor.input_range` is of gauges whose words are volts.
+pub(super) fn input_of_calibrated(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let path = "sensor.input_range";
+    let calibrated =
+        f.given("sensor.calibration") || (0..f.count("gauge")).any(|k| f.given(&format!("gauge[{k}].calibration")));
+    if f.given(path) && !calibrated {
+        findings.error(
+            codes::INPUT_WITHOUT_CALIBRATION,
+            path,
+            f.span(path),
+            "`sensor.input_range` stands beside no calibration: the gauge words are metres, and their converter spans `sensor.range`".to_owned(),
+            "take `input_range` out, or write `calibration`, the displacement as a polynomial of the voltage".to_owned(),
+        );
+    }
+    Some(())
+}

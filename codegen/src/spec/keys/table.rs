@@ -242,6 +242,7 @@ pub const SECTIONS: &[Section] = &[
             row("range", Shape::List(&[READING; 2]), Required, "", "[\"-2 um\", \"48 um\"]", "Smallest and largest displacement that it can report."),
             row("noise", one(Dimension::LENGTH, Range::closed(0.0, 1e-3), "nm"), Default("\"0 nm\""), "", "\"2.2 nm\"", "Noise, rms."),
             row("bits", integer(8, 32), Required, "", "16", "Resolution of its converter over the range."),
+            row("input_range", Shape::List(&[VOLTS; 2]), Rule("[\"-10 V\", \"10 V\"]"), "", "[\"0 V\", \"10 V\"]", "With a calibration: voltage of its converter at code 0 and at full scale."),
             row("calibration", CALIBRATION, Rule("the gauge words are metres"), "", "[\"-2 um\", \"5 um/V\"]", "With [control]: displacement as a polynomial of the gauge's voltage, lowest power first; the gauge words are then volts. For all six gauges; a gauge may have its own."),
         ],
     },
@@ -393,6 +394,7 @@ pub const SECTIONS: &[Section] = &[
         kind: Kind::Plain,
         doc: "What the supervisor in the controller takes for a fault, and for how long it must last; docs/supervisor.md. Gauges are looked at in turn, one a tick.",
         keys: &[
+            row("rest_voltage", Shape::One(VOLTS), Rule("0 V, or the limit of `actuator.voltage` that is nearest to it"), "", "\"0 V\"", "Voltage at which the legs stand while disarmed and to which they ramp down. Amplifiers that are switched off leave a stack at 0 V: from any other rest it jumps when they are switched on and off."),
             row("arm_time", TIMEOUT, Rule("100 ms, at least a period"), "", "\"100 ms\"", "Time without any condition that arming takes. Of six legs with their own gauges also the time constant with which the set-point is approached from where the legs are."),
             row("ramp_rate", one(Dimension::SLEW_RATE, Range::closed(1e-3, 1e12), "V/ms"), Rule("the whole voltage in a second, or `actuator.slew_rate` if that is less"), "", "\"0.1 V/ms\"", "Rate at which voltages go to rest when they ramp down, at most the slew rate."),
             row("gauge_time", TIMEOUT, Rule("10 ms, at least a period"), "", "\"10 ms\"", "Time after which a gauge that is not finite or out of range, or a converter that does not answer, is a fault."),

@@ -12,10 +12,13 @@ pub const PART: Part = Part {
         "Cargo.toml",
         "src/cycle.rs",
         "src/desk.rs",
+        "src/download.rs",
         "src/exchange.rs",
         "src/health.rs",
         "src/lib.rs",
+        "src/recording.rs",
         "src/schedule.rs",
+        "src/stepper.rs",
         "src/words.rs",
     },
 };

@@ -11,9 +11,11 @@ pub const PART: Part = Part {
     files: files! { "stm32":
         "Cargo.toml",
         "src/converters.rs",
+        "src/cycles.rs",
         "src/delay.rs",
         "src/lib.rs",
         "src/serial.rs",
+        "src/silent.rs",
         "src/timer.rs",
     },
 };

@@ -1,10 +1,13 @@
 //! Lines on a Unix socket: one request a line, one answer a line.
 
 use std::io::{self, Read, Write};
-use std::os::unix::net::{UnixListener, UnixStream};
-use std::path::{Path, PathBuf};
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::net::UnixStream;
+use std::path::Path;
 
-use crate::operator::{Operator, Said};
+use super::listener::Listener;
+use crate::console::Console;
+use crate::operator::Said;
 
 /// Connections at once; more are closed at once.
 const MOST: usize = 8;
@@ -13,8 +16,7 @@ const LONGEST: usize = 4096;
 
 /// The socket with its connections.
 pub struct Socket {
-    listener: UnixListener,
-    path: PathBuf,
+    listener: Listener,
     connections: Vec<Connection>,
 }
 
@@ -24,47 +26,33 @@ struct Connection {
 }
 
 impl Socket {
-    /// Listens at `path`. What a killed run left there is replaced; what is served is not.
+    /// Listens at `path`.
     ///
     /// # Errors
-    /// If somebody listens there, or the path cannot be used.
+    /// As [`Listener::open`].
     pub fn listen(path: &Path) -> io::Result<Self> {
-        if UnixStream::connect(path).is_ok() {
-            return Err(io::Error::new(
-                io::ErrorKind::AddrInUse,
-                "another program listens there: choose another --socket",
-            ));
-        }
-        if std::fs::symlink_metadata(path)
-            .is_ok_and(|meta| std::os::unix::fs::FileTypeExt::is_socket(&meta.file_type()))
-        {
-            std::fs::remove_file(path)?;
-        }
-        let listener = UnixListener::bind(path)?;
-        listener.set_nonblocking(true)?;
-        Ok(Self { listener, path: path.to_owned(), connections: Vec::new() })
+        Ok(Self { listener: Listener::open(path, "--socket")?, connections: Vec::new() })
     }
 
     /// Answers what came since the last call. Never waits.
-    pub fn serve(&mut self, operator: &mut Operator, last: Option<&Said>, now: u64) {
-        while let Ok((stream, _)) = self.listener.accept() {
-            if self.connections.len() < MOST && stream.set_nonblocking(true).is_ok() {
+    pub fn serve(&mut self, console: &mut Console, now: u64) {
+        while let Some(stream) = self.listener.accept() {
+            if self.connections.len() < MOST {
                 self.connections.push(Connection { stream, line: Vec::new() });
             }
         }
-        self.connections.retain_mut(|connection| connection.serve(operator, last, now).is_ok());
+        self.connections.retain_mut(|connection| connection.serve(console, now).is_ok());
     }
-}
 
-impl Drop for Socket {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.path);
+    /// What to wait for.
+    pub fn descriptors(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
+        std::iter::once(self.listener.descriptor()).chain(self.connections.iter().map(|line| line.stream.as_fd()))
     }
 }
 
 impl Connection {
     /// An error ends the connection.
-    fn serve(&mut self, operator: &mut Operator, last: Option<&Said>, now: u64) -> io::Result<()> {
+    fn serve(&mut self, console: &mut Console, now: u64) -> io::Result<()> {
         let mut bytes = [0; 512];
         loop {
             match self.stream.read(&mut bytes) {
@@ -83,8 +71,8 @@ impl Connection {
             let line: Vec<u8> = self.line.drain(..=end).collect();
             let line = String::from_utf8_lossy(&line);
             let answer = match line.trim() {
-                "status" => status(last),
-                line => operator.obey(line, now).unwrap_or_else(|error| format!("error: {error}")),
+                "status" => status(console.said.as_ref()),
+                line => console.obey(line, now).unwrap_or_else(|error| format!("error: {error}")),
             };
             // A reader that does not read is closed: nobody waits for it.
             self.stream.write_all(format!("{answer}\n").as_bytes())?;
@@ -96,7 +84,7 @@ impl Connection {
 fn status(last: Option<&Said>) -> String {
     match last {
         None => "no tick yet".to_owned(),
-        Some(Said { phase, cause, on, status, tick }) => {
+        Some(Said { phase, cause, on, status, tick, .. }) => {
             format!("tick={tick} phase={phase:?} cause={cause:?} amplifiers={} status={status:#x}", u8::from(*on))
         }
     }

@@ -4,6 +4,7 @@ use crate::record::{BLOCK_MAGIC, HEADER_WORDS, Layout, NO_TRIGGER};
 
 /// Places in a block's header.
 const WORDS: usize = 1;
+const ROWS: usize = 2;
 const TRIGGER: usize = 7;
 
 #[derive(Debug)]
@@ -47,10 +48,31 @@ impl<'m> Ring<'m> {
         self.lost
     }
 
+    /// Rows of all blocks that are held.
+    pub(super) fn rows(&self) -> u64 {
+        let mut rows: u64 = 0;
+        for k in 0..self.held {
+            rows += self.at(k).and_then(|block| block.get(ROWS)).copied().unwrap_or_default();
+        }
+        rows
+    }
+
+    /// Rows of the longest kind that fit into all blocks.
+    pub(super) fn capacity(&self) -> usize {
+        let room = self.size.saturating_sub(self.layout.preamble());
+        self.blocks * room.checked_div(self.layout.longest_row()).unwrap_or_default()
+    }
+
     /// The open block has room for the longest row.
     #[inline]
     pub(super) fn has_room(&self) -> bool {
-        self.used > 0 && self.used + self.layout.longest_row() <= self.size
+        self.has_room_for(1)
+    }
+
+    /// The open block has room for so many of the longest rows.
+    #[inline]
+    pub(super) fn has_room_for(&self, rows: usize) -> bool {
+        self.used > 0 && self.used + rows * self.layout.longest_row() <= self.size
     }
 
     /// Index of the `k`-th held block.

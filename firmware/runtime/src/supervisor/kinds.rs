@@ -50,6 +50,19 @@ impl Phase {
         !matches!(self, Self::Disarmed | Self::Faulted)
     }
 
+    /// In words for people.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Disarmed => "disarmed",
+            Self::Arming => "arming",
+            Self::Running => "running",
+            Self::Holding => "holding",
+            Self::RampingDown => "ramping down",
+            Self::Faulted => "faulted",
+        }
+    }
+
     /// The inverse of [`Phase::word`]; none for any other number.
     #[must_use]
     pub const fn from_word(word: u64) -> Option<Self> {
@@ -179,6 +192,26 @@ impl Cause {
             Self::Integrity => 10,
             Self::Converter => 11,
             Self::EmergencyStop => 12,
+        }
+    }
+
+    /// In words for people; nothing for [`Cause::None`].
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::GaugeNotFinite => "gauge not finite",
+            Self::GaugeRange => "gauge out of range",
+            Self::GaugeStuck => "gauge stuck",
+            Self::GaugeDisagreement => "gauges disagree",
+            Self::TrackingError => "tracking error",
+            Self::VoltageSaturation => "voltage saturation",
+            Self::SlewSaturation => "slew saturation",
+            Self::MissedTick => "missed tick",
+            Self::LinkLost => "link lost",
+            Self::Integrity => "integrity",
+            Self::Converter => "converter",
+            Self::EmergencyStop => "emergency stop",
         }
     }
 

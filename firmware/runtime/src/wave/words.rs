@@ -15,6 +15,37 @@ const MOST: i32 = 1 << 30;
 /// Steps stay below half a turn.
 const HALF_TURN: u64 = (1 << 63) - 1;
 
+impl Refused {
+    /// The word to name when a wave is refused over a link; none if one is under way. What an axis cannot do is told by the words
+    /// of its offset (range), amplitude (rate) and the one behind (acceleration), for [`Refused::of_word`].
+    #[must_use]
+    pub const fn word(self) -> Option<usize> {
+        let (axis, behind) = match self {
+            Self::Busy => return None,
+            Self::Word(word) => return Some(word),
+            Self::Range(axis) => (axis, 1),
+            Self::Rate(axis) => (axis, 2),
+            Self::Acceleration(axis) => (axis, 3),
+        };
+        Some(6 + axis * AXIS + behind)
+    }
+
+    /// What a word named by a link means, if every word sent could stand in its place.
+    #[must_use]
+    pub const fn of_word(word: usize) -> Self {
+        let (axis, behind) = match word.checked_sub(6) {
+            Some(place) => (place / AXIS, place % AXIS),
+            None => return Self::Word(word),
+        };
+        match behind {
+            1 if axis < 6 => Self::Range(axis),
+            2 if axis < 6 => Self::Rate(axis),
+            3 if axis < 6 => Self::Acceleration(axis),
+            _ => Self::Word(word),
+        }
+    }
+}
+
 impl<T: Real> Settings<T> {
     /// As words.
     #[must_use]

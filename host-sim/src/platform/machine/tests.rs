@@ -3,7 +3,7 @@ use crate::plant::LegParameters;
 use crate::platform::PlatformParameters;
 
 fn preparation(specimen: &Specimen) -> Preparation {
-    Preparation { peak: specimen.legs[0].u_max, rate: 200.0, settle: 0.2, update: 5e-5 }
+    Preparation { peak: specimen.legs[0].u_max, rate: 200.0, settle: 0.2, update: 5e-5, rest: 0.0 }
 }
 
 fn prepared(specimen: &Specimen) -> Machine {

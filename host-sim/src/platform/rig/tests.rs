@@ -70,7 +70,7 @@ impl PoseTrajectory for Rise {
 fn rig(noise: &Noise, seed: u64) -> PlatformRig {
     let specimen = Specimen::ideal(&PlatformParameters::reference(), &LegParameters::reference());
     let mut rig = PlatformRig::new(&specimen, noise, seed);
-    rig.prepare(&Preparation { peak: 100.0, rate: 1000.0, settle: 0.1, update: 5e-5 });
+    rig.prepare(&Preparation { peak: 100.0, rate: 1000.0, settle: 0.1, update: 5e-5, rest: 0.0 });
     rig
 }
 

@@ -49,7 +49,7 @@ pub const INVERSE_JACOBIAN: [[Real; LEGS]; 6] = [
 ];
 
 /// Largest |x|, |y|, |z| (m) and |θx|, |θy|, |θz| (rad) accepted; from `workspace`.
-const POSE_BOUND: [Real; 6] = [4e-5, 4e-5, 4e-5, 0.0006, 0.0006, 0.0006];
+pub(crate) const POSE_BOUND: [Real; 6] = [4e-5, 4e-5, 4e-5, 0.0006, 0.0006, 0.0006];
 
 /// Corrections of the forward kinematics: what they leave over the declared workspace is below 1e-13 m and rad, or
 /// the last bit.

@@ -39,6 +39,7 @@ mod step;
 
 pub mod supervised;
 pub mod supervision;
+pub mod waves;
 mod words;
 
 pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};

@@ -15,13 +15,13 @@ pub use crate::machine_words::{
     MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS,
     machine_output_words,
 };
-use crate::step::{GAUGE_FAULT, LEG_LIMITED};
+use crate::step::{GAUGE_FAULT, LEG_LIMITED, advance, outputs};
 use crate::supervision::PLAN;
 use specgen_runtime::{Estimate, Law, Real as _};
 use crate::limits::{gauge_is_accepted, leg_setpoint_is_accepted};
 use crate::supervision::{APPROACH_KEEP, APPROACH_NEGLIGIBLE};
 use crate::{SetpointKind, kinematics};
-use crate::{Config, LEGS, Real, State, TickInput, TickOutput, step};
+use crate::{Config, LEGS, Real, State, TickInput, TickOutput};
 
 /// State of the supervisor in this controller's arithmetic.
 pub type Supervisor = supervisor::Supervisor<Real>;
@@ -104,29 +104,42 @@ pub fn supervise(
     let channel = supervisor.watch.take_turn();
     let (expected, target) = expectation(state, channel);
     let (phase, cause) = (supervisor.phase, supervisor.cause);
-    if phase != Phase::Running {
-        let tick = stand(config, state, supervisor, &input.tick, channel, expected);
-        return MachineOutput {
-            tick,
-            phase,
-            cause,
-            amplifier_on: phase.is_powered(),
-        };
-    }
-    let before = codes(state);
-    let output = MachineOutput {
-        tick: if supervisor.approach.is_done() {
-            step(config, state, &input.tick)
-        } else {
-            step(config, state, &approaching(config, supervisor, &input.tick))
-        },
+    let status = if phase == Phase::Running {
+        run(config, state, supervisor, &input.tick, channel, [expected, target])
+    } else {
+        stand(config, state, supervisor, &input.tick, channel, expected)
+    };
+    MachineOutput {
+        tick: outputs(state, status),
         phase,
         cause,
-        amplifier_on: true,
+        amplifier_on: phase.is_powered(),
+    }
+}
+
+/// The law at work; returns its status. Of the channel: what is `expected`, and its `target`.
+#[inline]
+fn run(
+    config: &Config,
+    state: &mut State,
+    supervisor: &mut Supervisor,
+    input: &TickInput,
+    channel: usize,
+    [expected,
+    target,
+    ]: [Real; 2],
+) -> u32 {
+    let before = codes(state);
+    let approached;
+    let given = if supervisor.approach.is_done() {
+        input
+    } else {
+        approached = approaching(config, supervisor, input);
+        &approached
     };
-    let status = output.tick.status;
+    let status = advance(config, state, given);
     if status & GAUGE_FAULT == 0 {
-        look(state, supervisor, &input.tick, channel, expected, target);
+        look(state, supervisor, input, channel, expected, target);
     }
     if status & (GAUGE_FAULT | LEG_LIMITED) == 0 {
         supervisor.seen = 0;
@@ -137,12 +150,12 @@ pub fn supervise(
             .see(
                 faults,
                 limited,
-                &input.tick.displacement,
+                &input.displacement,
                 &moved,
                 config.code_limits().max_step,
             );
     }
-    output
+    status
 }
 
 /// Puts the law where the machine is: the demand on a leg is where its gauge shows it, and its level estimate is what the
@@ -228,7 +241,7 @@ fn look(
         );
 }
 
-/// Codes held or on their way to rest, the law suspended.
+/// Codes held or on their way to rest, the law suspended. Returns the status.
 #[cold]
 #[inline(never)]
 fn stand(
@@ -238,26 +251,12 @@ fn stand(
     input: &TickInput,
     channel: usize,
     expected: Real,
-) -> TickOutput {
+) -> u32 {
     move_codes(config, state, supervisor);
-    let mut output = TickOutput {
-        voltage: [0.0; LEGS],
-        requested: [0.0; LEGS],
-        demand: state.demand,
-        level: [0.0; LEGS],
-        drift: [0.0; LEGS],
-        dac_code: codes(state),
-        status: 0,
-    };
     let mut faults = 0;
-    for (index, leg) in state.legs.iter().enumerate() {
-        faults |= (!gauge_is_accepted(input.displacement[index]) as u32) << index;
-        output.voltage[index] = DAC.voltage(leg.code);
-        output.requested[index] = leg.memory.displacement();
-        output.level[index] = leg.estimate.level;
-        output.drift[index] = leg.estimate.drift;
+    for (index, reading) in input.displacement.iter().enumerate() {
+        faults |= (!gauge_is_accepted(*reading) as u32) << index;
     }
-    output.status = faults << 8;
     if faults == 0 && compares(supervisor.phase) {
         let reading = component(&input.displacement, channel);
         supervisor
@@ -273,7 +272,7 @@ fn stand(
             );
     }
     supervisor.see(faults, 0, &input.displacement, &[0; LEGS], 1);
-    output
+    faults << 8
 }
 
 /// What a leg ought to show by the code sent over the interval that has ended, and the demand on it, m.

@@ -1,0 +1,227 @@
+//! A session with a device: what it runs, how it stands, and what is asked of it.
+
+use std::fmt;
+use std::time::{Duration, Instant};
+
+use host_sim::description::Description;
+use specgen_link::client::{Client, ClientError, Patience, Port};
+use specgen_link::{Identity, RecorderAction, RecorderStatus, Reply, Request, Status, WORDS, WaveAction, put_words};
+use specgen_runtime::supervisor;
+
+use crate::pil::session_number;
+
+/// How often a device hears of its host, at least: five times before it takes the link for lost.
+pub const ALIVE: Duration = Duration::from_millis(20);
+
+/// Why there is no session.
+#[derive(Debug)]
+pub enum OpenError {
+    /// The link does not open.
+    Link(ClientError),
+    /// There is something else at its other end.
+    Other(String),
+}
+
+impl fmt::Display for OpenError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Link(error) => error.fmt(f),
+            Self::Other(text) => f.write_str(text),
+        }
+    }
+}
+
+impl From<ClientError> for OpenError {
+    fn from(error: ClientError) -> Self {
+        Self::Link(error)
+    }
+}
+
+/// An open session.
+pub struct Session<P> {
+    client: Client<P>,
+    identity: Identity,
+    description: Description,
+    period: f64,
+    /// Input words that are no measurements, as they were sent last.
+    command: Vec<u64>,
+    heard: Instant,
+    status: Status,
+}
+
+impl<P: Port> Session<P> {
+    /// Opens a session and asks who is there. With a `digest` only the controller of that spec will do.
+    ///
+    /// # Errors
+    /// No answer, or another controller.
+    pub fn open(port: P, patience: Patience, digest: Option<&str>) -> Result<Self, OpenError> {
+        let (mut client, identity) = Client::open(port, session_number(), patience)?;
+        let text = client.fetch(|offset| Request::Describe { offset })?;
+        let text = String::from_utf8_lossy(&text).into_owned();
+        let description = Description::parse(&text).map_err(|error| OpenError::Other(error.to_string()))?;
+        if digest.is_some_and(|digest| digest != description.digest) {
+            return Err(OpenError::Other(format!(
+                "the device runs the controller `{}` of spec digest {}; the spec gives {}: name the spec that it was built from, \
+                 or build and flash it from this one",
+                description.name,
+                description.digest,
+                digest.unwrap_or_default()
+            )));
+        }
+        let period = text.lines().find_map(|line| line.strip_prefix("period=")).and_then(|text| text.parse().ok());
+        let period = period.filter(|period| *period > 0.0 && f64::is_finite(*period)).ok_or_else(|| {
+            OpenError::Other("the controller's description lacks `period`: build and flash it with this specgen".into())
+        })?;
+        let measured = |name: &String| name.starts_with("gauge[") || name.starts_with("displacement[");
+        let words = description.input_names.iter().position(measured).unwrap_or(description.input_names.len());
+        let mut session = Self {
+            client,
+            identity,
+            description,
+            period,
+            command: vec![0; words],
+            heard: Instant::now(),
+            status: Status {
+                tick: 0,
+                phase: 0,
+                cause: 0,
+                amplifier_on: false,
+                status: 0,
+                events: 0,
+                late: 0,
+                link: specgen_link::Counters::NONE,
+            },
+        };
+        session.poll()?;
+        Ok(session)
+    }
+
+    /// What the controller says of itself.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Control period, s.
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    /// What it said last.
+    pub fn status(&self) -> &Status {
+        &self.status
+    }
+
+    /// Frames from the device that came damaged.
+    pub fn damaged(&self) -> u32 {
+        self.client.damaged()
+    }
+
+    /// How it stands, and that the host is there. The events are those since the last call.
+    ///
+    /// # Errors
+    /// As [`Client::ask`], here and below.
+    pub fn poll(&mut self) -> Result<&Status, ClientError> {
+        match self.client.ask(&Request::Status)? {
+            Reply::Status(status) => {
+                self.status = status;
+                self.heard = Instant::now();
+                Ok(&self.status)
+            }
+            _ => Err(ClientError::Unexpected),
+        }
+    }
+
+    /// Time until the device must hear of its host again.
+    pub fn due(&self) -> Duration {
+        ALIVE.saturating_sub(self.heard.elapsed())
+    }
+
+    fn done(&mut self, request: &Request<'_>) -> Result<(), ClientError> {
+        match self.client.ask(request)? {
+            Reply::Done => Ok(()),
+            _ => Err(ClientError::Unexpected),
+        }
+    }
+
+    /// Asks the supervisor; the request holds until the next one.
+    pub fn supervise(&mut self, request: supervisor::Request) -> Result<(), ClientError> {
+        self.done(&Request::Supervise { request: request.word() as u8 })
+    }
+
+    /// Input words that are no measurements, by their names.
+    pub fn free_names(&self) -> &[String] {
+        self.description.input_names.get(..self.command.len()).unwrap_or_default()
+    }
+
+    /// Words for assignments, all of them or none.
+    ///
+    /// # Errors
+    /// A name that cannot be set, or a value that its word cannot hold, in words.
+    pub fn assign(&self, assignments: &[(String, String)]) -> Result<Vec<u64>, String> {
+        let mut words = self.command.clone();
+        for (name, value) in assignments {
+            let place = self.free_names().iter().position(|known| known == name);
+            let slot = place
+                .and_then(|place| words.get_mut(place))
+                .ok_or_else(|| format!("`{name}` cannot be set; these can: {}", self.free_names().join(", ")))?;
+            let number = value.parse().ok().filter(|number: &f64| number.is_finite());
+            let number = number.ok_or_else(|| format!("`{name}`: expected a finite number, found `{value}`"))?;
+            *slot = self.description.encode(name, number).map_err(|error| error.to_string())?;
+        }
+        Ok(words)
+    }
+
+    /// Sends all words of the command, as [`Session::assign`] gives them.
+    pub fn command(&mut self, words: Vec<u64>) -> Result<(), ClientError> {
+        let mut bytes = [0; WORDS * size_of::<u64>()];
+        let put = put_words(&words, &mut bytes).ok_or(ClientError::TooLong)?;
+        self.done(&Request::Setpoint { words: put })?;
+        self.command = words;
+        Ok(())
+    }
+
+    /// Settings in force.
+    pub fn config(&mut self) -> Result<Vec<u64>, ClientError> {
+        let count = usize::from(self.identity.config_words);
+        match self.client.ask(&Request::ReadConfig)? {
+            Reply::Config { words } => words.words(count).map(Iterator::collect).ok_or(ClientError::Unexpected),
+            _ => Err(ClientError::Unexpected),
+        }
+    }
+
+    /// Other settings, all at once.
+    pub fn write_config(&mut self, words: &[u64]) -> Result<(), ClientError> {
+        let mut bytes = [0; WORDS * size_of::<u64>()];
+        let words = put_words(words, &mut bytes).ok_or(ClientError::TooLong)?;
+        self.done(&Request::WriteConfig { words })
+    }
+
+    /// Something of the recorder; how it stands then.
+    pub fn recorder(&mut self, action: RecorderAction) -> Result<RecorderStatus, ClientError> {
+        match self.client.ask(&Request::Recorder { action })? {
+            Reply::Recorder(status) => Ok(status),
+            _ => Err(ClientError::Unexpected),
+        }
+    }
+
+    /// The whole record, as the bytes of its file. Every piece tells the device that its host is there.
+    pub fn download(&mut self) -> Result<Vec<u8>, ClientError> {
+        self.client.fetch(|offset| Request::Download { offset })
+    }
+
+    /// Starts the wave of these words. Where it ends, at its center, is what is commanded from then on.
+    pub fn start_wave(&mut self, words: &[u64], center: &[u64; 6]) -> Result<(), ClientError> {
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        self.done(&Request::Wave { action: WaveAction::Start, words: specgen_link::Bytes(&bytes) })?;
+        let first = self.free_names().iter().position(|name| name == "setpoint[0]").unwrap_or_default();
+        for (slot, word) in self.command.iter_mut().skip(first).zip(center) {
+            *slot = *word;
+        }
+        Ok(())
+    }
+
+    /// Ends the wave under way, smoothly.
+    pub fn stop_wave(&mut self) -> Result<(), ClientError> {
+        self.done(&Request::Wave { action: WaveAction::Stop, words: specgen_link::Bytes(&[]) })
+    }
+}

@@ -1,0 +1,56 @@
+//! A device at a Unix stream socket, which carries the same frames as a serial line.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use std::time::Duration;
+
+use rustix::event::PollFlags;
+use specgen_link::client::Port;
+
+use crate::pil::wait::ready;
+
+/// Longest wait for room to send.
+const SEND: Duration = Duration::from_secs(2);
+
+/// A connection.
+pub struct SocketLine {
+    stream: UnixStream,
+}
+
+impl SocketLine {
+    /// Connects.
+    ///
+    /// # Errors
+    /// In words: nobody listens there, no permission.
+    pub fn open(path: &Path) -> Result<Self, String> {
+        let advice = |error: io::Error| {
+            let name = path.display();
+            match error.kind() {
+                ErrorKind::NotFound => format!("there is no socket `{name}`; is the program that serves it running?"),
+                ErrorKind::ConnectionRefused => format!("nobody listens at `{name}`; start the program that serves it"),
+                _ => format!("cannot connect to `{name}`: {error}"),
+            }
+        };
+        let stream = UnixStream::connect(path).map_err(advice)?;
+        stream.set_write_timeout(Some(SEND)).map_err(advice)?;
+        Ok(Self { stream })
+    }
+}
+
+impl Port for SocketLine {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.stream.write_all(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], limit: Duration) -> io::Result<usize> {
+        if !ready(&self.stream, PollFlags::IN, limit)? {
+            return Ok(0);
+        }
+        match self.stream.read(buffer) {
+            Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the program at the socket closed the connection")),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Ok(0),
+            other => other,
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! docs/guide.md walked as a reader would: its commands in order, in one folder, their output in the form that it shows.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+mod support;
+
+use std::fs;
+use std::time::Instant;
+
+use support::commands::{blocks, is_marked, shell};
+use support::repository;
+
+/// A line with each number as `#`: what a run says, whatever it measured. Columns may move.
+fn form(line: &str) -> String {
+    let mut out = String::new();
+    for word in line.split_whitespace() {
+        let mut digits = false;
+        for letter in word.chars() {
+            let number = letter.is_ascii_digit() || (digits && letter == '.');
+            if !number {
+                out.push(letter);
+            } else if !digits {
+                out.push('#');
+            }
+            digits = number;
+        }
+        out.push(' ');
+    }
+    out
+}
+
+/// Lines that are shown and that no line of the output has the form of.
+fn missing(shown: &str, output: &str) -> Vec<String> {
+    let forms: Vec<String> = output.lines().map(form).collect();
+    let is_there = |line: &&str| line.trim() == "…" || forms.contains(&form(line));
+    shown.lines().filter(|line| !is_there(line)).map(str::to_owned).collect()
+}
+
+#[test]
+fn the_guide_can_be_walked() {
+    let folder = tempfile::tempdir().unwrap();
+    let specs = folder.path().join("specs");
+    fs::create_dir_all(&specs).unwrap();
+    fs::copy(repository().join("specs/minimal.toml"), specs.join("minimal.toml")).unwrap();
+    let text = fs::read_to_string(repository().join("docs/guide.md")).unwrap();
+    let mut here = folder.path().to_owned();
+    let mut output = None;
+    let (mut commands, mut compared) = (0, 0);
+    for block in blocks(&text) {
+        match (block.language.as_str(), output.take()) {
+            ("sh", _) => {
+                let script: String =
+                    block.body.lines().filter(|line| !is_marked(line)).map(|line| format!("{line}\n")).collect();
+                commands += script.lines().filter(|line| line.starts_with("specgen ")).count();
+                let start = Instant::now();
+                let place = folder.path().join("place");
+                let run = shell(&here, &format!("{script}\npwd > '{}'", place.display()));
+                println!("{:5.1} s  guide.md:{}", start.elapsed().as_secs_f64(), block.line);
+                assert_eq!(run.code, 0, "guide.md:{}\n{script}{}\n{}", block.line, run.stdout, run.stderr);
+                here = fs::read_to_string(place).unwrap().trim().into();
+                // Nothing to compare with where everything is marked.
+                output = script.contains("specgen ").then_some(run.stdout);
+            }
+            // What is shown right below commands came from them.
+            ("text", Some(said)) => {
+                let missing = missing(&block.body, &said);
+                assert!(missing.is_empty(), "guide.md:{} shows {missing:#?}, the command said:\n{said}", block.line);
+                compared += 1;
+            }
+            _ => {}
+        }
+    }
+    assert!(commands >= 10 && compared >= 6, "{commands} commands, {compared} outputs");
+    assert!(here.ends_with("bench") && here.join("run.csv").is_file() && here.join("report.html").is_file());
+}
+
+/// The judge sees another form, and no more than that.
+#[test]
+fn a_line_that_is_not_said_is_seen() {
+    let said = "error, nm rms  23.98 |  23.74\ngate: passed\n";
+    assert_eq!(missing("error, nm rms 7.1 | 120.5\n…\n", said), Vec::<String>::new());
+    for other in ["error, um rms  23.98 |  23.74", "gate: failed", "error, nm rms  23.98"] {
+        assert_eq!(missing(other, said), [other]);
+    }
+}

@@ -1,0 +1,197 @@
+//! `specgen operate` as a user runs it, against a board on made-up converters behind a socket, in real time.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+#[path = "../../tests/tests/board_support/mod.rs"]
+mod board_support;
+mod support;
+
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use board_support::Line;
+use controller::supervised::Phase;
+use specgen_link::client::Port;
+use support::{Folder, Run};
+
+/// A board at a socket.
+struct Served {
+    path: PathBuf,
+    /// Phase of the machine, for the test to look at.
+    phase: Arc<AtomicU32>,
+    /// The converters fail from now on.
+    fails: Arc<AtomicBool>,
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Served {
+    fn new(folder: &Folder) -> Self {
+        let path = folder.path("board.sock");
+        let listener = UnixListener::bind(&path).unwrap();
+        listener.set_nonblocking(true).unwrap();
+        let (phase, fails, over) = (Arc::default(), Arc::default(), Arc::default());
+        let thread = {
+            let (phase, fails, over) = (Arc::clone(&phase), Arc::clone(&fails), Arc::clone(&over));
+            std::thread::spawn(move || serve(&listener, &phase, &fails, &over))
+        };
+        Self { path, phase, fails, over, thread: Some(thread) }
+    }
+
+    fn is(&self, phase: Phase) -> bool {
+        u64::from(self.phase.load(Ordering::Relaxed)) == phase.word()
+    }
+
+    fn operate(&self, folder: &Folder, arguments: &[&str]) -> Command {
+        let mut command = folder.command();
+        command.args(["operate", "--socket"]).arg(&self.path).args(arguments);
+        command
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap();
+        }
+    }
+}
+
+/// Ticks at 10 kHz, one connection after the other.
+fn serve(listener: &UnixListener, phase: &AtomicU32, fails: &AtomicBool, over: &AtomicBool) {
+    let mut line = Line::new(40_000);
+    line.with(|rig| rig.pace = 0);
+    let (start, mut ticks) = (Instant::now(), 0);
+    let mut stream: Option<UnixStream> = None;
+    while !over.load(Ordering::Relaxed) {
+        let due = (start.elapsed().as_secs_f64() * 1e4) as u64;
+        // A computer that is busy with other things does not make up for lost time.
+        let now = (due - ticks).min(100) as u32;
+        ticks = due;
+        line.parts(|parts| parts.fails = fails.load(Ordering::Relaxed));
+        line.tick(now);
+        phase.store(line.phase().word() as u32, Ordering::Relaxed);
+        if let Ok((next, _)) = listener.accept() {
+            next.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
+            stream = Some(next);
+        }
+        let Some(open) = &mut stream else {
+            std::thread::sleep(Duration::from_millis(1));
+            continue;
+        };
+        let mut bytes = [0; 4096];
+        match open.read(&mut bytes) {
+            Ok(0) => stream = None,
+            Ok(count) => {
+                line.send(&bytes[..count]).unwrap();
+                let count = line.receive(&mut bytes, Duration::ZERO).unwrap();
+                let _ = open.write_all(&bytes[..count]);
+            }
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(_) => stream = None,
+        }
+    }
+}
+
+const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n\
+    [[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
+
+#[test]
+fn a_script_runs_a_wave_and_fetches_its_record() {
+    let folder = Folder::new();
+    let board = Served::new(&folder);
+    folder.write("wave.toml", WAVE);
+    folder.write("fast.toml", WAVE.replace("frequency = 5.0", "frequency = 4000.0"));
+    folder.write(
+        "run.txt",
+        "record look\narm\nwait arming 20\nrun   # as soon as it is armed\nwait running 20\nset command=0\nwait 1.5\n\
+         record arm 1000\nwave wave.toml\nwait 0.6\nrecord trigger\nwait 0.4\nrecord look\nrecord download run.rec\n\
+         config write reference.toml\nramp-down\nwait disarmed 60\n",
+    );
+    let run = Run::of(&mut board.operate(&folder, &["reference.toml", "--script", "run.txt"]));
+    run.says(0, &["the recorder records, waits for its trigger", "the recorder is complete", "wrote "]);
+    assert!(board.is(Phase::Disarmed));
+    let bytes = std::fs::metadata(folder.path("run.rec")).unwrap().len();
+    assert!(bytes > 50_000, "{bytes}");
+    folder.run(&["replay", "run.rec", "--csv", "run.csv"]).says(0, &["rows exported"]);
+    let csv = folder.read("run.csv");
+    assert!(csv.lines().count() > 1000);
+
+    // For programs; and what a device refuses is told with its reason.
+    let run = Run::of(&mut board.operate(&folder, &["reference.toml", "--json", "status", "config"]));
+    let document: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+    assert_eq!(document["result"]["status"]["stands"], "disarmed", "{document:#}");
+    assert_eq!(document["result"]["answers"][1]["answer"]["mode"], 6, "{document:#}");
+    let run = Run::of(&mut board.operate(&folder, &["wave fast.toml"]));
+    run.says(1, &["not compared with a spec", "fast.toml: axis z (leg 2) would be faster"]);
+    let run = Run::of(&mut board.operate(&folder, &["wave wave.toml"]));
+    run.says(1, &["wave.toml: not now; the machine must be running"]);
+    let run = Run::of(&mut board.operate(&folder, &["set gauge[0]=1"]));
+    run.says(1, &["`gauge[0]` cannot be set; these can: command, selector"]);
+    let run = Run::of(&mut board.operate(&folder, &["record download no-folder/x.rec"]));
+    assert_eq!(run.code, 3, "{run:?}");
+    // Another controller is not operated.
+    let run = Run::of(&mut board.operate(&folder, &["legs.toml", "arm"]));
+    run.says(1, &["the device runs the controller `reference` of spec digest"]);
+    assert!(board.is(Phase::Disarmed));
+}
+
+#[test]
+fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
+    let folder = Folder::new();
+    let board = Served::new(&folder);
+    let mut lines = board
+        .operate(&folder, &["reference.toml"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut input = lines.stdin.take().unwrap();
+    input.write_all(b"go\nset setpoint[0]=x\nwait arming 0.1\nstatus\n").unwrap();
+    drop(input);
+    let output = lines.wait_with_output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    for text in ["`go` is none of", "expected a finite number, found `x`"] {
+        assert!(printed.contains(text), "{printed}");
+    }
+    let script = ["reference.toml", "arm", "wait arming 20", "run", "wait running 20", "wait 30"];
+    let running = board.operate(&folder, &script).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait(&board, Phase::Running);
+    board.fails.store(true, Ordering::Relaxed);
+    let output = running.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("the machine is faulted: converter, at tick "), "{told}");
+}
+
+#[test]
+fn ctrl_c_ramps_down_and_waits() {
+    let folder = Folder::new();
+    let board = Served::new(&folder);
+    let script = ["reference.toml", "arm", "wait arming 20", "run", "wait running 20", "wait 60"];
+    let running = board.operate(&folder, &script).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait(&board, Phase::Running);
+    let process = rustix::process::Pid::from_raw(running.id().cast_signed()).unwrap();
+    rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();
+    let output = running.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{told}");
+    assert!(told.contains("interrupted; the machine is disarmed, amplifiers off"), "{told}");
+    assert!(board.is(Phase::Disarmed));
+}
+
+fn wait(board: &Served, phase: Phase) {
+    let start = Instant::now();
+    while !board.is(phase) {
+        assert!(start.elapsed() < Duration::from_secs(60), "{:?}", board.phase);
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}

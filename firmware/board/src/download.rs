@@ -1,0 +1,165 @@
+//! The record as the bytes of its file, piece by piece: header, then blocks with their checksums. Nothing of the file is in memory
+//! but the blocks themselves, so that a piece costs the tick no more than its copy.
+
+use controller::DESCRIPTION;
+use controller::snapshot::recorder::Recorder;
+use specgen_runtime::Crc32;
+use specgen_runtime::record::write_header;
+
+/// Words of a piece at most: what is copied while the tick is held off.
+pub(crate) const WORDS: usize = 64;
+const WORD: usize = size_of::<u64>();
+/// Bytes of the file before its first block: magic, format and length of the text, the text, padding, checksum.
+const HEADER: usize = 16 + DESCRIPTION.len().next_multiple_of(WORD) + WORD;
+
+/// Where a byte of the file is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Header,
+    /// Of a block: its number, its words, the byte in it.
+    Block(usize, usize, usize),
+    /// Of the checksum behind a block: its number and words, the byte in it.
+    Checksum(usize, usize, usize),
+    End,
+}
+
+/// Gives out pieces.
+#[derive(Debug)]
+pub(crate) struct Download {
+    /// The checksum of the first `summed` words of this block.
+    crc: Crc32,
+    block: usize,
+    summed: usize,
+}
+
+/// What the background may do while the tick is held off: it gets the recorder, none if it records or there is none.
+pub(crate) trait Look: FnMut(&mut dyn FnMut(&Recorder<'static>)) -> bool {}
+impl<F: FnMut(&mut dyn FnMut(&Recorder<'static>)) -> bool> Look for F {}
+
+impl Download {
+    pub(crate) const fn new() -> Self {
+        Self { crc: Crc32::new(), block: 0, summed: 0 }
+    }
+
+    /// Length of the file and its bytes from `offset` on, in `piece`: as many as a piece has or as there are of one kind. None if
+    /// `look` finds no recorder that stands still. Bytes in order cost least: the checksum is then at hand.
+    pub(crate) fn read<'p>(
+        &mut self,
+        offset: u32,
+        piece: &'p mut [u8],
+        mut look: impl Look,
+    ) -> Option<(u32, &'p [u8])> {
+        let offset = usize::try_from(offset).unwrap_or(usize::MAX);
+        let mut words = [0; WORDS];
+        let (mut place, mut total, mut count) = (Place::End, 0, 0);
+        let stands = look(&mut |recorder| {
+            (place, total) = find(recorder, offset);
+            if let Place::Block(block, _, byte) = place {
+                count = copy(recorder, block, byte / WORD, &mut words);
+            }
+        });
+        if !stands {
+            return None;
+        }
+        let range = match place {
+            Place::Header => header(offset, piece),
+            Place::Block(block, _, byte) => {
+                let words = words.get(..count).unwrap_or_default();
+                self.sum(block, byte / WORD, words);
+                let bytes = words.iter().flat_map(|word| word.to_le_bytes());
+                for (slot, value) in piece.iter_mut().zip(bytes) {
+                    *slot = value;
+                }
+                byte % WORD..count * WORD
+            }
+            Place::Checksum(block, length, byte) => {
+                self.catch_up(block, length, &mut look)?;
+                let sum = u64::from(self.crc.finish()).to_le_bytes();
+                for (slot, value) in piece.iter_mut().zip(sum) {
+                    *slot = value;
+                }
+                byte..WORD
+            }
+            Place::End => 0..0,
+        };
+        let total = u32::try_from(total).unwrap_or(u32::MAX);
+        Some((total, piece.get(range).unwrap_or_default()))
+    }
+
+    /// Adds words of a block to its checksum, if they come next.
+    fn sum(&mut self, block: usize, first: usize, words: &[u64]) {
+        if first == 0 {
+            (self.crc, self.block, self.summed) = (Crc32::new(), block, 0);
+        }
+        if self.block == block && self.summed == first {
+            self.crc.words(words);
+            self.summed += words.len();
+        }
+    }
+
+    /// Brings the checksum of a block to its end, where not every piece was asked for in order. None if it records again.
+    fn catch_up(&mut self, block: usize, length: usize, look: &mut impl Look) -> Option<()> {
+        if self.block != block || self.summed > length {
+            (self.crc, self.block, self.summed) = (Crc32::new(), block, 0);
+        }
+        while self.summed < length {
+            let (mut words, mut count) = ([0; WORDS], 0);
+            let first = self.summed;
+            let stands = look(&mut |recorder| count = copy(recorder, block, first, &mut words));
+            if !stands || count == 0 {
+                return None;
+            }
+            self.sum(block, first, words.get(..count).unwrap_or_default());
+        }
+        Some(())
+    }
+}
+
+/// The header's bytes from `offset` on, into `piece`.
+fn header(offset: usize, piece: &mut [u8]) -> core::ops::Range<usize> {
+    let (mut at, mut filled) = (0_usize, 0);
+    let written = write_header(DESCRIPTION, |bytes| {
+        for (slot, byte) in piece.iter_mut().skip(filled).zip(bytes.iter().skip(offset.saturating_sub(at))) {
+            *slot = *byte;
+            filled += 1;
+        }
+        at += bytes.len();
+        Ok::<(), core::convert::Infallible>(())
+    });
+    match written {
+        Ok(()) => 0..filled,
+    }
+}
+
+/// Where the byte is, and the length of the file.
+fn find(recorder: &Recorder<'static>, offset: usize) -> (Place, usize) {
+    let (mut place, mut start) = (Place::End, HEADER);
+    if offset < HEADER {
+        place = Place::Header;
+    }
+    for index in 0..recorder.blocks() {
+        let words = recorder.block(index).unwrap_or_default().len();
+        let bytes = words * WORD;
+        if let Some(byte) = offset.checked_sub(start)
+            && byte < bytes + WORD
+        {
+            place = match byte.checked_sub(bytes) {
+                None => Place::Block(index, words, byte),
+                Some(byte) => Place::Checksum(index, words, byte),
+            };
+        }
+        start += bytes + WORD;
+    }
+    (place, start)
+}
+
+/// Copies words of a block; how many.
+fn copy(recorder: &Recorder<'static>, block: usize, first: usize, out: &mut [u64; WORDS]) -> usize {
+    let words = recorder.block(block).and_then(|words| words.get(first..)).unwrap_or_default();
+    let mut count = 0;
+    for (slot, word) in out.iter_mut().zip(words) {
+        *slot = *word;
+        count += 1;
+    }
+    count
+}

@@ -1,0 +1,161 @@
+//! The recorder of the loop, as the service sees it: away while it records, here once it has what it was to record.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use controller::snapshot::RECORD_LAYOUT;
+use controller::snapshot::recorder::{Activity, Settings, Trigger};
+
+use crate::handover::{Order, Tape};
+use crate::record;
+
+/// Blocks of the memory, and words of each: together 4 MiB.
+const BLOCKS: usize = 8;
+const BLOCK: usize = 1 << 16;
+/// Ticks that fit whatever they hold: one block is always about to be given up.
+pub const CAPACITY: u32 = {
+    let words = if BLOCK > 4 * RECORD_LAYOUT.preamble() { BLOCK } else { 4 * RECORD_LAYOUT.preamble() };
+    ((BLOCKS - 1) * ((words - RECORD_LAYOUT.preamble()) / RECORD_LAYOUT.longest_row())) as u32
+};
+
+/// How it stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Standing {
+    /// It records.
+    pub running: bool,
+    /// The trigger was seen.
+    pub triggered: bool,
+    /// Ticks that it holds.
+    pub ticks: u64,
+}
+
+/// The recorder's other side.
+pub struct Capture {
+    here: Option<Tape>,
+    /// What it was last told to record.
+    settings: Settings,
+    standing: Standing,
+    /// Number of the order by which it was last started anew while it was away.
+    restarted: Option<u32>,
+    /// File of what it holds, as bytes; made when it is first asked for.
+    image: Vec<u8>,
+    /// Where it is written each time it is complete.
+    file: Option<PathBuf>,
+    /// What was written, or why not.
+    pub written: Option<(PathBuf, io::Result<u64>)>,
+}
+
+/// What is recorded: everything until `after` ticks behind the first fault.
+fn settings(after: u32) -> Settings {
+    Settings {
+        streaming: false,
+        trigger: Trigger { fault: true, phase_change: false },
+        after: if after > 0 { after } else { 1 },
+        decimation: 1,
+        digest_every: 1,
+    }
+}
+
+impl Capture {
+    /// The service's side and a recorder that waits for a fault. `file` is written each time it is complete.
+    ///
+    /// # Errors
+    /// In words, if there is no recorder for this controller.
+    pub fn new(file: Option<&Path>) -> Result<(Self, Tape), String> {
+        let words = if BLOCK > 4 * RECORD_LAYOUT.preamble() { BLOCK } else { 4 * RECORD_LAYOUT.preamble() };
+        let mut tape = Box::new(record::recorder(BLOCKS, words)?);
+        let settings = settings(CAPACITY / 2);
+        tape.start(settings);
+        let capture = Self {
+            here: None,
+            settings,
+            standing: Standing { running: true, ..Standing::default() },
+            restarted: None,
+            image: Vec::new(),
+            file: file.map(Path::to_owned),
+            written: None,
+        };
+        Ok((capture, tape))
+    }
+
+    /// How it stands.
+    pub fn standing(&self) -> Standing {
+        self.standing
+    }
+
+    /// The loop said how its recorder stands.
+    pub fn hear(&mut self, recorded: Option<u64>, triggered: bool) {
+        if let Some(ticks) = recorded
+            && self.here.is_none()
+        {
+            self.standing = Standing { running: true, triggered, ticks };
+        }
+    }
+
+    /// What to tell the loop so that it records anew, until `after` ticks behind the trigger. `number` is what the order will have.
+    pub fn arm(&mut self, after: u32, number: u32) -> Order {
+        self.settings = settings(after);
+        self.standing = Standing { running: true, ..Standing::default() };
+        self.image = Vec::new();
+        match self.here.take() {
+            Some(mut tape) => {
+                tape.start(self.settings);
+                Order::Tape(tape)
+            }
+            None => {
+                self.restarted = Some(number);
+                Order::Record(self.settings)
+            }
+        }
+    }
+
+    /// The recorder came back after the loop had taken `taken` orders. An order, if it is to go again: it was started anew when
+    /// it was already on its way.
+    pub fn receive(&mut self, mut tape: Tape, taken: u32) -> Option<Order> {
+        if self.restarted.take().is_some_and(|number| number.wrapping_sub(taken).cast_signed() > 0) {
+            tape.start(self.settings);
+            return Some(Order::Tape(tape));
+        }
+        let triggered = self.standing.triggered || tape.activity() == Activity::Complete;
+        self.standing = Standing { running: false, triggered, ticks: tape.rows() };
+        // One that was only stopped is somebody's business who looks at it.
+        if let Some(path) = self.file.as_ref().filter(|_| triggered) {
+            self.written = Some((path.clone(), write(path, &tape)));
+        }
+        self.here = Some(tape);
+        None
+    }
+
+    /// The record as the bytes of its file; none while it records.
+    pub fn image(&mut self) -> Option<&[u8]> {
+        let tape = self.here.as_ref()?;
+        if self.image.is_empty() {
+            // A vector takes everything.
+            let _ = put(&mut self.image, tape);
+        }
+        Some(&self.image)
+    }
+}
+
+fn put(out: &mut impl Write, tape: &Tape) -> io::Result<()> {
+    record::begin(out)?;
+    (0..tape.blocks()).filter_map(|index| tape.block(index)).try_for_each(|block| record::add(out, block))
+}
+
+/// Writes what it holds to a file, whole or not at all; its ticks.
+fn write(path: &Path, tape: &Tape) -> io::Result<u64> {
+    let mut draft = path.as_os_str().to_owned();
+    draft.push(".part");
+    let draft = PathBuf::from(draft);
+    let written = File::create(&draft).and_then(|file| {
+        let mut out = BufWriter::new(file);
+        put(&mut out, tape)?;
+        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()?;
+        std::fs::rename(&draft, path)
+    });
+    if written.is_err() {
+        let _ = std::fs::remove_file(&draft);
+    }
+    written.map(|()| tape.rows())
+}

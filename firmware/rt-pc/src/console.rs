@@ -1,0 +1,166 @@
+//! Everything that may be asked of a run, whoever asks: operator, settings, waves, recorder. What is to be done by the loop goes
+//! out as orders, in the order in which it was asked for.
+
+use std::collections::VecDeque;
+
+use controller::waves::{self, Wave};
+use controller::{Config, Real};
+use specgen_runtime::wave::Settings;
+
+use crate::capture::{CAPACITY, Capture};
+use crate::handover::{Order, Row};
+use crate::operator::{Operator, Said};
+use crate::words::Places;
+
+/// Why something is not done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum No {
+    /// Not in this state of the machine, of the wave or of the recorder.
+    State,
+    /// This word of what was asked for.
+    Word(usize),
+}
+
+/// The console.
+pub struct Console {
+    /// Requests and input words.
+    pub operator: Operator,
+    /// The recorder of the loop.
+    pub capture: Capture,
+    /// What the supervisor said last.
+    pub said: Option<Said>,
+    places: Places,
+    /// Settings that are in force once all orders are taken.
+    config: Config,
+    /// Events since they were last told over the link.
+    events: u32,
+    orders: VecDeque<Order>,
+    /// Number of the last order that was put there; the first is 1.
+    number: u32,
+    /// Number of the order that began the last wave.
+    wave: Option<u32>,
+}
+
+impl Console {
+    /// At the start, with the settings of the run.
+    pub fn new(operator: Operator, capture: Capture, places: Places, config: Config) -> Self {
+        Self {
+            operator,
+            capture,
+            said: None,
+            places,
+            config,
+            events: 0,
+            orders: VecDeque::new(),
+            number: 0,
+            wave: None,
+        }
+    }
+
+    /// Hears of a tick.
+    pub fn hear(&mut self, row: &Row, said: Said) {
+        self.said = Some(said);
+        self.events |= self.places.events(&row.input);
+        self.capture.hear(row.recorded, row.triggered);
+        if !said.waving && self.wave.is_some_and(|number| said.orders.wrapping_sub(number).cast_signed() >= 0) {
+            self.wave = None;
+        }
+    }
+
+    /// A line: its answer.
+    ///
+    /// # Errors
+    /// As [`Operator::obey`], and while a wave makes the set-points.
+    pub fn obey(&mut self, line: &str, now: u64) -> Result<String, String> {
+        if self.waving() && line.trim_start().starts_with("set ") {
+            return Err("a wave makes the set-points; it ends over the link, by itself, or by hold".to_owned());
+        }
+        self.operator.obey(line, now)
+    }
+
+    /// Settings in force.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// Events since this was called last.
+    pub fn take_events(&mut self) -> u32 {
+        std::mem::take(&mut self.events)
+    }
+
+    /// Other settings from the next tick on.
+    pub fn configure(&mut self, config: Config) {
+        self.config = config;
+        self.order(Order::Configure(config));
+    }
+
+    /// Whether a wave is under way.
+    pub fn waving(&self) -> bool {
+        self.wave.is_some()
+    }
+
+    /// Begins a wave.
+    ///
+    /// # Errors
+    /// The machine does not run, or plays something else; a wave is under way; the word of the axis that would go beyond its limits.
+    pub fn start_wave(&mut self, settings: &Settings<Real>) -> Result<(), No> {
+        let limits = waves::limits(&self.config);
+        let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
+        let Some(said) = running.filter(|_| self.wave.is_none()) else { return Err(No::State) };
+        Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(No::State, No::Word))?;
+        waves::may_begin(said.status, self.operator.words(), &settings.center, &limits).map_err(|_| No::State)?;
+        // What is wanted when it is over goes first.
+        self.operator.rest_at(&settings.center);
+        self.wish();
+        self.wave = Some(self.order(Order::Wave(*settings)));
+        Ok(())
+    }
+
+    /// Brings the wave to rest, if there is one.
+    pub fn stop_wave(&mut self) {
+        self.order(Order::StopWave);
+    }
+
+    /// Records anew, until `after` ticks behind the trigger.
+    ///
+    /// # Errors
+    /// There is no room for so many.
+    pub fn arm_recorder(&mut self, after: u32) -> Result<(), No> {
+        if after > CAPACITY {
+            return Err(No::Word(0));
+        }
+        let order = self.capture.arm(after, self.number.wrapping_add(1));
+        self.order(order);
+        Ok(())
+    }
+
+    /// Triggers the recorder.
+    pub fn trigger_recorder(&mut self) {
+        self.order(Order::Trigger);
+    }
+
+    /// Stops the recorder.
+    pub fn stop_recorder(&mut self) {
+        self.order(Order::StopRecorder);
+    }
+
+    /// Puts an order behind the others; its number.
+    pub fn order(&mut self, order: Order) -> u32 {
+        self.number = self.number.wrapping_add(1);
+        self.orders.push_back(order);
+        self.number
+    }
+
+    /// Puts the operator's wish behind the other orders, if it changed.
+    pub fn wish(&mut self) {
+        if let Some(wish) = self.operator.wish() {
+            self.order(Order::Wish(wish));
+        }
+    }
+
+    /// Orders that are not sent yet, the oldest first, and the number of the oldest.
+    pub fn outgoing(&mut self) -> (&mut VecDeque<Order>, u32) {
+        let first = self.number.wrapping_sub(self.orders.len() as u32).wrapping_add(1);
+        (&mut self.orders, first)
+    }
+}

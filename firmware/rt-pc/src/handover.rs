@@ -1,0 +1,152 @@
+//! What the real-time thread and the service hand to each other: by value, through rings that never wait.
+
+use core::sync::atomic::{AtomicBool, AtomicU64};
+
+use controller::snapshot::MACHINE_STATE_WORDS;
+use controller::snapshot::recorder::{self, Recorder};
+use controller::{Config, Real};
+use rtrb::{Consumer, Producer, RingBuffer};
+use specgen_runtime::wave;
+
+use crate::words::Words;
+
+/// Rows between the threads: 0.8 s at 10 kHz.
+const ROWS: usize = 8192;
+/// Orders between the threads; the loop takes one a tick.
+const ORDERS: usize = 64;
+/// States between the threads, one for [`SNAPSHOT_EVERY`] rows and one for every change of the settings.
+const SNAPSHOTS: usize = 16;
+/// A block of the record of a run has so many rows.
+pub const SNAPSHOT_EVERY: u32 = 2048;
+
+/// A recorder with its memory, for as long as the program runs: whoever holds the box uses it.
+pub type Tape = Box<Recorder<'static>>;
+
+/// One tick, as it is handed over.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// Number of the tick; skipped ones are left out.
+    pub tick: u64,
+    /// Ticks that were run before it.
+    pub count: u64,
+    /// What went in.
+    pub input: Words,
+    /// What came out.
+    pub output: recorder::Row,
+    /// Digest of the machine after the tick; 0 where nothing records the run.
+    pub digest: u64,
+    /// Ticks before it that were late.
+    pub late: u64,
+    /// Orders taken before it.
+    pub orders: u32,
+    /// A block of the record begins with it: its [`Snapshot`] was handed over before.
+    pub opens: bool,
+    /// Whether the set-point is a wave's.
+    pub waving: bool,
+    /// Rows that the recorder of the loop holds, if it has one.
+    pub recorded: Option<u64>,
+    /// Whether that recorder has seen its trigger.
+    pub triggered: bool,
+}
+
+/// The machine before a tick.
+pub struct Snapshot {
+    /// Ticks that were run before it.
+    pub count: u64,
+    /// Its digest.
+    pub digest: u64,
+    /// Its words.
+    pub state: [u64; MACHINE_STATE_WORDS],
+}
+
+/// What the operator wants from the next tick on: the words that are his, and the request.
+#[derive(Debug, Clone, Copy)]
+pub struct Wish {
+    /// Input words; those that are measured are left out of account.
+    pub words: Words,
+    /// Number of the request.
+    pub request: u64,
+}
+
+/// Something for the loop to do between two ticks.
+// The largest variant lies in the ring in any case: a box would have to be released by the real-time thread.
+#[allow(clippy::large_enum_variant)]
+#[derive(Debug)]
+pub enum Order {
+    /// Other wishes.
+    Wish(Wish),
+    /// Other settings.
+    Configure(Config),
+    /// A wave begins, if none is under way.
+    Wave(wave::Settings<Real>),
+    /// The wave comes to rest.
+    StopWave,
+    /// Record with this.
+    Tape(Tape),
+    /// Begin anew with the recorder that the loop has.
+    Record(recorder::Settings),
+    /// Trigger the recorder.
+    Trigger,
+    /// Stop the recorder and hand it back.
+    StopRecorder,
+}
+
+/// What both threads see.
+#[derive(Debug, Default)]
+pub struct Shared {
+    /// The loop is to end.
+    pub stop: AtomicBool,
+    /// The loop has ended.
+    pub ended: AtomicBool,
+    /// Last sign of life of the service, ns of [`specgen_rt::clock::now`].
+    pub service_alive: AtomicU64,
+    /// Another number with every request over a link whose silence matters; 0 without one.
+    pub link: AtomicU64,
+    /// Ticks whose rows found no room.
+    pub lost_rows: AtomicU64,
+    /// Readings or outputs that the device did not make.
+    pub device_faults: AtomicU64,
+}
+
+/// The loop's ends of the rings that lead out.
+pub struct Outlets {
+    /// What was done.
+    pub rows: Producer<Row>,
+    /// States for the record of the run; none if there is no such record.
+    pub snapshots: Option<Producer<Snapshot>>,
+    /// Recorders that have what they were to record, and the orders that had been taken when they were handed over.
+    pub tapes: Producer<(Tape, u32)>,
+}
+
+/// The loop's ends of the rings.
+pub struct Inner {
+    /// See there.
+    pub outlets: Outlets,
+    /// What is wanted.
+    pub orders: Consumer<Order>,
+}
+
+/// The service's ends.
+pub struct Outer {
+    /// See [`Outlets`].
+    pub rows: Consumer<Row>,
+    /// See [`Outlets`].
+    pub snapshots: Consumer<Snapshot>,
+    /// See [`Outlets`].
+    pub tapes: Consumer<(Tape, u32)>,
+    /// See [`Inner`].
+    pub orders: Producer<Order>,
+}
+
+/// Rings, with room for states if the run is recorded.
+pub fn rings(records: bool) -> (Inner, Outer) {
+    let (rows, rows_out) = RingBuffer::new(ROWS);
+    let (snapshots, snapshots_out) = RingBuffer::new(if records { SNAPSHOTS } else { 1 });
+    // There is one tape; the second place makes that a matter of no care.
+    let (tapes, tapes_out) = RingBuffer::new(2);
+    let (orders, orders_in) = RingBuffer::new(ORDERS);
+    (
+        Inner { outlets: Outlets { rows, snapshots: records.then_some(snapshots), tapes }, orders: orders_in },
+        Outer { rows: rows_out, snapshots: snapshots_out, tapes: tapes_out, orders },
+    )
+}

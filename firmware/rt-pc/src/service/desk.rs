@@ -1,0 +1,186 @@
+//! What is answered over the link.
+
+use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
+use controller::{CONFIG_WORDS, Config, DESCRIPTION, Real};
+use specgen_link::{
+    Bytes, Counted, Counters, Device, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Status,
+    WaveAction, put_words,
+};
+use specgen_runtime::wave::{self, Settings};
+
+use crate::capture::CAPACITY;
+use crate::console::{Console, No};
+
+/// Bytes of a piece of something longer.
+const CHUNK: usize = 960;
+const _: () = assert!(CHUNK + 24 < specgen_link::MESSAGE);
+
+/// The console as the device of a link.
+pub struct Desk<'a> {
+    /// What is asked of the run.
+    pub console: &'a mut Console,
+    /// Now, ns.
+    pub now: u64,
+    /// Settings in an answer.
+    pub words: [u8; size_of::<[u64; CONFIG_WORDS]>()],
+}
+
+/// Answers every request with this refusal.
+pub struct Closed(pub Refusal);
+
+impl Device for Closed {
+    fn execute(&mut self, _: &Request<'_>) -> Reply<'_> {
+        Reply::Refused(self.0)
+    }
+}
+
+impl<'a> Desk<'a> {
+    /// At the console.
+    pub fn new(console: &'a mut Console, now: u64) -> Self {
+        Self { console, now, words: [0; size_of::<[u64; CONFIG_WORDS]>()] }
+    }
+
+    fn status(&mut self) -> Reply<'static> {
+        let events = self.console.take_events();
+        // Before the first tick it is as at power-up.
+        let said = self.console.said.as_ref();
+        Reply::Status(Status {
+            tick: said.map_or(0, |said| said.tick + 1),
+            phase: said.map_or(Phase::Disarmed, |said| said.phase).word() as u8,
+            cause: said.map_or(Cause::None, |said| said.cause).word() as u8,
+            amplifier_on: said.is_some_and(|said| said.on),
+            status: said.map_or(0, |said| said.status),
+            events,
+            late: said.map_or(0, |said| u32::try_from(said.late).unwrap_or(u32::MAX)),
+            // The endpoint fills it in.
+            link: Counters::NONE,
+        })
+    }
+
+    /// Gives the orders to the link, then does `what`.
+    fn ordered(&mut self, what: impl FnOnce(&mut Self) -> Result<(), Refusal>) -> Reply<'static> {
+        if !self.console.operator.take_for_link(self.now) {
+            return Reply::Refused(Refusal::State);
+        }
+        what(self).map_or_else(Reply::Refused, |()| Reply::Done)
+    }
+
+    fn supervise(&mut self, request: u8) -> Result<(), Refusal> {
+        let wanted = Wanted::from_word(u64::from(request));
+        if wanted.word() != u64::from(request) {
+            return Err(Refusal::Word { index: 0 });
+        }
+        self.console.operator.ask_by_link(wanted);
+        Ok(())
+    }
+
+    fn command(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {
+        // A wave makes the set-points: two at once would be a contradiction.
+        if self.console.waving() {
+            return Err(Refusal::State);
+        }
+        let expected = self.console.operator.free_words() as u16;
+        if self.console.operator.set_by_link(words) { Ok(()) } else { Err(Refusal::Length { expected }) }
+    }
+
+    fn configure(&mut self, words: Bytes<'_>) -> Result<(), Refusal> {
+        let mut config = [0; CONFIG_WORDS];
+        if !words.read_words(&mut config) {
+            return Err(Refusal::Length { expected: CONFIG_WORDS as u16 });
+        }
+        let config = Config::from_words(&config).map_err(|error| Refusal::Word { index: error.word as u16 })?;
+        self.console.configure(config);
+        Ok(())
+    }
+
+    fn wave(&mut self, action: WaveAction, words: Bytes<'_>) -> Result<(), Refusal> {
+        if action == WaveAction::Stop {
+            self.console.stop_wave();
+            return Ok(());
+        }
+        let mut settings = [0; wave::WORDS];
+        if !words.read_words(&mut settings) {
+            return Err(Refusal::Length { expected: wave::WORDS as u16 });
+        }
+        let settings = Settings::<Real>::from_words(&settings)
+            .map_err(|refused| refused.word().map_or(Refusal::State, |index| Refusal::Word { index: index as u16 }))?;
+        self.console.start_wave(&settings).map_err(refusal)
+    }
+
+    fn recorder(&mut self, action: RecorderAction) -> Reply<'static> {
+        let done = match action {
+            RecorderAction::Look => Ok(()),
+            RecorderAction::Arm { after } => self.console.arm_recorder(after),
+            RecorderAction::Trigger => {
+                self.console.trigger_recorder();
+                Ok(())
+            }
+            RecorderAction::Stop => {
+                self.console.stop_recorder();
+                Ok(())
+            }
+        };
+        if let Err(no) = done {
+            return Reply::Refused(refusal(no));
+        }
+        let standing = self.console.capture.standing();
+        Reply::Recorder(RecorderStatus {
+            running: standing.running,
+            triggered: standing.triggered,
+            ticks: u32::try_from(standing.ticks).unwrap_or(u32::MAX),
+            capacity: CAPACITY,
+        })
+    }
+}
+
+fn refusal(no: No) -> Refusal {
+    match no {
+        No::State => Refusal::State,
+        No::Word(index) => Refusal::Word { index: index as u16 },
+    }
+}
+
+fn piece(whole: &[u8], offset: u32) -> Reply<'_> {
+    let start = usize::try_from(offset).unwrap_or(usize::MAX);
+    let rest = whole.get(start..).unwrap_or_default();
+    let piece = rest.get(..CHUNK).unwrap_or(rest);
+    Reply::Chunk { offset, total: u32::try_from(whole.len()).unwrap_or(u32::MAX), bytes: Bytes(piece) }
+}
+
+impl Device for Desk<'_> {
+    fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
+        self.console.operator.heard(self.now);
+        match *request {
+            Request::Hello => {
+                self.console.operator.greeted();
+                Reply::Identity(Identity {
+                    config_words: CONFIG_WORDS as u16,
+                    input_words: MACHINE_INPUT_WORDS as u16,
+                    output_words: MACHINE_OUTPUT_WORDS as u16,
+                    stages: 0,
+                    counted: Counted::Nothing,
+                    description: DESCRIPTION.len() as u32,
+                })
+            }
+            Request::Describe { offset } => piece(DESCRIPTION.as_bytes(), offset),
+            Request::Status => self.status(),
+            Request::Supervise { request } => self.ordered(|desk| desk.supervise(request)),
+            Request::Setpoint { words } => self.ordered(|desk| desk.command(words)),
+            Request::ReadConfig => match put_words(&self.console.config().to_words(), &mut self.words) {
+                Some(words) => Reply::Config { words },
+                None => Reply::Refused(Refusal::TooLong),
+            },
+            Request::WriteConfig { words } => self.ordered(|desk| desk.configure(words)),
+            Request::Recorder { action } => self.recorder(action),
+            Request::Download { offset } => match self.console.capture.image() {
+                Some(image) => piece(image, offset),
+                None => Reply::Refused(Refusal::State),
+            },
+            Request::Wave { action, words } => self.ordered(|desk| desk.wave(action, words)),
+            // The machine of a PC is the host's own: it is tried by `specgen sim` and `specgen replay`.
+            Request::LockstepReset { .. } | Request::LockstepStep { .. } | Request::LockstepStage { .. } => {
+                Reply::Refused(Refusal::Unsupported)
+            }
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! A Unix socket that is listened to without waiting, and is gone when the program is.
+
+use std::io;
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::{Path, PathBuf};
+
+/// The socket.
+pub struct Listener {
+    listener: UnixListener,
+    path: PathBuf,
+}
+
+impl Listener {
+    /// Listens at `path`. What a killed run left there is replaced; what is served is not. `option` is how to name another one.
+    ///
+    /// # Errors
+    /// If somebody listens there, or the path cannot be used.
+    pub fn open(path: &Path, option: &str) -> io::Result<Self> {
+        if UnixStream::connect(path).is_ok() {
+            let text = format!("another program listens there: choose another {option}");
+            return Err(io::Error::new(io::ErrorKind::AddrInUse, text));
+        }
+        if std::fs::symlink_metadata(path)
+            .is_ok_and(|meta| std::os::unix::fs::FileTypeExt::is_socket(&meta.file_type()))
+        {
+            std::fs::remove_file(path)?;
+        }
+        let listener = UnixListener::bind(path)?;
+        listener.set_nonblocking(true)?;
+        Ok(Self { listener, path: path.to_owned() })
+    }
+
+    /// Somebody who came since the last call. Never waits.
+    pub fn accept(&self) -> Option<UnixStream> {
+        let (stream, _) = self.listener.accept().ok()?;
+        stream.set_nonblocking(true).is_ok().then_some(stream)
+    }
+
+    /// What to wait for.
+    pub fn descriptor(&self) -> BorrowedFd<'_> {
+        self.listener.as_fd()
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
