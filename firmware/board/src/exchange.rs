@@ -175,16 +175,13 @@ impl Exchange {
     }
 }
 
-/// As at power-up.
-pub(crate) fn reset(machine: &mut Machine) {
-    *machine = at_reset();
-}
+/// The machine at power-up, in flash: made at run time it would first lie on the stack, which has no room for it.
+static AT_RESET: Machine = Machine::new();
 
-/// A function of its own, so that it fills the memory of its caller: made in place, a machine would first lie on the stack.
-/// `tests/tests/boards.rs` adds that up.
+/// As at power-up.
 #[inline(never)]
-fn at_reset() -> Machine {
-    Machine::new()
+pub(crate) fn reset(machine: &mut Machine) {
+    *machine = AT_RESET;
 }
 
 /// The supervised tick, for ticks and lock-step alike. A function of its own, so that its code is there once.
