@@ -107,6 +107,12 @@ pub fn check_legs(model: &Model, platform: &Platform<f64>, stroke: f64) -> (Reac
     (reach, found)
 }
 
+/// Where legs with gauges of their own end before the workspace or after their gauges: for `check`, not for every build.
+#[must_use]
+pub fn notes(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
+    if model.task_space.is_some() { Vec::new() } else { findings::notes_of_legs(model, reach) }
+}
+
 /// What is reached, with set-points about `bias`.
 fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose) -> Reach {
     let bounds = bounds(model);

@@ -165,7 +165,7 @@ fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
     assert_eq!(check.value["result"]["records"][0]["grid"], 32);
     let text = folder.run(&["check", "legs.toml"]);
     assert!(text.code == 0 && text.stdout.starts_with("legs.toml is good\n"), "{text:#?}");
-    // What a check cannot measure is a note, and nothing else is said.
+    // What a check cannot measure is a note, and so is where legs and gauges end; nothing else is said.
     assert!(text.stderr.starts_with("note[N0872]") && text.stderr.ends_with("0 errors, 0 warnings\n"), "{text:#?}");
 
     let ir = folder.json(&["dump-ir", "legs.toml"]);

@@ -25,6 +25,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut findings = compiled.findings.clone();
     findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
     findings.extend(lint::estimated(&compiled.model));
+    findings.extend(compiled.reach.iter().flat_map(|reach| reach::notes(&compiled.model, reach)));
     ui.findings(Some(&compiled.source), &findings);
     let text = format!(
         "{} is good\n{}{}",

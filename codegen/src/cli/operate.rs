@@ -54,7 +54,8 @@ enum Source {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let is_spec = |word: &&String| word.ends_with(".toml");
+    // `wave x.toml` is a command.
+    let is_spec = |word: &&String| word.ends_with(".toml") && Order::parse(word).is_err();
     let spec = arguments.words.first().filter(is_spec);
     let commands = arguments.words.get(usize::from(spec.is_some())..).unwrap_or_default();
     let source = source(arguments, commands)?;

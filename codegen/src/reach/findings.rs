@@ -23,15 +23,19 @@ pub(super) fn of(model: &Model, reach: &Reach, bias: &PathReach) -> Vec<Diagnost
     findings
 }
 
-/// Findings about legs with their own gauges.
+/// Warnings about legs with their own gauges.
 pub(super) fn of_legs(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
-    let mut findings = Vec::new();
-    if model.controller.setpoint == SetpointKind::Pose {
-        findings.extend(of_furthest_axis(model, reach));
-    }
-    findings.extend(of_gauge_ends(model, reach));
-    findings.extend(of_condition(model, reach));
-    findings
+    of_gauge_ends(model, reach).filter(is_warning).into_iter().chain(of_condition(model, reach)).collect()
+}
+
+/// Notes about them: what is cut short where they end.
+pub(super) fn notes_of_legs(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
+    let cut = (model.controller.setpoint == SetpointKind::Pose).then(|| of_furthest_axis(model, reach)).flatten();
+    cut.into_iter().chain(of_gauge_ends(model, reach).filter(|one| !is_warning(one))).collect()
+}
+
+fn is_warning(finding: &Diagnostic) -> bool {
+    finding.severity > Severity::Note
 }
 
 /// The bound that lies furthest beyond what its axis reaches.

@@ -17,13 +17,7 @@ const DIGEST_EVERY: u32 = 16;
 #[must_use]
 pub fn recorder(memory: &'static mut [u64]) -> Option<Recorder<'static>> {
     let most = memory.len() / (PREAMBLES * RECORD_LAYOUT.preamble());
-    let blocks = if most > BLOCKS {
-        BLOCKS
-    } else if most < 2 {
-        2
-    } else {
-        most
-    };
+    let blocks = most.clamp(2, BLOCKS);
     let mut recorder = Recorder::new(memory, blocks, RECORD_LAYOUT).ok()?;
     recorder.start(settings((recorder.capacity() / 2) as u32));
     Some(recorder)

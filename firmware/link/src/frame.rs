@@ -165,7 +165,7 @@ mod tests {
         for crc in [bare.checksum(b"123456789"), table.checksum(b"123456789"), CRC.checksum(b"123456789")] {
             assert_eq!(crc, CRC_32_ISCSI.check);
         }
-        let bytes: [u8; FRAME] = core::array::from_fn(|place| (place * 151 >> 3) as u8);
+        let bytes: [u8; FRAME] = core::array::from_fn(|place| ((place * 151) >> 3) as u8);
         for length in 0..bytes.len() {
             assert_eq!(bare.checksum(&bytes[..length]), table.checksum(&bytes[..length]), "{length} bytes");
         }

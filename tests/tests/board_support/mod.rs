@@ -151,7 +151,7 @@ impl Rig {
             return Some(byte);
         }
         // Lost, or with a bit flipped.
-        if what.is_multiple_of(2) { None } else { Some(byte ^ 1 << (what >> 8) % 8) }
+        if what.is_multiple_of(2) { None } else { Some(byte ^ (1 << ((what >> 8) % 8))) }
     }
 }
 
@@ -226,7 +226,11 @@ pub fn wave(amplitude: f64, frequency: f64) -> Settings<f64> {
     let mut settings = Settings::still();
     for (axis, wave) in settings.axes.iter_mut().enumerate() {
         let scale = if axis < 3 { 1.0 } else { 10.0 };
-        let tone = Tone { amplitude: amplitude * scale, phase: 0, step: step_of(frequency + axis as f64, controller::PERIOD_SECONDS) };
+        let tone = Tone {
+            amplitude: amplitude * scale,
+            phase: 0,
+            step: step_of(frequency + axis as f64, controller::PERIOD_SECONDS),
+        };
         *wave = AxisWave { offset: 0.0, shape: Shape::Sine { tone } };
     }
     settings.ramp_ticks = 300;

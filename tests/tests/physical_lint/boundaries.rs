@@ -21,6 +21,7 @@ fn checked(text: &str, dir: &Path, rounding: bool) -> Vec<Diagnostic> {
                 findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
             }
             findings.extend(specgen::lint::estimated(&compiled.model));
+            findings.extend(compiled.reach.iter().flat_map(|reach| specgen::reach::notes(&compiled.model, reach)));
             findings
         }
         Err(refused) => refused.findings,

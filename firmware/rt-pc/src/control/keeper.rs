@@ -6,8 +6,8 @@
 use core::sync::atomic::Ordering;
 
 use controller::Config;
-use controller::snapshot::{MACHINE_STATE_WORDS, record_before};
 use controller::snapshot::recorder::{Activity, Settings};
+use controller::snapshot::{MACHINE_STATE_WORDS, record_before};
 use controller::supervised::Machine;
 
 use crate::handover::{Outlets, Row, SNAPSHOT_EVERY, Shared, Snapshot, Tape};

@@ -78,10 +78,7 @@ impl MachineInput {
     /// From words in the order of [`MACHINE_INPUT_NAMES`].
     #[must_use]
     pub fn from_words(words: &[u64; MACHINE_INPUT_WORDS]) -> Self {
-        let tick = match words.first_chunk() {
-            Some(tick) => tick,
-            None => &[0; INPUT_WORDS],
-        };
+        let tick = words.first_chunk().unwrap_or(&[0; INPUT_WORDS]);
         Self {
             tick: TickInput::from_words(tick),
             request: Request::from_word(words[INPUT_WORDS]),

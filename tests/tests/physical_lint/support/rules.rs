@@ -152,6 +152,15 @@ const OF_PARTS: &[Rule] = &[
         ..RULE
     },
     Rule {
+        code: "W0817",
+        key: "supervisor.rest_voltage",
+        text: "[timing]\n",
+        raises: "[supervisor]\nrest_voltage = \"1 V\"\n\n[timing]\n",
+        passes: "[supervisor]\nrest_voltage = \"0 V\"\n\n[timing]\n",
+        line: Some("rest_voltage"),
+        ..RULE
+    },
+    Rule {
         code: "W0810",
         key: "leg.fixed_inertia",
         text: "\"1.07e5 g mm^2\"",
