@@ -175,7 +175,9 @@ fn commands_within_sentences_are_those_of_the_program() {
                 let left_out = [DisplayHelp, MissingRequiredArgument, MissingSubcommand].contains(&error.kind());
                 // `--target NAME` stands for its values.
                 let stands_for = |word: &String| word.chars().all(|letter| letter.is_ascii_uppercase());
-                let general = error.kind() == InvalidValue && line.words.iter().skip(1).any(stands_for);
+                // `identify -o` names an option.
+                let named = line.words.last().is_some_and(|word| word.starts_with('-'));
+                let general = error.kind() == InvalidValue && (named || line.words.iter().skip(1).any(stands_for));
                 assert!(left_out || general, "{name}: `{quoted}`\n{error}");
             }
             count += 1;
