@@ -72,7 +72,20 @@ impl Emitted {
     /// As [`Emitted::new`].
     #[must_use]
     pub fn with_records(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, String)]) -> Self {
-        let compiled = compile_edited(name, spec, edits, records);
+        Self::of(name, compile_edited(name, spec, edits, records))
+    }
+
+    /// The reference as it stands in `specs/`: the same digest as that of `firmware/controller`.
+    ///
+    /// # Panics
+    /// As [`Emitted::new`].
+    #[must_use]
+    pub fn reference(name: &str) -> Self {
+        let path = repository().join("specs/reference.toml");
+        Self::of(name, compile(&path).unwrap_or_else(|refused| panic!("{name} is refused: {:#?}", refused.findings)))
+    }
+
+    fn of(name: &str, compiled: Compiled) -> Self {
         let dir = scratch().join(name);
         let _ = fs::remove_dir_all(&dir);
         workspace::write(&dir, &compiled.files).expect("the folder was just removed");

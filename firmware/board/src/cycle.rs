@@ -1,11 +1,13 @@
 //! One control tick on real converters.
 
 use controller::sensing::gauge_reading;
+use controller::snapshot::recorder::Recorder;
 use controller::snapshot::{record_after, record_before};
 use controller::supervised::{
-    CONVERTER, Cause, INTEGRITY, LINK_LOST, MACHINE_INPUT_WORDS, MISSED_TICK, Machine, MachineInput, Request, STOP,
+    CONVERTER, Cause, INTEGRITY, LINK_LOST, MACHINE_INPUT_WORDS, MISSED_TICK, Machine, MachineInput, MachineOutput,
+    Request, STOP,
 };
-use controller::{INPUT_WORDS, Real};
+use controller::{Config, INPUT_WORDS, Real};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
 use specgen_link::Silence;
 use specgen_runtime::Real as _;
@@ -94,7 +96,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     ///
     /// Converters that failed are started again by a new request to acknowledge, while the amplifiers are off.
     pub fn tick(&mut self, exchange: &mut Exchange, noticed: Noticed) -> bool {
-        if exchange.lockstep.is_some() {
+        if exchange.in_lockstep() {
             self.stand_by(exchange, noticed);
             return false;
         }
@@ -133,11 +135,11 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
 
         let input = take(&mut self.input, orders, &readings, events);
         if let Some(recorder) = recorder {
-            record_before(config, self.machine, recorder);
+            begin_row(config, self.machine, recorder);
         }
         let output = exchange::step(config, self.machine, input);
         if let Some(recorder) = recorder {
-            record_after(self.machine, input, &output, recorder);
+            end_row(self.machine, input, &output, recorder);
         }
 
         // Off before the codes change, on only after they are out.
@@ -218,6 +220,18 @@ fn take<'a>(
     words[INPUT_WORDS] = orders.request.word();
     words[INPUT_WORDS + 1] = u64::from(events);
     slot.insert(MachineInput::from_words(&words))
+}
+
+/// What the recorder keeps from before a tick. In a frame of its own, as [`take`].
+#[inline(never)]
+fn begin_row(config: &Config, machine: &Machine, recorder: &mut Recorder<'static>) {
+    record_before(config, machine, recorder);
+}
+
+/// What it keeps from after it.
+#[inline(never)]
+fn end_row(machine: &Machine, input: &MachineInput, output: &MachineOutput, recorder: &mut Recorder<'static>) {
+    record_after(machine, input, output, recorder);
 }
 
 /// Counts a fault of a converter.

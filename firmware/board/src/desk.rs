@@ -25,31 +25,35 @@ const fn larger(a: usize, b: usize) -> usize {
 /// What lies behind the desk of the background. Everything else is in the [`Exchange`], which it looks into for as long as a copy
 /// takes.
 #[derive(Debug)]
-pub struct Desk<S> {
-    stopwatch: S,
+pub struct Desk {
+    stopwatch: Stopwatch,
     costs: Costs,
     session: Session<WORDS>,
     download: Download,
 }
 
-/// A desk while bytes are looked at. `with` gives access to the exchange and the machine, with the tick held off.
-#[derive(Debug)]
-pub struct Visit<'d, S, F> {
+/// Gives access to the exchange and the machine, with the tick held off for as long as that takes.
+pub type Access<'a> = dyn FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine)) + 'a;
+
+/// A desk while bytes are looked at. `dyn`, so that there is one copy of it, compiled as this crate is.
+pub struct Visit<'d, 'a> {
     /// The desk.
-    pub desk: &'d mut Desk<S>,
+    pub desk: &'d mut Desk,
     /// The access.
-    pub with: F,
+    pub with: &'d mut Access<'a>,
 }
 
-impl<S: Stopwatch> Desk<S> {
+impl Desk {
     /// At power-up.
     #[must_use]
-    pub const fn new(stopwatch: S) -> Self {
+    pub const fn new(stopwatch: Stopwatch) -> Self {
         Self { stopwatch, costs: Costs::NONE, session: Session::new(), download: Download::new() }
     }
 }
 
-impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<'_, S, F> {
+/// What takes much of the stack is not inlined: only one of it is then there at a time, and nothing of it while the answer is
+/// written.
+impl Visit<'_, '_> {
     fn identity(&mut self) -> Identity {
         self.desk.session.end();
         (self.with)(&mut |exchange, machine| {
@@ -64,8 +68,8 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
             config_words: CONFIG_WORDS as u16,
             input_words: MACHINE_INPUT_WORDS as u16,
             output_words: MACHINE_OUTPUT_WORDS as u16,
-            stages: u8::from(S::COUNTED != Counted::Nothing),
-            counted: S::COUNTED,
+            stages: u8::from(self.desk.stopwatch.counted != Counted::Nothing),
+            counted: self.desk.stopwatch.counted,
             description: DESCRIPTION.len() as u32,
         }
     }
@@ -95,7 +99,7 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
     fn order(&mut self, mut order: impl FnMut(&mut Exchange) -> bool) -> Reply<'static> {
         let mut reply = Reply::Refused(Refusal::State);
         (self.with)(&mut |exchange, _| {
-            if exchange.lockstep.is_none() && order(exchange) {
+            if !exchange.in_lockstep() && order(exchange) {
                 reply = Reply::Done;
             }
         });
@@ -113,6 +117,7 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
         })
     }
 
+    #[inline(never)]
     fn command(&mut self, words: Bytes<'_>) -> Reply<'static> {
         let mut command = [0; COMMAND_WORDS];
         if !words.read_words(&mut command) {
@@ -127,6 +132,7 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
         })
     }
 
+    #[inline(never)]
     fn config(&mut self) -> Reply<'_> {
         let mut config = None;
         (self.with)(&mut |exchange, _| config = Some(exchange.config));
@@ -147,8 +153,9 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
         reply
     }
 
+    #[inline(never)]
     fn download(&mut self, offset: u32) -> Reply<'_> {
-        let with = &mut self.with;
+        let with = &mut *self.with;
         let mut refusal = Refusal::Unsupported;
         let Desk { download, session, .. } = &mut *self.desk;
         let found = download.read(offset, session.buffer(), |action: &mut dyn FnMut(&_)| {
@@ -183,30 +190,30 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
     }
 
     /// Checks a wave while ticks go on, then hands it over.
+    #[inline(never)]
     fn start_wave(&mut self, bytes: Bytes<'_>) -> Reply<'static> {
-        let mut words = [0; wave::WORDS];
-        if !bytes.read_words(&mut words) {
-            return Reply::Refused(Refusal::Length { expected: wave::WORDS as u16 });
+        let mut limits = None;
+        (self.with)(&mut |exchange, _| limits = Some(waves::limits(&exchange.config)));
+        let Some(limits) = limits else { return Reply::Refused(Refusal::State) };
+        match &settings(bytes) {
+            None => Reply::Refused(Refusal::Length { expected: wave::WORDS as u16 }),
+            Some(Err(refused)) => Reply::Refused(refusal(*refused)),
+            Some(Ok(settings)) => self.begin_wave(limits, settings),
         }
-        let mut config = None;
-        (self.with)(&mut |exchange, _| config = Some(exchange.config));
-        let limits = waves::limits(&config.unwrap_or_default());
-        let loaded = Settings::<Real>::from_words(&words).and_then(|settings| {
-            let mut wave = Wave::new(limits);
-            wave.set(&settings)?;
-            wave.start();
-            Ok((settings.center, wave))
-        });
-        let (center, wave) = match loaded {
-            Ok(loaded) => loaded,
-            Err(refused) => {
-                let word = |index| Refusal::Word { index: index as u16 };
-                return Reply::Refused(refused.word().map_or(Refusal::State, word));
-            }
-        };
+    }
+
+    /// Hands a wave over, if the machine runs and none is under way.
+    #[inline(never)]
+    fn begin_wave(&mut self, limits: wave::Limits<Real>, settings: &Settings<Real>) -> Reply<'static> {
+        let mut wave = Wave::new(limits);
+        if let Err(refused) = wave.set(settings) {
+            return Reply::Refused(refusal(refused));
+        }
+        wave.start();
+        let center = settings.center;
         let mut reply = Reply::Refused(Refusal::State);
         (self.with)(&mut |exchange, _| {
-            let runs = exchange.report.phase == Phase::Running && exchange.lockstep.is_none();
+            let runs = exchange.report.phase == Phase::Running && !exchange.in_lockstep();
             if runs && !exchange.waves() {
                 let command = &exchange.orders.command;
                 reply = match waves::may_begin(exchange.report.status, command, &center, &limits) {
@@ -222,6 +229,8 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
     }
 
     /// The host steps the machine: only while nothing can move.
+    #[cfg(feature = "lockstep")]
+    #[inline(never)]
     fn reset(&mut self, config: Bytes<'_>) -> Reply<'static> {
         let (mut was, mut may) = (false, false);
         (self.with)(&mut |exchange, _| {
@@ -232,7 +241,7 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
             return Reply::Refused(Refusal::State);
         }
         let Desk { stopwatch, costs, session, .. } = &mut *self.desk;
-        let reply = session.reset(&mut Stepper { stopwatch, costs, with: &mut self.with }, config);
+        let reply = session.reset(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, config);
         if reply != Reply::Done && !was {
             // Settings that were refused have changed nothing.
             (self.with)(&mut |exchange, _| exchange.lockstep = None);
@@ -240,6 +249,8 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
         reply
     }
 
+    #[cfg(feature = "lockstep")]
+    #[inline(never)]
     fn step(&mut self, input: Bytes<'_>) -> Reply<'_> {
         let mut steps = false;
         (self.with)(&mut |exchange, _| steps = exchange.lockstep.is_some());
@@ -247,11 +258,23 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Visit<
             return Reply::Refused(Refusal::State);
         }
         let Desk { stopwatch, costs, session, .. } = &mut *self.desk;
-        session.step(&mut Stepper { stopwatch, costs, with: &mut self.with }, input)
+        session.step(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, input)
     }
 }
 
-impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Device for Visit<'_, S, F> {
+/// The settings of a wave, whose words are done with before the wave is made. None if there are too few or too many.
+#[inline(never)]
+fn settings(bytes: Bytes<'_>) -> Option<Result<Settings<Real>, wave::Refused>> {
+    let mut words = [0; wave::WORDS];
+    bytes.read_words(&mut words).then(|| Settings::from_words(&words))
+}
+
+/// Why a wave is refused, as the link says it.
+fn refusal(refused: wave::Refused) -> Refusal {
+    refused.word().map_or(Refusal::State, |index| Refusal::Word { index: index as u16 })
+}
+
+impl Device for Visit<'_, '_> {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
         (self.with)(&mut |exchange, _| exchange.hear());
         match *request {
@@ -263,13 +286,18 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> Device
             Request::ReadConfig => self.config(),
             Request::WriteConfig { words } => {
                 let Desk { stopwatch, costs, session, .. } = &mut *self.desk;
-                session.configure(&mut Stepper { stopwatch, costs, with: &mut self.with }, words)
+                session.configure(&mut Stepper { stopwatch: *stopwatch, costs, with: &mut *self.with }, words)
             }
+            #[cfg(feature = "lockstep")]
             Request::LockstepReset { config } => self.reset(config),
+            #[cfg(feature = "lockstep")]
             Request::LockstepStep { input } => self.step(input),
-            Request::LockstepStage { index: 0 } if S::COUNTED != Counted::Nothing => {
+            #[cfg(feature = "lockstep")]
+            Request::LockstepStage { index: 0 } if self.desk.stopwatch.counted != Counted::Nothing => {
                 Reply::Stage(self.desk.costs.stage())
             }
+            #[cfg(not(feature = "lockstep"))]
+            Request::LockstepReset { .. } | Request::LockstepStep { .. } => Reply::Refused(Refusal::Unsupported),
             Request::LockstepStage { .. } => Reply::Refused(Refusal::Unsupported),
             Request::Recorder { action } => self.recorder(action),
             Request::Download { offset } => self.download(offset),

@@ -11,6 +11,7 @@ use crate::words::{COMMAND_WORDS, PERIOD_NANOSECONDS};
 
 /// The link is lost after so long without a request, ns: 0.1 s.
 const LINK_TIMEOUT: u32 = 100_000_000;
+#[cfg(feature = "lockstep")]
 /// A lock-step is over after so long without a request, ns: 2 s, for its host also computes, and nothing moves meanwhile.
 const LOCKSTEP_TIMEOUT: u32 = 2_000_000_000;
 
@@ -137,7 +138,8 @@ impl Exchange {
     }
 
     /// Writes the set-point of a wave into the command, from where it stays when the wave has ended; only a running machine
-    /// follows one.
+    /// follows one. Not inlined: what it works with is done with before the law needs the stack.
+    #[inline(never)]
     pub(crate) fn advance_wave(&mut self) {
         let Some(wave) = &mut self.wave else { return };
         if self.report.phase != Phase::Running {
@@ -150,7 +152,13 @@ impl Exchange {
         }
     }
 
+    /// Whether the host steps the machine. Never in a program without the feature: the compiler then drops what is for it.
+    pub(crate) const fn in_lockstep(&self) -> bool {
+        cfg!(feature = "lockstep") && self.lockstep.is_some()
+    }
+
     /// The host steps the machine from here on. Only while nothing can move: false, and nothing changed, if something can.
+    #[cfg(feature = "lockstep")]
     pub(crate) fn enter_lockstep(&mut self) -> bool {
         let at_rest = self.report.tick > 0 && self.report.phase == Phase::Disarmed && !self.report.amplifier_on;
         if at_rest && self.lockstep.is_none() {
@@ -165,7 +173,8 @@ impl Exchange {
 
     /// Ends a lock-step, if there is one: machine and settings are as at power-up, and the recorder is told.
     pub(crate) fn leave_lockstep(&mut self, machine: &mut Machine) {
-        if self.lockstep.take().is_some() {
+        if self.in_lockstep() {
+            self.lockstep = None;
             self.config = Config::new();
             if let Some(recorder) = &mut self.recorder {
                 recorder.restarted();
@@ -184,8 +193,10 @@ pub(crate) fn reset(machine: &mut Machine) {
     *machine = AT_RESET;
 }
 
-/// The supervised tick, for ticks and lock-step alike. A function of its own, so that its code is there once.
-#[inline(never)]
+/// The supervised tick. Where lock-steps take it, too, a function of its own, so that its code is there once; else compiled as
+/// the program is, for speed.
+#[cfg_attr(feature = "lockstep", inline(never))]
+#[cfg_attr(not(feature = "lockstep"), inline(always))]
 pub(crate) fn step(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
     supervise(config, machine, input)
 }

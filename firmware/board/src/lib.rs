@@ -25,10 +25,10 @@ mod stepper;
 mod words;
 
 pub use cycle::{Board, Noticed};
-pub use desk::{Desk, Visit};
+pub use desk::{Access, Desk, Visit};
 pub use exchange::{Exchange, Orders, Report};
 pub use health::{BACKGROUND_SILENCE, Health};
 pub use recording::recorder;
 pub use schedule::{Due, Schedule};
-pub use stepper::{Stopwatch, Uncounted};
+pub use stepper::Stopwatch;
 pub use words::{COMMAND_WORDS, GAUGE_BITS, PERIOD_NANOSECONDS};

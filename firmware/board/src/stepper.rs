@@ -1,33 +1,27 @@
 //! The machine of a board as one that a host steps, and what a tick costs.
 
-use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_output_words};
+use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, MachineInput, machine_output_words};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
 use specgen_link::{Counted, Stage, lockstep};
 
-use crate::exchange::{self, Exchange};
+use crate::desk::Access;
+use crate::exchange;
 
 /// Name of the whole tick.
 const WHOLE: &str = "supervise";
 
-/// Counts what a tick costs. Read while nothing interrupts.
-pub trait Stopwatch {
+/// Counts what a tick costs.
+#[derive(Debug, Clone, Copy)]
+pub struct Stopwatch {
     /// What it counts.
-    const COUNTED: Counted;
-
-    /// The count, which wraps around.
-    fn now(&self) -> u32;
+    pub counted: Counted,
+    /// The count, which wraps around. Read while nothing interrupts.
+    pub now: fn() -> u32,
 }
 
-/// Where nothing is counted: on a host.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Uncounted;
-
-impl Stopwatch for Uncounted {
-    const COUNTED: Counted = Counted::Nothing;
-
-    fn now(&self) -> u32 {
-        0
-    }
+impl Stopwatch {
+    /// Where nothing is counted: on a host.
+    pub const NONE: Self = Self { counted: Counted::Nothing, now: || 0 };
 }
 
 /// What ticks have cost since power-up.
@@ -63,13 +57,13 @@ impl Costs {
 }
 
 /// Steps the machine while the tick is held off; in a lock-step the tick only keeps the converters at rest.
-pub(crate) struct Stepper<'a, S, F> {
-    pub(crate) stopwatch: &'a S,
-    pub(crate) costs: &'a mut Costs,
-    pub(crate) with: &'a mut F,
+pub(crate) struct Stepper<'d, 'a> {
+    pub(crate) stopwatch: Stopwatch,
+    pub(crate) costs: &'d mut Costs,
+    pub(crate) with: &'d mut Access<'a>,
 }
 
-impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> lockstep::Machine for Stepper<'_, S, F> {
+impl lockstep::Machine for Stepper<'_, '_> {
     fn description(&self) -> &str {
         DESCRIPTION
     }
@@ -79,11 +73,11 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> lockst
     }
 
     fn stages(&self) -> usize {
-        usize::from(S::COUNTED != Counted::Nothing)
+        usize::from(self.stopwatch.counted != Counted::Nothing)
     }
 
     fn counted(&self) -> Counted {
-        S::COUNTED
+        self.stopwatch.counted
     }
 
     fn configure(&mut self, config: &[u64]) -> Result<(), usize> {
@@ -111,9 +105,9 @@ impl<S: Stopwatch, F: FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine))> lockst
         let mut done = (0, 0);
         let stopwatch = self.stopwatch;
         (self.with)(&mut |exchange, machine| {
-            let begin = stopwatch.now();
+            let begin = (stopwatch.now)();
             let result = exchange::step(&exchange.config, machine, &input);
-            let cost = stopwatch.now().wrapping_sub(begin);
+            let cost = (stopwatch.now)().wrapping_sub(begin);
             for (slot, word) in output.iter_mut().zip(machine_output_words(&result, machine)) {
                 *slot = word;
             }

@@ -4,7 +4,7 @@
 
 use controller::supervised::{Machine, Request as Wanted};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
-use specgen_board::{COMMAND_WORDS, Desk, Exchange, Uncounted, Visit};
+use specgen_board::{COMMAND_WORDS, Desk, Exchange, Stopwatch, Visit};
 use specgen_link::{Bytes, Counted, Device, RecorderAction, Refusal, Reply, Request};
 
 fn bytes(words: &[u64]) -> Vec<u8> {
@@ -15,19 +15,19 @@ fn bytes(words: &[u64]) -> Vec<u8> {
 struct Bench {
     exchange: Exchange,
     machine: Box<Machine>,
-    desk: Desk<Uncounted>,
+    desk: Desk,
 }
 
 impl Bench {
     fn new() -> Self {
-        Self { exchange: Exchange::new(), machine: Box::new(Machine::new()), desk: Desk::new(Uncounted) }
+        Self { exchange: Exchange::new(), machine: Box::new(Machine::new()), desk: Desk::new(Stopwatch::NONE) }
     }
 
     /// Asks, and looks at the answer.
     fn ask<R>(&mut self, request: &Request<'_>, look: impl FnOnce(Reply<'_>) -> R) -> R {
         let Self { exchange, machine, desk } = self;
-        let with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, machine);
-        look(Visit { desk, with }.execute(request))
+        let mut with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, machine);
+        look(Visit { desk, with: &mut with }.execute(request))
     }
 
     fn expect(&mut self, request: &Request<'_>, expected: Reply<'_>) {

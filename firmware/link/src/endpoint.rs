@@ -60,8 +60,10 @@ impl Endpoint {
     }
 
     /// Takes a byte from the host. If it ends a request, `device` carries it out, and the bytes are the answer to send.
-    #[inline]
-    pub fn push(&mut self, byte: u8, device: &mut impl Device) -> Option<&[u8]> {
+    ///
+    /// One copy of it, compiled as this crate is and not as its caller: hence `dyn` and not inlined.
+    #[inline(never)]
+    pub fn push(&mut self, byte: u8, device: &mut dyn Device) -> Option<&[u8]> {
         let (header, message) = match self.receiver.push(byte)? {
             Ok(whole) => whole,
             Err(damage) => {

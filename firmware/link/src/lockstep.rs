@@ -38,8 +38,7 @@ pub trait Machine {
 /// What a lock-step keeps besides the machine, for one of up to N words of settings, inputs and outputs each.
 #[derive(Debug)]
 pub struct Session<const N: usize = WORDS> {
-    /// Words of a request, then those of the answer.
-    words: [u64; N],
+    /// Of the answer.
     bytes: [[u8; size_of::<u64>()]; N],
     /// Whether it was put at reset: before that there are no settings to step with.
     ready: bool,
@@ -55,7 +54,7 @@ impl<const N: usize> Session<N> {
     /// Waits for the first reset.
     #[must_use]
     pub const fn new() -> Self {
-        Self { words: [0; N], bytes: [[0; size_of::<u64>()]; N], ready: false }
+        Self { bytes: [[0; size_of::<u64>()]; N], ready: false }
     }
 
     /// Steps are refused until the next reset.
@@ -76,7 +75,8 @@ impl<const N: usize> Session<N> {
     /// [`Request::WriteConfig`].
     pub fn configure(&mut self, machine: &mut impl Machine, config: Bytes<'_>) -> Reply<'static> {
         let [count, ..] = machine.words();
-        let Some(words) = self.words.get_mut(..count) else { return Reply::Refused(Refusal::TooLong) };
+        let mut row = [0; N];
+        let Some(words) = row.get_mut(..count) else { return Reply::Refused(Refusal::TooLong) };
         if !config.read_words(words) {
             return Reply::Refused(Refusal::Length { expected: count as u16 });
         }
@@ -107,7 +107,8 @@ impl<const N: usize> Session<N> {
         if !input.read_words(row) {
             return Reply::Refused(Refusal::Length { expected: inputs as u16 });
         }
-        let Some(words) = self.words.get_mut(..outputs) else { return Reply::Refused(Refusal::TooLong) };
+        let mut out = [0; N];
+        let Some(words) = out.get_mut(..outputs) else { return Reply::Refused(Refusal::TooLong) };
         let (digest, cost) = machine.step(row, words);
         match put_words(words, self.bytes.as_flattened_mut()) {
             Some(output) => Reply::Stepped { cost, digest, output },

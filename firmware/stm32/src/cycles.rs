@@ -5,21 +5,11 @@ use specgen_board::Stopwatch;
 use specgen_link::Counted;
 
 /// DWT CYCCNT.
-#[derive(Debug, Clone, Copy)]
-pub struct Cycles;
+pub const CYCLES: Stopwatch = Stopwatch { counted: Counted::Cycles, now: DWT::cycle_count };
 
 /// Switches the counter on. An M7 keeps it locked until it is told the key; an M4 has no lock.
 pub fn start(dcb: &mut DCB, dwt: &mut DWT) {
     dcb.enable_trace();
     DWT::unlock();
     dwt.enable_cycle_counter();
-}
-
-impl Stopwatch for Cycles {
-    const COUNTED: Counted = Counted::Cycles;
-
-    #[inline]
-    fn now(&self) -> u32 {
-        DWT::cycle_count()
-    }
 }

@@ -6,7 +6,7 @@
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{Config, RingBufferedUartRx, UartTx};
 use controller::supervised::Machine;
-use specgen_board::{Desk, Exchange, Stopwatch, Visit};
+use specgen_board::{Desk, Exchange, Visit};
 use specgen_link::{Endpoint, FRAME};
 
 /// Of the link, with 8 data bits, no parity, one stop bit.
@@ -29,7 +29,7 @@ pub async fn serve(
     receiver: &mut RingBufferedUartRx<'static>,
     sender: &mut UartTx<'static, Async>,
     endpoint: &mut Endpoint,
-    desk: &mut Desk<impl Stopwatch>,
+    desk: &mut Desk,
     answer: &mut [u8; ANSWER],
     mut with: impl FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine)),
 ) -> ! {

@@ -47,7 +47,7 @@ mod app {
     use specgen_board::{Desk, Exchange, Health, Noticed, Schedule, recorder};
     use specgen_link::Endpoint;
     use specgen_stm32::converters::BusCell;
-    use specgen_stm32::cycles::{self, Cycles};
+    use specgen_stm32::cycles::{self, CYCLES};
     use specgen_stm32::{converters, serial, timer};
 
     use crate::{Board, RECORD, WATCHDOG, clocks, pins};
@@ -134,7 +134,7 @@ mod app {
         local = [
             receiver, sender,
             endpoint: Endpoint = Endpoint::new(),
-            desk: Desk<Cycles> = Desk::new(Cycles),
+            desk: Desk = Desk::new(CYCLES),
             answer: [u8; serial::ANSWER] = [0; serial::ANSWER],
         ]
     )]

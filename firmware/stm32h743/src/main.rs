@@ -48,7 +48,7 @@ mod app {
     use specgen_board::{Desk, Exchange, Health, Noticed, Schedule, recorder};
     use specgen_link::Endpoint;
     use specgen_stm32::converters::BusCell;
-    use specgen_stm32::cycles::{self, Cycles};
+    use specgen_stm32::cycles::{self, CYCLES};
     use specgen_stm32::{converters, serial, timer};
 
     use crate::{Board, RECORD, WATCHDOG, caches, clocks, pins};
@@ -138,7 +138,7 @@ mod app {
         local = [
             receiver, sender,
             endpoint: Endpoint = Endpoint::new(),
-            desk: Desk<Cycles> = Desk::new(Cycles),
+            desk: Desk = Desk::new(CYCLES),
             #[unsafe(link_section = ".axisram.answer")]
             answer: [u8; serial::ANSWER] = [0; serial::ANSWER],
         ]

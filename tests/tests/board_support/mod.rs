@@ -16,7 +16,7 @@ use controller::supervised::{Machine, Phase};
 use controller::supervision::READINGS_PER_LEG;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_board::{Board, Desk, Exchange, Noticed, Uncounted, Visit, recorder};
+use specgen_board::{Board, Desk, Exchange, Noticed, Stopwatch, Visit, recorder};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::Endpoint;
 use specgen_link::client::{Client, ClientError, Patience, Port};
@@ -70,7 +70,7 @@ pub struct Rig {
     pub board: Board<'static, Parts, Parts>,
     pub exchange: Exchange,
     pub parts: Parts,
-    desk: Desk<Uncounted>,
+    desk: Desk,
     endpoint: Endpoint,
     noise: ChaCha8Rng,
     answers: VecDeque<u8>,
@@ -97,7 +97,7 @@ impl Line {
             board,
             exchange,
             parts,
-            desk: Desk::new(Uncounted),
+            desk: Desk::new(Stopwatch::NONE),
             endpoint: Endpoint::new(),
             noise: ChaCha8Rng::seed_from_u64(3),
             answers: VecDeque::new(),
@@ -161,8 +161,8 @@ impl Port for Line {
         for byte in bytes {
             let Some(byte) = rig.spoil(*byte) else { continue };
             let Rig { board, exchange, desk, endpoint, .. } = &mut *rig;
-            let with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, board.machine_mut());
-            let answer = endpoint.push(byte, &mut Visit { desk, with }).map(<[u8]>::to_vec);
+            let mut with = |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(exchange, board.machine_mut());
+            let answer = endpoint.push(byte, &mut Visit { desk, with: &mut with }).map(<[u8]>::to_vec);
             for byte in answer.unwrap_or_default() {
                 if let Some(byte) = rig.spoil(byte) {
                     rig.answers.push_back(byte);
