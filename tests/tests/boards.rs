@@ -70,7 +70,7 @@ fn image_of(board: &Board) -> Option<Vec<u8>> {
     let _ = fs::remove_dir_all(&dir);
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[board.folder]);
     workspace::write(&dir, &files).unwrap();
-    let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu, &scratch().join("boards"));
+    let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu, &scratch().join("boards"), false);
     Some(built.unwrap_or_else(|error| panic!("{error}")).elf)
 }
 

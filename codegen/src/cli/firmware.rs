@@ -42,6 +42,9 @@ pub struct Common {
     /// build less.
     #[arg(long, value_name = "DIR")]
     target_dir: Option<PathBuf>,
+    /// With lock-step for `specgen pil --port`: the host may step the machine of a board that stands at rest. For boards.
+    #[arg(long)]
+    lockstep: bool,
     /// Do not run the emulator: no instruction counts, no comparison of bits.
     #[arg(long)]
     no_measure: bool,
@@ -135,6 +138,11 @@ fn make(spec: &Path, common: &Common, ui: &mut Ui) -> Result<(Compiled, Made), F
     {
         return Err(Refused { source: Some(compiled.source), findings: vec![finding] }.into());
     }
+    if common.lockstep && !matches!(target.kind, Kind::Board(_)) {
+        let boards = "stm32h743, stm32f4";
+        let message = format!("--lockstep is for the targets {boards}; {} has it in any case or never", target.name);
+        return Err(Failure::Usage(message));
+    }
     let part = workspace::parts::PARTS.iter().find(|part| part.folder == target.folder);
     if part.is_none_or(|part| part.files.is_empty()) {
         return Err(Failure::Environment(format!("this specgen was built without the firmware for {}", target.name)));
@@ -144,7 +152,8 @@ fn make(spec: &Path, common: &Common, ui: &mut Ui) -> Result<(Compiled, Made), F
     workspace::write(&output, &files)?;
     ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
     let target_dir = common.target_dir.clone().unwrap_or_else(|| output.join("target"));
-    let made = build(&compiled, target, &Folders { output: &output, target: &target_dir }, !common.no_measure, ui)?;
+    let folders = Folders { output: &output, target: &target_dir };
+    let made = build(&compiled, target, &folders, common, ui)?;
     Ok((compiled, made))
 }
 
@@ -179,8 +188,15 @@ struct Folders<'a> {
     target: &'a Path,
 }
 
-fn build(compiled: &Compiled, target: Target, folders: &Folders<'_>, measure: bool, ui: &Ui) -> Result<Made, Failure> {
+fn build(
+    compiled: &Compiled,
+    target: Target,
+    folders: &Folders<'_>,
+    common: &Common,
+    ui: &Ui,
+) -> Result<Made, Failure> {
     let Folders { output, target: target_dir } = *folders;
+    let measure = !common.no_measure;
     let declared = compiled.model.target.mcu;
     let mut made = Made {
         name: compiled.ir.name.clone(),
@@ -222,7 +238,8 @@ fn build(compiled: &Compiled, target: Target, folders: &Folders<'_>, measure: bo
             made.board = mcu.part().board.to_owned();
             let toolchain = target::toolchain::find()?;
             ui.progress(&format!("building for {}", made.board));
-            let image = target::build::build_folder(&toolchain, output, target.folder, mcu, target_dir)?;
+            let image =
+                target::build::build_folder(&toolchain, output, target.folder, mcu, target_dir, common.lockstep)?;
             examine(&mut made, &image, false, output)?;
             if mcu != declared {
                 made.notes.push(format!(

@@ -58,7 +58,7 @@ pub fn build_pil(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, Targe
     build_program(&toolchain::find()?, dir, EMULATED, mcu, target_dir, &["--bin", "pil", "--features", "pil"])
 }
 
-/// Builds the firmware in `dir/folder` for `mcu`.
+/// Builds the firmware in `dir/folder` for `mcu`; `lockstep`: so that a host may step its machine.
 ///
 /// # Errors
 /// As [`build_image`].
@@ -68,8 +68,10 @@ pub fn build_folder(
     folder: &str,
     mcu: Mcu,
     target_dir: &Path,
+    lockstep: bool,
 ) -> Result<Image, TargetError> {
-    build_program(toolchain, dir, folder, mcu, target_dir, &[])
+    let features: &[&str] = if lockstep { &["--features", "lockstep"] } else { &[] };
+    build_program(toolchain, dir, folder, mcu, target_dir, features)
 }
 
 fn build_program(

@@ -112,7 +112,9 @@ impl std::error::Error for ClientError {
 fn words(refusal: Refusal) -> String {
     use std::format;
     match refusal {
-        Refusal::Unsupported => "it does not do that; flash an image that does".into(),
+        Refusal::Unsupported => {
+            "it does not do that; flash an image that does (for lock-step: `specgen flash --lockstep`)".into()
+        }
         Refusal::NoSession => "no session is open; it restarted, or another host talks to it".into(),
         Refusal::Sequence => "requests came out of order; does another host talk to it?".into(),
         Refusal::Version => "another version of the link".into(),

@@ -3,9 +3,9 @@
 //! Received bytes go by DMA into a ring, as a tick may last longer than a byte and an F4 holds one byte only. Answers go out
 //! by DMA, so that the background sleeps meanwhile.
 
+use controller::supervised::Machine;
 use embassy_stm32::mode::Async;
 use embassy_stm32::usart::{Config, RingBufferedUartRx, UartTx};
-use controller::supervised::Machine;
 use specgen_board::{Desk, Exchange, Visit};
 use specgen_link::{Endpoint, FRAME};
 
