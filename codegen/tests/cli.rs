@@ -83,7 +83,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["pil", "reference.toml", "--trajectory", "case-3"], "but not `case-3`"),
         (&["operate"], "--port"),
         (&["operate", "--port", "x", "--socket", "y"], "cannot be used with"),
-        (&["operate", "--socket", "y", "--baud", "9600"], "--port"),
+        (&["operate", "--socket", "y", "--baud", "9600"], "cannot be used with"),
         (&["operate", "--socket", "y", "legs.toml", "go"], "`go` is none of: status, arm"),
         (&["operate", "--socket", "y", "--script", "none.txt"], "could not read `none.txt`"),
         (&["operate", "--socket", "y", "--script", "none.txt", "arm"], "exclude each other"),

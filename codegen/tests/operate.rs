@@ -169,7 +169,7 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     let output = running.wait_with_output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("the machine is faulted: converter, at tick "), "{told}");
+    assert!(told.contains("the machine is faulted: gauge not finite, at tick "), "{told}");
 }
 
 #[test]

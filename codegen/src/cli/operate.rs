@@ -28,7 +28,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DEVICE")]
     port: Option<PathBuf>,
     /// Its rate, baud.
-    #[arg(long, default_value_t = BAUD, requires = "port", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
+    #[arg(long, default_value_t = BAUD, requires = "port", conflicts_with = "socket", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
     baud: u32,
     /// A program that serves the link at this Unix socket.
     #[arg(long, value_name = "PATH")]

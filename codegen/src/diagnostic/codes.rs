@@ -356,7 +356,7 @@ codes! {
         "More than a hundredth of the voltage range, or less than two ten-millionths: probably a slip of the unit.";
     CONVERTER_COARSE = "W0808", "converter step large against the stroke",
         "One code moves a leg by more than a thousandth of its stroke.";
-    REST_NOT_ZERO = "W0817", "a rest that amplifiers do not keep when they are off",
+    REST_NOT_ZERO = "W0819", "a rest that amplifiers do not keep when they are off",
         "A stack whose amplifier is off discharges to 0 V. Where the legs rest at another voltage although 0 V is permitted, the amplifiers make a jump when they are switched on, and one when they are switched off.";
     LEG_PART_SMALL = "W0810", "mass and inertia of a leg part do not fit the leg",
         "The radius of gyration of a part is less than a fiftieth of the leg.";

@@ -6,7 +6,7 @@ use specgen_runtime::recorder::{Activity, Recorder, Row as Out, Settings, Trigge
 
 const LAYOUT: Layout = Layout { config: 3, input: 14, state: 5 };
 
-/// A machine that counts: its state is the tick, its output follows from the input.
+/// A machine that counts: its state is the tick, its digest follows from it, its output from the input.
 fn input(tick: u64) -> Vec<u64> {
     (0..14).map(|k| if k % 3 == 0 { tick / 4 } else { k * (tick % 2) }).collect()
 }
@@ -22,7 +22,7 @@ fn ticks(recorder: &mut Recorder<'_>, range: std::ops::Range<u64>, phase: impl F
         if recorder.opens() {
             recorder.open(&[1, 2, 3], tick ^ 0xd1, |words| words.fill(tick));
         }
-        recorder.push(&input(tick), &out(tick, phase(tick)), || tick ^ 0xd2);
+        recorder.push(&input(tick), &out(tick, phase(tick)), || (tick + 1) ^ 0xd1);
     }
 }
 
@@ -58,7 +58,7 @@ fn is_right(blocks: &[Block], phase: impl Fn(u64) -> u32, every: u64) {
             let out = out(tick, phase(tick));
             assert_eq!((row.tick, &row.input), (tick, &input(tick)));
             assert_eq!((row.codes, row.status, row.supervisor), (out.codes, out.status, out.supervisor));
-            assert!(row.digest.is_none_or(|digest| digest == tick ^ 0xd2));
+            assert!(row.digest.is_none_or(|digest| digest == (tick + 1) ^ 0xd1));
         }
     }
 }
@@ -96,7 +96,7 @@ fn a_trigger_keeps_what_was_before_it_and_so_many_rows_after() {
             .filter(|row| row.digest.is_some())
             .map(|row| row.tick)
             .collect();
-        assert!(digests.len() > 5 && digests.windows(2).all(|pair| pair[1] - pair[0] == 10), "{digests:?}");
+        assert!(digests.len() > 5 && digests.windows(2).all(|pair| pair[1] - pair[0] <= 10), "{digests:?}");
     }
 }
 

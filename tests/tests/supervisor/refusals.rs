@@ -97,7 +97,7 @@ fn legs_rest_where_amplifiers_that_are_off_leave_them() {
                 "{spec}, {low} V: rests at {volts} V"
             );
             assert!((actuation.code_min..=actuation.code_max).contains(&code));
-            let odd = compiled.findings.iter().any(|found| found.code == "W0817");
+            let odd = compiled.findings.iter().any(|found| found.code == "W0819");
             assert_eq!(odd, !key.is_empty(), "{spec}, {low} V: {:?}", compiled.findings);
         }
     }

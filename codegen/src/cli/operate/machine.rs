@@ -219,7 +219,19 @@ impl<P: Port> Machine<P> {
 
     /// The settings of a spec; its tables stay in the spec.
     fn write_config(&mut self, path: &Path) -> Result<(), Ended> {
-        let compiled = compile::compile(path).map_err(|refused| Ended::Failed(refused.into()))?;
+        // Compiling takes its time, in which the link is not to be lost.
+        let compiled = std::thread::scope(|scope| {
+            let work = scope.spawn(|| compile::compile(path));
+            while !work.is_finished() {
+                self.look()?;
+                std::thread::sleep(super::ALIVE);
+            }
+            match work.join() {
+                Ok(compiled) => compiled.map_err(|refused| Ended::Failed(refused.into())),
+                // The hook has said where.
+                Err(_) => Err(Ended::Failed(Failure::Environment("the compiler of specs failed".to_owned()))),
+            }
+        })?;
         let (ours, theirs) = (&compiled.ir, self.session.description());
         let words = &compiled.ir.integrity.settings;
         if ours.scalar.bits() != theirs.scalar.bits() || words.len() != theirs.config_names.len() {
@@ -233,8 +245,6 @@ impl<P: Port> Machine<P> {
             )));
         }
         let words = words.clone();
-        // Compiling takes its time; the link may have been lost meanwhile, and is there again.
-        self.look()?;
         self.session.write_config(&words).map_err(|error| match error {
             ClientError::Refused(Refusal::Word { index }) => {
                 let names = &self.session.description().config_names;

@@ -152,7 +152,7 @@ const OF_PARTS: &[Rule] = &[
         ..RULE
     },
     Rule {
-        code: "W0817",
+        code: "W0819",
         key: "supervisor.rest_voltage",
         text: "[timing]\n",
         raises: "[supervisor]\nrest_voltage = \"1 V\"\n\n[timing]\n",
