@@ -11,6 +11,6 @@ mod socket;
 mod wave;
 
 pub use order::{Order, Until};
-pub use session::{ALIVE, OpenError, Session};
+pub use session::{ALIVE, Session};
 pub use socket::SocketLine;
 pub use wave::{read_wave, refused_wave};

@@ -15,7 +15,7 @@ mod session;
 pub(crate) mod wait;
 
 pub use difference::Difference;
-pub use lockstep::{Cost, Lockstep, OpenError, Stop};
+pub use lockstep::{Cost, Lockstep, Stop};
 pub use pipes::Pipes;
 pub use serial::{BAUD, SerialLine};
-pub use session::session_number;
+pub use session::{OpenError, Opened, open};

@@ -13,8 +13,8 @@ use specgen_link::client::{Patience, Port};
 
 use super::ui::{Failure, Ui};
 use crate::compile;
-use crate::operate::{ALIVE, OpenError, Order, Session, SocketLine};
-use crate::pil::{BAUD, SerialLine};
+use crate::operate::{ALIVE, Order, Session, SocketLine};
+use crate::pil::{BAUD, OpenError, SerialLine};
 use machine::{Ended, Machine};
 
 /// Arguments of `operate`.

@@ -1,6 +1,5 @@
 //! A session with a device: what it runs, how it stands, and what is asked of it.
 
-use std::fmt;
 use std::time::{Duration, Instant};
 
 use host_sim::description::Description;
@@ -8,34 +7,10 @@ use specgen_link::client::{Client, ClientError, Patience, Port};
 use specgen_link::{Identity, RecorderAction, RecorderStatus, Reply, Request, Status, WORDS, WaveAction, put_words};
 use specgen_runtime::supervisor;
 
-use crate::pil::session_number;
+use crate::pil::{self, OpenError, Opened};
 
 /// How often a device hears of its host, at least: five times before it takes the link for lost.
 pub const ALIVE: Duration = Duration::from_millis(20);
-
-/// Why there is no session.
-#[derive(Debug)]
-pub enum OpenError {
-    /// The link does not open.
-    Link(ClientError),
-    /// There is something else at its other end.
-    Other(String),
-}
-
-impl fmt::Display for OpenError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Link(error) => error.fmt(f),
-            Self::Other(text) => f.write_str(text),
-        }
-    }
-}
-
-impl From<ClientError> for OpenError {
-    fn from(error: ClientError) -> Self {
-        Self::Link(error)
-    }
-}
 
 /// An open session.
 pub struct Session<P> {
@@ -55,10 +30,7 @@ impl<P: Port> Session<P> {
     /// # Errors
     /// No answer, or another controller.
     pub fn open(port: P, patience: Patience, digest: Option<&str>) -> Result<Self, OpenError> {
-        let (mut client, identity) = Client::open(port, session_number(), patience)?;
-        let text = client.fetch(|offset| Request::Describe { offset })?;
-        let text = String::from_utf8_lossy(&text).into_owned();
-        let description = Description::parse(&text).map_err(|error| OpenError::Other(error.to_string()))?;
+        let Opened { client, identity, text, description } = pil::open(port, patience)?;
         if digest.is_some_and(|digest| digest != description.digest) {
             return Err(OpenError::Other(format!(
                 "the device runs the controller `{}` of spec digest {}; the spec gives {}: name the spec that it was built from, \

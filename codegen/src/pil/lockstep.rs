@@ -12,7 +12,7 @@ use specgen_link::client::{Client, ClientError, Patience, Port};
 use specgen_link::{Counted, Identity, Reply, Request, WORDS, put_words};
 
 use super::difference::Difference;
-use super::session::session_number;
+use super::session::{self, OpenError, Opened};
 
 /// Ticks that arming may take.
 const ARMING: u64 = 100_000;
@@ -102,24 +102,6 @@ pub struct Lockstep<P> {
     waited: Duration,
 }
 
-/// Why there is no lock-step.
-#[derive(Debug)]
-pub enum OpenError {
-    /// The link does not open.
-    Link(ClientError),
-    /// There is something else at its other end.
-    Other(String),
-}
-
-impl fmt::Display for OpenError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Link(error) => error.fmt(f),
-            Self::Other(text) => f.write_str(text),
-        }
-    }
-}
-
 impl<P: Port> Lockstep<P> {
     /// Opens the link and asks whether the device runs this very controller. Set, `interrupted` ends the run.
     ///
@@ -131,10 +113,7 @@ impl<P: Port> Lockstep<P> {
         patience: Patience,
         interrupted: &'static AtomicBool,
     ) -> Result<Self, OpenError> {
-        let (mut client, identity) = Client::open(port, session_number(), patience).map_err(OpenError::Link)?;
-        let text = client.fetch(|offset| Request::Describe { offset }).map_err(OpenError::Link)?;
-        let text = String::from_utf8_lossy(&text).into_owned();
-        let theirs = Description::parse(&text).map_err(|error| OpenError::Other(error.to_string()))?;
+        let Opened { client, identity, description: theirs, .. } = session::open(port, patience)?;
         let ours = host.controller().description();
         if &theirs != ours {
             return Err(OpenError::Other(format!(

@@ -1,8 +1,61 @@
-//! Numbers of sessions.
+//! Opening a session with a device, and who is there.
+
+use std::fmt;
+
+use host_sim::description::Description;
+use specgen_link::client::{Client, ClientError, Patience, Port};
+use specgen_link::{Identity, Request};
+
+/// Why there is no session.
+#[derive(Debug)]
+pub enum OpenError {
+    /// The link does not open.
+    Link(ClientError),
+    /// There is something else at its other end.
+    Other(String),
+}
+
+impl fmt::Display for OpenError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Link(error) => error.fmt(f),
+            Self::Other(text) => f.write_str(text),
+        }
+    }
+}
+
+impl From<ClientError> for OpenError {
+    fn from(error: ClientError) -> Self {
+        Self::Link(error)
+    }
+}
+
+/// A session that was opened, with the device's own description.
+pub struct Opened<P> {
+    /// The link.
+    pub client: Client<P>,
+    /// What the device says of itself first.
+    pub identity: Identity,
+    /// Its description as it came.
+    pub text: String,
+    /// The same, read.
+    pub description: Description,
+}
+
+/// Opens a session and asks who is there.
+///
+/// # Errors
+/// No answer, or a description that cannot be read.
+pub fn open<P: Port>(port: P, patience: Patience) -> Result<Opened<P>, OpenError> {
+    let (mut client, identity) = Client::open(port, session_number(), patience)?;
+    let text = client.fetch(|offset| Request::Describe { offset })?;
+    let text = String::from_utf8_lossy(&text).into_owned();
+    let description = Description::parse(&text).map_err(|error| OpenError::Other(error.to_string()))?;
+    Ok(Opened { client, identity, text, description })
+}
 
 /// Another one in every run, so that frames of the last one are not taken for those of this.
-#[must_use]
-pub fn session_number() -> u16 {
+fn session_number() -> u16 {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
     (now.subsec_nanos() >> 8 ^ std::process::id()) as u16
 }

@@ -95,7 +95,7 @@ impl Visit<'_, '_> {
         reply
     }
 
-    /// Asks for something of the ticks, unless the host steps the machine or `allowed` says otherwise.
+    /// Asks for something of the ticks, unless the host steps the machine or `order` refuses.
     fn order(&mut self, mut order: impl FnMut(&mut Exchange) -> bool) -> Reply<'static> {
         let mut reply = Reply::Refused(Refusal::State);
         (self.with)(&mut |exchange, _| {

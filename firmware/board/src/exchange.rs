@@ -11,8 +11,8 @@ use crate::words::{COMMAND_WORDS, PERIOD_NANOSECONDS};
 
 /// The link is lost after so long without a request, ns: 0.1 s.
 const LINK_TIMEOUT: u32 = 100_000_000;
-#[cfg(feature = "lockstep")]
 /// A lock-step is over after so long without a request, ns: 2 s, for its host also computes, and nothing moves meanwhile.
+#[cfg(feature = "lockstep")]
 const LOCKSTEP_TIMEOUT: u32 = 2_000_000_000;
 
 /// What the background wants of the ticks to come.
