@@ -1,7 +1,7 @@
 //! The command line: arguments in, text or JSON out, exit code.
 //!
 //! Exit codes: 0 good, 1 the spec, a record or a budget fails, 2 usage, 3 environment (a missing tool, a full disk),
-//! 130 ended by Ctrl-C with the best so far.
+//! 130 ended by Ctrl-C, with the best so far where a part of the work is a result.
 
 mod build;
 mod check;
@@ -30,6 +30,7 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
+use crate::interrupt;
 use ui::{Failure, Ui};
 
 /// Compiles one description of a piezo-driven Stewart platform into a `no_std` Rust controller.
@@ -38,6 +39,7 @@ use ui::{Failure, Ui};
     version,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
+    max_term_width = 120,
     override_usage = "specgen [OPTIONS] <SPEC>\n       specgen <COMMAND>",
     after_help = examples::MAIN
 )]
@@ -118,6 +120,7 @@ pub fn run() -> ExitCode {
         Err(error) => return refuse_arguments(error),
     };
     let mut ui = Ui::new(cli.common.json);
+    interrupt::catch(move || Ui::new(cli.common.json).failed(&Failure::ended_early()));
     let done = match &cli.command {
         None => build::run(&cli.build, &mut ui),
         Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
@@ -143,10 +146,13 @@ pub fn run() -> ExitCode {
             Ok(())
         }
     };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => ExitCode::from(ui.failed(&failure)),
+    if done.is_err() {
+        interrupt::settle();
     }
+    // What is said from here on is the last word.
+    interrupt::heed();
+    let code = done.map_or_else(|failure| ui.failed(&failure), |()| 0);
+    ExitCode::from(ui.not_all_out().unwrap_or(code))
 }
 
 /// Help and version, or why the arguments make no sense.

@@ -13,6 +13,7 @@ pub mod doctor;
 pub mod emit;
 pub mod everett;
 pub mod identify;
+pub mod interrupt;
 pub mod ir;
 pub mod lint;
 pub mod lower;

@@ -195,6 +195,18 @@ fn sim_gives_one_document_and_its_files_hold_the_same_table() {
         let trace = folder.read(&format!("out/sim/trace-{mode}-1hz.csv"));
         assert!(trace.lines().count() > 40, "{mode}");
     }
+    // A leg goes no further than its gauge sees.
+    let recorded = folder.json(&["sim", "legs.toml", "--record", "run.rec", "--seconds", "0.2"]);
+    assert_eq!(recorded.code, 0, "{}", recorded.value);
+    let replayed = folder.json(&["replay", "run.rec", "--spec", "legs.toml"]);
+    assert_eq!((replayed.code, &replayed.value["result"]["bit_equal"]), (0, &true.into()));
+    // A record with a hole is exported, and said to be one.
+    let mut bytes = fs::read(folder.path("run.rec")).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    folder.write("hole.rec", bytes);
+    folder.run(&["replay", "hole.rec", "--csv", "hole.csv"]).says(1, &["is damaged", "its rows are missing"]);
+    assert!(folder.path("hole.csv").is_file());
     folder.json(&["sim", "nothing.toml"]).finding("E0101");
     let refused = folder.json(&["sim", "legs.toml", "--plant", "legs.toml"]);
     assert!(refused.code == 1 && refused.error().contains("legs.toml"), "{}", refused.error());
@@ -229,6 +241,10 @@ fn a_spec_that_is_no_spec_is_refused_with_its_name_and_a_mend() {
     folder.write("latin.toml", b"schema = 1\nname = \"caf\xe9\"\n");
     folder.write("binary.toml", (0..=255).cycle().take(5000).map(|b: u16| b as u8).collect::<Vec<_>>());
     folder.write("syntax.toml", "schema = 1\nname = [\n");
+    let units = || "schema = 1\nname = \"x\"\n".encode_utf16();
+    folder.write("utf16.toml", units().flat_map(u16::to_be_bytes).collect::<Vec<_>>());
+    let mark = std::iter::once(0xfeff).chain(units());
+    folder.write("marked.toml", mark.flat_map(u16::to_le_bytes).collect::<Vec<_>>());
     fs::create_dir(folder.path("folder.toml")).unwrap();
     let before = folder.listing();
     for (spec, code, line, mend) in [
@@ -238,6 +254,8 @@ fn a_spec_that_is_no_spec_is_refused_with_its_name_and_a_mend() {
         ("huge.toml", "E0102", None, "measurements belong in CSV files"),
         ("latin.toml", "E0103", Some(2), "save the file as UTF-8"),
         ("binary.toml", "E0103", Some(2), "save the file as UTF-8"),
+        ("utf16.toml", "E0103", Some(1), "iconv"),
+        ("marked.toml", "E0103", Some(1), "iconv"),
         ("syntax.toml", "E0104", Some(2), "]"),
     ] {
         for arguments in [&[spec, "-o", "out", "--no-build"][..], &["check", spec], &["dump-ir", spec]] {

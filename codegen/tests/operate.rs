@@ -138,7 +138,18 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     let run = Run::of(&mut board.operate(&folder, &["wave wave.toml"]));
     run.says(1, &["wave.toml: not now; the machine must be running"]);
     let run = Run::of(&mut board.operate(&folder, &["set gauge[0]=1"]));
-    run.says(1, &["`gauge[0]` cannot be set; these can: command, selector"]);
+    run.says(2, &["`gauge[0]` cannot be set; these can: command, selector"]);
+    // A mistake in the last line is found before the first is carried out.
+    for (last, code, text) in [
+        ("set command=x", 2, "`command`: expected a finite number, found `x`; nothing was asked of the machine"),
+        ("wave none.toml", 2, "could not read `none.toml`"),
+        ("config write none.toml", 1, "none.toml is refused"),
+        ("record download no-folder/x.rec", 3, "there is no folder `no-folder`"),
+    ] {
+        let run = Run::of(&mut board.operate(&folder, &["reference.toml", "arm", "wait arming 20", last]));
+        run.says(code, &[text]);
+        assert!(board.is(Phase::Disarmed), "{last}");
+    }
     let run = Run::of(&mut board.operate(&folder, &["record download no-folder/x.rec"]));
     assert_eq!(run.code, 3, "{run:?}");
     // Another controller is not operated.

@@ -24,7 +24,7 @@ fn machine<'a>(report: &'a Value, name: &str) -> &'a Value {
 fn a_machine_run_alone_gives_the_same_bits() {
     for spec in ["reference.toml", "legs.toml"] {
         let folder = Folder::new();
-        let some = ["robust", spec, "--samples", "4", "--seed", "3", "--vary", "mass=20%"];
+        let some = ["robust", spec, "--draws", "4", "--seed", "3", "--vary", "mass=20%"];
         let whole = folder.json(&some).value;
         let report = &whole["result"];
         let drawn: Vec<&Value> = report["runs"].as_array().unwrap().iter().filter(|run| run["drawn"] == true).collect();
@@ -56,8 +56,7 @@ fn the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads() {
     for spec in ["reference.toml", "legs.toml"] {
         let folder = Folder::new();
         let run = |threads: &str, output: &str, seed: &str| {
-            let run =
-                folder.run(&["robust", spec, "--samples", "5", "--threads", threads, "-o", output, "--seed", seed]);
+            let run = folder.run(&["robust", spec, "--draws", "5", "--threads", threads, "-o", output, "--seed", seed]);
             assert_eq!(run.code, 0, "{run:#?}");
             (run.stdout, contents(&folder.path(output)))
         };
@@ -120,7 +119,7 @@ fn nominal_legs_have_the_error_that_tune_scores() {
 #[test]
 fn the_gate_of_options_or_spec_fails_a_build_with_the_reason_and_the_figures() {
     let folder = Folder::new();
-    let few = ["robust", "legs.toml", "--samples", "3", "--vary", "gain=1%"];
+    let few = ["robust", "legs.toml", "--draws", "3", "--vary", "gain=1%"];
     let with = |more: &[&str]| folder.run(&[&few, more].concat());
     with(&["--max-error", "1 nm"]).says(1, &["not robust: largest rms error is", "above 1.00 nm"]);
     with(&["--max-error", "1 nm", "--quantile", "95"]).says(1, &["95 % quantile of the rms error is"]);
@@ -142,7 +141,7 @@ fn the_gate_of_options_or_spec_fails_a_build_with_the_reason_and_the_figures() {
     let own = folder.run(&few[..4]);
     own.says(1, &["above 1.00 nm"]);
     assert!(own.stdout.contains("gain          0.990 to 1.010  (spec"), "{}", own.stdout);
-    let given = folder.run(&["robust", "legs.toml", "--samples", "3", "--max-error", "1 um", "--vary", "gain=2%"]);
+    let given = folder.run(&["robust", "legs.toml", "--draws", "3", "--max-error", "1 um", "--vary", "gain=2%"]);
     assert_eq!(given.code, 0, "{given:#?}");
     assert!(given.stdout.contains("gain          0.980 to 1.020  (option"), "{}", given.stdout);
 }
@@ -152,7 +151,7 @@ fn what_cannot_be_run_is_refused_with_a_mend_and_nothing_is_written() {
     let folder = Folder::new();
     let before = folder.listing();
     let cases: &[(&str, &[&str], &str)] = &[
-        ("legs.toml", &["--samples", "0"], "0 is not in 1..=1000000"),
+        ("legs.toml", &["--draws", "0"], "0 is not in 1..=1000000"),
         ("legs.toml", &["--vary", "mass=-0.5:1"], "expected factors above 0"),
         ("legs.toml", &["--vary", "mass=1.1:0.9"], "give the smaller value first"),
         ("legs.toml", &["--vary", "colour=5%"], "expected one of mass"),
@@ -192,7 +191,7 @@ fn ctrl_c_keeps_what_was_run_and_says_so() {
     let folder = Folder::new();
     let mut child = folder
         .command()
-        .args(["robust", "legs.toml", "--samples", "2000", "--threads", "1"])
+        .args(["robust", "legs.toml", "--draws", "2000", "--threads", "1"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

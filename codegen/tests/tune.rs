@@ -4,8 +4,8 @@
 
 mod support;
 
+use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;
-use std::time::Duration;
 
 use serde_json::Value;
 use specgen::compile::{Compiled, compile};
@@ -199,25 +199,26 @@ fn what_cannot_be_tuned_is_refused_with_a_mend() {
 #[test]
 fn ctrl_c_keeps_the_best_so_far_and_says_so() {
     let folder = Folder::new();
-    let child = folder
+    let mut child = folder
         .command()
         .args(["tune", "legs.toml", "--evaluations", "1000000", "--threads", "1"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap());
+    let mut stderr = String::new();
+    while !stderr.lines().last().is_some_and(|line| line.starts_with("cma: ")) {
+        assert_ne!(lines.read_line(&mut stderr).unwrap(), 0, "it ended before it was interrupted: {stderr}");
+    }
     let process = child.id().to_string();
-    let killer = std::thread::spawn(move || {
-        // Long enough to build and to begin; a run of a million candidates is not over by then.
-        std::thread::sleep(Duration::from_secs(40));
-        std::process::Command::new("kill").args(["-INT", &process]).status().unwrap()
-    });
+    assert!(std::process::Command::new("kill").args(["-INT", &process]).status().unwrap().success());
+    lines.read_to_string(&mut stderr).unwrap();
     let output = child.wait_with_output().unwrap();
-    assert!(killer.join().unwrap().success());
     let run = Run {
         code: output.status.code().unwrap_or_default(),
         stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
+        stderr,
     };
     run.says(130, &["interrupted: this is the best of"]);
     assert!(run.stdout.contains("tuned") && run.stdout.contains("+++ legs.toml"), "{}", run.stdout);

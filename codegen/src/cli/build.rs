@@ -78,18 +78,15 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         }
     }
     summary.over_budget = over_budget(&compiled, &summary);
-    ui.result(&summary.text(&compiled), json!(summary));
-    let difference = summary.measurement.as_ref().and_then(|m| m.first_difference.clone());
-    if let Some(difference) = difference {
-        return Err(Failure::Gate(format!(
-            "the emulated machine computes other bits than the host: {difference}; report this as a defect of specgen with the spec"
-        )));
+    let text = summary.text(&compiled);
+    let Some(message) = summary.verdict() else {
+        ui.result(&text, json!(summary));
+        return Ok(());
+    };
+    if !ui.is_json() {
+        ui.out(&text);
     }
-    if summary.over_budget.is_empty() {
-        Ok(())
-    } else {
-        Err(Failure::Gate(format!("over budget: {}", summary.over_budget.join("; "))))
-    }
+    Err(Failure::Judged { message, result: json!(summary) })
 }
 
 /// Host library, image, and the exercise on both.
@@ -127,6 +124,16 @@ impl Summary {
             missing: None,
             over_budget: Vec::new(),
         }
+    }
+
+    /// Why what was made must not be used, if so.
+    fn verdict(&self) -> Option<String> {
+        if let Some(difference) = self.measurement.as_ref().and_then(|m| m.first_difference.as_ref()) {
+            return Some(format!(
+                "the emulated machine computes other bits than the host: {difference}; report this as a defect of specgen with the spec"
+            ));
+        }
+        (!self.over_budget.is_empty()).then(|| format!("over budget: {}", self.over_budget.join("; ")))
     }
 
     fn text(&self, compiled: &Compiled) -> String {

@@ -13,6 +13,7 @@ use specgen_runtime::Motion;
 use super::file::write_file;
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled};
+use crate::interrupt::Scratch;
 use crate::lower;
 use crate::model::Model;
 use crate::target;
@@ -130,13 +131,13 @@ fn within_range(model: &Model, pose: &[f64; 6]) -> Result<(), String> {
 struct Generated {
     controller: Controller,
     /// Holds the library while it is loaded.
-    _scratch: tempfile::TempDir,
+    _scratch: Scratch,
 }
 
 impl Generated {
     fn build(compiled: &Compiled, ui: &mut Ui) -> Result<Self, Failure> {
         let environment = |error: &dyn std::fmt::Display| Failure::Environment(error.to_string());
-        let scratch = tempfile::tempdir().map_err(|error| environment(&error))?;
+        let scratch = Scratch::new().map_err(|error| environment(&error))?;
         let folder = scratch.path().join("controller");
         workspace::write(&folder, &compiled.files)?;
         ui.progress("building the emitted controller for this host");

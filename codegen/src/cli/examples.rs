@@ -16,7 +16,7 @@ Examples:
 docs/guide.md leads from the bench to running firmware. Every command has examples of its own: `specgen check --help`.
 (minutes) takes some; (board) wants a board, a second program, or a computer at rest.
 
-Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment, 130 interrupted with a result.";
+Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment, 130 interrupted.";
 
 pub const CHECK: &str = "\
 Examples:
@@ -56,7 +56,7 @@ Examples:
 
 pub const ROBUST: &str = "\
 Examples:
-  specgen robust legs.toml --samples 10                    # ten random machines and the corners
+  specgen robust legs.toml --draws 10                      # ten random machines and the corners
   specgen robust legs.toml --replay gain-low               # one of them alone, to the bit
   specgen robust platform.toml --max-error \"60 nm\" --max-orientation \"300 nrad\"  # (minutes) a gate for builds";
 

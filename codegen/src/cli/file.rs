@@ -1,53 +1,77 @@
-//! Single files that a command writes.
+//! Files that a command writes.
 
 use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use tempfile::NamedTempFile;
+
 use super::ui::Failure;
+use crate::interrupt::{self, Claimed, Guard};
 
 /// Writes `path` so that a failure leaves no half file: beside it, then renamed. What is not a regular file, such as a
 /// device or a pipe, is written to and stays what it is; a link stays a link.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let failed = |reason: &dyn std::fmt::Display| {
-        Failure::Environment(format!("could not write `{}`: {reason}; nothing was changed", path.display()))
-    };
-    match fs::metadata(path) {
-        Ok(found) if found.is_dir() => return Err(failed(&"it is a folder, name a file in it")),
-        Ok(found) if !found.is_file() => {
-            let mut device = fs::OpenOptions::new().write(true).open(path).map_err(|error| failed(&error))?;
-            return device.write_all(bytes).map_err(|error| failed(&error));
-        }
-        _ => {}
-    }
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-    let folder = match target.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    if !folder.is_dir() {
-        return Err(failed(&format_args!("there is no folder `{}`", folder.display())));
-    }
-    let mut file = temporary_in(folder).map_err(|error| failed(&error))?;
-    file.write_all(bytes).map_err(|error| failed(&error))?;
-    file.persist(&target).map_err(|error| failed(&error.error))?;
-    Ok(())
+    PendingFile::with(path, bytes)?.keep()
+}
+
+/// Refuses a place where a file cannot be, before the minutes that its content takes.
+pub fn check_place(path: &Path) -> Result<(), Failure> {
+    // A pipe would wait for its reader.
+    if is_device(path) { Ok(()) } else { PendingFile::create(path).map(|_| ()) }
+}
+
+/// Writes all files into a new or existing folder, all of them or none.
+pub fn write_folder(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
+    let _claimed = claim(folder)?;
+    let pending: Result<Vec<_>, _> =
+        files.iter().map(|(name, bytes)| PendingFile::with(&folder.join(name), bytes)).collect();
+    let pending = pending?;
+    let _whole = interrupt::whole();
+    pending.into_iter().try_for_each(PendingFile::put)
+}
+
+/// Makes a folder for results to come; it goes again if none comes.
+pub fn claim(folder: &Path) -> Result<Claimed, Failure> {
+    Claimed::new(folder)
+        .map_err(|error| Failure::Environment(format!("could not create the folder `{}`: {error}", folder.display())))
+}
+
+/// Says which file could not be written.
+pub fn unwritten(path: &Path, reason: &dyn std::fmt::Display) -> Failure {
+    Failure::Environment(format!("could not write `{}`: {reason}; nothing was changed", path.display()))
+}
+
+/// Neither a regular file nor a folder: it cannot be replaced by another one.
+fn is_device(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
 /// A file that is written piece by piece: beside its place, and put there when it is whole ([`PendingFile::keep`]).
 pub struct PendingFile {
-    file: tempfile::NamedTempFile,
+    place: Place,
     target: PathBuf,
+}
+
+enum Place {
+    Beside {
+        file: NamedTempFile,
+        // After the file: it is kept in mind until it is gone.
+        _guard: Guard,
+    },
+    /// A device or a pipe takes what comes.
+    Device(fs::File),
 }
 
 impl PendingFile {
     /// Begins a file.
     pub fn create(path: &Path) -> Result<Self, Failure> {
-        let failed = |reason: &dyn std::fmt::Display| {
-            Failure::Environment(format!("could not write `{}`: {reason}; nothing was changed", path.display()))
-        };
         if path.is_dir() {
-            return Err(failed(&"it is a folder, name a file in it"));
+            return Err(unwritten(path, &"it is a folder, name a file in it"));
+        }
+        if is_device(path) {
+            let file = fs::OpenOptions::new().write(true).open(path).map_err(|error| unwritten(path, &error))?;
+            return Ok(Self { place: Place::Device(file), target: path.to_owned() });
         }
         let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         let folder = match target.parent() {
@@ -55,37 +79,56 @@ impl PendingFile {
             _ => Path::new("."),
         };
         if !folder.is_dir() {
-            return Err(failed(&format_args!("there is no folder `{}`", folder.display())));
+            return Err(unwritten(path, &format_args!("there is no folder `{}`", folder.display())));
         }
-        let file = temporary_in(folder).map_err(|error| failed(&error))?;
-        Ok(Self { file, target })
+        let (file, guard) =
+            Guard::file(|| temporary_in(folder), NamedTempFile::path).map_err(|error| unwritten(path, &error))?;
+        Ok(Self { place: Place::Beside { file, _guard: guard }, target })
+    }
+
+    /// A file that needs only to be kept.
+    fn with(path: &Path, bytes: &[u8]) -> Result<Self, Failure> {
+        let mut pending = Self::create(path)?;
+        pending.write_all(bytes).map_err(|error| unwritten(path, &error))?;
+        Ok(pending)
     }
 
     /// The file is whole.
     pub fn keep(self) -> Result<(), Failure> {
-        let Self { file, target } = self;
-        file.persist(&target).map(|_| ()).map_err(|error| {
-            Failure::Environment(format!(
-                "could not write `{}`: {}; nothing was changed",
-                target.display(),
-                error.error
-            ))
-        })
+        let _whole = interrupt::whole();
+        self.put()
+    }
+
+    fn put(self) -> Result<(), Failure> {
+        let Self { place, target } = self;
+        match place {
+            Place::Device(_) => Ok(()),
+            Place::Beside { file, _guard } => {
+                file.persist(&target).map(|_| ()).map_err(|error| unwritten(&target, &error.error))
+            }
+        }
     }
 }
 
 impl Write for PendingFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write(bytes)
+        match &mut self.place {
+            // The file below: with the name that it has meanwhile an error would tell nobody anything.
+            Place::Beside { file, .. } => file.as_file_mut().write(bytes),
+            Place::Device(file) => file.write(bytes),
+        }
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
+        match &mut self.place {
+            Place::Beside { file, .. } => file.as_file_mut().flush(),
+            Place::Device(file) => file.flush(),
+        }
     }
 }
 
 /// A temporary file, but with the permissions of any other file: it becomes the user's.
-fn temporary_in(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
+fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));

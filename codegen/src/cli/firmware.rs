@@ -147,6 +147,10 @@ fn make(spec: &Path, common: &Common, ui: &mut Ui) -> Result<(Compiled, Made), F
     if part.is_none_or(|part| part.files.is_empty()) {
         return Err(Failure::Environment(format!("this specgen was built without the firmware for {}", target.name)));
     }
+    // What is missing is said before anything is written.
+    if matches!(target.kind, Kind::Emulated | Kind::Board(_)) {
+        target::toolchain::find()?;
+    }
     let output = common.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[target.folder]);
     workspace::write(&output, &files)?;
@@ -262,7 +266,7 @@ fn examine(made: &mut Made, image: &Image, whole_image: bool, output: &Path) -> 
     let folder = output.join("target");
     std::fs::create_dir_all(&folder).map_err(|error| TargetError::io("creating", &folder, error))?;
     let kept = folder.join(format!("{}.elf", made.target));
-    std::fs::write(&kept, &image.elf).map_err(|error| TargetError::io("writing", &kept, error))?;
+    target::host::write_whole(&kept, &image.elf)?;
     made.artifact = kept.display().to_string();
     made.compiler = Some(image.compiler.clone());
     let rules = Rules { single: !image.mcu.part().double, whole_image };

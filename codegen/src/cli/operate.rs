@@ -4,7 +4,6 @@ mod machine;
 
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 
 use clap::{ArgGroup, Args};
@@ -13,6 +12,7 @@ use specgen_link::client::{Patience, Port};
 
 use super::ui::{Failure, Ui};
 use crate::compile;
+use crate::interrupt;
 use crate::operate::{ALIVE, Order, Session, SocketLine};
 use crate::pil::{BAUD, OpenError, SerialLine};
 use machine::{Ended, Machine};
@@ -42,9 +42,6 @@ pub struct Arguments {
     words: Vec<String>,
 }
 
-/// Ctrl-C was pressed.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
 /// Where commands come from.
 enum Source {
     /// All of them are known.
@@ -67,9 +64,16 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         }
         None => None,
     };
+    if let Source::List(orders) = &source {
+        for order in orders {
+            if let Order::WriteConfig(spec) = order {
+                compile::compile(spec)?;
+            }
+        }
+    }
     let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.as_str());
-    // A second Ctrl-C while this one is heeded does nothing; without a handler the first would leave the machine alone.
-    let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed));
+    // The machine is not to be left alone.
+    interrupt::heed();
     match (&arguments.port, &arguments.socket) {
         (Some(path), _) => {
             let line = SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?;
@@ -124,7 +128,11 @@ fn operate(
         let text = format!("{name}: not compared with a spec; name it to be sure that the device runs its controller");
         ui.progress(&text);
     }
-    let mut machine = Machine::new(session, &INTERRUPTED);
+    let mut machine = Machine::new(session, interrupt::heed());
+    if let Source::List(orders) = &source {
+        // A mistake in the last of them would leave the machine alone in the middle.
+        machine.check(orders)?;
+    }
     let ended = match source {
         Source::List(orders) => list(&orders, &mut machine, ui),
         Source::Lines => lines(&mut machine, ui),

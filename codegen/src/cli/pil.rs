@@ -5,7 +5,6 @@ mod report;
 mod scenario;
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use clap::Args;
@@ -18,6 +17,7 @@ use specgen_link::client::{Patience, Port};
 use super::sim::{PlantArguments, environment, frequency};
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled};
+use crate::interrupt;
 use crate::pil::{BAUD, Lockstep, OpenError, Pipes, SerialLine, Stop};
 use crate::target::emulator::Emulator;
 use crate::target::{self, Image, stack};
@@ -70,9 +70,6 @@ fn seconds(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|time| (1e-3..=1e3).contains(time)).ok_or_else(expected)
 }
 
-/// Ctrl-C was pressed.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // What is wrong with the arguments, or missing on the machine, is told before the minutes of the rest.
     arguments.plant.leg()?;
@@ -96,8 +93,6 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let library = target::host::build_library(&output, &target_dir)?;
     let host = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
 
-    // A second Ctrl-C while this one is heeded does nothing; without a handler the first would end it all.
-    let _ = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed));
     match (line, emulator) {
         (Some(line), _) => {
             let name = arguments.port.as_deref().unwrap_or_else(|| std::path::Path::new("")).display().to_string();
@@ -150,7 +145,8 @@ fn in_the_loop<P: Port>(
     arguments: &Arguments,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
-    let mut lockstep = Lockstep::open(host, port, patience, &INTERRUPTED).map_err(|error| match error {
+    // From the first tick on there is something to report.
+    let mut lockstep = Lockstep::open(host, port, patience, interrupt::heed()).map_err(|error| match error {
         OpenError::Other(text) => Failure::Gate(text),
         OpenError::Link(_) => Failure::Environment(format!("{}: {error}", report.device)),
     })?;

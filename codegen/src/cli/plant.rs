@@ -1,7 +1,7 @@
 //! `specgen plant`: the simulated machine of a spec in shared memory, for the real-time target on the same computer.
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
 use clap::Args;
 use host_sim::platform::rig::Noise;
@@ -14,6 +14,7 @@ use specgen_rt::scheduling;
 use super::sim::{PlantArguments, environment};
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled};
+use crate::interrupt;
 use crate::machine;
 use crate::served::{Machine, Served};
 
@@ -21,8 +22,6 @@ use crate::served::{Machine, Served};
 const PATIENCE: u64 = SECOND / 10;
 /// Samples per period of the paper's trajectory, which is not run here.
 const NO_TRAJECTORY: u32 = 1;
-
-static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Arguments of `plant`.
 #[derive(Args, Debug)]
@@ -62,8 +61,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     {
         refused.map_err(environment)?;
     }
-    // Whatever ends it, the file is to go. A handler that is set already ends it as well.
-    let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
+    // Whatever ends it, the file is to go, and what was served is told.
+    let stop = interrupt::heed();
     let server = Server::create(&path, &compiled.ir.digest).map_err(|error| match error {
         OpenError::Served { .. } => Failure::Usage(error.to_string()),
         error => environment(error),
@@ -79,7 +78,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut times = Histogram::new();
     let end = arguments.seconds.map(|seconds| clock::now() + (seconds * SECOND as f64) as u64);
     let mut seen = 0;
-    while !STOP.load(Ordering::Relaxed) && end.is_none_or(|end| clock::now() < end) {
+    while !stop.load(Ordering::Relaxed) && end.is_none_or(|end| clock::now() < end) {
         if let Some((actuation, wanted)) = server.wait(&mut seen, look, PATIENCE) {
             let start = clock::now();
             let sensing = served.answer(&actuation, wanted);

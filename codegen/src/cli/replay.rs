@@ -10,9 +10,8 @@ use host_sim::controller::{MachineWord, Supervised};
 use host_sim::description::Description;
 use host_sim::record::{self, Block, Header, Piece, Reader, Replay, ReplayError};
 use serde_json::{Value, json};
-use specgen_runtime::supervisor::{Cause, Phase};
 
-use super::file::PendingFile;
+use super::file::{PendingFile, unwritten};
 use super::sim;
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled};
@@ -39,10 +38,21 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut reader = open(&arguments.record)?;
     let mut csv = arguments.csv.as_deref().map(Csv::new).transpose()?;
     let Some(spec) = &arguments.spec else {
-        let found = export(&mut reader, csv.as_mut()).map_err(|error| refuse(&error))?;
+        let found = export(&mut reader, csv.as_mut(), &refuse)?;
         let rows = csv.map(Csv::finish).transpose()?.unwrap_or_default();
-        ui.result(&format!("{shown}: {rows} rows exported{found}\n"), json!({ "rows": rows }));
-        return Ok(());
+        let result = json!({ "rows": rows, "damaged": found.damaged, "cut": found.cut });
+        let cut = if found.cut { "; the file ends within a block" } else { "" };
+        let text = format!("{shown}: {rows} rows exported{cut}\n");
+        let Some((block, reason)) = found.damaged.first() else {
+            ui.result(&text, result);
+            return Ok(());
+        };
+        if !ui.is_json() {
+            ui.out(&text);
+        }
+        let message =
+            format!("{shown}: block {block} is damaged: {reason}; its rows are missing. Fetch or copy it again");
+        return Err(Failure::Judged { message, result });
     };
     let compiled = compile::compile(spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
@@ -168,16 +178,8 @@ fn text(found: &Replay, period: f64) -> String {
 
 /// Phase and cause in words.
 fn name(supervisor: u32) -> String {
-    let MachineWord { phase, cause, amplifier_on } = MachineWord::of(u64::from(supervisor));
-    format!("{}, amplifiers {}", says(phase, cause), if amplifier_on { "on" } else { "off" })
-}
-
-/// Phase and cause in words, by their numbers.
-pub(super) fn says(phase: u8, cause: u8) -> String {
-    let named = |name: Option<&str>, word: u8| name.map_or_else(|| word.to_string(), str::to_owned);
-    let of_phase = named(Phase::from_word(u64::from(phase)).map(Phase::name), phase);
-    let of_cause = named(Cause::from_word(u64::from(cause)).map(Cause::name), cause);
-    if of_cause.is_empty() { of_phase } else { format!("{of_phase}: {of_cause}") }
+    let word = MachineWord::of(u64::from(supervisor));
+    format!("{word}, amplifiers {}", if word.amplifier_on { "on" } else { "off" })
 }
 
 fn document(found: &Replay, period: f64) -> Value {
@@ -205,24 +207,29 @@ fn document(found: &Replay, period: f64) -> Value {
     })
 }
 
-/// Reads a record for its CSV alone; what is wrong with it, in words.
-fn export(reader: &mut Reader<BufReader<File>>, mut csv: Option<&mut Csv>) -> Result<String, String> {
+/// What is wrong with a record that was read for its CSV alone.
+#[derive(Default)]
+struct Exported {
+    damaged: Vec<(usize, String)>,
+    cut: bool,
+}
+
+fn export(
+    reader: &mut Reader<BufReader<File>>,
+    mut csv: Option<&mut Csv>,
+    refuse: &impl Fn(&dyn std::fmt::Display) -> Failure,
+) -> Result<Exported, Failure> {
     let header = reader.header().clone();
-    let mut found = String::new();
-    while let Some(piece) = reader.next_piece().map_err(|error| error.to_string())? {
+    let mut found = Exported::default();
+    while let Some(piece) = reader.next_piece().map_err(|error| refuse(&error))? {
         match piece {
             Piece::Block(block) => {
                 if let Some(csv) = csv.as_deref_mut() {
-                    csv.add(&header, &block).map_err(|failure| match failure {
-                        Failure::Environment(text) => text,
-                        other => format!("{other:?}"),
-                    })?;
+                    csv.add(&header, &block)?;
                 }
             }
-            Piece::Damaged { block, reason } => {
-                let _ = write!(found, "; block {block} is damaged: {reason}");
-            }
-            Piece::Cut { .. } => found.push_str("; the file ends within a block"),
+            Piece::Damaged { block, reason } => found.damaged.push((block, reason)),
+            Piece::Cut { .. } => found.cut = true,
         }
     }
     Ok(found)
@@ -231,25 +238,26 @@ fn export(reader: &mut Reader<BufReader<File>>, mut csv: Option<&mut Csv>) -> Re
 /// A CSV file on its way.
 struct Csv {
     file: BufWriter<PendingFile>,
+    /// As its user named it.
+    path: PathBuf,
     rows: u64,
 }
 
 impl Csv {
     fn new(path: &Path) -> Result<Self, Failure> {
-        Ok(Self { file: BufWriter::new(PendingFile::create(path)?), rows: 0 })
+        Ok(Self { file: BufWriter::new(PendingFile::create(path)?), path: path.to_owned(), rows: 0 })
     }
 
     fn add(&mut self, header: &Header, block: &Block) -> Result<(), Failure> {
         record::write_csv(&mut self.file, header, block, self.rows == 0)
-            .map_err(|error| Failure::Environment(format!("could not write the CSV: {error}")))?;
+            .map_err(|error| unwritten(&self.path, &error))?;
         self.rows += block.rows.len() as u64;
         Ok(())
     }
 
     fn finish(mut self) -> Result<u64, Failure> {
-        let failed = |error: &dyn std::fmt::Display| Failure::Environment(format!("could not write the CSV: {error}"));
-        self.file.flush().map_err(|error| failed(&error))?;
-        self.file.into_inner().map_err(|error| failed(&error))?.keep()?;
+        self.file.flush().map_err(|error| unwritten(&self.path, &error))?;
+        self.file.into_inner().map_err(|error| unwritten(&self.path, &error))?.keep()?;
         Ok(self.rows)
     }
 }

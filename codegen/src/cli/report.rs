@@ -11,10 +11,11 @@ use host_sim::scenario::{MODES, select};
 use serde_json::json;
 
 use super::check::describe;
-use super::file::write_file;
+use super::file::{check_place, write_file};
 use super::sim::{emitted, environment};
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled, Refused};
+use crate::interrupt::Scratch;
 use crate::model::TaskSpace;
 use crate::paper::convergence;
 use crate::report::evidence::Bits;
@@ -63,6 +64,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = compile::compile(&arguments.spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", compiled.ir.name)));
+    check_place(&output)?;
     let mut built = build(&compiled, arguments.no_target, ui)?;
     let name = file_name(&arguments.spec);
     let mut fine = fine(&compiled, ui)?;
@@ -154,7 +156,7 @@ fn file_name(path: &Path) -> String {
 
 /// Host library, image, and the exercise on both.
 fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure> {
-    let scratch = tempfile::tempdir().map_err(environment)?;
+    let scratch = Scratch::new().map_err(environment)?;
     let folder = scratch.path().join("controller");
     let cache = scratch.path().join("target");
     workspace::write(&folder, &compiled.files)?;

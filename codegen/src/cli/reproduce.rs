@@ -10,9 +10,11 @@ use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::Noise;
 use host_sim::platform::table::{MachiningTable, PoseTable};
 
-use super::sim::{emitted, environment, write_folder};
+use super::file::{claim, write_folder};
+use super::sim::{emitted, environment};
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled};
+use crate::interrupt::Scratch;
 use crate::machine;
 use crate::paper::{convergence, printed};
 use crate::reproduce::table::{Cell, Row, Table};
@@ -67,8 +69,8 @@ impl Steps<'_> {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // A folder that cannot be written is told before the minutes of the rest.
-    write_folder(&arguments.output, &[])?;
-    let scratch = tempfile::tempdir().map_err(environment)?;
+    let _claimed = claim(&arguments.output)?;
+    let scratch = Scratch::new().map_err(environment)?;
     let specs = [("legs", embedded::LEGS), ("reference", embedded::PLATFORM)];
     let [legs, reference] = specs.map(|(name, text)| {
         let source = embedded::source(name, text, scratch.path()).map_err(environment)?;

@@ -4,20 +4,18 @@ mod report;
 mod trajectory;
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use clap::Args;
 
-use super::sim::{PlantArguments, emitted, environment, frequency, write_folder};
+use super::file::{claim, write_folder};
+use super::sim::{PlantArguments, emitted, environment, frequency};
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled};
+use crate::interrupt;
 use crate::robust::factors::Given;
 use crate::robust::{Factors, Gate, Plan, Study};
 use crate::spec::quantity::{self, Dimension};
-
-/// Set by Ctrl-C.
-static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Part of the stroke beyond which an error counts as diverged, unless asked otherwise.
 const BOUND: f64 = 0.05;
@@ -31,8 +29,8 @@ pub struct Arguments {
     /// The spec file.
     spec: PathBuf,
     /// Random machines, besides the corners.
-    #[arg(long, default_value_t = 100, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    samples: u32,
+    #[arg(long = "draws", value_name = "N", alias = "samples", default_value_t = 100, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    draws: u32,
     /// Range of an uncertainty, in place of that of [robust] or the default: `mass=5%`, `gain=0.9:1.1`, `delay_ticks=1`.
     /// Of mass, stiffness, damping, gain, hysteresis, creep, lag, noise (factors) and delay_ticks.
     #[arg(long, value_name = "NAME=RANGE", value_parser = Given::parse)]
@@ -101,12 +99,13 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let seed = arguments.plant.seed;
     let plan = match &arguments.replay {
         Some(name) => Plan::alone(&factors, name, seed).map_err(Failure::Usage)?,
-        None => Plan::new(&factors, arguments.samples, seed),
+        None => Plan::new(&factors, arguments.draws, seed),
     };
     let threads = arguments.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         |threads| threads as usize,
     );
+    let _claimed = arguments.output.as_deref().map(claim).transpose()?;
     let controller = emitted(&compiled, ui)?;
     let study = Study {
         compiled: &compiled,
@@ -116,12 +115,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         noise: !arguments.plant.no_noise,
         bound: arguments.diverged_above.unwrap_or(BOUND * compiled.model.actuator.stroke),
     };
-    // A second Ctrl-C while this one is heeded does nothing; without a handler the first would end it all.
-    let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
+    // The machines that are done make a result.
+    let stop = interrupt::heed();
     let all = plan.members.len();
     let started = Instant::now();
     let mut shown = 0;
-    let runs = study.run_all(&plan, threads, &STOP, |done| {
+    let runs = study.run_all(&plan, threads, stop, |done| {
         let lines = done * LINES / all;
         if lines > shown || ui.is_terminal() {
             shown = lines;

@@ -6,8 +6,7 @@ pub(super) mod platform;
 mod record;
 
 use std::fmt::Display;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::controller::Controller;
@@ -16,9 +15,10 @@ use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
 use serde_json::json;
 
-use super::file::write_file;
+use super::file::{check_place, claim, write_file};
 use super::ui::{Failure, Ui};
 use crate::compile;
+use crate::interrupt::Scratch;
 use crate::target;
 use crate::workspace;
 
@@ -50,7 +50,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "samples", "frequency", "trajectory"])]
     record: Option<PathBuf>,
     /// Length of that wave, s.
-    #[arg(long, default_value_t = 1.0, requires = "record", allow_negative_numbers = true)]
+    #[arg(long, value_name = "S", default_value_t = 1.0, requires = "record", allow_negative_numbers = true)]
     seconds: f64,
 }
 
@@ -105,6 +105,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(task) => platform::check(arguments, task)?,
         None => legs::check(arguments)?,
     }
+    // A place that cannot be is told before the minutes of the rest, too.
+    let _claimed = arguments.output.as_deref().map(claim).transpose()?;
+    arguments.record.as_deref().map_or(Ok(()), check_place)?;
     let mut controller = emitted(&compiled, ui)?;
     if let Some(path) = &arguments.record {
         return record::run(arguments, path, &compiled, controller, ui);
@@ -118,7 +121,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 /// The emitted controller, built for this host from the same files that the main job writes. What it was built in is gone
 /// when this returns; the library stays loaded.
 pub(super) fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
-    let scratch = tempfile::tempdir().map_err(environment)?;
+    let scratch = Scratch::new().map_err(environment)?;
     let workspace = scratch.path().join("controller");
     workspace::write(&workspace, &compiled.files)?;
     ui.progress("building the emitted controller for this host");
@@ -159,15 +162,5 @@ pub fn run_forc(arguments: &ForcArguments, ui: &mut Ui) -> Result<(), Failure> {
     write_file(&arguments.output, record.to_csv().as_bytes())?;
     let text = format!("wrote {rows} rows to {}\n", arguments.output.display());
     ui.result(&text, json!({ "rows": rows, "file": arguments.output.display().to_string() }));
-    Ok(())
-}
-
-/// Writes all files into a new or existing folder; each is replaced whole.
-pub(super) fn write_folder(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Failure> {
-    fs::create_dir_all(folder)
-        .map_err(|error| Failure::Environment(format!("could not create `{}`: {error}", folder.display())))?;
-    for (name, bytes) in files {
-        write_file(&folder.join(name), bytes)?;
-    }
     Ok(())
 }

@@ -4,7 +4,6 @@ mod report;
 mod start;
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
@@ -13,11 +12,12 @@ use host_sim::plant::LegParameters;
 use host_sim::trajectory::PaperPath;
 use serde_json::json;
 
-use super::file::write_file;
-use super::sim::{PlantArguments, emitted, environment, frequency, write_folder};
+use super::file::{claim, write_file, write_folder};
+use super::sim::{PlantArguments, emitted, environment, frequency};
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled, Refused};
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
+use crate::interrupt;
 use crate::spec::SpecSource;
 use crate::tuning::cma::Cma;
 use crate::tuning::feasible::{Feasibility, Required};
@@ -28,9 +28,6 @@ use crate::tuning::{
     Candidate, Case, Conditions, Optimiser, Score, Search, SearchOptions, Setting, Space, TrajectoryChoice, What,
     front, plot, write,
 };
-
-/// Set by Ctrl-C.
-static STOP: AtomicBool = AtomicBool::new(false);
 
 /// Arguments of `tune`.
 #[derive(Args, Debug)]
@@ -173,6 +170,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         |threads| threads as usize,
     );
+    let _claimed = arguments.output.as_deref().map(claim).transpose()?;
     let controller = emitted(&compiled, ui)?;
     let job = Job { arguments, compiled, controller, leg, space, feasibility, threads };
     job.run(ui)
@@ -209,8 +207,6 @@ impl Job<'_> {
         let own = Setting::of(&self.compiled);
         let case = self.case(&own, &self.tuned_on())?;
         let starts = start::starts(self, &case, own, ui)?;
-        // A second Ctrl-C while this one is heeded does nothing; without a handler the first would end it all.
-        let _ = ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed));
         let searches = self.search(&case, &starts, ui)?;
         let (best, found) = self.best(&searches, &starts);
 
@@ -324,7 +320,8 @@ impl Job<'_> {
             let options = SearchOptions {
                 evaluations: self.evaluations(),
                 threads: self.threads,
-                stop: &STOP,
+                // The best so far is a result.
+                stop: interrupt::heed(),
                 progress: &progress,
             };
             let search = Search::run(optimiser.as_mut(), &self.space, &self.feasibility, case, &options);

@@ -1,6 +1,7 @@
 //! What the user sees: results on standard output, findings and progress on standard error.
 
-use std::io::{IsTerminal, Write};
+use std::cell::RefCell;
+use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 
 use serde_json::{Value, json};
@@ -11,6 +12,8 @@ use crate::spec::SpecSource;
 use crate::target::TargetError;
 use crate::workspace::WriteError;
 
+/// Exit code where the machine is to blame: a tool, a disk.
+const ENVIRONMENT: u8 = 3;
 /// Exit code of a command that was ended by Ctrl-C, as shells have it.
 const INTERRUPTED: u8 = 130;
 
@@ -45,6 +48,14 @@ pub enum Failure {
     },
 }
 
+impl Failure {
+    /// Ended by Ctrl-C before there was a result.
+    pub fn ended_early() -> Self {
+        let message = "interrupted: there is no result; every file that is there is whole".to_owned();
+        Self::Interrupted { message, result: Value::Null }
+    }
+}
+
 impl From<Refused> for Failure {
     fn from(refused: Refused) -> Self {
         Self::Refused(Box::new(refused))
@@ -67,18 +78,27 @@ impl From<TargetError> for Failure {
 pub struct Ui {
     json: bool,
     findings: Vec<Value>,
+    /// Why standard output is not whole.
+    lost: RefCell<Option<io::Error>>,
+}
+
+/// Writes to standard error. A message that nobody can read, on a full disk say, is no reason to end.
+macro_rules! say {
+    ($($text:tt)*) => {
+        let _ = write!(anstream::stderr(), $($text)*);
+    };
 }
 
 impl Ui {
     /// Text, or one JSON document at the end.
     pub fn new(json: bool) -> Self {
-        Self { json, findings: Vec::new() }
+        Self { json, findings: Vec::new(), lost: RefCell::new(None) }
     }
 
     /// A line about what is being done, for the eyes only.
     pub fn progress(&self, line: &str) {
         if !self.json {
-            anstream::eprintln!("{line}");
+            say!("{line}\n");
         }
     }
 
@@ -95,8 +115,8 @@ impl Ui {
                 self.findings.extend(list);
             }
         } else {
-            let color = std::io::stderr().is_terminal();
-            anstream::eprint!("{}", diagnostic::render(findings, source, color));
+            let color = io::stderr().is_terminal();
+            say!("{}", diagnostic::render(findings, source, color));
         }
     }
 
@@ -112,24 +132,24 @@ impl Ui {
     /// Shows how far something is, in place of the line before where the eyes are at a terminal.
     pub fn rate(&self, line: &str) {
         if !self.json {
-            if std::io::stderr().is_terminal() {
-                anstream::eprint!("\r\x1b[2K{line}")
+            if io::stderr().is_terminal() {
+                say!("\r\x1b[2K{line}");
             } else {
-                anstream::eprintln!("{line}")
+                say!("{line}\n");
             }
         }
     }
 
     /// Ends the line of [`Ui::rate`].
     pub fn rate_done(&self) {
-        if !self.json && std::io::stderr().is_terminal() {
-            anstream::eprintln!();
+        if !self.json && io::stderr().is_terminal() {
+            say!("\n");
         }
     }
 
     /// Whether someone looks at standard error.
     pub fn is_terminal(&self) -> bool {
-        std::io::stderr().is_terminal()
+        io::stderr().is_terminal()
     }
 
     /// Whether the result is for programs.
@@ -139,7 +159,19 @@ impl Ui {
 
     /// Plain text on standard output. A closed pipe is the reader's business, not an error of ours.
     pub fn out(&self, text: &str) {
-        let _ = std::io::stdout().write_all(text.as_bytes());
+        let mut stdout = io::stdout();
+        if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush())
+            && error.kind() != io::ErrorKind::BrokenPipe
+        {
+            self.lost.borrow_mut().get_or_insert(error);
+        }
+    }
+
+    /// Says so and gives the exit code if standard output did not take all that was written to it.
+    pub fn not_all_out(&self) -> Option<u8> {
+        let error = self.lost.take()?;
+        say!("error: could not write to standard output: {error}; what is there of it is not whole\n");
+        Some(ENVIRONMENT)
     }
 
     /// Reports a failure; returns the exit code.
@@ -154,9 +186,9 @@ impl Ui {
             Failure::Write(error @ (WriteError::Occupied { .. } | WriteError::NotAFolder { .. })) => {
                 (1, error.to_string())
             }
-            Failure::Write(error) => (3, error.to_string()),
-            Failure::Target(error) => (3, error.to_string()),
-            Failure::Environment(text) => (3, text.clone()),
+            Failure::Write(error) => (ENVIRONMENT, error.to_string()),
+            Failure::Target(error) => (ENVIRONMENT, error.to_string()),
+            Failure::Environment(text) => (ENVIRONMENT, text.clone()),
             Failure::Judged { message, .. } => (1, message.clone()),
             Failure::Interrupted { message, .. } => (INTERRUPTED, message.clone()),
         };
@@ -167,7 +199,7 @@ impl Ui {
             };
             self.document(code, result, Some(&message));
         } else {
-            anstream::eprintln!("error: {message}");
+            say!("error: {message}\n");
         }
         code
     }

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 use rustix::event::PollFlags;
 use rustix::fs::{CWD, Mode, mkfifoat};
 use specgen_link::client::Port;
-use tempfile::TempDir;
 
 use super::wait::ready;
+use crate::interrupt::Scratch;
 use crate::target::emulator::{self, Emulator};
 use crate::target::{Image, TargetError};
 
@@ -28,7 +28,7 @@ pub struct Pipes {
     to: Option<File>,
     from: File,
     /// Image, pipes and what the emulator printed.
-    folder: TempDir,
+    folder: Scratch,
 }
 
 impl Pipes {
@@ -37,8 +37,7 @@ impl Pipes {
     /// # Errors
     /// [`TargetError::Io`] if the system refuses a folder, a pipe or the program.
     pub fn start(emulator: &Emulator, image: &Image) -> Result<Self, TargetError> {
-        let folder =
-            tempfile::tempdir().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
+        let folder = Scratch::new().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
         let pipe = |name: &str| {
             let path = folder.path().join(name);
             mkfifoat(CWD, &path, Mode::RUSR | Mode::WUSR)

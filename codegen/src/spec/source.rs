@@ -81,6 +81,10 @@ fn read_bytes(path: &Path, shown: &str) -> Result<Vec<u8>, Diagnostic> {
 }
 
 fn into_text(bytes: Vec<u8>, shown: &str) -> Result<String, Diagnostic> {
+    // Of text in another encoding some bytes may still pass for UTF-8; a zero byte is in no text.
+    if let Some(found) = other_encoding(&bytes, shown) {
+        return Err(found);
+    }
     let text = String::from_utf8(bytes).map_err(|error| {
         let offset = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();
@@ -96,4 +100,23 @@ fn into_text(bytes: Vec<u8>, shown: &str) -> Result<String, Diagnostic> {
         )
     })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// UTF-16 and UTF-32, by their marks and by their zeros.
+fn other_encoding(bytes: &[u8], shown: &str) -> Option<Diagnostic> {
+    let marked = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
+    let zero = bytes.iter().position(|byte| *byte == 0);
+    if !marked && zero.is_none_or(|_| std::str::from_utf8(bytes).is_err()) {
+        return None;
+    }
+    let offset = if marked { 0 } else { zero.unwrap_or_default() };
+    let line = 1 + bytes[..offset].iter().filter(|b| **b == b'\n').count();
+    let looks = if marked { "it begins with the mark of UTF-16".to_owned() } else { format!("byte {offset} is zero") };
+    Some(finding(
+        codes::NOT_TEXT,
+        shown,
+        Some(line),
+        format!("the spec file is not UTF-8 text: {looks} (line {line})"),
+        "save the file as UTF-8, not as UTF-16 (\"Unicode\" in some editors): iconv -f utf-16 -t utf-8 OLD > NEW",
+    ))
 }

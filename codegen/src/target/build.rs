@@ -5,6 +5,7 @@ use super::error::TargetError;
 use super::panics;
 use super::process::{self, Finished};
 use super::toolchain::{self, Toolchain};
+use crate::interrupt::Scratch;
 use crate::model::Mcu;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
@@ -163,7 +164,7 @@ pub(super) fn cargo_artifact(
     if let Some((path, bytes)) = slot.as_ref().map(|slot| slot.fetch(target_dir)).transpose()?.flatten() {
         return Ok(Artifact { path, bytes });
     }
-    let scratch = tempfile::tempdir().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
+    let scratch = Scratch::new().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
 
     command
         // Cargo reads its configuration from the working folder upwards, so work where the package is.

@@ -3,6 +3,7 @@
 use super::build::{BuildRequest, cargo_artifact};
 use super::error::TargetError;
 use super::process::{clean_command, find_in_path};
+use crate::interrupt;
 use std::path::{Path, PathBuf};
 
 /// A shared library may leave symbols undefined unless told otherwise, and then the proof that nothing can
@@ -70,10 +71,21 @@ fn keep(built: &Path, bytes: &[u8]) -> Result<PathBuf, TargetError> {
     }
     let kept = built.with_file_name(format!("specgen-{name}{}", std::env::consts::DLL_SUFFIX));
     if !kept.is_file() {
-        // Written beside and renamed, so that nobody loads half a library.
-        let partial = kept.with_extension(format!("{}.part", std::process::id()));
-        std::fs::write(&partial, bytes).map_err(|e| TargetError::io("writing", &partial, e))?;
-        std::fs::rename(&partial, &kept).map_err(|e| TargetError::io("renaming", &partial, e))?;
+        write_whole(&kept, bytes)?;
     }
     Ok(kept)
+}
+
+/// Writes a file beside its place and renames it, so that nobody finds half of it.
+///
+/// # Errors
+/// [`TargetError::Io`]; nothing is left then.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), TargetError> {
+    let _whole = interrupt::whole();
+    let partial = path.with_extension(format!("{}.part", std::process::id()));
+    let written = std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path));
+    written.map_err(|error| {
+        let _ = std::fs::remove_file(&partial);
+        TargetError::io("writing", path, error)
+    })
 }

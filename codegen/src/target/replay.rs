@@ -6,6 +6,7 @@
 use super::build::Image;
 use super::emulator::Emulator;
 use super::error::TargetError;
+use crate::interrupt::Scratch;
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
@@ -129,7 +130,7 @@ fn replay_from(
         let text = format!("input row {tick} has {} words, row 0 has {width}", inputs[tick].len());
         return Err(TargetError::BadRequest { text });
     }
-    let folder = tempfile::tempdir().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
+    let folder = Scratch::new().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
     write_words(&folder.path().join("config.bin"), config.iter().copied())?;
     write_words(&folder.path().join(file), inputs.iter().flatten().copied())?;
     emulator.run(image, folder.path(), limit)?;

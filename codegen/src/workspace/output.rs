@@ -10,6 +10,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::sha256;
+use crate::interrupt;
 
 /// Name of the manifest in the output folder.
 const MANIFEST: &str = ".specgen";
@@ -89,6 +90,7 @@ impl std::error::Error for WriteError {}
 /// See [`WriteError`].
 pub fn write(dir: &Path, files: &BTreeMap<String, String>) -> Result<(), WriteError> {
     let known = check_free(dir)?;
+    let _whole = interrupt::whole();
     let mut undo = Undo::default();
     let done = stage_and_move(dir, files, &known, &mut undo);
     if done.is_err() {

@@ -3,6 +3,7 @@
 mod snapshot;
 
 use libloading::Symbol;
+use specgen_runtime::supervisor::{Cause, Phase};
 
 use super::{Buffer, Controller, ControllerError, TickController};
 
@@ -31,6 +32,21 @@ impl MachineWord {
     pub fn of(word: u64) -> Self {
         let [phase, cause, on, ..] = word.to_le_bytes();
         Self { phase, cause, amplifier_on: on & 1 == 1 }
+    }
+}
+
+/// Phase and cause in words, such as `ramping down: gauge range`.
+impl std::fmt::Display for MachineWord {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match Phase::from_word(u64::from(self.phase)) {
+            Some(phase) => f.write_str(phase.name())?,
+            None => self.phase.fmt(f)?,
+        }
+        match Cause::from_word(u64::from(self.cause)).map(Cause::name) {
+            Some("") => Ok(()),
+            Some(cause) => write!(f, ": {cause}"),
+            None => write!(f, ": {}", self.cause),
+        }
     }
 }
 

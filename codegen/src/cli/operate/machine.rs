@@ -5,13 +5,13 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use host_sim::controller::MachineWord;
 use serde_json::{Value, json};
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{RecorderStatus, Refusal};
 use specgen_runtime::supervisor::{Phase, Request};
 
-use crate::cli::file::write_file;
-use crate::cli::replay::says;
+use crate::cli::file::{check_place, write_file};
 use crate::cli::ui::{Failure, Ui};
 use crate::compile;
 use crate::operate::{Order, Session, Until, read_wave, refused_wave};
@@ -63,7 +63,7 @@ impl<P: Port> Machine<P> {
     /// Phase and cause in words.
     pub fn stands(&self) -> String {
         let status = self.session.status();
-        says(status.phase, status.cause)
+        MachineWord { phase: status.phase, cause: status.cause, amplifier_on: status.amplifier_on }.to_string()
     }
 
     pub fn is_powered(&self) -> bool {
@@ -118,6 +118,17 @@ impl<P: Port> Machine<P> {
         if !ui.is_json() && !text.is_empty() {
             ui.out(&format!("{}\n", text.trim_end()));
         }
+    }
+
+    /// Refuses `orders` if one of them makes no sense whatever the device does: names, numbers, waves, files that cannot be.
+    pub fn check(&self, orders: &[Order]) -> Result<(), Failure> {
+        let nonsense = |text: String| Failure::Usage(format!("{text}; nothing was asked of the machine"));
+        orders.iter().try_for_each(|order| match order {
+            Order::Set(assignments) => self.session.assign(assignments).map(|_| ()).map_err(nonsense),
+            Order::Wave(path) => self.wave_of(path).map(|_| ()).map_err(nonsense),
+            Order::Download(path) => check_place(path),
+            _ => Ok(()),
+        })
     }
 
     /// Carries an order out.
@@ -267,13 +278,16 @@ impl<P: Port> Machine<P> {
         Ok((json!({ "file": path.display().to_string(), "bytes": bytes.len() }), text))
     }
 
+    fn wave_of(&self, path: &Path) -> Result<(Vec<u64>, [u64; 6]), String> {
+        let name = path.display();
+        let text = std::fs::read_to_string(path).map_err(|error| format!("could not read `{name}`: {error}"))?;
+        let single = self.session.description().scalar.bits() == 32;
+        read_wave(&text, self.session.period(), single).map_err(|error| format!("{name}: {}", error.trim_end()))
+    }
+
     fn wave(&mut self, path: &Path) -> Result<(), Ended> {
         let name = path.display();
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| Ended::Refused(format!("could not read `{name}`: {error}")))?;
-        let single = self.session.description().scalar.bits() == 32;
-        let (words, center) = read_wave(&text, self.session.period(), single)
-            .map_err(|error| Ended::Refused(format!("{name}: {}", error.trim_end())))?;
+        let (words, center) = self.wave_of(path).map_err(Ended::Refused)?;
         self.session.start_wave(&words, &center).map_err(|error| match error {
             ClientError::Refused(Refusal::Word { index }) => Ended::Refused(format!("{name}: {}", refused_wave(index))),
             ClientError::Refused(Refusal::State) => Ended::Refused(format!(

@@ -7,7 +7,8 @@ use host_sim::scenario::{LINEARITY_FREQUENCIES, MODES, TRACKING_FREQUENCIES, sel
 use host_sim::table::{LinearityTable, TrackingTable};
 use serde_json::json;
 
-use super::{Arguments, environment, write_folder};
+use super::{Arguments, environment};
+use crate::cli::file::write_folder;
 use crate::cli::ui::{Failure, Ui};
 use crate::compile::Compiled;
 use crate::machine;

@@ -15,7 +15,8 @@ use host_sim::platform::{PlatformScenario, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use serde_json::{Value, json};
 
-use super::{Arguments, environment, write_folder};
+use super::{Arguments, environment};
+use crate::cli::file::write_folder;
 use crate::cli::ui::{Failure, Ui};
 use crate::compile::Compiled;
 use crate::machine;

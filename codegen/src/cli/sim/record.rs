@@ -17,7 +17,7 @@ use specgen_runtime::recorder::{Recorder, Settings as Recording};
 use specgen_runtime::wave::{AxisWave, Limits, Settings, Shape, Tone, Wave, step_of};
 
 use super::{Arguments, environment};
-use crate::cli::file::PendingFile;
+use crate::cli::file::{PendingFile, unwritten};
 use crate::cli::ui::{Failure, Ui};
 use crate::compile::Compiled;
 use crate::machine;
@@ -63,7 +63,7 @@ pub(super) fn run(
         .map_err(|unfit| Failure::Environment(format!("the recorder does not fit this controller: {unfit:?}")))?;
     recorder.start(Recording::STREAM);
     let file = BufWriter::with_capacity(1 << 20, PendingFile::create(path)?);
-    let mut writer = Writer::new(file, &text).map_err(environment)?;
+    let mut writer = Writer::new(file, &text).map_err(|error| unwritten(path, &error))?;
     let mut recorded = Recorded::new(machine, &mut recorder, &mut writer).map_err(environment)?;
     recorded.reset();
     ui.progress(&format!("recording {seconds} s of a wave on all axes under the supervisor"));
@@ -78,14 +78,14 @@ pub(super) fn run(
         (false, Err(error)) => return Err(environment(error)),
     };
     ended.map_err(|ended| match ended {
-        Ended::Io(error) => environment(error),
+        Ended::Io(error) => unwritten(path, &error),
         Ended::Controller(error) => environment(error),
-        Ended::Supervisor { tick, word } => Failure::Gate(format!(
-            "tick {tick}: the supervisor is in phase {} by cause {} instead of running; nothing was written",
-            word.phase, word.cause
-        )),
+        Ended::Supervisor { tick, word } => {
+            Failure::Gate(format!("tick {tick}: the supervisor is not running but {word}; nothing was written"))
+        }
     })?;
-    let file = writer.finish().map_err(environment)?.into_inner().map_err(environment)?;
+    let file = writer.finish().map_err(|error| unwritten(path, &error))?;
+    let file = file.into_inner().map_err(|error| unwritten(path, &error))?;
     file.keep()?;
     let bytes = std::fs::metadata(path).map(|found| found.len()).unwrap_or_default();
     let ticks = recorder.tick();
@@ -118,7 +118,8 @@ fn wave(compiled: &Compiled, ticks: i32) -> Result<Wave<f64>, Failure> {
             }
         }
         None => {
-            let [low, high] = ir.bounds.leg;
+            // Where a leg can be, as far as its gauge sees it: the controller believes more, and the supervisor no gauge beyond.
+            let [low, high] = [ir.bounds.sensor[0].max(0.0), ir.bounds.sensor[1].min(compiled.model.actuator.stroke)];
             // A leg follows no faster than its amplifier lets it; what accelerates it is not limited by the spec.
             let rate = compiled.model.actuator.slew_rate * compiled.model.actuator.leg_gain();
             Limits {

@@ -1,0 +1,226 @@
+//! Ctrl-C, SIGTERM and a terminal that is closed: what is half done is taken away, then the process ends.
+//!
+//! A command that has a result to show on the way, or a machine to bring down, asks by [`heed`] to be told instead, and ends
+//! by itself.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use tempfile::TempDir;
+
+static PRESSED: AtomicBool = AtomicBool::new(false);
+static HEEDED: AtomicBool = AtomicBool::new(false);
+/// Held by whoever must not be cut in two.
+static WHOLE: Mutex<()> = Mutex::new(());
+/// What is there on the way only, in the order in which it was made.
+static PASSING: Mutex<Vec<Passing>> = Mutex::new(Vec::new());
+
+/// What goes away at the end, whichever end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Passing {
+    /// With all that is in it.
+    Tree(PathBuf),
+    File(PathBuf),
+    /// If nothing is in it.
+    EmptyFolder(PathBuf),
+}
+
+impl Passing {
+    fn remove(&self) -> io::Result<()> {
+        match self {
+            Self::Tree(path) => fs::remove_dir_all(path),
+            Self::File(path) => fs::remove_file(path),
+            Self::EmptyFolder(path) => fs::remove_dir(path),
+        }
+    }
+}
+
+/// From now on an interrupt takes away what is on the way, calls `end`, which says so, and ends the process with the exit code
+/// that `end` gives.
+pub fn catch(end: impl Fn() -> u8 + Send + 'static) {
+    // Without a handler an interrupt ends the process all the same, and leaves what lies in temporary folders.
+    let _ = ctrlc::set_handler(move || {
+        PRESSED.store(true, Ordering::SeqCst);
+        if HEEDED.load(Ordering::SeqCst) {
+            return;
+        }
+        let _whole = whole();
+        let passing = locked(&PASSING);
+        for one in passing.iter().rev() {
+            // A compiler that was interrupted with us may write its last file just now.
+            let grows =
+                |error: &io::Error| error.kind() == io::ErrorKind::DirectoryNotEmpty && matches!(one, Passing::Tree(_));
+            for _ in 0..20 {
+                match one.remove() {
+                    Err(error) if grows(&error) => std::thread::sleep(Duration::from_millis(20)),
+                    _ => break,
+                }
+            }
+        }
+        std::process::exit(i32::from(end()));
+    });
+}
+
+/// From now on an interrupt does nothing but set what is returned: the command looks at it and ends by itself. A second one
+/// does nothing.
+pub fn heed() -> &'static AtomicBool {
+    HEEDED.store(true, Ordering::SeqCst);
+    &PRESSED
+}
+
+/// Waits for the end if an interrupt is about to bring it: what failed meanwhile failed because of it, as a compiler that
+/// heard of the interrupt first.
+pub fn settle() {
+    std::thread::sleep(Duration::from_millis(50));
+    while PRESSED.load(Ordering::SeqCst) && !HEEDED.load(Ordering::SeqCst) {
+        std::thread::park_timeout(Duration::from_secs(1));
+    }
+}
+
+/// No interrupt ends the process while this is held. For moments, not for work.
+pub fn whole() -> MutexGuard<'static, ()> {
+    locked(&WHOLE)
+}
+
+fn locked<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
+    // Whoever panicked with it left a list that is whole.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Keeps the name of something that an interrupt is to take away; dropped when it is gone, or somebody's.
+#[derive(Debug)]
+pub struct Guard(Passing);
+
+impl Guard {
+    fn of(passing: Passing) -> Self {
+        locked(&PASSING).push(passing.clone());
+        Self(passing)
+    }
+
+    /// Of a file that is made by `make`.
+    ///
+    /// # Errors
+    /// What `make` says.
+    pub fn file<T>(make: impl FnOnce() -> io::Result<T>, path: impl Fn(&T) -> &Path) -> io::Result<(T, Self)> {
+        let _whole = whole();
+        let made = make()?;
+        let guard = Self::of(Passing::File(path(&made).to_owned()));
+        Ok((made, guard))
+    }
+}
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        let mut passing = locked(&PASSING);
+        if let Some(index) = passing.iter().rposition(|one| *one == self.0) {
+            passing.remove(index);
+        }
+    }
+}
+
+/// A temporary folder, gone when this is dropped or the process is interrupted.
+#[derive(Debug)]
+pub struct Scratch {
+    folder: TempDir,
+    // After the folder: it is kept in mind until it is gone.
+    _guard: Guard,
+}
+
+impl Scratch {
+    /// A new and empty one.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn new() -> io::Result<Self> {
+        let _whole = whole();
+        let folder = tempfile::tempdir()?;
+        let guard = Guard::of(Passing::Tree(folder.path().to_owned()));
+        Ok(Self { folder, _guard: guard })
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
+/// Folders that were made for results to come; those that are still empty at the end go.
+#[derive(Debug)]
+pub struct Claimed(Vec<Guard>);
+
+impl Claimed {
+    /// Makes `folder` and what is missing above it.
+    ///
+    /// # Errors
+    /// What the file system says; nothing was made then.
+    pub fn new(folder: &Path) -> io::Result<Self> {
+        let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
+        let mut missing: Vec<&Path> = folder.ancestors().take_while(is_missing).collect();
+        missing.reverse();
+        let mut claimed = Self(Vec::new());
+        for path in missing {
+            let _whole = whole();
+            match fs::create_dir(path) {
+                Ok(()) => claimed.0.push(Guard::of(Passing::EmptyFolder(path.to_owned()))),
+                // Somebody else was faster.
+                Err(_) if path.is_dir() => {}
+                Err(error) => return Err(error),
+            }
+        }
+        // What is there and is no folder is told by trying to use it as one.
+        if folder.is_dir() { Ok(claimed) } else { fs::create_dir(folder).map(|()| claimed) }
+    }
+}
+
+impl Drop for Claimed {
+    fn drop(&mut self) {
+        while let Some(guard) = self.0.pop() {
+            // One that holds something stays.
+            let _ = guard.0.remove();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn passing(path: &Path) -> usize {
+        let is_of =
+            |one: &&Passing| matches!(one, Passing::Tree(p) | Passing::File(p) | Passing::EmptyFolder(p) if p == path);
+        locked(&PASSING).iter().filter(is_of).count()
+    }
+
+    #[test]
+    fn a_scratch_folder_is_kept_in_mind_until_it_is_gone() {
+        let scratch = Scratch::new().unwrap();
+        let path = scratch.path().to_owned();
+        fs::write(path.join("half"), "x").unwrap();
+        assert_eq!((passing(&path), path.is_dir()), (1, true));
+        drop(scratch);
+        assert_eq!((passing(&path), path.exists()), (0, false));
+    }
+
+    #[test]
+    fn claimed_folders_stay_if_something_is_in_them() {
+        let scratch = Scratch::new().unwrap();
+        let inner = scratch.path().join("a/b");
+        drop(Claimed::new(&inner).unwrap());
+        assert!(!scratch.path().join("a").exists());
+        let claimed = Claimed::new(&inner).unwrap();
+        fs::write(inner.join("result"), "x").unwrap();
+        drop(claimed);
+        assert!(inner.join("result").is_file());
+        // What was there before is nobody's to remove.
+        fs::create_dir(scratch.path().join("old")).unwrap();
+        drop(Claimed::new(&scratch.path().join("old")).unwrap());
+        assert!(scratch.path().join("old").is_dir());
+        assert!(Claimed::new(&inner.join("result")).is_err());
+        assert!(Claimed::new(&inner.join("result/below")).is_err());
+    }
+}

@@ -1,0 +1,148 @@
+//! What is left when a command is interrupted, and when standard output or standard error takes nothing more.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+#![cfg(unix)]
+
+mod support;
+
+use std::fs::{self, File};
+use std::os::unix::fs::{FileTypeExt, PermissionsExt};
+use std::os::unix::process::CommandExt;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use rustix::process::{Pid, Signal, kill_process_group};
+use support::{Folder, Run};
+
+/// A folder with a `cargo` that never ends, and a folder for what is temporary.
+fn with_slow_cargo() -> Folder {
+    let folder = Folder::new();
+    fs::create_dir_all(folder.path("bin")).unwrap();
+    fs::create_dir_all(folder.path("tmp")).unwrap();
+    let script = format!("#!/bin/sh\n: > '{}'\nexec sleep 20\n", folder.path("begun").display());
+    folder.write("bin/cargo", script);
+    fs::set_permissions(folder.path("bin/cargo"), fs::Permissions::from_mode(0o755)).unwrap();
+    folder
+}
+
+fn slow(folder: &Folder, arguments: &[&str]) -> Command {
+    let mut command = folder.command();
+    command.args(arguments).env("PATH", format!("{}:/usr/bin:/bin", folder.path("bin").display()));
+    // What was built earlier would need no cargo.
+    command.env("TMPDIR", folder.path("tmp")).env_remove("SPECGEN_BUILD_CACHE");
+    command
+}
+
+/// Interrupted, with all that it has started, as soon as it waits for cargo.
+fn interrupted(folder: &Folder, arguments: &[&str], signal: Signal) -> Run {
+    let _ = fs::remove_file(folder.path("begun"));
+    let mut command = slow(folder, arguments);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0).spawn().unwrap();
+    let start = Instant::now();
+    while !folder.path("begun").exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{arguments:?} starts no cargo");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    kill_process_group(Pid::from_raw(child.id().cast_signed()).unwrap(), signal).unwrap();
+    let output = child.wait_with_output().unwrap();
+    Run {
+        code: output.status.code().unwrap_or_else(|| panic!("{arguments:?} ended by a signal: {output:?}")),
+        stdout: String::from_utf8(output.stdout).unwrap(),
+        stderr: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+fn is_empty(folder: &Folder, name: &str) -> bool {
+    fs::read_dir(folder.path(name)).unwrap().next().is_none()
+}
+
+#[test]
+fn an_interrupt_leaves_nothing_half_done() {
+    let folder = with_slow_cargo();
+    for (arguments, left) in [
+        (&["sim", "legs.toml", "-o", "a/traces"][..], "a"),
+        (&["reproduce", "-o", "rep"], "rep"),
+        (&["report", "legs.toml", "-o", "page.html"], "page.html"),
+        (&["replay", "legs.toml", "--csv", "rows.csv"], "rows.csv"),
+    ] {
+        if arguments[0] == "replay" {
+            // No record, so no cargo: what a refusal leaves.
+            assert_eq!(folder.run(arguments).code, 1);
+        } else {
+            let run = interrupted(&folder, arguments, Signal::INT);
+            run.says(130, &["error: interrupted: there is no result; every file that is there is whole"]);
+            assert!(!run.stderr.contains("failed"), "{run:?}");
+        }
+        assert!(!folder.path(left).exists(), "{arguments:?} leaves {left}");
+        assert!(is_empty(&folder, "tmp"), "{arguments:?}");
+    }
+    // Whole before the build began: the next run takes it up.
+    let run = interrupted(&folder, &["legs.toml", "-o", "out"], Signal::INT);
+    assert_eq!(run.code, 130, "{run:?}");
+    assert!(is_empty(&folder, "tmp"));
+    assert_eq!(folder.run(&["legs.toml", "-o", "out", "--no-build"]).code, 0);
+}
+
+#[test]
+fn an_end_from_outside_is_told_to_programs() {
+    let folder = with_slow_cargo();
+    for signal in [Signal::TERM, Signal::HUP] {
+        let run = interrupted(&folder, &["sim", "legs.toml", "--json"], signal);
+        assert_eq!((run.code, run.stderr.as_str()), (130, ""));
+        let document: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
+        assert_eq!((&document["exit_code"], &document["result"]), (&130.into(), &serde_json::Value::Null));
+        assert!(document["error"].as_str().unwrap().starts_with("interrupted: "));
+        assert!(is_empty(&folder, "tmp"));
+    }
+}
+
+/// The device that takes nothing.
+fn full() -> Option<File> {
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").ok();
+    if full.is_none() {
+        eprintln!("skipped: there is no /dev/full here");
+    }
+    full
+}
+
+#[test]
+fn output_that_is_not_whole_is_an_error() {
+    let folder = Folder::new();
+    for arguments in [&["dump-ir", "legs.toml"][..], &["check", "legs.toml", "--json"], &["completions", "bash"]] {
+        let Some(full) = full() else { return };
+        let output = folder.command().args(arguments).stdout(full).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(3), "{arguments:?}: {said}");
+        assert!(said.contains("error: could not write to standard output: "), "{arguments:?}: {said}");
+    }
+    // Whoever has read enough, as `head` does, is no error.
+    let script = format!("'{}' dump-ir legs.toml | head -1; echo \"${{PIPESTATUS[0]}}\"", support::BINARY);
+    let output = Command::new("bash").args(["-c", &script]).current_dir(folder.path("")).output().unwrap();
+    assert!(String::from_utf8(output.stdout).unwrap().ends_with("\n0\n"));
+}
+
+/// The exit code is the same whether somebody can read why, or not.
+#[test]
+fn messages_that_nobody_can_read_change_nothing() {
+    let folder = Folder::new();
+    for (arguments, code) in [(&["check", "nothing.toml"][..], 1), (&["check", "legs.toml"], 0), (&["--bogus"], 2)] {
+        let Some(full) = full() else { return };
+        let status = folder.command().args(arguments).stdout(Stdio::null()).stderr(full).status().unwrap();
+        assert_eq!(status.code(), Some(code), "{arguments:?}");
+    }
+}
+
+/// A pipe takes what comes; it is not replaced by a file. Nor is a folder filled by half.
+#[test]
+fn a_pipe_stays_a_pipe() {
+    let folder = Folder::new();
+    let pipe = folder.path("pipe.csv");
+    rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RWXU).unwrap();
+    let mut reader = Command::new("cat").arg(&pipe).stdout(Stdio::piped()).spawn().unwrap();
+    assert_eq!(folder.run(&["forc", "--grid", "4", "-o", "pipe.csv"]).code, 0);
+    let mut rows = String::new();
+    std::io::Read::read_to_string(&mut reader.stdout.take().unwrap(), &mut rows).unwrap();
+    reader.wait().unwrap();
+    assert!(rows.contains("displacement_um") && rows.lines().count() > 100);
+    assert!(fs::metadata(&pipe).unwrap().file_type().is_fifo());
+}
