@@ -82,7 +82,7 @@ impl PendingFile {
             return Err(unwritten(path, &format_args!("there is no folder `{}`", folder.display())));
         }
         let (file, guard) =
-            Guard::file(|| temporary_in(folder), NamedTempFile::path).map_err(|error| unwritten(path, &error))?;
+            Guard::file(|| temporary_in(folder), NamedTempFile::path).map_err(|error| unwritten(path, &plain(&error)))?;
         Ok(Self { place: Place::Beside { file, _guard: guard }, target })
     }
 
@@ -125,6 +125,12 @@ impl Write for PendingFile {
             Place::Device(file) => file.flush(),
         }
     }
+}
+
+/// What the system says, without the name of a temporary file, which tells nobody anything.
+fn plain(error: &io::Error) -> String {
+    let below = error.get_ref().and_then(std::error::Error::source);
+    below.map_or_else(|| error.to_string(), ToString::to_string)
 }
 
 /// A temporary file, but with the permissions of any other file: it becomes the user's.
