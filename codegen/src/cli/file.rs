@@ -81,8 +81,8 @@ impl PendingFile {
         if !folder.is_dir() {
             return Err(unwritten(path, &format_args!("there is no folder `{}`", folder.display())));
         }
-        let (file, guard) =
-            Guard::file(|| temporary_in(folder), NamedTempFile::path).map_err(|error| unwritten(path, &plain(&error)))?;
+        let (file, guard) = Guard::file(|| temporary_in(folder), NamedTempFile::path)
+            .map_err(|error| unwritten(path, &plain(&error)))?;
         Ok(Self { place: Place::Beside { file, _guard: guard }, target })
     }
 

@@ -4,7 +4,7 @@
 mod report;
 mod scenario;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
@@ -81,7 +81,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         None => None,
     };
     let emulator = if line.is_none() { Some(Emulator::find()?) } else { None };
-    if arguments.elf.is_none() && line.is_none() {
+    let given = arguments.elf.as_deref().map(|path| given(path, &compiled)).transpose()?;
+    if given.is_none() && line.is_none() {
         target::toolchain::find()?;
     }
 
@@ -95,12 +96,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 
     match (line, emulator) {
         (Some(line), _) => {
-            let name = arguments.port.as_deref().unwrap_or_else(|| std::path::Path::new("")).display().to_string();
+            let name = arguments.port.as_deref().unwrap_or_else(|| Path::new("")).display().to_string();
             let report = Report::new(&compiled, name, None);
             in_the_loop(host, line, Patience::SERIAL, report, &plan, &compiled, arguments, ui)
         }
         (None, Some(emulator)) => {
-            let image = image(arguments, &compiled, &output, &target_dir, ui)?;
+            let image = given.map_or_else(|| built(&compiled, &output, &target_dir, ui), Ok)?;
             let bound = stack::bound(&image.elf, SUPERVISE)?;
             let bound = bound.is_complete().then_some(bound.bytes);
             let name = format!("{} ({}) in {}", image.mcu.machine(), image.mcu.core(), emulator.version);
@@ -116,19 +117,14 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 /// The whole tick in the image.
 const SUPERVISE: &str = "specgen_supervise";
 
-fn image(
-    arguments: &Arguments,
-    compiled: &Compiled,
-    output: &std::path::Path,
-    target_dir: &std::path::Path,
-    ui: &Ui,
-) -> Result<Image, Failure> {
+fn given(path: &Path, compiled: &Compiled) -> Result<Image, Failure> {
+    let elf = std::fs::read(path)
+        .map_err(|error| Failure::Environment(format!("could not read the image `{}`: {error}", path.display())))?;
+    Ok(Image { mcu: compiled.model.target.mcu, elf, path: path.to_owned(), compiler: String::new() })
+}
+
+fn built(compiled: &Compiled, output: &Path, target_dir: &Path, ui: &Ui) -> Result<Image, Failure> {
     let mcu = compiled.model.target.mcu;
-    if let Some(path) = &arguments.elf {
-        let elf = std::fs::read(path)
-            .map_err(|error| Failure::Environment(format!("could not read `{}`: {error}", path.display())))?;
-        return Ok(Image { mcu, elf, path: path.clone(), compiler: String::new() });
-    }
     ui.progress(&format!("building the image for {}", mcu.machine()));
     Ok(target::build_pil(output, mcu, target_dir)?)
 }
