@@ -195,18 +195,6 @@ fn sim_gives_one_document_and_its_files_hold_the_same_table() {
         let trace = folder.read(&format!("out/sim/trace-{mode}-1hz.csv"));
         assert!(trace.lines().count() > 40, "{mode}");
     }
-    // A leg goes no further than its gauge sees.
-    let recorded = folder.json(&["sim", "legs.toml", "--record", "run.rec", "--seconds", "0.2"]);
-    assert_eq!(recorded.code, 0, "{}", recorded.value);
-    let replayed = folder.json(&["replay", "run.rec", "--spec", "legs.toml"]);
-    assert_eq!((replayed.code, &replayed.value["result"]["bit_equal"]), (0, &true.into()));
-    // A record with a hole is exported, and said to be one.
-    let mut bytes = fs::read(folder.path("run.rec")).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
-    folder.write("hole.rec", bytes);
-    folder.run(&["replay", "hole.rec", "--csv", "hole.csv"]).says(1, &["is damaged", "its rows are missing"]);
-    assert!(folder.path("hole.csv").is_file());
     folder.json(&["sim", "nothing.toml"]).finding("E0101");
     let refused = folder.json(&["sim", "legs.toml", "--plant", "legs.toml"]);
     assert!(refused.code == 1 && refused.error().contains("legs.toml"), "{}", refused.error());

@@ -176,7 +176,7 @@ fn text(found: &Replay, period: f64) -> String {
     out
 }
 
-/// Phase and cause in words.
+/// Phase, cause and amplifiers in words.
 fn name(supervisor: u32) -> String {
     let word = MachineWord::of(u64::from(supervisor));
     format!("{word}, amplifiers {}", if word.amplifier_on { "on" } else { "off" })

@@ -51,7 +51,7 @@ impl fmt::Display for Stop {
             Self::Difference(difference) => difference.fmt(f),
             Self::Link(error) => error.fmt(f),
             Self::Supervisor { tick, word } => {
-                write!(f, "tick {tick}: the supervisor is not running but {word}; host and device agree on it")
+                write!(f, "tick {tick}: instead of running the machine is {word}; host and device agree on it")
             }
             Self::Settings(error) => error.fmt(f),
             Self::Interrupted => f.write_str("interrupted"),

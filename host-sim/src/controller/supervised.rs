@@ -2,6 +2,8 @@
 
 mod snapshot;
 
+use std::fmt;
+
 use libloading::Symbol;
 use specgen_runtime::supervisor::{Cause, Phase};
 
@@ -35,17 +37,17 @@ impl MachineWord {
     }
 }
 
-/// Phase and cause in words, such as `ramping down: gauge range`.
-impl std::fmt::Display for MachineWord {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+/// Phase and, if there is one, cause in words; a number where there is no such.
+impl fmt::Display for MachineWord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match Phase::from_word(u64::from(self.phase)) {
             Some(phase) => f.write_str(phase.name())?,
-            None => self.phase.fmt(f)?,
+            None => write!(f, "phase {}", self.phase)?,
         }
-        match Cause::from_word(u64::from(self.cause)).map(Cause::name) {
-            Some("") => Ok(()),
-            Some(cause) => write!(f, ": {cause}"),
-            None => write!(f, ": {}", self.cause),
+        match Cause::from_word(u64::from(self.cause)) {
+            Some(Cause::None) => Ok(()),
+            Some(cause) => write!(f, ": {}", cause.name()),
+            None => write!(f, ": cause {}", self.cause),
         }
     }
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use host_sim::controller::MachineWord;
 use serde_json::{Value, json};
 use specgen_link::client::{ClientError, Port};
-use specgen_link::{RecorderStatus, Refusal};
+use specgen_link::{RecorderStatus, Refusal, Status};
 use specgen_runtime::supervisor::{Phase, Request};
 
 use crate::cli::file::{check_place, write_file};
@@ -62,8 +62,8 @@ impl<P: Port> Machine<P> {
 
     /// Phase and cause in words.
     pub fn stands(&self) -> String {
-        let status = self.session.status();
-        MachineWord { phase: status.phase, cause: status.cause, amplifier_on: status.amplifier_on }.to_string()
+        let Status { phase, cause, amplifier_on, .. } = *self.session.status();
+        MachineWord { phase, cause, amplifier_on }.to_string()
     }
 
     pub fn is_powered(&self) -> bool {

@@ -81,7 +81,7 @@ pub(super) fn run(
         Ended::Io(error) => unwritten(path, &error),
         Ended::Controller(error) => environment(error),
         Ended::Supervisor { tick, word } => {
-            Failure::Gate(format!("tick {tick}: the supervisor is not running but {word}; nothing was written"))
+            Failure::Gate(format!("tick {tick}: instead of running the machine is {word}; nothing was written"))
         }
     })?;
     let file = writer.finish().map_err(|error| unwritten(path, &error))?;
@@ -118,8 +118,9 @@ fn wave(compiled: &Compiled, ticks: i32) -> Result<Wave<f64>, Failure> {
             }
         }
         None => {
-            // Where a leg can be, as far as its gauge sees it: the controller believes more, and the supervisor no gauge beyond.
-            let [low, high] = [ir.bounds.sensor[0].max(0.0), ir.bounds.sensor[1].min(compiled.model.actuator.stroke)];
+            // Where the gauge sees the leg and the stack moves it; the bounds of set-points are wider than both.
+            let high = compiled.model.actuator.stroke.min(ir.bounds.sensor[1]).min(ir.bounds.leg[1]);
+            let low = ir.bounds.sensor[0].max(ir.bounds.leg[0]);
             // A leg follows no faster than its amplifier lets it; what accelerates it is not limited by the spec.
             let rate = compiled.model.actuator.slew_rate * compiled.model.actuator.leg_gain();
             Limits {
