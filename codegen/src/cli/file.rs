@@ -33,8 +33,16 @@ pub fn write_folder(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<(), Fa
 
 /// Makes a folder for results to come; it goes again if none comes.
 pub fn claim(folder: &Path) -> Result<Claimed, Failure> {
-    Claimed::new(folder)
-        .map_err(|error| Failure::Environment(format!("could not create the folder `{}`: {error}", folder.display())))
+    let failed = |reason: &dyn std::fmt::Display| {
+        let shown = folder.display();
+        Failure::Environment(format!(
+            "could not create the folder `{shown}`: {reason}; nothing was changed. Name another with -o"
+        ))
+    };
+    if folder.exists() && !folder.is_dir() {
+        return Err(failed(&"a file has that name"));
+    }
+    Claimed::new(folder).map_err(|error| failed(&error))
 }
 
 /// Says which file could not be written.
