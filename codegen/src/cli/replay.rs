@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         return Err(Failure::Judged { message, result });
     };
     let compiled = compile::compile(spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    ui.findings_in_brief(&compiled.source, &compiled.findings);
     // Before the library is built: a wrong spec is told at once.
     same_build(arguments, &reader.header().description, &compiled)?;
     let controller = sim::emitted(&compiled, ui)?;
