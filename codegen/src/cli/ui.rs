@@ -126,7 +126,7 @@ impl Ui {
             self.findings(Some(source), findings);
         } else if !findings.is_empty() {
             let (count, s) = (findings.len(), if findings.len() == 1 { "" } else { "s" });
-            eprintln!("{0}: {count} finding{s}, shown by `specgen check {0}`", source.display_name);
+            say!("{0}: {count} finding{s}, shown by `specgen check {0}`\n", source.display_name);
         }
     }
 
