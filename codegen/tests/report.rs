@@ -107,6 +107,21 @@ fn the_report_of_a_platform_has_the_figures_of_section_4() {
     is_drawn(&folder, "page.html", document.value["result"]["figures"].as_u64().unwrap() as usize);
 }
 
+/// A spec whose workspace holds none of the paper's paths: why is said once, and no figure or table is left empty.
+#[test]
+fn paths_that_are_refused_leave_no_empty_figure_or_table() {
+    let folder = Folder::new();
+    let spec = std::fs::read_to_string(support::repository().join("specs/features/platform-frames.toml")).unwrap();
+    folder.write("frames.toml", spec.replace("../records/", "records/"));
+    let document = folder.json(&["report", "frames.toml", "--generations", "1", "--no-target", "-o", "page.html"]);
+    assert_eq!(document.code, 0, "{:#}", document.value);
+    let page = folder.read("page.html");
+    // Two cases, machining, and the linear relation.
+    assert_eq!(page.matches("The controller refused set-points").count(), 4);
+    assert!(!page.contains("<td>–</td>") && !page.contains("class=\"n\">–</td>"), "a value that was not made");
+    is_drawn(&folder, "page.html", document.value["result"]["figures"].as_u64().unwrap() as usize);
+}
+
 /// The judge of pages sees what it is there for.
 #[test]
 fn a_page_with_an_empty_figure_or_an_error_is_seen() {

@@ -88,8 +88,9 @@ impl Remark {
                  1.2 MN/m, tip 40 mm above the platform); gains and machine are ours, and x(t) is missing in print."
             }
             Self::BelowResolution => {
-                "The printed angles are at or below what the paper's own gauges can see: 2.2 nm at ±80 mm is 20 nrad. Ours \
-                 are true angles, and no smaller than that noise permits."
+                "The printed angles, 1.6 to 28 nrad, are about or below what the paper's own gauges can see: 2.2 nm at ±80 mm \
+                 is 20 nrad. Ours are true angles: with P/F what gauge noise leaves, with P also what the part's torque \
+                 turns."
             }
             Self::Ewma => {
                 "(AII.18) prints 0 < λ < 2 for every weight, which is its ω = 1 case; right is 0 < λω < 2, and the emitted \

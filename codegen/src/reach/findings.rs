@@ -223,6 +223,8 @@ fn advice(path: &PathReach, what: &str) -> String {
 /// The reach as text for `specgen check`. `biased`: set-points count from a bias, else from rest.
 #[must_use]
 pub fn describe(reach: &Reach, biased: bool) -> String {
+    // Rounding errors of a bound at zero are not shown as -0.0.
+    let tenths = |value: f64| libm::round(value * 10.0) / 10.0 + 0.0;
     let mut text = String::new();
     // Writing to a String cannot fail.
     let _ = writeln!(
@@ -237,10 +239,10 @@ pub fn describe(reach: &Reach, biased: bool) -> String {
             text,
             "    {:<3} {:>9.1} to {:>8.1} | {:>9.1} to {:>8.1}   (declared ±{:.1})",
             AXES[axis],
-            one.from_middle[0] * scale,
-            one.from_middle[1] * scale,
-            one.from_bias[0] * scale,
-            one.from_bias[1] * scale,
+            tenths(one.from_middle[0] * scale),
+            tenths(one.from_middle[1] * scale),
+            tenths(one.from_bias[0] * scale),
+            tenths(one.from_bias[1] * scale),
             one.declared * scale
         );
     }

@@ -21,6 +21,7 @@ pub fn section(found: &Convergence, command: &str) -> Section {
     )
     .with("best so far", Style::Line, Values::scaled(&x), Values::plain(&best))
     .with("median of the generation", Style::Dash, Values::scaled(&x), Values::plain(&median));
+    let charts = if best.iter().any(|cost| cost.is_finite()) { vec![chart] } else { Vec::new() };
     let mut table = Grid::new("Table 3: settings", &["what", "paper", "here"]);
     for row in TABLE_3 {
         table.push(row.map(str::to_owned).to_vec());
@@ -28,6 +29,6 @@ pub fn section(found: &Convergence, command: &str) -> Section {
     Section::new("convergence", "Genetic algorithm", command)
         .text(&fell(found))
         .text("The spec keeps its own numbers: specgen tune writes better ones into it, by this algorithm or CMA-ES.")
-        .charts(vec![chart])
+        .charts(charts)
         .table(table)
 }

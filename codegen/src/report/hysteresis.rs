@@ -32,7 +32,7 @@ pub fn section(leg: &LegParameters, lowest: f64) -> Section {
         let (x, y) = (Values::scaled(&voltages), Values::scaled(&displacements));
         chart = chart.with(&format!("{frequency} Hz"), Style::Line, x, y);
     }
-    Section::new("hysteresis", "Rate-dependent hysteresis", "specgen forc -o record.csv --rate V/S")
+    Section::new("hysteresis", "Rate-dependent hysteresis", "")
         .text("The simulated leg, open loop: amplifier lag, plays with rate-dependent thresholds, creep, asymmetry, resonance. It is not of the controller's model class: no Everett table can hold it. The loop becomes rounder and wider with the rate, as in the paper.")
         .charts(vec![chart])
         .table(table)

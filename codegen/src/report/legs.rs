@@ -5,6 +5,7 @@ use host_sim::controller::TickController;
 use host_sim::scenario::{LegScenario, MODES, TRACKING_FREQUENCIES, select};
 
 use super::chart::{Axis, Chart, Style};
+use super::motion::TARGETS;
 use super::section::Section;
 use crate::reproduce;
 
@@ -38,16 +39,17 @@ pub fn section(
             let tracking = scenario.run(controller, frequency)?.tracking;
             let times = [tracking.interval, tracking.interval];
             let of = |pick: fn([f64; 2]) -> f64| values(&tracking, pick);
-            if mode == "invhys" {
-                path = path.over_time("target T", Style::Dash, times, &of(|[t, _]| t * 1e6));
-            }
             path = path.over_time(mode, Style::Line, times, &of(|[_, y]| y * 1e6));
             error = error.over_time(mode, Style::Line, times, &of(|[t, y]| (t - y) * 1e9));
+            // On top, for the laws lie on it.
+            if mode == "pcc" {
+                path = path.over_time("target T", Style::Dash, times, &of(|[t, _]| t * 1e6)).colored(TARGETS);
+            }
         }
         charts.extend([path, error]);
     }
     Ok(Section::new("leg-tracking", "Leg tracking", command)
-        .text("Each leg follows the paper's trajectory with the emitted controller, on its own gauge: target T, reading Y. The jump of 112 nm at the end of the ramp is the paper's.")
+        .text("Each leg follows the paper's trajectory with the emitted controller, on its own gauge: target T, reading Y. invhys is the inverse model alone, ewma and pcc adapt it. The jump of 112 nm at the end of the ramp is the paper's.")
         .charts(charts)
         .comparison(&table))
 }

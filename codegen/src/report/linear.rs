@@ -9,8 +9,10 @@ use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, select};
 use host_sim::table::Line;
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen_runtime::Platform;
+use specgen_runtime::setpoint::{REFUSED, STALE};
 
 use super::chart::{Axis, Chart, Style, Values};
+use super::motion::REFUSED_PATH;
 use super::section::{Grid, Section};
 use crate::model::Actuator;
 use crate::reproduce;
@@ -78,6 +80,9 @@ pub fn of_platform(
     for frequency in PLATFORM_FREQUENCIES {
         let trajectory = PaperPose { path: PaperPath::Case1, reading: Reading::Corrected, frequency };
         let run = traced.run(controller, &trajectory)?;
+        if run.status & (REFUSED | STALE) != 0 {
+            continue;
+        }
         let Some(trace) = &run.trace else { continue };
         let before = trace.len().saturating_sub(run.samples.len());
         for leg in 0..6 {
@@ -109,7 +114,11 @@ pub fn of_platform(
             }
         }
     }
-    Ok(Section::new("linear", "Linear relation behind the inverse model", command)
+    let section = Section::new("linear", "Linear relation behind the inverse model", command);
+    if lines.series.is_empty() {
+        return Ok(section.text(&format!("Not made: case 1 is not followed. {REFUSED_PATH}")));
+    }
+    Ok(section
         .text("What a leg really does, J h of the true pose, against what the inverse model was asked for. The legs are out of tolerance, each in its own way, and share one record if the spec names one: λ is how far off. Table 1 of the paper is with six legs on their own gauges: specgen report specs/legs.toml.")
         .charts(vec![lines])
         .table(table))

@@ -10,7 +10,7 @@ use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen_runtime::setpoint::{REFUSED, STALE};
 
 use super::chart::{Axis, Chart, Style};
-use super::motion::{AXES, TARGETS, change, error};
+use super::motion::{AXES, REFUSED_PATH, TARGETS, change, error};
 use super::section::Section;
 use crate::reproduce::platform::{MACHINING_FREQUENCY, parts, table_9};
 
@@ -30,6 +30,7 @@ pub fn section(
     let mut section = Section::new("machining", "Machining, P against P/F", command)
         .text("The tip presses into a linear work part from the start of the path. Forces and torques are those of the part on the platform, about P_C in base axes.");
     let mut table = MachiningTable::default();
+    let mut refused = Vec::new();
     for (number, (name, part)) in [23, 26].into_iter().zip(parts()) {
         let make = |kind: &str, figure: usize, what: &str, y: Axis| {
             let id = format!("{kind}-{figure}-{name}");
@@ -52,10 +53,7 @@ pub fn section(
             select(controller, word)?;
             let run = sampled.machine(controller, &trajectory, part)?;
             if run.status & (REFUSED | STALE) != 0 {
-                section = section.text(&format!(
-                    "{name} with {mode} is not scored: the controller refused set-points (status {:#x}).",
-                    run.status
-                ));
+                refused.push(format!("{name} with {mode}"));
                 continue;
             }
             table.push(name, mode, &run.errors);
@@ -76,12 +74,11 @@ pub fn section(
                     let pose: Vec<f64> = run.samples.iter().map(|sample| sample.tick.pose[axis] * 1e6).collect();
                     let load: Vec<f64> = run.samples.iter().map(|sample| sample.tick.wrench.numbers()[axis]).collect();
                     change(&mut paths[turning], |chart| {
-                        chart.over_time(&format!("{label} target"), Style::Dash, times, &target).over_time(
-                            label,
-                            Style::Line,
-                            times,
-                            &pose,
-                        )
+                        chart
+                            .over_time(label, Style::Line, times, &pose)
+                            .colored(axis % 3)
+                            .over_time(&format!("{label} target"), Style::Dash, times, &target)
+                            .colored(TARGETS + axis % 3)
                     });
                     let name = [["Fx", "Fy", "Fz"], ["Tx", "Ty", "Tz"]][turning][axis % 3];
                     change(&mut wrench[turning], |chart| chart.over_time(name, Style::Line, times, &load));
@@ -92,6 +89,9 @@ pub fn section(
             let ([path, turn], [error, error_turn], [force, torque]) = (paths, errors, wrench);
             section = section.charts(vec![path, error, turn, error_turn, force, torque]);
         }
+    }
+    if !refused.is_empty() {
+        section = section.text(&format!("{REFUSED_PATH} Not scored: {}.", refused.join(", ")));
     }
     Ok(section.comparison(&table_9(&table)))
 }

@@ -19,6 +19,9 @@ pub(super) const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 /// Colours of targets, beside those of the axes.
 pub(super) const TARGETS: usize = 8;
 
+/// Why a run is not scored.
+pub(super) const REFUSED_PATH: &str = "The controller refused set-points: the path leaves the workspace of the spec, or moves faster than its control.setpoint.stream_speed.";
+
 /// What a sample shows of one coordinate.
 type Pick = fn(&PoseSample, usize) -> f64;
 
@@ -44,6 +47,7 @@ pub fn sections(
         )
         .text("P/F with each law of adaptation; target and true pose of the platform, both from rest, the bias included. Errors are target less true pose.");
         let mut table = PoseTable::default();
+        let mut refused = Vec::new();
         for (place, frequency) in FREQUENCIES.into_iter().enumerate() {
             progress(&format!("{name} at {frequency} Hz"));
             let trajectory = PaperPose { path, reading: Reading::Corrected, frequency };
@@ -52,7 +56,7 @@ pub fn sections(
                 select(controller, word)?;
                 let run = sampled.run(controller, &trajectory)?;
                 if run.status & (REFUSED | STALE) != 0 {
-                    section = section.text(&format!("{mode} at {frequency} Hz is not scored: the controller refused set-points (status {:#x}); the path leaves the workspace of the spec, or moves faster than its control.setpoint.stream_speed.", run.status));
+                    refused.push(format!("{mode} at {frequency} Hz"));
                     continue;
                 }
                 table.rows.push(PoseRow::of(name, mode, frequency, &run.errors));
@@ -64,6 +68,9 @@ pub fn sections(
             if let Some(charts) = figures.finish() {
                 section = section.charts(charts);
             }
+        }
+        if !refused.is_empty() {
+            section = section.text(&format!("{REFUSED_PATH} Not scored: {}.", refused.join(", ")));
         }
         for comparison in tables(&table, name) {
             section = section.comparison(&comparison);

@@ -80,19 +80,31 @@ fn write_section(out: &mut String, section: &Section, data: &mut serde_json::Map
 
 fn write_table(out: &mut String, grid: &Grid) {
     let _ = writeln!(out, "<div class=\"table\"><table>\n<caption>{}</caption>\n<thead><tr>", escaped(&grid.caption));
-    for text in &grid.head {
-        let _ = write!(out, "<th scope=\"col\">{}</th>", escaped(text));
+    let numbers: Vec<bool> = (0..grid.head.len()).map(|column| numeric(grid, column)).collect();
+    let class = |column: usize| if numbers.get(column) == Some(&true) { " class=\"n\"" } else { "" };
+    for (column, text) in grid.head.iter().enumerate() {
+        let _ = write!(out, "<th scope=\"col\"{}>{}</th>", class(column), escaped(text));
     }
     out.push_str("</tr></thead>\n<tbody>\n");
     for row in &grid.rows {
         out.push_str("<tr>");
-        for text in row {
-            let number = text.trim_start_matches(['-', '+', '<', '>', ' ']).starts_with(|c: char| c.is_ascii_digit());
-            let _ = write!(out, "<td{}>{}</td>", if number { " class=\"n\"" } else { "" }, escaped(text));
+        for (column, text) in row.iter().enumerate() {
+            let _ = write!(out, "<td{}>{}</td>", class(column), escaped(text));
         }
         out.push_str("</tr>\n");
     }
     out.push_str("</tbody></table></div>\n");
+}
+
+/// Whether a column holds numbers and is set to the right: most of its texts are numbers, and at least one.
+fn numeric(grid: &Grid, column: usize) -> bool {
+    let texts = grid.rows.iter().filter_map(|row| row.get(column)).filter(|text| !text.is_empty());
+    let (mut numbers, mut all) = (0, 0);
+    for text in texts {
+        all += 1;
+        numbers += usize::from(text.trim_start_matches(['<', '>', ' ']).parse::<f64>().is_ok());
+    }
+    2 * numbers > all
 }
 
 fn write_charts(out: &mut String, charts: &[Chart], data: &mut serde_json::Map<String, serde_json::Value>) {

@@ -44,7 +44,7 @@ pub fn section(compiled: &Compiled, controller: Option<&mut dyn TickController>)
         Values::scaled(&[weights[0]]),
         Values::plain(&[highest]),
     );
-    let mut section = Section::new("region", "Stability region of the adaptation", "specgen reproduce")
+    let mut section = Section::new("region", "Stability region of the adaptation", "")
         .text("Below a curve the run-to-run law is stable on a leg that answers at once. With amplifier lag and modes the limit is lower: that is what the compiler checks, see margins.");
     let mut table = None;
     if let Some(controller) = controller {

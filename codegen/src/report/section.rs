@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::chart::Chart;
-use crate::reproduce::table::Table as Comparison;
+use crate::reproduce::table::{Cell, Table as Comparison};
 use crate::reproduce::write::{cell, digits};
 
 /// A part of the page with a heading.
@@ -102,7 +102,12 @@ impl Section {
     pub fn comparison(mut self, table: &Comparison) -> Self {
         let mut grid =
             Grid::new(table.title, &["case", "quantity", "Hz", "unit", "paper", "ours", "ours / paper", "remark"]);
-        for row in &table.rows {
+        // A run that was refused has nothing to compare; why stands above.
+        let shown: Vec<_> = table.rows.iter().filter(|row| made(&row.ours)).collect();
+        if shown.is_empty() {
+            return self.text(&format!("{}: no run to compare.", table.title));
+        }
+        for row in &shown {
             grid.push(vec![
                 row.case.clone(),
                 row.quantity.clone(),
@@ -115,9 +120,17 @@ impl Section {
             ]);
         }
         self.parts.push(Part::Table(grid));
-        for remark in table.remarks() {
+        let mut remarks: Vec<_> = shown.iter().filter_map(|row| row.remark).collect();
+        remarks.sort_unstable();
+        remarks.dedup();
+        for remark in remarks {
             self.parts.push(Part::Text(format!("{}: {}", remark.id(), remark.text())));
         }
         self
     }
+}
+
+/// Whether there is a value.
+fn made(cell: &Cell) -> bool {
+    !matches!(cell, Cell::Number(value) if !value.is_finite())
 }

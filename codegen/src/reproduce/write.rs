@@ -50,6 +50,14 @@ pub(crate) fn fell(convergence: &Convergence) -> String {
     };
     let cost = |value: Option<f64>| value.map_or_else(|| "none".to_owned(), |cost| format!("{cost:.4e}"));
     let unstable: usize = convergence.history.iter().map(|generation| generation.unstable).sum();
+    if last.best.is_none() {
+        return format!(
+            "{} numbers, {} generations, {} strings, and none with a cost: {unstable} were rejected for their margins and not simulated, the others could not follow the multisine.",
+            convergence.dimension,
+            convergence.history.len(),
+            last.evaluations
+        );
+    }
     format!(
         "{} numbers, {} generations, {} strings: the best cost falls from {} to {} µm s², the median of a generation from {} to {}; {unstable} strings were rejected for their margins and not simulated.",
         convergence.dimension,

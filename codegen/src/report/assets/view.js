@@ -4,7 +4,9 @@ class View {
     this.figure = figure;
     this.data = data;
     this.turn = [-0.6, 0.42];
-    this.frame = 0;
+    // What stands still, as on paper, shows the largest move.
+    const far = p => Math.hypot(p[0], p[1], p[2]);
+    this.frame = data.poses.reduce((best, p, k) => (far(p) > far(data.poses[best]) ? k : best), 0);
     this.playing = false;
     // Without a motion there are no bars on the right.
     const still = data.poses.length < 2;
@@ -15,7 +17,7 @@ class View {
       const controls = html("span", bar, "", "controls bar");
       this.button = html("button", controls, "play");
       this.button.addEventListener("click", () => this.play(!this.playing));
-      this.time = this.slider(controls, "time", 0, data.poses.length - 1, 0, 1, v => { this.play(false); this.frame = v; });
+      this.time = this.slider(controls, "time", 0, data.poses.length - 1, this.frame, 1, v => { this.play(false); this.frame = v; });
       // Some 30 mm for the longest move at the start.
       const largest = Math.max(1, ...data.poses.flatMap(p => p.slice(0, 3).map(Math.abs)));
       this.by = Math.log10(3e7 / largest);
@@ -135,7 +137,7 @@ class View {
 
   bars(legs) {
     const stroke = this.data.stroke * 1e9, [left, top, wide, step] = [640, 96, 250, 46];
-    element("text", { x: left, y: top - 34 }, this.svg).textContent = "leg extension, of " + number(stroke / 1000) + " µm";
+    element("text", { x: left, y: top - 34 }, this.svg).textContent = "leg extension in µm, stroke " + number(stroke / 1000) + " µm";
     legs.forEach((v, k) => {
       const y = top + k * step, length = Math.min(Math.max(v / stroke, 0), 1) * wide;
       element("text", { x: left - 8, y: y + 13, "text-anchor": "end" }, this.svg).textContent = String(k + 1);
