@@ -83,6 +83,10 @@ fn condition(probes: &[Probe; 6], height: f64, radius: f64) -> f64 {
 /// Names the one gauge whose sign or order of coordinates would explain a layout that sees badly.
 pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
+    // A slip that puts a gauge out of the pattern of the others is known better from that.
+    if found.list.iter().any(|finding| finding.code == codes::GAUGE_PATTERN) {
+        return;
+    }
     let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
     let now = condition(&task.probes, height, radius);
     if now <= GOOD {

@@ -80,10 +80,6 @@ fn digits(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
 /// Names the gauge whose sign, digits or order of coordinates would put it in line with the others.
 pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
-    // What sees a motion badly is said already, with the same slips.
-    if found.list.iter().any(|finding| finding.code == codes::GAUGE_SLIP) {
-        return;
-    }
     // How many patterns each change restores, and one of them; changes that break none.
     let mut restoring: Vec<(usize, &str, Change)> = Vec::new();
     for gauge in 0..6 {

@@ -7,6 +7,7 @@ use rand_chacha::rand_core::SeedableRng;
 use specgen::diagnostic::{Diagnostic, Severity};
 
 use super::support::tally::{Base, hit_rate, is_about, new_findings};
+use super::support::undetectable::UNDETECTABLE;
 use super::support::{mutants, plausible, slips, spec, verdict};
 
 /// Specs that slips are made in.
@@ -18,6 +19,8 @@ const BASES: [&str; 5] = [
     "features/platform-environment.toml",
 ];
 const LEAST: f64 = 0.95;
+/// More than this share declared undetectable would say that the kinds are no slips, or that the table excuses too much.
+const MOST_UNDETECTABLE: f64 = 0.12;
 
 /// Specs of the second set, beside six plausible platforms.
 const SECOND_BASES: [&str; 7] = [
@@ -29,8 +32,12 @@ const SECOND_BASES: [&str; 7] = [
     "features/platform-frames.toml",
     "features/platform-f32.toml",
 ];
+/// First kinds in the second specs and ten plausible platforms: 267 of 300 before any rule was changed for them, 289 after.
 const OTHER_SEED: u64 = 6_051;
+/// 241 of 300 at first, 254 after a first round of rules, 273 after the second; 26 of the other 27 are undetectable.
 const SECOND_SEED: u64 = 411;
+/// Run only when rules and reasons stood: 281 of 300 at the first run, 13 of the rest undetectable. 283 after a slip of digits
+/// that one rule hid from another was let through; nothing else was changed for it.
 const THIRD_SEED: u64 = 90_417;
 
 fn share_of_first(kind: &str) -> usize {
@@ -71,7 +78,7 @@ fn slips_of_the_first_kinds_are_found_in_other_specs() {
 fn slips_of_a_second_set_are_found_at_their_key() {
     let (_folder, bases) = bases(&SECOND_BASES, SECOND_SEED, 6);
     let tally = hit_rate(&bases, slips::all, SECOND_SEED, |_| 30);
-    assert!(tally.of_detectable() >= LEAST, "{tally:?}");
+    assert!(tally.of_detectable() >= LEAST && tally.excused() <= MOST_UNDETECTABLE, "{tally:?}");
 }
 
 /// All kinds, in platforms that nobody looked at while rules were made.
@@ -80,7 +87,19 @@ fn slips_of_all_kinds_are_found_in_fresh_platforms() {
     let (_folder, bases) = bases(&[], THIRD_SEED, 10);
     let both = |text: &str| mutants::all(text).into_iter().chain(slips::all(text)).collect();
     let tally = hit_rate(&bases, both, THIRD_SEED, |_| 25);
-    assert!(tally.of_detectable() >= LEAST, "{tally:?}");
+    assert!(tally.of_detectable() >= LEAST && tally.excused() <= MOST_UNDETECTABLE, "{tally:?}");
+}
+
+/// No reason stands for a slip that nobody makes.
+#[test]
+fn every_reason_is_of_a_slip() {
+    let (_folder, bases) = bases(&SECOND_BASES, SECOND_SEED, 6);
+    let made = |base: &Base| mutants::all(&base.text).into_iter().chain(slips::all(&base.text)).collect::<Vec<_>>();
+    let all: Vec<(&Base, Vec<mutants::Mutant>)> = bases.iter().map(|base| (base, made(base))).collect();
+    for one in UNDETECTABLE {
+        let used = all.iter().any(|(base, slips)| slips.iter().any(|slip| one.is_of(&base.name, slip)));
+        assert!(used, "{} {} {}", one.kind, one.key, one.change);
+    }
 }
 
 #[test]

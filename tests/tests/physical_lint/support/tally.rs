@@ -54,6 +54,11 @@ impl Tally {
         self.good as f64 / self.all as f64
     }
 
+    /// Declared undetectable, of all.
+    pub fn excused(self) -> f64 {
+        self.undetectable as f64 / self.all as f64
+    }
+
     /// Found, of what can be.
     pub fn of_detectable(self) -> f64 {
         self.good as f64 / (self.all - self.undetectable) as f64
@@ -62,8 +67,8 @@ impl Tally {
 
 /// A spec in which slips are made: its name, text and folder, and what is found in it as it is.
 pub struct Base {
-    name: String,
-    text: String,
+    pub name: String,
+    pub text: String,
     dir: std::path::PathBuf,
     known: BTreeSet<(String, String)>,
 }

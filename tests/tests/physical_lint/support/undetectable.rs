@@ -7,11 +7,11 @@ use super::mutants::Mutant;
 /// Which slips, and why nobody could know.
 pub struct Undetectable {
     /// The kind; empty: any.
-    kind: &'static str,
+    pub kind: &'static str,
     /// Key without indices, or its beginning.
-    key: &'static str,
+    pub key: &'static str,
     /// Part of the change; empty: any.
-    change: &'static str,
+    pub change: &'static str,
     /// The spec that it is true of; empty: any.
     base: &'static str,
     pub why: &'static str,
@@ -98,15 +98,19 @@ pub const UNDETECTABLE: &[Undetectable] = &[
     Undetectable { base: JOINTS, ..of("", "gauge.target_", "", FREE) },
 ];
 
+impl Undetectable {
+    /// Whether it says so of a slip in a spec.
+    pub fn is_of(&self, base: &str, mutant: &Mutant) -> bool {
+        // gauge[3].point[1] → gauge.point
+        let key: String = list(&mutant.key).split(['[', ']']).step_by(2).collect();
+        (self.kind.is_empty() || self.kind == mutant.kind)
+            && key.starts_with(self.key)
+            && mutant.change.contains(self.change)
+            && (self.base.is_empty() || self.base == base)
+    }
+}
+
 /// The reason for which a slip in a spec cannot be known, if there is one.
 pub fn reason(base: &str, mutant: &Mutant) -> Option<&'static str> {
-    // gauge[3].point[1] → gauge.point
-    let key: String = list(&mutant.key).split(['[', ']']).step_by(2).collect();
-    let matches = |one: &&Undetectable| {
-        (one.kind.is_empty() || one.kind == mutant.kind)
-            && key.starts_with(one.key)
-            && mutant.change.contains(one.change)
-            && (one.base.is_empty() || one.base == base)
-    };
-    UNDETECTABLE.iter().find(matches).map(|one| one.why)
+    UNDETECTABLE.iter().find(|one| one.is_of(base, mutant)).map(|one| one.why)
 }
