@@ -148,6 +148,9 @@ fn flashing(folder: &Folder, image: &str) {
 #[test]
 fn what_does_not_fit_together_is_refused_before_anything_is_built() {
     let folder = Folder::new();
+    let flash = folder.run(&["flash", "legs.toml", "-o", "unwritten"]);
+    flash.says(2, &["qemu is no board", "--target stm32h743"]);
+    assert!(!folder.path("unwritten").exists());
     let before = folder.listing();
     folder
         .run(&["build", "legs.toml", "--target", "esp32"])

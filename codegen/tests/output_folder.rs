@@ -92,6 +92,33 @@ fn a_file_that_is_no_longer_made_goes_and_a_deleted_one_comes_back() {
 }
 
 #[test]
+fn a_target_that_is_built_for_no_more_leaves_only_what_cargo_made_and_may_come_back() {
+    let folder = Folder::new();
+    write(&folder);
+    let fresh = listing(&folder.path("out"));
+    // As another target's folder, built in; cargo changed its lock file.
+    fs::create_dir_all(folder.path("out/rt-pc/target")).unwrap();
+    folder.write("out/rt-pc/target/rt-pc", "built");
+    folder.write("out/rt-pc/Cargo.lock", "changed by cargo");
+    folder.write("Cargo.lock", "precious");
+    let manifest = folder.read("out/.specgen");
+    let lock = digest(b"as it was written");
+    folder.write("out/.specgen", format!("{manifest}{lock}  rt-pc/Cargo.lock\n{lock}  ../Cargo.lock\n"));
+    for _ in 0..2 {
+        write(&folder);
+        assert_eq!(folder.read("out/rt-pc/target/rt-pc"), "built");
+        assert!(!folder.path("out/rt-pc/Cargo.lock").exists());
+        assert_eq!(folder.read("Cargo.lock"), "precious");
+    }
+    fs::remove_dir_all(folder.path("out/rt-pc")).unwrap();
+    assert_eq!(listing(&folder.path("out")), fresh);
+    // Anything else in it is somebody's.
+    fs::create_dir_all(folder.path("out/rt-pc/src")).unwrap();
+    folder.write("out/rt-pc/src/main.rs", "mine");
+    refused(&folder, "out", 1, &["rt-pc/"]);
+}
+
+#[test]
 fn an_empty_folder_and_one_whose_parents_are_missing_are_taken() {
     let folder = Folder::new();
     fs::create_dir(folder.path("out")).unwrap();

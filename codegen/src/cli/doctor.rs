@@ -39,7 +39,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut period = PERIOD;
     if let Some(spec) = &arguments.spec {
         let compiled = compile::compile(spec)?;
-        ui.findings(Some(&compiled.source), &compiled.findings);
+        ui.findings_in_brief(&compiled.source, &compiled.findings);
         period = (compiled.model.timing.period * 1e9) as u64;
     }
     ui.progress(&format!("measuring wake-ups every {} for {} s", time_text(period), arguments.seconds));

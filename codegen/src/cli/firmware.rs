@@ -84,7 +84,7 @@ struct Made {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let (compiled, made) = make(&arguments.spec, &arguments.common, ui)?;
+    let (compiled, made) = make(&arguments.spec, &arguments.common, any, ui)?;
     judge(&made, &text::of(&compiled, &made), ui)
 }
 
@@ -126,13 +126,24 @@ fn refusal(made: &Made) -> String {
     format!("{} for {} is refused:{list}", made.target, made.board)
 }
 
-/// Compiles, writes, builds, checks, measures.
-fn make(spec: &Path, common: &Common, ui: &mut Ui) -> Result<(Compiled, Made), Failure> {
+/// Every target will do.
+fn any(_: Target) -> Result<(), Failure> {
+    Ok(())
+}
+
+/// Compiles, writes, builds, checks, measures. A target that the command does not `accept` is refused before anything is written.
+fn make(
+    spec: &Path,
+    common: &Common,
+    accept: fn(Target) -> Result<(), Failure>,
+    ui: &mut Ui,
+) -> Result<(Compiled, Made), Failure> {
     let compiled = compile::compile(spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     let declared = compiled.model.target.mcu;
     // clap lets only known names through.
     let target = common.target.as_deref().and_then(Target::named).unwrap_or_else(|| Target::of(declared));
+    accept(target)?;
     if let Kind::Board(mcu) = target.kind
         && let Some(finding) = wrong_part(&compiled, mcu, target)
     {

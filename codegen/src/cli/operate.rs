@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = match spec {
         Some(spec) => {
             let compiled = compile::compile(spec.as_ref())?;
-            ui.findings(Some(&compiled.source), &compiled.findings);
+            ui.findings_in_brief(&compiled.source, &compiled.findings);
             Some(compiled)
         }
         None => None,

@@ -54,7 +54,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = exchange::path_of(&arguments.name).map_err(|error| Failure::Usage(format!("--name: {error}")))?;
     let compiled = compile::compile(&arguments.spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    ui.findings_in_brief(&compiled.source, &compiled.findings);
     let machine = prepared(arguments, &compiled, ui)?;
     let mut served = Served::new(machine, &compiled.model, &compiled.ir);
     for refused in

@@ -10,7 +10,6 @@ use host_sim::controller::{MachineWord, Supervised};
 use host_sim::description::Description;
 use host_sim::record::{self, Block, Header, Piece, Reader, Replay, ReplayError};
 use serde_json::{Value, json};
-use specgen_runtime::supervisor::{Cause, Phase};
 
 use super::file::PendingFile;
 use super::sim;
@@ -45,7 +44,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         return Ok(());
     };
     let compiled = compile::compile(spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    ui.findings_in_brief(&compiled.source, &compiled.findings);
     // Before the library is built: a wrong spec is told at once.
     same_build(arguments, &reader.header().description, &compiled)?;
     let controller = sim::emitted(&compiled, ui)?;
@@ -166,18 +165,10 @@ fn text(found: &Replay, period: f64) -> String {
     out
 }
 
-/// Phase and cause in words.
+/// Phase, cause and amplifiers in words.
 fn name(supervisor: u32) -> String {
-    let MachineWord { phase, cause, amplifier_on } = MachineWord::of(u64::from(supervisor));
-    format!("{}, amplifiers {}", says(phase, cause), if amplifier_on { "on" } else { "off" })
-}
-
-/// Phase and cause in words, by their numbers.
-pub(super) fn says(phase: u8, cause: u8) -> String {
-    let named = |name: Option<&str>, word: u8| name.map_or_else(|| word.to_string(), str::to_owned);
-    let of_phase = named(Phase::from_word(u64::from(phase)).map(Phase::name), phase);
-    let of_cause = named(Cause::from_word(u64::from(cause)).map(Cause::name), cause);
-    if of_cause.is_empty() { of_phase } else { format!("{of_phase}: {of_cause}") }
+    let word = MachineWord::of(u64::from(supervisor));
+    format!("{word}, amplifiers {}", if word.amplifier_on { "on" } else { "off" })
 }
 
 fn document(found: &Replay, period: f64) -> Value {

@@ -100,6 +100,16 @@ impl Ui {
         }
     }
 
+    /// Findings of a spec that a command only looks things up in, for people in one line.
+    pub fn findings_in_brief(&mut self, source: &SpecSource, findings: &[Diagnostic]) {
+        if self.json {
+            self.findings(Some(source), findings);
+        } else if !findings.is_empty() {
+            let (count, s) = (findings.len(), if findings.len() == 1 { "" } else { "s" });
+            eprintln!("{0}: {count} finding{s}, shown by `specgen check {0}`", source.display_name);
+        }
+    }
+
     /// The result: `text` for people, `value` for programs.
     pub fn result(&self, text: &str, value: Value) {
         if self.json {

@@ -50,11 +50,9 @@ impl fmt::Display for Stop {
         match self {
             Self::Difference(difference) => difference.fmt(f),
             Self::Link(error) => error.fmt(f),
-            Self::Supervisor { tick, word } => write!(
-                f,
-                "tick {tick}: the supervisor is in phase {} by cause {} instead of running; host and device agree on it",
-                word.phase, word.cause
-            ),
+            Self::Supervisor { tick, word } => {
+                write!(f, "tick {tick}: instead of running the machine is {word}; host and device agree on it")
+            }
             Self::Settings(error) => error.fmt(f),
             Self::Interrupted => f.write_str("interrupted"),
         }

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use super::sha256;
 
@@ -149,7 +149,7 @@ fn replace(
     undo: &mut Undo,
 ) -> Result<(), WriteError> {
     let made: BTreeSet<&str> = files.keys().map(String::as_str).chain([MANIFEST]).collect();
-    // Not only what is known: a lock file of ours is never compared, as cargo may change it.
+    // Not only what is known: a file that cargo made may lie where one of ours goes.
     for path in made.iter().copied().chain(known.iter().map(String::as_str)) {
         let (from, aside) = (dir.join(path), old.join(path));
         if fs::symlink_metadata(&from).is_ok() {
@@ -235,6 +235,7 @@ fn check_free(dir: &Path) -> Result<BTreeSet<String>, WriteError> {
         .collect();
     let mut found = Found { recorded, ours: BTreeSet::new(), foreign: Vec::new() };
     found.walk(dir, "").map_err(|error| io_error("read", dir, error))?;
+    found.lock_files(dir);
     if found.foreign.is_empty() {
         return Ok(found.ours);
     }
@@ -262,7 +263,7 @@ impl Found {
                 let prefix = format!("{path}/");
                 if self.recorded.keys().any(|recorded| recorded.starts_with(&prefix)) {
                     self.walk(root, &path)?;
-                } else if fs::read_dir(root.join(&path))?.next().is_some() {
+                } else if !entries(root, &path)?.is_empty() {
                     self.foreign.push(prefix);
                 }
             } else if self.is_ours(root, &path, kind) {
@@ -272,6 +273,14 @@ impl Found {
             }
         }
         Ok(())
+    }
+
+    /// Lock files that specgen wrote are its own even where cargo changed them since.
+    fn lock_files(&mut self, root: &Path) {
+        let within = |path: &str| Path::new(path).components().all(|part| matches!(part, Component::Normal(_)));
+        let is_lock = |path: &str| Path::new(path).file_name().is_some_and(|name| name == "Cargo.lock");
+        let locks = self.recorded.keys().filter(|path| is_lock(path) && within(path) && root.join(path).is_file());
+        self.ours.extend(locks.cloned());
     }
 
     fn is_ours(&self, root: &Path, path: &str, kind: fs::FileType) -> bool {

@@ -2,13 +2,13 @@
 //! machine out. Of some of the ticks that run on, the control law alone is counted, too, on a copy of the state: the difference
 //! is what the supervisor costs.
 
+use crate::counted::counted_tick;
 use crate::instructions::{InstructionCounter, SelfTest};
 use crate::semihosting::{Exit, File};
 use crate::stats::{self, Stage, Summary};
 use crate::{is_due, specgen_step, stack};
 use controller::supervised::{
-    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, MachineOutput, Phase, machine_output_words,
-    supervise,
+    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, Phase, machine_output_words,
 };
 use controller::{CONFIG_WORDS, Config, State, TickInput, TickOutput};
 use core::mem::MaybeUninit;
@@ -50,7 +50,7 @@ pub fn replay(
             let ran = machine.supervisor.phase == Phase::Running;
             let due = is_due(ticks);
             let law = (ran && due).then(|| count_law(counter, config, &machine.state, &tick_input.tick));
-            let (tick_output, instructions, depth) = tick(counter, config, &mut machine, &tick_input, due);
+            let (tick_output, instructions, depth) = counted_tick(counter, config, &mut machine, &tick_input, due);
             match law {
                 Some(law) if tick_output.phase == Phase::Running => {
                     stages[RUNNING].add(instructions);
@@ -101,47 +101,4 @@ fn count_law(counter: &mut InstructionCounter, config: &Config, state: &State, i
     ];
     // SAFETY: C passes the address of a result this large first, then the three references.
     unsafe { counter.measure_call(specgen_step as *const (), arguments) }
-}
-
-/// One supervised tick with its instructions and, if it is to be `painted`, its stack, bytes; else 0. In a frame of its own, so that the stack pointer stands still
-/// around the call.
-#[inline(never)]
-#[allow(unsafe_code)] // The tick is called from assembly that counts it.
-fn tick(
-    counter: &mut InstructionCounter,
-    config: &Config,
-    machine: &mut Machine,
-    input: &MachineInput,
-    painted: bool,
-) -> (MachineOutput, u32, usize) {
-    let mut output = MaybeUninit::<MachineOutput>::uninit();
-    let arguments = [
-        (&raw mut output) as usize,
-        (&raw const *config) as usize,
-        (&raw mut *machine) as usize,
-        (&raw const *input) as usize,
-    ];
-    // SAFETY: C passes the address of a result this large first, then the three references; the tick writes it.
-    unsafe {
-        let tick = specgen_supervise as *const ();
-        let (instructions, depth) = if painted {
-            stack::measure_depth(|| counter.measure_call(tick, arguments))
-        } else {
-            (counter.measure_call(tick, arguments), 0)
-        };
-        (output.assume_init(), instructions, depth)
-    }
-}
-
-/// C returns what is larger through memory of the caller, whatever its fields.
-const LARGEST_RESULT_IN_REGISTERS: usize = 32;
-const _: () = assert!(size_of::<MachineOutput>() > LARGEST_RESULT_IN_REGISTERS);
-
-/// What the targets call every tick.
-#[unsafe(no_mangle)]
-#[inline(never)]
-#[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
-#[allow(improper_ctypes_definitions)] // Caller and callee are compiled together; only the registers matter.
-extern "C" fn specgen_supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
-    supervise(config, machine, input)
 }

@@ -8,6 +8,7 @@
 #![no_std]
 #![no_main]
 
+mod counted;
 mod instructions;
 mod machine;
 mod panic;

@@ -6,6 +6,7 @@
 #![no_std]
 #![no_main]
 
+mod counted;
 mod instructions;
 mod panic;
 mod pipe;

@@ -1,14 +1,11 @@
 //! The supervised controller as a machine that a host steps, with what each tick costs.
 
-use controller::supervised::{
-    MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, MachineOutput, machine_output_words, supervise,
-};
+use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_output_words};
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
-use core::mem::MaybeUninit;
 use specgen_link::{Counted, Stage, WORDS, lockstep};
 
+use crate::counted::counted_tick;
 use crate::instructions::InstructionCounter;
-use crate::stack;
 use crate::stages::Stages;
 
 const _: () = assert!(CONFIG_WORDS <= WORDS && MACHINE_INPUT_WORDS <= WORDS && MACHINE_OUTPUT_WORDS <= WORDS);
@@ -81,7 +78,8 @@ impl lockstep::Machine for Steps {
         if due {
             self.stages.measure(&mut self.counter, &self.config, &self.machine.state, &input.tick);
         }
-        let (result, instructions, depth) = tick(&mut self.counter, &self.config, &mut self.machine, &input, due);
+        let (result, instructions, depth) =
+            counted_tick(&mut self.counter, &self.config, &mut self.machine, &input, due);
         self.stages.add_step(instructions);
         if depth > self.deepest {
             self.deepest = depth;
@@ -104,47 +102,4 @@ impl lockstep::Machine for Steps {
 /// Ticks that the stages and the stack are measured on, for that takes far longer than the tick.
 const fn is_due(tick: u64) -> bool {
     tick.is_multiple_of(32)
-}
-
-/// One tick with its instructions and, if it is to be `painted`, its stack, bytes; else 0. In a frame of its own, so
-/// that the stack pointer stands still around the call.
-#[inline(never)]
-#[allow(unsafe_code)] // The tick is called from assembly that counts it.
-fn tick(
-    counter: &mut InstructionCounter,
-    config: &Config,
-    machine: &mut Machine,
-    input: &MachineInput,
-    painted: bool,
-) -> (MachineOutput, u32, usize) {
-    let mut output = MaybeUninit::<MachineOutput>::uninit();
-    let arguments = [
-        (&raw mut output) as usize,
-        (&raw const *config) as usize,
-        (&raw mut *machine) as usize,
-        (&raw const *input) as usize,
-    ];
-    // SAFETY: C passes the address of a result this large first, then the three references; the tick writes it.
-    unsafe {
-        let tick = specgen_supervise as *const ();
-        let (instructions, depth) = if painted {
-            stack::measure_depth(|| counter.measure_call(tick, arguments))
-        } else {
-            (counter.measure_call(tick, arguments), 0)
-        };
-        (output.assume_init(), instructions, depth)
-    }
-}
-
-/// C returns what is larger through memory of the caller, whatever its fields.
-const LARGEST_RESULT_IN_REGISTERS: usize = 32;
-const _: () = assert!(size_of::<MachineOutput>() > LARGEST_RESULT_IN_REGISTERS);
-
-/// What the instruction count, the painted stack and the static stack bound all refer to.
-#[unsafe(no_mangle)]
-#[inline(never)]
-#[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
-#[allow(improper_ctypes_definitions)] // Caller and callee are compiled together; only the registers matter.
-extern "C" fn specgen_supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
-    supervise(config, machine, input)
 }

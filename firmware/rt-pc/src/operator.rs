@@ -137,7 +137,7 @@ impl Operator {
         let waited = now.saturating_sub(self.since);
         match (self.step, said.phase) {
             (Step::Arming | Step::Starting | Step::Playing, Phase::Faulted) => {
-                self.give_up(format!("the machine faulted at tick {}: {:?}", said.tick, said.cause), now);
+                self.give_up(format!("the machine faulted: {}", said.cause.name()), now);
             }
             (Step::Arming, Phase::Running) | (Step::Starting, Phase::Running) => {
                 for (place, word) in std::mem::take(&mut self.play) {
@@ -147,12 +147,12 @@ impl Operator {
             }
             (Step::Arming, Phase::Arming | Phase::Holding) => self.go(Step::Starting, Request::Run, now),
             (Step::Arming | Step::Starting, _) if waited > STEP_LIMIT => {
-                self.give_up(format!("the machine is still {:?} after {} s", said.phase, STEP_LIMIT / SECOND), now);
+                self.give_up(format!("the machine is still {} after {} s", said.phase.name(), STEP_LIMIT / SECOND), now);
             }
             (Step::GoingDown, Phase::Disarmed | Phase::Faulted) if !said.on => self.go(Step::Over, Request::None, now),
             (Step::GoingDown, _) if waited > DOWN_LIMIT => {
                 let text =
-                    format!("not down after {} s ({:?}): amplifiers switched off", DOWN_LIMIT / SECOND, said.phase);
+                    format!("not down after {} s ({}): amplifiers switched off", DOWN_LIMIT / SECOND, said.phase.name());
                 self.complaint.get_or_insert(text);
                 self.go(Step::Over, Request::None, now);
             }
@@ -399,7 +399,7 @@ mod tests {
         let mut operator = operator();
         operator.plan(&[], 0).unwrap();
         operator.hear(&said(Phase::Faulted, true), 1);
-        assert!(operator.complaint.as_ref().unwrap().contains("faulted at tick 7"));
+        assert!(operator.complaint.as_ref().unwrap().contains("faulted: "));
         operator.hear(&said(Phase::Holding, true), 2);
         assert!(!operator.is_over());
         operator.hear(&said(Phase::Holding, true), 2 + DOWN_LIMIT);

@@ -204,7 +204,7 @@ impl Summary<'_> {
 fn words(incident: &Incident) -> String {
     let Incident { tick, phase, cause } = incident;
     let did = if *phase == Phase::Faulted { "faulted" } else { "held" };
-    format!("the machine {did} at tick {tick}: {cause:?}")
+    format!("the machine {did} at tick {tick}: {}", cause.name())
 }
 
 fn hertz(period: u64) -> f64 {

@@ -2,7 +2,10 @@
 
 mod snapshot;
 
+use std::fmt;
+
 use libloading::Symbol;
+use specgen_runtime::supervisor::{Cause, Phase};
 
 use super::{Buffer, Controller, ControllerError, TickController};
 
@@ -31,6 +34,21 @@ impl MachineWord {
     pub fn of(word: u64) -> Self {
         let [phase, cause, on, ..] = word.to_le_bytes();
         Self { phase, cause, amplifier_on: on & 1 == 1 }
+    }
+}
+
+/// Phase and, if there is one, cause in words; a number where there is no such.
+impl fmt::Display for MachineWord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match Phase::from_word(u64::from(self.phase)) {
+            Some(phase) => f.write_str(phase.name())?,
+            None => write!(f, "phase {}", self.phase)?,
+        }
+        match Cause::from_word(u64::from(self.cause)) {
+            Some(Cause::None) => Ok(()),
+            Some(cause) => write!(f, ": {}", cause.name()),
+            None => write!(f, ": cause {}", self.cause),
+        }
     }
 }
 

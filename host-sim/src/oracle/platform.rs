@@ -11,20 +11,24 @@
 //! displacement for the motion of a piezo platform. No bumpless change between modes. Set-points: bias by a fifth-order
 //! polynomial, hold and stream; another [`Generator`] can be plugged in.
 
+mod generator;
+mod settings;
+
 use nalgebra::{SMatrix, SVector};
 
-use super::design::{Gains, Plant, Rule};
+use super::design::Gains;
 use super::notch::{Notch, NotchState};
 use super::preisach::{Memory, Table};
 use crate::closed_loop::LEGS;
 use crate::controller::{ControllerError, TickController};
 use crate::description::Description;
-use crate::forc::ReversalExperiment;
-use crate::noise::Gauge;
-use crate::plant::{LegParameters, LegPlant};
-use crate::platform::{Geometry, Masses, Matrix6, Probe, Six, Specimen};
+use crate::platform::{Geometry, Masses, Matrix6, Probe, Six};
 use crate::trajectory::PoseTarget;
 use crate::word::Scalar;
+
+pub use generator::Generator;
+use generator::Plain;
+pub use settings::{Drive, Settings};
 
 type Matrix = SMatrix<f64, 6, 6>;
 type Vector = SVector<f64, 6>;
@@ -39,155 +43,6 @@ pub(super) fn vector(values: &Six) -> Vector {
 
 fn numbers(vector: &Vector) -> Six {
     std::array::from_fn(|k| vector[k])
-}
-
-/// Converter and limits of the drives.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drive {
-    /// Full drive of the Everett tables, V.
-    pub max: f64,
-    /// Converter step, V, code 0 at 0 V.
-    pub lsb: f64,
-    /// Highest code.
-    pub code_max: i64,
-    /// Largest change of the code per tick.
-    pub step_max: i64,
-    /// ρ̂ of a leg, m/V: what P alone takes the drive for.
-    pub gain: f64,
-}
-
-impl Drive {
-    /// 16 bits over 150 V, limited to 100 V and 40 V/ms; 0.631 µm/V.
-    #[must_use]
-    pub fn reference(period: f64) -> Self {
-        let lsb = 150.0 / 65535.0;
-        Self {
-            max: 100.0,
-            lsb,
-            code_max: (100.0 / lsb) as i64,
-            step_max: (40e3 * period / lsb) as i64,
-            gain: 5.0 * 0.1262e-6,
-        }
-    }
-}
-
-/// What a platform controller is built from, SI.
-#[derive(Debug, Clone)]
-pub struct Settings {
-    /// Nominal plant, lag and control period.
-    pub plant: Plant,
-    /// ζ_d of the modal notch, if there is one.
-    pub notch_damping: Option<f64>,
-    /// P/F gains and bandwidths.
-    pub combined: Gains,
-    /// P alone.
-    pub position: Gains,
-    /// k_v of P/F and of P alone, N s/m and N m s/rad.
-    pub velocity: Six,
-    /// Cut-off of the filter of the pose's derivative, rad/s.
-    pub velocity_cutoff: f64,
-    /// Lead of the leg displacements, s.
-    pub lead: f64,
-    /// The gauges; their words are metres.
-    pub probes: [Probe; 6],
-    /// Everett tables of the legs.
-    pub tables: [Table; LEGS],
-    /// Converter and limits.
-    pub drive: Drive,
-    /// Bias pose.
-    pub bias: Six,
-    /// Time taken to it, s.
-    pub bias_time: f64,
-}
-
-impl Settings {
-    /// For a machine, from its nominal data and reversal curves of every leg (32 intervals, 20 V/s), at a control period
-    /// (s): gains by the study's rule, bias 10 µm up in 0.3 s.
-    #[must_use]
-    pub fn of(specimen: &Specimen, period: f64, notch_damping: Option<f64>) -> Self {
-        let rule = Rule::of(&specimen.nominal, LegParameters::reference().tau_amp_s, period, notch_damping);
-        let design = rule.design();
-        Self {
-            plant: rule.plant().clone(),
-            notch_damping,
-            combined: design.combined,
-            position: design.position,
-            velocity: [0.0; 6],
-            velocity_cutoff: 3e3,
-            lead: 0.0,
-            probes: specimen.nominal.probes,
-            tables: tables(&specimen.legs),
-            drive: Drive::reference(period),
-            bias: [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0],
-            bias_time: 0.3,
-        }
-    }
-}
-
-/// Everett tables of six legs as built, each from its own record with its gauge's noise; equal legs share one.
-fn tables(legs: &[LegParameters; LEGS]) -> [Table; LEGS] {
-    let of = |leg: usize| {
-        let parameters = &legs[leg];
-        let experiment = ReversalExperiment {
-            rows_per_interval: 1,
-            update: parameters.step_s,
-            drive_max: parameters.u_max,
-            ..ReversalExperiment::reference(32)
-        };
-        let mut gauge = Gauge::new(&parameters.noise, 1, leg as u64);
-        let record = experiment.run(&mut LegPlant::new(parameters), &mut gauge);
-        Table::from_record(&record, 32, parameters.u_max)
-    };
-    let first = of(0);
-    std::array::from_fn(|leg| if legs[leg] == legs[0] { first.clone() } else { of(leg) })
-}
-
-/// The set-point of each tick.
-pub trait Generator {
-    /// As at power-up.
-    fn reset(&mut self);
-
-    /// The target at the end of the coming interval, with the bias, and the status bits (16 to 18).
-    fn next(&mut self, command: u64, selector: u64, sequence: u64, wanted: &PoseTarget) -> (PoseTarget, u64);
-}
-
-/// Bias by a polynomial of the fifth order, then hold and stream.
-struct Plain {
-    bias: Six,
-    ticks: u64,
-    period: f64,
-    tick: u64,
-    last: PoseTarget,
-}
-
-impl Generator for Plain {
-    fn reset(&mut self) {
-        self.tick = 0;
-        self.last = PoseTarget::default();
-    }
-
-    fn next(&mut self, command: u64, _: u64, _: u64, wanted: &PoseTarget) -> (PoseTarget, u64) {
-        if self.tick < self.ticks {
-            self.tick += 1;
-            let length = self.ticks as f64 * self.period;
-            let s = self.tick as f64 / self.ticks as f64;
-            let way = s * s * s * (10.0 + s * (6.0 * s - 15.0));
-            let rate = 30.0 * s * s * (1.0 - s) * (1.0 - s) / length;
-            let acceleration = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (length * length);
-            let of = |factor: f64| self.bias.map(|b| b * factor);
-            self.last = PoseTarget { pose: of(way), rate: of(rate), acceleration: of(acceleration) };
-            return (self.last, 1 << 18);
-        }
-        let finite =
-            [wanted.pose, wanted.rate, wanted.acceleration].iter().all(|six| six.iter().all(|x| x.is_finite()));
-        let refused = command == 1 && !finite;
-        self.last = if command == 1 && finite {
-            PoseTarget { pose: std::array::from_fn(|k| self.bias[k] + wanted.pose[k]), ..*wanted }
-        } else {
-            PoseTarget { pose: self.last.pose, ..PoseTarget::default() }
-        };
-        (self.last, if refused { 1 << 16 } else { 0 })
-    }
 }
 
 /// Values of the configuration words.
@@ -334,13 +189,7 @@ impl PlatformOracle {
             notch,
             config: default.clone(),
             default,
-            generator: Box::new(Plain {
-                bias: settings.bias,
-                ticks: libm::round(settings.bias_time / plant.period) as u64,
-                period: plant.period,
-                tick: 0,
-                last: PoseTarget::default(),
-            }),
+            generator: Box::new(Plain::new(settings.bias, settings.bias_time, plant.period)),
             state: State::new(),
             description: description(),
         };

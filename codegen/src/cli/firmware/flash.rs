@@ -92,7 +92,7 @@ struct Ready {
 }
 
 fn of_spec(arguments: &Arguments, ui: &mut Ui) -> Result<Ready, Failure> {
-    let (compiled, made) = make(&arguments.file, &arguments.common, ui)?;
+    let (compiled, made) = make(&arguments.file, &arguments.common, a_board, ui)?;
     if !ui.is_json() {
         ui.out(&text::of(&compiled, &made));
     }
@@ -133,6 +133,10 @@ fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Fai
     let list: String = failures.iter().map(|failure| format!("\n  {failure}")).collect();
     let message = format!("{image} is refused for {}:{list}\nnothing was flashed", part.board);
     Err(Failure::Judged { message, result: json!({ "image": image, "failures": failures }) })
+}
+
+fn a_board(target: Target) -> Result<(), Failure> {
+    if matches!(target.kind, Kind::Board(_)) { Ok(()) } else { Err(not_a_board(target.name)) }
 }
 
 fn not_a_board(name: &str) -> Failure {

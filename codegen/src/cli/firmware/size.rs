@@ -32,7 +32,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = &arguments.file;
     let Some(bytes) = read_image(path)? else {
-        let (_, made) = make(path, &arguments.common, ui)?;
+        let (_, made) = make(path, &arguments.common, super::any, ui)?;
         let mut out = format!("{} for {}\n", made.artifact, made.board);
         if let Some(size) = &made.size {
             out += &(text::sections(size) + &text::owners(size));

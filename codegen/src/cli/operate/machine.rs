@@ -5,13 +5,13 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use host_sim::controller::MachineWord;
 use serde_json::{Value, json};
 use specgen_link::client::{ClientError, Port};
-use specgen_link::{RecorderStatus, Refusal};
+use specgen_link::{RecorderStatus, Refusal, Status};
 use specgen_runtime::supervisor::{Phase, Request};
 
 use crate::cli::file::write_file;
-use crate::cli::replay::says;
 use crate::cli::ui::{Failure, Ui};
 use crate::compile;
 use crate::operate::{Order, Session, Until, read_wave, refused_wave};
@@ -62,8 +62,8 @@ impl<P: Port> Machine<P> {
 
     /// Phase and cause in words.
     pub fn stands(&self) -> String {
-        let status = self.session.status();
-        says(status.phase, status.cause)
+        let Status { phase, cause, amplifier_on, .. } = *self.session.status();
+        MachineWord { phase, cause, amplifier_on }.to_string()
     }
 
     pub fn is_powered(&self) -> bool {

@@ -80,10 +80,9 @@ pub(super) fn run(
     ended.map_err(|ended| match ended {
         Ended::Io(error) => environment(error),
         Ended::Controller(error) => environment(error),
-        Ended::Supervisor { tick, word } => Failure::Gate(format!(
-            "tick {tick}: the supervisor is in phase {} by cause {} instead of running; nothing was written",
-            word.phase, word.cause
-        )),
+        Ended::Supervisor { tick, word } => {
+            Failure::Gate(format!("tick {tick}: instead of running the machine is {word}; nothing was written"))
+        }
     })?;
     let file = writer.finish().map_err(environment)?.into_inner().map_err(environment)?;
     file.keep()?;
@@ -118,7 +117,9 @@ fn wave(compiled: &Compiled, ticks: i32) -> Result<Wave<f64>, Failure> {
             }
         }
         None => {
-            let [low, high] = ir.bounds.leg;
+            // Where the gauge sees the leg and the stack moves it; the bounds of set-points are wider than both.
+            let high = compiled.model.actuator.stroke.min(ir.bounds.sensor[1]).min(ir.bounds.leg[1]);
+            let low = ir.bounds.sensor[0].max(ir.bounds.leg[0]);
             // A leg follows no faster than its amplifier lets it; what accelerates it is not limited by the spec.
             let rate = compiled.model.actuator.slew_rate * compiled.model.actuator.leg_gain();
             Limits {

@@ -14,6 +14,7 @@ pub const PART: Part = Part {
         "README.md",
         "build.rs",
         "memory.x",
+        "src/counted.rs",
         "src/instructions.rs",
         "src/machine.rs",
         "src/main.rs",

@@ -1,137 +1,12 @@
 //! Platforms that no controller may be made for: each is refused before anything is written, at its place in the file, with
 //! what was expected, and with a mend that is itself accepted when it is put into the spec.
 
+mod support;
+
 use std::fs;
-use std::path::Path;
 
-use specgen::compile::{Refused, compile};
-use specgen::diagnostic::{Diagnostic, Place, Severity, codes, render};
-use specgen_tests::repository;
-
-/// A spec that is wrong, and how what the finding says mends it.
-struct Case {
-    what: &'static str,
-    /// Old and new text; the first place of the old text is replaced.
-    edits: Vec<(&'static str, String)>,
-    /// A table of poses beside the spec.
-    table: Option<String>,
-    code: &'static str,
-    /// The text at which the finding stands: its line and column are those of the first place; none: the table.
-    at: Option<&'static str>,
-    /// Part of the message.
-    says: &'static str,
-    /// From the help and the wrong spec and table to the mended ones.
-    mend: fn(&str, &str, &str) -> (String, String),
-}
-
-fn reference() -> String {
-    fs::read_to_string(repository().join("specs/reference.toml")).expect("a spec of this repository")
-}
-
-/// A folder with the records that the spec names.
-fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    fs::create_dir(folder.path().join("records")).expect("created");
-    let record = "records/reference-forc.csv";
-    fs::copy(repository().join("specs").join(record), folder.path().join(record)).expect("copied");
-    folder
-}
-
-fn edited(text: &str, edits: &[(&'static str, String)]) -> String {
-    edits.iter().fold(text.to_owned(), |text, (old, new)| {
-        assert!(text.contains(old), "no `{old}`");
-        text.replacen(old, new, 1)
-    })
-}
-
-fn verdict(folder: &Path, text: &str, table: Option<&str>) -> Result<Vec<Diagnostic>, Refused> {
-    let path = folder.join("platform.toml");
-    fs::write(&path, text).expect("written");
-    if let Some(table) = table {
-        fs::write(folder.join("table.csv"), table).expect("written");
-    }
-    compile(&path).map(|compiled| compiled.findings)
-}
-
-/// The number that follows `marker`.
-fn after<'a>(help: &'a str, marker: &str) -> &'a str {
-    let (_, rest) = help.split_once(marker).unwrap_or_else(|| panic!("no `{marker}` in: {help}"));
-    let end = rest.find(|c: char| !(c.is_ascii_digit() || "+-.e".contains(c))).unwrap_or(rest.len());
-    rest[..end].trim_end_matches('.')
-}
-
-fn value(help: &str, marker: &str) -> f64 {
-    let text = after(help, marker);
-    text.parse().unwrap_or_else(|_| panic!("`{text}` after `{marker}` in: {help}"))
-}
-
-/// Line and column, from 1, of the first place of a text.
-fn place_of(text: &str, part: &str) -> (usize, usize) {
-    let at = text.find(part).unwrap_or_else(|| panic!("no `{part}`"));
-    let line = text[..at].matches('\n').count() + 1;
-    let begin = text[..at].rfind('\n').map_or(0, |end| end + 1);
-    (line, text[begin..at].chars().count() + 1)
-}
-
-fn hold(cases: Vec<Case>) {
-    let folder = folder();
-    for case in cases {
-        let what = case.what;
-        let bad = edited(&reference(), &case.edits);
-        let Err(refused) = verdict(folder.path(), &bad, case.table.as_deref()) else { panic!("{what}: accepted") };
-        let source = refused.source.expect("it was read");
-        let shown = render(&refused.findings, &source, false);
-        let found = refused
-            .findings
-            .iter()
-            .find(|found| found.code == case.code)
-            .unwrap_or_else(|| panic!("{what}: no {}:\n{shown}", case.code));
-        assert_eq!(found.severity, Severity::Error, "{what}");
-        assert!(codes::find(found.code).is_some(), "{what}");
-        assert!(found.message.contains(case.says), "{what}: {}", found.message);
-        match case.at {
-            Some(at) => {
-                let (line, column) = place_of(&bad, at);
-                let place = format!("/platform.toml:{line}:{column}\n");
-                assert!(shown.contains(&place), "{what}: no `{place}` in:\n{shown}");
-                assert!(matches!(found.place, Place::Spec(_)), "{what}: {found:?}");
-            }
-            None => {
-                let Place::File { path, .. } = &found.place else { panic!("{what}: {found:?}") };
-                assert_eq!(path, "table.csv", "{what}");
-                assert!(shown.contains("--> table.csv"), "{what}:\n{shown}");
-            }
-        }
-        let (mended, table) = (case.mend)(&found.help, &bad, case.table.as_deref().unwrap_or_default());
-        assert!(mended != bad || Some(&table) != case.table.as_ref(), "{what}: nothing mended");
-        if let Err(refused) = verdict(folder.path(), &mended, case.table.is_some().then_some(&table)) {
-            panic!(
-                "{what}: the mend `{}` is refused in its turn:\n{}",
-                found.help,
-                render(&refused.findings, &source, false)
-            );
-        }
-    }
-}
-
-const BIAS_Z: &str = "\"10 um\", \"0 urad\"";
-const CASE_1: &str = "kind      = \"case-1\"\nfrequency = \"1 Hz\"";
-
-fn case(
-    what: &'static str,
-    edits: &[(&'static str, &str)],
-    (code, at, says): (&'static str, &'static str, &'static str),
-    mend: fn(&str, &str, &str) -> (String, String),
-) -> Case {
-    let edits = edits.iter().map(|(old, new)| (*old, (*new).to_owned())).collect();
-    Case { what, edits, table: None, code, at: Some(at), says, mend }
-}
-
-/// The spec with `old` replaced by `new`, the table unchanged.
-fn put(bad: &str, old: &str, new: &str) -> (String, String) {
-    assert!(bad.contains(old), "no `{old}`");
-    (bad.replacen(old, new, 1), String::new())
-}
+use specgen::diagnostic::Severity;
+use support::{BIAS_Z, CASE_1, after, case, edited, folder, hold, put, reference, value, verdict, with_table};
 
 #[test]
 fn the_reference_is_accepted() {
@@ -261,18 +136,6 @@ fn a_geometry_that_does_not_hold_and_gauges_that_do_not_see() {
             },
         ),
     ]);
-}
-
-/// The reference with `table.csv` for its first trajectory.
-fn with_table(
-    what: &'static str,
-    table: String,
-    code: &'static str,
-    says: &'static str,
-    mend: fn(&str, &str, &str) -> (String, String),
-) -> Case {
-    let spec = "kind   = \"waveform\"\nfile   = \"table.csv\"\nperiod = \"1 ms\"";
-    Case { what, edits: vec![(CASE_1, spec.to_owned())], table: Some(table), code, at: None, says, mend }
 }
 
 /// 3 µm in x and 40 µrad about y, up and back in 0.1 s.
