@@ -12,13 +12,16 @@ mod actuator;
 mod alike;
 mod bodies;
 mod budget;
+mod contact;
 mod electronics;
 mod gauge_layout;
+mod gauge_pattern;
 mod gauges;
 mod layout;
 mod motion;
 pub mod paths;
 mod timing;
+mod weights;
 
 pub use budget::{estimated, least};
 
@@ -39,6 +42,8 @@ const RULES: &[Rule] = &[
     layout::legs_cross,
     bodies::leg_parts_have_size,
     bodies::mass_centres_off_the_joints,
+    bodies::parts_are_bodies,
+    bodies::centre_over_joints,
     bodies::moments_of_each_axis,
     bodies::moments_fit_symmetry,
     bodies::leg_parts_against_platform,
@@ -50,17 +55,27 @@ const RULES: &[Rule] = &[
     electronics::current_fits_slew,
     electronics::amplifier_noise,
     electronics::converter_step,
+    electronics::converter_range,
     electronics::rest_without_power,
     gauges::noise_of_a_step,
     gauges::range_centred,
+    gauges::range_beyond_zero,
     gauges::step_against_stroke,
     gauges::odd_coordinates,
     gauges::opposite_directions,
     gauges::size_of_layout,
+    gauge_pattern::out_of_pattern,
     gauge_layout::slip_of_one,
     alike::calibrations,
+    alike::calibrations_straight,
     alike::gains_by_stiffness,
-    alike::work_piece,
+    alike::gains_in_order,
+    contact::work_piece,
+    contact::lever_of_contact,
+    contact::contact_near_bias,
+    weights::ratio_of_gains,
+    weights::adapts_in_time,
+    weights::drift_behind_level,
     timing::times_that_do_nothing,
     timing::lead_of_the_lag,
     timing::transfer,

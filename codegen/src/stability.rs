@@ -195,7 +195,9 @@ fn refusal(model: &Model, code: &'static str, message: String, largest: f64) -> 
         } else {
             String::new()
         };
-        format!("the largest stable {name} is {level}{unit}{drift}; or lengthen the run, or narrow gain_ratio")
+        format!(
+            "the largest stable {name} is {level}{unit}{drift}; or lengthen the run, or narrow `adaptation.gain_ratio`, or check `amplifier.lag`, `actuator.resonance` and `timing.period`, which make the loop"
+        )
     };
     Diagnostic {
         severity: Severity::Error,

@@ -347,7 +347,7 @@ codes! {
     RESONANCE_ODD = "W0803", "resonance, stiffness and mass do not fit",
         "The resonance lies far from what axial_stiffness makes with the mass of the extensible part, alone or with a sixth of the platform.";
     SLEW_TOO_FAST = "W0804", "a slew rate that does not spare the stacks",
-        "The voltage could cross its range within a fifth of a period of the resonance. A stack that is driven so fast overshoots into tension, which ceramics do not stand.";
+        "The voltage could cross its range within a third of a period of the resonance. A stack that is driven so fast overshoots into tension, which ceramics do not stand.";
     LAG_AGAINST_SLEW = "W0805", "an amplifier too slow for the slew rate",
         "A first-order lag makes at most range / lag of slew.";
     CURRENT_AGAINST_SLEW = "W0806", "an amplifier without the current for the slew rate",
@@ -363,13 +363,13 @@ codes! {
     CENTRE_AT_JOINT = "W0811", "mass centre in the joint",
         "The mass centre lies far nearer to its joint than the part's radius of gyration. Write 0 for a part that is balanced about its joint.";
     MOMENT_ODD = "W0812", "a moment of inertia that does not fit the size",
-        "About one axis the radius of gyration is less than a tenth of the joint circle, or more than three times it.";
+        "About x or y the radius of gyration is less than a tenth of the joint circle, or more than three times it; about z, less than 0.3 or more than 1.5 times.";
     MOMENTS_UNEVEN = "W0813", "moments of inertia in another order?",
-        "I_xx and I_yy differ by more than a factor of two on a platform whose joints lie alike along x and y.";
+        "I_xx and I_yy differ by more than a factor of two on a platform whose joints lie alike along x and y; or by less, where I_zz is as one of the two.";
     LEG_MASS_ODD = "W0814", "leg and platform of very different mass",
         "A leg part weighs more than five times the platform, or less than a five-thousandth of it.";
     JOINTS_TOUCH = "W0815", "joints that would touch",
-        "Two joints of one body are nearer to each other than two thousandths of its radius.";
+        "Two joints of one body are nearer to each other than a hundredth of a leg, which would have to be thinner than that.";
     PLATFORM_WIDER = "W0816", "platform wider than its base",
         "Possible, but most hexapods stand on the wider side: are the two in each other's place?";
     OUT_OF_PROPORTION = "W0817", "radii and height out of proportion",
@@ -381,7 +381,7 @@ codes! {
     GAUGE_QUIET = "W0820", "gauge noise far below its step",
         "Nobody can measure a noise below a fiftieth of the converter's step: probably a slip of the unit.";
     GAUGE_LOPSIDED = "W0821", "a range with ends in different units?",
-        "One end of sensor.range lies a hundred times further from rest than the other, or the range of a leg's gauge twenty strokes away.";
+        "One end of sensor.range lies a hundred times further from rest than the other, or five times further and five times beyond what there is to see; or the range of a leg's gauge ends five strokes away.";
     GAUGE_COARSE = "W0822", "gauge step large against the stroke",
         "One code of the gauge is more than a thousandth of the stroke.";
     COORDINATE_ODD = "W0823", "a coordinate that is nearly zero",
@@ -401,13 +401,23 @@ codes! {
     TIME_WITHOUT_EFFECT = "W0830", "a time too short to have an effect",
         "Lag, lead or dead time is less than a hundredth of a tick.";
     LEAD_TOO_LONG = "W0831", "a lead longer than what it takes out",
-        "More than three times amplifier lag and tick together: the legs would run ahead of the set-point.";
+        "More than amplifier lag and tick together, and a quarter: the legs would run ahead of the set-point.";
     TRANSFER_ODD = "W0832", "a transfer time that is no transfer",
         "Shorter than a tick, or longer than five seconds.";
     VELOCITY_FILTER_SLOW = "W0833", "a velocity filter far below the modes",
         "It passes less than a tenth of the lowest mode's frequency.";
     TICKS_AGAINST_MODES = "W0834", "tick and modes do not fit",
         "Fewer than four ticks to a period of the lowest mode, or more than three thousand: period, stiffness or masses are in another unit.";
+    GAIN_RATIO_ODD = "W0835", "a gain ratio that no stack has",
+        "Less than a fifth of the identified gain, or more than four times it: no temperature and no amplitude does that to a stack.";
+    ADAPTATION_SLOW = "W0836", "an adaptation that comes too late",
+        "The level estimate takes more than half a second. The error of a hysteresis model changes with every turn of the motion.";
+    DRIFT_ODD = "W0837", "a drift estimate that does not go with the level",
+        "It follows faster than the level estimate, or two thousand times slower: probably the unit, or the two in each other's place.";
+    CONTACT_LEVER = "W0838", "a work piece that turns on too long a lever",
+        "Its stiffness of turning, over that along an axis, is a lever of more than three radii of the platform.";
+    CONTACT_FAR = "W0839", "a work piece that presses the legs together",
+        "At the bias it is so far from its unloaded pose that the legs would bend by more than they reach.";
     MOVE_BEYOND_SLEW = "W0840", "moves faster than the slew rate",
         "At control.setpoint.speed the voltage would have to change faster than actuator.slew_rate.";
     MOVE_SLOW = "W0841", "moves that take minutes",
@@ -418,6 +428,16 @@ codes! {
         "At control.setpoint.stream_speed a stream may jump across the whole workspace in one tick.";
     WORKSPACE_TINY = "W0844", "a workspace bound of next to nothing",
         "Less than half a hundredth of what the legs reach on this axis.";
+    GAINS_EXCHANGED = "W0845", "gains of two axes in each other's place?",
+        "Gains go with the stiffness of their axes. Two are five times apart for it, and would fit in each other's place.";
+    RANGE_AT_ZERO = "W0846", "an end of the range that is nearly zero",
+        "Not zero, but less than a thousandth of the range from rest: probably a slip of the unit.";
+    CALIBRATION_BENT = "W0847", "a calibration that is far from straight",
+        "A power of the voltage above the first adds more than a tenth of the range. Gauges are straight within a hundredth or two.";
+    GAUGE_PATTERN = "W0848", "a gauge out of the pattern of the others",
+        "Gauges stand at one height or one radius, look straight along the axis, their radius or across it, or make an equilateral triangle. One does not, and would with another sign, digit or order of its coordinates.";
+    CONVERTER_WIDE = "W0849", "a converter that the stacks hardly use",
+        "dac.range spans more than four times actuator.voltage: two bits and more are never used.";
     PATH_BEYOND_SLEW = "E0850", "trajectory faster than the slew rate",
         "A leg would need a faster change of voltage than actuator.slew_rate, even with a quarter more gain than the mean.";
     PATH_NEAR_SLEW = "W0851", "trajectory near the slew rate",
@@ -430,6 +450,10 @@ codes! {
         "A sinusoid above a fifth of the lowest mode's frequency excites it.";
     WAVEFORM_STEP = "W0855", "a step that stands out",
         "Between two rows of a table an axis moves four times further than in the rows around: a jump between two pieces.";
+    LEG_PART_SHAPE = "W0856", "mass, inertia and mass centre of no one body",
+        "A part of a leg reaches from its joint: its radius of gyration is a quarter to five quarters of the way to its mass centre.";
+    CENTRE_FAR = "W0857", "a centre of mass outside the legs",
+        "It lies further beside the axis than the joints, or three times as far above or below them.";
     JOINT_ANGLE = "E0860", "joints beyond their angle",
         "Somewhere in the workspace a joint of a leg turns further than leg.joint_angle.";
     CONDITION_POOR = "W0861", "legs that hold the platform badly",

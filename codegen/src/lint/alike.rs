@@ -1,4 +1,4 @@
-//! Values that come six at a time and are much alike: calibrations of gauges, gains by stiffness, stiffness of a work piece.
+//! Values that come six at a time and are much alike: calibrations of gauges, gains by stiffness.
 
 use super::{AXES, Facts, Found, figure};
 use crate::diagnostic::codes;
@@ -6,10 +6,13 @@ use crate::model::Gains;
 
 /// A coefficient of a calibration against the middle one of the six.
 const CALIBRATION_SPREAD: f64 = 3.0;
+/// What a power above the first adds at an end of the range, in spans. Gauges on the market are straight within 0.02.
+const MOST_BENT: f64 = 0.1;
 /// A gain over the stiffness of its axis, against the middle one of the six.
 const GAIN_SPREAD: f64 = 10.0;
-/// Stiffness of a work piece over that of the platform on its legs.
-const SOUND_WORK_PIECE: core::ops::RangeInclusive<f64> = 1e-3..=20.0;
+/// Two gains over their stiffness are so many times apart as they stand, and less than that in each other's place.
+const EXCHANGED_NOW: f64 = 5.0;
+const EXCHANGED_THEN: f64 = 1.5;
 
 /// The middle of six magnitudes.
 fn middle(values: [f64; 6]) -> f64 {
@@ -42,7 +45,38 @@ pub(super) fn calibrations(facts: &Facts, found: &mut Found) {
                     ["um", "um/V"].map(|unit| format!("{} {unit}", figure(value * 1e6)))[power],
                     figure(usual * 1e6)
                 ),
-                "check its unit and its sign against the other gauges; a wrong sign makes the loop run away",
+                "check its unit and its sign against the other gauges; where those have theirs from `sensor.calibration`, that may be the wrong one; a wrong sign makes the loop run away",
+            );
+        }
+    }
+}
+
+/// A gauge is nearly straight: what it adds in higher powers of the voltage is small over its range.
+pub(super) fn calibrations_straight(facts: &Facts, found: &mut Found) {
+    let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
+    let [low, high] = facts.model.sensor.range;
+    for (gauge, powers) in calibration.iter().enumerate() {
+        let [offset, slope, ..] = powers[..] else { continue };
+        // Volts at the ends, by the slope alone.
+        let volts = [low, high].map(|end| libm::fabs((end - offset) / slope));
+        let farthest = if volts[0] > volts[1] { volts[0] } else { volts[1] };
+        for (power, coefficient) in powers.iter().enumerate().skip(2) {
+            let added = libm::fabs(coefficient * libm::pow(farthest, power as f64));
+            if added.is_nan() || added <= MOST_BENT * (high - low) {
+                continue;
+            }
+            let own = format!("gauge[{gauge}].calibration");
+            let key = if found.model.spans.contains_key(&own) { own } else { "sensor.calibration".to_owned() };
+            found.warning(
+                codes::CALIBRATION_BENT,
+                &format!("{key}[{power}]"),
+                format!(
+                    "power {power} of the calibration of gauge {gauge} adds {} um at {} V, on a range of {} um",
+                    figure(added * 1e6),
+                    figure(farthest),
+                    figure((high - low) * 1e6)
+                ),
+                "gauges are straight within a hundredth or two of their range: check the unit of this coefficient (nm/V^2 or um/V^2) and of the slope before it",
             );
         }
     }
@@ -83,26 +117,41 @@ pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// A work piece that the platform feels, and that does not hold it fast.
-pub(super) fn work_piece(facts: &Facts, found: &mut Found) {
+/// Two axes with each other's gains: each is off for its stiffness, and both fit when exchanged.
+pub(super) fn gains_in_order(facts: &Facts, found: &mut Found) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
-    for (axis, value) in task.environment.stiffness.into_iter().enumerate() {
-        let ratio = value / stiffness[axis];
-        if value == 0.0 || SOUND_WORK_PIECE.contains(&ratio) {
-            continue;
+    let sections: [(&str, Option<&Gains>); 2] =
+        [("gains", task.gains.as_ref()), ("position_gains", task.position_gains.as_ref())];
+    for (section, gains) in sections {
+        let Some(gains) = gains else { continue };
+        for (name, values) in
+            [("proportional", gains.proportional), ("integral", gains.integral), ("derivative", gains.derivative)]
+        {
+            // Translations among themselves, and rotations: across them the units would not fit.
+            for (a, b) in [(0, 1), (0, 2), (1, 2), (3, 4), (3, 5), (4, 5)] {
+                if values[a] == 0.0 || values[b] == 0.0 {
+                    continue;
+                }
+                let apart = |one: f64, other: f64| libm::fabs(libm::log((one / stiffness[a]) / (other / stiffness[b])));
+                let (now, exchanged) = (apart(values[a], values[b]), apart(values[b], values[a]));
+                if now <= libm::log(EXCHANGED_NOW) || exchanged >= libm::log(EXCHANGED_THEN) {
+                    continue;
+                }
+                found.warning(
+                    codes::GAINS_EXCHANGED,
+                    &format!("{section}.{name}[{a}]"),
+                    format!(
+                        "the gains of {} and {} are {} and {}, while the platform is {} times as stiff along the first as along the second",
+                        AXES[a],
+                        AXES[b],
+                        figure(values[a]),
+                        figure(values[b]),
+                        figure(stiffness[a] / stiffness[b])
+                    ),
+                    &format!("in each other's place they would go with the stiffness: check the order of `{section}.{name}`"),
+                );
+            }
         }
-        found.warning(
-            codes::WORK_PIECE_ODD,
-            &format!("control.environment.stiffness[{axis}]"),
-            format!(
-                "along {} the work piece is {} times as stiff as the platform on its legs ({} against {})",
-                AXES[axis],
-                figure(ratio),
-                figure(value),
-                figure(stiffness[axis])
-            ),
-            "too soft to matter or too stiff to move against: check the unit (N/m or N/um, N m/rad); 0 means no contact on that axis",
-        );
     }
 }

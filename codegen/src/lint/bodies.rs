@@ -1,16 +1,27 @@
 //! Masses and inertias against sizes.
 
 use super::{Facts, Found, figure};
-use crate::diagnostic::codes;
+use crate::diagnostic::{Diagnostic, codes};
 
 /// Least radius of gyration of a leg part, in leg lengths: that of a disc a fifteenth of the leg long.
 const THINNEST: f64 = 0.02;
 /// Nearest that a mass centre lies to its own joint, in radii of gyration of the part.
 const NEAREST_CENTRE: f64 = 0.02;
+/// Radius of gyration of a part over the way from its joint to its mass centre. A rod from the joint on has 0.58, half its
+/// mass at either end 1, a lump half as long as that 0.29.
+const SOUND_PART: core::ops::RangeInclusive<f64> = 0.25..=1.25;
 /// Radius of gyration about one axis, in radii of the joint circle.
 const SOUND_AXIS: core::ops::RangeInclusive<f64> = 0.1..=3.0;
+/// The same about z: a platform reaches out to its joints. An even disc of their radius has 0.71, one of less than half of it
+/// 0.3, one of twice it 1.41. About x and y a tall load adds its height.
+const SOUND_TURN: core::ops::RangeInclusive<f64> = 0.3..=1.5;
+/// Farthest centre of mass from P_C, in radii of the joint circle: beside the axis, and along it.
+const FARTHEST_CENTRE: [f64; 3] = [1.0, 1.0, 3.0];
 /// How much the moments about x and y differ on a platform that its joints cannot tell x from y on.
 const UNEVEN: f64 = 2.0;
+/// The same, where the moment about z is as one of the two within so much: then that about z is expected to be the odd one.
+const ODD_ONE: f64 = 1.3;
+const AS_THAT_ABOUT_Z: f64 = 1.15;
 /// A leg part against the platform, by mass.
 const SOUND_SHARE: core::ops::RangeInclusive<f64> = 2e-4..=5.0;
 
@@ -66,12 +77,62 @@ pub(super) fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
     }
 }
 
+/// Mass, inertia and mass centre of a part are those of one body, which begins at its joint.
+pub(super) fn parts_are_bodies(facts: &Facts, found: &mut Found) {
+    for (part, mass, inertia, center) in parts(facts) {
+        let radius = libm::sqrt(inertia / mass);
+        let key = format!("leg.{part}_inertia");
+        // Zero is a choice: a part that is balanced about its joint. What is far off is said already.
+        let said = |one: &Diagnostic| [key.as_str(), &format!("leg.{part}_center")].contains(&one.key.as_str());
+        if *center == 0.0 || SOUND_PART.contains(&(radius / center)) || found.list.iter().any(said) {
+            continue;
+        }
+        found.warning(
+            codes::LEG_PART_SHAPE,
+            &key,
+            format!(
+                "the {part} part of a leg has a radius of gyration of {} mm (from {} g and {} g mm^2) about a mass centre {} mm from its joint",
+                figure(radius * 1e3),
+                figure(mass * 1e3),
+                figure(inertia * 1e9),
+                figure(center * 1e3)
+            ),
+            &format!(
+                "a rod from the joint on has {} mm there: check `leg.{part}_inertia` (about the mass centre), `leg.{part}_mass` and `leg.{part}_center`",
+                figure(center * 1e3 / libm::sqrt(3.0))
+            ),
+        );
+    }
+}
+
+/// The centre of mass lies above the joints, or near them.
+pub(super) fn centre_over_joints(facts: &Facts, found: &mut Found) {
+    let (body, size) = (&facts.model.platform, facts.model.geometry.joint_radius());
+    for (axis, value) in body.center_of_mass.into_iter().enumerate() {
+        if libm::fabs(value) <= FARTHEST_CENTRE[axis] * size {
+            continue;
+        }
+        found.warning(
+            codes::CENTRE_FAR,
+            &format!("platform.center_of_mass[{axis}]"),
+            format!(
+                "the centre of mass lies {} mm from P_C along {}, on a platform whose joints are {} mm from the middle",
+                figure(value * 1e3),
+                ["x", "y", "z"][axis],
+                figure(size * 1e3)
+            ),
+            "the load would lie outside the legs: check the unit of `platform.center_of_mass` and the order of its axes",
+        );
+    }
+}
+
 /// Each moment by itself. (The largest is checked with the spec.)
 pub(super) fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
     let (body, size) = (&facts.model.platform, facts.model.geometry.joint_radius());
     for (axis, moment) in body.inertia.into_iter().enumerate() {
         let radius = libm::sqrt(moment / body.mass);
-        if SOUND_AXIS.contains(&(radius / size)) {
+        let sound = if axis == 2 { SOUND_TURN } else { SOUND_AXIS };
+        if sound.contains(&(radius / size)) {
             continue;
         }
         found.warning(
@@ -98,11 +159,14 @@ pub(super) fn moments_fit_symmetry(facts: &Facts, found: &mut Found) {
     let (along_x, along_y) = (spread(0), spread(1));
     let alike = along_x < 1.05 * along_y && along_y < 1.05 * along_x;
     let ratio = if xx > yy { xx / yy } else { yy / xx };
-    if !alike || ratio <= UNEVEN {
+    let [from_xx, from_yy] = [xx, yy].map(|moment| libm::fabs(libm::log(moment / zz)));
+    let nearest = if from_xx < from_yy { from_xx } else { from_yy };
+    let exchanged = ratio > ODD_ONE && nearest < libm::log(AS_THAT_ABOUT_Z);
+    if !alike || (ratio <= UNEVEN && !exchanged) {
         return;
     }
     // The odd one of the three is suspected: the one whose fellow is on the third axis.
-    let odd = usize::from(libm::fabs(libm::log(yy / zz)) > libm::fabs(libm::log(xx / zz)));
+    let odd = usize::from(from_yy > from_xx);
     found.warning(
         codes::MOMENTS_UNEVEN,
         &format!("platform.inertia[{odd}]"),

@@ -4,12 +4,15 @@ use super::{Facts, Found, figure};
 use crate::diagnostic::codes;
 use crate::model::Model;
 
-/// Largest slew rate of a first-order lag is range over time constant; what is declared may exceed it by this.
-const LAG_SLACK: f64 = 3.0;
+/// Largest slew rate of a first-order lag is range over time constant: a limit above that never binds.
+const LAG_SLACK: f64 = 1.0;
 /// Noise of an amplifier, of its range.
 const SOUND_NOISE: core::ops::RangeInclusive<f64> = 2e-7..=1e-2;
 /// A converter step of more than this share of the stroke is too coarse for any nanopositioning.
 const COARSEST_STEP: f64 = 1e-3;
+
+/// Range of a converter over that of the stacks: amplifiers are bought for their stacks.
+const WIDEST_RANGE: f64 = 4.0;
 
 /// An amplifier that is so slow never makes the declared slew rate.
 pub(super) fn lag_fits_slew(facts: &Facts, found: &mut Found) {
@@ -99,6 +102,25 @@ pub(super) fn converter_step(facts: &Facts, found: &mut Found) {
             figure(actuator.stroke * 1e6)
         ),
         "a converter of 16 bits or more is usual; check `dac.range` and `dac.bits` too: the range is in volts at the stack",
+    );
+}
+
+/// A converter is not spread over many times what the stacks take.
+pub(super) fn converter_range(facts: &Facts, found: &mut Found) {
+    let ([low, high], [from, to]) = (facts.model.dac.range, facts.model.actuator.voltage);
+    if high - low <= WIDEST_RANGE * (to - from) {
+        return;
+    }
+    let item = usize::from(high - to >= from - low);
+    found.warning(
+        codes::CONVERTER_WIDE,
+        &format!("dac.range[{item}]"),
+        format!(
+            "the converter spans {} V, the stacks take {} V of it",
+            figure(high - low),
+            figure(to - from)
+        ),
+        "two bits and more of the converter are never used: check `dac.range`, in volts at the stack, and `actuator.voltage`",
     );
 }
 

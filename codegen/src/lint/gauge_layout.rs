@@ -12,15 +12,15 @@ const MUCH_BETTER: f64 = 1.5;
 const GOOD: f64 = 2.0;
 
 /// One change of one gauge: what was mistaken, if it was.
-struct Change {
-    key: String,
-    what: String,
-    probe: Probe,
+pub(super) struct Change {
+    pub(super) key: String,
+    pub(super) what: String,
+    pub(super) probe: Probe,
 }
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Signs and pairs of coordinates of `vector` in each other's place; what they would be called.
+/// Signs and coordinates of `vector` in each other's place; what they would be called.
 fn changed(vector: [f64; 3]) -> Vec<([f64; 3], String)> {
     let mut list = Vec::new();
     for k in 0..3 {
@@ -32,11 +32,16 @@ fn changed(vector: [f64; 3]) -> Vec<([f64; 3], String)> {
         other.swap(a, b);
         list.push((other, format!("the order of {} and {}", AXES[a], AXES[b])));
     }
+    for by in 1..3 {
+        let mut other = vector;
+        other.rotate_left(by);
+        list.push((other, "the order of x, y and z".to_owned()));
+    }
     list.retain(|(other, _)| *other != vector);
     list
 }
 
-fn changes(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
+pub(super) fn changes(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
     let point = changed(probe.point).into_iter().map(|(point, what)| Change {
         key: format!("gauge[{gauge}].point"),
         what,
@@ -78,6 +83,10 @@ fn condition(probes: &[Probe; 6], height: f64, radius: f64) -> f64 {
 /// Names the one gauge whose sign or order of coordinates would explain a layout that sees badly.
 pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
+    // A slip that puts a gauge out of the pattern of the others is known better from that.
+    if found.list.iter().any(|finding| finding.code == codes::GAUGE_PATTERN) {
+        return;
+    }
     let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
     let now = condition(&task.probes, height, radius);
     if now <= GOOD {

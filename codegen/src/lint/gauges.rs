@@ -7,10 +7,14 @@ use crate::diagnostic::codes;
 const QUIETEST: f64 = 0.02;
 /// A step coarser than this share of the stroke.
 const COARSEST_STEP: f64 = 1e-3;
-/// How far a gauge of one leg may reach past the stroke to one side, in strokes.
-const FARTHEST: f64 = 20.0;
-/// The two sides of a range that is declared about rest.
+/// How far a gauge may reach to one side, in what there is to see there. Gauges come in steps of 2 to 2.5: that is two steps
+/// too wide.
+const FARTHEST: f64 = 5.0;
+/// The two sides of a range that is declared about rest, where one reaches too far; and wherever it reaches.
+const UNEVEN: f64 = 5.0;
 const LOPSIDED: f64 = 100.0;
+/// An end of the range that is not zero but below this share of the whole: nobody sets the zero of a gauge so near.
+const END_AT_ZERO: f64 = 1e-3;
 /// A coordinate that is not zero but below this share of the platform, and above the rounding of a drawing.
 const NEARLY_ZERO: f64 = 2e-3;
 const ROUNDING: f64 = 1e-6;
@@ -50,7 +54,9 @@ pub(super) fn range_centred(facts: &Facts, found: &mut Found) {
     let below = -low;
     let (lopsided, item) = if facts.model.task_space.is_some() {
         // Seen from rest, a platform moves both ways.
-        (below > 0.0 && high > 0.0 && (below > LOPSIDED * high || high > LOPSIDED * below), usize::from(high < below))
+        let seen = FARTHEST * farthest_seen(facts);
+        let beyond = |far: f64, near: f64| far > LOPSIDED * near || (far > UNEVEN * near && far > seen);
+        (below > 0.0 && high > 0.0 && (beyond(below, high) || beyond(high, below)), usize::from(high < below))
     } else {
         (below > FARTHEST * stroke || high > FARTHEST * stroke, usize::from(high > below))
     };
@@ -66,8 +72,45 @@ pub(super) fn range_centred(facts: &Facts, found: &mut Found) {
             figure(high * 1e6),
             figure(stroke * 1e6)
         ),
-        "check that both ends of `sensor.range` are in the same unit",
+        "check both ends of `sensor.range`, their unit and their digits",
     );
+}
+
+/// An end of a range in the wrong unit is a tiny one beside the other.
+pub(super) fn range_beyond_zero(facts: &Facts, found: &mut Found) {
+    let model = facts.model;
+    for (name, range, scale, unit) in
+        [("sensor.range", model.sensor.range, 1e6, "um"), ("dac.range", model.dac.range, 1.0, "V")]
+    {
+        for (item, end) in range.into_iter().enumerate() {
+            if end == 0.0 || libm::fabs(end) >= END_AT_ZERO * (range[1] - range[0]) {
+                continue;
+            }
+            found.warning(
+                codes::RANGE_AT_ZERO,
+                &format!("{name}[{item}]"),
+                format!(
+                    "a range from {} {unit} to {} {unit} ends next to 0, but not there",
+                    figure(range[0] * scale),
+                    figure(range[1] * scale)
+                ),
+                &format!("check the unit of this end of `{name}`; write 0 if it is meant to be there"),
+            );
+        }
+    }
+}
+
+/// Largest displacement at any gauge in the workspace, m, to first order: every axis at its bound.
+fn farthest_seen(facts: &Facts) -> f64 {
+    let Some(task) = &facts.model.task_space else { return 0.0 };
+    let (along, turns) = (facts.model.workspace.translation, facts.model.workspace.rotation);
+    task.probes.iter().fold(0.0, |most: f64, probe| {
+        let [x, y, z] = [probe.point[0], probe.point[1], probe.point[2] - facts.model.geometry.height];
+        let n = probe.direction;
+        let lever = [y * n[2] - z * n[1], z * n[0] - x * n[2], x * n[1] - y * n[0]];
+        let seen = (0..3).fold(0.0, |sum, k| sum + libm::fabs(n[k]) * along[k] + libm::fabs(lever[k]) * turns[k]);
+        if seen > most { seen } else { most }
+    })
 }
 
 /// One code of the gauge against the stroke.
@@ -94,15 +137,19 @@ pub(super) fn odd_coordinates(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
     let radius = facts.model.geometry.joint_radius();
     for (gauge, probe) in task.probes.iter().enumerate() {
-        for (axis, value) in probe.point.into_iter().enumerate() {
+        let target = format!("gauge[{gauge}].target_point");
+        let given = found.model.spans.contains_key(&target);
+        let points = [(format!("gauge[{gauge}].point"), probe.point), (target, probe.plane_point)];
+        let listed = points.iter().take(1 + usize::from(given));
+        for (key, axis, value) in listed.flat_map(|(key, point)| (0..3).map(move |axis| (key, axis, point[axis]))) {
             if value.abs() < ROUNDING || value.abs() >= NEARLY_ZERO * radius {
                 continue;
             }
             found.warning(
                 codes::COORDINATE_ODD,
-                &format!("gauge[{gauge}].point[{axis}]"),
+                &format!("{key}[{axis}]"),
                 format!(
-                    "{} of gauge {gauge} is {}, on a platform of {} mm",
+                    "{} of `{key}` is {}, on a platform of {} mm",
                     ["x", "y", "z"][axis],
                     amount(0, value),
                     figure(radius * 1e3)

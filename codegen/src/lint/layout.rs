@@ -4,8 +4,9 @@ use super::{Facts, Found, figure};
 use crate::diagnostic::codes;
 use crate::reach::joints;
 
-/// Two joints of one body nearer than this share of its radius cannot be built: they would be one.
-const NEAREST: f64 = 2e-3;
+/// Two joints of one body nearer than this share of a leg cannot be built: a leg that is a hundred times as long as thick is no
+/// strut, and two stand beside each other.
+const NEAREST: f64 = 1e-2;
 /// Base, platform and height are of one size: none is so many times larger or smaller than what lies between the others.
 const OUT_OF_PROPORTION: f64 = 5.0;
 /// Legs that would be shorter by more than this share with each other's joints cross.
@@ -14,6 +15,7 @@ const CROSSED: f64 = 1e-3;
 /// The joints of a pair are two parts that stand beside each other.
 pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
     let geometry = &facts.model.geometry;
+    let Some(legs) = &facts.legs else { return };
     for (body, joints) in [("base", &geometry.base_joints), ("platform", &geometry.platform_joints)] {
         let distance = |a: &[f64; 3], b: &[f64; 3]| libm::hypot(libm::hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
         let pairs = (0..6).flat_map(|i| (0..i).map(move |j| (i, j)));
@@ -23,10 +25,8 @@ pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
         else {
             continue;
         };
-        let radius =
-            joints.iter().map(|joint| distance(joint, &[0.0; 3])).fold(0.0, |a: f64, b| if b > a { b } else { a });
         // Legs that meet in one joint are a layout of their own; a gap that is nearly none is a slip.
-        if gap == 0.0 || gap >= NEAREST * radius {
+        if gap == 0.0 || gap >= NEAREST * legs.shortest() {
             continue;
         }
         let listed = format!("geometry.{body}_joints[{j}]");
@@ -39,9 +39,9 @@ pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
             codes::JOINTS_TOUCH,
             &key,
             format!(
-                "joints {i} and {j} of the {body} are {} mm apart, on a body of {} mm",
+                "joints {i} and {j} of the {body} are {} mm apart, for legs of {} mm",
                 figure(gap * 1e3),
-                figure(radius * 1e3)
+                figure(legs.shortest() * 1e3)
             ),
             &format!(
                 "check the unit of `{key}`: an angle of a few degrees sets the joints of a pair some millimetres apart"

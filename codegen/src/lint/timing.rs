@@ -5,8 +5,8 @@ use crate::diagnostic::codes;
 
 /// Below this share of a tick a time does nothing.
 const NOTHING: f64 = 0.01;
-/// Largest lead, in amplifier lags and ticks together.
-const LARGEST_LEAD: f64 = 3.0;
+/// Largest lead, in amplifier lags and ticks together: what there is to take out, and a quarter for the modes.
+const LARGEST_LEAD: f64 = 1.25;
 /// A change of mode that takes longer than this is not meant, s.
 const LONGEST_TRANSFER: f64 = 5.0;
 /// A velocity filter slower than this share of the lowest mode.

@@ -62,7 +62,9 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
                     "the gauge looks along its target: its direction and the target's normal have a cosine of {}",
                     number(cosine)
                 ),
-                "turn the target to face the gauge; without target_normal it does".to_owned(),
+                format!(
+                    "check `gauge[{gauge}].direction` and `gauge[{gauge}].target_normal`; a target turns to face its gauge where target_normal is left out"
+                ),
             );
         }
     }

@@ -18,14 +18,6 @@ pub(super) const OF_CONTROL: &[Rule] = &[
         passes: "\"0.0169 nm\"",
         ..RULE
     },
-    Rule {
-        code: "W0821",
-        key: "sensor.range[0]",
-        text: "\"55 um\"]",
-        raises: "\"5510 um\"]",
-        passes: "\"5490 um\"]",
-        ..RULE
-    },
     Rule { code: "W0822", key: "sensor.bits", text: "bits  = 17", raises: "bits  = 10", passes: "bits  = 11", ..RULE },
     Rule {
         code: "W0823",
@@ -100,8 +92,8 @@ pub(super) const OF_CONTROL: &[Rule] = &[
         code: "W0831",
         key: "control.lead",
         text: "\"0.1 ms\"",
-        raises: "\"1.36 ms\"",
-        passes: "\"1.34 ms\"",
+        raises: "\"0.57 ms\"",
+        passes: "\"0.56 ms\"",
         ..RULE
     },
     Rule {
