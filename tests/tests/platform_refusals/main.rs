@@ -148,6 +148,33 @@ fn table() -> String {
 }
 
 #[test]
+fn converters_that_do_not_see_their_gauge() {
+    const NOISE: &str = "noise = \"2.2 nm\"";
+    const INPUT: &str = "input_range = [\"0 V\", \"2 V\"]";
+    hold(vec![
+        case(
+            "the reading zero beyond the converter",
+            &[(NOISE, "noise = \"2.2 nm\"\ncalibration = [\"-55 um\", \"10 um/V\"]\ninput_range = [\"0 V\", \"2 V\"]")],
+            ("E0474", "[\"0 V\", \"2 V\"]", "does not see the reading zero"),
+            |help, bad, _| {
+                let (_, range) = help.split_once("write input_range = ").expect("a mend");
+                let (range, _) = range.split_once(" or wider").expect("a mend");
+                put(bad, "[\"0 V\", \"2 V\"]", range)
+            },
+        ),
+        case(
+            "volts for words in metres",
+            &[(NOISE, "noise = \"2.2 nm\"\ninput_range = [\"0 V\", \"2 V\"]")],
+            ("E0475", "[\"0 V\", \"2 V\"]", "stands beside no calibration"),
+            |help, bad, _| {
+                assert!(help.contains("take `input_range` out"), "{help}");
+                put(bad, INPUT, "")
+            },
+        ),
+    ]);
+}
+
+#[test]
 fn tables_of_poses() {
     let line_50 = table().lines().nth(50).expect("a row").to_owned();
     let spoilt = |new: &str| table().replacen(&line_50, new, 1);
