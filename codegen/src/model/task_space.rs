@@ -5,7 +5,7 @@ use super::Gains;
 /// The task-space controller, section 4 of the paper. A pose is x, y, z, θx, θy, θz from rest, m and rad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TaskSpace {
-    /// Loops that are closed at start-up; how the feed-forward adapts is [`Adaptation::mode`].
+    /// Loops that are closed at start-up; how the feed-forward adapts is [`Adaptation::mode`](super::Adaptation::mode).
     pub mode: ControlMode,
     /// What the six gauges see, in the order of the words `gauge[0]` to `gauge[5]`.
     pub probes: [Probe; 6],

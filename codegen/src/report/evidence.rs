@@ -156,7 +156,9 @@ pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &s
         let name = if whole { "whole tick".to_owned() } else { stage.name.clone() };
         stages.push([vec![name, format!("{:.0}", stage.mean)], counts.to_vec()].concat());
     }
-    section.table(table).table(stages)
+    let budget =
+        "target.budget.instructions is for the mean of a tick; the period has to hold the most expensive one, too.";
+    section.text(budget).table(table).table(stages)
 }
 
 /// What identifies the bits: digests of the exercise on this host, and whether the emulated machine agrees.

@@ -147,12 +147,18 @@ impl Operator {
             }
             (Step::Arming, Phase::Arming | Phase::Holding) => self.go(Step::Starting, Request::Run, now),
             (Step::Arming | Step::Starting, _) if waited > STEP_LIMIT => {
-                self.give_up(format!("the machine is still {} after {} s", said.phase.name(), STEP_LIMIT / SECOND), now);
+                self.give_up(
+                    format!("the machine is still {} after {} s", said.phase.name(), STEP_LIMIT / SECOND),
+                    now,
+                );
             }
             (Step::GoingDown, Phase::Disarmed | Phase::Faulted) if !said.on => self.go(Step::Over, Request::None, now),
             (Step::GoingDown, _) if waited > DOWN_LIMIT => {
-                let text =
-                    format!("not down after {} s ({}): amplifiers switched off", DOWN_LIMIT / SECOND, said.phase.name());
+                let text = format!(
+                    "not down after {} s ({}): amplifiers switched off",
+                    DOWN_LIMIT / SECOND,
+                    said.phase.name()
+                );
                 self.complaint.get_or_insert(text);
                 self.go(Step::Over, Request::None, now);
             }

@@ -165,16 +165,20 @@ class Chart {
 
   curve(s, parent) {
     const { x, y } = this.data;
-    let path = "", pen = false, drawn = 0;
+    let path = "", pen = false, drawn = 0, last = 0, travel = 0;
     for (let k = 0; k < s.x.length; k++) {
       const px = this.toX(this.place(s.x[k], x)), py = this.toY(this.place(s.y[k], y));
       if (!isFinite(px) || !isFinite(py)) { pen = false; continue; }
       drawn++;
       if (s.style === "dots") element("circle", { cx: px.toFixed(1), cy: py.toFixed(1), r: 3.5, fill: this.color(s) }, parent);
       else path += (pen ? "L" : "M") + px.toFixed(1) + " " + py.toFixed(1);
+      if (pen) travel += Math.abs(py - last);
+      last = py;
       pen = true;
     }
-    if (path) element("path", { d: path, fill: "none", stroke: this.color(s), "stroke-width": s.style === "dash" ? 1.6 : 1.3, "stroke-dasharray": s.style === "dash" ? "6 4" : "none", "stroke-linejoin": "round" }, parent);
+    // Noise fills a band: others have to be seen through it.
+    const band = travel > 12000;
+    if (path) element("path", { d: path, fill: "none", stroke: this.color(s), "stroke-opacity": band ? 0.5 : 1, "stroke-width": band ? 0.8 : s.style === "dash" ? 1.6 : 1.3, "stroke-dasharray": s.style === "dash" ? "6 4" : "none", "stroke-linejoin": "round" }, parent);
     return drawn;
   }
 
