@@ -26,6 +26,7 @@ pub mod stack;
 pub mod targets;
 mod thumb;
 pub mod toolchain;
+pub mod user_cache;
 
 pub use build::{Image, build_image, build_pil};
 pub use error::TargetError;
