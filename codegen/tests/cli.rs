@@ -2,14 +2,14 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
+use crate::support;
 use std::ffi::OsString;
 use std::fs;
 use std::os::unix::ffi::OsStringExt;
 use std::os::unix::fs::{PermissionsExt, symlink};
 
-use support::{Document, Folder, Run};
+use crate::support::{Document, Folder, Run};
 
 const COMMANDS: [&str; 19] = [
     "check",

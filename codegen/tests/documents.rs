@@ -2,12 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
 use std::collections::BTreeSet;
 use std::fs;
 
-use support::{Folder, repository};
+use crate::support::{Folder, repository};
 
 const DOCUMENTS: [&str; 16] = [
     "README.md",

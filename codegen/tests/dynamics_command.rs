@@ -1,10 +1,9 @@
 //! `specgen dynamics` as a user runs it.
 #![allow(clippy::unwrap_used)] // A test.
 
-mod support;
 
 use serde_json::Value;
-use support::{Folder, repository};
+use crate::support::{Folder, repository};
 
 fn reference() -> (String, Value) {
     let path = repository().join("tests/oracle/dynamics-reference.json");

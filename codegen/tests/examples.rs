@@ -2,16 +2,16 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
+use crate::support;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::fs;
 use std::process::Command;
 use std::time::Instant;
 
-use support::commands::{Line, blocks, shell};
-use support::{Folder, repository};
+use crate::support::commands::{Line, blocks, shell};
+use crate::support::{Folder, repository};
 
 /// Every command with its path, such as `specgen identify linear`, and the examples below its help.
 fn examples() -> Vec<(String, Vec<Line>)> {

@@ -4,7 +4,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
 use std::ffi::OsString;
 use std::fs;
@@ -12,7 +11,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use specgen::target;
-use support::{Document, Folder, Run};
+use crate::support::{Document, Folder, Run};
 
 /// Where images are built: kept between runs, so that `core` is compiled once.
 fn target_dir() -> String {

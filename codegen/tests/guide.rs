@@ -2,13 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
 use std::fs;
 use std::time::Instant;
 
-use support::commands::{blocks, is_marked, shell};
-use support::repository;
+use crate::support::commands::{blocks, is_marked, shell};
+use crate::support::repository;
 
 /// A line with each number as `#`: what a run says, whatever it measured. Columns may move.
 fn form(line: &str) -> String {

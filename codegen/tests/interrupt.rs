@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 #![cfg(unix)]
 
-mod support;
 
+use crate::support;
 use std::fs::{self, File};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::os::unix::process::CommandExt;
@@ -12,7 +12,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process_group};
-use support::{Folder, Run};
+use crate::support::{Folder, Run};
 
 /// A folder with a `cargo` that never ends, and a folder for what is temporary.
 fn with_slow_cargo() -> Folder {

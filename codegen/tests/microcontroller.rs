@@ -4,9 +4,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-#[path = "microcontroller/faults.rs"]
 mod faults;
-#[path = "microcontroller/fixture.rs"]
 mod fixture;
 
 use fixture::{INPUT_WORDS, OUTPUT_WORDS, Workspace, expected, target_dir};

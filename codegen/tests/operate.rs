@@ -2,9 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-#[path = "../../tests/tests/board_support/mod.rs"]
-mod board_support;
-mod support;
 
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
@@ -15,10 +12,10 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use board_support::Line;
+use crate::board_support::Line;
 use controller::supervised::Phase;
 use specgen_link::client::Port;
-use support::{Folder, Run};
+use crate::support::{Folder, Run};
 
 /// A board at a socket.
 struct Served {

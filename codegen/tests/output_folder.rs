@@ -2,14 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::process::Command;
 
-use support::unprivileged::{Unprivileged, set_mode};
-use support::{Folder, Run, contents, digest, listing};
+use crate::support::unprivileged::{Unprivileged, set_mode};
+use crate::support::{Folder, Run, contents, digest, listing};
 
 /// Writes the reference workspace to `out`.
 fn write(folder: &Folder) {

@@ -4,10 +4,9 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-#[path = "pil/board.rs"]
 mod board;
-mod support;
 
+use crate::support;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::AtomicBool;
@@ -21,7 +20,7 @@ use specgen::model::Mcu;
 use specgen::pil::{Lockstep, Pipes, Stop};
 use specgen::target::{self, Image, emulator::Emulator};
 use specgen_link::client::Patience;
-use support::{BINARY, Run, repository};
+use crate::support::{BINARY, Run, repository};
 
 /// One workspace for all, so that dependencies are built once; one run at a time writes it.
 static ONE: Mutex<()> = Mutex::new(());

@@ -2,11 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
 use std::fs;
 
-use support::{Folder, repository};
+use crate::support::{Folder, repository};
 
 /// The folder, with `name` beside the records; its paths to them are mended.
 fn folder(name: &str) -> (Folder, String) {

@@ -2,13 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
 use std::fs;
 
 use specgen::everett::EverettTable;
 use specgen::identify::rate::write_rate_csv;
-use support::{Folder, repository};
+use crate::support::{Folder, repository};
 
 /// `specs/legs.toml` with lines added to [hysteresis], in a folder beside its records.
 fn legs_with(lines: &str) -> Folder {

@@ -2,11 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
 use std::fs;
 
-use support::Folder;
+use crate::support::Folder;
 
 #[test]
 fn what_sim_records_replays_bit_for_bit_and_a_changed_bit_does_not() {

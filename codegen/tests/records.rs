@@ -3,13 +3,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
 use std::fmt::Write as _;
 use std::fs;
 
 use serde_json::Value;
-use support::{Document, Folder};
+use crate::support::{Document, Folder};
 
 const HEADER: &str = "time_s,drive_V,displacement_um";
 const BAD: &str = "records/bad.csv";

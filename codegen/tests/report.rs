@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
+use crate::support;
 use std::path::Path;
 use std::process::Command;
 
-use support::Folder;
+use crate::support::Folder;
 
 /// Largest report, bytes.
 const LARGEST: usize = 5_000_000;

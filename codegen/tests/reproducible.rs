@@ -2,16 +2,16 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
+use crate::support;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use support::unprivileged::Unprivileged;
-use support::{Folder, Run, contents, repository};
+use crate::support::unprivileged::Unprivileged;
+use crate::support::{Folder, Run, contents, repository};
 
 type Files = BTreeMap<String, Vec<u8>>;
 

@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-mod support;
 
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read};
@@ -12,7 +11,7 @@ use serde_json::Value;
 use specgen::compile::compile;
 use specgen::model::AdaptationMode;
 use specgen::stability::platform::{Adapting, Law};
-use support::{Folder, contents};
+use crate::support::{Folder, contents};
 
 /// A run of `name` in a report.
 fn machine<'a>(report: &'a Value, name: &str) -> &'a Value {

@@ -19,7 +19,6 @@ use specgen_link::client::ClientError;
 use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
 use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
-#[path = "rt_pc/host.rs"]
 mod host;
 use host::{Host, Record};
 

@@ -15,8 +15,6 @@ pub mod controller;
 pub mod description;
 pub mod forc;
 pub mod noise;
-#[cfg(any(test, feature = "oracle"))]
-pub mod oracle;
 pub mod plant;
 pub mod platform;
 pub mod record;

@@ -34,9 +34,7 @@ pub use frames::UserFrames;
 pub use gauge::{GaugeSignal, Probe};
 pub use geometry::{Geometry, angles, rate_matrix, rotation};
 pub use inertia::Masses;
-#[cfg(any(test, feature = "oracle"))]
-pub(crate) use linear::exponential;
-pub use linear::{Matrix3, Matrix6, Six, Three};
+pub use linear::{Matrix3, Matrix6, Six, Three, exponential};
 pub use machine::Machine;
 pub use parameters::{Joints, PlatformParameters, REFERENCE_PLATFORM};
 pub use rig::PlatformRig;

@@ -133,6 +133,3 @@ pub fn select(controller: &mut dyn TickController, mode: u32) -> Result<(), Cont
     }
     controller.configure(&words)
 }
-
-#[cfg(test)]
-mod tests;

@@ -8,6 +8,7 @@ pub mod pair;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use host_sim::controller::{Controller, TickController};
@@ -28,19 +29,33 @@ pub fn repository() -> PathBuf {
     here.parent().unwrap_or(here).to_owned()
 }
 
-/// Where tests build: a folder for each test binary, as several run at once.
+/// A new folder of this process below `target/tests/scratch`, which the next whole test run empties. Nobody else writes there.
 ///
 /// # Panics
-/// If the system cannot name the running binary.
+/// If it cannot be made.
 #[must_use]
-pub fn scratch() -> PathBuf {
-    let binary = std::env::current_exe().expect("a running binary has a name");
-    let stem = binary.file_stem().expect("and not only a folder").to_string_lossy().into_owned();
-    // Cargo appends a hash, which changes with the compiler.
-    builds().join(stem.rsplit_once('-').map_or(&*stem, |(name, _)| name))
+pub fn scratch(name: &str) -> PathBuf {
+    static MADE: AtomicU32 = AtomicU32::new(0);
+    let number = MADE.fetch_add(1, Ordering::Relaxed);
+    let folder = builds().join("scratch").join(std::process::id().to_string()).join(format!("{name}-{number}"));
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("target is writable");
+    folder
 }
 
-/// Where the folders of all test binaries are, and what they share.
+/// Where cargo builds images: shared, so that what they have in common is compiled once, but not by two tests at once, as cargo
+/// would let one wait for the other.
+#[must_use]
+pub fn image_target() -> PathBuf {
+    builds().join(format!("build-{}", std::env::var("SPECGEN_TEST_WORKER").unwrap_or_default()))
+}
+
+/// Whether what only gains by length runs at full length: `cargo xtask soak`.
+#[must_use]
+pub fn is_soak() -> bool {
+    std::env::var_os("SPECGEN_SOAK").is_some()
+}
+
 fn builds() -> PathBuf {
     repository().join("target/tests")
 }
@@ -57,7 +72,7 @@ pub struct Emitted {
 static BUILD: Mutex<()> = Mutex::new(());
 
 impl Emitted {
-    /// Compiles a spec of `specs/` with `edits` (old text, new text) and writes its workspace to `target/tests/<name>`.
+    /// Compiles a spec of `specs/` with `edits` (old text, new text) and writes its workspace to a folder of its own.
     ///
     /// # Panics
     /// If an edit finds nothing to replace, or the spec is refused.
@@ -86,9 +101,8 @@ impl Emitted {
     }
 
     fn of(name: &str, compiled: Compiled) -> Self {
-        let dir = scratch().join(name);
-        let _ = fs::remove_dir_all(&dir);
-        workspace::write(&dir, &compiled.files).expect("the folder was just removed");
+        let dir = scratch(name);
+        workspace::write(&dir, &compiled.files).expect("an empty folder");
         Self { compiled, dir }
     }
 
@@ -128,8 +142,7 @@ impl Emitted {
             panic!("{missing}");
         }
         let _one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
-        // Shared by all test binaries, so that `core` is compiled once; it is locked while one builds.
-        Some(target::build_image(&self.dir, mcu, &builds().join("build")).unwrap_or_else(|error| panic!("{error}")))
+        Some(target::build_image(&self.dir, mcu, &image_target()).unwrap_or_else(|error| panic!("{error}")))
     }
 
     /// Input rows of every kind that a tick may meet, for leg or pose set-points.
@@ -181,9 +194,10 @@ pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)], more: &[(&
         assert!(text.contains(old), "{spec} has no `{old}`");
         text = text.replace(old, new);
     }
-    // Beside a copy of the records, as a user would have it.
-    let folder = scratch().join("specs").join(name).join("features");
-    let records = scratch().join("specs").join(name).join("records");
+    // Beside a copy of the records, as a user would have it: an unchanged spec is the same controller wherever it is compiled.
+    let scratch = scratch(name);
+    let folder = scratch.join(Path::new(spec).parent().unwrap_or(Path::new("")));
+    let records = scratch.join("records");
     for folder in [&folder, &records] {
         fs::create_dir_all(folder).expect("target is writable");
     }
@@ -193,7 +207,6 @@ pub fn compile_edited(name: &str, spec: &str, edits: &[(&str, &str)], more: &[(&
     for (file, text) in more {
         fs::write(records.join(file), text).expect("target is writable");
     }
-    let text = text.replace("\"records/", "\"../records/");
     let path = folder.join("platform.toml");
     fs::write(&path, text).expect("target is writable");
     compile(&path).unwrap_or_else(|refused| panic!("{name} is refused: {:#?}", refused.findings))

@@ -1,11 +1,10 @@
 //! What a board recorded, through the frames of the link: what is downloaded replays bit for bit on the host, whatever happens
 //! to the line, to the settings, or to the machine in between.
 
-mod board_support;
 
 use std::io::Cursor;
 
-use board_support::{Line, bytes, done, refused, running, wait, wave};
+use crate::board_support::{Line, bytes, done, refused, running, wait, wave};
 use controller::supervised::Phase;
 use controller::{Config, ControlMode};
 use host_sim::controller::Supervised;

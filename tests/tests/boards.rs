@@ -14,7 +14,7 @@ use specgen::target::callgraph::CallGraph;
 use specgen::target::checks::{self, Rule, Rules};
 use specgen::target::{build, image, stack, toolchain};
 use specgen::workspace;
-use specgen_tests::{compile_edited, repository, scratch};
+use specgen_tests::{compile_edited, repository, image_target, scratch};
 
 /// Bytes of RAM, the stack's reserve included, without the buffer of a recorder.
 const RAM: u64 = 24 * 1024;
@@ -66,11 +66,10 @@ fn image_of(board: &Board) -> Option<Vec<u8>> {
         Err(missing) => panic!("{missing}"),
     };
     let compiled = compile_edited(board.name, "reference.toml", board.edits, &[]);
-    let dir = scratch().join(board.name);
-    let _ = fs::remove_dir_all(&dir);
+    let dir = scratch(board.name);
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[board.folder]);
     workspace::write(&dir, &files).unwrap();
-    let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu, &scratch().join("boards"), false);
+    let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu, &image_target(), false);
     Some(built.unwrap_or_else(|error| panic!("{error}")).elf)
 }
 

@@ -2,12 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
-mod identify_support;
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-use identify_support::{Drive, generator};
+use crate::identify_support::{Drive, generator};
 use rand_chacha::rand_core::Rng;
 use specgen::diagnostic::{Diagnostic, Place, Severity};
 use specgen::identify::{Options, Record, identify, read_record};

@@ -3,9 +3,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
-mod identify_support;
 
-use identify_support::{Drive, generator, normal, random_table, uniform};
+use crate::identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
 use specgen::identify::regressor::{Plane, evaluate};

@@ -2,12 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
-mod identify_support;
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
-use identify_support::{generator, normal};
+use crate::identify_support::{generator, normal};
 use specgen::diagnostic::Diagnostic;
 use specgen::identify::response::{ResponseReport, respond_text};
 use specgen::identify::{Record, gauge, linear, parse_record, stiffness};

@@ -2,9 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
-mod identify_support;
 
-use identify_support::{Drive, generator, normal, random_table, uniform};
+use crate::identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::everett::EverettTable;
 use specgen::identify::regressor::{Plane, evaluate};
 use specgen::identify::{

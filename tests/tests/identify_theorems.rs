@@ -2,9 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
-mod identify_support;
 
-use identify_support::{Relays, generator, random_table, uniform};
+use crate::identify_support::{Relays, generator, random_table, uniform};
 use nalgebra::DMatrix;
 use specgen::identify::Staircase;
 use specgen::identify::nnls;

@@ -4,8 +4,8 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
-mod figures;
 
+use crate::figures;
 use host_sim::controller::TickController;
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;

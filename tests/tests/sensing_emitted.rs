@@ -1,15 +1,13 @@
 //! The emitted `controller::sensing` and forward kinematics against the runtime with the constants of the IR, bit for bit: the
 //! emitter puts every constant where it belongs.
 
-#[path = "support/gauges.rs"]
-mod gauges;
 
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use gauges::{Random, legs, lowered, model, real, runtime, sensing, task, three_two_one, tilted, with_scalar};
+use crate::support::gauges::{Random, legs, lowered, model, real, runtime, sensing, task, three_two_one, tilted, with_scalar};
 use specgen::emit::emit;
 use specgen::ir::Ir;
 use specgen::model::{Model, Scalar};
@@ -107,8 +105,7 @@ fn expected<T: Real>(ir: &Ir, rows: &[([T; 6], [T; 6])]) -> Vec<String> {
 
 /// What the emitted crate says.
 fn emitted<T: Real>(name: &str, ir: &Ir, rows: &[([T; 6], [T; 6])]) -> Vec<String> {
-    let dir = scratch().join(name);
-    let _ = fs::remove_dir_all(&dir);
+    let dir = scratch(name);
     workspace::write(&dir, &workspace::files(ir, &emit(ir))).unwrap();
     fs::create_dir_all(dir.join("probe/src")).unwrap();
     fs::write(dir.join("probe/Cargo.toml"), MANIFEST).unwrap();

@@ -3,16 +3,11 @@
 // Clippy sees the helpers of an integration test as production code.
 #![allow(clippy::expect_used, clippy::panic)]
 
-mod support {
-    #![allow(dead_code)] // shared with other tests, which use other parts
-    pub mod specs;
-}
-
 use std::fs;
 
 use specgen::diagnostic::{Diagnostic, Place, codes, render, to_json};
 use specgen::spec::{self, SpecSource};
-use support::specs::{errors, every_key, folder_with_records, root, source};
+use crate::support::specs::{errors, every_key, folder_with_records, root, source};
 
 /// The text that a user sees, against the committed one; SPECGEN_BLESS=1 writes it.
 #[test]

@@ -5,18 +5,13 @@
 // Clippy sees the helpers of an integration test as production code.
 #![allow(clippy::expect_used, clippy::panic)]
 
-mod support {
-    #![allow(dead_code)] // shared with other tests, which use other parts
-    pub mod specs;
-}
-
 use std::fs;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 use specgen::diagnostic::{Diagnostic, Place, Severity, codes, render, to_json};
 use specgen::spec;
-use support::specs::{every_key, folder_with_records, root, source, spec_files};
+use crate::support::specs::{every_key, folder_with_records, root, source, spec_files};
 
 /// Pieces that have broken parsers before.
 const TOKENS: &[&str] = &[

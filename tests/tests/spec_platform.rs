@@ -3,11 +3,7 @@
 // Clippy sees the helpers of an integration test as production code.
 #![allow(clippy::expect_used, clippy::panic)]
 
-mod support {
-    #![allow(dead_code)] // shared with other tests, which use other parts
-    pub mod specs;
-}
-
+use crate::support;
 use std::f64::consts::{FRAC_PI_6, PI};
 use std::fs;
 
@@ -17,7 +13,7 @@ use specgen::model::{
     SetpointKind, SetpointRules, TaskSpace, Trajectory, TrajectoryKind,
 };
 use specgen::spec::{self, SpecSource};
-use support::specs::{errors, folder_with_records, root, source};
+use crate::support::specs::{errors, folder_with_records, root, source};
 
 fn model(name: &str) -> Model {
     let source = SpecSource::read(&root().join("specs").join(name)).expect("readable");

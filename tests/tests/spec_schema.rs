@@ -3,17 +3,12 @@
 // Clippy sees the helpers of an integration test as production code.
 #![allow(clippy::expect_used, clippy::panic)]
 
-mod support {
-    #![allow(dead_code)] // shared with other tests, which use other parts
-    pub mod specs;
-}
-
 use std::fs;
 use std::path::Path;
 
 use serde_json::{Value, json};
 use specgen::{diagnostic, spec};
-use support::specs::{every_key, root, spec_files};
+use crate::support::specs::{every_key, root, spec_files};
 
 fn validator() -> jsonschema::Validator {
     let schema: Value = serde_json::from_str(&spec::json_schema()).expect("the schema is JSON");

@@ -1,60 +1,42 @@
-//! Every test binary of the workspace, as many at a time as there are processors.
+//! Every test of the workspace: one binary a package, run by modules, as many at a time as there are processors.
 //!
-//! `cargo test` runs them one after the other. Most of their time goes into compiling emitted controllers, which keeps one
-//! processor busy (one codegen unit, whole-program optimisation), so the others would wait.
+//! `cargo test` runs one binary after the other, and at the end of each all processors but one wait for its longest test. Here a
+//! job is a module of a binary (what its tests share is made once), the longest start first, and one line says how each ended.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::progress::{Durations, Progress};
 use crate::run::{Outcome, cargo, expect_success};
+use crate::skips;
 
-/// Those that take longest, the longest first: one that comes last would run alone.
-const SLOWEST: [&str; 6] = [
-    "tests platform_tables",
-    "tests platform_bits",
-    "codegen robust",
-    "tests rate_options",
-    "tests boards",
-    "codegen pil",
-];
-
-/// Compiles them all, runs them, then the examples of the documentation.
-pub fn test(root: &Path) -> Outcome {
-    let binaries = match compile(root) {
-        Ok(binaries) => binaries,
-        Err(why) => return Outcome::Failed(why),
-    };
-    // Many tests build the same controller: once in a run is enough. What an earlier run left is not trusted.
-    let kept = root.join("target/tests/kept");
-    if let Err(error) = std::fs::remove_dir_all(&kept)
-        && error.kind() != std::io::ErrorKind::NotFound
-    {
-        return Outcome::Failed(format!("removing {}: {error}", kept.display()));
-    }
-    let workers = std::thread::available_parallelism().map_or(1, usize::from);
-    println!("{} test binaries, {workers} at a time", binaries.len());
-    let failed = run(&binaries, workers, &kept);
-    if !failed.is_empty() {
-        return Outcome::Failed(format!("see the failed tests above, of {}", failed.join(", ")));
-    }
-    let doc = cargo(root, &["test", "--release", "--workspace", "--doc", "--quiet"]);
-    expect_success(doc, "see the failed examples above")
+/// How tests are run.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Mode {
+    /// Those that only gain by length run at full length: the soak.
+    pub soak: bool,
+    /// The cross compiler or the emulator is missing, which a step before has said: what needs it is skipped.
+    pub tools_missing: bool,
 }
 
-/// A compiled test binary.
-struct Binary {
-    /// Package and target, such as `specgen-tests bit_identity`.
-    name: String,
-    executable: PathBuf,
-    /// Folder of its package: where cargo would run it.
-    folder: PathBuf,
+/// The variable of the environment that asks tests for their long form.
+pub const SOAK: &str = "SPECGEN_SOAK";
+
+/// What was run.
+#[derive(Debug, Default)]
+pub struct Ran {
+    /// `package::module::test`, sorted, with whether it passed.
+    pub tests: Vec<(String, bool)>,
+    /// Why a test or a part of one was not run: job, reason.
+    pub skipped: Vec<(String, String)>,
 }
 
-/// Compiles without running; errors are printed by cargo.
-fn compile(root: &Path) -> Result<Vec<Binary>, String> {
+/// Compiles every test binary of the workspace without running it; errors are printed by cargo.
+pub fn compile(root: &Path) -> Result<Vec<Binary>, String> {
     let arguments = ["test", "--release", "--workspace", "--no-run", "--message-format=json-render-diagnostics"];
     let output = cargo(root, &arguments)
         .stderr(Stdio::inherit())
@@ -63,67 +45,196 @@ fn compile(root: &Path) -> Result<Vec<Binary>, String> {
     if !output.status.success() {
         return Err(format!("{}; see the errors above", output.status));
     }
-    let mut binaries: Vec<Binary> = String::from_utf8_lossy(&output.stdout).lines().filter_map(binary).collect();
-    let place = |binary: &Binary| SLOWEST.iter().position(|name| *name == binary.name).unwrap_or(SLOWEST.len());
-    binaries.sort_by(|a, b| (place(a), &a.name).cmp(&(place(b), &b.name)));
+    let mut binaries: Vec<Binary> = String::from_utf8_lossy(&output.stdout).lines().filter_map(Binary::of).collect();
+    binaries.sort_by(|a, b| a.name.cmp(&b.name));
     if binaries.is_empty() {
         return Err("cargo named no test binary".to_owned());
     }
     Ok(binaries)
 }
 
-/// The test binary that a message of cargo speaks of, if it does.
-fn binary(line: &str) -> Option<Binary> {
-    let message: serde_json::Value = serde_json::from_str(line).ok()?;
-    if message["reason"] != "compiler-artifact" || message["profile"]["test"] != true {
-        return None;
+/// Runs the binaries' tests, then looks at what was skipped.
+pub fn test(root: &Path, binaries: &[Binary], mode: Mode, ran: &mut Ran) -> Outcome {
+    let kept = root.join("target/tests");
+    let durations = Durations::read(&kept.join("durations.json"));
+    let jobs = match jobs(binaries, &durations) {
+        Ok(jobs) => jobs,
+        Err(why) => return Outcome::Failed(why),
+    };
+    let workers = std::thread::available_parallelism().map_or(1, usize::from);
+    // What earlier runs left; a folder that cannot be removed is nobody's matter, as names are not used twice.
+    let _ = std::fs::remove_dir_all(kept.join("scratch"));
+    println!("{} modules of {} test binaries, {workers} at a time", jobs.len(), binaries.len());
+    let done = run(&jobs, workers, &kept, &durations, mode);
+    Durations::of(done.iter().map(|ended| (ended.name.clone(), ended.took))).write(&kept.join("durations.json"));
+    let mut failed = Vec::new();
+    for ended in done {
+        if !ended.good {
+            failed.push(ended.name.clone());
+        }
+        ran.tests.extend(ended.tests);
+        ran.skipped.extend(ended.skipped.into_iter().map(|why| (ended.name.clone(), why)));
     }
-    let folder = Path::new(message["manifest_path"].as_str()?).parent()?.to_owned();
-    let package = folder.file_name()?.to_string_lossy().into_owned();
-    Some(Binary {
-        name: format!("{package} {}", message["target"]["name"].as_str()?),
-        executable: message["executable"].as_str()?.into(),
-        folder,
-    })
+    ran.tests.sort();
+    ran.skipped.sort();
+    if !failed.is_empty() {
+        failed.sort();
+        return Outcome::Failed(format!("see the failed tests above, of {}", failed.join(", ")));
+    }
+    skips::judge(root, &ran.skipped)
 }
 
-/// Runs them and prints what each says when it ends. Returns the names of those that failed.
-fn run(binaries: &[Binary], workers: usize, kept: &Path) -> Vec<String> {
+/// The examples in the documentation.
+pub fn examples(root: &Path) -> Outcome {
+    let doc = cargo(root, &["test", "--release", "--workspace", "--doc", "--quiet"]);
+    expect_success(doc, "see the failed examples above")
+}
+
+/// A compiled test binary.
+pub struct Binary {
+    /// Package and target, such as `specgen-tests all`; the target is left out where it is the library.
+    name: String,
+    executable: PathBuf,
+    /// Folder of its package: where cargo would run it.
+    folder: PathBuf,
+}
+
+impl Binary {
+    /// The test binary that a message of cargo speaks of, if it does.
+    fn of(line: &str) -> Option<Self> {
+        let message: serde_json::Value = serde_json::from_str(line).ok()?;
+        if message["reason"] != "compiler-artifact" || message["profile"]["test"] != true {
+            return None;
+        }
+        let manifest = Path::new(message["manifest_path"].as_str()?);
+        let folder = manifest.parent()?.to_owned();
+        let package = folder.file_name()?.to_string_lossy().into_owned();
+        let target = message["target"]["name"].as_str()?;
+        let library = message["target"]["kind"].as_array()?.iter().any(|kind| kind == "lib");
+        Some(Self {
+            name: if library { package } else { format!("{package} {target}") },
+            executable: message["executable"].as_str()?.into(),
+            folder,
+        })
+    }
+
+    /// Paths of its tests, without those that are ignored.
+    fn tests(&self) -> Result<Vec<String>, String> {
+        let list = |more: &[&str]| -> Result<Vec<String>, String> {
+            let mut command = Command::new(&self.executable);
+            command.current_dir(&self.folder).args(["--list", "--format", "terse"]).args(more);
+            let output = command.output().map_err(|error| format!("{}: {error}", self.name))?;
+            let text = String::from_utf8_lossy(&output.stdout).into_owned();
+            Ok(text.lines().filter_map(|line| line.strip_suffix(": test")).map(str::to_owned).collect())
+        };
+        let ignored = list(&["--ignored"])?;
+        Ok(list(&[])?.into_iter().filter(|test| !ignored.contains(test)).collect())
+    }
+}
+
+/// A module of a binary.
+struct Job<'a> {
+    /// Such as `tests all::platform_tables`.
+    name: String,
+    binary: &'a Binary,
+    tests: Vec<String>,
+}
+
+/// The longest first: one that comes last would run alone.
+fn jobs<'a>(binaries: &'a [Binary], durations: &Durations) -> Result<Vec<Job<'a>>, String> {
+    let mut jobs = Vec::new();
+    for binary in binaries {
+        let mut modules: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        for test in binary.tests()? {
+            let module = test.split_once("::").map_or("", |(module, _)| module);
+            modules.entry(module.to_owned()).or_default().push(test);
+        }
+        jobs.extend(modules.into_iter().map(|(module, tests)| {
+            let name = if module.is_empty() { binary.name.clone() } else { format!("{}::{module}", binary.name) };
+            Job { name, binary, tests }
+        }));
+    }
+    jobs.sort_by(|a, b| durations.expect(&b.name).cmp(&durations.expect(&a.name)).then_with(|| a.name.cmp(&b.name)));
+    Ok(jobs)
+}
+
+/// How a job ended.
+struct Ended {
+    name: String,
+    good: bool,
+    took: Duration,
+    tests: Vec<(String, bool)>,
+    skipped: Vec<String>,
+}
+
+/// Runs them; a line for each, with all that it printed where it failed.
+fn run(jobs: &[Job<'_>], workers: usize, kept: &Path, durations: &Durations, mode: Mode) -> Vec<Ended> {
     let next = AtomicUsize::new(0);
-    let failed = Mutex::new(Vec::new());
-    let work = || {
-        while let Some(binary) = binaries.get(next.fetch_add(1, Ordering::Relaxed)) {
+    let expected: Vec<Duration> = jobs.iter().map(|job| durations.expect(&job.name)).collect();
+    let done = Mutex::new((Vec::new(), Progress::new(expected, workers)));
+    let work = &|worker: usize| {
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(job) = jobs.get(index) else { break };
             let start = Instant::now();
-            // What cargo sets at run time and a test may read.
-            let ended = Command::new(&binary.executable)
-                .current_dir(&binary.folder)
-                .env("CARGO_MANIFEST_DIR", &binary.folder)
-                .env("SPECGEN_BUILD_CACHE", kept)
-                .stdin(Stdio::null())
-                .output();
-            let (good, text) = match ended {
-                Ok(output) => (output.status.success(), [output.stdout, output.stderr].concat()),
-                Err(error) => (false, error.to_string().into_bytes()),
-            };
+            let (good, text) = job.run(kept, mode, worker);
+            let ended = job.ended(good, &text, start.elapsed());
             // One at a time, so that outputs do not mix. A poisoned lock would mean that printing panicked.
-            let mut failed = failed.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-            print(&binary.name, start.elapsed(), &text);
+            let mut done = done.lock().unwrap_or_else(PoisonError::into_inner);
+            let (list, progress) = &mut *done;
+            let line = progress.ended(index, ended.took);
+            let word = if good { "ok" } else { "FAILED" };
+            println!("{line}  {word:6}  {} ({}, {:.1} s)", job.name, ended.tests.len(), ended.took.as_secs_f64());
             if !good {
-                println!("FAILED: {}", binary.name);
-                failed.push(binary.name.clone());
+                println!("{}\n", text.trim());
             }
+            list.push(ended);
         }
     };
     std::thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(work);
+        for worker in 0..workers {
+            scope.spawn(move || work(worker));
         }
     });
-    let mut failed = failed.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-    failed.sort();
-    failed
+    done.into_inner().unwrap_or_else(PoisonError::into_inner).0
 }
 
-fn print(name: &str, took: Duration, text: &[u8]) {
-    println!("\n--- {name}, {:.1} s\n{}", took.as_secs_f64(), String::from_utf8_lossy(text).trim());
+impl Job<'_> {
+    /// Whether all passed, and what was printed. One test at a time: the other processors have other jobs.
+    fn run(&self, kept: &Path, mode: Mode, worker: usize) -> (bool, String) {
+        let mut command = Command::new(&self.binary.executable);
+        // What cargo sets at run time and a test may read.
+        command
+            .current_dir(&self.binary.folder)
+            .env("CARGO_MANIFEST_DIR", &self.binary.folder)
+            .env("SPECGEN_CACHE", kept.join("cache"))
+            .env("SPECGEN_TEST_WORKER", worker.to_string())
+            .args(["--show-output", "--test-threads=1", "--exact"])
+            .args(&self.tests)
+            .stdin(Stdio::null());
+        if mode.soak {
+            command.env(SOAK, "1");
+        }
+        if mode.tools_missing {
+            command.env(specgen::target::ALLOW_MISSING, "1");
+        }
+        match command.output() {
+            Ok(output) => {
+                let text = [output.stdout, output.stderr].concat();
+                (output.status.success(), String::from_utf8_lossy(&text).into_owned())
+            }
+            Err(error) => (false, error.to_string()),
+        }
+    }
+
+    fn ended(&self, good: bool, text: &str, took: Duration) -> Ended {
+        let failed = |test: &str| !text.lines().any(|line| line == format!("test {test} ... ok"));
+        Ended {
+            name: self.name.clone(),
+            good,
+            took,
+            tests: self.tests.iter().map(|test| (format!("{} {test}", self.binary.name), !failed(test))).collect(),
+            skipped: skips::of(text),
+        }
+    }
 }

@@ -1,9 +1,12 @@
-//! Developer commands: `cargo xtask setup`, `cargo xtask test`, `cargo xtask bless`.
+//! Developer commands: see [`USAGE`].
 
 mod binaries;
 mod generated;
+mod progress;
 mod run;
 mod setup;
+mod skips;
+mod soak;
 mod steps;
 
 use std::path::{Path, PathBuf};
@@ -13,6 +16,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
 
   setup   installs what the tests need: a cross compiler for Cortex-M and QEMU
   test    setup, then formatting, lints, every test, documentation, freshness of generated files
+  soak    every test at full length, for releases; writes tests/soak.txt
   bless   writes the generated files that are committed anew
 
 With SPECGEN_ALLOW_MISSING=1, what needs a tool that cannot be installed is skipped, and said so.";
@@ -23,6 +27,7 @@ fn main() -> ExitCode {
     match words[..] {
         ["setup"] => steps::setup(),
         ["test"] => steps::test(&root()),
+        ["soak"] => steps::soak(&root()),
         ["bless"] => steps::bless(&root()),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");

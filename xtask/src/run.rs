@@ -15,16 +15,23 @@ pub enum Outcome {
 }
 
 /// Steps done so far.
-#[derive(Default)]
 pub struct Report {
+    start: Instant,
+    /// How many there will be.
+    total: usize,
     steps: Vec<(String, Outcome, Duration)>,
 }
 
 impl Report {
+    pub fn new(total: usize) -> Self {
+        Self { start: Instant::now(), total, steps: Vec::new() }
+    }
+
     /// Does a step, in view. Later steps are done whether or not it passes.
     pub fn step(&mut self, name: &str, work: impl FnOnce() -> Outcome) {
-        println!("\n=== {name}");
         let start = Instant::now();
+        let gone = clock(start - self.start);
+        println!("\n=== {gone}  step {} of {}: {name}", self.steps.len() + 1, self.total);
         let outcome = work();
         self.steps.push((name.to_owned(), outcome, start.elapsed()));
     }
@@ -36,7 +43,7 @@ impl Report {
 
     /// Prints one line per step; fails if one failed.
     pub fn finish(self) -> ExitCode {
-        println!("\n=== summary");
+        println!("\n=== {}  summary", clock(self.start.elapsed()));
         for (name, outcome, took) in &self.steps {
             let (word, detail) = match outcome {
                 Outcome::Passed => ("ok", ""),
@@ -47,6 +54,12 @@ impl Report {
         }
         if self.has_failed() { ExitCode::FAILURE } else { ExitCode::SUCCESS }
     }
+}
+
+/// Minutes and seconds.
+pub fn clock(time: Duration) -> String {
+    let seconds = time.as_secs();
+    format!("{:2}:{:02}", seconds / 60, seconds % 60)
 }
 
 /// Cargo in the repository, the one that runs this.

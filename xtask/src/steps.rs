@@ -1,9 +1,12 @@
 //! What each command does, in order.
 
-use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::{binaries, generated, setup};
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Instant;
+
+use crate::binaries::{self, Binary, Mode, Ran};
+use crate::run::{Outcome, Report, cargo, expect_success};
+use crate::{generated, setup, soak};
 
 /// Its own workspace, built for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
@@ -15,8 +18,10 @@ const BOARDS: [&str; 2] = ["firmware/stm32h743/Cargo.toml", "firmware/stm32f4/Ca
 const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 /// Its own workspace, because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
+/// Workspaces of their own with lock files of their own.
+const STANDING_ALONE: [&str; 4] = [FIRMWARE, REAL_TIME, BOARDS[0], BOARDS[1]];
 /// Members of the workspace that people write.
-const HAND_WRITTEN: [&str; 9] = [
+const HAND_WRITTEN: [&str; 10] = [
     "specgen",
     "specgen-runtime",
     "specgen-hal",
@@ -24,35 +29,36 @@ const HAND_WRITTEN: [&str; 9] = [
     "specgen-board",
     "specgen-rt",
     "host-sim",
+    "oracle",
     "specgen-tests",
     "xtask",
 ];
 
 /// `cargo xtask setup`
 pub fn setup() -> ExitCode {
-    let mut report = Report::default();
+    let mut report = Report::new(1);
     report.step("cross compiler and QEMU", setup::microcontroller);
     report.finish()
 }
 
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
-    let mut report = Report::default();
+    let lock_files = STANDING_ALONE.len();
+    let mut report = Report::new(8 + lock_files);
     report.step("cross compiler and QEMU", setup::microcontroller);
-    if report.has_failed() {
-        // Every test that needs them would fail for the same reason.
-        return report.finish();
-    }
+    let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
     report.step("formatting", || formatting(root));
+    let binaries = compiled(root, &mut report);
+    report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
+    report.step("examples in the documentation", || binaries::examples(root));
     report.step("lints", || lints(root));
-    report.step("tests", || binaries::test(root));
     report.step("documentation", || {
         let mut doc = cargo(root, &["doc", "--release", "--workspace", "--no-deps", "--quiet"]);
         doc.env("RUSTDOCFLAGS", "-D warnings");
         expect_success(doc, "see the warnings above")
     });
     report.step("generated files are fresh", || generated::check(root));
-    for manifest in [FIRMWARE, REAL_TIME].iter().chain(&BOARDS) {
+    for manifest in STANDING_ALONE {
         report.step(&format!("lock file of {manifest} is fresh"), || {
             let mut metadata =
                 cargo(root, &["metadata", "--locked", "--format-version=1", "--manifest-path", manifest]);
@@ -63,11 +69,38 @@ pub fn test(root: &Path) -> ExitCode {
     report.finish()
 }
 
+/// `cargo xtask soak`
+pub fn soak(root: &Path) -> ExitCode {
+    let mut report = Report::new(4);
+    report.step("cross compiler and QEMU", setup::microcontroller);
+    let binaries = compiled(root, &mut report);
+    let mut ran = Ran::default();
+    let start = Instant::now();
+    report.step("tests at full length", || binaries::test(root, &binaries, Mode { soak: true, ..Mode::default() }, &mut ran));
+    let took = start.elapsed();
+    let good = !report.has_failed();
+    report.step("record of the soak", || soak::write(root, &ran, took, good));
+    report.finish()
+}
+
+/// Every test binary; none where they do not compile, which fails.
+fn compiled(root: &Path, report: &mut Report) -> Vec<Binary> {
+    let mut binaries = Vec::new();
+    report.step("compiling the tests", || match binaries::compile(root) {
+        Ok(made) => {
+            binaries = made;
+            Outcome::Passed
+        }
+        Err(why) => Outcome::Failed(why),
+    });
+    binaries
+}
+
 /// `cargo xtask bless`
 pub fn bless(root: &Path) -> ExitCode {
-    let mut report = Report::default();
+    let mut report = Report::new(1 + STANDING_ALONE.len());
     report.step("generated files", || generated::bless(root));
-    for manifest in [FIRMWARE, REAL_TIME].iter().chain(&BOARDS) {
+    for manifest in STANDING_ALONE {
         report.step(&format!("lock file of {manifest}"), || {
             // Keeps the versions that are locked; only the path packages follow their manifests.
             expect_success(cargo(root, &["update", "--workspace", "--manifest-path", manifest]), "see above")

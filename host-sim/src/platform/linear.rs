@@ -125,7 +125,7 @@ pub(crate) fn inverse(a: &Matrix6) -> Matrix6 {
 }
 
 /// e^A of an N×N matrix given as rows: Taylor series of A/2^s with |A/2^s| ≤ 1/4, squared s times.
-pub(crate) fn exponential(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
+pub fn exponential(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let n = matrix.len();
     let multiply = |a: &[Vec<f64>], b: &[Vec<f64>]| {
         let mut out = vec![vec![0.0; n]; n];

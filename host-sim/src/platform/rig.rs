@@ -180,6 +180,3 @@ impl PlatformRig {
         self.machine.hold(&inputs, interval);
     }
 }
-
-#[cfg(test)]
-mod tests;

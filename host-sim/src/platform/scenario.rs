@@ -157,6 +157,3 @@ pub fn select(controller: &mut dyn TickController, mode: u32) -> Result<(), Cont
     controller.description().set_config(&mut words, "mode", f64::from(mode))?;
     controller.configure(&words)
 }
-
-#[cfg(test)]
-mod tests;

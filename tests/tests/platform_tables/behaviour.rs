@@ -7,7 +7,7 @@ use host_sim::platform::{PlatformScenario, Specimen, UserFrames};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use specgen::machine;
 
-use crate::bench::{BIAS, Bench, PERIOD, in_parallel, paper, reference_machine};
+use super::bench::{BIAS, Bench, PERIOD, in_parallel, paper, reference_machine};
 
 const LEG_LIMITED: u32 = 0x3f;
 /// One step of the converter, V.

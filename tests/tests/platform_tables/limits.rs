@@ -7,7 +7,7 @@ use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use specgen::lower::platform;
 use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning, closed_loop_of};
 
-use crate::bench::{BIAS, Bench, PERIOD, PLANTS, Pair, SEED, in_parallel, median, random_machines};
+use super::bench::{BIAS, Bench, PERIOD, PLANTS, Pair, SEED, in_parallel, median, random_machines};
 
 /// A small step of the demand on every axis, then rest.
 struct Nudge;

@@ -3,7 +3,7 @@
 
 use host_sim::controller::{Controller, TickController};
 use host_sim::forc::{ReversalRecord, ReversalRow};
-use host_sim::oracle::{PlatformOracle, Settings, Table};
+use ::oracle::{PlatformOracle, Settings, Table};
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::Specimen;
 use host_sim::platform::rig::{Noise, Record, RunOptions};
@@ -12,7 +12,7 @@ use host_sim::platform::{PlatformParameters, PlatformScenario};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use specgen_tests::Emitted;
 
-use crate::bench::PERIOD;
+use super::bench::PERIOD;
 
 /// Up, then a dance on all six axes.
 struct Dance;

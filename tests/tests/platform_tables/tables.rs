@@ -5,7 +5,7 @@ use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory,
 use host_sim::platform::table::{MachiningTable, PoseRow, PoseTable, paper_rms};
 use host_sim::trajectory::PaperPath;
 
-use crate::bench::{Bench, PLANTS, in_parallel, median, paper, random_machines, reference_machine};
+use super::bench::{Bench, PLANTS, in_parallel, median, paper, random_machines, reference_machine};
 
 const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)];
 #[allow(clippy::type_complexity)] // A table of two.

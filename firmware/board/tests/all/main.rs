@@ -1,0 +1,8 @@
+//! A board on made-up converters, in one binary.
+
+#[path = "../../../../tests/tests/board_support/mod.rs"]
+mod board_support;
+mod cycle;
+mod desk;
+mod link;
+mod schedule;

@@ -1,0 +1,105 @@
+//! How far a list of jobs is, and how long it may still take, from how long each took last time.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use crate::run::clock;
+
+/// How long jobs take: of the last run on this machine, else of the run that the table below was taken from.
+pub struct Durations(BTreeMap<String, f64>);
+
+/// Seconds on two cores, of jobs above five seconds: for the order on a machine that has not run them yet.
+const TABLE: &[(&str, f64)] = &[];
+/// Of a job that neither names.
+const OTHERS: f64 = 1.0;
+
+impl Durations {
+    /// Those of the last run, if there was one.
+    pub fn read(path: &Path) -> Self {
+        let last = std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+        Self(last.unwrap_or_else(|| TABLE.iter().map(|(name, seconds)| ((*name).to_owned(), *seconds)).collect()))
+    }
+
+    pub fn of(jobs: impl Iterator<Item = (String, Duration)>) -> Self {
+        Self(jobs.map(|(name, took)| (name, took.as_secs_f64())).collect())
+    }
+
+    /// For the next run. Without it that one only has a worse order, so a failure is no matter.
+    pub fn write(&self, path: &Path) {
+        if let Ok(text) = serde_json::to_string_pretty(&self.0) {
+            let _ = std::fs::write(path, text);
+        }
+    }
+
+    pub fn expect(&self, name: &str) -> Duration {
+        Duration::from_secs_f64(self.0.get(name).copied().filter(|s| *s >= 0.0 && *s < 1e6).unwrap_or(OTHERS))
+    }
+}
+
+/// Jobs that are done and those that are not.
+pub struct Progress {
+    start: Instant,
+    workers: usize,
+    /// Of each job; none once it has ended.
+    open: Vec<Option<Duration>>,
+    /// Expected and measured time of those that ended.
+    ended: (Duration, Duration),
+}
+
+impl Progress {
+    pub fn new(expected: Vec<Duration>, workers: usize) -> Self {
+        let open = expected.into_iter().map(Some).collect();
+        Self { start: Instant::now(), workers, open, ended: (Duration::ZERO, Duration::ZERO) }
+    }
+
+    /// `[ 12/115]  1:40, about 4:10 left`
+    pub fn ended(&mut self, index: usize, took: Duration) -> String {
+        if let Some(expected) = self.open.get_mut(index).and_then(Option::take) {
+            self.ended.0 += expected;
+            self.ended.1 += took;
+        }
+        let total = self.open.len();
+        let left = self.open.iter().flatten().count();
+        let gone = clock(self.start.elapsed());
+        format!("[{:4}/{total}] {gone}, about {} left", total - left, clock(self.left()))
+    }
+
+    /// What was expected of the open jobs, by how wrong the expectation was so far.
+    fn left(&self) -> Duration {
+        let expected: Duration = self.open.iter().flatten().sum();
+        let ratio = if self.ended.0.is_zero() { 1.0 } else { self.ended.1.as_secs_f64() / self.ended.0.as_secs_f64() };
+        expected.mul_f64(ratio.clamp(0.1, 100.0) / self.workers.max(1) as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_follows_what_was_measured() {
+        let second = Duration::from_secs;
+        let mut progress = Progress::new(vec![second(10), second(20), second(30)], 2);
+        assert_eq!(progress.left(), second(30));
+        assert!(progress.ended(0, second(20)).starts_with("[   1/3]  0:00, about  0:50 left"));
+        // A job that ends twice counts once.
+        progress.ended(0, second(20));
+        assert_eq!(progress.left(), second(50));
+        progress.ended(1, second(40));
+        assert!(progress.ended(2, second(60)).ends_with("about  0:00 left"));
+    }
+
+    #[test]
+    fn last_durations_come_before_the_table_and_damage_is_no_matter() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("durations.json");
+        Durations::of([("a".to_owned(), Duration::from_secs(7))].into_iter()).write(&path);
+        assert_eq!(Durations::read(&path).expect("a"), Duration::from_secs(7));
+        assert_eq!(Durations::read(&path).expect("b"), Duration::from_secs(1));
+        std::fs::write(&path, "{\"a\": -1.0}").unwrap();
+        assert_eq!(Durations::read(&path).expect("a"), Duration::from_secs(1));
+        std::fs::write(&path, "no").unwrap();
+        assert_eq!(Durations::read(&path).expect("a"), Duration::from_secs(1));
+    }
+}

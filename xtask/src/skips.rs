@@ -1,0 +1,53 @@
+//! Tests that could not run, or not wholly: seen, counted, and under CI refused unless they are on the list.
+
+use std::path::Path;
+
+use crate::run::Outcome;
+
+/// What a test prints before the reason.
+const MARK: &str = "skipped: ";
+/// The list: a reason a line, as it begins; `#` begins a remark.
+const LIST: &str = "tests/skips.txt";
+
+/// The reasons in what a job printed.
+pub fn of(text: &str) -> Vec<String> {
+    let reasons = text.lines().filter_map(|line| line.split_once(MARK)).map(|(_, reason)| reason.trim().to_owned());
+    let mut reasons: Vec<String> = reasons.collect();
+    reasons.dedup();
+    reasons
+}
+
+/// Prints them. Under CI, where nobody reads them, one that is not expected fails.
+pub fn judge(root: &Path, skipped: &[(String, String)]) -> Outcome {
+    println!("\n{} skipped", skipped.len());
+    for (job, reason) in skipped {
+        println!("  {job}: {reason}");
+    }
+    let list = std::fs::read_to_string(root.join(LIST)).unwrap_or_default();
+    let unexpected: Vec<&str> =
+        skipped.iter().filter(|(_, reason)| !is_listed(&list, reason)).map(|(job, _)| job.as_str()).collect();
+    if unexpected.is_empty() || std::env::var_os("CI").is_none() {
+        return Outcome::Passed;
+    }
+    Outcome::Failed(format!("skipped, and not on the list of {LIST}: {}", unexpected.join(", ")))
+}
+
+fn is_listed(list: &str, reason: &str) -> bool {
+    let lines = list.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
+    lines.into_iter().any(|line| reason.starts_with(line))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_is_found_wherever_it_stands_and_listed_by_its_beginning() {
+        let text = "test a ... ok\nname: skipped: no card here\nskipped: QEMU is missing\nskipped: QEMU is missing\n";
+        assert_eq!(of(text), ["no card here", "QEMU is missing"]);
+        let list = "# devices\nno card\n\n";
+        assert!(is_listed(list, "no card here"));
+        assert!(!is_listed(list, "QEMU is missing"));
+        assert!(!is_listed("", "anything"));
+    }
+}
