@@ -1,9 +1,8 @@
 //! `specgen dynamics` as a user runs it.
 #![allow(clippy::unwrap_used)] // A test.
 
-
-use serde_json::Value;
 use crate::support::{Folder, repository};
+use serde_json::Value;
 
 fn reference() -> (String, Value) {
     let path = repository().join("tests/oracle/dynamics-reference.json");

@@ -4,14 +4,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-
 use std::ffi::OsString;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-use specgen::target;
 use crate::support::{Document, Folder, Run};
+use specgen::target;
 
 /// Where images are built: kept between runs, so that `core` is compiled once.
 fn target_dir() -> String {

@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 #![cfg(unix)]
 
-
 use crate::support;
 use std::fs::{self, File};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
@@ -11,8 +10,8 @@ use std::os::unix::process::CommandExt;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use rustix::process::{Pid, Signal, kill_process_group};
 use crate::support::{Folder, Run};
+use rustix::process::{Pid, Signal, kill_process_group};
 
 /// A folder with a `cargo` that never ends, and a folder for what is temporary.
 fn with_slow_cargo() -> Folder {

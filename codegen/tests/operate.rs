@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::PathBuf;
@@ -13,9 +12,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::board_support::Line;
+use crate::support::{Folder, Run};
 use controller::supervised::Phase;
 use specgen_link::client::Port;
-use crate::support::{Folder, Run};
 
 /// A board at a socket.
 struct Served {

@@ -13,6 +13,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::support::{BINARY, Run, repository};
 use board::{Board, Stepped};
 use host_sim::controller::{Controller, Supervised, TickController};
 use serde_json::Value;
@@ -20,7 +21,6 @@ use specgen::model::Mcu;
 use specgen::pil::{Lockstep, Pipes, Stop};
 use specgen::target::{self, Image, emulator::Emulator};
 use specgen_link::client::Patience;
-use crate::support::{BINARY, Run, repository};
 
 /// One workspace for all, so that dependencies are built once; one run at a time writes it.
 static ONE: Mutex<()> = Mutex::new(());

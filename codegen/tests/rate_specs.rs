@@ -2,12 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-
 use std::fs;
 
+use crate::support::{Folder, repository};
 use specgen::everett::EverettTable;
 use specgen::identify::rate::write_rate_csv;
-use crate::support::{Folder, repository};
 
 /// `specs/legs.toml` with lines added to [hysteresis], in a folder beside its records.
 fn legs_with(lines: &str) -> Folder {

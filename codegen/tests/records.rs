@@ -3,12 +3,11 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-
 use std::fmt::Write as _;
 use std::fs;
 
-use serde_json::Value;
 use crate::support::{Document, Folder};
+use serde_json::Value;
 
 const HEADER: &str = "time_s,drive_V,displacement_um";
 const BAD: &str = "records/bad.csv";

@@ -2,16 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-
 use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;
 
+use crate::support::{Folder, contents};
 use serde_json::Value;
 use specgen::compile::compile;
 use specgen::model::AdaptationMode;
 use specgen::stability::platform::{Adapting, Law};
-use crate::support::{Folder, contents};
 
 /// A run of `name` in a report.
 fn machine<'a>(report: &'a Value, name: &str) -> &'a Value {

@@ -2,16 +2,15 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-
 use crate::support;
 use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;
 
+use crate::support::{Folder, Run, contents};
 use serde_json::Value;
 use specgen::compile::{Compiled, compile};
 use specgen::lower::platform;
 use specgen::stability::platform::{Conditions, Law, RestDynamics, Tuning, closed_loop_of};
-use crate::support::{Folder, Run, contents};
 
 /// The row of a setting in a report.
 fn row<'a>(report: &'a Value, name: &str) -> &'a Value {

@@ -1,7 +1,6 @@
 //! What a board recorded, through the frames of the link: what is downloaded replays bit for bit on the host, whatever happens
 //! to the line, to the settings, or to the machine in between.
 
-
 use std::io::Cursor;
 
 use crate::board_support::{Line, bytes, done, refused, running, wait, wave};

@@ -14,7 +14,7 @@ use specgen::target::callgraph::CallGraph;
 use specgen::target::checks::{self, Rule, Rules};
 use specgen::target::{build, image, stack, toolchain};
 use specgen::workspace;
-use specgen_tests::{compile_edited, repository, image_target, scratch};
+use specgen_tests::{compile_edited, image_target, repository, scratch};
 
 /// Bytes of RAM, the stack's reserve included, without the buffer of a recorder.
 const RAM: u64 = 24 * 1024;

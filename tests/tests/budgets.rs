@@ -1,5 +1,5 @@
 //! What a tick costs on the emulated microcontrollers, against the figures the project promises.
-//! `cargo test --release -p specgen-tests --test budgets -- --nocapture` prints them.
+//! `cargo test --release -p specgen-tests budgets -- --nocapture` prints them.
 
 use host_sim::controller::TickController;
 use host_sim::description::Description;

@@ -3,7 +3,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
-
 use crate::identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;

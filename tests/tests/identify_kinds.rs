@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
-
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 

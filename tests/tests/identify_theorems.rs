@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 
-
 use crate::identify_support::{Relays, generator, random_table, uniform};
 use nalgebra::DMatrix;
 use specgen::identify::Staircase;

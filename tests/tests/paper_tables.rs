@@ -1,5 +1,5 @@
 //! The paper's Tables 1 and 2, from the emitted controller on the reference plant: our figures against the paper's and
-//! against the study of the same plant. `cargo test --release -p specgen-tests --test paper_tables -- --nocapture` prints them.
+//! against the study of the same plant. `cargo test --release -p specgen-tests paper_tables -- --nocapture` prints them.
 
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;

@@ -1,7 +1,7 @@
 //! What a tick of the controller in task space costs on the emulated microcontrollers: against the figures the project
 //! promises, and against the committed ones of `tests/budgets/platform.json`, stage by stage.
 //!
-//! `cargo test --release -p specgen-tests --test platform_budgets -- --nocapture` prints them; with `SPECGEN_BLESS=1` in
+//! `cargo test --release -p specgen-tests platform_budgets -- --nocapture` prints them; with `SPECGEN_BLESS=1` in
 //! the environment the figures of the present cross compiler are committed anew.
 
 use std::collections::BTreeMap;

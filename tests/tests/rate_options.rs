@@ -1,9 +1,8 @@
 //! Rate-dependent options of the emitted controller: equal bits on host and microcontroller, and what they are worth on the
-//! reference plant. `cargo test --release -p specgen-tests --test rate_options -- --nocapture` prints the table of
+//! reference plant. `cargo test --release -p specgen-tests rate_options -- --nocapture` prints the table of
 //! `docs/hysteresis.md`, and what a tick costs with each.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
-
 
 use crate::figures;
 use host_sim::controller::TickController;

@@ -1,6 +1,5 @@
 //! Pose from gauges, and from leg displacements, against geometry in 32 digits; layouts that cannot work are refused.
 
-
 use crate::support::gauges::{
     Random, double, legs, lowered, model, probe, real, runtime, sensing, series, task, three_two_one, tilted,
     with_scalar,

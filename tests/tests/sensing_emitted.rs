@@ -1,13 +1,14 @@
 //! The emitted `controller::sensing` and forward kinematics against the runtime with the constants of the IR, bit for bit: the
 //! emitter puts every constant where it belongs.
 
-
 use std::fmt::Write as _;
 use std::fs;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
-use crate::support::gauges::{Random, legs, lowered, model, real, runtime, sensing, task, three_two_one, tilted, with_scalar};
+use crate::support::gauges::{
+    Random, legs, lowered, model, real, runtime, sensing, task, three_two_one, tilted, with_scalar,
+};
 use specgen::emit::emit;
 use specgen::ir::Ir;
 use specgen::model::{Model, Scalar};

@@ -438,7 +438,7 @@ fn a_table_is_part_of_the_digest_and_its_absence_is_reported() {
 /// Mean instructions of the stage on the M7 in f64: standing, streaming, moving, playing.
 const BUDGETS: [(&str, f64); 4] = [("hold", 150.0), ("stream", 300.0), ("move", 300.0), ("trajectory", 450.0)];
 
-/// `cargo test -p specgen-tests --test setpoint instructions -- --nocapture` prints the figures.
+/// `cargo test -p specgen-tests setpoint instructions -- --nocapture` prints the figures.
 #[test]
 fn set_points_stay_within_their_instructions() {
     let emitted = Emitted::new("setpoint-budget", "reference.toml", &[]);

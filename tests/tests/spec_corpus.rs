@@ -5,9 +5,9 @@
 
 use std::fs;
 
+use crate::support::specs::{errors, every_key, folder_with_records, root, source};
 use specgen::diagnostic::{Diagnostic, Place, codes, render, to_json};
 use specgen::spec::{self, SpecSource};
-use crate::support::specs::{errors, every_key, folder_with_records, root, source};
 
 /// The text that a user sees, against the committed one; SPECGEN_BLESS=1 writes it.
 #[test]
@@ -36,11 +36,7 @@ fn the_corpus_is_rendered_as_committed() {
             stale.push(format!("{name}, now:\n{text}"));
         }
     }
-    assert!(
-        stale.is_empty(),
-        "SPECGEN_BLESS=1 cargo test -p specgen-tests --test spec_corpus accepts:\n{}",
-        stale.join("\n")
-    );
+    assert!(stale.is_empty(), "SPECGEN_BLESS=1 cargo test -p specgen-tests spec_corpus accepts:\n{}", stale.join("\n"));
 }
 
 #[test]

@@ -3,11 +3,13 @@
 // Clippy sees the helpers of an integration test as production code.
 #![allow(clippy::expect_used, clippy::panic)]
 
+use crate::support::specs::{
+    Choice, LEGS, PLATFORM, errors, every_key, folder_with_records, line_of, source, spec_files,
+};
 use specgen::diagnostic::{Diagnostic, codes, render};
 use specgen::spec::keys::{Item, Key, Kind, Presence, SECTIONS, Section, Shape};
 use specgen::spec::{self, SpecSource};
 use specgen::stability;
-use crate::support::specs::{Choice, LEGS, PLATFORM, errors, every_key, folder_with_records, line_of, source, spec_files};
 
 #[test]
 fn every_spec_of_the_repository_is_accepted_without_a_warning_and_stable() {

@@ -7,11 +7,11 @@
 
 use std::fs;
 
+use crate::support::specs::{every_key, folder_with_records, root, source, spec_files};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 use specgen::diagnostic::{Diagnostic, Place, Severity, codes, render, to_json};
 use specgen::spec;
-use crate::support::specs::{every_key, folder_with_records, root, source, spec_files};
 
 /// Pieces that have broken parsers before.
 const TOKENS: &[&str] = &[

@@ -7,13 +7,13 @@ use crate::support;
 use std::f64::consts::{FRAC_PI_6, PI};
 use std::fs;
 
+use crate::support::specs::{errors, folder_with_records, root, source};
 use specgen::diagnostic::{codes, render};
 use specgen::model::{
     AdaptationMode, ControlMode, Environment, Frames, Gains, Interaction, Mcu, Model, PaperPath, Probe, Scalar,
     SetpointKind, SetpointRules, TaskSpace, Trajectory, TrajectoryKind,
 };
 use specgen::spec::{self, SpecSource};
-use crate::support::specs::{errors, folder_with_records, root, source};
 
 fn model(name: &str) -> Model {
     let source = SpecSource::read(&root().join("specs").join(name)).expect("readable");

@@ -6,9 +6,9 @@
 use std::fs;
 use std::path::Path;
 
+use crate::support::specs::{every_key, root, spec_files};
 use serde_json::{Value, json};
 use specgen::{diagnostic, spec};
-use crate::support::specs::{every_key, root, spec_files};
 
 fn validator() -> jsonschema::Validator {
     let schema: Value = serde_json::from_str(&spec::json_schema()).expect("the schema is JSON");
@@ -86,7 +86,7 @@ fn assert_fresh(path: &Path, text: &str) {
     let committed = fs::read_to_string(path).unwrap_or_default();
     assert!(
         committed == text,
-        "{} is stale: run SPECGEN_BLESS=1 cargo test -p specgen-tests --test spec_schema",
+        "{} is stale: run SPECGEN_BLESS=1 cargo test -p specgen-tests spec_schema",
         path.display()
     );
 }

@@ -76,7 +76,9 @@ pub fn soak(root: &Path) -> ExitCode {
     let binaries = compiled(root, &mut report);
     let mut ran = Ran::default();
     let start = Instant::now();
-    report.step("tests at full length", || binaries::test(root, &binaries, Mode { soak: true, ..Mode::default() }, &mut ran));
+    report.step("tests at full length", || {
+        binaries::test(root, &binaries, Mode { soak: true, ..Mode::default() }, &mut ran)
+    });
     let took = start.elapsed();
     let good = !report.has_failed();
     report.step("record of the soak", || soak::write(root, &ran, took, good));

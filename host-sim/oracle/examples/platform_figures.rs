@@ -5,13 +5,13 @@
 
 use std::time::Instant;
 
-use oracle::design::{Deviation, Gains, Rule};
-use oracle::{PlatformOracle, Settings};
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Noise, Record, RunOptions};
 use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, PLATFORM_MODES, select};
 use host_sim::platform::{PlatformRig, PlatformScenario, Specimen, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
+use oracle::design::{Deviation, Gains, Rule};
+use oracle::{PlatformOracle, Settings};
 
 const PERIOD: f64 = 1e-4;
 const PARTS: [(&str, WorkPart); 2] = [

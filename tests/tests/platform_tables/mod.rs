@@ -1,5 +1,5 @@
 //! The paper's Tables 5 to 9, limits of stability and behaviour in the large, from the emitted controller on simulated
-//! machines out of tolerance. `cargo test --release -p specgen-tests --test platform_tables -- --nocapture` prints every
+//! machines out of tolerance. `cargo test --release -p specgen-tests platform_tables -- --nocapture` prints every
 //! figure.
 
 mod behaviour;

@@ -1,9 +1,9 @@
 //! The emitted tick against one written apart from it, in plain f64 with matrices: host-sim's reference controller, fed
 //! with the same tables, settings and inputs.
 
+use ::oracle::{PlatformOracle, Settings, Table};
 use host_sim::controller::{Controller, TickController};
 use host_sim::forc::{ReversalRecord, ReversalRow};
-use ::oracle::{PlatformOracle, Settings, Table};
 use host_sim::plant::{LegParameters, NoiseParameters};
 use host_sim::platform::Specimen;
 use host_sim::platform::rig::{Noise, Record, RunOptions};

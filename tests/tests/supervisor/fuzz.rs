@@ -1,5 +1,5 @@
 //! Any bits in every input word. A million ticks of each kind; with `SPECGEN_FUZZ_TICKS=100000000` so many:
-//! `SPECGEN_FUZZ_TICKS=100000000 cargo test --release -p specgen-tests --test supervisor -- any_bits --nocapture`.
+//! `SPECGEN_FUZZ_TICKS=100000000 cargo test --release -p specgen-tests supervisor::fuzz -- --nocapture`.
 
 use super::bench::*;
 use host_sim::controller::Supervised;

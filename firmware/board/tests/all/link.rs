@@ -3,7 +3,6 @@
 
 #![allow(clippy::unwrap_used)] // A panic is a failed test.
 
-
 use crate::board_support::{Line, bytes, done, refused, running, wave};
 use controller::supervised::{MACHINE_INPUT_WORDS, Machine, MachineInput, Phase, machine_output_words, supervise};
 use controller::{CONFIG_WORDS, Config, ControlMode};

@@ -1,15 +1,14 @@
 //! Sessions with frames truncated, repeated, lost or flipped at every byte: what is carried out is what was asked, in its
 //! order, each once; the rest is counted.
 
-
 use crate::support;
+use crate::support::{Notebook, leaked, session};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen_link::client::{Client, Patience, Port};
 use specgen_link::{Counters, Device, Endpoint, FRAME, Reply, Request};
 use std::io;
 use std::time::Duration;
-use crate::support::{Notebook, leaked, session};
 
 fn requests() -> Vec<Request<'static>> {
     vec![

@@ -1,15 +1,14 @@
 //! Every message survives the way through a frame, and sizes are what the crate says.
 
-
 use crate::support;
 use std::time::Duration;
 
+use crate::support::{IDENTITY, Tap, leaked};
 use specgen_link::client::{Client, ClientError, Patience};
 use specgen_link::{
     Bytes, Counters, Device, Endpoint, FRAME, MESSAGE, RecorderAction, RecorderStatus, Refusal, Reply, Request, Stage,
     Status, WORDS, WaveAction,
 };
-use crate::support::{IDENTITY, Tap, leaked};
 
 const STATUS: Status = Status {
     tick: u64::MAX,

@@ -1,6 +1,5 @@
 //! R, T(θ) and the leg Jacobian against quaternions and central differences.
 
-
 use crate::common::Random;
 use specgen_runtime::Attitude;
 

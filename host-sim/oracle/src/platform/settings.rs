@@ -1,10 +1,10 @@
 //! What a platform controller is built from.
 
+use crate::design::{Gains, Plant, Rule};
+use crate::preisach::Table;
 use host_sim::closed_loop::LEGS;
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
-use crate::design::{Gains, Plant, Rule};
-use crate::preisach::Table;
 use host_sim::plant::{LegParameters, LegPlant};
 use host_sim::platform::{Probe, Six, Specimen};
 

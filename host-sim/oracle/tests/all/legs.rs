@@ -3,11 +3,11 @@
 //! The record is taken from the leg as built; the study's table is the comparison, in nm.
 
 use host_sim::closed_loop::LEGS;
+use host_sim::forc::ReversalExperiment;
+use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
 use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, TRACKING_FREQUENCIES};
 use host_sim::table::TrackingTable;
-use host_sim::forc::ReversalExperiment;
-use host_sim::noise::Gauge;
 use oracle::{Oracle, Table};
 
 const DAC_LSB: f64 = 150.0 / 65535.0;

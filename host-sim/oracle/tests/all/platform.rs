@@ -2,15 +2,15 @@
 //! equal legs; `examples/platform_figures.rs` has all of them, with tolerances and random machines.
 
 use host_sim::controller::TickController;
-use host_sim::platform::rig::{Noise, RunOptions};
-use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, PLATFORM_MODES, select};
-use host_sim::platform::{PlatformScenario, Specimen, WorkPart};
-use oracle::design::{Deviation, Gains, Rule};
-use oracle::{PlatformOracle, Settings};
 use host_sim::plant::LegParameters;
 use host_sim::platform::PlatformParameters;
 use host_sim::platform::rig::{GaugeFault, Record};
+use host_sim::platform::rig::{Noise, RunOptions};
+use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, PLATFORM_MODES, select};
+use host_sim::platform::{PlatformScenario, Specimen, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
+use oracle::design::{Deviation, Gains, Rule};
+use oracle::{PlatformOracle, Settings};
 
 /// Base N of the study at 10 kHz.
 fn base_n() -> (Specimen, Settings) {

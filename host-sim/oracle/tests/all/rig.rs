@@ -1,9 +1,9 @@
-use host_sim::platform::rig::{BUSY, GaugeFault, Noise, PlatformRig, Record, RunOptions};
-use host_sim::platform::Specimen;
 use host_sim::closed_loop::{Preparation, RunError};
 use host_sim::controller::{ControllerError, TickController};
 use host_sim::description::Description;
 use host_sim::plant::LegParameters;
+use host_sim::platform::Specimen;
+use host_sim::platform::rig::{BUSY, GaugeFault, Noise, PlatformRig, Record, RunOptions};
 use host_sim::platform::{PlatformParameters, WorkPart};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 
