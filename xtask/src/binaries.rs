@@ -28,7 +28,7 @@ pub fn test(root: &Path) -> Outcome {
         Err(why) => return Outcome::Failed(why),
     };
     // Many tests build the same controller: once in a run is enough. What an earlier run left is not trusted.
-    let kept = root.join("target/tests/kept");
+    let kept = root.join("target/tests/cache");
     if let Err(error) = std::fs::remove_dir_all(&kept)
         && error.kind() != std::io::ErrorKind::NotFound
     {
@@ -98,7 +98,7 @@ fn run(binaries: &[Binary], workers: usize, kept: &Path) -> Vec<String> {
             let ended = Command::new(&binary.executable)
                 .current_dir(&binary.folder)
                 .env("CARGO_MANIFEST_DIR", &binary.folder)
-                .env("SPECGEN_BUILD_CACHE", kept)
+                .env("SPECGEN_CACHE", kept)
                 .stdin(Stdio::null())
                 .output();
             let (good, text) = match ended {
