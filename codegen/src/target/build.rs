@@ -7,9 +7,7 @@ use super::process::{self, Finished};
 use super::toolchain::{self, Toolchain};
 use crate::interrupt::Scratch;
 use crate::model::Mcu;
-use crate::workspace::sha256;
 use std::fs::{self, File};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -168,7 +166,6 @@ pub(super) fn cargo_artifact(
     if let Some((path, bytes)) = slot.as_mut().map(|slot| slot.fetch(&target_dir)).transpose()?.flatten() {
         return Ok(Artifact { path, bytes });
     }
-
     command
         // Cargo reads its configuration from the working folder upwards, so work where the package is.
         .current_dir(package)
@@ -181,69 +178,6 @@ pub(super) fn cargo_artifact(
     if !request.rustc_args.is_empty() {
         command.arg("--").args(request.rustc_args);
     }
-    let mut artifact = run_cargo(command, package, what, &pick)?;
-    if !artifact.is_known(&target_dir)? {
-        // Cargo says that it is up to date, but nobody has seen it leave a compiler: it may have been damaged since.
-        artifact.forget(&target_dir)?;
-        artifact = run_cargo(command, package, what, &pick)?;
-        artifact.is_known(&target_dir)?;
-    }
-    if let Some(slot) = slot {
-        slot.keep(&target_dir, &artifact.path, &artifact.bytes);
-    }
-    Ok(Artifact { path: artifact.path, bytes: artifact.bytes })
-}
-
-/// What cargo says that it made.
-struct Made {
-    path: PathBuf,
-    bytes: Vec<u8>,
-    /// It was there already.
-    fresh: bool,
-}
-
-impl Made {
-    /// Whether it came out of a compiler, now or in an earlier build into this folder, of which a list is kept.
-    fn is_known(&self, target_dir: &Path) -> Result<bool, TargetError> {
-        let list = target_dir.join("specgen-built.txt");
-        let digest = sha256(&self.bytes);
-        if fs::read_to_string(&list).is_ok_and(|text| text.lines().any(|line| line == digest)) {
-            return Ok(true);
-        }
-        if self.fresh {
-            return Ok(false);
-        }
-        let file = File::options().create(true).append(true).open(&list);
-        let added = file.and_then(|mut file| writeln!(file, "{digest}"));
-        added.map_err(|error| TargetError::io("writing", &list, error))?;
-        Ok(true)
-    }
-
-    /// Takes away all that cargo made beside it, so that the next build makes it anew; kept libraries stay, others may load
-    /// them.
-    fn forget(&self, target_dir: &Path) -> Result<(), TargetError> {
-        let Some(folder) = self.path.parent().filter(|folder| folder.starts_with(target_dir)) else { return Ok(()) };
-        let entries = fs::read_dir(folder).map_err(|e| TargetError::io("reading", folder, e))?;
-        for path in entries.map_while(Result::ok).map(|entry| entry.path()) {
-            let kept = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"specgen-"));
-            let removed = match (kept, path.is_dir()) {
-                (true, _) => Ok(()),
-                (false, true) => fs::remove_dir_all(&path),
-                (false, false) => fs::remove_file(&path),
-            };
-            removed.map_err(|e| TargetError::io("removing", &path, e))?;
-        }
-        Ok(())
-    }
-}
-
-/// Runs cargo and reads the last artifact that `pick` recognises.
-fn run_cargo(
-    command: &mut Command,
-    package: &Path,
-    what: &str,
-    pick: impl Fn(&serde_json::Value) -> Option<PathBuf>,
-) -> Result<Made, TargetError> {
     let scratch = Scratch::new().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
     let finished =
         process::run(command, scratch.path(), LIMIT).map_err(|e| TargetError::io("running cargo in", package, e))?;
@@ -261,7 +195,11 @@ fn run_cargo(
             text: "cargo reports success, but no artifact of the expected kind".into(),
         })?;
     let bytes = fs::read(&path).map_err(|e| TargetError::io("reading", &path, e))?;
-    Ok(Made { path, bytes, fresh })
+    // What cargo found made and only took for up to date may have been damaged since it was.
+    if let Some(slot) = slot.filter(|_| !fresh) {
+        slot.keep(&target_dir, &path, &bytes);
+    }
+    Ok(Artifact { path, bytes })
 }
 
 /// What cargo printed, in our words where we know better.

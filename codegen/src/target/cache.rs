@@ -286,10 +286,10 @@ impl Slot {
     /// Keeps what was built, unless its sources were changed meanwhile.
     pub fn keep(self, target_dir: &Path, built: &Path, bytes: &[u8]) {
         let Ok(place) = built.strip_prefix(target_dir) else { return };
-        for key in self.recipe.keys_after() {
-            if let Err(error) = self.cache.keep(&key, place, bytes) {
-                say(format!("what was built could not be kept in {}: {error}", self.cache.folder.display()));
-            }
+        if self.recipe.is_current()
+            && let Err(error) = self.cache.keep(&self.recipe.key(), place, bytes)
+        {
+            say(format!("what was built could not be kept in {}: {error}", self.cache.folder.display()));
         }
     }
 }

@@ -34,15 +34,8 @@ pub(super) struct Recipe {
     package: PathBuf,
     /// Of everything but the sources.
     context: Digester,
-    sources: Sources,
-}
-
-/// Sources as they are at one time.
-#[derive(PartialEq, Eq)]
-struct Sources {
-    digest: [u8; 32],
-    /// The workspace's lock file, which cargo makes if it is not there.
-    lock: Option<Vec<u8>>,
+    /// Of every source.
+    sources: [u8; 32],
 }
 
 impl Recipe {
@@ -66,29 +59,20 @@ impl Recipe {
         let package = plain(&std::path::absolute(package).ok()?);
         configuration(&package, &mut context)?;
         tools(command, &package, &mut context)?;
-        let sources = Sources::of(&package)?;
+        let sources = sources(&package)?;
         Some(Self { package, context, sources })
     }
 
     /// The name of the build.
     pub fn key(&self) -> String {
-        self.key_of(&self.sources)
-    }
-
-    /// The names under which it may be found once it is built: none if sources were changed meanwhile, two if cargo made the
-    /// lock file.
-    pub fn keys_after(&self) -> BTreeSet<String> {
-        match Sources::of(&self.package) {
-            Some(now) if now.digest == self.sources.digest => [self.key(), self.key_of(&now)].into(),
-            _ => BTreeSet::new(),
-        }
-    }
-
-    fn key_of(&self, sources: &Sources) -> String {
         let mut key = self.context.clone();
-        key.add(sources.digest);
-        key.add(sources.lock.as_deref().unwrap_or_default());
+        key.add(self.sources);
         key.digest().iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Whether the sources are those that this was made of.
+    pub fn is_current(&self) -> bool {
+        sources(&self.package) == Some(self.sources)
     }
 }
 
@@ -183,43 +167,41 @@ fn configuration(package: &Path, context: &mut Digester) -> Option<()> {
     Some(())
 }
 
-impl Sources {
-    /// Every file that a build of the package can see: the package, what its manifest names by a path, what theirs do, and the
-    /// manifest of the workspace. None if something cannot be read.
-    fn of(package: &Path) -> Option<Self> {
-        let root = package.parent().unwrap_or(package);
-        let mut files = BTreeMap::new();
-        let mut open = vec![package.to_owned()];
-        let manifest = root.join("Cargo.toml");
-        if manifest.is_file() {
-            open.extend(named(root, &fs::read(&manifest).ok()?));
-            files.insert(manifest.clone(), fs::read(&manifest).ok()?);
-        }
-        // A package that is a workspace of its own has its own.
-        let lock = root.join("Cargo.lock");
-        let lock = if package.join("Cargo.lock").is_file() { None } else { Some(lock) };
-        let lock = match lock.filter(|lock| lock.is_file()) {
-            Some(lock) => Some(fs::read(lock).ok()?),
-            None => None,
-        };
-        let mut seen = BTreeSet::new();
-        while let Some(path) = open.pop() {
-            if !seen.insert(path.clone()) {
-                continue;
-            }
-            collect(&path, &mut files)?;
-            if let Some(manifest) = files.get(&path.join("Cargo.toml")) {
-                open.extend(named(&path, manifest));
-            }
-        }
-        let mut digest = Digester::default();
-        for (path, content) in files {
-            // The same workspace in another folder is the same.
-            digest.add(path.strip_prefix(root).unwrap_or(&path).as_os_str().as_encoded_bytes());
-            digest.add(content);
-        }
-        Some(Self { digest: digest.digest(), lock })
+/// Digest of every file that a build of the package can see: the package, what its manifest names by a path, what theirs do,
+/// and manifest and lock file of the workspace. None if something cannot be read.
+fn sources(package: &Path) -> Option<[u8; 32]> {
+    let root = package.parent().unwrap_or(package);
+    let mut files = BTreeMap::new();
+    let mut open = vec![package.to_owned()];
+    let manifest = root.join("Cargo.toml");
+    if manifest.is_file() {
+        collect(&manifest, &mut files)?;
+        open.extend(named(root, &files[&manifest]));
     }
+    // Cargo makes one if there is none; it says nothing where nothing comes from elsewhere. A package that is a workspace of
+    // its own has its own.
+    let lock = root.join("Cargo.lock");
+    let says = |text: &str| text.lines().any(|line| line.starts_with("source = "));
+    if lock.is_file() && !package.join("Cargo.lock").is_file() && says(&fs::read_to_string(&lock).ok()?) {
+        collect(&lock, &mut files)?;
+    }
+    let mut seen = BTreeSet::new();
+    while let Some(path) = open.pop() {
+        if !seen.insert(path.clone()) {
+            continue;
+        }
+        collect(&path, &mut files)?;
+        if let Some(manifest) = files.get(&path.join("Cargo.toml")) {
+            open.extend(named(&path, manifest));
+        }
+    }
+    let mut digest = Digester::default();
+    for (path, content) in files {
+        // The same workspace in another folder is the same.
+        digest.add(path.strip_prefix(root).unwrap_or(&path).as_os_str().as_encoded_bytes());
+        digest.add(content);
+    }
+    Some(digest.digest())
 }
 
 /// All that a manifest in `folder` names by a key `path`.
