@@ -75,7 +75,7 @@ fn edit(path: &Path, edit: impl FnOnce(&mut Vec<u8>)) {
     fs::write(path, bytes).unwrap();
 }
 
-fn flip(bytes: &mut Vec<u8>) {
+fn flip(bytes: &mut [u8]) {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
 }
@@ -104,7 +104,7 @@ fn an_unchanged_spec_is_built_once_and_everything_else_anew() {
     fs::remove_file(folder.path("broken")).unwrap();
 
     // Damaged: found, said, removed, built, with the same result.
-    let damages: [fn(&mut Vec<u8>); 3] = [flip, |bytes| bytes.truncate(bytes.len() - 1), Vec::clear];
+    let damages: [fn(&mut Vec<u8>); 3] = [|bytes| flip(bytes), |bytes| bytes.truncate(bytes.len() - 1), Vec::clear];
     for damage in damages {
         let [entry] = counted.entries().try_into().unwrap();
         edit(&entry, damage);
@@ -172,7 +172,7 @@ fn what_lies_in_the_output_folder_is_not_believed() {
     assert_eq!((counted.0.path("out/Cargo.lock").is_file(), counted.builds(&build)), (true, 0));
 
     // The library under the name of its digest.
-    let damages: [fn(&mut Vec<u8>); 2] = [flip, |bytes| bytes.truncate(100)];
+    let damages: [fn(&mut Vec<u8>); 2] = [|bytes| flip(bytes), |bytes| bytes.truncate(100)];
     for damage in damages {
         edit(&library, damage);
         assert_eq!(artifact(&mut counted.command(&build)), (0, library.clone()));
@@ -186,7 +186,7 @@ fn what_lies_in_the_output_folder_is_not_believed() {
     ));
     let uncached = [&build[..], &["--no-cache"]].concat();
     assert_eq!(artifact(&mut counted.command(&uncached)), (1, library.clone()));
-    edit(&made, flip);
+    edit(&made, |bytes| flip(bytes));
     assert_eq!(artifact(&mut counted.command(&uncached)), (1, library.clone()));
     assert!(fs::read(&library).unwrap() == good && fs::read(&made).unwrap() == good);
 
