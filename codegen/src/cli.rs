@@ -4,6 +4,7 @@
 //! 130 ended by Ctrl-C, with the best so far where a part of the work is a result.
 
 mod build;
+mod cache;
 mod check;
 mod completions;
 mod doctor;
@@ -31,6 +32,7 @@ use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use crate::interrupt;
+use crate::target;
 use ui::{Failure, Ui};
 
 /// Compiles one description of a piezo-driven Stewart platform into a `no_std` Rust controller.
@@ -58,6 +60,9 @@ struct Common {
     /// Print the result as JSON on standard output.
     #[arg(long, global = true)]
     json: bool,
+    /// Build anew: take no build that was kept, and keep none.
+    #[arg(long, global = true)]
+    no_cache: bool,
 }
 
 #[derive(Subcommand, Debug)]
@@ -102,6 +107,8 @@ enum Command {
         /// The spec file.
         spec: PathBuf,
     },
+    /// Show how much of what was built is kept, or remove it.
+    Cache(cache::Arguments),
     /// Print a script that completes commands, options and files in a shell.
     Completions(completions::Arguments),
 }
@@ -121,6 +128,9 @@ pub fn run() -> ExitCode {
     };
     let mut ui = Ui::new(cli.common.json);
     interrupt::catch(move || Ui::new(cli.common.json).failed(&Failure::ended_early()));
+    if cli.common.no_cache {
+        target::cache::switch_off();
+    }
     let done = match &cli.command {
         None => build::run(&cli.build, &mut ui),
         Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
@@ -141,6 +151,7 @@ pub fn run() -> ExitCode {
         Some(Command::Plant(arguments)) => plant::run(arguments, &mut ui),
         Some(Command::Doctor(arguments)) => doctor::run(arguments, &mut ui),
         Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),
+        Some(Command::Cache(arguments)) => cache::run(arguments, &ui),
         Some(Command::Completions(arguments)) => {
             completions::run(arguments, command(), &ui);
             Ok(())
@@ -151,6 +162,9 @@ pub fn run() -> ExitCode {
     }
     // What is said from here on is the last word.
     interrupt::heed();
+    if let Some(trouble) = target::cache::trouble() {
+        ui.progress(&format!("warning: {trouble}"));
+    }
     let code = done.map_or_else(|failure| ui.failed(&failure), |()| 0);
     ExitCode::from(ui.not_all_out().unwrap_or(code))
 }

@@ -2,6 +2,7 @@
 
 #[path = "../../tests/tests/board_support/mod.rs"]
 mod board_support;
+mod build_cache;
 mod cli;
 mod documents;
 mod dynamics_command;

@@ -144,6 +144,13 @@ pub const DUMP_IR: &str = "\
 Examples:
   specgen dump-ir platform.toml > constants.json           # every constant of the controller";
 
+pub const CACHE: &str = "\
+Examples:
+  specgen cache                                            # its folder, how many builds, how large
+
+With --clear it is emptied, which is safe at any time. SPECGEN_CACHE=DIR names another folder, SPECGEN_CACHE= keeps nothing;
+--no-cache does neither take nor keep for one command.";
+
 pub const COMPLETIONS: &str = "\
 Examples:
   specgen completions bash > specgen.bash                  # for one session: source specgen.bash

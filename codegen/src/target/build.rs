@@ -154,48 +154,50 @@ pub(super) fn cargo_artifact(
     what: &str,
     pick: impl Fn(&serde_json::Value) -> Option<PathBuf>,
 ) -> Result<Artifact, TargetError> {
-    let (package, target_dir) = (request.package, request.target_dir);
-    let slot = cache::Slot::of(command, package, request.rustc_args)?;
-    fs::create_dir_all(target_dir).map_err(|e| TargetError::io("creating", target_dir, e))?;
+    let package = request.package;
+    let target_dir = std::path::absolute(request.target_dir)
+        .map_err(|error| TargetError::io("resolving", request.target_dir, error))?;
+    let mut slot = cache::Slot::of(command, package, request.rustc_args);
+    fs::create_dir_all(&target_dir).map_err(|e| TargetError::io("creating", &target_dir, e))?;
     let lock_path = target_dir.join("specgen.lock");
     let lock = File::create(&lock_path).map_err(|e| TargetError::io("creating", &lock_path, e))?;
     // Cargo's own lock ends with cargo; this one lasts until the artifact is read. Dropping the file frees it.
     lock.lock().map_err(|e| TargetError::io("locking", &lock_path, e))?;
-    if let Some((path, bytes)) = slot.as_ref().map(|slot| slot.fetch(target_dir)).transpose()?.flatten() {
+    if let Some((path, bytes)) = slot.as_mut().map(|slot| slot.fetch(&target_dir)).transpose()?.flatten() {
         return Ok(Artifact { path, bytes });
     }
-    let scratch = Scratch::new().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
-
     command
         // Cargo reads its configuration from the working folder upwards, so work where the package is.
         .current_dir(package)
         .args(["--message-format=json-render-diagnostics", "--color=never"])
         .arg("--target-dir")
-        .arg(std::path::absolute(target_dir).map_err(|e| TargetError::io("resolving", target_dir, e))?);
+        .arg(&target_dir);
     if request.locked {
         command.arg("--locked");
     }
     if !request.rustc_args.is_empty() {
         command.arg("--").args(request.rustc_args);
     }
+    let scratch = Scratch::new().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
     let finished =
         process::run(command, scratch.path(), LIMIT).map_err(|e| TargetError::io("running cargo in", package, e))?;
     if !finished.success() {
         return Err(failure(what, &finished));
     }
-    let path = finished
+    let (path, fresh) = finished
         .stdout
         .lines()
         .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .filter_map(|message| pick(&message))
+        .filter_map(|message| Some((pick(&message)?, message["fresh"] == true)))
         .next_back()
         .ok_or_else(|| TargetError::BuildFailed {
             what: what.to_owned(),
             text: "cargo reports success, but no artifact of the expected kind".into(),
         })?;
     let bytes = fs::read(&path).map_err(|e| TargetError::io("reading", &path, e))?;
-    if let Some(slot) = slot {
-        slot.keep(&path)?;
+    // What cargo found made and only took for up to date may have been damaged since it was.
+    if let Some(slot) = slot.filter(|_| !fresh) {
+        slot.keep(&target_dir, &path, &bytes);
     }
     Ok(Artifact { path, bytes })
 }

@@ -1,9 +1,10 @@
 //! Builds DIR/host of an emitted workspace into a shared library for this machine.
 
 use super::build::{BuildRequest, cargo_artifact};
+use super::cache;
 use super::error::TargetError;
 use super::process::{clean_command, find_in_path};
-use crate::interrupt;
+use crate::workspace::sha256;
 use std::path::{Path, PathBuf};
 
 /// A shared library may leave symbols undefined unless told otherwise, and then the proof that nothing can
@@ -59,20 +60,12 @@ fn cargo() -> Result<PathBuf, TargetError> {
     })
 }
 
-/// Copies the library to a name that only this content has.
+/// Copies the library to a name that only this content has. A file that has the name already is replaced unless it has the
+/// content, too: it may have been cut off or damaged since.
 fn keep(built: &Path, bytes: &[u8]) -> Result<PathBuf, TargetError> {
-    use sha2::{Digest, Sha256};
-    use std::fmt::Write;
-
-    let mut name = String::new();
-    for byte in &Sha256::digest(bytes)[..8] {
-        // Writing to a String cannot fail.
-        let _ = write!(name, "{byte:02x}");
-    }
-    let kept = built.with_file_name(format!("specgen-{name}{}", std::env::consts::DLL_SUFFIX));
-    if !kept.is_file() {
-        write_whole(&kept, bytes)?;
-    }
+    let name = format!("specgen-{}{}", &sha256(bytes)[..16], std::env::consts::DLL_SUFFIX);
+    let kept = built.with_file_name(name);
+    cache::put(&kept, bytes)?;
     Ok(kept)
 }
 
@@ -81,11 +74,27 @@ fn keep(built: &Path, bytes: &[u8]) -> Result<PathBuf, TargetError> {
 /// # Errors
 /// [`TargetError::Io`]; nothing is left then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), TargetError> {
-    let _whole = interrupt::whole();
-    let partial = path.with_extension(format!("{}.part", std::process::id()));
-    let written = std::fs::write(&partial, bytes).and_then(|()| std::fs::rename(&partial, path));
-    written.map_err(|error| {
-        let _ = std::fs::remove_file(&partial);
-        TargetError::io("writing", path, error)
-    })
+    cache::replace(path, bytes, false).map_err(|error| TargetError::io("writing", path, error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_kept_library_is_never_believed_by_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let built = folder.path().join("libcontroller_host.so");
+        let content = b"a library".to_vec();
+        let kept = keep(&built, &content).unwrap();
+        for damaged in [&b"a libr"[..], b"b library", b""] {
+            fs::write(&kept, damaged).unwrap();
+            let mapped = fs::File::open(&kept).unwrap();
+            assert_eq!(keep(&built, &content).unwrap(), kept);
+            assert_eq!(fs::read(&kept).unwrap(), content);
+            // Another file of that name, so that a process that has mapped the old one does not see its end move.
+            assert_eq!(mapped.metadata().unwrap().len(), damaged.len() as u64);
+        }
+    }
 }

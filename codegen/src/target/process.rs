@@ -24,29 +24,56 @@ impl Finished {
     }
 }
 
-/// A command that no outer cargo, rustc wrapper or flag of the caller's environment leaks into.
-///
-/// `cargo test` sets variables that change what a cargo inside it builds.
+/// Variables that change what cargo builds, by the beginning of their names: `cargo test` sets some for what runs inside it,
+/// people set others. The same spec gives the same bytes, so a build sees none of them.
+const LEAKS: [&str; 19] = [
+    "RUSTC",
+    "RUSTDOC",
+    "RUSTFLAGS",
+    "CARGO_BIN_",
+    "CARGO_BUILD_",
+    "CARGO_CFG_",
+    "CARGO_CRATE_NAME",
+    "CARGO_ENCODED_",
+    "CARGO_FEATURE_",
+    "CARGO_INCREMENTAL",
+    "CARGO_MANIFEST_",
+    "CARGO_PKG_",
+    "CARGO_PRIMARY_PACKAGE",
+    "CARGO_PROFILE_",
+    "CARGO_TARGET_",
+    "CARGO_UNSTABLE_",
+    "__CARGO",
+    // Of build scripts.
+    "DEFMT_",
+    "SPECGEN_LOCATE_PANICS",
+];
+/// Points into the outer toolchain; another compiler would load that one's libraries.
+const LIBRARIES: &str = "LD_LIBRARY_PATH";
+/// How many compilers run at once is no flag.
+const JOBS: &str = "CARGO_BUILD_JOBS";
+/// Without these some machines cannot link at all.
+const LINKING: [&str; 6] =
+    ["COMPILER_PATH", "GCC_EXEC_PREFIX", "LIBRARY_PATH", "LD_RUN_PATH", "MACOSX_DEPLOYMENT_TARGET", "SDKROOT"];
+
+/// Whether a build sees this variable of the caller's and may make other bytes by it.
+pub fn decides_on_link(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    // The linker of an image is looked for by `toolchain`.
+    let of_target = name.starts_with("CARGO_TARGET_") && name.ends_with("_LINKER") && !name.contains("THUMB");
+    of_target || LINKING.contains(&&*name)
+}
+
+fn leaks(name: &OsStr) -> bool {
+    let text = name.to_string_lossy();
+    text == LIBRARIES || LEAKS.iter().any(|leak| text.starts_with(leak)) && text != JOBS && !decides_on_link(name)
+}
+
+/// A command that no outer cargo, rustc wrapper or flag of the caller's environment leaks into. Where crates come from and
+/// which toolchain is meant stays the caller's choice.
 pub fn clean_command(program: impl AsRef<OsStr>) -> Command {
-    const LEAKS: [&str; 14] = [
-        "RUSTC",
-        "RUSTC_WRAPPER",
-        "RUSTC_WORKSPACE_WRAPPER",
-        "RUSTC_BOOTSTRAP",
-        "RUSTFLAGS",
-        "RUSTDOCFLAGS",
-        "CARGO_ENCODED_RUSTFLAGS",
-        "CARGO_BUILD_TARGET",
-        "CARGO_BUILD_RUSTFLAGS",
-        "CARGO_TARGET_DIR",
-        "CARGO_BUILD_TARGET_DIR",
-        "CARGO_MANIFEST_DIR",
-        "CARGO_PKG_NAME",
-        // Points into the outer toolchain; another compiler would load that one's libraries.
-        "LD_LIBRARY_PATH",
-    ];
     let mut command = Command::new(program);
-    for name in LEAKS {
+    for (name, _) in std::env::vars_os().filter(|(name, _)| leaks(name)) {
         command.env_remove(name);
     }
     command
@@ -85,10 +112,48 @@ pub fn find_in_path(name: &str) -> Option<PathBuf> {
 
 /// First line that the program prints, or `None` if it cannot be run or fails.
 pub fn first_line(command: &mut Command) -> Option<String> {
+    Some(printed(command)?.lines().next().unwrap_or_default().trim().to_owned())
+}
+
+/// All that the program prints, or `None` if it cannot be run or fails.
+pub fn printed(command: &mut Command) -> Option<String> {
     let output = command.stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
-    if !output.status.success() {
-        return None;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_changes_a_build_does_not_leak_and_what_a_machine_needs_is_handed_on() {
+        for name in [
+            "RUSTFLAGS",
+            "RUSTC_WRAPPER",
+            "CARGO_ENCODED_RUSTFLAGS",
+            "CARGO_PROFILE_RELEASE_OPT_LEVEL",
+            "CARGO_BUILD_RUSTFLAGS",
+            "CARGO_TARGET_DIR",
+            "CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUSTFLAGS",
+            "CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER",
+            "CARGO_INCREMENTAL",
+            "SPECGEN_LOCATE_PANICS",
+            "LD_LIBRARY_PATH",
+        ] {
+            assert!(leaks(OsStr::new(name)) && !decides_on_link(OsStr::new(name)), "{name}");
+        }
+        for name in [
+            "PATH",
+            "CARGO_HOME",
+            "CARGO_HTTP_PROXY",
+            "CARGO_REGISTRIES_A_TOKEN",
+            "CARGO_BUILD_JOBS",
+            "RUSTUP_TOOLCHAIN",
+        ] {
+            assert!(!leaks(OsStr::new(name)) && !decides_on_link(OsStr::new(name)), "{name}");
+        }
+        for name in ["CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_LINKER", "LIBRARY_PATH"] {
+            assert!(!leaks(OsStr::new(name)) && decides_on_link(OsStr::new(name)), "{name}");
+        }
     }
-    let text = String::from_utf8_lossy(&output.stdout);
-    Some(text.lines().next().unwrap_or_default().trim().to_owned())
 }

@@ -1,0 +1,200 @@
+//! What was built is not built again, and nothing that was kept is believed.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+#![cfg(unix)]
+
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use serde_json::Value;
+use crate::support::{Document, Folder, Run};
+
+/// A folder with a `cargo` that counts what it builds, and a cache of its own.
+struct Counted(Folder);
+
+impl Counted {
+    fn new() -> Self {
+        let folder = Folder::new();
+        let cargo = specgen::target::find_program("cargo").unwrap();
+        fs::create_dir(folder.path("bin")).unwrap();
+        let place = folder.path("");
+        let (place, cargo) = (place.display(), cargo.display());
+        let script = format!(
+            "#!/bin/sh\nif [ \"$1\" != -vV ]; then\n  echo \"$1\" >> '{place}/runs'\n  [ ! -e '{place}/broken' ] || exit 1\nfi\nexec '{cargo}' \"$@\"\n"
+        );
+        folder.write("bin/cargo", script);
+        fs::set_permissions(folder.path("bin/cargo"), fs::Permissions::from_mode(0o755)).unwrap();
+        Self(folder)
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let path = std::env::var("PATH").unwrap();
+        let mut command = self.0.command();
+        command.args(arguments).env("PATH", format!("{}:{path}", self.0.path("bin").display()));
+        command.env("SPECGEN_CACHE", self.0.path("cache"));
+        command
+    }
+
+    /// Runs it well; how often cargo was run to build.
+    fn builds(&self, arguments: &[&str]) -> usize {
+        self.builds_with(&mut self.command(arguments)).0
+    }
+
+    fn builds_with(&self, command: &mut Command) -> (usize, Run) {
+        let _ = fs::remove_file(self.0.path("runs"));
+        let run = Run::of(command);
+        assert_eq!(run.code, 0, "{run:#?}");
+        (self.runs(), run)
+    }
+
+    fn runs(&self) -> usize {
+        fs::read_to_string(self.0.path("runs")).map_or(0, |text| text.lines().count())
+    }
+
+    /// What `specgen cache` says, as JSON.
+    fn cache(&self, arguments: &[&str]) -> Value {
+        Document::of(&Run::of(&mut self.command(arguments))).value["result"].clone()
+    }
+
+    fn entries(&self) -> Vec<PathBuf> {
+        let entries = fs::read_dir(self.0.path("cache/builds")).unwrap();
+        entries.map(|entry| entry.unwrap().path()).collect()
+    }
+}
+
+const SIM: [&str; 6] = ["sim", "legs.toml", "--record", "run.rec", "--seconds", "0.1"];
+const REPLAY: [&str; 4] = ["replay", "run.rec", "--spec", "legs.toml"];
+
+fn edit(path: &Path, edit: impl FnOnce(&mut Vec<u8>)) {
+    let mut bytes = fs::read(path).unwrap();
+    edit(&mut bytes);
+    fs::write(path, bytes).unwrap();
+}
+
+fn flip(bytes: &mut [u8]) {
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+}
+
+#[test]
+fn an_unchanged_spec_is_built_once_and_everything_else_anew() {
+    let counted = Counted::new();
+    let folder = &counted.0;
+    assert_eq!(counted.builds(&SIM), 1);
+    let recorded = fs::read(folder.path("run.rec")).unwrap();
+
+    // A cargo that fails is not asked.
+    folder.write("broken", "");
+    for command in [&SIM[..], &REPLAY] {
+        assert_eq!(counted.builds(command), 0, "{command:?}");
+    }
+    assert_eq!(fs::read(folder.path("run.rec")).unwrap(), recorded);
+    // What the environment says of profiles and flags reaches no build, so it asks for no other.
+    let mut set = counted.command(&SIM);
+    set.env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "0").env("RUSTFLAGS", "-Copt-level=0").env("CARGO_INCREMENTAL", "1");
+    assert_eq!(counted.builds_with(&mut set).0, 0);
+    // Unless the cache is left out.
+    let uncached = [&SIM[..], &["--no-cache"]].concat();
+    assert_eq!(Run::of(&mut counted.command(&uncached)).code, 3);
+    assert_eq!(Run::of(counted.command(&SIM).env("SPECGEN_CACHE", "")).code, 3);
+    fs::remove_file(folder.path("broken")).unwrap();
+
+    // Damaged: found, said, removed, built, with the same result.
+    let damages: [fn(&mut Vec<u8>); 3] = [|bytes| flip(bytes), |bytes| bytes.truncate(bytes.len() - 1), Vec::clear];
+    for damage in damages {
+        let [entry] = counted.entries().try_into().unwrap();
+        edit(&entry, damage);
+        let (builds, run) = counted.builds_with(&mut counted.command(&REPLAY));
+        assert_eq!(builds, 1);
+        assert_eq!(run.stderr.matches("warning: a kept build was damaged").count(), 1, "{}", run.stderr);
+        assert_eq!(counted.builds(&REPLAY), 0);
+    }
+
+    // Another source.
+    let text = folder.read("legs.toml");
+    folder.write("legs.toml", text.replace("name = \"", "name = \"other-"));
+    assert_eq!((counted.builds(&SIM), counted.builds(&SIM)), (1, 0));
+    assert_eq!(counted.entries().len(), 2);
+    // Looked at and emptied.
+    let shown = counted.cache(&["cache", "--json"]);
+    assert_eq!(shown["builds"], 2, "{shown}");
+    assert!(shown["bytes"].as_u64().unwrap() > 10_000 && shown["removed"] == 0, "{shown}");
+    let cleared = counted.cache(&["cache", "--clear", "--json"]);
+    assert_eq!((&cleared["removed"], &cleared["builds"], &cleared["bytes"]), (&2.into(), &0.into(), &0.into()));
+    assert!(counted.entries().is_empty());
+    let empty = Run::of(counted.command(&["cache"]).env("SPECGEN_CACHE", ""));
+    assert!(empty.code == 0 && empty.stdout.starts_with("no builds are kept"), "{empty:?}");
+}
+
+#[test]
+fn two_at_once_build_once() {
+    let counted = Counted::new();
+    let commands = ["a.rec", "b.rec"].map(|file| ["sim", "legs.toml", "--record", file, "--seconds", "0.1"]);
+    let started = commands
+        .map(|arguments| counted.command(&arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
+    for child in started {
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+    }
+    assert_eq!((counted.runs(), counted.entries().len()), (1, 1));
+    assert_eq!(fs::read(counted.0.path("a.rec")).unwrap(), fs::read(counted.0.path("b.rec")).unwrap());
+}
+
+#[test]
+fn a_cache_that_cannot_be_written_costs_one_line() {
+    let counted = Counted::new();
+    let mut nowhere = counted.command(&SIM);
+    let (builds, run) = counted.builds_with(nowhere.env("SPECGEN_CACHE", "/dev/null/cache"));
+    assert_eq!(builds, 1);
+    assert_eq!(run.stderr.matches("warning: what was built could not be kept").count(), 1, "{}", run.stderr);
+    let mut nowhere = counted.command(&SIM);
+    let (builds, run) = counted.builds_with(nowhere.arg("--json").env("SPECGEN_CACHE", "/dev/null/cache"));
+    assert_eq!((builds, run.stderr.as_str()), (1, ""));
+}
+
+#[test]
+fn what_lies_in_the_output_folder_is_not_believed() {
+    let counted = Counted::new();
+    let build = ["build", "minimal.toml", "--target", "host", "-o", "out", "--json"];
+    let artifact = |command: &mut Command| {
+        let (builds, run) = counted.builds_with(command);
+        let document = Document::of(&run);
+        (builds, counted.0.path(document.value["result"]["artifact"].as_str().unwrap()))
+    };
+    let (builds, library) = artifact(&mut counted.command(&build));
+    assert_eq!(builds, 1);
+    let good = fs::read(&library).unwrap();
+    // Cargo has made a lock file, which says nothing.
+    assert_eq!((counted.0.path("out/Cargo.lock").is_file(), counted.builds(&build)), (true, 0));
+
+    // The library under the name of its digest.
+    let damages: [fn(&mut Vec<u8>); 2] = [|bytes| flip(bytes), |bytes| bytes.truncate(100)];
+    for damage in damages {
+        edit(&library, damage);
+        assert_eq!(artifact(&mut counted.command(&build)), (0, library.clone()));
+        assert!(fs::read(&library).unwrap() == good);
+    }
+    // What cargo made itself, without a cache that would know better: sources are written anew, so it compiles.
+    let made = library.with_file_name(format!(
+        "{}controller_host{}",
+        std::env::consts::DLL_PREFIX,
+        std::env::consts::DLL_SUFFIX
+    ));
+    let uncached = [&build[..], &["--no-cache"]].concat();
+    assert_eq!(artifact(&mut counted.command(&uncached)), (1, library.clone()));
+    edit(&made, |bytes| flip(bytes));
+    assert_eq!(artifact(&mut counted.command(&uncached)), (1, library.clone()));
+    assert!(fs::read(&library).unwrap() == good && fs::read(&made).unwrap() == good);
+
+    // What cargo is configured with, and does not concern the build or does.
+    fs::create_dir(counted.0.path(".cargo")).unwrap();
+    counted.0.write(".cargo/config.toml", "[net]\nretry = 1\n");
+    assert_eq!(counted.builds(&build), 0);
+    counted.0.write(".cargo/config.toml", "[profile.release]\ndebug = 0\n");
+    assert_eq!((counted.builds(&build), counted.builds(&build)), (1, 0));
+    let text = counted.0.read("minimal.toml");
+    counted.0.write("minimal.toml", text.replace("name = \"", "name = \"other-"));
+    assert_eq!(counted.builds(&build), 1);
+}
