@@ -8,8 +8,8 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use serde_json::Value;
 use crate::support::{Document, Folder, Run};
+use serde_json::Value;
 
 /// A folder with a `cargo` that counts what it builds, and a cache of its own.
 struct Counted(Folder);

@@ -50,10 +50,11 @@ pub fn image_target() -> PathBuf {
     builds().join(format!("build-{}", std::env::var("SPECGEN_TEST_WORKER").unwrap_or_default()))
 }
 
-/// Whether what only gains by length runs at full length: `cargo xtask soak`.
+/// How much of what only gains by length is run: the short length in the test run, the long one where `SPECGEN_SOAK` is set, as
+/// `cargo xtask soak` does.
 #[must_use]
-pub fn is_soak() -> bool {
-    std::env::var_os("SPECGEN_SOAK").is_some()
+pub fn length<T>(short: T, long: T) -> T {
+    if std::env::var_os("SPECGEN_SOAK").is_some() { long } else { short }
 }
 
 fn builds() -> PathBuf {

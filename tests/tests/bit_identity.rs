@@ -9,7 +9,9 @@ use specgen_tests::{Emitted, column, host_trace, integers};
 use std::fs;
 
 /// Ticks of each comparison.
-const TICKS: usize = 100_000;
+fn ticks() -> usize {
+    specgen_tests::length(20_000, 100_000)
+}
 /// A converter whose codes meet every threshold of the grid: 2.5 mV a code, 1250 codes a cell.
 const ALIGNED: (&str, &str) = ("[\"0 V\", \"150 V\"]", "[\"0 V\", \"163.8375 V\"]");
 const CODES_PER_CELL: i64 = 1250;
@@ -25,17 +27,17 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
     let mut controller = emitted.controller();
     let description = controller.description().clone();
     for (what, pose, mode) in RUNS {
-        let inputs = emitted.stimulus(&description, pose, TICKS, 7);
+        let inputs = emitted.stimulus(&description, pose, ticks(), 7);
         let kind = if pose { 0.0 } else { 1.0 };
         let (host, config) = host_trace(&mut controller, &[("mode", mode), ("setpoint_kind", kind)], &inputs);
         covers(&host, what, pose);
         for mcu in mcus {
             let Some(image) = emitted.image(*mcu) else { continue };
             let (target, _) = verify::replay(&image, &config, &host).unwrap_or_else(|error| panic!("{error}"));
-            assert_eq!(target.len(), TICKS);
+            assert_eq!(target.len(), ticks());
             let difference = first_difference(&host, &target);
             assert!(difference.is_none(), "{name}, {what}, {mcu:?}: {}", difference.unwrap());
-            println!("{name}, {what}, {mcu:?}: {TICKS} ticks, no differing word");
+            println!("{name}, {what}, {mcu:?}: {} ticks, no differing word", ticks());
         }
     }
 }

@@ -16,7 +16,9 @@ use specgen::verify;
 use specgen_tests::{Emitted, column, host_trace, integers};
 
 /// Ticks of each mode under the hostile record.
-const TICKS: usize = 100_000;
+fn ticks() -> usize {
+    specgen_tests::length(20_000, 100_000)
+}
 /// Ticks of each mode in closed loop.
 const TRACKING: u32 = 20_000;
 /// `interaction` of a force sensor, and its status bit.
@@ -42,7 +44,7 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
     let description = controller.description().clone();
     let images: Vec<Image> = mcus.iter().filter_map(|mcu| emitted.image(*mcu)).collect();
     for (seed, (what, mode, interaction)) in (20..).zip(MODES) {
-        let inputs = emitted.platform_stimulus(&description, TICKS, seed);
+        let inputs = emitted.platform_stimulus(&description, ticks(), seed);
         let settings = [("mode", mode), ("interaction", interaction), ("environment_stiffness[2]", 3e6)];
         let (hostile, config) = host_trace(&mut controller, &settings, &inputs);
         covers(&hostile, what, interaction == MEASURED);
@@ -51,7 +53,7 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
         let tracking = verify::exercise(&mut controller, model, ir, TRACKING).unwrap();
         tracks(&tracking, what);
         for image in &images {
-            for (record, host, ticks) in [("hostile", &hostile, TICKS), ("tracking", &tracking, TRACKING as usize)] {
+            for (record, host, ticks) in [("hostile", &hostile, ticks()), ("tracking", &tracking, TRACKING as usize)] {
                 let (target, _) = verify::replay(image, &config, host).unwrap_or_else(|error| panic!("{error}"));
                 assert_eq!((host.len(), target.len()), (ticks, ticks));
                 let difference = first_difference(host, &target);

@@ -11,7 +11,9 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen_tests::Emitted;
 
 const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
-const TICKS: u32 = 1_000_000;
+fn ticks() -> u32 {
+    specgen_tests::length(200_000, 1_000_000)
+}
 /// Ticks under one `Config`.
 const STRETCH: u32 = 2000;
 /// Ticks from one reset to the next.
@@ -129,7 +131,7 @@ fn fuzz(name: &str, edits: &[(&str, &str)]) {
     let mut output = vec![0; description.output_names.len()];
     let (mut previous, mut sequence, mut step, mut calm) = ([codes[0]; 6], 0, 0, false);
     let (mut healthy, mut faulty, mut largest) = (0, 0, 0);
-    for tick in 0..TICKS {
+    for tick in 0..ticks() {
         if tick % LIFE == 0 {
             controller.reset();
             previous = [codes[0]; 6];
@@ -158,8 +160,9 @@ fn fuzz(name: &str, edits: &[(&str, &str)]) {
         let faults = output[status] & FAULTS != 0;
         (healthy, faulty) = (healthy + u32::from(!faults), faulty + u32::from(faults));
     }
-    println!("{name}: {TICKS} ticks, {healthy} without and {faulty} with a fault, largest step {largest} codes");
-    assert!(healthy > TICKS / 20 && faulty > TICKS / 20, "{name}: {healthy} without, {faulty} with a fault");
+    let ticks = ticks();
+    println!("{name}: {ticks} ticks, {healthy} without and {faulty} with a fault, largest step {largest} codes");
+    assert!(healthy > ticks / 20 && faulty > ticks / 20, "{name}: {healthy} without, {faulty} with a fault");
     assert!(largest > 2000, "{name}: the slew limit was never felt: {largest}");
 }
 

@@ -1,5 +1,4 @@
-//! Any bits in every input word. A million ticks of each kind; with `SPECGEN_FUZZ_TICKS=100000000` so many:
-//! `SPECGEN_FUZZ_TICKS=100000000 cargo test --release -p specgen-tests supervisor::fuzz -- --nocapture`.
+//! Any bits in every input word: 200,000 ticks of each kind, and 50 million in the soak.
 
 use super::bench::*;
 use host_sim::controller::Supervised;
@@ -7,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 fn ticks() -> u64 {
-    std::env::var("SPECGEN_FUZZ_TICKS").ok().and_then(|text| text.parse().ok()).unwrap_or(1_000_000)
+    specgen_tests::length(200_000, 50_000_000)
 }
 
 fn fuzz(kind: Kind, more: &[(&str, &str)], name: &str) {

@@ -8,7 +8,9 @@ use std::collections::BTreeSet;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Sequences, and ticks of each.
-pub const SEQUENCES: u32 = 10_000;
+pub fn sequences() -> u32 {
+    specgen_tests::length(2_000, 10_000)
+}
 const TICKS: u32 = 24;
 
 /// A controller under random sequences; `each` sees the bench after every tick, and the row of output before it.
@@ -149,7 +151,7 @@ fn phases_and_causes_of_random_sequences_are_those_of_the_oracle() {
     let emitted = emitted("supervisor-sequences", "legs.toml", &[]);
     let mut bench = Bench::new(Kind::Legs, &emitted, &[("setpoint_kind", 1.0), ("mode", 2.0)]);
     let max_step = i64::from(emitted.compiled.ir.defaults.max_step);
-    let met = follow(&mut bench, Oracle::new(Bounds::legs()), max_step, SEQUENCES);
+    let met = follow(&mut bench, Oracle::new(Bounds::legs()), max_step, sequences());
     for cause in 1..=12 {
         assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
     }
@@ -165,7 +167,7 @@ fn phases_and_causes_of_a_platform_are_those_of_the_oracle() {
     let model = &emitted.compiled.model;
     let ([x, y, z], [a, b, c]) = (model.workspace.translation, model.workspace.rotation);
     let bounds = Bounds::platform([x, y, z, a, b, c], model.sensor.range);
-    let met = follow(&mut bench, Oracle::new(bounds.clone()), max_step, SEQUENCES);
+    let met = follow(&mut bench, Oracle::new(bounds.clone()), max_step, sequences());
     for cause in [1, 4, 6, 8, 9, 10, 11, 12] {
         assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
     }
