@@ -15,6 +15,8 @@ const BOARDS: [&str; 2] = ["firmware/stm32h743/Cargo.toml", "firmware/stm32f4/Ca
 const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 /// Its own workspace, because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
+/// Its own workspace, because of its dependencies too.
+const SCHEMA: &str = "tests/schema/Cargo.toml";
 /// Members of the workspace that people write.
 const HAND_WRITTEN: [&str; 9] = [
     "specgen",
@@ -46,6 +48,9 @@ pub fn test(root: &Path) -> ExitCode {
     report.step("formatting", || formatting(root));
     report.step("lints", || lints(root));
     report.step("tests", || binaries::test(root));
+    report.step("published schema", || {
+        expect_success(cargo(root, &["test", "--quiet", "--locked", "--manifest-path", SCHEMA]), "see the test above")
+    });
     report.step("documentation", || {
         let mut doc = cargo(root, &["doc", "--release", "--workspace", "--no-deps", "--quiet"]);
         doc.env("RUSTDOCFLAGS", "-D warnings");
@@ -82,7 +87,7 @@ fn formatting(root: &Path) -> Outcome {
     }
     // Not `--all`: the emitted controller is formatted by specgen itself.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
-    let excluded = [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON].into_iter().chain(BOARDS);
+    let excluded = [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA].into_iter().chain(BOARDS);
     let excluded = excluded.map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
         let mend = format!("run: cargo fmt {}", scope.join(" "));
