@@ -21,7 +21,7 @@ pub struct Steps {
 #[must_use]
 pub fn steps(model: &Model) -> Steps {
     let [low, high] = model.dac.range;
-    let code = (high - low) / (2_f64.powi(model.dac.bits as i32) - 1.0);
+    let code = (high - low) / (libm::ldexp(1.0, model.dac.bits as i32) - 1.0);
     let leg = code * model.actuator.leg_gain();
     let inverse = inverse_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
     let along = |axis: usize| inverse[axis].iter().fold(0.0, |sum, entry| sum + entry.abs()) * leg / 2.0;
@@ -43,8 +43,8 @@ pub fn check(model: &Model) -> Vec<Diagnostic> {
         return Vec::new();
     }
     // A step is the range over 2^b − 1.
-    let codes_needed = (2_f64.powi(model.dac.bits as i32) - 1.0) * largest / precision;
-    let enough = (model.dac.bits..=MOST_BITS).find(|bits| 2_f64.powi(*bits as i32) - 1.0 >= codes_needed);
+    let codes_needed = (libm::ldexp(1.0, model.dac.bits as i32) - 1.0) * largest / precision;
+    let enough = (model.dac.bits..=MOST_BITS).find(|bits| libm::ldexp(1.0, *bits as i32) - 1.0 >= codes_needed);
     let [low, high] = model.dac.range;
     let range = (high - low) * precision / largest;
     let nanometres = |metres: f64| format!("{:.3} nm", metres * 1e9);

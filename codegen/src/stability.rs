@@ -158,7 +158,7 @@ fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Ad
     };
     // Four decades up to the largest weight there is.
     let steps = 400;
-    let scale_at = |k: i32| largest_scale * 10f64.powf(-4.0 * (1.0 - f64::from(k) / f64::from(steps)));
+    let scale_at = |k: i32| largest_scale * libm::exp10(-4.0 * (1.0 - f64::from(k) / f64::from(steps)));
     let Some(first_stable) = (0..=steps).find(|&k| stable(scale_at(k))) else {
         return 0.0;
     };
@@ -179,7 +179,7 @@ fn refusal(model: &Model, code: &'static str, message: String, largest: f64) -> 
     let key = if bandwidth { "adaptation.level_bandwidth" } else { "adaptation.level_weight" };
     let run = model.timing.period * f64::from(model.adaptation.run_interval);
     let shown = |value: f64| {
-        let digits = 10f64.powi(3 - value.abs().log10().floor() as i32);
+        let digits = libm::exp10(3.0 - libm::log10(value.abs()).floor());
         (value * digits).floor() / digits
     };
     let help = if largest <= 0.0 {

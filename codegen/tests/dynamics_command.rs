@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used)] // A test.
 
 use crate::support::{Folder, repository};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde_json::Value;
 
 fn reference() -> (String, Value) {
@@ -79,4 +81,80 @@ fn bad_states_are_refused_in_words() {
         folder.run(&["dynamics", "reference.toml", "--states", name]).says(1, &[words, name]);
     }
     folder.run(&["dynamics", "reference.toml", "--states", "none.csv"]).says(1, &["none.csv", "cannot be read"]);
+}
+
+/// Everything that is written as a number, without a parser of JSON.
+fn number_texts(document: &str) -> Vec<String> {
+    let pieces = document.split(|c: char| c.is_ascii_whitespace() || "[]{},:".contains(c));
+    pieces.filter(|piece| piece.parse::<f64>().is_ok()).map(str::to_owned).collect()
+}
+
+/// How many of `texts` the binary reads as another number than the nearest double: they go in as rates and accelerations,
+/// which the result repeats. The nearest double by `core`, which reads any decimal exactly.
+fn misread(texts: &[String]) -> usize {
+    let folder = Folder::new();
+    let state = |texts: &[String]| {
+        let text = |k: usize| texts.get(k).map_or("0", String::as_str);
+        let six = |from: usize| (from..from + 6).map(text).collect::<Vec<_>>().join(", ");
+        format!(r#"{{"h": [0, 0, 0.181, 0, 0.01, 0], "hd": [{}], "hdd": [{}]}}"#, six(0), six(6))
+    };
+    let states: Vec<String> = texts.chunks(12).map(state).collect();
+    folder.write("states.json", format!("[{}]", states.join(",\n")));
+    let run = folder.run(&["dynamics", "reference.toml", "--states", "states.json", "-o", "out.json"]);
+    assert_eq!(run.code, 0, "{run:?}");
+    let out = folder.read("out.json");
+    let fields = |key: &str| -> Vec<f64> {
+        let start = format!("\"{key}\": [");
+        let rows = out.split(&start).skip(1).map(|rest| rest.split(']').next().unwrap());
+        rows.flat_map(|row| row.split(',').map(|number| number.trim().parse::<f64>().unwrap())).collect()
+    };
+    let (rates, accelerations) = (fields("hd"), fields("hdd"));
+    let found = rates.chunks(6).zip(accelerations.chunks(6)).flat_map(|(a, b)| a.iter().chain(b));
+    assert_eq!(rates.len() + accelerations.len(), texts.len().div_ceil(12) * 12);
+    found.zip(texts).filter(|(found, text)| found.to_bits() != text.parse::<f64>().unwrap().to_bits()).count()
+}
+
+/// The binary under test has the features of a user's binary (`tests/tests/features.rs`): what holds here holds there.
+#[test]
+fn no_number_of_the_oracle_is_misread() {
+    let mut texts = Vec::new();
+    for name in ["reference", "asymmetric"] {
+        let path = repository().join(format!("tests/oracle/dynamics-{name}.json"));
+        texts.extend(number_texts(&std::fs::read_to_string(path).unwrap()));
+    }
+    assert!(texts.len() >= 4_635, "only {} numbers", texts.len());
+    assert_eq!(misread(&texts), 0, "of {}", texts.len());
+}
+
+#[test]
+fn no_double_is_misread_however_it_is_written() {
+    let mut random = ChaCha8Rng::seed_from_u64(13);
+    let mut texts: Vec<String> = [
+        "-0.0",
+        "5e-324",
+        "2.2250738585072011e-308",
+        "1.7976931348623157e308",
+        "1e23",
+        "9007199254740993",
+        "9007199254740993.0000000000000000000000000000000000000000000000000000001",
+        "0.1000000000000000055511151231257827021181583404541015625",
+        "123456789012345678901234567890",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    for k in 0..30_000 {
+        // Every tenth a subnormal, which the shift makes of any bits.
+        let bits = random.next_u64();
+        let value = f64::from_bits(if k % 10 == 0 { bits >> 12 } else { bits });
+        if !value.is_finite() {
+            continue;
+        }
+        texts.push(match k % 3 {
+            0 => format!("{value:?}"),
+            1 => format!("{value:e}"),
+            // More digits than any double needs.
+            _ => format!("{value:.24e}"),
+        });
+    }
+    assert_eq!(misread(&texts), 0, "of {}", texts.len());
 }

@@ -7,6 +7,7 @@ mod boards;
 mod budgets;
 mod dynamics;
 mod emitted;
+mod features;
 mod figures;
 mod identify_bad_input;
 mod identify_faults;

@@ -19,7 +19,9 @@ const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 /// Its own workspace, because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
 /// Workspaces of their own with lock files of their own.
-const STANDING_ALONE: [&str; 4] = [FIRMWARE, REAL_TIME, BOARDS[0], BOARDS[1]];
+const STANDING_ALONE: [&str; 5] = [FIRMWARE, REAL_TIME, SCHEMA, BOARDS[0], BOARDS[1]];
+/// Its own workspace, because of its dependencies too.
+const SCHEMA: &str = "tests/schema/Cargo.toml";
 /// Members of the workspace that people write.
 const HAND_WRITTEN: [&str; 10] = [
     "specgen",
@@ -44,7 +46,7 @@ pub fn setup() -> ExitCode {
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
     let lock_files = STANDING_ALONE.len();
-    let mut report = Report::new(8 + lock_files);
+    let mut report = Report::new(9 + lock_files);
     report.step("cross compiler and QEMU", setup::microcontroller);
     let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
     report.step("formatting", || formatting(root));
@@ -52,6 +54,9 @@ pub fn test(root: &Path) -> ExitCode {
     report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
     report.step("examples in the documentation", || binaries::examples(root));
     report.step("lints", || lints(root));
+    report.step("published schema", || {
+        expect_success(cargo(root, &["test", "--quiet", "--locked", "--manifest-path", SCHEMA]), "see the test above")
+    });
     report.step("documentation", || {
         let mut doc = cargo(root, &["doc", "--release", "--workspace", "--no-deps", "--quiet"]);
         doc.env("RUSTDOCFLAGS", "-D warnings");
@@ -117,7 +122,7 @@ fn formatting(root: &Path) -> Outcome {
     }
     // Not `--all`: the emitted controller is formatted by specgen itself.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
-    let excluded = [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON].into_iter().chain(BOARDS);
+    let excluded = [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA].into_iter().chain(BOARDS);
     let excluded = excluded.map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
         let mend = format!("run: cargo fmt {}", scope.join(" "));

@@ -172,7 +172,7 @@ mod tests {
         // Slow against the cycle of 0.2 s: a faster one looks like a lag, which the account takes out first.
         let creep: Vec<f64> = lagging(&time, &drive, 1.0).iter().map(|x| 1e-9 * x).collect();
         assert_eq!(explain(&time, &drive, &creep, 0.0, 1e-7, &keep).main, Source::Creep);
-        let steps: Vec<f64> = drive.iter().map(|u| 1e-9 * (0.8 * u).sin()).collect();
+        let steps: Vec<f64> = drive.iter().map(|u| 1e-9 * libm::sin(0.8 * u)).collect();
         assert_eq!(explain(&time, &drive, &steps, 0.0, 1e-7, &keep).main, Source::Model);
         let rms = mean_square(&steps).sqrt();
         assert_eq!(explain(&time, &drive, &steps, rms, 1e-7, &keep).main, Source::Noise);

@@ -238,7 +238,7 @@ fn widest(record: &Record, first: usize, end: usize, gain: f64) -> f64 {
 /// E0625 if there is no relation, or one of them has no gain.
 pub fn together(mut relations: Vec<Relation>, reference: Option<f64>) -> Result<LinearReport, Vec<Diagnostic>> {
     relations.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
-    let apart = |f: f64, wanted: f64| (f / wanted).ln().abs();
+    let apart = |f: f64, wanted: f64| libm::log(f / wanted).abs();
     let chosen = match reference {
         None => relations.first(),
         Some(wanted) => {

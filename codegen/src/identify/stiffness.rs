@@ -140,16 +140,16 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
     let base = mean_square(&straight.residual);
     let mut best: Option<Creep> = None;
     let shortest = 10.0 * duration / (time.len() - 1) as f64;
-    let steps = ((duration / shortest).log10() * PER_DECADE as f64).ceil().max(1.0) as usize;
+    let steps = (libm::log10(duration / shortest) * PER_DECADE as f64).ceil().max(1.0) as usize;
     let at = |tau: f64| -> Option<Creep> {
         let state = lagging(time, force, tau);
         let found = fit(&[&one, &ramp, force, &state], &y)?;
         Some(Creep { tau, square: mean_square(&found.residual), found, state })
     };
     let better = |best: &Option<Creep>, tried: &Creep| best.as_ref().is_none_or(|b| tried.square < b.square);
-    let ratio = (duration / shortest).powf(1.0 / steps as f64);
+    let ratio = libm::pow(duration / shortest, 1.0 / steps as f64);
     for k in 0..=steps {
-        best = at(shortest * ratio.powi(k as i32)).filter(|tried| better(&best, tried)).or(best);
+        best = at(shortest * libm::pow(ratio, k as f64)).filter(|tried| better(&best, tried)).or(best);
     }
     // Between the neighbours of the best one, ever closer.
     let mut width = ratio.sqrt();

@@ -66,6 +66,22 @@ fn balance(a: &mut Matrix) {
     }
 }
 
+/// Largest magnitude of an eigenvalue; infinite if they cannot be found, NaN if one of them is.
+#[must_use]
+pub fn spectral_radius(matrix: &Matrix) -> f64 {
+    let Some(values) = eigenvalues(matrix) else {
+        return f64::INFINITY;
+    };
+    let mut largest = 0.0;
+    for (re, im) in values {
+        let magnitude = libm::hypot(re, im);
+        if magnitude > largest || magnitude.is_nan() {
+            largest = magnitude;
+        }
+    }
+    largest
+}
+
 /// Similar matrix with zeros below the first subdiagonal, by elimination with row pivots.
 fn hessenberg(a: &mut Matrix) {
     let n = a.size();
@@ -286,7 +302,7 @@ mod tests {
     /// Largest distance of a value of one set from the nearest of the other.
     fn distance(found: &[(f64, f64)], expected: &[(f64, f64)]) -> f64 {
         let nearest =
-            |(a, b): (f64, f64)| expected.iter().map(|(c, d)| (a - c).hypot(b - d)).fold(f64::INFINITY, f64::min);
+            |(a, b): (f64, f64)| expected.iter().map(|(c, d)| libm::hypot(a - c, b - d)).fold(f64::INFINITY, f64::min);
         found.iter().map(|&value| nearest(value)).fold(0.0, f64::max)
     }
 
@@ -317,7 +333,7 @@ mod tests {
         }
         let mut matrix = Matrix::zeros(8);
         for k in 0..8 {
-            matrix[(0, k)] = -coefficients[k + 1] * 1e6_f64.powi(k as i32);
+            matrix[(0, k)] = -coefficients[k + 1] * libm::pow(1e6, k as f64);
             if k > 0 {
                 matrix[(k, k - 1)] = 1e-6;
             }

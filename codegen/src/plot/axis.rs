@@ -42,7 +42,7 @@ impl Axis {
             (low, high) = (1.0, 10.0);
         }
         if scale == Scale::Log {
-            (low, high) = (low.log10(), high.log10());
+            (low, high) = (libm::log10(low), libm::log10(high));
         }
         if high - low <= 1e-12 * high.abs().max(low.abs()).max(1e-300) {
             let room = if low == 0.0 { 1.0 } else { 0.1 * low.abs() };
@@ -56,7 +56,7 @@ impl Axis {
     pub(super) fn at(&self, value: f64) -> f64 {
         let value = match self.scale {
             Scale::Linear => value,
-            Scale::Log if value > 0.0 => value.log10(),
+            Scale::Log if value > 0.0 => libm::log10(value),
             Scale::Log => f64::NAN,
         };
         self.pixels[0] + (value - self.low) / (self.high - self.low) * (self.pixels[1] - self.pixels[0])
@@ -72,10 +72,10 @@ impl Axis {
 
 fn linear(low: f64, high: f64) -> Vec<Tick> {
     let rough = (high - low) / 6.0;
-    let decade = 10f64.powf(rough.log10().floor());
+    let decade = libm::exp10(libm::log10(rough).floor());
     let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|f| f * decade >= rough).unwrap_or(10.0);
     let step = factor * decade;
-    let digits = (-step.log10().floor()).clamp(0.0, 12.0) as usize;
+    let digits = (-libm::log10(step).floor()).clamp(0.0, 12.0) as usize;
     let first = (low / step).ceil() as i64;
     let last = (high / step).floor() as i64;
     (first..=last.min(first + 20))
@@ -102,8 +102,8 @@ fn logarithmic(low: f64, high: f64) -> Vec<Tick> {
     let mut ticks = Vec::new();
     for decade in (low.floor() as i32)..=(high.ceil() as i32) {
         for factor in factors {
-            let value = factor * 10f64.powi(decade);
-            if value.log10() >= low && value.log10() <= high {
+            let value = factor * libm::exp10(f64::from(decade));
+            if libm::log10(value) >= low && libm::log10(value) <= high {
                 let label = if (-3..5).contains(&decade) {
                     format!("{}", (value * 1e6).round() / 1e6)
                 } else {
@@ -115,7 +115,7 @@ fn logarithmic(low: f64, high: f64) -> Vec<Tick> {
     }
     // Less than a factor two between the ends: even steps show more.
     if ticks.len() < 2 {
-        ticks = linear(10f64.powf(low), 10f64.powf(high));
+        ticks = linear(libm::exp10(low), libm::exp10(high));
     }
     ticks
 }

@@ -96,7 +96,7 @@ pub fn of_platform(
                 })
                 .collect();
             let Some(line) = Line::fit(&points) else { continue };
-            let off: f64 = points.iter().map(|(x, y)| (y - line.slope * x - line.offset).powi(2)).sum();
+            let off: f64 = points.iter().map(|(x, y)| y - line.slope * x - line.offset).map(|e| e * e).sum();
             let rms = libm::sqrt(off / points.len() as f64) * 1e9;
             table.push(vec![
                 format!("{}", leg + 1),

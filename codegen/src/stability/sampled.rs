@@ -10,10 +10,8 @@
 
 use core::f64::consts::TAU;
 
-use nalgebra::{DMatrix, SMatrix, SVector};
-
 use crate::model::Model;
-use crate::numerics::Matrix;
+use crate::numerics::{Matrix, exponential, spectral_radius as largest_magnitude};
 
 /// Linear dynamics of a leg as the adaptation sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,75 +38,50 @@ impl LegDynamics {
         }
     }
 
-    /// State transition of [p, y, v] over one run and its response to a held input.
-    fn discretise(&self) -> (SMatrix<f64, 3, 3>, SVector<f64, 3>) {
+    /// State transition of [p, y, v] over one run, and in the fourth column its response to a held input.
+    fn discretise(&self) -> Matrix {
         // A lag far below the run is as good as none; the bound keeps the matrix exponential well scaled.
-        let lag = self.lag.max(1e-4 * self.run);
+        let shortest = 1e-4 * self.run;
+        let lag = if self.lag > shortest { self.lag } else { shortest };
         let stiffness = self.resonance * self.resonance;
         let damping = 2.0 * self.damping_ratio * self.resonance;
         // [A B; 0 0], velocity in units of ω y to balance the rows.
-        let continuous = SMatrix::<f64, 4, 4>::new(
-            -1.0 / lag,
-            0.0,
-            0.0,
-            1.0 / lag,
-            0.0,
-            0.0,
-            self.resonance,
-            0.0,
-            stiffness / self.resonance,
-            -stiffness / self.resonance,
-            -damping,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-        );
-        let discrete = (continuous * self.run).exp();
-        (discrete.fixed_view::<3, 3>(0, 0).into(), discrete.fixed_view::<3, 1>(0, 3).into())
+        let mut continuous = Matrix::zeros(4);
+        continuous.set_row(0, &[-1.0 / lag, 0.0, 0.0, 1.0 / lag]);
+        continuous.set_row(1, &[0.0, 0.0, self.resonance, 0.0]);
+        continuous.set_row(2, &[stiffness / self.resonance, -stiffness / self.resonance, -damping, 0.0]);
+        exponential(&continuous.scaled(self.run))
     }
 }
 
-/// Spectral radius of the loop from run to run; `drift_weight` none for EWMA.
+/// Spectral radius of the loop from run to run, infinite if it cannot be found; `drift_weight` none for EWMA.
 #[must_use]
 pub fn spectral_radius(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> f64 {
-    let one_run = one_run(dynamics, level_weight, drift_weight, gain_ratio);
-    one_run.complex_eigenvalues().iter().map(|value| value.norm()).fold(0.0, f64::max)
+    largest_magnitude(&transition(dynamics, level_weight, drift_weight, gain_ratio))
 }
 
 /// The loop from run to run as a matrix over [p, y, v, δ̂, φ̂], φ̂ left out for EWMA.
 #[must_use]
 pub fn transition(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> Matrix {
-    let one_run = one_run(dynamics, level_weight, drift_weight, gain_ratio);
-    let mut matrix = Matrix::zeros(one_run.nrows());
-    for row in 0..one_run.nrows() {
-        for column in 0..one_run.ncols() {
-            matrix[(row, column)] = one_run[(row, column)];
-        }
-    }
-    matrix
-}
-
-fn one_run(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> DMatrix<f64> {
-    let (transition, input) = dynamics.discretise();
+    let discrete = dynamics.discretise();
     let states = if drift_weight.is_some() { 5 } else { 4 };
-    let mut one_run = DMatrix::zeros(states, states);
+    let mut one_run = Matrix::zeros(states);
     // Estimates after the reading: m = y + δ̂ + φ̂ (φ̂ = 0 under EWMA).
     let level_row = estimate_row(states, [level_weight, 1.0, level_weight]);
-    set_row(&mut one_run, 3, &level_row);
+    one_run.set_row(3, &level_row);
     let mut request_row: Vec<f64> = level_row.iter().map(|x| -x).collect();
     if let Some(weight) = drift_weight {
         let drift_row = estimate_row(states, [weight, 0.0, 1.0]);
-        set_row(&mut one_run, 4, &drift_row);
+        one_run.set_row(4, &drift_row);
         for (request, drift) in request_row.iter_mut().zip(&drift_row) {
             *request -= drift;
         }
     }
     for row in 0..3 {
+        let input = discrete[(row, 3)];
         for column in 0..states {
-            let own = if column < 3 { transition[(row, column)] } else { 0.0 };
-            one_run[(row, column)] = own + gain_ratio * input[row] * request_row[column];
+            let own = if column < 3 { discrete[(row, column)] } else { 0.0 };
+            one_run[(row, column)] = own + gain_ratio * input * request_row[column];
         }
     }
     one_run
@@ -118,12 +91,6 @@ fn one_run(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>,
 fn estimate_row(states: usize, [measured, level, drift]: [f64; 3]) -> Vec<f64> {
     let row = [0.0, measured, 0.0, level, drift];
     row[..states].to_vec()
-}
-
-fn set_row(matrix: &mut DMatrix<f64>, row: usize, values: &[f64]) {
-    for (column, value) in values.iter().enumerate() {
-        matrix[(row, column)] = *value;
-    }
 }
 
 #[cfg(test)]

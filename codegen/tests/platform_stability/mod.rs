@@ -1,6 +1,7 @@
 //! Design and stability of the platform loop against the study's figures, and against a simulation that shares nothing
 //! with it.
 
+#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
 mod design;

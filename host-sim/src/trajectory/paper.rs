@@ -301,7 +301,7 @@ mod tests {
         // Machining with the printed time factor: y and the angles start somewhere in their turn.
         let machining = paper(PaperPath::Machining, Reading::AsPrinted, 1.0);
         assert!((machining.duration() - 0.35).abs() < 1e-12);
-        um(5.8 * (0.1 * PI).sin(), jump_of(&machining, 1, 0.5));
+        um(5.8 * libm::sin(0.1 * PI), jump_of(&machining, 1, 0.5));
         assert!(jump_of(&machining, 3, 0.5).pose > 10e-6);
     }
 

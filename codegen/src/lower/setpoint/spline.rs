@@ -64,7 +64,7 @@ mod tests {
         let mut state = 5_u64;
         let mut next = || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (state >> 40) as f64 / 2f64.powi(24)
+            (state >> 40) as f64 / f64::from(1 << 24)
         };
         (0..n).map(|_| next()).collect()
     }

@@ -38,7 +38,7 @@ pub(super) fn slew_moves_a_code(f: &Fields, findings: &mut Findings) -> Option<(
     let bits: u32 = f.whole("dac.bits")?;
     let [low, high] = f.list::<2>("dac.range")?;
     let (slew, period) = (f.number("actuator.slew_rate")?, f.number("timing.period")?);
-    let code = (high - low) / (2_f64.powi(bits as i32) - 1.0);
+    let code = (high - low) / (libm::ldexp(1.0, bits as i32) - 1.0);
     if low < high && slew * period < code {
         findings.error(
             codes::SLEW_BELOW_CODE,

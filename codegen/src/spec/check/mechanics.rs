@@ -281,8 +281,8 @@ mod tests {
         let platform = [p, third - p, third + p, 2.0 * third - p, 2.0 * third + p, -p];
         let turn = nalgebra::Rotation3::from_euler_angles(pose[3], pose[4], pose[5]);
         std::array::from_fn(|i| {
-            let joint = Vector3::new(platform[i].cos(), platform[i].sin(), 0.0) * 0.1;
-            let anchor = Vector3::new(base[i].cos(), base[i].sin(), 0.0) * 0.15;
+            let joint = Vector3::new(libm::cos(platform[i]), libm::sin(platform[i]), 0.0) * 0.1;
+            let anchor = Vector3::new(libm::cos(base[i]), libm::sin(base[i]), 0.0) * 0.15;
             (Vector3::new(pose[0], pose[1], g.height + pose[2]) + turn * joint - anchor).norm()
         })
     }

@@ -14,7 +14,7 @@ use super::law::{Adapting, Law, Tuning};
 use super::modes::ModalBasis;
 use super::notch::{Biquad, Notch};
 use super::sampled::{Plant, STATES};
-use crate::numerics::{Matrix, Matrix6, eigenvalues};
+use crate::numerics::{Matrix, Matrix6, spectral_radius};
 
 /// A linear combination of the states.
 type Signal = Vec<f64>;
@@ -64,17 +64,7 @@ impl ClosedLoop {
     /// Largest magnitude of an eigenvalue of one tick; infinite if it cannot be found.
     #[must_use]
     pub fn spectral_radius(&self, law: Law, tuning: &Tuning, conditions: &Conditions) -> f64 {
-        let Some(values) = eigenvalues(&self.transition(law, tuning, conditions)) else {
-            return f64::INFINITY;
-        };
-        let mut largest = 0.0;
-        for (re, im) in values {
-            let magnitude = libm::hypot(re, im);
-            if magnitude > largest || magnitude.is_nan() {
-                largest = magnitude;
-            }
-        }
-        largest
+        spectral_radius(&self.transition(law, tuning, conditions))
     }
 
     /// The matrix of one tick. States that the law or the tuning does not use are left out: an idle integrator would read

@@ -84,10 +84,10 @@ mod tests {
             let (mut re, mut im) = (0.0, 0.0);
             for (k, x) in c.iter().enumerate() {
                 let angle = -frequency * period * k as f64;
-                re += x * angle.cos();
-                im += x * angle.sin();
+                re += x * libm::cos(angle);
+                im += x * libm::sin(angle);
             }
-            re.hypot(im)
+            libm::hypot(re, im)
         };
         at(&section.b) / at(&[1.0, section.a[0], section.a[1]])
     }

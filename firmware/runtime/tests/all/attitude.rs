@@ -1,4 +1,5 @@
 //! R, T(θ) and the leg Jacobian against quaternions and central differences.
+#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 use crate::common::Random;
 use specgen_runtime::Attitude;
