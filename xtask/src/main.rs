@@ -1,6 +1,7 @@
-//! Developer commands: `cargo xtask setup`, `cargo xtask test`, `cargo xtask bless`.
+//! Developer commands: `cargo xtask setup`, `cargo xtask test`, `cargo xtask bless`, `cargo xtask fresh`.
 
 mod binaries;
+mod fresh;
 mod generated;
 mod run;
 mod setup;
@@ -14,6 +15,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   setup   installs what the tests need: a cross compiler for Cortex-M and QEMU
   test    setup, then formatting, lints, every test, documentation, freshness of generated files
   bless   writes the generated files that are committed anew
+  fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
 
 With SPECGEN_ALLOW_MISSING=1, what needs a tool that cannot be installed is skipped, and said so.";
 
@@ -24,6 +26,11 @@ fn main() -> ExitCode {
         ["setup"] => steps::setup(),
         ["test"] => steps::test(&root()),
         ["bless"] => steps::bless(&root()),
+        ["fresh", "--help" | "-h"] => {
+            println!("{}", fresh::usage());
+            ExitCode::SUCCESS
+        }
+        ["fresh", ref arguments @ ..] => fresh::fresh(&root(), arguments),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");
             ExitCode::SUCCESS
