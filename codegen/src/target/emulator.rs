@@ -114,7 +114,7 @@ impl Emulator {
 /// What installs it, for whoever may.
 #[must_use]
 pub fn install_command() -> String {
-    if cfg!(target_os = "macos") { "brew install qemu".into() } else { format!("apt-get install {PROGRAM}") }
+    if cfg!(target_os = "macos") { "brew install qemu".into() } else { format!("apt-get install {PROGRAM} on Debian") }
 }
 
 /// Why it ended, and what it printed.

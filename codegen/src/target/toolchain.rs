@@ -108,7 +108,7 @@ fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, 
         candidates.iter().filter_map(|candidate| Some((candidate, Sysroot::of(candidate)?))).collect();
     let mut without_linker = None;
     for (candidate, sysroot) in &probed {
-        let Some(core) = sysroot.core() else { continue };
+        let Some(core) = sysroot.core().filter(|_| !is_old(&sysroot.version)) else { continue };
         let linker = if sysroot.rust_lld().is_some() {
             None
         } else if let Some(linker) = probed.iter().find_map(|(_, other)| other.rust_lld()).or_else(|| lld(elsewhere)) {
@@ -150,6 +150,16 @@ pub fn install_command() -> String {
         format!(", or on Debian: apt-get install {}", PACKAGES.join(" "))
     };
     format!("rustup target add {TRIPLE}{debian}")
+}
+
+/// Whether a compiler is older than what the emitted code is written for; Debian without its updates has one.
+fn is_old(version: &str) -> bool {
+    let numbers = |text: &str| -> Option<(u32, u32)> {
+        let mut parts = text.split('.').map(str::parse);
+        Some((parts.next()?.ok()?, parts.next()?.ok()?))
+    };
+    let found = version.split(' ').nth(1).and_then(numbers);
+    found.is_some_and(|found| Some(found) < numbers(env!("CARGO_PKG_RUST_VERSION")))
 }
 
 /// The folder a compiler belongs to.
@@ -283,6 +293,17 @@ mod tests {
         fs::write(bin.join("ld.lld"), "").unwrap();
         let found = choose(&[debian], std::slice::from_ref(&bin)).unwrap();
         assert_eq!(found.linker, Some(bin.join("ld.lld")));
+    }
+
+    #[test]
+    fn an_old_compiler_does_not_serve() {
+        assert!(is_old("rustc 1.85.1 (4eb161250 2025-03-15)"));
+        assert!(!is_old("rustc 1.95.0 (x)") && !is_old("rustc 2.0.0-nightly") && !is_old("mine"));
+        let root = tempfile::tempdir().unwrap();
+        let debian = fake(root.path(), "debian", &[SOURCE, LLD]);
+        let script = fs::read_to_string(&debian.rustc).unwrap().replace("1.95.0", "1.85.0");
+        fs::write(&debian.rustc, script).unwrap();
+        assert!(choose(&[debian], &[]).is_err());
     }
 
     #[test]
