@@ -7,9 +7,11 @@ mod root;
 
 use std::path::Path;
 use std::process::ExitCode;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use root::{Caller, Root};
+use specgen::interrupt;
 
 /// The README's main job.
 const MAIN_JOB: &str = "cargo run --release -- specs/reference.toml -o out/reference --setup";
@@ -17,6 +19,8 @@ const MAIN_JOB: &str = "cargo run --release -- specs/reference.toml -o out/refer
 const TESTS: &str = "cargo xtask test";
 /// Where what a scenario printed is kept, below the repository.
 const KEPT: &str = "target/fresh";
+/// Exit code after Ctrl-C, as shells have it.
+const INTERRUPTED: u8 = 130;
 
 const USAGE: &str = "usage: cargo xtask fresh [--main-job-only] [SCENARIO…]
 
@@ -96,10 +100,16 @@ pub fn fresh(repository: &Path, arguments: &[&str]) -> ExitCode {
             return ExitCode::from(3);
         }
     };
-    // Roots are gone after Ctrl-C too.
-    specgen::interrupt::catch(|| 130);
-    let chosen = SCENARIOS.iter().filter(|scenario| names.is_empty() || names.contains(&scenario.name));
-    let lines: Vec<Line> = chosen.map(|scenario| run(scenario, &caller, repository, !options.is_empty())).collect();
+    // Roots are gone after Ctrl-C too: what runs in them is ended, the rest follows.
+    interrupt::catch(|| INTERRUPTED);
+    let pressed = interrupt::heed();
+    let mut lines = Vec::new();
+    for scenario in SCENARIOS.iter().filter(|scenario| names.is_empty() || names.contains(&scenario.name)) {
+        lines.push(run(scenario, &caller, repository, !options.is_empty()));
+        if pressed.load(Ordering::SeqCst) {
+            return ExitCode::from(INTERRUPTED);
+        }
+    }
     println!("\n=== summary\n{:20}{:>9}{:>9}  {:34}{:>6}{:>9}", "scenario", "main job", "s", "bits", "tests", "s");
     for line in &lines {
         let of = |ran: &Option<Ran>| {

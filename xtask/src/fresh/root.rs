@@ -2,9 +2,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
 
-use specgen::interrupt::Scratch;
+use specgen::interrupt::{self, Scratch};
 use specgen::target::{TRIPLE, find_program};
 
 /// What Rust itself needs to link programs.
@@ -253,8 +255,7 @@ impl Home<'_> {
             "git clone",
         )?;
         // A work tree that shares its repository hands over the branch of another.
-        let head = output(Command::new("git").arg("-C").arg(repository).args(["rev-parse", "HEAD"]))?;
-        let head = String::from_utf8_lossy(&head.stdout).trim().to_owned();
+        let head = text("git", &["-C", &repository.display().to_string(), "rev-parse", "HEAD"])?;
         succeed(
             Command::new("git").arg("-C").arg(&to).args(["checkout", "--quiet", "--detach", &head]),
             "git checkout",
@@ -270,10 +271,9 @@ impl Home<'_> {
         let mut command = namespace(offline, Some(self.root.path()));
         command.arg("chroot").arg(format!("--userspec={0}:{0}", self.user)).arg(self.root.path()).args(["env", "-i"]);
         command.args(self.environment.iter().map(|(name, value)| format!("{name}={value}")));
-        command.args(["sh", "-c", &format!("cd {}/{CLONE} 2>/dev/null; exec 2>&1; {words}", self.folder)]);
-        let output = output(&mut command)?;
-        let printed = [output.stdout, output.stderr].concat();
-        Ok((output.status.code().unwrap_or(-1), String::from_utf8_lossy(&printed).into_owned()))
+        command.args(["sh", "-c", &format!("cd {}/{CLONE} 2>/dev/null; {words}", self.folder)]);
+        let (status, printed) = watched(&mut command)?;
+        Ok((status.code().unwrap_or(-1), printed))
     }
 
     /// As [`Home::run`], where there is only one way to end.
@@ -312,22 +312,41 @@ fn namespace(offline: bool, root: Option<&Path>) -> Command {
 }
 
 fn succeed(command: &mut Command, what: &str) -> Result<(), String> {
-    let done = output(command)?;
-    if done.status.success() {
+    let (status, printed) = watched(command)?;
+    if status.success() {
         return Ok(());
     }
-    let printed = String::from_utf8_lossy(&[done.stdout, done.stderr].concat()).into_owned();
     let lines: Vec<&str> = printed.lines().collect();
-    Err(format!("{what}: {}\n{}", done.status, lines[lines.len().saturating_sub(20)..].join("\n")))
+    Err(format!("{what}: {status}\n{}", lines[lines.len().saturating_sub(20)..].join("\n")))
 }
 
-fn output(command: &mut Command) -> Result<Output, String> {
-    command.stdin(Stdio::null()).output().map_err(|error| format!("{}: {error}", command.get_program().display()))
+/// Runs to the end, or to Ctrl-C: how it ended, and all that it printed. Of a [`namespace`] nothing goes on after that, so
+/// that its root can be removed.
+fn watched(command: &mut Command) -> Result<(ExitStatus, String), String> {
+    let program = command.get_program().display().to_string();
+    let failed = |error: std::io::Error| format!("{program}: {error}");
+    let scratch = Scratch::new().map_err(failed)?;
+    let path = scratch.path().join("printed");
+    let file = fs::File::create(&path).map_err(failed)?;
+    let second = file.try_clone().map_err(failed)?;
+    let mut child = command.stdin(Stdio::null()).stdout(file).stderr(second).spawn().map_err(failed)?;
+    loop {
+        if let Some(status) = child.try_wait().map_err(failed)? {
+            let printed = fs::read(&path).map_err(failed)?;
+            return Ok((status, String::from_utf8_lossy(&printed).into_owned()));
+        }
+        if interrupt::heed().load(Ordering::SeqCst) {
+            child.kill().and_then(|()| child.wait()).map_err(failed)?;
+            return Err("interrupted".to_owned());
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
 }
 
 /// What a program prints.
 fn text(program: &str, words: &[&str]) -> Result<String, String> {
-    let output = output(Command::new(program).args(words))?;
+    let output = Command::new(program).args(words).stdin(Stdio::null()).output();
+    let output = output.map_err(|error| format!("{program}: {error}"))?;
     if !output.status.success() {
         return Err(format!("{program} {} ends with {}", words.join(" "), output.status));
     }
