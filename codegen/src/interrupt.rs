@@ -136,8 +136,20 @@ impl Scratch {
     /// # Errors
     /// What the file system says.
     pub fn new() -> io::Result<Self> {
+        Self::made(tempfile::tempdir)
+    }
+
+    /// A new and empty one in another folder than the system's, so that what is in it can be renamed to its place there.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn below(folder: &Path) -> io::Result<Self> {
+        Self::made(|| tempfile::tempdir_in(folder))
+    }
+
+    fn made(make: impl FnOnce() -> io::Result<TempDir>) -> io::Result<Self> {
         let _whole = whole();
-        let folder = tempfile::tempdir()?;
+        let folder = make()?;
         let guard = Guard::of(Passing::Tree(folder.path().to_owned()));
         Ok(Self { folder, _guard: guard })
     }

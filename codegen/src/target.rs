@@ -6,9 +6,10 @@
 //!                              ─replay──────────→ outputs, state digests, instructions, painted stack
 //! DIR/host ─host::build_library→ shared library
 //! ```
-//! [`toolchain`] is the one place that looks for a cross compiler, [`provision`] the one that installs.
+//! [`toolchain`] is the one place that looks for a cross compiler, [`places`] says where tools may be, [`provision`] brings them.
 //! Nothing here knows TOML, the IR or the control law; the words it moves are opaque.
 
+mod apt;
 pub mod build;
 pub mod cache;
 pub mod callgraph;
@@ -18,6 +19,7 @@ pub mod error;
 pub mod host;
 pub mod image;
 mod panics;
+pub mod places;
 mod process;
 pub mod provision;
 pub mod replay;
@@ -26,6 +28,7 @@ pub mod stack;
 pub mod targets;
 mod thumb;
 pub mod toolchain;
+pub mod unpacked;
 pub mod user_cache;
 
 pub use build::{Image, build_image, build_pil};
@@ -35,6 +38,9 @@ pub use replay::{ReplayResult, replay, replay_machine};
 
 /// Rust's name of the compilation target of every [`Mcu`](crate::model::Mcu) here.
 pub const TRIPLE: &str = "thumbv7em-none-eabihf";
+
+/// What brings the tools that are missing.
+pub const SET_UP: &str = "specgen SPEC --setup, or in the repository cargo xtask setup";
 
 /// What is there to build for a microcontroller and to run the image.
 #[derive(Debug, Clone)]

@@ -73,6 +73,33 @@ pub struct Measurement {
     pub used: Used,
 }
 
+/// What an image shows without being run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Inspection {
+    /// Emulated machine that it is for.
+    pub machine: String,
+    /// `rustc --version` of the cross compiler.
+    pub compiler: String,
+    /// Bytes of flash, replay harness included.
+    pub flash: u64,
+    /// Of these, code.
+    pub code: u64,
+    /// Of these, constants (tables).
+    pub constants: u64,
+    /// Bytes of RAM taken statically. Config and State are not in it: only a run tells their size.
+    pub ram: u64,
+    /// Bytes of code that a tick can reach.
+    pub tick_code: u64,
+    /// Static bound of a tick's stack, bytes; none if the call graph cannot be bounded.
+    pub stack_bound: Option<u64>,
+    /// Panic or allocator symbols in the image.
+    pub forbidden_symbols: Vec<String>,
+    /// What the tick must not do, looked for in the image.
+    pub checks: Checked,
+    /// What a budget is held against.
+    pub used: Used,
+}
+
 /// Instructions of one stage.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Stage {
@@ -96,18 +123,40 @@ impl Measurement {
     }
 }
 
+/// Looks at an image without running it.
+///
+/// # Errors
+/// The image is not one of specgen's.
+pub fn inspect(image: &Image) -> Result<Inspection, TargetError> {
+    let footprint = image::footprint(&image.elf)?;
+    let bound = stack::bound(&image.elf, stack::STEP_SYMBOL)?;
+    let rules = Rules { single: !image.mcu.part().double, whole_image: true };
+    let checks = checks::check(&image.elf, Some(stack::STEP_SYMBOL), rules)?;
+    Ok(Inspection {
+        machine: image.mcu.machine().to_owned(),
+        compiler: image.compiler.clone(),
+        flash: footprint.flash,
+        code: footprint.code,
+        constants: footprint.constants,
+        ram: footprint.ram,
+        tick_code: bound.code_bytes,
+        stack_bound: bound.is_complete().then_some(bound.bytes),
+        forbidden_symbols: footprint.panic_symbols.into_iter().chain(footprint.allocator_symbols).collect(),
+        used: used(image, None, &checks)?,
+        checks,
+    })
+}
+
 /// Replays `host`'s inputs under the configuration `config` on the emulated machine and measures it.
 ///
 /// # Errors
 /// The emulator is missing or fails, or the image is not one of specgen's.
 pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measurement, TargetError> {
-    let footprint = image::footprint(&image.elf)?;
-    let bound = stack::bound(&image.elf, stack::STEP_SYMBOL)?;
+    let seen = inspect(image)?;
+    let mut checks = seen.checks;
     let (replayed, stats) = replay(image, config, host)?;
-    let rules = Rules { single: !image.mcu.part().double, whole_image: true };
-    let mut checks = checks::check(&image.elf, Some(stack::STEP_SYMBOL), rules)?;
     checks.hold_against_painted(stats.painted_stack);
-    let used = used(image, &stats, &checks)?;
+    let used = used(image, Some(&stats), &checks)?;
     let stages = stats.stages.iter().filter(|stage| stage.calls > 0).map(|stage| Stage {
         name: stage.name.clone(),
         calls: stage.calls,
@@ -116,17 +165,17 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measuremen
         max: stage.largest,
     });
     Ok(Measurement {
-        machine: image.mcu.machine().to_owned(),
-        compiler: image.compiler.clone(),
-        flash: footprint.flash,
-        code: footprint.code,
-        constants: footprint.constants,
-        ram: footprint.ram + stats.state_bytes + stats.config_bytes,
+        machine: seen.machine,
+        compiler: seen.compiler,
+        flash: seen.flash,
+        code: seen.code,
+        constants: seen.constants,
+        ram: seen.ram + stats.state_bytes + stats.config_bytes,
         state: stats.state_bytes,
-        tick_code: bound.code_bytes,
-        stack_bound: bound.is_complete().then_some(bound.bytes),
+        tick_code: seen.tick_code,
+        stack_bound: seen.stack_bound,
         stack_painted: stats.painted_stack,
-        forbidden_symbols: footprint.panic_symbols.into_iter().chain(footprint.allocator_symbols).collect(),
+        forbidden_symbols: seen.forbidden_symbols,
         stages: stages.collect(),
         ticks: stats.ticks,
         first_difference: first_difference(host, &replayed).map(|difference| difference.to_string()),
@@ -135,25 +184,28 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measuremen
     })
 }
 
-/// What the replay image uses, and who of it.
-fn used(image: &Image, stats: &target::replay::ReplayStats, checks: &Checked) -> Result<Used, TargetError> {
+/// What the replay image uses, and who of it; without a run, neither Config and State nor instructions.
+fn used(image: &Image, stats: Option<&target::replay::ReplayStats>, checks: &Checked) -> Result<Used, TargetError> {
     let size = size::size(&image.elf)?;
     let stack = checks.stack.unwrap_or(0);
-    let mut ram_by = vec![
-        ("State".to_owned(), stats.state_bytes),
-        ("Config".to_owned(), stats.config_bytes),
-        ("stack of a tick".to_owned(), stack),
-    ];
-    ram_by.extend(size.variables.iter().cloned());
+    let words = stats.map_or(Vec::new(), |stats| {
+        vec![("State".to_owned(), stats.state_bytes), ("Config".to_owned(), stats.config_bytes)]
+    });
+    let ram_by: Vec<(String, u64)> = words
+        .iter()
+        .cloned()
+        .chain([("stack of a tick".to_owned(), stack)])
+        .chain(size.variables.iter().cloned())
+        .collect();
     Ok(Used {
         flash: size.flash(),
         flash_by: size.owners.iter().map(|owner| (owner.name.clone(), owner.flash())).collect(),
-        ram: size.ram() + stats.state_bytes + stats.config_bytes + stack,
+        ram: size.ram() + words.iter().map(|(_, bytes)| bytes).sum::<u64>() + stack,
         ram_by,
         stack: checks.stack,
         stack_by: checks.path.clone(),
-        instructions: stats.stage(WHOLE).map(|step| step.mean().ceil() as u64),
-        instructions_by: per_tick(stats),
+        instructions: stats.and_then(|stats| stats.stage(WHOLE)).map(|step| step.mean().ceil() as u64),
+        instructions_by: stats.map(per_tick).unwrap_or_default(),
     })
 }
 

@@ -12,6 +12,7 @@ mod guide;
 mod interrupt;
 mod microcontroller;
 mod operate;
+mod optional;
 mod output_folder;
 mod pil;
 mod platform_check;

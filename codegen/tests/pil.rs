@@ -241,7 +241,8 @@ fn ctrl_c_ends_it_with_what_was_done_and_leaves_no_emulator() {
 fn without_the_emulator_the_command_that_installs_it_is_named() {
     let (_one, folder) = workspace();
     let nothing = tempfile::tempdir().unwrap();
-    let value = document(pil(&spec("legs.toml"), &folder, &[]).env("PATH", nothing.path()), 3);
+    let mut command = pil(&spec("legs.toml"), &folder, &[]);
+    let value = document(command.env("SPECGEN_TOOLS", nothing.path()).env("SPECGEN_CACHE", ""), 3);
     assert!(value["error"].as_str().unwrap().contains("apt-get install qemu-system-arm"), "{value:#}");
 }
 

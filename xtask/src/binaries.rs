@@ -238,3 +238,38 @@ impl Job<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    /// A file beside `main.rs` that it does not name would be compiled by nobody, and its tests missed by nobody.
+    #[test]
+    fn every_file_of_tests_is_a_module() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let mut seen = 0;
+        for folder in [
+            "tests/tests",
+            "codegen/tests",
+            "host-sim/oracle/tests/all",
+            "firmware/runtime/tests/all",
+            "firmware/link/tests/all",
+            "firmware/board/tests/all",
+            "firmware/hal/tests/all",
+        ] {
+            let main = fs::read_to_string(root.join(folder).join("main.rs")).unwrap();
+            for entry in fs::read_dir(root.join(folder)).unwrap() {
+                let path = entry.unwrap().path();
+                let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+                let module = path.extension().is_some_and(|end| end == "rs") || path.join("mod.rs").is_file();
+                if module && name != "main" {
+                    seen += 1;
+                    assert!(main.contains(&format!("mod {name};")), "{folder}/main.rs does not name {name}");
+                }
+            }
+        }
+        assert!(seen > 70, "{seen} modules");
+    }
+}

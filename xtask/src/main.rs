@@ -1,6 +1,7 @@
 //! Developer commands: see [`USAGE`].
 
 mod binaries;
+mod fresh;
 mod generated;
 mod progress;
 mod run;
@@ -18,6 +19,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   test    setup, then formatting, lints, every test, documentation, freshness of generated files
   soak    every test at full length, for releases; writes tests/soak.txt
   bless   writes the generated files that are committed anew
+  fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
 
 With SPECGEN_ALLOW_MISSING=1, what needs a tool that cannot be installed is skipped, and said so.";
 
@@ -29,6 +31,11 @@ fn main() -> ExitCode {
         ["test"] => steps::test(&root()),
         ["soak"] => steps::soak(&root()),
         ["bless"] => steps::bless(&root()),
+        ["fresh", "--help" | "-h"] => {
+            println!("{}", fresh::usage());
+            ExitCode::SUCCESS
+        }
+        ["fresh", ref arguments @ ..] => fresh::fresh(&root(), arguments),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");
             ExitCode::SUCCESS

@@ -1,4 +1,4 @@
-//! The main job: spec to a workspace, built and measured where the tools are there.
+//! The main job: spec to a workspace, built and checked, and measured where the tools for it are there.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,8 +12,8 @@ use super::check::describe;
 use super::ui::{Failure, Ui};
 use crate::budget::{self, group};
 use crate::compile::{self, Compiled};
-use crate::target::{self, TargetError};
-use crate::verify::{self, Measurement};
+use crate::target;
+use crate::verify::{self, Inspection, Measurement};
 use crate::workspace;
 
 /// Ticks of the exercise that is run on host and emulated machine.
@@ -31,9 +31,13 @@ pub struct Arguments {
     /// Write the source only.
     #[arg(long)]
     no_build: bool,
-    /// First install what is missing for building and measuring (cross compiler, emulator).
+    /// First bring what is missing for the microcontroller (cross compiler, emulator): by rustup or apt, else into the user's
+    /// cache. Where that fails, the job goes on without.
     #[arg(long, conflicts_with = "no_build")]
     setup: bool,
+    /// Exit with code 3 where what needs a missing cross compiler or emulator is left out.
+    #[arg(long, conflicts_with = "no_build")]
+    require_target: bool,
 }
 
 /// What was made.
@@ -47,7 +51,9 @@ struct Summary {
     table_bytes: usize,
     host_library: Option<String>,
     measurement: Option<Measurement>,
-    /// Why there is no library or no measurement.
+    /// What the image shows without being run, where it could not be.
+    image: Option<Inspection>,
+    /// What was left out, why, and what brings it.
     missing: Option<String>,
     over_budget: Vec<String>,
 }
@@ -57,8 +63,9 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         // clap demands it unless there is a subcommand.
         return Err(Failure::Usage("name a spec file".to_owned()));
     };
-    if arguments.setup {
-        target::provision::provision(&mut |step| ui.progress(step))?;
+    let set_up = if arguments.setup { target::provision::provision(&mut |step| ui.progress(step)).err() } else { None };
+    if let Some(error) = &set_up {
+        ui.progress(&format!("{error}; going on without"));
     }
     let compiled = compile::compile(spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
@@ -67,26 +74,38 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     ui.progress(&format!("wrote {} files to {}", compiled.files.len(), output.display()));
 
     let mut summary = Summary::of(&compiled, &output);
-    if arguments.no_build {
+    // What was written is whole, whatever follows.
+    let built = if arguments.no_build {
         summary.missing = Some("not built: --no-build".to_owned());
+        Ok(())
     } else {
-        match build(&compiled, &output, &mut summary, ui) {
-            Ok(()) => {}
-            // What was written is whole; what is missing is said, with the command that installs it.
-            Err(Failure::Target(error @ TargetError::MissingTool { .. })) => summary.missing = Some(error.to_string()),
-            Err(failure) => return Err(failure),
+        build(&compiled, &output, &mut summary, ui)
+    };
+    let refused = match built {
+        Ok(()) => None,
+        Err(Failure::Target(error)) if error.is_of_a_tool() => {
+            // Set-up knows more of the same tool: what was tried.
+            let missing = format!("left out: {}: {}", summary.undone(), set_up.unwrap_or(error));
+            summary.missing = Some(missing.clone());
+            arguments.require_target.then_some(missing)
         }
-    }
+        Err(Failure::Target(error)) => Some(error.to_string()),
+        Err(failure) => return Err(failure),
+    };
     summary.over_budget = over_budget(&compiled, &summary);
     let text = summary.text(&compiled);
-    let Some(message) = summary.verdict() else {
-        ui.result(&text, json!(summary));
-        return Ok(());
+    let failure = match (summary.verdict(), refused) {
+        (Some(message), _) => Failure::Judged { message, result: json!(summary) },
+        (None, Some(message)) => Failure::Incomplete { message, result: json!(summary) },
+        (None, None) => {
+            ui.result(&text, json!(summary));
+            return Ok(());
+        }
     };
     if !ui.is_json() {
         ui.out(&text);
     }
-    Err(Failure::Judged { message, result: json!(summary) })
+    Err(failure)
 }
 
 /// Host library, image, and the exercise on both.
@@ -100,11 +119,17 @@ fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> 
     let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS)
         .map_err(|error| Failure::Environment(error.to_string()))?;
 
-    target::available()?;
+    let toolchain = target::toolchain::find()?;
     let mcu = compiled.model.target.mcu;
     ui.progress(&format!("building and measuring for {}", mcu.machine()));
-    let image = target::build_image(output, mcu, &target_dir)?;
-    summary.measurement = Some(verify::measure(&image, &controller.default_config(), &host)?);
+    let image = target::build::build_image_with(&toolchain, output, mcu, &target_dir)?;
+    match verify::measure(&image, &controller.default_config(), &host) {
+        Ok(measurement) => summary.measurement = Some(measurement),
+        Err(error) => {
+            summary.image = Some(verify::inspect(&image)?);
+            return Err(error.into());
+        }
+    }
     Ok(())
 }
 
@@ -121,8 +146,18 @@ impl Summary {
             table_bytes: nodes * compiled.ir.scalar.bits() as usize / 8,
             host_library: None,
             measurement: None,
+            image: None,
             missing: None,
             over_budget: Vec::new(),
+        }
+    }
+
+    /// What a missing tool leaves out.
+    fn undone(&self) -> &'static str {
+        match (&self.host_library, &self.image) {
+            (None, _) => "building",
+            (_, None) => "the image for the microcontroller (memory, stack, instructions, comparison of bits)",
+            (_, Some(_)) => "running the image (instructions, stack seen, comparison of bits)",
         }
     }
 
@@ -160,18 +195,30 @@ impl Summary {
         if let Some(library) = &self.host_library {
             let _ = writeln!(out, "  host library: {library} (links only without a panic path)");
         }
-        if let Some(m) = &self.measurement {
-            let of = |budget: Option<u64>| budget.map_or(String::new(), |b| format!(" of {}", group(b)));
-            let _ = writeln!(out, "  {} ({}):", m.machine, m.compiler);
+        let of = |budget: Option<u64>| budget.map_or(String::new(), |b| format!(" of {}", group(b)));
+        let bound = |bytes: Option<u64>| {
+            bytes.map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(target.stack)))
+        };
+        let flash = |out: &mut String, [all, code, constants, tick]: [u64; 4]| {
             let _ = writeln!(
                 out,
                 "    flash         {}{} bytes: {} code, {} constants; a tick reaches {} bytes of code",
-                group(m.flash),
+                group(all),
                 of(target.flash),
-                group(m.code),
-                group(m.constants),
-                group(m.tick_code)
+                group(code),
+                group(constants),
+                group(tick)
             );
+        };
+        if let Some(i) = &self.image {
+            let _ = writeln!(out, "  {} ({}), not run:", i.machine, i.compiler);
+            flash(&mut out, [i.flash, i.code, i.constants, i.tick_code]);
+            let _ = writeln!(out, "    RAM           {}{} bytes static, without State", group(i.ram), of(target.ram));
+            let _ = writeln!(out, "    stack a tick  {} (static)", bound(i.stack_bound));
+        }
+        if let Some(m) = &self.measurement {
+            let _ = writeln!(out, "  {} ({}):", m.machine, m.compiler);
+            flash(&mut out, [m.flash, m.code, m.constants, m.tick_code]);
             let _ = writeln!(
                 out,
                 "    RAM           {}{} bytes, of which State {}",
@@ -179,10 +226,8 @@ impl Summary {
                 of(target.ram),
                 group(m.state)
             );
-            let bound = m
-                .stack_bound
-                .map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes", group(bytes), of(target.stack)));
-            let _ = writeln!(out, "    stack a tick  {bound} at most (static), {} seen", group(m.stack_painted));
+            let _ =
+                writeln!(out, "    stack a tick  {} (static), {} seen", bound(m.stack_bound), group(m.stack_painted));
             for stage in &m.stages {
                 let budget = if stage.name == "step" { of(target.instructions) } else { String::new() };
                 let _ = writeln!(
@@ -214,8 +259,12 @@ impl Summary {
 
 /// What exceeds the spec's `[target.budget]` or the part, and what the image must not do, in words.
 fn over_budget(compiled: &Compiled, summary: &Summary) -> Vec<String> {
-    let Some(m) = &summary.measurement else { return Vec::new() };
-    let mut over = budget::over(&compiled.model.target, &m.used);
-    over.extend(m.checks.faults.iter().map(|fault| fault.text.clone()));
+    let (used, checks) = match (&summary.measurement, &summary.image) {
+        (Some(m), _) => (&m.used, &m.checks),
+        (None, Some(i)) => (&i.used, &i.checks),
+        (None, None) => return Vec::new(),
+    };
+    let mut over = budget::over(&compiled.model.target, used);
+    over.extend(checks.faults.iter().map(|fault| fault.text.clone()));
     over
 }

@@ -7,6 +7,7 @@ pub const MAIN: &str = "\
 Examples:
   specgen platform.toml --no-build         # compile, write a workspace of Rust source
   specgen platform.toml -o controller      # (minutes) the same, built, measured, compared with the host bit by bit
+  specgen platform.toml --setup            # (minutes) the same, after bringing cross compiler and emulator
   specgen check platform.toml              # every finding, nothing written
   specgen sim platform.toml --frequency 10 # the paper's experiments with the emitted controller
   specgen tune platform.toml --write       # (minutes) gains from the simulated loop, into the spec

@@ -296,7 +296,7 @@ fn emulate(
 ) -> Result<Option<Measurement>, Failure> {
     let tools = match target::available() {
         Ok(tools) => tools,
-        Err(error @ TargetError::MissingTool { .. }) => {
+        Err(error) if error.is_of_a_tool() => {
             notes.push(format!("instructions not counted: {error}"));
             return Ok(None);
         }

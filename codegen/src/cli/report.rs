@@ -25,7 +25,6 @@ use crate::report::section::{Part, Section};
 use crate::report::view::Motion;
 use crate::report::{evidence, hysteresis, legs, linear, machining, motion, noise, region, view};
 use crate::spec::SpecSource;
-use crate::target::TargetError;
 use crate::verify::{self, Measurement};
 use crate::{lower, machine, precision, reproduce, target, workspace};
 
@@ -174,7 +173,7 @@ fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure
             .and_then(|image| verify::measure(&image, &controller.default_config(), &host));
         match measured {
             Ok(measurement) => Ok(measurement),
-            Err(error @ TargetError::MissingTool { .. }) => Err(error.to_string()),
+            Err(error) if error.is_of_a_tool() => Err(error.to_string()),
             Err(error) => return Err(error.into()),
         }
     };

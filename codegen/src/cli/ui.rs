@@ -39,6 +39,13 @@ pub enum Failure {
         /// For programs; the text is out already.
         result: Value,
     },
+    /// What this machine lacks or a tool refuses, after a part of the work is done: exit code 3, with that part.
+    Incomplete {
+        /// What, and why.
+        message: String,
+        /// For programs; the text is out already.
+        result: Value,
+    },
     /// Ended from outside with a result: what was found so far.
     Interrupted {
         /// What is left undone.
@@ -200,11 +207,14 @@ impl Ui {
             Failure::Target(error) => (ENVIRONMENT, error.to_string()),
             Failure::Environment(text) => (ENVIRONMENT, text.clone()),
             Failure::Judged { message, .. } => (1, message.clone()),
+            Failure::Incomplete { message, .. } => (ENVIRONMENT, message.clone()),
             Failure::Interrupted { message, .. } => (INTERRUPTED, message.clone()),
         };
         if self.json {
             let result = match failure {
-                Failure::Interrupted { result, .. } | Failure::Judged { result, .. } => result.clone(),
+                Failure::Interrupted { result, .. }
+                | Failure::Judged { result, .. }
+                | Failure::Incomplete { result, .. } => result.clone(),
                 _ => Value::Null,
             };
             self.document(code, result, Some(&message));

@@ -37,8 +37,8 @@ pub const EMULATED: &str = "qemu";
 /// `Cargo.lock` is respected; nothing is downloaded if the crates are in cargo's cache.
 ///
 /// # Errors
-/// [`TargetError::MissingTool`] without a cross compiler, [`TargetError::PanicPath`] if the controller can
-/// panic, [`TargetError::BuildFailed`] for everything else that cargo says.
+/// [`TargetError::MissingTool`] without a cross compiler, [`TargetError::BrokenTool`] if it lacks a crate or a part of its own,
+/// [`TargetError::PanicPath`] if the controller can panic, [`TargetError::BuildFailed`] for everything else that cargo says.
 pub fn build_image(dir: &Path, mcu: Mcu, target_dir: &Path) -> Result<Image, TargetError> {
     build_image_with(&toolchain::find()?, dir, mcu, target_dir)
 }
@@ -213,6 +213,18 @@ fn failure(what: &str, finished: &Finished) -> TargetError {
     if let Some(line) = finished.stderr.lines().find(is_proof) {
         let text = line.trim().to_owned();
         return TargetError::PanicPath { what: what.to_owned(), text };
+    }
+    // The machine's fault, not the workspace's: no network for a crate, a compiler that is there by half.
+    const BROKEN: [&str; 5] = [
+        "failed to download",
+        "failed to get `",
+        "failed to load source for dependency",
+        "can't find crate for `core`",
+        "linker `rust-lld` not found",
+    ];
+    let is_broken = |line: &&str| BROKEN.iter().any(|words| line.contains(words));
+    if let Some(line) = finished.stderr.lines().find(is_broken) {
+        return TargetError::BrokenTool { tool: format!("the compiler of {what}"), text: line.trim().to_owned() };
     }
     TargetError::BuildFailed { what: what.to_owned(), text }
 }

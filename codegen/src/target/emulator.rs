@@ -2,9 +2,10 @@
 
 use super::build::Image;
 use super::error::TargetError;
-use super::process::{self, find_in_path, first_line};
+use super::places::Places;
+use super::process::{self, first_line, with_libraries};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 /// QEMU for ARM.
@@ -14,7 +15,14 @@ pub struct Emulator {
     pub program: PathBuf,
     /// The first line of `--version`.
     pub version: String,
+    /// Folders of its libraries, if it does not find them by itself.
+    pub libraries: Vec<PathBuf>,
 }
+
+/// Its program, and the name of Debian's package.
+pub(super) const PROGRAM: &str = "qemu-system-arm";
+/// A machine that every version has that is good enough.
+const MACHINE: &str = "mps2-an500";
 
 /// How the firmware says why it ended: the codes of `firmware/qemu/src/semihosting.rs`.
 const EXITS: [(i32, &str); 7] = [
@@ -30,19 +38,42 @@ const EXITS: [(i32, &str); 7] = [
 const CONFIG_REFUSED: i32 = 64;
 
 impl Emulator {
-    /// Finds it on `PATH`.
+    /// The first that works, on `PATH`, in the usual folders, or among what [`provision`](super::provision) has unpacked.
     ///
     /// # Errors
     /// [`TargetError::MissingTool`] with the command that installs it.
     pub fn find() -> Result<Self, TargetError> {
-        let missing = || TargetError::MissingTool {
+        Self::find_in(&Places::here())
+    }
+
+    /// [`Emulator::find`] in given places.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn find_in(places: &Places) -> Result<Self, TargetError> {
+        let unpacked = places.unpacked(PROGRAM).and_then(|at| Some((at.program(PROGRAM)?, at.libraries())));
+        let candidates: Vec<_> = places.all(PROGRAM).map(|program| (program, Vec::new())).chain(unpacked).collect();
+        let found = candidates.iter().find_map(|(program, libraries)| Self::at(program, libraries));
+        found.ok_or_else(|| TargetError::MissingTool {
             tool: "QEMU for ARM".into(),
-            looked: "qemu-system-arm on PATH".into(),
-            command: "apt-get install qemu-system-arm".into(),
-        };
-        let program = find_in_path("qemu-system-arm").ok_or_else(missing)?;
-        let version = first_line(Command::new(&program).arg("--version")).ok_or_else(missing)?;
-        Ok(Self { program, version })
+            looked: match candidates.first() {
+                None => format!("{PROGRAM} on PATH and in specgen's cache"),
+                Some((broken, _)) => {
+                    format!("{PROGRAM} that works; {} does not run, or does not know {MACHINE}", broken.display())
+                }
+            },
+            command: format!("{}   (by hand: {})", super::SET_UP, install_command()),
+        })
+    }
+
+    /// The program, if it runs and knows the machine.
+    fn at(program: &Path, libraries: &[PathBuf]) -> Option<Self> {
+        let version = first_line(with_libraries(Command::new(program).arg("--version"), libraries))?;
+        let mut machines = Command::new(program);
+        let listed =
+            with_libraries(machines.args(["-machine", "help"]), libraries).stdin(Stdio::null()).output().ok()?;
+        let knows = String::from_utf8_lossy(&listed.stdout).lines().any(|line| line.starts_with(MACHINE));
+        knows.then(|| Self { program: program.to_owned(), version, libraries: libraries.to_vec() })
     }
 
     /// Runs the image to its end with `folder` as its working folder: semihosting files live there.
@@ -70,7 +101,7 @@ impl Emulator {
         let kernel = folder.join("image.elf");
         std::fs::write(&kernel, &image.elf).map_err(|e| TargetError::io("writing", &kernel, e))?;
         let mut command = Command::new(&self.program);
-        command
+        with_libraries(&mut command, &self.libraries)
             .current_dir(folder)
             .args(["-machine", image.mcu.machine(), "-cpu", image.mcu.core()])
             .args(["-icount", "shift=10", "-semihosting-config", "enable=on,target=native"])
@@ -78,6 +109,12 @@ impl Emulator {
             .args(["-kernel", "image.elf"]);
         Ok(command)
     }
+}
+
+/// What installs it, for whoever may.
+#[must_use]
+pub fn install_command() -> String {
+    if cfg!(target_os = "macos") { "brew install qemu".into() } else { format!("apt-get install {PROGRAM} on Debian") }
 }
 
 /// Why it ended, and what it printed.

@@ -16,6 +16,22 @@ pub enum TargetError {
         /// The command that installs it.
         command: String,
     },
+    /// A tool could not be brought onto this machine.
+    SetUpFailed {
+        /// What is missing.
+        tool: String,
+        /// Each way that was tried, and where it ended.
+        tried: Vec<String>,
+        /// What is left to do by hand.
+        command: String,
+    },
+    /// A tool is there and does not do its work on this machine.
+    BrokenTool {
+        /// Which.
+        tool: String,
+        /// The useful part of what it printed.
+        text: String,
+    },
     /// The compiler or the linker refused the emitted workspace.
     BuildFailed {
         /// What was being built.
@@ -70,7 +86,13 @@ impl TargetError {
     /// True if the machine lacks something, false if the emitted workspace is to blame (exit codes 3 and 1).
     #[must_use]
     pub fn is_environment(&self) -> bool {
-        matches!(self, Self::MissingTool { .. } | Self::Io { .. })
+        self.is_of_a_tool() || matches!(self, Self::Io { .. })
+    }
+
+    /// True if what is missing or broken is a tool that not every machine has: what needs it can be left out.
+    #[must_use]
+    pub fn is_of_a_tool(&self) -> bool {
+        matches!(self, Self::MissingTool { .. } | Self::SetUpFailed { .. } | Self::BrokenTool { .. })
     }
 
     pub(crate) fn io(doing: &str, path: impl Into<PathBuf>, source: std::io::Error) -> Self {
@@ -84,6 +106,10 @@ impl fmt::Display for TargetError {
             Self::MissingTool { tool, looked, command } => {
                 write!(f, "{tool} is not installed (looked for {looked}); install it with: {command}")
             }
+            Self::SetUpFailed { tool, tried, command } => {
+                write!(f, "{tool} could not be set up: {}; by hand: {command}", tried.join("; "))
+            }
+            Self::BrokenTool { tool, text } => write!(f, "{tool} does not work on this machine: {text}"),
             Self::BuildFailed { what, text } => write!(f, "building {what} failed:\n{text}"),
             Self::PanicPath { what, text } => write!(
                 f,

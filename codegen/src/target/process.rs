@@ -79,6 +79,15 @@ pub fn clean_command(program: impl AsRef<OsStr>) -> Command {
     command
 }
 
+/// Lets the program find libraries in these folders; in none, nothing is changed.
+pub fn with_libraries<'a>(command: &'a mut Command, folders: &[PathBuf]) -> &'a mut Command {
+    // A folder whose name cannot stand in a list would not be found by the loader either.
+    if let Some(list) = std::env::join_paths(folders).ok().filter(|_| !folders.is_empty()) {
+        command.env("LD_LIBRARY_PATH", list);
+    }
+    command
+}
+
 /// Runs to the end, or to the limit, with what it prints going to two files in `scratch`: a pipe
 /// that nobody empties would stop the program.
 pub fn run(command: &mut Command, scratch: &Path, limit: Duration) -> io::Result<Finished> {

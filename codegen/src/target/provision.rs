@@ -1,99 +1,147 @@
-//! Installs what building and running for a microcontroller needs.
+//! Brings what building and running for a microcontroller needs, by the first way that leads there.
 //!
-//! First choice is `rustup target add`; where rustup is absent or cannot fetch, Debian's packages, as root or
-//! with a `sudo` that asks no password. Nothing that is installed is removed, no configuration is edited.
+//! 1. What is there already, if it works.
+//! 2. The compiler by `rustup target add`.
+//! 3. Debian's packages, installed as root or with a sudo that asks for no password.
+//! 4. The same packages, [unpacked] into a folder of the user's cache.
+//!
+//! Nothing that is installed is removed, no configuration is edited, nobody is asked for a password.
 
-use super::emulator::Emulator;
+use super::apt::{Apt, Refusal};
+use super::emulator::{self, Emulator};
 use super::error::TargetError;
-use super::process::{clean_command, find_in_path, first_line};
-use super::toolchain;
-use super::{TRIPLE, Tools, available};
-use std::process::{Command, Stdio};
+use super::places::Places;
+use super::process::{self, clean_command};
+use super::toolchain::{self, Toolchain};
+use super::{TRIPLE, Tools, unpacked};
+use crate::interrupt::Scratch;
+use std::time::Duration;
 
-const DEBIAN_COMPILER: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
-const DEBIAN_LINKER: &str = "lld";
-const DEBIAN_EMULATOR: &str = "qemu-system-arm";
+/// Longest time for rustup: it downloads some megabytes.
+const RUSTUP_LIMIT: Duration = Duration::from_secs(600);
 
-/// Installs what is missing and returns what is there then. `say` is told every step before it is taken.
+/// Brings what is missing and returns what is there then. `say` is told every step before it is taken.
 ///
 /// # Errors
-/// [`TargetError::MissingTool`] for what could not be installed, with the command for someone who may.
+/// [`TargetError::SetUpFailed`] for what cannot be had, with what was tried and what is left to do by hand.
 pub fn provision(say: &mut dyn FnMut(&str)) -> Result<Tools, TargetError> {
-    if let Err(missing) = toolchain::find() {
-        say(&missing.to_string());
-        install_compiler(say);
+    provision_in(&Places::here(), say)
+}
+
+/// [`provision`] in given places.
+fn provision_in(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Tools, TargetError> {
+    let toolchain = compiler(places, say);
+    // Of use without a compiler too: `pil --elf`.
+    let emulator = emulator(places, say);
+    if let (Err(_), Err(second)) = (&toolchain, &emulator) {
+        // The first is returned.
+        say(&second.to_string());
     }
-    if let Err(missing) = Emulator::find() {
-        say(&missing.to_string());
-        apt_install(&[DEBIAN_EMULATOR], say);
-    }
-    let tools = available()?;
+    let tools = Tools { toolchain: toolchain?, emulator: emulator? };
     say(&format!("cross compiler: {} ({})", tools.toolchain.version, tools.toolchain.rustc.display()));
-    say(&format!("emulator: {}", tools.emulator.version));
+    say(&format!("emulator: {} ({})", tools.emulator.version, tools.emulator.program.display()));
     Ok(tools)
 }
 
-/// Tries one way after the other; [`toolchain::find`] judges the result.
-fn install_compiler(say: &mut dyn FnMut(&str)) {
-    if let Some(rustup) = find_in_path("rustup") {
-        run(clean_command(rustup).args(["target", "add", TRIPLE]), say);
-        if toolchain::find().is_ok() {
-            return;
+fn compiler(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Toolchain, TargetError> {
+    let find = || toolchain::find_in(places);
+    let mut search = Search { places, say, tried: Vec::new() };
+    if let Some(found) = search.already(&find) {
+        return Ok(found);
+    }
+    if let Some(found) = search.way("rustup target add", &find, rustup) {
+        return Ok(found);
+    }
+    let mut packages = toolchain::PACKAGES.to_vec();
+    if !toolchain::has_linker(places) {
+        packages.push(toolchain::LINKER_PACKAGE);
+    }
+    search.debian(&packages, &find).ok_or_else(|| search.failed("a Rust compiler", toolchain::install_command()))
+}
+
+fn emulator(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Emulator, TargetError> {
+    let find = || Emulator::find_in(places);
+    let mut search = Search { places, say, tried: Vec::new() };
+    if let Some(found) = search.already(&find) {
+        return Ok(found);
+    }
+    let found = search.debian(&[emulator::PROGRAM], &find);
+    found.ok_or_else(|| search.failed("QEMU for ARM", emulator::install_command()))
+}
+
+/// What looks for a tool; it alone judges whether a way has led there.
+type Find<'a, T> = &'a dyn Fn() -> Result<T, TargetError>;
+
+/// The search for one tool.
+struct Search<'a> {
+    places: &'a Places,
+    say: &'a mut dyn FnMut(&str),
+    /// Each way, and where it ended.
+    tried: Vec<String>,
+}
+
+impl Search<'_> {
+    /// What is there; else what is missing is said.
+    fn already<T>(&mut self, find: Find<'_, T>) -> Option<T> {
+        find().map_err(|missing| (self.say)(&missing.to_string())).ok()
+    }
+
+    /// Debian's packages, in both ways.
+    fn debian<T>(&mut self, packages: &[&str], find: Find<'_, T>) -> Option<T> {
+        let mut offline = false;
+        let installed = self.way("apt-get install", find, |places, say| {
+            let apt = Apt::of_the_system(places)?;
+            say(&format!("running: {}", apt.shown(packages)));
+            let done = apt.install(packages);
+            offline = done == Err(Refusal::NoNetwork);
+            done
+        });
+        if installed.is_some() || offline {
+            return installed;
         }
+        self.way("unpacked packages", find, |places, say| {
+            unpacked::fetch(packages[0], packages, places, &|| find().is_ok(), say)
+        })
     }
-    apt_install(&DEBIAN_COMPILER, say);
-    if matches!(toolchain::find(), Err(TargetError::MissingTool { tool, .. }) if tool == toolchain::LINKER) {
-        apt_install(&[DEBIAN_LINKER], say);
+
+    /// Goes one way; none, with a note of why, if the tool is not there at its end.
+    fn way<T>(
+        &mut self,
+        name: &str,
+        find: Find<'_, T>,
+        go: impl FnOnce(&Places, &mut dyn FnMut(&str)) -> Result<(), Refusal>,
+    ) -> Option<T> {
+        let why = match go(self.places, &mut *self.say) {
+            Ok(()) => match find() {
+                Ok(found) => return Some(found),
+                Err(_) => "done, but what it brought does not work".to_owned(),
+            },
+            Err(refusal) => refusal.to_string(),
+        };
+        (self.say)(&format!("{name}: {why}"));
+        self.tried.push(format!("{name}: {why}"));
+        None
+    }
+
+    fn failed(&self, tool: &str, command: String) -> TargetError {
+        TargetError::SetUpFailed { tool: tool.to_owned(), tried: self.tried.clone(), command }
     }
 }
 
-fn apt_install(packages: &[&str], say: &mut dyn FnMut(&str)) {
-    let Some(apt) = find_in_path("apt-get") else {
-        say("there is no apt-get here, so nothing can be installed");
-        return;
-    };
-    let Some(prefix) = become_root() else {
-        say(&format!("not root, and sudo wants a password: apt-get install {} is left to you", packages.join(" ")));
-        return;
-    };
-    let apt_command = || {
-        let mut words = prefix.iter().map(String::as_str).chain([apt.to_str().unwrap_or("apt-get")]);
-        let mut command = Command::new(words.next().unwrap_or("apt-get"));
-        command.args(words).env("DEBIAN_FRONTEND", "noninteractive");
-        command
-    };
-    // Package lists may be old or absent on a fresh machine; if this fails, the install may still work.
-    run(apt_command().args(["update", "-qq"]), say);
-    // `--no-remove`: rather fail than replace a compiler that someone installed.
-    run(apt_command().args(["install", "-y", "-qq", "--no-install-recommends", "--no-remove"]).args(packages), say);
+fn rustup(places: &Places, say: &mut dyn FnMut(&str)) -> Result<(), Refusal> {
+    let rustup = places.program("rustup").ok_or_else(|| Refusal::other("there is no rustup"))?;
+    say(&format!("running: rustup target add {TRIPLE}"));
+    let failed = |error: std::io::Error| Refusal::other(format!("rustup cannot be run: {error}"));
+    let scratch = Scratch::new().map_err(failed)?;
+    let mut command = clean_command(rustup);
+    let done = process::run(command.args(["target", "add", TRIPLE]), scratch.path(), RUSTUP_LIMIT).map_err(failed)?;
+    if done.success() {
+        return Ok(());
+    }
+    let why = done.stderr.lines().find_map(|line| line.strip_prefix("error: ")).unwrap_or("it does not say why");
+    // What follows are addresses and causes of causes.
+    Err(Refusal::other(why.split(": ").next().unwrap_or(why)))
 }
 
-/// What to put before a command so that it runs as root: nothing, or sudo; `None` if neither works.
-fn become_root() -> Option<Vec<String>> {
-    if first_line(Command::new("id").arg("-u")).as_deref() == Some("0") {
-        return Some(Vec::new());
-    }
-    let allowed = Command::new("sudo")
-        .args(["-n", "true"])
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success());
-    allowed.then(|| vec!["sudo".to_owned(), "-n".to_owned()])
-}
-
-/// Runs a command in full view; says so if it fails.
-fn run(command: &mut Command, say: &mut dyn FnMut(&str)) {
-    let words: Vec<String> = std::iter::once(command.get_program())
-        .chain(command.get_args())
-        .map(|word| word.to_string_lossy().into_owned())
-        .collect();
-    let shown = words.join(" ");
-    say(&format!("running: {shown}"));
-    match command.stdin(Stdio::null()).status() {
-        Ok(status) if status.success() => {}
-        Ok(status) => say(&format!("{shown} failed ({status})")),
-        Err(error) => say(&format!("{shown} cannot be run: {error}")),
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -3,15 +3,17 @@
 //! In order, and without touching anyone's configuration:
 //! 1. the `rustc` on `PATH` has the target installed (`rustup target add`);
 //! 2. the `rustc` on `PATH` has its sources (`rustup component add rust-src`): `core` is built from them;
-//! 3. Debian's `rustc-web cargo-web rust-web-src` in `/usr`: the same way.
+//! 3. a `rustc` further down `PATH` or in `/usr/bin`, such as Debian's `rustc-web cargo-web rust-web-src`: the same way;
+//! 4. the same packages as [`provision`](super::provision) has unpacked them.
 //!
 //! Building `core`, `-Z emit-stack-sizes` and `-Z location-detail` are not stable, so `RUSTC_BOOTSTRAP=1` is set for these builds
 //! alone. The linker is `rust-lld` of that compiler, of the one on `PATH`, or LLVM's `ld.lld`.
 
 use super::TRIPLE;
 use super::error::TargetError;
-use super::process::{clean_command, find_in_path, first_line};
-use std::path::{Path, PathBuf};
+use super::places::Places;
+use super::process::{clean_command, first_line, with_libraries};
+use std::path::PathBuf;
 use std::process::Command;
 
 /// What [`TargetError::MissingTool`] calls a linker, where a compiler alone is not enough.
@@ -39,6 +41,8 @@ pub struct Toolchain {
     pub core: CoreLibrary,
     /// `rustc --version`.
     pub version: String,
+    /// Folders of the compiler's libraries, if it does not find them by itself.
+    pub libraries: Vec<PathBuf>,
 }
 
 /// A compiler that may or may not serve.
@@ -46,33 +50,65 @@ pub struct Toolchain {
 struct Candidate {
     rustc: PathBuf,
     cargo: PathBuf,
+    libraries: Vec<PathBuf>,
 }
+
+/// Debian's packages of a compiler, and the name under which they are unpacked.
+pub(super) const PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
+/// Debian's package of the linker.
+pub(super) const LINKER_PACKAGE: &str = "lld";
 
 /// Finds a cross compiler.
 ///
 /// # Errors
 /// [`TargetError::MissingTool`] with the command that installs one.
 pub fn find() -> Result<Toolchain, TargetError> {
-    let mut candidates = Vec::new();
-    if let (Some(rustc), Some(cargo)) = (find_in_path("rustc"), find_in_path("cargo")) {
-        candidates.push(Candidate { rustc, cargo });
+    find_in(&Places::here())
+}
+
+/// [`find`] in given places.
+///
+/// # Errors
+/// As there.
+pub fn find_in(places: &Places) -> Result<Toolchain, TargetError> {
+    let mut elsewhere = places.programs.clone();
+    elsewhere.extend(places.unpacked(PACKAGES[0]).map(|unpacked| unpacked.programs()));
+    choose(&candidates(places), &elsewhere)
+}
+
+/// Whether a linker is there for a compiler that comes without one.
+pub(super) fn has_linker(places: &Places) -> bool {
+    let sysroots = candidates(places).into_iter().filter_map(|candidate| Sysroot::of(&candidate));
+    sysroots.into_iter().any(|sysroot| sysroot.rust_lld().is_some()) || lld(&places.programs).is_some()
+}
+
+/// Every compiler that has a cargo.
+fn candidates(places: &Places) -> Vec<Candidate> {
+    let mut found: Vec<Candidate> = Vec::new();
+    if let (Some(rustc), Some(cargo)) = (places.program("rustc"), places.program("cargo")) {
+        found.push(Candidate { rustc, cargo, libraries: Vec::new() });
     }
-    let debian = Candidate { rustc: "/usr/bin/rustc".into(), cargo: "/usr/bin/cargo".into() };
-    if debian.rustc.is_file() && debian.cargo.is_file() {
-        candidates.push(debian);
+    for folder in &places.programs {
+        let (rustc, cargo) = (folder.join("rustc"), folder.join("cargo"));
+        if rustc.is_file() && cargo.is_file() && found.iter().all(|known| known.rustc != rustc) {
+            found.push(Candidate { rustc, cargo, libraries: Vec::new() });
+        }
     }
-    let search_path = std::env::var_os("PATH").unwrap_or_default();
-    let elsewhere: Vec<PathBuf> = std::env::split_paths(&search_path).collect();
-    choose(&candidates, &elsewhere)
+    if let Some(unpacked) = places.unpacked(PACKAGES[0])
+        && let (Some(rustc), Some(cargo)) = (unpacked.program("rustc"), unpacked.program("cargo"))
+    {
+        found.push(Candidate { rustc, cargo, libraries: unpacked.libraries() });
+    }
+    found
 }
 
 /// The first candidate that serves; linkers are looked for beside every candidate, then in `elsewhere`.
 fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, TargetError> {
     let probed: Vec<(&Candidate, Sysroot)> =
-        candidates.iter().filter_map(|candidate| Some((candidate, Sysroot::of(&candidate.rustc)?))).collect();
+        candidates.iter().filter_map(|candidate| Some((candidate, Sysroot::of(candidate)?))).collect();
     let mut without_linker = None;
     for (candidate, sysroot) in &probed {
-        let Some(core) = sysroot.core() else { continue };
+        let Some(core) = sysroot.core().filter(|_| !is_old(&sysroot.version)) else { continue };
         let linker = if sysroot.rust_lld().is_some() {
             None
         } else if let Some(linker) = probed.iter().find_map(|(_, other)| other.rust_lld()).or_else(|| lld(elsewhere)) {
@@ -87,26 +123,43 @@ fn choose(candidates: &[Candidate], elsewhere: &[PathBuf]) -> Result<Toolchain, 
             linker,
             core,
             version: sysroot.version.clone(),
+            libraries: candidate.libraries.clone(),
         });
     }
     Err(match without_linker {
         Some(rustc) => TargetError::MissingTool {
             tool: LINKER.into(),
             looked: format!("rust-lld beside {} and on PATH, ld.lld on PATH", rustc.display()),
-            command: "apt-get install lld".into(),
+            command: format!("{}   (by hand: apt-get install {LINKER_PACKAGE})", super::SET_UP),
         },
         None => TargetError::MissingTool {
             tool: format!("a Rust compiler for {TRIPLE}"),
-            looked: "the target or rust-src in the rustc on PATH, Debian's rustc-web in /usr".into(),
-            command: install_command(),
+            looked: "the target or rust-src in the rustc on PATH, Debian's rustc-web in /usr and in specgen's cache"
+                .into(),
+            command: format!("{}   (by hand: {})", super::SET_UP, install_command()),
         },
     })
 }
 
-/// Words for whoever has neither.
+/// What installs one, for whoever may.
 #[must_use]
 pub fn install_command() -> String {
-    format!("rustup target add {TRIPLE}   (or, on Debian: apt-get install rustc-web cargo-web rust-web-src)")
+    let debian = if cfg!(target_os = "macos") {
+        String::new()
+    } else {
+        format!(", or on Debian: apt-get install {}", PACKAGES.join(" "))
+    };
+    format!("rustup target add {TRIPLE}{debian}")
+}
+
+/// Whether a compiler is older than what the emitted code is written for; Debian without its updates has one.
+fn is_old(version: &str) -> bool {
+    let numbers = |text: &str| -> Option<(u32, u32)> {
+        let mut parts = text.split('.').map(str::parse);
+        Some((parts.next()?.ok()?, parts.next()?.ok()?))
+    };
+    let found = version.split(' ').nth(1).and_then(numbers);
+    found.is_some_and(|found| Some(found) < numbers(env!("CARGO_PKG_RUST_VERSION")))
 }
 
 /// The folder a compiler belongs to.
@@ -117,11 +170,13 @@ struct Sysroot {
 }
 
 impl Sysroot {
-    fn of(rustc: &Path) -> Option<Self> {
-        let path = PathBuf::from(first_line(clean_command(rustc).args(["--print", "sysroot"]))?);
-        let host = first_line(clean_command(rustc).args(["--print", "host-tuple"]))?;
-        let version = first_line(clean_command(rustc).arg("--version"))?;
-        Some(Self { path, host, version })
+    fn of(candidate: &Candidate) -> Option<Self> {
+        let ask = |words: &[&str]| {
+            let mut command = clean_command(&candidate.rustc);
+            first_line(with_libraries(&mut command, &candidate.libraries).args(words))
+        };
+        let path = PathBuf::from(ask(&["--print", "sysroot"])?);
+        Some(Self { path, host: ask(&["--print", "host-tuple"])?, version: ask(&["--version"])? })
     }
 
     fn core(&self) -> Option<CoreLibrary> {
@@ -161,7 +216,7 @@ impl Toolchain {
             flags.push("-Clinker-flavor=ld.lld".into());
         }
         let mut command = clean_command(&self.cargo);
-        command
+        with_libraries(&mut command, &self.libraries)
             .env("RUSTC", &self.rustc)
             .env("RUSTC_BOOTSTRAP", "1")
             // See `firmware/stm32/src/silent.rs`.
@@ -181,6 +236,7 @@ mod tests {
     use super::*;
     use std::fs;
     use std::os::unix::fs::PermissionsExt;
+    use std::path::Path;
 
     /// A compiler that only knows where it lives.
     fn fake(root: &Path, name: &str, files: &[&str]) -> Candidate {
@@ -198,7 +254,7 @@ mod tests {
         );
         fs::write(&rustc, script).unwrap();
         fs::set_permissions(&rustc, fs::Permissions::from_mode(0o755)).unwrap();
-        Candidate { rustc, cargo: sysroot.join("cargo") }
+        Candidate { rustc, cargo: sysroot.join("cargo"), libraries: Vec::new() }
     }
 
     const TARGET: &str = "lib/rustlib/thumbv7em-none-eabihf/lib/libcore.rlib";
@@ -237,6 +293,17 @@ mod tests {
         fs::write(bin.join("ld.lld"), "").unwrap();
         let found = choose(&[debian], std::slice::from_ref(&bin)).unwrap();
         assert_eq!(found.linker, Some(bin.join("ld.lld")));
+    }
+
+    #[test]
+    fn an_old_compiler_does_not_serve() {
+        assert!(is_old("rustc 1.85.1 (4eb161250 2025-03-15)"));
+        assert!(!is_old("rustc 1.95.0 (x)") && !is_old("rustc 2.0.0-nightly") && !is_old("mine"));
+        let root = tempfile::tempdir().unwrap();
+        let debian = fake(root.path(), "debian", &[SOURCE, LLD]);
+        let script = fs::read_to_string(&debian.rustc).unwrap().replace("1.95.0", "1.85.0");
+        fs::write(&debian.rustc, script).unwrap();
+        assert!(choose(&[debian], &[]).is_err());
     }
 
     #[test]

@@ -1,0 +1,84 @@
+//! Where the tools for microcontrollers may be: the one list of folders that every search goes through.
+
+use super::unpacked::{self, Unpacked};
+use super::user_cache;
+use std::path::{Path, PathBuf};
+
+/// The variable of the environment with the folders to search instead of `PATH` and the usual ones, written as `PATH` is.
+pub const VARIABLE: &str = "SPECGEN_TOOLS";
+
+/// Where programs are even if `PATH` does not say so.
+const USUAL: [&str; 3] = ["/usr/local/bin", "/usr/bin", "/opt/homebrew/bin"];
+
+/// Folders to search.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Places {
+    /// Folders of programs, the first comes first.
+    pub programs: Vec<PathBuf>,
+    /// Where packages are unpacked for this user alone; none without a cache folder.
+    pub unpacked: Option<PathBuf>,
+}
+
+impl Places {
+    /// Those of this machine and user.
+    #[must_use]
+    pub fn here() -> Self {
+        let folders = |name| std::env::var_os(name).map(|list| std::env::split_paths(&list).collect::<Vec<PathBuf>>());
+        let programs = folders(VARIABLE).unwrap_or_else(|| {
+            let path = folders("PATH").unwrap_or_default();
+            path.into_iter().chain(USUAL.map(PathBuf::from)).collect()
+        });
+        Self::of(programs, user_cache::folder().map(|cache| cache.join(unpacked::FOLDER)))
+    }
+
+    /// Each folder once.
+    fn of(mut programs: Vec<PathBuf>, unpacked: Option<PathBuf>) -> Self {
+        let mut seen = std::collections::BTreeSet::new();
+        programs.retain(|folder| !folder.as_os_str().is_empty() && seen.insert(folder.clone()));
+        Self { programs, unpacked }
+    }
+
+    /// The first program of that name.
+    #[must_use]
+    pub fn program(&self, name: &str) -> Option<PathBuf> {
+        self.all(name).next()
+    }
+
+    /// All programs of that name.
+    pub fn all(&self, name: &str) -> impl Iterator<Item = PathBuf> {
+        self.programs.iter().map(move |folder| folder.join(name)).filter(|file| file.is_file())
+    }
+
+    /// The packages that were unpacked under this name, if they were.
+    #[must_use]
+    pub fn unpacked(&self, name: &str) -> Option<Unpacked> {
+        Unpacked::at(&self.unpacked.as_deref()?.join(name))
+    }
+
+    /// Where packages are unpacked to.
+    #[must_use]
+    pub fn cache(&self) -> Option<&Path> {
+        self.unpacked.as_deref()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_folder_is_searched_once_and_in_order() {
+        let root = tempfile::tempdir().unwrap();
+        let [a, b] = ["a", "b"].map(|name| root.path().join(name));
+        for folder in [&a, &b] {
+            std::fs::create_dir(folder).unwrap();
+            std::fs::write(folder.join("tool"), "").unwrap();
+        }
+        let places = Places::of(vec![b.clone(), a.clone(), PathBuf::new(), b.clone()], None);
+        assert_eq!(places.programs, [b.clone(), a.clone()]);
+        assert_eq!(places.program("tool"), Some(b.join("tool")));
+        assert_eq!(places.all("tool").count(), 2);
+        assert_eq!(places.program("other"), None);
+        assert!(places.unpacked("tool").is_none());
+    }
+}

@@ -1,0 +1,98 @@
+//! The main job on machines that lack the tools for microcontrollers: it does the rest, says what was left out, and fails only
+//! if told to.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+use specgen::target::{self, ALLOW_MISSING};
+use crate::support::{Folder, Run};
+
+/// The main job on the legs, with tools searched in `tools` and no cache.
+fn main_job(folder: &Folder, tools: &Path, more: &[&str]) -> Command {
+    let mut command = folder.command();
+    command.args(["legs.toml", "-o", "out"]).args(more).env("SPECGEN_TOOLS", tools).env("SPECGEN_CACHE", "");
+    command
+}
+
+fn json(run: &Run) -> Value {
+    serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("not one document: {error}\n{}", run.stdout))
+}
+
+#[test]
+fn without_tools_everything_else_is_done_and_one_line_says_what_was_left_out() {
+    let folder = Folder::new();
+    let nothing = tempfile::tempdir().unwrap();
+    let run = Run::of(&mut main_job(&folder, nothing.path(), &[]));
+    run.says(0, &[]);
+    let lines: Vec<&str> = run.stdout.lines().filter(|line| line.contains("left out:")).collect();
+    assert_eq!(lines.len(), 1, "{}", run.stdout);
+    for words in ["the image for the microcontroller", "thumbv7em-none-eabihf", "specgen SPEC --setup"] {
+        assert!(lines[0].contains(words), "no `{words}` in: {}", lines[0]);
+    }
+    assert!(run.stdout.contains("host library: "), "{}", run.stdout);
+    for file in ["controller/src/step.rs", "host/Cargo.toml", "qemu/Cargo.toml", "runtime/Cargo.toml"] {
+        assert!(folder.path("out").join(file).is_file(), "{file}");
+    }
+
+    // Required, it is exit code 3 with the same result.
+    let run = Run::of(&mut main_job(&folder, nothing.path(), &["--require-target"]));
+    run.says(3, &["error: left out: the image for the microcontroller"]);
+    assert!(run.stdout.contains("host library: "), "{}", run.stdout);
+    for (more, code) in [(&["--json"][..], 0), (&["--json", "--require-target"], 3)] {
+        let run = Run::of(&mut main_job(&folder, nothing.path(), more));
+        let document = json(&run);
+        assert_eq!((run.code, &document["exit_code"]), (code, &Value::from(code)));
+        assert!(document["result"]["host_library"].is_string(), "{document:#}");
+        assert!(document["result"]["measurement"].is_null() && document["result"]["image"].is_null());
+        assert!(document["result"]["missing"].as_str().unwrap().contains("specgen SPEC --setup"), "{document:#}");
+    }
+}
+
+#[test]
+fn set_up_that_fails_says_what_was_tried_and_the_job_goes_on() {
+    let folder = Folder::new();
+    let nothing = tempfile::tempdir().unwrap();
+    let run = Run::of(&mut main_job(&folder, nothing.path(), &["--setup"]));
+    run.says(0, &["there is no rustup", "there is no apt-get", "going on without"]);
+    assert!(run.stdout.contains("left out: the image for the microcontroller"), "{}", run.stdout);
+    assert!(run.stdout.contains("could not be set up: rustup target add: there is no rustup"), "{}", run.stdout);
+    assert!(folder.path("out/controller/src/step.rs").is_file());
+    Run::of(&mut main_job(&folder, nothing.path(), &["--setup", "--require-target"])).says(3, &["could not be set up"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn without_the_emulator_alone_the_image_is_built_and_looked_at() {
+    if let Err(missing) = target::toolchain::find() {
+        assert!(std::env::var_os(ALLOW_MISSING).is_some_and(|value| value == "1"), "{missing}");
+        support::skipped(&missing.to_string());
+        return;
+    }
+    let folder = Folder::new();
+    let tools = tempfile::tempdir().unwrap();
+    let found = target::toolchain::find().unwrap();
+    for (name, program) in [("rustc", &found.rustc), ("cargo", &found.cargo)] {
+        std::os::unix::fs::symlink(program, tools.path().join(name)).unwrap();
+    }
+    if found.linker.is_some() || !found.libraries.is_empty() {
+        support::skipped("the cross compiler here is more than two programs");
+        return;
+    }
+    // An emulator that does not run is as good as none.
+    std::fs::write(tools.path().join("qemu-system-arm"), "").unwrap();
+    let run = Run::of(&mut main_job(&folder, tools.path(), &["--json"]));
+    let document = json(&run);
+    assert_eq!(run.code, 0, "{document:#}");
+    let image = &document["result"]["image"];
+    assert!(image["flash"].as_u64().unwrap() > 10_000, "{document:#}");
+    assert!(image["stack_bound"].as_u64().unwrap() > 100, "{document:#}");
+    assert_eq!(image["forbidden_symbols"], serde_json::json!([]));
+    let missing = document["result"]["missing"].as_str().unwrap();
+    assert!(missing.starts_with("left out: running the image"), "{missing}");
+    assert!(missing.contains("apt-get install qemu-system-arm"), "{missing}");
+    assert_eq!(missing.lines().count(), 1);
+}
