@@ -3,7 +3,6 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-
 use std::path::Path;
 use std::process::Command;
 
@@ -69,7 +68,7 @@ fn set_up_that_fails_says_what_was_tried_and_the_job_goes_on() {
 fn without_the_emulator_alone_the_image_is_built_and_looked_at() {
     if let Err(missing) = target::toolchain::find() {
         assert!(std::env::var_os(ALLOW_MISSING).is_some_and(|value| value == "1"), "{missing}");
-        support::skipped(&missing.to_string());
+        crate::support::skipped(&missing.to_string());
         return;
     }
     let folder = Folder::new();
@@ -79,7 +78,7 @@ fn without_the_emulator_alone_the_image_is_built_and_looked_at() {
         std::os::unix::fs::symlink(program, tools.path().join(name)).unwrap();
     }
     if found.linker.is_some() || !found.libraries.is_empty() {
-        support::skipped("the cross compiler here is more than two programs");
+        crate::support::skipped("the cross compiler here is more than two programs");
         return;
     }
     // An emulator that does not run is as good as none.
