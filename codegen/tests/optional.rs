@@ -9,7 +9,7 @@ use std::process::Command;
 
 use serde_json::Value;
 use specgen::target::{self, ALLOW_MISSING};
-use crate::support::{Folder, Run};
+use crate::support::{self, Folder, Run};
 
 /// The main job on the legs, with tools searched in `tools` and no cache.
 fn main_job(folder: &Folder, tools: &Path, more: &[&str]) -> Command {
