@@ -3,13 +3,12 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
-
 use std::path::Path;
 use std::process::Command;
 
+use crate::support::{self, Folder, Run};
 use serde_json::Value;
 use specgen::target::{self, ALLOW_MISSING};
-use crate::support::{self, Folder, Run};
 
 /// The main job on the legs, with tools searched in `tools` and no cache.
 fn main_job(folder: &Folder, tools: &Path, more: &[&str]) -> Command {
