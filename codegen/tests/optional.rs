@@ -6,9 +6,9 @@
 use std::path::Path;
 use std::process::Command;
 
+use crate::support::{self, Folder, Run};
 use serde_json::Value;
 use specgen::target::{self, ALLOW_MISSING};
-use crate::support::{Folder, Run};
 
 /// The main job on the legs, with tools searched in `tools` and no cache.
 fn main_job(folder: &Folder, tools: &Path, more: &[&str]) -> Command {

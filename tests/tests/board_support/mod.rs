@@ -2,7 +2,7 @@
 //! the host waits for an answer.
 
 #![allow(dead_code)] // Each test uses its part.
-#![allow(clippy::unwrap_used)] // Helpers of tests, where a panic is a failed test.
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;

@@ -1,5 +1,4 @@
 //! Appendix B, checked run by run on a static leg Y = λ·ρ̂X + d: steady errors, equivalence of the two forms, anti-windup.
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 use specgen_runtime::{Estimate, Law};
 

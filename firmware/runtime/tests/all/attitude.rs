@@ -1,5 +1,4 @@
 //! R, T(θ) and the leg Jacobian against quaternions and central differences.
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 use crate::common::Random;
 use specgen_runtime::Attitude;

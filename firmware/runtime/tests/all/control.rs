@@ -1,5 +1,4 @@
 //! Kernels of the control law in task space: modal notch, integral, bumpless transfer, adaptation by innovations.
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 use core::f64::consts::TAU;
 

@@ -1,5 +1,4 @@
 //! Properties of the reversal memory, by the names of the theorems, against brute-force relays.
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 use crate::common::*;
 use specgen_runtime::{Digest, ReversalMemory};

@@ -1,5 +1,4 @@
 //! The rate-dependent models: dynamic Preisach (6) against brute-force relays, creep against a fine-step integration.
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 use crate::common;
 use crate::common::*;

@@ -1,5 +1,4 @@
 //! The kernels against the host's elementary functions in double precision, and the reduction of turns against exact places.
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 use specgen_runtime::Real;
 use specgen_runtime::trig::{sine_cosine, sine_cosine_turns, sine_versine, versine};

@@ -1,5 +1,4 @@
 //! The rate filter against its transfer function.
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 use std::f64::consts::{PI, TAU};
 

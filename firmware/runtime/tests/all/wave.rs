@@ -1,5 +1,4 @@
 //! Waves: their shapes against textbook formulas, their derivatives against differences, their limits, and their ends.
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 use specgen_runtime::Motion;
 use specgen_runtime::wave::{AxisWave, Limits, Refused, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of};

@@ -1,6 +1,5 @@
 //! The set-point generator: what it does on command and what it refuses; in [`promises`] what it promises whatever the
 //! command, in [`frames`] the user's frames.
-#![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 
 mod frames;
 mod promises;
