@@ -242,7 +242,7 @@ fn without_the_emulator_the_command_that_installs_it_is_named() {
     let (_one, folder) = workspace();
     let nothing = tempfile::tempdir().unwrap();
     let mut command = pil(&spec("legs.toml"), &folder, &[]);
-    let value = document(command.env("SPECGEN_TOOLS", nothing.path()).env("SPECGEN_CACHE", ""), 3);
+    let value = document(command.env("SPECGEN_TOOLS", nothing.path()).env("XDG_CACHE_HOME", nothing.path()), 3);
     assert!(value["error"].as_str().unwrap().contains("apt-get install qemu-system-arm"), "{value:#}");
 }
 

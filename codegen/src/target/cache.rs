@@ -87,7 +87,7 @@ impl Cache {
     /// That of the user; none if [`user_cache::folder`] has none.
     #[must_use]
     pub fn of_user() -> Option<Self> {
-        Some(Self { folder: user_cache::folder()?.join("builds"), limit: LIMIT })
+        Some(Self { folder: user_cache::builds()?, limit: LIMIT })
     }
 
     /// Where it is, whether or not something is kept yet.

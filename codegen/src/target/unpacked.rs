@@ -74,9 +74,9 @@ pub(super) fn fetch(
     works: &dyn Fn() -> bool,
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Refusal> {
-    let folder = places.cache().ok_or_else(|| {
-        Refusal::other("there is no cache folder to unpack into (SPECGEN_CACHE is empty, or there is no home)")
-    })?;
+    let folder = places
+        .cache()
+        .ok_or_else(|| Refusal::other("there is no cache folder to unpack into (neither XDG_CACHE_HOME nor a home)"))?;
     let [apt, dpkg] = ["apt-get", "dpkg-deb"].map(|program| places.program(program));
     let apt = apt.ok_or_else(|| Refusal::other("there is no apt-get"))?;
     let dpkg = dpkg.ok_or_else(|| Refusal::other("there is no dpkg-deb"))?;

@@ -184,7 +184,7 @@ fn where_nothing_can_be_done_each_way_is_named() {
     let mut machine = Machine::with(&[("id", USER)]);
     machine.cache = false;
     let text = machine.emulator().unwrap_err().to_string();
-    for words in ["there is no apt-get", "there is no cache folder", "SPECGEN_CACHE", "by hand: "] {
+    for words in ["there is no apt-get", "there is no cache folder", "XDG_CACHE_HOME", "by hand: "] {
         assert!(text.contains(words), "no `{words}` in: {text}");
     }
     let text = machine.compiler().unwrap_err().to_string();
