@@ -6,7 +6,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::support::{self, Folder, Run};
+use crate::support::{Folder, Run};
 use serde_json::Value;
 use specgen::target::{self, ALLOW_MISSING};
 
