@@ -134,7 +134,8 @@ mod tests {
     #[test]
     fn every_hand_written_file_of_runtime_and_targets_is_copied() {
         let firmware = Path::new(env!("CARGO_MANIFEST_DIR")).join("../firmware");
-        let folders = std::fs::read_dir(&firmware).unwrap().map(|entry| entry.unwrap().file_name());
+        let entries = std::fs::read_dir(&firmware).unwrap().map(Result::unwrap);
+        let folders = entries.filter(|entry| entry.path().is_dir()).map(|entry| entry.file_name());
         let folders = folders.map(|name| name.to_string_lossy().into_owned()).filter(|name| name != "controller");
         for folder in folders {
             let part = parts::PARTS.iter().find(|part| part.folder == folder);

@@ -102,15 +102,13 @@ fn an_unchanged_spec_is_built_once_and_everything_else_anew() {
     fs::remove_file(folder.path("broken")).unwrap();
 
     // Damaged: found, said, removed, built, with the same result.
-    let damages: [fn(&mut Vec<u8>); 3] = [|bytes| flip(bytes), |bytes| bytes.truncate(bytes.len() - 1), Vec::clear];
-    for damage in damages {
-        let [entry] = counted.entries().try_into().unwrap();
-        edit(&entry, damage);
-        let (builds, run) = counted.builds_with(&mut counted.command(&REPLAY));
-        assert_eq!(builds, 1);
-        assert_eq!(run.stderr.matches("warning: a kept build was damaged").count(), 1, "{}", run.stderr);
-        assert_eq!(counted.builds(&REPLAY), 0);
-    }
+    // (Every bit and every cut of an entry: the unit tests of the cache.)
+    let [entry] = counted.entries().try_into().unwrap();
+    edit(&entry, |bytes| flip(bytes));
+    let (builds, run) = counted.builds_with(&mut counted.command(&REPLAY));
+    assert_eq!(builds, 1);
+    assert_eq!(run.stderr.matches("warning: a kept build was damaged").count(), 1, "{}", run.stderr);
+    assert_eq!(counted.builds(&REPLAY), 0);
 
     // Another source.
     let text = folder.read("legs.toml");
@@ -194,7 +192,4 @@ fn what_lies_in_the_output_folder_is_not_believed() {
     assert_eq!(counted.builds(&build), 0);
     counted.0.write(".cargo/config.toml", "[profile.release]\ndebug = 0\n");
     assert_eq!((counted.builds(&build), counted.builds(&build)), (1, 0));
-    let text = counted.0.read("minimal.toml");
-    counted.0.write("minimal.toml", text.replace("name = \"", "name = \"other-"));
-    assert_eq!(counted.builds(&build), 1);
 }

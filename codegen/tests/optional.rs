@@ -10,14 +10,13 @@ use crate::support::{Folder, Run};
 use serde_json::Value;
 use specgen::target::{self, ALLOW_MISSING};
 
-/// The main job on the legs, with tools searched in `tools` and no cache.
+/// The main job on the legs, with tools searched in `tools` alone.
 fn main_job(folder: &Folder, tools: &Path, more: &[&str]) -> Command {
     let mut command = folder.command();
     command
         .args(["legs.toml", "-o", "out"])
         .args(more)
         .env("SPECGEN_TOOLS", tools)
-        .env("SPECGEN_CACHE", "")
         .env("XDG_CACHE_HOME", folder.path("no-cache"));
     command
 }

@@ -17,7 +17,7 @@ use specgen::identify::{Options, Record, identify, parse_record, write_table_csv
 use specgen::model::Mcu;
 use specgen::target::Image;
 use specgen::verify;
-use specgen_tests::{Emitted, column, host_trace, integers};
+use specgen_tests::{Emitted, column, host_trace, integers, length};
 
 const TICKS: usize = 30_000;
 /// Ticks that instructions are counted over.
@@ -163,7 +163,7 @@ fn records() -> Vec<Record> {
     [20.0, 200.0, 2000.0].map(record).to_vec()
 }
 
-/// RMSE in nm at 0.1, 1 and 10 Hz under Invhys and PCC with one tick of 250 µs, as the study's column at 4 kHz.
+/// RMSE in nm at 0.1 (in the soak; else NaN), 1 and 10 Hz under Invhys and PCC with one tick of 250 µs, as the study's column at 4 kHz.
 fn tracking(name: &str, lines: &str, records: &[(&str, String)]) -> [[f64; 3]; 2] {
     let block = format!("[hysteresis]\nmemory = 64\n{lines}\n[unused]\n");
     let old = "[hysteresis]\ngrid    = 32\nmemory  = 64\nrecords = [\"records/reference-forc.csv\"]  # one for all six legs, or six\n";
@@ -172,8 +172,8 @@ fn tracking(name: &str, lines: &str, records: &[(&str, String)]) -> [[f64; 3]; 2
     let emitted = Emitted::with_records(name, "legs.toml", &edits, records);
     let mut controller = emitted.controller();
     let legs = std::array::from_fn(|_| LegParameters::reference());
-    let mut result = [[0.0; 3]; 2];
-    for (k, frequency) in [0.1, 1.0, 10.0].into_iter().enumerate() {
+    let mut result = [[f64::NAN; 3]; 2];
+    for (k, frequency) in [0.1, 1.0, 10.0].into_iter().enumerate().skip(length(1, 0)) {
         let samples = (4000.0 / frequency) as u32;
         let scenario = LegScenario::new(&legs, &LegParameters::reference().noise, 1, samples);
         let modes = [MODES[0], MODES[2]];
@@ -228,7 +228,7 @@ fn what_the_options_are_worth_on_the_reference_plant() {
     let [dynamic, dynamic_pcc] = run("rate-plant-dynamic", &found, RateOption::DynamicPreisach);
     let [creep, creep_pcc] = run("rate-plant-creep", &found, RateOption::Creep);
     // The table of the slowest record gives the study's row: 127, 242 and about 500 nm.
-    for (ours, study) in slow.iter().zip([127.0, 242.0, 500.0]) {
+    for (ours, study) in slow.iter().zip([127.0, 242.0, 500.0]).skip(length(1, 0)) {
         assert!((ours / study - 1.0).abs() < 0.1, "{ours} against {study}");
     }
     // (6) against the static table of the same records, and against that of the slowest one under PCC.
@@ -241,5 +241,5 @@ fn what_the_options_are_worth_on_the_reference_plant() {
     assert!(creep[2] < 0.7 * still[2] && creep[2] < 0.3 * slow[2], "{creep:?}");
     assert!(creep_pcc[2] < 0.8 * still_pcc[2] && creep_pcc[2] < 12.0, "{creep_pcc:?} {still_pcc:?}");
     // It has its price: alone, its slow states are off for as long as they take to settle.
-    assert!(creep[0] > slow[0], "{creep:?}");
+    assert!(length(true, creep[0] > slow[0]), "{creep:?}");
 }

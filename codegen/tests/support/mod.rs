@@ -194,6 +194,11 @@ pub fn contents(root: &Path) -> BTreeMap<String, Vec<u8>> {
     files.map(|path| (path.clone(), fs::read(root.join(path)).unwrap())).collect()
 }
 
+/// How much of what only gains by length is run: the long length in the soak.
+pub fn length<T>(short: T, long: T) -> T {
+    if std::env::var_os("SPECGEN_SOAK").is_some() { long } else { short }
+}
+
 /// Says why part of a test did not run.
 pub fn skipped(why: &str) {
     println!("{}: skipped: {why}", std::thread::current().name().unwrap_or("test"));

@@ -136,13 +136,15 @@ pub struct Pair {
 }
 
 /// How many.
-pub const PLANTS: u32 = 12;
+pub fn plants() -> u32 {
+    specgen_tests::length(4, 12)
+}
 
 /// Random machines with their controllers; built once.
 pub fn random_machines() -> &'static [Pair] {
     static MACHINES: OnceLock<Vec<Pair>> = OnceLock::new();
     MACHINES.get_or_init(|| {
-        in_parallel(PLANTS, |number| {
+        in_parallel(plants(), |number| {
             let specimen = Specimen::random(SEED, number);
             let records = records(&specimen.legs);
             let of = |what: &str, edits: &[(&str, &str)]| {

@@ -7,7 +7,7 @@ use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use specgen::lower::platform;
 use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning, closed_loop_of};
 
-use super::bench::{BIAS, Bench, PERIOD, PLANTS, Pair, SEED, in_parallel, median, random_machines};
+use super::bench::{BIAS, Bench, PERIOD, Pair, SEED, in_parallel, median, plants, random_machines};
 
 /// A small step of the demand on every axis, then rest.
 struct Nudge;
@@ -169,7 +169,7 @@ fn damping(closed_loop: &ClosedLoop) -> [f64; 6] {
 #[test]
 fn no_start_rule_is_unstable_on_any_machine() {
     let machines = random_machines();
-    let unstable: Vec<String> = in_parallel(PLANTS, |number| {
+    let unstable: Vec<String> = in_parallel(plants(), |number| {
         let Pair { notched, plain } = &machines[number as usize];
         let mut damped = notched.design().combined;
         damped.derivative = damping(&closed_loop(notched));
@@ -192,7 +192,7 @@ fn no_start_rule_is_unstable_on_any_machine() {
         bad
     })
     .concat();
-    println!("unstable of {} machines and bases: {unstable:?}", 3 * PLANTS);
+    println!("unstable of {} machines and bases: {unstable:?}", 3 * plants());
     assert!(unstable.is_empty());
 }
 

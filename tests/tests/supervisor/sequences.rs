@@ -167,7 +167,8 @@ fn phases_and_causes_of_a_platform_are_those_of_the_oracle() {
     let model = &emitted.compiled.model;
     let ([x, y, z], [a, b, c]) = (model.workspace.translation, model.workspace.rotation);
     let bounds = Bounds::platform([x, y, z, a, b, c], model.sensor.range);
-    let met = follow(&mut bench, Oracle::new(bounds.clone()), max_step, sequences());
+    // Fewer do not meet every cause.
+    let met = follow(&mut bench, Oracle::new(bounds.clone()), max_step, 10_000);
     for cause in [1, 4, 6, 8, 9, 10, 11, 12] {
         assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
     }
