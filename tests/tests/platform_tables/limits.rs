@@ -7,7 +7,9 @@ use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use specgen::lower::platform;
 use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning, closed_loop_of};
 
-use super::bench::{BIAS, Bench, PERIOD, Pair, SEED, in_parallel, median, plants, random_machines};
+use specgen_tests::length;
+
+use super::bench::{BIAS, Bench, PERIOD, PLANTS, SEED, in_parallel, median, random_machines};
 
 /// A small step of the demand on every axis, then rest.
 struct Nudge;
@@ -122,7 +124,7 @@ const COMBINED: (u32, Law) = (6, Law::Combined(Adapting::Pcc));
 #[test]
 fn predicted_limits_are_those_of_the_machine() {
     let machines = random_machines();
-    let count = 4;
+    let count = length(2, 4);
     let cases = [
         ("weights, F ewma", EWMA, 0),
         ("weights, F pcc", PCC, 0),
@@ -134,7 +136,7 @@ fn predicted_limits_are_those_of_the_machine() {
         let pair = &machines[number as usize];
         let mut rows = Vec::new();
         for (what, law, latency) in cases {
-            for (base, bench) in [("notch", &pair.notched), ("no notch", &pair.plain)] {
+            for (base, bench) in [("notch", &pair.notched), ("no notch", pair.plain())] {
                 rows.push((what, base, limit(bench, law, &bench.design().combined, latency)));
             }
         }
@@ -169,8 +171,10 @@ fn damping(closed_loop: &ClosedLoop) -> [f64; 6] {
 #[test]
 fn no_start_rule_is_unstable_on_any_machine() {
     let machines = random_machines();
-    let unstable: Vec<String> = in_parallel(plants(), |number| {
-        let Pair { notched, plain } = &machines[number as usize];
+    let count = length(4, PLANTS);
+    let unstable: Vec<String> = in_parallel(count, |number| {
+        let pair = &machines[number as usize];
+        let (notched, plain) = (&pair.notched, pair.plain());
         let mut damped = notched.design().combined;
         damped.derivative = damping(&closed_loop(notched));
         let bases = [
@@ -192,7 +196,7 @@ fn no_start_rule_is_unstable_on_any_machine() {
         bad
     })
     .concat();
-    println!("unstable of {} machines and bases: {unstable:?}", 3 * plants());
+    println!("unstable of {} machines and bases: {unstable:?}", 3 * count);
     assert!(unstable.is_empty());
 }
 

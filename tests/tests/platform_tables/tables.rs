@@ -5,7 +5,7 @@ use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory,
 use host_sim::platform::table::{MachiningTable, PoseRow, PoseTable, paper_rms};
 use host_sim::trajectory::PaperPath;
 
-use super::bench::{Bench, in_parallel, median, paper, plants, random_machines, reference_machine};
+use super::bench::{Bench, PLANTS, in_parallel, median, paper, random_machines, reference_machine};
 
 const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)];
 #[allow(clippy::type_complexity)] // A table of two.
@@ -81,7 +81,7 @@ fn case_1_at_10_hz_on_the_reference_machine() {
 #[test]
 fn tables_5_to_8_on_random_machines() {
     let machines = random_machines();
-    let tables = in_parallel(plants(), |number| free_motion(&machines[number as usize].notched, &[1.0, 10.0]));
+    let tables = in_parallel(PLANTS, |number| free_motion(&machines[number as usize].notched, &[1.0, 10.0]));
     let mut closest: f64 = 0.0;
     for (table, machine) in tables.iter().zip(machines) {
         let nominal = &machine.notched.specimen.nominal;
@@ -122,7 +122,7 @@ fn tables_5_to_8_on_random_machines() {
 #[test]
 fn table_9_on_random_machines() {
     let machines = random_machines();
-    let tables = in_parallel(plants(), |number| machining(&machines[number as usize].notched));
+    let tables = in_parallel(PLANTS, |number| machining(&machines[number as usize].notched));
     for (part, _) in PARTS {
         let mut columns: [Vec<f64>; 4] = Default::default();
         for (table, machine) in tables.iter().zip(machines) {
