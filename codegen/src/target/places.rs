@@ -31,11 +31,13 @@ impl Places {
         Self::of(programs, user_cache::folder().map(|cache| cache.join(unpacked::FOLDER)))
     }
 
-    /// Each folder once.
-    fn of(mut programs: Vec<PathBuf>, unpacked: Option<PathBuf>) -> Self {
+    /// Each folder once, and so that it is found from another working folder too.
+    fn of(programs: Vec<PathBuf>, unpacked: Option<PathBuf>) -> Self {
         let mut seen = std::collections::BTreeSet::new();
-        programs.retain(|folder| !folder.as_os_str().is_empty() && seen.insert(folder.clone()));
-        Self { programs, unpacked }
+        // An empty path has no absolute one.
+        let mut programs: Vec<PathBuf> = programs.iter().filter_map(|path| std::path::absolute(path).ok()).collect();
+        programs.retain(|folder| seen.insert(folder.clone()));
+        Self { programs, unpacked: unpacked.and_then(|path| std::path::absolute(path).ok()) }
     }
 
     /// The first program of that name.
@@ -80,5 +82,6 @@ mod tests {
         assert_eq!(places.all("tool").count(), 2);
         assert_eq!(places.program("other"), None);
         assert!(places.unpacked("tool").is_none());
+        assert!(Places::of(Vec::new(), Some("cache".into())).cache().unwrap().is_absolute());
     }
 }

@@ -18,7 +18,7 @@ use std::time::Duration;
 pub const FOLDER: &str = "tools";
 /// Not unpacked: the loader of this machine fits its own C library only.
 const OF_THE_SYSTEM: [&str; 2] = ["libc6_", "libc-bin_"];
-/// Texts for people: two thirds of the files, and no program reads them.
+/// Texts for people, which no program here reads.
 const UNUSED: [&str; 4] = ["usr/share/doc", "usr/share/man", "usr/share/info", "usr/share/locale"];
 /// Longest time for one package, s.
 const LIMIT: Duration = Duration::from_secs(300);
