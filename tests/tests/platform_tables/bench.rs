@@ -139,7 +139,7 @@ pub struct Pair {
 impl Pair {
     pub fn plain(&self) -> &Bench {
         let edits = [("notch_damping   = 1.0", "notch           = false")];
-        self.plain.get_or_init(|| self::of("plain", self.number, &edits))
+        self.plain.get_or_init(|| of("plain", self.number, &edits))
     }
 }
 
