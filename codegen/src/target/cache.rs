@@ -1,7 +1,7 @@
 //! Builds that are kept by what they are made of, so that nothing is compiled twice: `builds` in the
 //! [folder of the user's cache](user_cache::folder).
 //!
-//! An entry is one file: its name is the [key] of the build, its first line the SHA-256 of that name and of all that follows.
+//! An entry is one file: its name is the `key` of the build, its first line the SHA-256 of that name and of all that follows.
 //! It is written beside its place and renamed, and checked whenever it is taken: one that is damaged is removed and built
 //! anew. What was used longest ago goes first when there is too much. Programs that run at once may share the folder. Where it
 //! cannot be written, builds are made as if it were not there; [`trouble`] says so.
