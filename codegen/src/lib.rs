@@ -19,7 +19,6 @@ pub mod lint;
 pub mod lower;
 pub mod machine;
 pub mod model;
-pub mod numerics;
 pub mod operate;
 pub mod paper;
 pub mod pil;

@@ -1,18 +1,15 @@
 //! What the scalar of the controller costs: rounding errors of leg displacements and of the measured pose, in nanometres per
 //! axis, by analysis and by trial.
 //!
-//! The analysis runs the controller's own kernels on numbers that remember what was rounded where (`traced`), over the whole
+//! The analysis runs the controller's own kernels on numbers that remember what was rounded where ([`specgen_numerics::Traced`]), over the whole
 //! workspace in 64 parts. The trial runs them in the controller's scalar at corners and random poses of the workspace, against the same kernels on 106 bits
-//! ([`Double`]) with constants, series and passes that are exact there. Both count the rounding of constants and the terms and
+//! ([`specgen_numerics::Double`]) with constants, series and passes that are exact there. Both count the rounding of constants and the terms and
 //! steps that are left out. Not counted: the set-point generator, calibration of gauges, and the inverse of the
 //! hysteresis, whose voltage leaves the controller in steps of the converter.
 
-mod double;
-mod form;
 mod kinematics;
 mod sensing;
 mod table;
-mod traced;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
@@ -23,7 +20,6 @@ use crate::ir::{Ir, Scalar};
 use crate::lower::PoseNoise;
 use crate::model::Model;
 
-pub use double::Double;
 pub use table::{Row, describe, rows};
 
 /// Random poses beside the corners of the workspace.

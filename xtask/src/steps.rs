@@ -23,8 +23,9 @@ const STANDING_ALONE: [&str; 5] = [FIRMWARE, REAL_TIME, SCHEMA, BOARDS[0], BOARD
 /// Its own workspace, because of its dependencies too.
 const SCHEMA: &str = "tests/schema/Cargo.toml";
 /// Members of the workspace that people write.
-const HAND_WRITTEN: [&str; 10] = [
+const HAND_WRITTEN: [&str; 11] = [
     "specgen",
+    "specgen-numerics",
     "specgen-runtime",
     "specgen-hal",
     "specgen-link",

@@ -3,6 +3,7 @@
 //! Jumps, corners, speed and place of a path are checked where it is lowered, its reach in [`crate::reach`].
 
 use serde::Serialize;
+use specgen_numerics::displacements;
 use specgen_runtime::Platform;
 
 use super::{Found, Legs, figure};
@@ -99,14 +100,14 @@ fn look(
     stretch: &Stretch,
 ) {
     let dt = stretch.interval;
-    let displacements: Vec<[f64; 6]> = stretch.poses.iter().map(|pose| platform.displacements(pose)).collect();
-    for pair in displacements.windows(2) {
+    let legs: Vec<[f64; 6]> = stretch.poses.iter().map(|pose| displacements(platform, pose)).collect();
+    for pair in legs.windows(2) {
         for leg in 0..6 {
             larger(&mut demand.leg_speed, (pair[1][leg] - pair[0][leg]).abs() / dt);
         }
     }
     let second = |a: f64, b: f64, c: f64| (a - 2.0 * b + c) / (dt * dt);
-    for (three, poses) in displacements.windows(3).zip(stretch.poses.windows(3)) {
+    for (three, poses) in legs.windows(3).zip(stretch.poses.windows(3)) {
         for leg in 0..6 {
             larger(&mut demand.leg_acceleration, second(three[0][leg], three[1][leg], three[2][leg]).abs());
         }

@@ -1,6 +1,6 @@
 //! 6×6 matrices in plain loops: the same bits on every machine.
 
-pub(super) use crate::numerics::Matrix6 as Matrix;
+pub(super) use specgen_numerics::Matrix6 as Matrix;
 
 /// The inverse by Gauss-Jordan elimination with complete pivoting; none if a pivot vanishes.
 pub(super) fn inverse(matrix: &Matrix) -> Option<Matrix> {
@@ -109,7 +109,7 @@ mod tests {
         matrices.push(cyclic);
         for matrix in &matrices {
             let inverse = inverse(matrix).unwrap();
-            let one = crate::numerics::multiply6(&inverse, matrix);
+            let one = specgen_numerics::multiply6(&inverse, matrix);
             for (i, row) in one.iter().enumerate() {
                 for (j, value) in row.iter().enumerate() {
                     assert!((value - f64::from(u8::from(i == j))).abs() < 1e-11, "{i} {j}: {value}");

@@ -7,7 +7,7 @@ use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 use crate::ir::{Actuation, Hysteresis, Scalar, Supervision};
 use crate::model::Model;
-use crate::numerics::multiply6;
+use specgen_numerics::multiply6;
 
 /// Gauges are looked at in turn.
 const CHANNELS: f64 = 6.0;

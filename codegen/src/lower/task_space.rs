@@ -3,7 +3,7 @@
 use super::linear;
 use crate::ir::{ControlLaw, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Scalar, Section};
 use crate::model::{self, Model};
-use crate::numerics::{Matrix6, multiply6, transpose6};
+use specgen_numerics::{Matrix6, multiply6, transpose6};
 use crate::stability::platform::{self as design, Design, RestDynamics};
 
 const IDENTITY: Matrix6 = {

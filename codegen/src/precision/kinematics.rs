@@ -1,9 +1,9 @@
 //! Leg displacements of a pose.
 
+use specgen_numerics::{Double, Kernels, Traced, trace};
 use specgen_runtime::{Legs, Real, Series};
 
-use super::traced::{Traced, trace};
-use super::{Double, Figures, bounds, boxes, keep};
+use super::{Figures, bounds, boxes, keep};
 use crate::ir::{Kinematics, Scalar};
 use crate::model::{Geometry, Model};
 
@@ -51,7 +51,7 @@ impl Exact {
             series: self.series(),
             newton_steps: STEPS,
         };
-        legs.displacements(&pose.map(Double::from))
+        Double::displacements(&legs, &pose.map(Double::from))
     }
 }
 
@@ -68,7 +68,7 @@ fn series(leading: Double, first: u32) -> Vec<Double> {
 }
 
 /// The kernel with the controller's constants in numbers of `T`.
-pub(super) fn displacements<T: Real>(constants: &Kinematics, pose: &[f64; 6]) -> [f64; 6]
+pub(super) fn displacements<T: Kernels>(constants: &Kinematics, pose: &[f64; 6]) -> [f64; 6]
 where
     f64: FromReal<T>,
 {
@@ -82,7 +82,7 @@ where
         series: Series { sine: &sine, versine: &versine },
         newton_steps: constants.newton_steps as usize,
     };
-    legs.displacements(&pose.map(of)).map(f64::from_real)
+    T::displacements(&legs, &pose.map(of)).map(f64::from_real)
 }
 
 /// A number of the controller as a double, exactly.
@@ -179,7 +179,10 @@ fn bound<const SINGLE: bool>(
     constants: &Kinematics,
     exact: &Exact,
     inverse: &[[f64; 6]; 6],
-) -> ([f64; 6], [f64; 6]) {
+) -> ([f64; 6], [f64; 6])
+where
+    Traced<SINGLE>: Kernels,
+{
     let bounds = bounds(model);
     let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
     let (mut of_legs, mut of_pose) = ([0.0; 6], [0.0; 6]);
@@ -196,9 +199,8 @@ fn bound<const SINGLE: bool>(
                 series: series.series(),
                 newton_steps: constants.newton_steps as usize,
             };
-            let found = legs.displacements(&core::array::from_fn(|axis| {
-                Traced::coordinate(axis, corner[axis][0], corner[axis][1])
-            }));
+            let pose = core::array::from_fn(|axis| Traced::coordinate(axis, corner[axis][0], corner[axis][1]));
+            let found = Traced::displacements(&legs, &pose);
             core::array::from_fn::<_, 6, _>(|leg| {
                 let left = left_by_newton(constants.newton_steps, found[leg].magnitude(), constants.rest_length[leg]);
                 found[leg].off_by([-left, left])

@@ -1,11 +1,10 @@
 //! The pose from the gauges.
 
+use specgen_numerics::{Double, Kernels, Trace, Traced, magnitude, trace};
 use specgen_runtime::{Gauges, Real};
 
-use super::form::magnitude;
 use super::kinematics::{Exact as ExactLegs, FromReal, TracedLegs, cut, kept};
-use super::traced::{Trace, Traced, trace};
-use super::{Double, Figures, bounds, boxes, keep};
+use super::{Figures, bounds, boxes, keep};
 use crate::diagnostic::Diagnostic;
 use crate::ir::{Kinematics, Scalar, Sensing};
 use crate::lower;
@@ -107,7 +106,7 @@ impl Exact {
     }
 }
 
-fn pose<T: Real>(constants: &Sensing, readings: &[f64; 6]) -> [f64; 6]
+fn pose<T: Kernels>(constants: &Sensing, readings: &[f64; 6]) -> [f64; 6]
 where
     f64: FromReal<T>,
 {
@@ -127,7 +126,7 @@ where
         arc_sine: &arc_sine,
         arc_tangent: &arc_tangent,
     };
-    gauges.pose(&readings.map(of)).map(f64::from_real)
+    T::pose(&gauges, &readings.map(of)).map(f64::from_real)
 }
 
 /// Errors of the pose that is computed from the readings that `poses` make.
@@ -150,9 +149,9 @@ pub(super) fn figures(
     };
     let mut figures = Figures::none(bound, single);
     for given in poses {
-        let readings = gauges.readings(&legs.series(), &given.map(Double::from)).map(|y| scalar.round(y.value()));
+        let readings = Double::readings(&gauges, &legs.series(), &given.map(Double::from)).map(|y| scalar.round(y.value()));
         let found = if single { pose::<f32>(constants, &readings) } else { pose::<f64>(constants, &readings) };
-        let wanted = gauges.pose(&readings.map(Double::from));
+        let wanted = Double::pose(&gauges, &readings.map(Double::from));
         keep(&mut figures.sampled, core::array::from_fn(|axis| (Double::from(found[axis]) - wanted[axis]).value()));
         if let Some(against) = &mut figures.against_f64 {
             let in_f64 = pose::<f64>(constants, &readings);
@@ -169,7 +168,10 @@ fn bound<const SINGLE: bool>(
     constants: &Sensing,
     exact: &Exact,
     legs: &ExactLegs,
-) -> [f64; 6] {
+) -> [f64; 6]
+where
+    Traced<SINGLE>: Kernels,
+{
     let bounds = bounds(model);
     let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
     let mut bound = [0.0; 6];
@@ -180,10 +182,10 @@ fn bound<const SINGLE: bool>(
             let series = TracedLegs::of(kinematics, legs, largest);
             let pose = core::array::from_fn(|axis| Traced::coordinate(axis, corner[axis][0], corner[axis][1]));
             // Readings are given numbers, of which it only counts where they lie.
-            let readings = gauges.readings(&series.series(), &pose).map(Traced::given);
+            let readings = Traced::readings(&gauges, &series.series(), &pose).map(Traced::given);
             let guess = gauges.guess(&readings);
             let start = start(&gauges, &readings, &guess);
-            gauges.pose_from(&readings, &guess, start)
+            Traced::pose_from(&gauges, &readings, &guess, start)
         });
         keep(&mut bound, found.map(|axis| record.error(&[(axis, 1.0)])));
     }
@@ -199,15 +201,18 @@ fn start<const SINGLE: bool>(
     gauges: &Gauges<'_, Traced<SINGLE>>,
     readings: &[Traced<SINGLE>; 6],
     guess: &[Traced<SINGLE>; 6],
-) -> [Traced<SINGLE>; 3] {
+) -> [Traced<SINGLE>; 3]
+where
+    Traced<SINGLE>: Kernels,
+{
     let psi = [guess[3], guess[4], guess[5]];
-    let next = gauges.next_turn(readings, guess, &psi);
+    let next = Traced::next_turn(gauges, readings, guess, &psi);
     // As it would be without rounding.
     let step: [Traced<SINGLE>; 3] = core::array::from_fn(|k| (next[k] - psi[k]).given());
     let longest = step.iter().fold(0.0, |a: f64, step| if step.magnitude() > a { step.magnitude() } else { a });
     // Where all passes lie if κ is below a half.
     let around = psi.map(|psi| psi.widened(2.0 * longest).given());
-    let after = gauges.next_turn(readings, guess, &around);
+    let after = Traced::next_turn(gauges, readings, guess, &around);
     // The constants of the controller contract as those without rounding do, but for their last bits.
     let contraction = 1.001
         * Trace::peek(|record| {

@@ -1,6 +1,7 @@
 //! The largest boxes of poses that the legs reach, about the middle of their strokes.
 
 use serde::Serialize;
+use specgen_numerics::jacobian;
 
 use super::Pose;
 use super::travel::Legs;
@@ -23,7 +24,7 @@ pub struct Boxes {
 
 impl Boxes {
     pub(super) fn of(legs: &Legs<'_>, centre: Pose, declared: &Pose) -> Self {
-        let slopes = legs.platform.jacobian(&centre).map(|row| row.map(f64::abs));
+        let slopes = jacobian(legs.platform, &centre).map(|row| row.map(f64::abs));
         // Where the linear legs would end; the corners say what is left of that.
         let fitted = |half: Pose| {
             let share = legs.corners_within(&centre, &half);

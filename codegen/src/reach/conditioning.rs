@@ -2,6 +2,7 @@
 
 use nalgebra::Matrix6;
 use serde::Serialize;
+use specgen_numerics::jacobian;
 use specgen_runtime::Platform;
 
 use super::Pose;
@@ -49,7 +50,7 @@ impl Conditioning {
     ) -> Self {
         let mut found: Option<Self> = None;
         for pose in poses {
-            let [smallest, largest] = singular_values(&platform.jacobian(&pose), joint_radius);
+            let [smallest, largest] = singular_values(&jacobian(platform, &pose), joint_radius);
             let condition = if smallest > 0.0 { largest / smallest } else { f64::MAX };
             let one = found.get_or_insert(Self {
                 at_rest: condition,

@@ -1,6 +1,7 @@
 //! Leg displacements along axes, over boxes and along paths, from the kinematics that the controller uses.
 
 use nalgebra::{Matrix6, Vector6};
+use specgen_numerics::{displacements, jacobian};
 use specgen_runtime::Platform;
 
 use super::{INTERIOR_POSES, PathReach, Pose, wider};
@@ -20,8 +21,7 @@ pub(super) struct Legs<'a> {
 impl Legs<'_> {
     /// Smallest and largest leg displacement at a pose, m.
     pub(super) fn span(&self, pose: &Pose) -> [f64; 2] {
-        let displacements = self.platform.displacements(pose);
-        displacements.iter().map(|x| [*x, *x]).fold([f64::INFINITY, f64::NEG_INFINITY], wider)
+        displacements(self.platform, pose).iter().map(|x| [*x, *x]).fold([f64::INFINITY, f64::NEG_INFINITY], wider)
     }
 
     fn holds(&self, pose: &Pose) -> bool {
@@ -33,9 +33,9 @@ impl Legs<'_> {
     pub(super) fn middle(&self) -> Pose {
         let mut pose = [0.0; 6];
         for _ in 0..8 {
-            let missing = self.platform.displacements(&pose).map(|x| 0.5 * self.stroke - x);
-            let jacobian = self.platform.jacobian(&pose);
-            let rows = Matrix6::from_fn(|i, j| jacobian[i][j]);
+            let missing = displacements(self.platform, &pose).map(|x| 0.5 * self.stroke - x);
+            let slopes = jacobian(self.platform, &pose);
+            let rows = Matrix6::from_fn(|i, j| slopes[i][j]);
             let Some(step) = rows.lu().solve(&Vector6::from(missing)) else {
                 break;
             };
@@ -55,8 +55,8 @@ impl Legs<'_> {
             moved
         };
         // No pose within reach is further than the strokes allow the steepest leg, twice over for the curvature.
-        let jacobian = self.platform.jacobian(pose);
-        let steepest = jacobian.iter().map(|row| row[axis].abs()).fold(0.0, |a: f64, b| if b > a { b } else { a });
+        let slopes = jacobian(self.platform, pose);
+        let steepest = slopes.iter().map(|row| row[axis].abs()).fold(0.0, |a: f64, b| if b > a { b } else { a });
         let far = 2.0 * self.stroke / steepest;
         let far = if axis >= 3 && far > LARGEST_ANGLE { LARGEST_ANGLE } else { far };
         pose[axis] + sign * self.largest(far, |by| self.holds(&moved(by)))
@@ -98,9 +98,9 @@ impl Legs<'_> {
         let turn = bounds[3] + bounds[4] + bounds[5];
         let second = (libm::exp(turn) - 1.0 - turn) * joint_radius;
         let motion = bounds[0] + bounds[1] + bounds[2] + turn * joint_radius + second;
-        let jacobian = self.platform.jacobian(&[0.0; 6]);
+        let slopes = jacobian(self.platform, &[0.0; 6]);
         let mut largest = 0.0;
-        for (row, length) in jacobian.iter().zip(rest_lengths) {
+        for (row, length) in slopes.iter().zip(rest_lengths) {
             let mut linear = 0.0;
             for (slope, bound) in row.iter().zip(bounds) {
                 linear += slope.abs() * bound;
@@ -118,11 +118,11 @@ impl Legs<'_> {
     /// over the strokes of a piezo they do not change.
     pub(super) fn shift(&self, poses: impl Iterator<Item = Pose>) -> PathReach {
         let mut path = PathReach { poses: 0, displacement: [f64::INFINITY, f64::NEG_INFINITY], shift: None };
-        let slopes = self.platform.jacobian(&[0.0; 6]).map(|row| row[2]);
+        let slopes = jacobian(self.platform, &[0.0; 6]).map(|row| row[2]);
         let (mut lowest, mut highest) = (f64::NEG_INFINITY, f64::INFINITY);
         for pose in poses {
             path.poses += 1;
-            for (x, slope) in self.platform.displacements(&pose).iter().zip(slopes) {
+            for (x, slope) in displacements(self.platform, &pose).iter().zip(slopes) {
                 // What is no number is beyond every stroke, and stays so.
                 path.displacement =
                     if x.is_nan() { [f64::NEG_INFINITY, f64::INFINITY] } else { wider(path.displacement, [*x, *x]) };

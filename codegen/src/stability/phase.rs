@@ -2,7 +2,7 @@
 
 use core::f64::consts::PI;
 
-use crate::numerics::{Matrix, eigenvalues};
+use specgen_numerics::{Matrix, eigenvalues};
 
 /// Steps of the scan over half a turn, and bisections of the interval that holds the margin.
 const STEPS: u32 = 90;

@@ -24,7 +24,7 @@ use specgen_runtime::Platform;
 
 use crate::diagnostic::Diagnostic;
 use crate::model::{Gains, Interaction, Model, TaskSpace};
-use crate::numerics::Matrix6;
+use specgen_numerics::Matrix6;
 
 pub use super::LARGEST_RADIUS;
 pub use closed_loop::{ClosedLoop, Conditions};

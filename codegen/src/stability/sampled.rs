@@ -11,7 +11,7 @@
 use core::f64::consts::TAU;
 
 use crate::model::Model;
-use crate::numerics::{Matrix, exponential, spectral_radius as largest_magnitude};
+use specgen_numerics::{Matrix, exponential, spectral_radius as largest_magnitude};
 
 /// Linear dynamics of a leg as the adaptation sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -15,7 +15,7 @@ use host_sim::platform::rig::{Bench, Request};
 use host_sim::trajectory::PoseTarget;
 use serde::Serialize;
 
-use crate::numerics::Matrix6;
+use specgen_numerics::Matrix6;
 use crate::stability::platform::{Biquad, ClosedLoop};
 
 /// Word of the mode F with the inverse model alone.

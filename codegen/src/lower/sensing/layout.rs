@@ -7,7 +7,7 @@ use super::finding;
 use crate::diagnostic::{Diagnostic, codes};
 use crate::lower::linear::{self, Matrix, cross, dot, dusted, norm};
 use crate::model::{Model, Probe};
-use crate::numerics::multiply6;
+use specgen_numerics::multiply6;
 
 /// A line that meets its plane this many joint radii away from P_C cannot meet the platform.
 const FARTHEST: f64 = 10.0;

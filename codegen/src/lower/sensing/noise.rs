@@ -4,7 +4,7 @@ use super::layout;
 use crate::diagnostic::Diagnostic;
 use crate::lower::kinematics::leg_jacobian;
 use crate::model::Model;
-use crate::numerics::multiply6;
+use specgen_numerics::multiply6;
 
 /// Noise of one gauge reading and what it becomes, rms. Gauges are independent of each other, and the converter's error is spread
 /// evenly over its step.

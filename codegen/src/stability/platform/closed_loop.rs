@@ -14,7 +14,7 @@ use super::law::{Adapting, Law, Tuning};
 use super::modes::ModalBasis;
 use super::notch::{Biquad, Notch};
 use super::sampled::{Plant, STATES};
-use crate::numerics::{Matrix, Matrix6, spectral_radius};
+use specgen_numerics::{Matrix, Matrix6, spectral_radius};
 
 /// A linear combination of the states.
 type Signal = Vec<f64>;

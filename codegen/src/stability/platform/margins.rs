@@ -9,7 +9,7 @@ use super::law::{Law, Tuning};
 use super::rule::is_stable;
 use super::search::largest_stable;
 use super::{nominal_conditions, worst_radius};
-use crate::numerics::eigenvalues;
+use specgen_numerics::eigenvalues;
 
 /// No margin is looked for beyond these.
 const LARGEST_RATIO: f64 = 10.0;

@@ -1,7 +1,7 @@
 //! Modes of the platform on its legs: K v = ω² M v with K = Jᵀ k_a J at rest.
 
 use super::RestDynamics;
-use crate::numerics::{Matrix6, generalized_modes, inverse_of_modes, multiply6, transpose6};
+use specgen_numerics::{Matrix6, generalized_modes, inverse_of_modes, multiply6, transpose6};
 
 /// A coupling smaller than this against the largest is rounding: modes that do not couple are kept exactly apart, which
 /// lets the closed loop fall into small blocks.

@@ -5,7 +5,7 @@ use core::f64::consts::PI;
 use serde::Serialize;
 
 use super::modes::ModalBasis;
-use crate::numerics::Matrix6;
+use specgen_numerics::Matrix6;
 
 /// A mode above this part of half the tick rate gets no section: sampled, it shows up elsewhere.
 const HIGHEST: f64 = 0.9;

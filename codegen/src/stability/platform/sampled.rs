@@ -7,7 +7,7 @@
 //! their damping ratios stay, and K_e is the stiffness of a work piece that the platform touches.
 
 use super::modes::ModalBasis;
-use crate::numerics::{Matrix, Matrix6, exponential};
+use specgen_numerics::{Matrix, Matrix6, exponential};
 
 /// States: lagged drive, displacement, velocity over ω, six each.
 pub(super) const STATES: usize = 18;

@@ -9,7 +9,7 @@ const OWN_ROUNDING: f64 = 1e-15;
 
 /// `centre` + `slope`·p + e for any p in \[−1, 1\]⁶ and some |e| ≤ `rest`; always within `low` and `high`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Form {
+pub(crate) struct Form {
     centre: f64,
     slope: [f64; 6],
     rest: f64,
@@ -26,39 +26,40 @@ fn most(values: [f64; 4]) -> f64 {
 }
 
 /// Ends of the products of two intervals.
-pub(super) fn times(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+pub(crate) fn times(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     let ends = [a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]];
     [least(ends), most(ends)]
 }
 
 /// Largest magnitude of an interval.
-pub(super) fn magnitude([low, high]: [f64; 2]) -> f64 {
+#[must_use]
+pub fn magnitude([low, high]: [f64; 2]) -> f64 {
     let (a, b) = (low.abs(), high.abs());
     if a > b { a } else { b }
 }
 
 impl Form {
-    pub(super) const fn constant(value: f64) -> Self {
+    pub(crate) const fn constant(value: f64) -> Self {
         Self { centre: value, slope: [0.0; 6], rest: 0.0, low: value, high: value }
     }
 
     /// Coordinate `axis` of a pose, from `low` to `high`.
-    pub(super) fn coordinate(axis: usize, [low, high]: [f64; 2]) -> Self {
+    pub(crate) fn coordinate(axis: usize, [low, high]: [f64; 2]) -> Self {
         let mut slope = [0.0; 6];
         slope[axis] = 0.5 * (high - low);
         Self { centre: 0.5 * (low + high), slope, rest: 0.0, low, high }
     }
 
-    pub(super) const fn range(self) -> [f64; 2] {
+    pub(crate) const fn range(self) -> [f64; 2] {
         [self.low, self.high]
     }
 
-    pub(super) fn magnitude(self) -> f64 {
+    pub(crate) fn magnitude(self) -> f64 {
         magnitude(self.range())
     }
 
     /// Smallest magnitude.
-    pub(super) fn nearest(self) -> f64 {
+    pub(crate) fn nearest(self) -> f64 {
         if self.low <= 0.0 && self.high >= 0.0 {
             return 0.0;
         }
@@ -67,7 +68,7 @@ impl Form {
     }
 
     /// A single value.
-    pub(super) fn point(self) -> Option<f64> {
+    pub(crate) fn point(self) -> Option<f64> {
         (self.low == self.high).then_some(self.low)
     }
 
@@ -88,11 +89,11 @@ impl Form {
     }
 
     /// Up to `more` beyond what it was.
-    pub(super) fn widened(self, more: f64) -> Self {
+    pub(crate) fn widened(self, more: f64) -> Self {
         Self { rest: self.rest + more, low: self.low - more, high: self.high + more, ..self }
     }
 
-    pub(super) fn negative(self) -> Self {
+    pub(crate) fn negative(self) -> Self {
         Self {
             centre: -self.centre,
             slope: self.slope.map(|slope| -slope),
@@ -102,13 +103,13 @@ impl Form {
         }
     }
 
-    pub(super) fn scaled(self, factor: f64) -> Self {
+    pub(crate) fn scaled(self, factor: f64) -> Self {
         let [low, high] = times(self.range(), [factor, factor]);
         let slope = self.slope.map(|slope| slope * factor);
         Self { centre: self.centre * factor, slope, rest: self.rest * factor.abs(), low, high }
     }
 
-    pub(super) fn plus(self, other: Self) -> Self {
+    pub(crate) fn plus(self, other: Self) -> Self {
         let size = self.centre.abs() + other.centre.abs() + self.radius() + other.radius();
         let bounds = [self.low + other.low, self.high + other.high];
         Self {
@@ -120,7 +121,7 @@ impl Form {
         .within([bounds[0] - OWN_ROUNDING * size, bounds[1] + OWN_ROUNDING * size])
     }
 
-    pub(super) fn product(self, other: Self) -> Self {
+    pub(crate) fn product(self, other: Self) -> Self {
         let (a, b) = (self.centre, other.centre);
         let (wide_a, wide_b) = (self.radius(), other.radius());
         let size = (a.abs() + wide_a) * (b.abs() + wide_b);
@@ -135,7 +136,7 @@ impl Form {
     }
 
     /// 1/x for an x that is not zero.
-    pub(super) fn inverse(self) -> Self {
+    pub(crate) fn inverse(self) -> Self {
         let (middle, radius) = (self.centre, self.radius());
         let ends = [1.0 / self.low, 1.0 / self.high];
         let (low, high) = if ends[0] < ends[1] { (ends[0], ends[1]) } else { (ends[1], ends[0]) };

@@ -19,7 +19,7 @@ use super::form::{Form, magnitude, times};
 ///
 /// `SINGLE`: the controller computes in `f32`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Traced<const SINGLE: bool> {
+pub struct Traced<const SINGLE: bool> {
     form: Form,
     error: f64,
     /// Its node; none for what is exact.
@@ -43,10 +43,10 @@ thread_local! {
 }
 
 /// The record of a computation.
-pub(super) struct Trace(Vec<Node>);
+pub struct Trace(Vec<Node>);
 
 /// Runs a computation and keeps its record.
-pub(super) fn trace<R>(run: impl FnOnce() -> R) -> (R, Trace) {
+pub fn trace<R>(run: impl FnOnce() -> R) -> (R, Trace) {
     NODES.with(|nodes| nodes.borrow_mut().clear());
     let result = run();
     (result, Trace(NODES.with(RefCell::take)))
@@ -68,13 +68,13 @@ const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
 
 impl Trace {
     /// The record so far, while it is being made.
-    pub(super) fn peek<R>(look: impl FnOnce(&Self) -> R) -> R {
+    pub fn peek<R>(look: impl FnOnce(&Self) -> R) -> R {
         let record = Self(NODES.with(|nodes| nodes.borrow().clone()));
         look(&record)
     }
 
     /// How much Σ `weights`·results may be off.
-    pub(super) fn error<const SINGLE: bool>(&self, results: &[(Traced<SINGLE>, f64)]) -> f64 {
+    pub fn error<const SINGLE: bool>(&self, results: &[(Traced<SINGLE>, f64)]) -> f64 {
         let derivatives = self.derivatives(results);
         let mut own = 0.0;
         let mut known = [0.0; 2];
@@ -87,7 +87,7 @@ impl Trace {
     }
 
     /// Range of the derivative of Σ `weights`·results by `number`.
-    pub(super) fn derivative<const SINGLE: bool>(
+    pub fn derivative<const SINGLE: bool>(
         &self,
         results: &[(Traced<SINGLE>, f64)],
         number: Traced<SINGLE>,
@@ -123,22 +123,22 @@ impl<const SINGLE: bool> Traced<SINGLE> {
     const UNIT: f64 = if SINGLE { 5.960_464_477_539_063e-8 } else { 1.110_223_024_625_156_5e-16 };
 
     /// Coordinate `axis` of the pose, anywhere from `low` to `high`, exact.
-    pub(super) fn coordinate(axis: usize, low: f64, high: f64) -> Self {
+    pub fn coordinate(axis: usize, low: f64, high: f64) -> Self {
         Self { form: Form::coordinate(axis, [low, high]), error: 0.0, node: None }
     }
 
     /// A constant of the controller; what it stands for is smaller by something from `low` to `high`.
-    pub(super) fn constant(value: f64, [low, high]: [f64; 2]) -> Self {
+    pub fn constant(value: f64, [low, high]: [f64; 2]) -> Self {
         Self::exact(Form::constant(value)).off_by([low, high])
     }
 
     /// The same, counted as exact: an input of what follows. It keeps a node, to take derivatives by.
-    pub(super) fn given(self) -> Self {
+    pub fn given(self) -> Self {
         Self::exact(self.form.widened(self.error)).noted()
     }
 
     /// A number that an exact one is `low` to `high` below.
-    pub(super) fn off_by(self, known: [f64; 2]) -> Self {
+    pub fn off_by(self, known: [f64; 2]) -> Self {
         if known == [0.0; 2] {
             return self;
         }
@@ -151,7 +151,7 @@ impl<const SINGLE: bool> Traced<SINGLE> {
     }
 
     /// Anywhere up to `more` from where it was.
-    pub(super) fn widened(self, more: f64) -> Self {
+    pub fn widened(self, more: f64) -> Self {
         Self { form: self.form.widened(more), ..self }
     }
 
@@ -164,12 +164,12 @@ impl<const SINGLE: bool> Traced<SINGLE> {
     }
 
     /// Smallest and largest value.
-    pub(super) const fn range(self) -> [f64; 2] {
+    pub const fn range(self) -> [f64; 2] {
         self.form.range()
     }
 
     /// Largest magnitude.
-    pub(super) fn magnitude(self) -> f64 {
+    pub fn magnitude(self) -> f64 {
         self.form.magnitude()
     }
 

@@ -1,0 +1,65 @@
+//! The controller's kernels on the compiler's numbers. Generic code is compiled by the crate that names its types: named
+//! here, the kernels are compiled once, and optimised.
+
+use specgen_runtime::{Gauges, Legs, Platform, Real, Series};
+
+use crate::{Double, Traced};
+
+/// Displacements of the legs from rest at `pose` (m and rad), m: [`Platform::displacements`].
+#[must_use]
+pub fn displacements(platform: &Platform<f64>, pose: &[f64; 6]) -> [f64; 6] {
+    platform.displacements(pose)
+}
+
+/// ∂l/∂h at `pose` (m and rad), a row by leg, m/m and m/rad: [`Platform::jacobian`].
+#[must_use]
+pub fn jacobian(platform: &Platform<f64>, pose: &[f64; 6]) -> [[f64; 6]; 6] {
+    platform.jacobian(pose)
+}
+
+/// A number with the controller's kinematics and gauges compiled for it.
+pub trait Kernels: Real {
+    /// [`Legs::displacements`] at `pose` (m and rad), m.
+    #[must_use]
+    fn displacements(legs: &Legs<'_, Self>, pose: &[Self; 6]) -> [Self; 6];
+
+    /// [`Gauges::readings`] at `pose` (m and rad), m.
+    #[must_use]
+    fn readings(gauges: &Gauges<'_, Self>, series: &Series<'_, Self>, pose: &[Self; 6]) -> [Self; 6];
+
+    /// [`Gauges::pose`] of `readings` (m), m and rad.
+    #[must_use]
+    fn pose(gauges: &Gauges<'_, Self>, readings: &[Self; 6]) -> [Self; 6];
+
+    /// [`Gauges::next_turn`]: one pass from the turn `psi`.
+    #[must_use]
+    fn next_turn(gauges: &Gauges<'_, Self>, readings: &[Self; 6], guess: &[Self; 6], psi: &[Self; 3]) -> [Self; 3];
+
+    /// [`Gauges::pose_from`]: all passes from the turn `psi`.
+    #[must_use]
+    fn pose_from(gauges: &Gauges<'_, Self>, readings: &[Self; 6], guess: &[Self; 6], psi: [Self; 3]) -> [Self; 6];
+}
+
+macro_rules! kernels {
+    ($($number:ty),*) => {$(
+        impl Kernels for $number {
+            fn displacements(legs: &Legs<'_, Self>, pose: &[Self; 6]) -> [Self; 6] {
+                legs.displacements(pose)
+            }
+            fn readings(gauges: &Gauges<'_, Self>, series: &Series<'_, Self>, pose: &[Self; 6]) -> [Self; 6] {
+                gauges.readings(series, pose)
+            }
+            fn pose(gauges: &Gauges<'_, Self>, readings: &[Self; 6]) -> [Self; 6] {
+                gauges.pose(readings)
+            }
+            fn next_turn(gauges: &Gauges<'_, Self>, readings: &[Self; 6], guess: &[Self; 6], psi: &[Self; 3]) -> [Self; 3] {
+                gauges.next_turn(readings, guess, psi)
+            }
+            fn pose_from(gauges: &Gauges<'_, Self>, readings: &[Self; 6], guess: &[Self; 6], psi: [Self; 3]) -> [Self; 6] {
+                gauges.pose_from(readings, guess, psi)
+            }
+        }
+    )*};
+}
+
+kernels!(f32, f64, Double, Traced<true>, Traced<false>);

@@ -1,0 +1,29 @@
+//! Numerics of the host whose results reach emitted bytes: plain loops in a written order, IEEE basic operations and `libm`
+//! only, so that every machine computes the same.
+//!
+//! | part | what |
+//! |---|---|
+//! | [`Matrix`], [`Matrix6`] | dense matrices, eigenvalues, modes of mass and stiffness, exponential |
+//! | [`Double`] | numbers of 106 bits: the reference for rounding errors |
+//! | [`Traced`] | numbers that record every operation: bounds of rounding errors over a box of poses |
+//! | [`Kernels`], [`displacements`], [`jacobian`] | the controller's kernels on these numbers, compiled here |
+//!
+//! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
+
+mod double;
+mod eigenvalues;
+mod exponential;
+mod form;
+mod kernels;
+mod matrix;
+mod symmetric;
+mod traced;
+
+pub use double::Double;
+pub use eigenvalues::{eigenvalues, spectral_radius};
+pub use exponential::exponential;
+pub use form::magnitude;
+pub use kernels::{Kernels, displacements, jacobian};
+pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
+pub use symmetric::{generalized_modes, inverse_of_modes, symmetric_eigen};
+pub use traced::{Trace, Traced, trace};
