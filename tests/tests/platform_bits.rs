@@ -20,7 +20,9 @@ fn ticks() -> usize {
     specgen_tests::length(20_000, 100_000)
 }
 /// Ticks of each mode in closed loop.
-const TRACKING: u32 = 20_000;
+fn tracked() -> u32 {
+    specgen_tests::length(10_000, 20_000)
+}
 /// `interaction` of a force sensor, and its status bit.
 const MEASURED: f64 = 2.0;
 const WRENCH_FAULT: u64 = 0x8_0000;
@@ -50,10 +52,10 @@ fn compare(name: &str, edits: &[(&str, &str)], mcus: &[Mcu]) {
         covers(&hostile, what, interaction == MEASURED);
         // The controller keeps these settings.
         let Compiled { model, ir, .. } = &emitted.compiled;
-        let tracking = verify::exercise(&mut controller, model, ir, TRACKING).unwrap();
+        let tracking = verify::exercise(&mut controller, model, ir, tracked()).unwrap();
         tracks(&tracking, what);
         for image in &images {
-            for (record, host, ticks) in [("hostile", &hostile, ticks()), ("tracking", &tracking, TRACKING as usize)] {
+            for (record, host, ticks) in [("hostile", &hostile, ticks()), ("tracking", &tracking, tracked() as usize)] {
                 let (target, _) = verify::replay(image, &config, host).unwrap_or_else(|error| panic!("{error}"));
                 assert_eq!((host.len(), target.len()), (ticks, ticks));
                 let difference = first_difference(host, &target);

@@ -3,8 +3,8 @@
 use super::linear;
 use crate::ir::{ControlLaw, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Scalar, Section};
 use crate::model::{self, Model};
-use specgen_numerics::{Matrix6, multiply6, transpose6};
 use crate::stability::platform::{self as design, Design, RestDynamics};
+use specgen_numerics::{Matrix6, multiply6, transpose6};
 
 const IDENTITY: Matrix6 = {
     let mut matrix = [[0.0; 6]; 6];

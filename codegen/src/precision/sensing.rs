@@ -149,7 +149,8 @@ pub(super) fn figures(
     };
     let mut figures = Figures::none(bound, single);
     for given in poses {
-        let readings = Double::readings(&gauges, &legs.series(), &given.map(Double::from)).map(|y| scalar.round(y.value()));
+        let readings =
+            Double::readings(&gauges, &legs.series(), &given.map(Double::from)).map(|y| scalar.round(y.value()));
         let found = if single { pose::<f32>(constants, &readings) } else { pose::<f64>(constants, &readings) };
         let wanted = Double::pose(&gauges, &readings.map(Double::from));
         keep(&mut figures.sampled, core::array::from_fn(|axis| (Double::from(found[axis]) - wanted[axis]).value()));

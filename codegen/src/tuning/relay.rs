@@ -15,8 +15,8 @@ use host_sim::platform::rig::{Bench, Request};
 use host_sim::trajectory::PoseTarget;
 use serde::Serialize;
 
-use specgen_numerics::Matrix6;
 use crate::stability::platform::{Biquad, ClosedLoop};
+use specgen_numerics::Matrix6;
 
 /// Word of the mode F with the inverse model alone.
 const OPEN: f64 = 1.0;
