@@ -26,6 +26,8 @@ pub struct ControlLaw {
     pub compliance: f64,
     /// J⁻ᵀ/k_a, m/N and 1/N.
     pub wrench_to_legs: [[f64; 6]; LEGS],
+    /// Its inverse, k_a Jᵀ, N/m and N.
+    pub legs_to_wrench: [[f64; 6]; 6],
     /// V⁻¹ K⁻¹, K = Jᵀ k_a J. V are the modes if a notch is declared, else the axes of the pose.
     pub force_to_modes: [[f64; 6]; 6],
     /// V⁻¹ J⁻¹.

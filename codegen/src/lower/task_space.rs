@@ -49,6 +49,9 @@ pub(super) fn law(
         period: round(model.timing.period),
         compliance: round(compliance),
         wrench_to_legs: round_all(wrench_to_legs),
+        legs_to_wrench: round_all(
+            transpose6(&rest.jacobian).map(|row| row.map(|value| value * model.actuator.axial_stiffness)),
+        ),
         force_to_modes: round_all(multiply6(&legs_to_modes, &wrench_to_legs)),
         legs_to_modes: round_all(legs_to_modes),
         modes_to_legs: round_all(multiply6(&rest.jacobian, &from_modal)),

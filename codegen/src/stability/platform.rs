@@ -117,7 +117,8 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
             ModeMargins::of(&closed_loop, law, tuning, ratios)
         })
         .collect();
-    let findings = refusal::thin(model, task, &closed_loop, &margins);
+    let mut findings = refusal::thin(model, task, &closed_loop, &margins);
+    findings.extend(refusal::slower_than_position(model, task, &combined, &position));
     let basis = &closed_loop.basis;
     Ok(Design {
         modes: core::array::from_fn(|i| Mode {

@@ -1,6 +1,6 @@
 //! What the design gives, refuses and points out.
 
-use specgen::model::{Gains, Interaction, Model, TaskSpace};
+use specgen::model::{AdaptationMode, Gains, Interaction, Model, TaskSpace};
 use specgen::stability::platform::{Design, Law, Tuning, describe, design};
 
 use super::study::{model, rest};
@@ -135,6 +135,12 @@ fn thin_margins_and_modes_beyond_the_notch_are_pointed_out() {
     assert_eq!(thin.findings.len(), 1, "{:#?}", thin.findings);
     assert_eq!((thin.findings[0].code, thin.findings[0].key.as_str()), ("W0423", "position_gains.integral"));
     assert!(rule.findings.is_empty());
+    let bare = designed(|model, _| model.adaptation.mode = AdaptationMode::Invhys).unwrap();
+    assert_eq!(bare.findings.iter().map(|one| one.code).collect::<Vec<_>>(), ["W0425"]);
+    for (mode, name) in [(AdaptationMode::Ewma, "\"ewma\""), (AdaptationMode::Pcc, "\"pcc\"")] {
+        assert!(bare.findings[0].help.contains(name));
+        assert!(designed(|model, _| model.adaptation.mode = mode).unwrap().findings.is_empty());
+    }
     let slow = designed(|model, _| model.timing.period = 1.0 / 1500.0).unwrap();
     assert!(
         slow.findings.iter().any(|one| one.code == "W0424" && one.message.contains("795 Hz")),

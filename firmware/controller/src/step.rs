@@ -35,8 +35,8 @@ use crate::hysteresis::{TABLES, Table};
 use crate::limits::DAC;
 use crate::setpoint::PLAN;
 use crate::task_space::{
-    COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, MODES_TO_LEGS, PERIOD, REST_FORCE,
-    TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
+    COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, MODES_TO_LEGS,
+    PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
     linear_displacement, linear_drive, modal_error, notch_error, notch_innovation,
 };
 use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
@@ -110,25 +110,14 @@ pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> 
     let mut request = each(|leg| demand[leg] + state.load[leg] + correction[leg]);
     if entered {
         let held = each(|leg| state.legs[leg].requested - request[leg]);
-        if config.mode().law() == Law::Invhys {
-            state.transfer.begin(held);
-        } else {
-            for (estimate, held) in state
-                .estimates
-                .iter_mut()
-                .zip(transform(&LEGS_TO_MODES, &held))
-            {
-                estimate.level -= held;
-            }
-            state.transfer.begin([0.0; LEGS]);
-            request = each(|leg| state.legs[leg].requested);
-        }
+        hand_over(config, state, &held);
+        request = each(|leg| state.legs[leg].requested);
     } else {
         state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
-    }
-    if state.transfer.is_active() {
-        let offset = state.transfer.offset();
-        request = each(|leg| request[leg] + offset[leg]);
+        if state.transfer.is_active() {
+            let offset = state.transfer.offset();
+            request = each(|leg| request[leg] + offset[leg]);
+        }
     }
     let mut limited = 0;
     for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
@@ -195,6 +184,33 @@ fn enter_mode(config: &Config, state: &mut State) -> bool {
         state.deflection = [0.0; 6];
     }
     true
+}
+
+/// Gives what the first request of a mode lacks to where the legs stand, m of each leg, to what the mode would itself
+/// come to hold it with: the estimates, else the integral. Where there is neither it becomes an offset that fades,
+/// which estimates would learn against.
+#[inline]
+fn hand_over(config: &Config, state: &mut State, held: &[Real; LEGS]) {
+    let mode = config.mode();
+    let mut left = *held;
+    if mode.law() != Law::Invhys {
+        for (estimate, held) in state
+            .estimates
+            .iter_mut()
+            .zip(transform(&LEGS_TO_MODES, held))
+        {
+            estimate.level -= held;
+        }
+        left = [0.0; LEGS];
+    } else if mode.feeds_back() {
+        let force = transform(&LEGS_TO_WRENCH, held);
+        let gain = &config.active_gains().integral;
+        let taken = each(|axis| if gain[axis] > 0.0 { force[axis] } else { 0.0 });
+        state.integral.grow(&taken);
+        let moved = transform(&WRENCH_TO_LEGS, &taken);
+        left = each(|leg| held[leg] - moved[leg]);
+    }
+    state.transfer.begin(left);
 }
 
 /// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.

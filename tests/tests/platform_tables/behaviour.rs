@@ -282,3 +282,65 @@ fn the_machine_of_the_reference_spec_is_the_reference_machine() {
         assert!((a.reading(0.18, &pose) - b.reading(0.18, &pose)).abs() < 1e-15);
     }
 }
+
+/// Largest distance from the path in the half second before a change of mode at `tick` of the path and in the one after, m.
+fn excursion(
+    scenario: &PlatformScenario,
+    bench: &Bench,
+    from: u32,
+    to: u32,
+    path: &PaperPose,
+    tick: usize,
+) -> [f64; 2] {
+    const WINDOW: usize = 5000;
+    let mut controller = bench.controller();
+    let mut words = controller.default_config();
+    controller.description().set_config(&mut words, "mode", f64::from(to)).expect("a mode");
+    select(&mut controller, from).expect("a mode");
+    let mut prepared = scenario.rig().clone();
+    let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, 0).expect("the words");
+    rig.arm(60.0).expect("the bias");
+    let mut largest = [0.0_f64; 2];
+    for k in 0..tick + WINDOW {
+        if k == tick {
+            rig.configure(&words).expect("a permitted setting");
+        }
+        let now = rig.tick(&Request::stream(path.target((k + 1) as f64 * PERIOD))).expect("a tick");
+        if k + WINDOW >= tick {
+            let off: f64 = (0..3).map(|axis| (now.pose[axis] - now.target[axis]).powi(2)).sum();
+            let window = &mut largest[usize::from(k >= tick)];
+            *window = window.max(off.sqrt());
+        }
+    }
+    largest
+}
+
+#[test]
+fn a_change_of_mode_in_motion_disturbs_no_more_than_the_modes_themselves() {
+    let bench = reference_machine();
+    let scenario = bench.scenario();
+    let path = paper(PaperPath::Case1, 1.0);
+    let pairs: Vec<(u32, u32)> =
+        (0..7).flat_map(|from| (0..7).map(move |to| (from, to))).filter(|(from, to)| from != to).collect();
+    let ticks = [7000, 9000, 11_000];
+    let found = in_parallel(42, |pair| {
+        let (from, to) = pairs[pair as usize];
+        ticks.map(|tick| excursion(&scenario, bench, from, to, &path, tick))
+    });
+    // What each mode is off by where nothing changes.
+    let mut usual = [0.0_f64; 7];
+    for ((from, _), found) in pairs.iter().zip(&found) {
+        usual[*from as usize] = found.iter().fold(usual[*from as usize], |most, [before, _]| most.max(*before));
+    }
+    println!("off the path in modes 0 to 6: {:.0?} nm", usual.map(|m| m * 1e9));
+    let mut worst = [0.0_f64; 2];
+    for ((from, to), found) in pairs.iter().zip(&found) {
+        let after = found.iter().fold(0.0_f64, |most, [_, after]| most.max(*after));
+        let share = after / usual[*from as usize].max(usual[*to as usize]);
+        if share > worst[0] {
+            worst = [share, after];
+        }
+        assert!(share <= 2.0, "{from} to {to}: {:.1} nm", after * 1e9);
+    }
+    println!("after a change at most {:.2} of the larger of the two, {:.1} nm", worst[0], worst[1] * 1e9);
+}

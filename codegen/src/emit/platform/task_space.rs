@@ -15,7 +15,8 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     };
     let law = &task.law;
     let (period, compliance) = (real(law.period), real(law.compliance));
-    let (wrench_to_legs, force_to_modes) = (matrix(&law.wrench_to_legs), matrix(&law.force_to_modes));
+    let (wrench_to_legs, legs_to_wrench) = (matrix(&law.wrench_to_legs), matrix(&law.legs_to_wrench));
+    let force_to_modes = matrix(&law.force_to_modes);
     let (legs_to_modes, modes_to_legs) = (matrix(&law.legs_to_modes), matrix(&law.modes_to_legs));
     let (rest_force, wrench_limit) = (six(&law.rest_force), six(&law.wrench_limit));
     let (keep, negligible) = (real(law.transfer_keep), real(law.transfer_negligible));
@@ -52,6 +53,8 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const COMPLIANCE: Real = #compliance;
         /// J⁻ᵀ/k_a at rest: generalised force on the platform to the displacement of each leg that it takes, m/N and 1/N.
         pub const WRENCH_TO_LEGS: [[Real; 6]; LEGS] = #wrench_to_legs;
+        /// k_a Jᵀ at rest, its inverse: N/m and N.
+        pub const LEGS_TO_WRENCH: [[Real; 6]; 6] = #legs_to_wrench;
         /// V⁻¹ K⁻¹ with K = Jᵀ k_a J: generalised force to the deflection it makes, in modal coordinates.
         pub const FORCE_TO_MODES: [[Real; 6]; 6] = #force_to_modes;
         /// V⁻¹ J⁻¹: leg displacements to modal coordinates.

@@ -287,7 +287,7 @@ pub const SECTIONS: &[Section] = &[
             row("velocity_cutoff", BANDWIDTH, Rule("0.6 pi rad / period"), "", "\"9e3 rad/s\"", "First-order low-pass of the pose derivative, below half the tick rate (pi rad / period)."),
             row("interaction", Shape::One(Item::Choice(&["none", "modelled", "measured"])), Default("\"none\""), "", "\"none\"", "Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words."),
             row("lead", one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Default("\"0 ms\""), "", "\"0.2 ms\"", "Time by which the leg displacements are asked for early, in proportion to their rate: about the amplifier lag less one period. Takes out part of the lag of fast motion; a set-point that steps is overshot by step x lead / period for one tick."),
-            row("transfer_time", one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("\"50 ms\""), "", "\"50 ms\"", "Time constant with which the offset fades that makes a change of mode bumpless."),
+            row("transfer_time", one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("\"50 ms\""), "", "\"50 ms\"", "Time constant with which the offset of a change of mode fades, where neither estimates nor an integral take it over: in F with Invhys."),
         ],
     },
     Section {

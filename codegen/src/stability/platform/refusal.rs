@@ -8,7 +8,7 @@ use super::margins::ModeMargins;
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions, notch, worst_radius};
 use crate::diagnostic::{Diagnostic, Severity, codes};
-use crate::model::{Model, TaskSpace};
+use crate::model::{AdaptationMode, ControlMode, Model, TaskSpace};
 
 const ADAPTED: [Law; 2] = [Law::Feedforward(Adapting::Ewma), Law::Feedforward(Adapting::Pcc)];
 const COMBINED: [Law; 3] =
@@ -267,6 +267,41 @@ pub(super) fn thin(
         ));
     }
     findings
+}
+
+/// P/F without estimates has its integral alone against what disturbs it, as P has; where that of P is faster, P may be the
+/// more accurate of the two.
+pub(super) fn slower_than_position(
+    model: &Model,
+    task: &TaskSpace,
+    combined: &Tuning,
+    position: &Tuning,
+) -> Option<Diagnostic> {
+    if task.mode != ControlMode::PF || model.adaptation.mode != AdaptationMode::Invhys {
+        return None;
+    }
+    let ratio = combined.integral.iter().zip(&position.integral).fold(1.0, |most: f64, (both, alone)| {
+        let ratio = alone / both;
+        if ratio > most { ratio } else { most }
+    });
+    let message = if ratio.is_infinite() {
+        "P/F with Invhys has an axis without integral, which P has: in contact P may be the more accurate".to_owned()
+    } else {
+        format!(
+            "P/F with Invhys corrects disturbances {ratio:.1} times slower than P: in contact P may be the more accurate"
+        )
+    };
+    (ratio > 1.0).then(|| {
+        finding(
+            model,
+            Severity::Warning,
+            codes::SLOWER_THAN_P,
+            &["adaptation.mode", "adaptation"],
+            message,
+            "write adaptation.mode = \"ewma\" or \"pcc\": their estimates correct what the integral of P/F leaves"
+                .to_owned(),
+        )
+    })
 }
 
 /// Four significant digits, rounded down, so that the number shown is itself accepted.
