@@ -233,7 +233,7 @@ fn without_permission_nothing_changes() {
     let mut masked = Command::new("sh");
     masked.args(["-c", "umask 0777; exec \"$@\"", "sh"]).arg(plain.get_program()).args(plain.get_args());
     masked.current_dir(folder.path("")).args(arguments("a/b/out"));
-    Run::of(&mut masked).says(3, &["could not create `a/b`", "nothing was changed"]);
+    Run::of(&mut masked).says(3, &["could not write `a/b/out`", "nothing was changed"]);
     assert_eq!(folder.listing(), before);
 
     // The failure comes in the middle: some files are moved by then, and must come back.
