@@ -54,7 +54,7 @@ impl Bench {
         let compiled = compile::compile(&spec_file).unwrap_or_else(|_| panic!("{spec} compiles"));
         let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["rt-pc"]);
         let root = folder.path().join("controller");
-        workspace::write(&root, &files).unwrap();
+        workspace::write_scratch(&root, &files).unwrap();
         // Kept between runs and shared by both specs, so that dependencies are compiled once.
         let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc").join(spec);
         let cargo = |verb: &[&str]| {

@@ -12,7 +12,7 @@ use crate::lock;
 /// The lock in the work folder; its text names the owner.
 const LOCK: &str = "lock";
 /// A run that only writes is over by then; one that builds is not waited for.
-const PATIENCE: Duration = Duration::from_secs(10);
+const PATIENCE: Duration = Duration::from_secs(5);
 const ROUND: Duration = Duration::from_millis(20);
 
 /// The right to write an output folder and to build in it, until this is dropped.

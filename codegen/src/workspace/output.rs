@@ -70,7 +70,9 @@ impl Place {
             .map_err(|error| WriteError::io("find", dir, error))?;
         let inside = dir.join(WORK);
         let beside = match (dir.parent(), dir.file_name()) {
-            (Some(parent), Some(name)) if !(exists && (system::is_mount(&dir) || system::check_writable(parent).is_err())) => {
+            (Some(parent), Some(name))
+                if !(exists && (system::is_mount(&dir) || system::check_writable(parent).is_err())) =>
+            {
                 Some(parent.join(format!(".{}.specgen", name.to_string_lossy())))
             }
             _ => None,

@@ -99,7 +99,7 @@ impl InstructionCounter {
     }
 }
 
-// SAFETY, of these four: they take nothing, leave every register but the program counter as it was, and return.
+// SAFETY: these four take nothing, leave every register but the program counter as it was, and return.
 #[unsafe(naked)]
 unsafe extern "C" fn no_nops() {
     naked_asm!("bx lr")
