@@ -44,7 +44,9 @@ pub fn write(dir: &Path, files: &BTreeMap<String, String>) -> Result<Hold, Write
         // Nothing but new files: a swap does not fail half-way.
         let _ = fs::remove_dir_all(place.work.join(NEW));
     }
-    done.map(|()| hold)
+    // Not by `map`: that would drop `hold`, which waits for `_whole`, before it.
+    done?;
+    Ok(hold)
 }
 
 /// Writes the files into a folder of the process's own, which goes with it: nothing is looked for there, nothing kept.
