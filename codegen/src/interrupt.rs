@@ -3,7 +3,7 @@
 //! A command that has a result to show on the way, or a machine to bring down, asks by [`heed`] to be told instead, and ends
 //! by itself.
 
-use std::fs;
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,6 +11,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use tempfile::TempDir;
+
+use crate::lock;
 
 static PRESSED: AtomicBool = AtomicBool::new(false);
 static HEEDED: AtomicBool = AtomicBool::new(false);
@@ -105,10 +107,10 @@ impl Guard {
     ///
     /// # Errors
     /// What `make` says.
-    pub fn file<T>(make: impl FnOnce() -> io::Result<T>, path: impl Fn(&T) -> &Path) -> io::Result<(T, Self)> {
+    pub fn file<T>(make: impl FnOnce() -> io::Result<T>, path: impl Fn(&T) -> PathBuf) -> io::Result<(T, Self)> {
         let _whole = whole();
         let made = make()?;
-        let guard = Self::of(Passing::File(path(&made).to_owned()));
+        let guard = Self::of(Passing::File(path(&made)));
         Ok((made, guard))
     }
 }
@@ -126,9 +128,13 @@ impl Drop for Guard {
 #[derive(Debug)]
 pub struct Scratch {
     folder: TempDir,
-    // After the folder: it is kept in mind until it is gone.
+    // After the folder: it is kept in mind, and locked, until it is gone.
     _guard: Guard,
+    _lock: Option<File>,
 }
+
+/// Of the names of temporary folders.
+const SCRATCH: &str = "specgen-scratch-";
 
 impl Scratch {
     /// A new and empty one.
@@ -136,7 +142,7 @@ impl Scratch {
     /// # Errors
     /// What the file system says.
     pub fn new() -> io::Result<Self> {
-        Self::made(tempfile::tempdir)
+        Self::below(&std::env::temp_dir())
     }
 
     /// A new and empty one in another folder than the system's, so that what is in it can be renamed to its place there.
@@ -144,14 +150,21 @@ impl Scratch {
     /// # Errors
     /// What the file system says.
     pub fn below(folder: &Path) -> io::Result<Self> {
-        Self::made(|| tempfile::tempdir_in(folder))
-    }
-
-    fn made(make: impl FnOnce() -> io::Result<TempDir>) -> io::Result<Self> {
+        // Of processes that were killed.
+        lock::sweep(folder, SCRATCH);
         let _whole = whole();
-        let folder = make()?;
-        let guard = Guard::of(Passing::Tree(folder.path().to_owned()));
-        Ok(Self { folder, _guard: guard })
+        loop {
+            let folder = tempfile::Builder::new().prefix(SCRATCH).tempdir_in(folder)?;
+            let lock = match File::open(folder.path()).and_then(|file| lock::of(file, folder.path())) {
+                Ok(lock) => Some(lock),
+                // Another process took it for one that was left.
+                Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::NotFound) => continue,
+                // Where folders cannot be locked nobody sweeps.
+                Err(_) => None,
+            };
+            let guard = Guard::of(Passing::Tree(folder.path().to_owned()));
+            return Ok(Self { folder, _guard: guard, _lock: lock });
+        }
     }
 
     /// Where it is.

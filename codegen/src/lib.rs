@@ -16,6 +16,7 @@ pub mod identify;
 pub mod interrupt;
 pub mod ir;
 pub mod lint;
+pub mod lock;
 pub mod lower;
 pub mod machine;
 pub mod model;

@@ -51,6 +51,8 @@ const RULES: &[Rule] = &[
     actuator::stiffness_fits_resonance,
     actuator::slew_spares_the_stacks,
     actuator::slew_moves_the_legs,
+    actuator::resonance_is_damped,
+    actuator::grid_shows_the_loop,
     electronics::lag_fits_slew,
     electronics::current_fits_slew,
     electronics::amplifier_noise,

@@ -1,6 +1,9 @@
 //! The files of a self-contained workspace. Beside the emitted crate it holds the runtime and the targets, copied verbatim
 //! from the sources that specgen itself was built with. [`write()`] puts them into a folder, whole or not at all.
 
+mod error;
+mod found;
+mod hold;
 mod output;
 pub mod parts;
 
@@ -11,7 +14,10 @@ use sha2::{Digest, Sha256};
 use crate::emit::EmittedCrate;
 use crate::ir::Ir;
 
-pub use output::{WriteError, write};
+pub use error::WriteError;
+pub use hold::Hold;
+pub(crate) use output::sync;
+pub use output::{write, write_scratch};
 use parts::Part;
 
 /// All files of a workspace: path relative to its root, text. The same spec gives the same bytes.

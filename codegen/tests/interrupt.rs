@@ -82,6 +82,27 @@ fn an_interrupt_leaves_nothing_half_done() {
     assert_eq!(folder.run(&["legs.toml", "-o", "out", "--no-build"]).code, 0);
 }
 
+/// A run that builds has the folder: another one says whose it is, and takes it once that is killed.
+#[test]
+fn a_folder_in_use_names_the_run_that_has_it() {
+    let folder = with_slow_cargo();
+    let mut command = slow(&folder, &["legs.toml", "-o", "out"]);
+    let mut builds = command.stdout(Stdio::null()).stderr(Stdio::null()).process_group(0).spawn().unwrap();
+    let start = Instant::now();
+    while !folder.path("begun").exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "it starts no cargo");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let owner = format!("process {} (`", builds.id());
+    let words = ["output folder `out` is in use by ", &owner, "legs.toml -o out`)", "nothing was written", "-o"];
+    folder.run(&["legs.toml", "-o", "out", "--no-build"]).says(3, &words);
+    kill_process_group(Pid::from_raw(builds.id().cast_signed()).unwrap(), Signal::KILL).unwrap();
+    builds.wait().unwrap();
+    assert!(folder.path(".out.specgen/lock").exists());
+    assert_eq!(folder.run(&["legs.toml", "-o", "out", "--no-build"]).code, 0);
+    assert!(!folder.path(".out.specgen").exists());
+}
+
 #[test]
 fn an_end_from_outside_is_told_to_programs() {
     let folder = with_slow_cargo();

@@ -10,6 +10,7 @@ mod examples;
 mod firmware;
 mod guide;
 mod interrupt;
+mod kills;
 mod microcontroller;
 mod operate;
 mod optional;

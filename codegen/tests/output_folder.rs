@@ -116,6 +116,86 @@ fn a_target_that_is_built_for_no_more_leaves_only_what_cargo_made_and_may_come_b
     refused(&folder, "out", 1, &["rt-pc/"]);
 }
 
+/// Cargo makes a lock file beside a manifest of ours; any other is somebody's.
+#[test]
+fn a_lock_file_in_a_folder_that_specgen_did_not_write_is_not_overwritten() {
+    let folder = Folder::new();
+    for (path, named) in [("Cargo.lock", "Cargo.lock"), ("qemu/Cargo.lock", "qemu/")] {
+        let place = folder.path("theirs").join(path);
+        fs::create_dir_all(place.parent().unwrap()).unwrap();
+        fs::write(&place, "precious").unwrap();
+        refused(&folder, "theirs", 1, &[&format!("were changed since: {named};")]);
+        fs::remove_dir_all(folder.path("theirs")).unwrap();
+    }
+    // Nor one in a folder of an output that is no package.
+    write(&folder);
+    folder.write("out/controller/src/Cargo.lock", "precious");
+    refused(&folder, "out", 1, &["controller/src/Cargo.lock"]);
+}
+
+/// The states that a run may be killed in are made by hand; those that come about are in `kills`.
+#[test]
+fn what_a_killed_run_left_is_taken_up() {
+    let folder = Folder::new();
+    write(&folder);
+    let fresh = folder.listing();
+    let work = folder.path(".out.specgen");
+    // After the swap: cargo's folder and what somebody had put there meanwhile lie in the old output.
+    for (path, text) in [("target/object.o", "built"), ("Cargo.lock", "locked")] {
+        fs::create_dir_all(folder.path("out/target")).unwrap();
+        fs::write(folder.path("out").join(path), text).unwrap();
+    }
+    let with_target = folder.listing();
+    fs::create_dir(&work).unwrap();
+    fs::rename(folder.path("out"), work.join("new")).unwrap();
+    assert_eq!(folder.run(&["legs.toml", "-o", "again", "--no-build"]).code, 0);
+    fs::rename(folder.path("again"), folder.path("out")).unwrap();
+    write(&folder);
+    assert_eq!(folder.listing(), with_target);
+
+    // What is not cargo's comes back too, and is then somebody's in the way.
+    fs::create_dir(&work).unwrap();
+    fs::rename(folder.path("out"), work.join("new")).unwrap();
+    fs::write(work.join("new/notes.txt"), "mine").unwrap();
+    folder.run(&["legs.toml", "-o", "out", "--no-build"]).says(1, &["notes.txt"]);
+    assert_eq!(folder.read("out/notes.txt"), "mine");
+    fs::remove_dir_all(folder.path("out")).unwrap();
+
+    // Before it: new files without their manifest are not whole.
+    fs::create_dir_all(work.join("new/controller")).unwrap();
+    fs::write(work.join("new/controller/half.rs"), "fn ha").unwrap();
+    write(&folder);
+    assert_eq!(folder.listing(), fresh);
+    // In the midst of files that are replaced one by one; the manifest knows both.
+    fs::create_dir_all(work.join("old")).unwrap();
+    fs::rename(folder.path("out/README.md"), work.join("old/README.md")).unwrap();
+    write(&folder);
+    assert_eq!(folder.listing(), fresh);
+}
+
+/// Both at once is neither a mixture nor somebody's mistake.
+#[test]
+fn runs_at_once_write_one_after_the_other() {
+    let folder = Folder::new();
+    folder.spec("other.toml", &[("= \"pcc\"", "= \"ewma\""), ("name = \"legs\"", "name = \"other\"")]);
+    let whole = ["legs", "other"].map(|name| {
+        assert_eq!(folder.run(&[&format!("{name}.toml"), "-o", name, "--no-build"]).code, 0);
+        contents(&folder.path(name))
+    });
+    let begin = |k: usize| {
+        let mut command = folder.command();
+        command.args([["legs.toml", "other.toml"][k % 2], "-o", "out", "--no-build"]);
+        command.stderr(std::process::Stdio::piped()).stdout(std::process::Stdio::piped()).spawn().unwrap()
+    };
+    let running: Vec<_> = (0..8).map(begin).collect();
+    for run in running {
+        let output = run.wait_with_output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    assert!(whole.contains(&contents(&folder.path("out"))));
+    assert!(!folder.path(".out.specgen").exists());
+}
+
 #[test]
 fn an_empty_folder_and_one_whose_parents_are_missing_are_taken() {
     let folder = Folder::new();
@@ -233,7 +313,7 @@ fn without_permission_nothing_changes() {
     let mut masked = Command::new("sh");
     masked.args(["-c", "umask 0777; exec \"$@\"", "sh"]).arg(plain.get_program()).args(plain.get_args());
     masked.current_dir(folder.path("")).args(arguments("a/b/out"));
-    Run::of(&mut masked).says(3, &["could not create `a/b`", "nothing was changed"]);
+    Run::of(&mut masked).says(3, &["could not write `a/b/out`", "nothing was changed"]);
     assert_eq!(folder.listing(), before);
 
     // The failure comes in the middle: some files are moved by then, and must come back.

@@ -7,6 +7,7 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -53,7 +54,7 @@ impl Bench {
         let compiled = compile::compile(&spec_file).unwrap_or_else(|_| panic!("{spec} compiles"));
         let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["rt-pc"]);
         let root = folder.path().join("controller");
-        workspace::write(&root, &files).unwrap();
+        workspace::write_scratch(&root, &files).unwrap();
         // Kept between runs and shared by both specs, so that dependencies are compiled once.
         let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc").join(spec);
         let cargo = |verb: &[&str]| {
@@ -92,7 +93,9 @@ impl Bench {
 
     /// The binary on the simulated machine, recording to `record`.
     fn command(&self, record: &str) -> Command {
-        let mut command = Command::new(&self.binary);
+        // Whatever the umask, nobody else may connect.
+        let mut command = Command::new("sh");
+        command.args(["-c", "umask 0; exec \"$@\"", "sh"]).arg(&self.binary);
         command.args(["--sim", &self.name, "--allow-no-rt", "--json", "--record"]).arg(self.path(record));
         command
     }
@@ -234,7 +237,11 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     command.arg("--link").arg(&link).arg("--capture").arg(bench.path("capture.rec"));
     let running = Running::new(&mut command);
     wait_for("the link", || link.exists());
+    for path in [&socket, &link] {
+        assert_eq!(fs::metadata(path).unwrap().permissions().mode() & 0o777, 0o600, "{}", path.display());
+    }
     let mut lines = Lines::new(&socket);
+    many_short_lines_are_no_long_one(&socket);
 
     let mut host = Host::open(&link, 1).unwrap();
     let machine = bench.machine();
@@ -337,6 +344,16 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     assert!(waved.count() == 4000 && (highest - 1e-6).abs() < 1e-9, "{highest:e}");
     assert_eq!(record.rows.last().unwrap().supervisor >> 16, 0, "amplifiers off in the last tick");
     assert!(record.rows.iter().any(|row| row.supervisor >> 8 & 0xff == u32::from(LINK_LOST)));
+}
+
+fn many_short_lines_are_no_long_one(socket: &Path) {
+    let mut lines = Lines::new(socket);
+    lines.0.get_mut().write_all("status\n".repeat(1000).as_bytes()).unwrap();
+    let mut answers = lines.0.lines();
+    assert!((0..1000).all(|_| answers.next().is_some_and(|answer| !answer.unwrap().starts_with("error"))));
+    let mut lines = Lines::new(socket);
+    lines.0.get_mut().write_all(&[b'x'; 5000]).unwrap();
+    assert_eq!(lines.0.lines().next().unwrap().unwrap(), "error: a line has at most 4096 bytes");
 }
 
 /// What a file may be long is limited, as on a full disk.

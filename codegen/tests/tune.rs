@@ -193,6 +193,28 @@ fn what_cannot_be_tuned_is_refused_with_a_mend() {
     assert_eq!(folder.listing(), before, "nothing is written");
 }
 
+#[test]
+fn an_edit_made_while_it_is_tuned_is_not_lost() {
+    let folder = Folder::new();
+    let mut command = folder.command();
+    command.args(["tune", "legs.toml", "--evaluations", "20", "--seconds", "0.2", "--write"]);
+    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap());
+    let mut stderr = String::new();
+    while !stderr.contains("preparing the machine") {
+        assert_ne!(lines.read_line(&mut stderr).unwrap(), 0, "it ended before the spec was edited: {stderr}");
+    }
+    let edited = folder.read("legs.toml") + "# mine\n";
+    folder.write("legs.toml", &edited);
+    lines.read_to_string(&mut stderr).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let stdout = String::from_utf8(output.stdout).unwrap();
+    let run = Run { code: output.status.code().unwrap_or_default(), stdout, stderr };
+    run.says(1, &["`legs.toml` was changed while it was tuned", "nothing was written", "tune again"]);
+    assert!(run.stdout.contains("+++ legs.toml"), "{}", run.stdout);
+    assert_eq!(folder.read("legs.toml"), edited);
+}
+
 /// An interrupt as the terminal sends it.
 #[cfg(unix)]
 #[test]

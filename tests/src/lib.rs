@@ -103,7 +103,7 @@ impl Emitted {
 
     fn of(name: &str, compiled: Compiled) -> Self {
         let dir = scratch(name);
-        workspace::write(&dir, &compiled.files).expect("an empty folder");
+        workspace::write_scratch(&dir, &compiled.files).expect("an empty folder");
         Self { compiled, dir }
     }
 

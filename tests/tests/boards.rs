@@ -68,7 +68,7 @@ fn image_of(board: &Board) -> Option<Vec<u8>> {
     let compiled = compile_edited(board.name, "reference.toml", board.edits, &[]);
     let dir = scratch(board.name);
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[board.folder]);
-    workspace::write(&dir, &files).unwrap();
+    workspace::write_scratch(&dir, &files).unwrap();
     let built = build::build_folder(&toolchain, &dir, board.folder, board.mcu, &image_target(), false);
     Some(built.unwrap_or_else(|error| panic!("{error}")).elf)
 }

@@ -43,3 +43,4 @@ mod stability_refusal;
 mod supervisor;
 mod support;
 mod tables_from_identify;
+mod unsafe_code;

@@ -107,7 +107,7 @@ fn expected<T: Real>(ir: &Ir, rows: &[([T; 6], [T; 6])]) -> Vec<String> {
 /// What the emitted crate says.
 fn emitted<T: Real>(name: &str, ir: &Ir, rows: &[([T; 6], [T; 6])]) -> Vec<String> {
     let dir = scratch(name);
-    workspace::write(&dir, &workspace::files(ir, &emit(ir))).unwrap();
+    workspace::write_scratch(&dir, &workspace::files(ir, &emit(ir))).unwrap();
     fs::create_dir_all(dir.join("probe/src")).unwrap();
     fs::write(dir.join("probe/Cargo.toml"), MANIFEST).unwrap();
     fs::write(dir.join("probe/src/main.rs"), PROGRAM).unwrap();

@@ -3,6 +3,7 @@
 mod binaries;
 mod fresh;
 mod generated;
+mod packages;
 mod progress;
 mod run;
 mod setup;
@@ -16,8 +17,8 @@ use std::process::ExitCode;
 const USAGE: &str = "usage: cargo xtask COMMAND
 
   setup   installs what the tests need: a cross compiler for Cortex-M and QEMU
-  test    setup, then formatting, lints, every test, documentation, freshness of generated files
-  soak    every test at full length, for releases; writes tests/soak.txt
+  test    setup, then formatting, lints, every test, documentation, freshness of generated files, lock files and licences
+  soak    every test at full length, and known defects of packages, for releases; writes tests/soak.txt
   bless   writes the generated files that are committed anew
   fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
 

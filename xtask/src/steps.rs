@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use crate::binaries::{self, Binary, Mode, Ran};
 use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::{generated, setup, soak};
+use crate::{generated, packages, setup, soak};
 
 /// Its own workspace, built for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
@@ -20,6 +20,10 @@ const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
 /// Workspaces of their own with lock files of their own.
 const STANDING_ALONE: [&str; 5] = [FIRMWARE, REAL_TIME, SCHEMA, BOARDS[0], BOARDS[1]];
+/// Every lock file there is.
+const LOCKED: [&str; 7] = ["Cargo.toml", FIRMWARE, REAL_TIME, SCHEMA, BOARDS[0], BOARDS[1], LINK_PROOF];
+/// Its own workspace, built by a test.
+const LINK_PROOF: &str = "firmware/link/tests/proof/Cargo.toml";
 /// Its own workspace, because of its dependencies too.
 const SCHEMA: &str = "tests/schema/Cargo.toml";
 /// Members of the workspace that people write.
@@ -46,8 +50,7 @@ pub fn setup() -> ExitCode {
 
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
-    let lock_files = STANDING_ALONE.len();
-    let mut report = Report::new(9 + lock_files);
+    let mut report = Report::new(9 + LOCKED.len());
     report.step("cross compiler and QEMU", setup::microcontroller);
     let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
     report.step("formatting", || formatting(root));
@@ -64,21 +67,17 @@ pub fn test(root: &Path) -> ExitCode {
         expect_success(doc, "see the warnings above")
     });
     report.step("generated files are fresh", || generated::check(root));
-    for manifest in STANDING_ALONE {
-        report.step(&format!("lock file of {manifest} is fresh"), || {
-            let mut metadata =
-                cargo(root, &["metadata", "--locked", "--format-version=1", "--manifest-path", manifest]);
-            metadata.stdout(std::process::Stdio::null());
-            expect_success(metadata, "run: cargo xtask bless")
-        });
+    for manifest in LOCKED {
+        report.step(&format!("lock file and licences of {manifest}"), || packages::check(root, manifest));
     }
     report.finish()
 }
 
 /// `cargo xtask soak`
 pub fn soak(root: &Path) -> ExitCode {
-    let mut report = Report::new(4);
+    let mut report = Report::new(5);
     report.step("cross compiler and QEMU", setup::microcontroller);
+    report.step("known defects of packages", || packages::advisories(root, &LOCKED));
     let binaries = compiled(root, &mut report);
     let mut ran = Ran::default();
     let start = Instant::now();
@@ -139,7 +138,16 @@ fn lints(root: &Path) -> Outcome {
     if let Err(outcome) = setup::component("clippy", "clippy") {
         return outcome;
     }
-    // In release, so that build scripts and macros are those of the tests.
-    let clippy = ["clippy", "--release", "--workspace", "--all-targets", "--", "-D", "warnings"];
-    expect_success(cargo(root, &clippy), "mend what is reported above")
+    // In release, so that build scripts and macros are those of the tests. Boards are built from an emitted workspace by their
+    // tests.
+    let own: &[&str] = &["--workspace", "--all-targets"];
+    let alone = [REAL_TIME, SCHEMA].map(|manifest| vec!["--manifest-path", manifest, "--all-targets", "--locked"]);
+    for scope in std::iter::once(own.to_vec()).chain(alone) {
+        let clippy = [&["clippy", "--release", "--quiet"], &scope[..], &["--", "-D", "warnings"]].concat();
+        let outcome = expect_success(cargo(root, &clippy), "mend what is reported above");
+        if !matches!(outcome, Outcome::Passed) {
+            return outcome;
+        }
+    }
+    Outcome::Passed
 }

@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = compile::compile(spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
-    workspace::write(&output, &compiled.files)?;
+    let _hold = workspace::write(&output, &compiled.files)?;
     ui.progress(&format!("wrote {} files to {}", compiled.files.len(), output.display()));
 
     let mut summary = Summary::of(&compiled, &output);

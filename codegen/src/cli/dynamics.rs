@@ -139,7 +139,7 @@ impl Generated {
         let environment = |error: &dyn std::fmt::Display| Failure::Environment(error.to_string());
         let scratch = Scratch::new().map_err(|error| environment(&error))?;
         let folder = scratch.path().join("controller");
-        workspace::write(&folder, &compiled.files)?;
+        workspace::write_scratch(&folder, &compiled.files)?;
         ui.progress("building the emitted controller for this host");
         let library = target::host::build_library(&folder, &scratch.path().join("target"))?;
         let controller = Controller::load(&library).map_err(|error| environment(&error))?;

@@ -8,6 +8,7 @@ use tempfile::NamedTempFile;
 
 use super::ui::Failure;
 use crate::interrupt::{self, Claimed, Guard};
+use crate::{lock, workspace};
 
 /// Writes `path` so that a failure leaves no half file: beside it, then renamed. What is not a regular file, such as a
 /// device or a pipe, is written to and stays what it is; a link stays a link.
@@ -89,7 +90,7 @@ impl PendingFile {
         if !folder.is_dir() {
             return Err(unwritten(path, &format_args!("there is no folder `{}`", folder.display())));
         }
-        let (file, guard) = Guard::file(|| temporary_in(folder), NamedTempFile::path)
+        let (file, guard) = Guard::file(|| temporary_beside(&target, folder), |file| file.path().to_owned())
             .map_err(|error| unwritten(path, &plain(&error)))?;
         Ok(Self { place: Place::Beside { file, _guard: guard }, target })
     }
@@ -112,7 +113,12 @@ impl PendingFile {
         match place {
             Place::Device(_) => Ok(()),
             Place::Beside { file, _guard } => {
-                file.persist(&target).map(|_| ()).map_err(|error| unwritten(&target, &error.error))
+                // On the disk before it takes the place of what was there.
+                workspace::sync(file.path()).map_err(|error| unwritten(&target, &error))?;
+                file.persist(&target).map_err(|error| unwritten(&target, &error.error))?;
+                let folder = target.parent().filter(|folder| !folder.as_os_str().is_empty());
+                let _ = workspace::sync(folder.unwrap_or(Path::new(".")));
+                Ok(())
             }
         }
     }
@@ -141,10 +147,23 @@ fn plain(error: &io::Error) -> String {
     below.map_or_else(|| error.to_string(), ToString::to_string)
 }
 
-/// A temporary file, but with the permissions of any other file: it becomes the user's.
-fn temporary_in(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
+/// A temporary file, but with the permissions of any other file: it becomes the user's. What killed processes left of theirs
+/// goes.
+fn temporary_beside(target: &Path, folder: &Path) -> io::Result<NamedTempFile> {
+    let name: String = target.file_name().unwrap_or_default().to_string_lossy().chars().take(60).collect();
+    let prefix = format!(".{name}.specgen-");
+    lock::sweep(folder, &prefix);
+    loop {
+        let mut builder = tempfile::Builder::new();
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let file = builder.prefix(&prefix).tempfile_in(folder)?;
+        // The lock lasts as long as any of the two is open.
+        match file.as_file().try_clone().and_then(|same| lock::of(same, file.path())) {
+            // Another process took it for one that was left.
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+            Err(error) => return Err(error),
+            Ok(_) => return Ok(file),
+        }
+    }
 }

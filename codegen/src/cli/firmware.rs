@@ -164,7 +164,7 @@ fn make(
     }
     let output = common.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[target.folder]);
-    workspace::write(&output, &files)?;
+    let _hold = workspace::write(&output, &files)?;
     ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
     let target_dir = common.target_dir.clone().unwrap_or_else(|| output.join("target"));
     let folders = Folders { output: &output, target: &target_dir };

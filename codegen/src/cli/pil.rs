@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 
     let output = arguments.output.clone().unwrap_or_else(|| format!("{}-controller", compiled.ir.name));
     let output = PathBuf::from(output);
-    workspace::write(&output, &compiled.files)?;
+    let hold = workspace::write(&output, &compiled.files)?;
     let target_dir = output.join("target");
     ui.progress(&format!("building the host library in {}", output.display()));
     let library = target::host::build_library(&output, &target_dir)?;
@@ -98,10 +98,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         (Some(line), _) => {
             let name = arguments.port.as_deref().unwrap_or_else(|| Path::new("")).display().to_string();
             let report = Report::new(&compiled, name, None);
+            drop(hold);
             in_the_loop(host, line, Patience::SERIAL, report, &plan, &compiled, arguments, ui)
         }
         (None, Some(emulator)) => {
             let image = given.map_or_else(|| built(&compiled, &output, &target_dir, ui), Ok)?;
+            drop(hold);
             let bound = stack::bound(&image.elf, SUPERVISE)?;
             let bound = bound.is_complete().then_some(bound.bytes);
             let name = format!("{} ({}) in {}", image.mcu.machine(), image.mcu.core(), emulator.version);

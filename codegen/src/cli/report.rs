@@ -158,7 +158,7 @@ fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure
     let scratch = Scratch::new().map_err(environment)?;
     let folder = scratch.path().join("controller");
     let cache = scratch.path().join("target");
-    workspace::write(&folder, &compiled.files)?;
+    workspace::write_scratch(&folder, &compiled.files)?;
     ui.progress("building the emitted controller for this host");
     let library = target::host::build_library(&folder, &cache)?;
     let mut controller = Controller::load(&library).map_err(environment)?;

@@ -123,7 +123,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 pub(super) fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
     let scratch = Scratch::new().map_err(environment)?;
     let workspace = scratch.path().join("controller");
-    workspace::write(&workspace, &compiled.files)?;
+    workspace::write_scratch(&workspace, &compiled.files)?;
     ui.progress("building the emitted controller for this host");
     let library = target::host::build_library(&workspace, &scratch.path().join("target"))?;
     Controller::load(&library).map_err(environment)

@@ -230,12 +230,26 @@ impl Job<'_> {
             write_folder(folder, &files)?;
             ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
         }
-        if self.arguments.write {
+        // Somebody may have edited it in the minutes since it was read.
+        let edited =
+            self.arguments.write && SpecSource::read(&self.arguments.spec).map_or(true, |now| now.text != source.text);
+        let written = self.arguments.write && !edited;
+        if written {
             write_file(&self.arguments.spec, text.as_bytes())?;
             ui.progress(&format!("wrote the result into {}", self.arguments.spec.display()));
         }
         ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
-        let shown = report.text(!self.arguments.write);
+        let shown = report.text(!written);
+        if edited {
+            if !ui.is_json() {
+                ui.out(&shown);
+            }
+            let spec = self.arguments.spec.display();
+            let message = format!(
+                "`{spec}` was changed while it was tuned: nothing was written into it. Apply the patch, or tune again"
+            );
+            return Err(Failure::Judged { message, result: report.value().clone() });
+        }
         if found.is_some() {
             let done: usize = searches.iter().map(|(_, search)| search.evaluations).sum();
             if !ui.is_json() {

@@ -456,6 +456,10 @@ codes! {
         "A part of a leg reaches from its joint: its radius of gyration is a quarter to five quarters of the way to its mass centre.";
     CENTRE_FAR = "W0857", "a centre of mass outside the legs",
         "It lies further beside the axis than the joints, or three times as far above or below them.";
+    DAMPING_ODD = "W0858", "a resonance without damping",
+        "The damping ratio of a leg is below that of a bare ceramic, 0.0002: probably a slip, as of a percentage for a ratio.";
+    GRID_COARSE = "W0859", "a grid too coarse for a hysteresis loop",
+        "Less than 8 intervals per axis of the Preisach plane: each branch of the loop would be a few straight pieces.";
     JOINT_ANGLE = "E0860", "joints beyond their angle",
         "Somewhere in the workspace a joint of a leg turns further than leg.joint_angle.";
     CONDITION_POOR = "W0861", "legs that hold the platform badly",

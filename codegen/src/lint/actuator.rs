@@ -18,6 +18,11 @@ const FASTEST: f64 = 1.0 / 3.0;
 /// A stack that takes longer over its range, s, follows nothing.
 const SLOWEST: f64 = 1.0;
 
+/// Damping ratio of a bare ceramic of a mechanical quality of 2,500. Whatever it is mounted in has more.
+const LEAST_DAMPED: f64 = 2e-4;
+/// Fewer cells to an axis do not show the bend of a branch.
+const COARSEST_GRID: usize = 8;
+
 /// No piezo leg moves by more than a hundredth of its length.
 pub(super) fn strain(facts: &Facts, found: &mut Found) {
     let Some(legs) = &facts.legs else { return };
@@ -106,5 +111,42 @@ pub(super) fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
             figure(actuator.slew_rate * actuator.leg_gain() * 1e6)
         ),
         "check the unit: V/ms or V/s",
+    );
+}
+
+/// Everything that is built is damped.
+pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
+    let actuator = &facts.model.actuator;
+    if actuator.damping_ratio >= LEAST_DAMPED {
+        return;
+    }
+    found.warning(
+        codes::DAMPING_ODD,
+        "actuator.damping_ratio",
+        format!(
+            "with a damping ratio of {} a leg that is pushed rings for {} s (to a hundredth); a bare ceramic has {} and more",
+            figure(actuator.damping_ratio),
+            figure(libm::log(100.0) / (actuator.damping_ratio * TAU * actuator.resonance)),
+            figure(LEAST_DAMPED)
+        ),
+        "0.01 to 0.2 is usual: measure it with `specgen identify response`; check that it is a ratio, with critical damping as 1",
+    );
+}
+
+/// A table of a few cells is no model of a hysteresis loop.
+pub(super) fn grid_shows_the_loop(facts: &Facts, found: &mut Found) {
+    let grid = facts.model.hysteresis.grid;
+    if grid >= COARSEST_GRID {
+        return;
+    }
+    let [low, high] = facts.model.actuator.voltage;
+    found.warning(
+        codes::GRID_COARSE,
+        "hysteresis.grid",
+        format!(
+            "{grid} intervals of {} V each: within one the model of a leg is a straight line",
+            figure((high - low) / grid as f64)
+        ),
+        "the error of the inverse falls with the square of `hysteresis.grid`: 16 to 32 is usual, and `specgen identify` chooses it by the record",
     );
 }

@@ -1,328 +1,271 @@
-//! The output folder: written whole or not at all.
+//! The output folder: written whole or not at all, whatever ends the process.
 //!
-//! A manifest (`.specgen`) lists every file with its SHA-256, so that a later run can tell its own output from somebody's
-//! work. Everything is first written into a private folder on the same file system and then moved; a step that fails
-//! takes back those before it.
+//! Every file is first written into a work folder beside the output, then the two folders change places in one step. What the
+//! old one holds beside our files (cargo's `target`) is carried over. Where folders cannot be swapped, such as a mount point,
+//! files are replaced one by one, with a manifest that knows both versions: what a killed run leaves there, the next one
+//! recognises as its own.
+
+mod replace;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
+use std::fs::{self, File};
 use std::io;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
-use super::sha256;
+use super::error::WriteError;
+use super::found::{MANIFEST, Manifest, WORK, check_free, entries};
+use super::hold::Hold;
 use crate::interrupt;
 
-/// Name of the manifest in the output folder.
-const MANIFEST: &str = ".specgen";
-/// Build output and lock files that cargo makes in a workspace; never ours, never in the way.
-const CARGO_MAKES: [&str; 2] = ["target", "Cargo.lock"];
-/// As many files of somebody else as a message names.
-const NAMED: usize = 5;
-
-/// Why an output folder could not be written.
-#[derive(Debug)]
-pub enum WriteError {
-    /// The folder holds files that specgen did not write, or that were changed since. Nothing was changed.
-    Occupied {
-        /// The folder.
-        dir: PathBuf,
-        /// Up to a few of the files, relative to it; a folder that is foreign as a whole ends in `/`.
-        files: Vec<String>,
-    },
-    /// Something other than a folder has that name. Nothing was changed.
-    NotAFolder {
-        /// What was named as the output folder.
-        dir: PathBuf,
-    },
-    /// The file system said no. Nothing was changed.
-    Io {
-        /// What was attempted.
-        action: String,
-        /// Its answer.
-        source: io::Error,
-    },
-    /// The file system said no, and again when what had been done was to be undone.
-    HalfWritten {
-        /// The folder.
-        dir: PathBuf,
-        /// What was attempted.
-        action: String,
-        /// Its answer.
-        source: io::Error,
-    },
-}
-
-impl std::fmt::Display for WriteError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Occupied { dir, files } => write!(
-                f,
-                "output folder `{}` holds files that specgen did not write or that were changed since: {}; \
-                 nothing was written. Name another folder with -o, or move them away",
-                dir.display(),
-                files.join(", ")
-            ),
-            Self::NotAFolder { dir } => write!(
-                f,
-                "the output `{}` exists and is not a folder; nothing was written. Name a folder with -o, or move it away",
-                dir.display()
-            ),
-            Self::Io { action, source } => write!(
-                f,
-                "could not {action}: {source}; nothing was changed. Check permissions and free space, or name another folder with -o"
-            ),
-            Self::HalfWritten { dir, action, source } => write!(
-                f,
-                "could not {action}: {source}, nor put back what was there before: `{}` is half-written. \
-                 Delete it, or name another folder with -o",
-                dir.display()
-            ),
-        }
-    }
-}
-
-impl std::error::Error for WriteError {}
+/// In the work folder: what is to be the output; after the swap, what was.
+const NEW: &str = "new";
+/// In the work folder: files that were replaced one by one.
+const OLD: &str = "old";
+/// In the work folder: a manifest on its way.
+const NEXT_MANIFEST: &str = "manifest";
 
 /// Writes the workspace into `dir`, which must not exist, be empty, or hold nothing but an unchanged earlier output
-/// (its `target` folders stay). A failure leaves everything as it was.
+/// (its `target` folders stay). A failure leaves everything as it was. No other run writes or builds there until what is
+/// returned is dropped.
 ///
 /// # Errors
 /// See [`WriteError`].
-pub fn write(dir: &Path, files: &BTreeMap<String, String>) -> Result<(), WriteError> {
-    let known = check_free(dir)?;
+pub fn write(dir: &Path, files: &BTreeMap<String, String>) -> Result<Hold, WriteError> {
+    let place = Place::of(dir)?;
+    let hold = Hold::take(&place.work, dir)?;
     let _whole = interrupt::whole();
-    let mut undo = Undo::default();
-    let done = stage_and_move(dir, files, &known, &mut undo);
+    take_up(&place).map_err(|e| WriteError::io("take up what a killed run left in", &place.work, e))?;
+    let earlier = Manifest::read(dir);
+    let known = check_free(dir, &earlier)?;
+    check_writable(dir, &known)?;
+    let change = Change { dir, work: &place.work, files, earlier: &earlier, known: &known };
+    let done = stage(&place.work, files).and_then(|()| put(&place, &change));
     if done.is_err() {
-        undo.folders();
+        // Nothing but new files: a swap does not fail half-way.
+        let _ = fs::remove_dir_all(place.work.join(NEW));
     }
-    match done {
-        Err(WriteError::Io { action, source }) if undo.failed => {
-            Err(WriteError::HalfWritten { dir: dir.to_owned(), action, source })
-        }
-        done => done,
-    }
+    // Not by `map`: that would drop `hold`, which waits for `_whole`, before it.
+    done?;
+    Ok(hold)
 }
 
-fn stage_and_move(
-    dir: &Path,
-    files: &BTreeMap<String, String>,
-    known: &BTreeSet<String>,
-    undo: &mut Undo,
-) -> Result<(), WriteError> {
-    let exists = dir.is_dir();
-    // On the file system of the output: inside it if it is there (it may be a mount point), else beside it.
-    let beside = match dir.parent() {
-        _ if exists => dir,
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    undo.create_folders(beside)?;
-    let staging = tempfile::Builder::new()
-        .prefix(".specgen-")
-        .tempdir_in(beside)
-        .map_err(|e| io_error("create a folder in", beside, e))?;
-    // The staging folder itself is private; what is made in it has the usual permissions.
-    let new = staging.path().join("new");
-    for (path, text) in files {
-        put(&new.join(path), text)?;
-    }
-    put(&new.join(MANIFEST), &manifest(files))?;
-    if !exists {
-        return fs::rename(&new, dir).map_err(|e| io_error("create", dir, e));
-    }
-    let old = staging.path().join("old");
-    fs::create_dir(&old).map_err(|e| io_error("create", &old, e))?;
-    let moved = replace(dir, &new, &old, files, known, undo);
-    // Before the staging folder goes, and with it what lay in the output before.
-    if moved.is_err() {
-        undo.moves();
-    }
-    moved
+/// Writes the files into a folder of the process's own, which goes with it: nothing is looked for there, nothing kept.
+///
+/// # Errors
+/// See [`WriteError`].
+pub fn write_scratch(dir: &Path, files: &BTreeMap<String, String>) -> Result<(), WriteError> {
+    files.iter().try_for_each(|(path, text)| write_file(&dir.join(path), text))
 }
 
-/// Moves what is replaced or no longer made from `dir` to `old`, and the new files into `dir`.
-fn replace(
-    dir: &Path,
-    new: &Path,
-    old: &Path,
-    files: &BTreeMap<String, String>,
-    known: &BTreeSet<String>,
-    undo: &mut Undo,
-) -> Result<(), WriteError> {
-    let made: BTreeSet<&str> = files.keys().map(String::as_str).chain([MANIFEST]).collect();
-    // Not only what is known: a file that cargo made may lie where one of ours goes.
-    for path in made.iter().copied().chain(known.iter().map(String::as_str)) {
-        let (from, aside) = (dir.join(path), old.join(path));
-        if fs::symlink_metadata(&from).is_ok() {
-            if let Some(folder) = aside.parent() {
-                fs::create_dir_all(folder).map_err(|e| io_error("create", folder, e))?;
+/// Where the output is and where the work is done.
+struct Place {
+    dir: PathBuf,
+    work: PathBuf,
+    /// The folder may be another one afterwards: it is no mount point, and nobody in it would lose the ground.
+    may_swap: bool,
+}
+
+impl Place {
+    fn of(dir: &Path) -> Result<Self, WriteError> {
+        let exists = dir.exists();
+        let dir = if exists { fs::canonicalize(dir) } else { std::path::absolute(dir) }
+            .map_err(|error| WriteError::io("find", dir, error))?;
+        let inside = dir.join(WORK);
+        let beside = match (dir.parent(), dir.file_name()) {
+            (Some(parent), Some(name))
+                if !(exists && (system::is_mount(&dir) || system::check_writable(parent).is_err())) =>
+            {
+                Some(parent.join(format!(".{}.specgen", name.to_string_lossy())))
             }
-            undo.rename(&from, &aside).map_err(|e| io_error("replace", &from, e))?;
-        }
+            _ => None,
+        };
+        let here = std::env::current_dir().and_then(fs::canonicalize);
+        let stands_in = here.is_ok_and(|here| here.starts_with(&dir));
+        Ok(match beside {
+            // A run with other rights was killed there: it is to be taken up.
+            Some(work) if !inside.exists() => Self { may_swap: !stands_in && system::is_mine(&dir), dir, work },
+            _ => Self { dir, work: inside, may_swap: false },
+        })
     }
-    for path in made {
-        let to = dir.join(path);
-        if let Some(folder) = to.parent() {
-            undo.create_folders(folder)?;
-        }
-        undo.rename(&new.join(path), &to).map_err(|e| io_error("write", &to, e))?;
+}
+
+/// What is to be done to an output.
+struct Change<'a> {
+    dir: &'a Path,
+    work: &'a Path,
+    files: &'a BTreeMap<String, String>,
+    /// What the earlier output consists of, and what of that is there.
+    earlier: &'a Manifest,
+    known: &'a BTreeSet<String>,
+}
+
+/// All new files, safe on the disk; the manifest last, as the sign that they are whole.
+fn stage(work: &Path, files: &BTreeMap<String, String>) -> Result<(), WriteError> {
+    let new = work.join(NEW);
+    write_scratch(&new, files)?;
+    sync_tree(&new)
+        .and_then(|()| put_manifest(work, &Manifest::of(files), &new))
+        .map_err(|error| WriteError::io("write", &new, error))
+}
+
+/// Puts a manifest into `folder`, in one step and safe on the disk.
+fn put_manifest(work: &Path, manifest: &Manifest, folder: &Path) -> io::Result<()> {
+    let beside = work.join(NEXT_MANIFEST);
+    fs::write(&beside, manifest.text())?;
+    sync(&beside)?;
+    fs::rename(&beside, folder.join(MANIFEST))?;
+    sync(folder)
+}
+
+fn put(place: &Place, change: &Change<'_>) -> Result<(), WriteError> {
+    let new = place.work.join(NEW);
+    if !change.dir.exists() {
+        fs::rename(&new, change.dir).map_err(|error| WriteError::io("create", change.dir, error))?;
+        let _ = place.dir.parent().map(sync);
+        return Ok(());
     }
-    // Folders that only the earlier output had; one that still holds something stays.
-    for stale in known.iter().filter(|path| !files.contains_key(*path)) {
-        for folder in Path::new(stale).ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty()) {
-            let _ = fs::remove_dir(dir.join(folder));
+    // Without a manifest the earlier one could not be told, after a kill, from files that are not yet all there.
+    if place.may_swap && !change.earlier.is_empty() && swap(&new, &place.dir).is_ok() {
+        // The output is whole; what cannot be carried over now, the next run takes up.
+        let _ = carry_over(&new, &place.dir);
+        return Ok(());
+    }
+    replace::one_by_one(change)
+}
+
+/// Both folders change places, in one step.
+fn swap(new: &Path, dir: &Path) -> io::Result<()> {
+    fs::set_permissions(new, fs::metadata(dir)?.permissions())?;
+    system::exchange(new, dir)?;
+    // A power failure before this finds one of the two, as one after it does.
+    let _ = dir.parent().map(sync);
+    Ok(())
+}
+
+/// What a run that was killed left in the work folder.
+fn take_up(place: &Place) -> io::Result<()> {
+    let is_left = |left: &Path| fs::symlink_metadata(left).is_ok();
+    let [new, old, manifest] = [NEW, OLD, NEXT_MANIFEST].map(|name| place.work.join(name));
+    if is_left(&new) {
+        carry_over(&new, &place.dir)?;
+    }
+    // Files that were ours.
+    if is_left(&old) {
+        fs::remove_dir_all(old)?;
+    }
+    if is_left(&manifest) { fs::remove_file(manifest) } else { Ok(()) }
+}
+
+/// Removes an output that another one has taken the place of, or that was never whole. What is not of specgen's making is moved
+/// into `dir`.
+fn carry_over(left: &Path, dir: &Path) -> io::Result<()> {
+    let manifest = Manifest::read(left);
+    // Without a manifest it was never whole: nobody else has put anything there.
+    if !manifest.is_empty() {
+        carry_folder(left, "", dir, &manifest)?;
+    }
+    fs::remove_dir_all(left)
+}
+
+fn carry_folder(left: &Path, below: &str, dir: &Path, manifest: &Manifest) -> io::Result<()> {
+    for (path, kind) in entries(left, below)? {
+        let to = dir.join(&path);
+        if manifest.is_ours(left, &path, kind) {
+            continue;
+        }
+        if kind.is_dir() && !manifest.is_cargos(&path) && (manifest.enters(&path) || entries(left, &path)?.is_empty()) {
+            carry_folder(left, &path, dir, manifest)?;
+        } else if fs::symlink_metadata(&to).is_err() {
+            if let Some(folder) = to.parent() {
+                fs::create_dir_all(folder)?;
+            }
+            fs::rename(left.join(&path), &to)?;
+        } else if !manifest.is_cargos(&path) {
+            let text = format!("`{}` and `{}` are both there; keep one", left.join(&path).display(), to.display());
+            return Err(io::Error::new(io::ErrorKind::AlreadyExists, text));
         }
     }
     Ok(())
 }
 
-/// What was done so far, to be taken back in reverse order.
-#[derive(Default)]
-struct Undo {
-    folders: Vec<PathBuf>,
-    moves: Vec<(PathBuf, PathBuf)>,
-    failed: bool,
+/// A folder that its owner has closed stays as it is.
+fn check_writable(dir: &Path, known: &BTreeSet<String>) -> Result<(), WriteError> {
+    let folders: BTreeSet<PathBuf> =
+        known.iter().filter_map(|path| dir.join(path).parent().map(Path::to_owned)).collect();
+    folders
+        .iter()
+        .try_for_each(|folder| system::check_writable(folder).map_err(|error| WriteError::io("write", folder, error)))
 }
 
-impl Undo {
-    /// Creates `folder` and what is missing above it.
-    fn create_folders(&mut self, folder: &Path) -> Result<(), WriteError> {
-        let missing: Vec<&Path> =
-            folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
-        for path in missing.into_iter().rev() {
-            fs::create_dir(path).map_err(|e| io_error("create", path, e))?;
-            self.folders.push(path.to_owned());
-        }
-        Ok(())
-    }
-
-    fn rename(&mut self, from: &Path, to: &Path) -> io::Result<()> {
-        fs::rename(from, to)?;
-        self.moves.push((from.to_owned(), to.to_owned()));
-        Ok(())
-    }
-
-    fn moves(&mut self) {
-        for (from, to) in self.moves.drain(..).rev() {
-            self.failed |= fs::rename(to, from).is_err();
-        }
-    }
-
-    fn folders(&mut self) {
-        for folder in self.folders.drain(..).rev() {
-            self.failed |= fs::remove_dir(folder).is_err();
-        }
-    }
-}
-
-/// The files of an unchanged earlier output in `dir`, the manifest included; none if it does not exist.
-fn check_free(dir: &Path) -> Result<BTreeSet<String>, WriteError> {
-    match fs::symlink_metadata(dir).and_then(|_| fs::metadata(dir)) {
-        Ok(found) if !found.is_dir() => return Err(WriteError::NotAFolder { dir: dir.to_owned() }),
-        Ok(_) => {}
-        // A link to nothing is something.
-        Err(error) if error.kind() == io::ErrorKind::NotFound && dir.is_symlink() => {
-            return Err(WriteError::NotAFolder { dir: dir.to_owned() });
-        }
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeSet::new()),
-        Err(error) => return Err(io_error("read", dir, error)),
-    }
-    // Without a manifest nothing here is ours.
-    let recorded: BTreeMap<String, String> = fs::read_to_string(dir.join(MANIFEST))
-        .unwrap_or_default()
-        .lines()
-        .filter_map(|line| line.split_once("  "))
-        .map(|(digest, path)| (path.to_owned(), digest.to_owned()))
-        .collect();
-    let mut found = Found { recorded, ours: BTreeSet::new(), foreign: Vec::new() };
-    found.walk(dir, "").map_err(|error| io_error("read", dir, error))?;
-    found.lock_files(dir);
-    if found.foreign.is_empty() {
-        return Ok(found.ours);
-    }
-    let more = found.foreign.len().saturating_sub(NAMED);
-    found.foreign.truncate(NAMED);
-    if more > 0 {
-        found.foreign.push(format!("and {more} more"));
-    }
-    Err(WriteError::Occupied { dir: dir.to_owned(), files: found.foreign })
-}
-
-/// What lies in an output folder.
-struct Found {
-    /// The manifest: path, digest.
-    recorded: BTreeMap<String, String>,
-    ours: BTreeSet<String>,
-    foreign: Vec<String>,
-}
-
-impl Found {
-    fn walk(&mut self, root: &Path, below: &str) -> io::Result<()> {
-        for (path, kind) in entries(root, below)? {
-            if kind.is_dir() {
-                // Into a folder that no earlier run wrote to there is no need to look: it may be a whole disk.
-                let prefix = format!("{path}/");
-                if self.recorded.keys().any(|recorded| recorded.starts_with(&prefix)) {
-                    self.walk(root, &path)?;
-                } else if !entries(root, &path)?.is_empty() {
-                    self.foreign.push(prefix);
-                }
-            } else if self.is_ours(root, &path, kind) {
-                self.ours.insert(path);
-            } else {
-                self.foreign.push(path);
-            }
-        }
-        Ok(())
-    }
-
-    /// Lock files that specgen wrote are its own even where cargo changed them since.
-    fn lock_files(&mut self, root: &Path) {
-        let within = |path: &str| Path::new(path).components().all(|part| matches!(part, Component::Normal(_)));
-        let is_lock = |path: &str| Path::new(path).file_name().is_some_and(|name| name == "Cargo.lock");
-        let locks = self.recorded.keys().filter(|path| is_lock(path) && within(path) && root.join(path).is_file());
-        self.ours.extend(locks.cloned());
-    }
-
-    fn is_ours(&self, root: &Path, path: &str, kind: fs::FileType) -> bool {
-        if !kind.is_file() {
-            return false;
-        }
-        if path == MANIFEST {
-            return !self.recorded.is_empty();
-        }
-        let Some(recorded) = self.recorded.get(path) else { return false };
-        fs::read(root.join(path)).is_ok_and(|bytes| sha256(&bytes) == *recorded)
-    }
-}
-
-/// What lies in the folder `below` of `root`, as path relative to `root` and kind, sorted, without what cargo makes.
-pub(super) fn entries(root: &Path, below: &str) -> io::Result<Vec<(String, fs::FileType)>> {
-    let mut out = Vec::new();
-    for entry in fs::read_dir(root.join(below))? {
-        let entry = entry?;
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if !CARGO_MAKES.contains(&name.as_str()) {
-            let path = if below.is_empty() { name } else { format!("{below}/{name}") };
-            out.push((path, entry.file_type()?));
-        }
-    }
-    out.sort_by(|a, b| a.0.cmp(&b.0));
-    Ok(out)
-}
-
-fn put(path: &Path, text: &str) -> Result<(), WriteError> {
+fn write_file(path: &Path, text: &str) -> Result<(), WriteError> {
     if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(|e| io_error("create", folder, e))?;
+        fs::create_dir_all(folder).map_err(|e| WriteError::io("create", folder, e))?;
     }
-    fs::write(path, text).map_err(|e| io_error("write", path, e))
+    fs::write(path, text).map_err(|e| WriteError::io("write", path, e))
 }
 
-fn manifest(files: &BTreeMap<String, String>) -> String {
-    files.iter().map(|(path, text)| format!("{}  {path}\n", sha256(text.as_bytes()))).collect()
+/// Waits until a file, or the list of a folder, is on the disk.
+pub(crate) fn sync(path: &Path) -> io::Result<()> {
+    match File::open(path)?.sync_all() {
+        // A file system that knows no such thing.
+        Err(error) if matches!(error.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => Ok(()),
+        done => done,
+    }
 }
 
-fn io_error(verb: &str, path: &Path, source: io::Error) -> WriteError {
-    WriteError::Io { action: format!("{verb} `{}`", path.display()), source }
+fn sync_tree(root: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(root)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() { sync_tree(&entry.path())? } else { sync(&entry.path())? }
+    }
+    sync(root)
+}
+
+/// What only the system knows.
+#[cfg(target_os = "linux")]
+mod system {
+    use std::io;
+    use std::path::Path;
+
+    use rustix::fs::{self, AtFlags, CWD, RenameFlags, StatxFlags};
+
+    pub fn exchange(a: &Path, b: &Path) -> io::Result<()> {
+        Ok(fs::renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
+    }
+
+    pub fn is_mount(dir: &Path) -> bool {
+        let found = fs::statx(CWD, dir, AtFlags::empty(), StatxFlags::empty());
+        found.is_ok_and(|found| found.stx_attributes.contains(fs::StatxAttributes::MOUNT_ROOT))
+    }
+
+    pub fn check_writable(dir: &Path) -> io::Result<()> {
+        Ok(fs::access(dir, fs::Access::WRITE_OK | fs::Access::EXEC_OK)?)
+    }
+
+    pub fn is_mine(dir: &Path) -> bool {
+        fs::stat(dir).is_ok_and(|found| found.st_uid == rustix::process::geteuid().as_raw())
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod system {
+    use std::io;
+    use std::path::Path;
+
+    pub fn exchange(_: &Path, _: &Path) -> io::Result<()> {
+        Err(io::ErrorKind::Unsupported.into())
+    }
+
+    pub fn is_mount(_: &Path) -> bool {
+        false
+    }
+
+    pub fn check_writable(dir: &Path) -> io::Result<()> {
+        let closed = std::fs::metadata(dir)?.permissions().readonly();
+        if closed { Err(io::ErrorKind::PermissionDenied.into()) } else { Ok(()) }
+    }
+
+    pub fn is_mine(_: &Path) -> bool {
+        true
+    }
 }

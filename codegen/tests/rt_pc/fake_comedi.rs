@@ -45,8 +45,10 @@ fn number(name: &str, otherwise: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
 }
 
+// SAFETY: as libcomedi's: the path is a string that ends with a zero.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn comedi_open(path: *const c_char) -> *mut c_void {
+    // SAFETY: see above.
     let path = unsafe { std::ffi::CStr::from_ptr(path) }.to_string_lossy().into_owned();
     // /dev/fake1 is card 1, and so on.
     match path.strip_prefix("/dev/fake").and_then(|number| number.parse::<usize>().ok()) {
@@ -120,12 +122,16 @@ pub extern "C" fn comedi_find_range(_: *mut c_void, _: c_uint, _: c_uint, _: c_u
     if low >= -10.0 && high <= 10.0 { 3 } else { -1 }
 }
 
+// SAFETY: as libcomedi's: the list leads to its instructions, and each of them to its data.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn comedi_do_insnlist(card: *mut c_void, list: *mut List) -> c_int {
     let mut log = LOG.lock().unwrap();
+    // SAFETY: see above.
     let list = unsafe { &*list };
+    // SAFETY: see above.
     let instructions = unsafe { std::slice::from_raw_parts(list.instructions, list.count as usize) };
     for (place, instruction) in (0_u32..).zip(instructions) {
+        // SAFETY: see above.
         let code = unsafe { &mut *instruction.data };
         let (differential, ground) = (2 << 24 | 3 << 16 | place, 3 << 16 | place);
         match (instruction.kind, instruction.subdevice, instruction.count) {

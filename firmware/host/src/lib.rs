@@ -23,6 +23,7 @@ const ABI_VERSION: u32 = 2;
 
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo) -> ! {
+    // SAFETY: nobody defines it; what calls it does not link.
     unsafe extern "C" {
         fn specgen_panic_path_remains() -> !;
     }

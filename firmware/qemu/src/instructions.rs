@@ -99,21 +99,25 @@ impl InstructionCounter {
     }
 }
 
+// SAFETY: these four take nothing, leave every register but the program counter as it was, and return.
 #[unsafe(naked)]
 unsafe extern "C" fn no_nops() {
     naked_asm!("bx lr")
 }
 
+// SAFETY: as above.
 #[unsafe(naked)]
 unsafe extern "C" fn one_nop() {
     naked_asm!("nop", "bx lr")
 }
 
+// SAFETY: as above.
 #[unsafe(naked)]
 unsafe extern "C" fn hundred_nops() {
     naked_asm!(".rept 100", "nop", ".endr", "bx lr")
 }
 
+// SAFETY: as above.
 #[unsafe(naked)]
 unsafe extern "C" fn thousand_nops() {
     naked_asm!(".rept 1000", "nop", ".endr", "bx lr")

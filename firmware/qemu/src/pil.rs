@@ -62,12 +62,14 @@ fn serve() -> Result<(), Exit> {
 
 #[exception]
 #[allow(unsafe_code)] // cortex-m-rt wants it so.
+// SAFETY: called by the vector table alone; ends the program.
 unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     exit(Exit::Fault)
 }
 
 #[exception]
 #[allow(unsafe_code)] // cortex-m-rt wants it so.
+// SAFETY: called by the vector table alone; ends the program.
 unsafe fn DefaultHandler(_: i16) {
     exit(Exit::Fault)
 }

@@ -41,7 +41,7 @@ fn notice() {
     }
 }
 
-// SAFETY: every call goes to the system's allocator with the arguments that came.
+// SAFETY: every call, of its functions too, goes to the system's allocator with the arguments that came.
 unsafe impl GlobalAlloc for Watched {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         notice();

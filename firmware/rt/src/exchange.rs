@@ -23,7 +23,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::clock;
-use mapping::Mapping;
+use mapping::{Mapping, Unfit};
 
 /// "SPGPLANT" in little-endian bytes.
 const MAGIC: u64 = u64::from_le_bytes(*b"SPGPLANT");
@@ -98,6 +98,13 @@ pub enum OpenError {
         /// The system's answer.
         cause: io::Error,
     },
+    /// Somebody else can change the file, or what it leads to.
+    NotOwn {
+        /// The file.
+        path: PathBuf,
+        /// What it is instead.
+        why: String,
+    },
     /// The file is something else, or of another version.
     NotAMachine {
         /// The file.
@@ -130,6 +137,11 @@ impl fmt::Display for OpenError {
             Self::File { path, cause } => {
                 write!(f, "{}: {cause}; expected a file that this user may read and write", path.display())
             }
+            Self::NotOwn { path, why } => write!(
+                f,
+                "{}: {why}; a simulated machine is a file of this user alone: remove it, or choose another --name",
+                path.display()
+            ),
             Self::NotAMachine { path } => write!(
                 f,
                 "{}: not a simulated machine of this version; remove it and start `specgen plant` of the specgen that made this controller",
@@ -150,6 +162,17 @@ impl fmt::Display for OpenError {
 }
 
 impl std::error::Error for OpenError {}
+
+impl OpenError {
+    fn of(unfit: Unfit, path: &Path) -> Self {
+        let path = path.to_owned();
+        match unfit {
+            Unfit::NotOwn(why) => Self::NotOwn { path, why },
+            Unfit::Size => Self::NotAMachine { path },
+            Unfit::File(cause) => Self::File { path, cause },
+        }
+    }
+}
 
 /// The file of a machine's name. Names are of letters, digits, `-` and `_`.
 ///
@@ -184,18 +207,22 @@ impl Server {
     /// Makes the file, for the machine of the spec with `digest` (SHA-256 in hex). It is removed when this is dropped.
     ///
     /// # Errors
-    /// If a machine of this name is served, or the file cannot be made.
+    /// If a machine of this name is served, something that is not this user's own has that name, or the file cannot be made.
     pub fn create(path: &Path, digest: &str) -> Result<Self, OpenError> {
         let failed = |cause| OpenError::File { path: path.to_owned(), cause };
-        if let Ok(old) = Mapping::<Words>::open(path) {
-            let process = old.words().server.load(Ordering::Acquire);
-            if old.words().magic.load(Ordering::Acquire) == MAGIC && process != 0 && is_alive(process) {
-                return Err(OpenError::Served { path: path.to_owned(), process });
+        match Mapping::<Words>::open(path) {
+            Ok(old) => {
+                let process = old.words().server.load(Ordering::Acquire);
+                if old.words().magic.load(Ordering::Acquire) == MAGIC && process != 0 && is_alive(process) {
+                    return Err(OpenError::Served { path: path.to_owned(), process });
+                }
             }
+            // What is left of another version, or nothing.
+            Err(Unfit::Size) => {}
+            Err(Unfit::File(cause)) if cause.kind() == io::ErrorKind::NotFound => {}
+            Err(unfit) => return Err(OpenError::of(unfit, path)),
         }
-        // Made under another name and renamed: nobody maps half a file, and who still maps an old one keeps that.
-        let fresh = path.with_extension(format!("{}.part", std::process::id()));
-        let mapping = Mapping::<Words>::create(&fresh).map_err(failed)?;
+        let (mapping, fresh) = Self::fresh(path)?;
         let words = mapping.words();
         words.version.store(VERSION, Ordering::Relaxed);
         for (word, half) in words.digest.iter().zip(half_digest(digest)) {
@@ -208,6 +235,22 @@ impl Server {
             failed(cause)
         })?;
         Ok(Self { mapping, path: path.to_owned() })
+    }
+
+    /// A new file, made under another name and then renamed: nobody maps half a file, and who still maps an old one keeps that.
+    fn fresh(path: &Path) -> Result<(Mapping<Words>, PathBuf), OpenError> {
+        let fresh = path.with_extension(format!("{}.part", std::process::id()));
+        let failed = |cause| OpenError::File { path: fresh.clone(), cause };
+        match Mapping::create(&fresh) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            made => return made.map(|mapping| (mapping, fresh.clone())).map_err(failed),
+        }
+        // Of a process of this number that was killed, if it is this user's own.
+        match Mapping::<Words>::open(&fresh) {
+            Ok(_) | Err(Unfit::Size) => std::fs::remove_file(&fresh).map_err(failed)?,
+            Err(unfit) => return Err(OpenError::of(unfit, &fresh)),
+        }
+        Mapping::create(&fresh).map(|mapping| (mapping, fresh.clone())).map_err(failed)
     }
 
     /// The latest actuation and what the controller waits for (session, tick), once the counter of either has moved on from
@@ -250,10 +293,7 @@ impl Client {
     /// # Errors
     /// If there is none, or it is of another spec.
     pub fn open(path: &Path, digest: &str) -> Result<Self, OpenError> {
-        let mapping = Mapping::<Words>::open(path).map_err(|cause| match cause.kind() {
-            io::ErrorKind::InvalidData => OpenError::NotAMachine { path: path.to_owned() },
-            _ => OpenError::File { path: path.to_owned(), cause },
-        })?;
+        let mapping = Mapping::<Words>::open(path).map_err(|unfit| OpenError::of(unfit, path))?;
         let words = mapping.words();
         if words.magic.load(Ordering::Acquire) != MAGIC || words.version.load(Ordering::Relaxed) != VERSION {
             return Err(OpenError::NotAMachine { path: path.to_owned() });

@@ -24,11 +24,13 @@ fn panic(_: &PanicInfo<'_>) -> ! {
 }
 
 #[exception]
+// SAFETY: called by the vector table alone; does not return.
 unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     stop()
 }
 
 #[exception]
+// SAFETY: called by the vector table alone; does not return.
 unsafe fn DefaultHandler(_: i16) -> ! {
     stop()
 }

@@ -178,11 +178,13 @@ extern "C" fn specgen_digest(machine: &Machine) -> u64 {
 }
 
 #[exception]
+// SAFETY: called by the vector table alone; ends the program.
 unsafe fn HardFault(_: &ExceptionFrame) -> ! {
     exit(Exit::Fault)
 }
 
 #[exception]
+// SAFETY: called by the vector table alone; ends the program.
 unsafe fn DefaultHandler(_: i16) {
     exit(Exit::Fault)
 }

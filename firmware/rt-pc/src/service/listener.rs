@@ -1,9 +1,17 @@
 //! A Unix socket that is listened to without waiting, and is gone when the program is.
 
+use std::fs::Permissions;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::{Path, PathBuf};
+
+use rustix::fs::{Mode, fchmod};
+use rustix::net;
+
+/// Connections that wait to be accepted, between two rounds.
+const BACKLOG: i32 = 128;
 
 /// The socket.
 pub struct Listener {
@@ -12,7 +20,8 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Listens at `path`. What a killed run left there is replaced; what is served is not. `option` is how to name another one.
+    /// Listens at `path`, for this user alone whatever the umask. What a killed run left there is replaced; what is served is
+    /// not. `option` is how to name another one.
     ///
     /// # Errors
     /// If somebody listens there, or the path cannot be used.
@@ -26,9 +35,20 @@ impl Listener {
         {
             std::fs::remove_file(path)?;
         }
-        let listener = UnixListener::bind(path)?;
-        listener.set_nonblocking(true)?;
-        Ok(Self { listener, path: path.to_owned() })
+        let socket = net::socket_with(
+            net::AddressFamily::UNIX,
+            net::SocketType::STREAM,
+            net::SocketFlags::CLOEXEC | net::SocketFlags::NONBLOCK,
+            None,
+        )?;
+        // The name that `bind` makes has the mode of the socket: nobody else can connect before it is set there.
+        fchmod(&socket, Mode::RUSR | Mode::WUSR)?;
+        net::bind(&socket, &net::SocketAddrUnix::new(path)?)?;
+        let this = Self { listener: UnixListener::from(socket), path: path.to_owned() };
+        // Less what the umask takes, which this gives back.
+        std::fs::set_permissions(path, Permissions::from_mode(0o600))?;
+        net::listen(&this.listener, BACKLOG)?;
+        Ok(this)
     }
 
     /// Somebody who came since the last call. Never waits.

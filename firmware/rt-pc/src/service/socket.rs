@@ -13,6 +13,8 @@ use crate::operator::Said;
 const MOST: usize = 8;
 /// Longest line, bytes.
 const LONGEST: usize = 4096;
+/// Bytes that are taken from a connection in a round.
+const ROUND: usize = 1 << 16;
 
 /// The socket with its connections.
 pub struct Socket {
@@ -54,19 +56,25 @@ impl Connection {
     /// An error ends the connection.
     fn serve(&mut self, console: &mut Console, now: u64) -> io::Result<()> {
         let mut bytes = [0; 512];
-        loop {
+        let mut taken = 0;
+        while taken < ROUND {
             match self.stream.read(&mut bytes) {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
-                Ok(count) => self.line.extend_from_slice(&bytes[..count]),
+                Ok(count) => {
+                    taken += count;
+                    self.line.extend_from_slice(&bytes[..count]);
+                    self.answer(console, now)?;
+                }
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(error),
             }
-            if self.line.len() > LONGEST {
-                let _ = self.stream.write_all(b"error: a line has at most 4096 bytes\n");
-                return Err(io::ErrorKind::InvalidData.into());
-            }
         }
+        Ok(())
+    }
+
+    /// Answers every line that is whole; what is left is the beginning of one.
+    fn answer(&mut self, console: &mut Console, now: u64) -> io::Result<()> {
         while let Some(end) = self.line.iter().position(|byte| *byte == b'\n') {
             let line: Vec<u8> = self.line.drain(..=end).collect();
             let line = String::from_utf8_lossy(&line);
@@ -76,6 +84,10 @@ impl Connection {
             };
             // A reader that does not read is closed: nobody waits for it.
             self.stream.write_all(format!("{answer}\n").as_bytes())?;
+        }
+        if self.line.len() > LONGEST {
+            let _ = self.stream.write_all(b"error: a line has at most 4096 bytes\n");
+            return Err(io::ErrorKind::InvalidData.into());
         }
         Ok(())
     }

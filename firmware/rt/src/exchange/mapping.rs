@@ -3,10 +3,10 @@
 use core::marker::PhantomData;
 use core::ptr::NonNull;
 use core::sync::atomic::AtomicU32;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, Permissions};
 use std::io;
 use std::os::fd::AsRawFd;
-use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::Path;
 
 use crate::clock::SECOND;
@@ -17,26 +17,76 @@ pub(super) struct Mapping<T> {
     kind: PhantomData<T>,
 }
 
+/// Read and written by its owner.
+const MODE: u32 = 0o600;
+
+/// Why a file is not mapped.
+#[derive(Debug)]
+pub(super) enum Unfit {
+    /// Somebody else can change it, or what it leads to.
+    NotOwn(String),
+    /// It has another size than a `T`.
+    Size,
+    /// The system's answer.
+    File(io::Error),
+}
+
+impl Unfit {
+    fn of(error: io::Error, path: &Path) -> Self {
+        match std::fs::read_link(path) {
+            Ok(target) => Self::NotOwn(format!("it is a symbolic link to {}", target.display())),
+            Err(_) => Self::File(error),
+        }
+    }
+}
+
+impl From<io::Error> for Unfit {
+    fn from(error: io::Error) -> Self {
+        Self::File(error)
+    }
+}
+
 // SAFETY: `T` is made of atomics; the mapping stays until it is dropped.
 unsafe impl<T: Sync> Send for Mapping<T> {}
 // SAFETY: as above.
 unsafe impl<T: Sync> Sync for Mapping<T> {}
 
 impl<T> Mapping<T> {
-    /// A new file of zeros, for this user alone.
+    /// A new file of zeros, for this user alone; `AlreadyExists` if anything has that name.
     pub(super) fn create(path: &Path) -> io::Result<Self> {
-        let file = OpenOptions::new().read(true).write(true).create(true).truncate(true).mode(0o600).open(path)?;
+        let file = OpenOptions::new().read(true).write(true).create_new(true).mode(MODE).open(path)?;
+        // Less what the umask takes, which this gives back.
+        file.set_permissions(Permissions::from_mode(MODE))?;
         file.set_len(size_of::<T>() as u64)?;
         Self::of(&file)
     }
 
-    /// A file that is there; `InvalidData` if it is too short.
-    pub(super) fn open(path: &Path) -> io::Result<Self> {
-        let file = OpenOptions::new().read(true).write(true).open(path)?;
-        if file.metadata()?.len() != size_of::<T>() as u64 {
-            return Err(io::Error::from(io::ErrorKind::InvalidData));
+    /// A file that is there. It has to be as [`Mapping::create`] makes it: whoever else may write it may make it shorter too, and
+    /// then reading the mapping ends the process.
+    pub(super) fn open(path: &Path) -> Result<Self, Unfit> {
+        let file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK)
+            .open(path)
+            .map_err(|error| Unfit::of(error, path))?;
+        let found = file.metadata()?;
+        // SAFETY: has no arguments and touches no memory.
+        let user = unsafe { libc::geteuid() };
+        if !found.is_file() {
+            return Err(Unfit::NotOwn("it is no regular file".to_owned()));
         }
-        Self::of(&file)
+        if found.uid() != user {
+            return Err(Unfit::NotOwn(format!("it belongs to user {}, and this is user {user}", found.uid())));
+        }
+        if found.mode() & 0o777 != MODE {
+            let mode = found.mode() & 0o777;
+            return Err(Unfit::NotOwn(format!("its mode is {mode:03o}, expected {MODE:03o}")));
+        }
+        if found.len() != size_of::<T>() as u64 {
+            return Err(Unfit::Size);
+        }
+        Ok(Self::of(&file)?)
     }
 
     fn of(file: &File) -> io::Result<Self> {

@@ -129,4 +129,20 @@ pub(super) const OF_SLIPS: &[Rule] = &[
         passes: "center_of_mass = [\"99 mm\"",
         ..RULE
     },
+    Rule {
+        code: "W0858",
+        key: "actuator.damping_ratio",
+        text: "damping_ratio   = 0.1 ",
+        raises: "damping_ratio   = 0.00019 ",
+        passes: "damping_ratio   = 0.00021 ",
+        ..RULE
+    },
+    Rule {
+        code: "W0859",
+        key: "hysteresis.grid",
+        text: "grid    = 32",
+        raises: "grid    = 7",
+        passes: "grid    = 8",
+        ..RULE
+    },
 ];

@@ -1,0 +1,193 @@
+//! `kill -9` at any time: every next run succeeds, what was written is whole, and nothing of the user's is lost.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+#![cfg(unix)]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use rustix::process::{Pid, Signal, kill_process_group};
+
+use crate::support::{Folder, Run, contents, length};
+
+/// A number from 0 to 1.
+fn part(random: &mut ChaCha8Rng) -> f64 {
+    f64::from(random.next_u32()) / f64::from(u32::MAX)
+}
+
+fn start(command: &mut Command) -> Child {
+    command.stdout(Stdio::null()).stderr(Stdio::null()).process_group(0).spawn().unwrap()
+}
+
+/// Kills it with all that it has started; whether it had not ended by itself.
+fn kill(mut child: Child) -> bool {
+    kill_process_group(Pid::from_raw(child.id().cast_signed()).unwrap(), Signal::KILL).ok();
+    child.wait().unwrap().signal() == Some(9)
+}
+
+/// One way to write the output.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Way {
+    /// From beside it: the folders change places.
+    Swap,
+    /// By somebody who stands in it: files are replaced one by one.
+    InPlace,
+}
+
+/// An output that is written by one spec and by another in turn, with what belongs to the user around it.
+struct Output {
+    folder: Folder,
+    /// What each spec makes.
+    whole: [BTreeMap<String, Vec<u8>>; 2],
+}
+
+const SPECS: [&str; 2] = ["legs.toml", "other.toml"];
+/// What the user has: in the output what cargo made, beside it work.
+const OF_USER: [&str; 4] = ["out/target/release/object.o", "out/Cargo.lock", "out/controller/target/kept", "notes.txt"];
+
+impl Output {
+    fn new() -> Self {
+        let folder = Folder::new();
+        folder.spec("other.toml", &[("= \"pcc\"", "= \"ewma\""), ("name = \"legs\"", "name = \"other\"")]);
+        let whole = SPECS.map(|spec| {
+            assert_eq!(folder.run(&[spec, "-o", spec.trim_end_matches(".toml"), "--no-build"]).code, 0);
+            contents(&folder.path(spec.trim_end_matches(".toml")))
+        });
+        assert_ne!(whole[0], whole[1]);
+        assert_eq!(folder.run(&[SPECS[0], "-o", "out", "--no-build"]).code, 0);
+        for path in OF_USER {
+            fs::create_dir_all(folder.path(path).parent().unwrap()).unwrap();
+            folder.write(path, path);
+        }
+        Self { folder, whole }
+    }
+
+    fn command(&self, spec: &str, way: Way) -> Command {
+        let mut command = self.folder.command();
+        match way {
+            Way::Swap => command.args([spec, "-o", "out", "--no-build"]),
+            Way::InPlace => {
+                command.current_dir(self.folder.path("out")).args([&format!("../{spec}"), "-o", ".", "--no-build"])
+            }
+        };
+        command
+    }
+
+    /// What specgen wrote of what is in the output.
+    fn written(&self) -> BTreeMap<String, Vec<u8>> {
+        let mut files = contents(&self.folder.path("out"));
+        files.retain(|path, _| !OF_USER.contains(&format!("out/{path}").as_str()));
+        files
+    }
+
+    fn work(&self) -> PathBuf {
+        self.folder.path(".out.specgen")
+    }
+
+    /// The next run of `spec` succeeds and leaves what it should.
+    fn recovers(&self, spec: usize, what: &str) {
+        let run = Run::of(&mut self.command(SPECS[spec], Way::Swap));
+        assert_eq!(run.code, 0, "{what}: {}", run.stderr);
+        assert!(self.written() == self.whole[spec], "{what}");
+        for path in OF_USER {
+            assert_eq!(fs::read_to_string(self.folder.path(path)).unwrap_or_default(), path, "{what}");
+        }
+        assert!(!self.work().exists(), "{what}");
+    }
+}
+
+/// Kills as soon as files are staged, or some moments later: returns how many came in the midst of it.
+fn aimed(way: Way, rounds: usize, random: &mut ChaCha8Rng) -> usize {
+    let output = Output::new();
+    let mut hits = 0;
+    for round in 0..rounds {
+        let (old, new) = (round % 2, (round + 1) % 2);
+        let aim = output.work().join(
+            [["new/Cargo.toml", "new/.specgen"], ["new/.specgen", "old/Cargo.toml"]][way as usize][round / 2 % 2],
+        );
+        let mut child = start(&mut output.command(SPECS[new], way));
+        while !aim.exists() && child.try_wait().unwrap().is_none() {
+            std::hint::spin_loop();
+        }
+        std::thread::sleep(Duration::from_secs_f64(4e-3 * part(random)));
+        hits += usize::from(kill(child) && output.work().join("new").exists());
+        let there = output.written();
+        let is_whole = there == output.whole[old] || there == output.whole[new];
+        let what = format!("{way:?}, round {round}, aimed at {}", aim.display());
+        assert!(is_whole || way == Way::InPlace, "{what}: neither the old output nor the new one");
+        output.recovers(new, &what);
+    }
+    hits
+}
+
+#[test]
+fn a_kill_while_a_folder_is_written_leaves_the_old_one_or_the_new_one() {
+    let mut random = ChaCha8Rng::seed_from_u64(14);
+    for way in [Way::Swap, Way::InPlace] {
+        let rounds = length(6, 40);
+        let hits = aimed(way, rounds, &mut random);
+        println!("{way:?}: {rounds} kills, {hits} in the midst of writing; every next run succeeded");
+        assert!(hits > 0, "{way:?}: no kill came in time");
+    }
+}
+
+/// The commands of which each was killed at random times of its run.
+#[test]
+fn every_run_after_a_kill_succeeds() {
+    if length(true, false) {
+        return crate::support::skipped("only in the soak: 200 kills at random times");
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(200);
+    let output = Output::new();
+    let folder = &output.folder;
+    let spec = folder.read("legs.toml");
+    let commands: [&[&str]; 4] = [
+        &["legs.toml", "-o", "out", "--no-build"],
+        &["tune", "legs.toml", "--evaluations", "8", "--seconds", "0.1", "--write"],
+        &["sim", "legs.toml", "--record", "run.rec", "--seconds", "0.1"],
+        &["report", "legs.toml", "--generations", "0", "--no-target", "-o", "page.html"],
+    ];
+    for arguments in commands {
+        // Once whole: how long it takes, with the controller built and kept.
+        let run = |what: &str| {
+            folder.write("legs.toml", &spec);
+            let begun = Instant::now();
+            let run = folder.run(arguments);
+            assert_eq!(run.code, 0, "{what}: {}", run.stderr);
+            begun.elapsed()
+        };
+        run("first");
+        let took = run("second");
+        let (rounds, mut killed) = (50, 0);
+        for round in 0..rounds {
+            let what = format!("{arguments:?}, round {round}");
+            folder.write("legs.toml", &spec);
+            let child = start(folder.command().args(arguments));
+            std::thread::sleep(took.mul_f64(1.05 * part(&mut random)));
+            killed += usize::from(kill(child));
+            // Whole, old or new: the spec compiles, the record replays, the page ends.
+            assert_eq!(folder.run(&["check", "legs.toml"]).code, 0, "{what}");
+            if arguments[0] == "sim" {
+                folder.write("legs.toml", &spec);
+                assert_eq!(folder.run(&["replay", "run.rec", "--spec", "legs.toml"]).code, 0, "{what}");
+            }
+            if arguments[0] == "report" {
+                assert!(folder.read("page.html").trim_end().ends_with("</html>"), "{what}");
+            }
+            run(&what);
+        }
+        println!("{arguments:?}: {rounds} kills within {took:.1?}, {killed} before its end; every next run succeeded");
+    }
+    output.recovers(0, "at the end");
+    let left: Vec<String> = fs::read_dir(folder.path(""))
+        .unwrap()
+        .map(|one| one.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    assert!(!left.iter().any(|name| name.contains(".specgen-")), "{left:?}");
+}
