@@ -3,10 +3,12 @@
 //! Plain data. Lowering fills it, emitters print it and do no arithmetic of their own. `specgen dump-ir` shows it.
 //! Numbers are already rounded to the controller's scalar, so that the text is the constant.
 
+mod permitted;
 mod task_space;
 
 use serde::Serialize;
 
+pub use permitted::*;
 use specgen_runtime::Platform;
 use specgen_runtime::dynamics::Leg;
 pub use task_space::*;
@@ -80,6 +82,8 @@ pub struct Ir {
     pub supervision: Supervision,
     /// Config at start-up.
     pub defaults: Defaults,
+    /// What a Config may hold, and how large the numbers of a state may become.
+    pub permitted: Permitted,
     /// Control in task space; none for six legs with their own gauges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub task_space: Option<TaskSpace>,
