@@ -11,6 +11,7 @@ use serde::Serialize;
 pub use permitted::*;
 use specgen_runtime::Platform;
 use specgen_runtime::dynamics::Leg;
+use specgen_runtime::supervisor::TIMERS;
 pub use task_space::*;
 
 /// Number of legs.
@@ -350,10 +351,13 @@ pub struct Supervision {
     pub ramp_step: i32,
     /// Ticks from one to the next.
     pub ramp_every: u32,
-    /// Counts at which a condition is a cause: gauge not finite, gauge range, voltage, slew, missed tick, converter.
-    pub patience: [u32; 6],
+    /// Ticks without a request over a link after which its host is lost.
+    pub host_ticks: u32,
+    /// Counts at which a condition is a cause: gauge not finite, gauge range, voltage, slew, missed tick, converter, host gone,
+    /// converter silent.
+    pub patience: [u32; TIMERS],
     /// What a tick with the condition counts.
-    pub weight: [u32; 6],
+    pub weight: [u32; TIMERS],
     /// m.
     pub stuck_motion: f64,
     /// Samples.

@@ -122,6 +122,8 @@ pub struct Supervisor {
     pub slew_time: Option<f64>,
     /// Within a second.
     pub missed_ticks: u32,
+    /// Silence of a host until the machine holds, and until it ramps down, s.
+    pub host_lost: Option<[f64; 2]>,
 }
 
 impl Model {

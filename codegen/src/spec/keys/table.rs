@@ -29,6 +29,7 @@ const fn integer(min: i64, max: i64) -> Shape {
 }
 
 const TIMEOUT: Shape = one(Dimension::TIME, Range::closed(1e-6, 60.0), "ms");
+const SILENCE: Item = item(Dimension::TIME, Range::closed(1e-6, 3600.0), "ms");
 const RADIUS: Range = Range::closed(1e-3, 10.0);
 const JOINT_ANGLE: Range = Range::open(0.0, 2.0 * std::f64::consts::FRAC_PI_3);
 const CIRCLES: &str = "joint circles";
@@ -407,6 +408,7 @@ pub const SECTIONS: &[Section] = &[
             row("voltage_time", TIMEOUT, Rule("500 ms, at least a period"), "", "\"500 ms\"", "Time that a leg may stay at a limit of its voltage or table."),
             row("slew_time", TIMEOUT, Rule("50 ms, at least a period"), "", "\"50 ms\"", "Time that a leg may stay at the limit of its slew rate."),
             row("missed_ticks", integer(1, 1000), Default("3"), "", "3", "Missed ticks within a second that are a fault."),
+            row("host_lost", Shape::List(&[SILENCE; 2]), Rule("[\"100 ms\", \"10 s\"]"), "", "[\"100 ms\", \"10 s\"]", "How long a host that has the orders may be silent until the machine holds, and until it ramps down and switches off. A converter that stays silent holds after `gauge_time`, and ramps down after the second time."),
         ],
     },
     Section {

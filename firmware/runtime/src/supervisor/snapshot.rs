@@ -1,6 +1,6 @@
 //! The supervisor as words.
 
-use super::{Approach, Cause, Channel, Debounce, Phase, Request, Supervisor, Watch};
+use super::{Approach, Cause, Channel, Debounce, Phase, Request, Supervisor, TIMERS, Watch};
 use crate::real::Real;
 use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Sizes, Snapshot, Writer};
 
@@ -10,7 +10,7 @@ const CHANNEL: usize = 7;
 const APPROACH: usize = 7;
 
 impl<T: Real> Snapshot for Supervisor<T> {
-    const WORDS: usize = 3 + 3 + 3 + 6 + 6 * CHANNEL + 6 + APPROACH;
+    const WORDS: usize = 3 + 3 + 3 + TIMERS + 6 * CHANNEL + 6 + APPROACH;
 
     fn save(&self, words: &mut Writer<'_>) {
         // By name and all of them, so that a field that is added is not forgotten.
