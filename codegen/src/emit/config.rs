@@ -15,27 +15,24 @@ pub fn code_limits() -> TokenStream {
         }
 
         /// These settings, if each is within its range.
+        #[inline(never)]
         fn checked(self) -> Result<Self, ConfigError> {
-            for (word, (value, permitted)) in self.to_words().into_iter().zip(&permitted::SETTINGS).enumerate() {
-                if !permitted.takes(value) {
+            Self::check(&self.to_words())?;
+            Ok(self)
+        }
+
+        /// Every word is within its range, or the first that is not.
+        #[inline(never)]
+        pub(crate) fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
+            for (word, (value, permitted)) in words.iter().zip(&permitted::SETTINGS).enumerate() {
+                if !permitted.takes(*value) {
                     return Err(ConfigError { word });
                 }
             }
-            if self.code_limits.max < self.code_limits.min {
+            if words[CONFIG_CODES + 2] < words[CONFIG_CODES + 1] {
                 return Err(ConfigError { word: CONFIG_CODES + 2 });
             }
-            Ok(self)
-        }
-    }
-}
-
-/// What [`crate::ir::Permitted`] is asked for in `from_words`: that each word is within its range, before any becomes a value.
-pub fn check_words() -> TokenStream {
-    quote! {
-        for (word, (value, permitted)) in words.iter().zip(&permitted::SETTINGS).enumerate() {
-            if !permitted.takes(*value) {
-                return Err(ConfigError { word });
-            }
+            Ok(())
         }
     }
 }

@@ -4,7 +4,7 @@
 //! What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build.
 
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
-use crate::words::CONFIG_CODES;
+use crate::words::{CONFIG_CODES, CONFIG_WORDS};
 use crate::{Real, limits, permitted};
 
 /// ρ̂ of a leg, m/V; from `actuator`. Mode P takes the leg as linear: u = q/ρ̂.
@@ -240,23 +240,30 @@ impl Config {
     }
 
     /// These settings, if each is within its range.
+    #[inline(never)]
     fn checked(self) -> Result<Self, ConfigError> {
-        for (word, (value, permitted)) in self
-            .to_words()
-            .into_iter()
+        Self::check(&self.to_words())?;
+        Ok(self)
+    }
+
+    /// Every word is within its range, or the first that is not.
+    #[inline(never)]
+    pub(crate) fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
+        for (word, (value, permitted)) in words
+            .iter()
             .zip(&permitted::SETTINGS)
             .enumerate()
         {
-            if !permitted.takes(value) {
+            if !permitted.takes(*value) {
                 return Err(ConfigError { word });
             }
         }
-        if self.code_limits.max < self.code_limits.min {
+        if words[CONFIG_CODES + 2] < words[CONFIG_CODES + 1] {
             return Err(ConfigError {
                 word: CONFIG_CODES + 2,
             });
         }
-        Ok(self)
+        Ok(())
     }
 }
 

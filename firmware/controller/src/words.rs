@@ -9,7 +9,7 @@ use specgen_runtime::setpoint::{Command, CommandKind, Target};
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Real as _};
 use crate::config::Environment;
 use crate::task_space::MODES_TO_LEGS;
-use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput, permitted};
+use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput};
 
 /// Words of a tick's input.
 pub const INPUT_WORDS: usize = 33;
@@ -237,15 +237,7 @@ impl Config {
     /// # Errors
     /// The first word that is out of range.
     pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
-        for (word, (value, permitted)) in words
-            .iter()
-            .zip(&permitted::SETTINGS)
-            .enumerate()
-        {
-            if !permitted.takes(*value) {
-                return Err(ConfigError { word });
-            }
-        }
+        Self::check(words)?;
         let Some(mode) = ControlMode::from_word(words[0]) else {
             return Err(ConfigError { word: 0 });
         };

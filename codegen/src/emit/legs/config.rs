@@ -29,7 +29,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
 
         use specgen_runtime::{CodeLimits, Law};
 
-        use crate::words::CONFIG_CODES;
+        use crate::words::{CONFIG_CODES, CONFIG_WORDS};
         use crate::{Real, limits, permitted};
 
         /// ρ̂ of a leg, m/V; from `actuator`. The virtual drive of (AII.1) is X = q̂/ρ̂; the tick itself needs only q̂.

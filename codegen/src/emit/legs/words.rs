@@ -3,7 +3,7 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::emit::{self, description, literal};
+use crate::emit::{description, literal};
 use crate::ir::Ir;
 
 /// Names of the input words.
@@ -22,7 +22,6 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let (inputs, outputs) = (inputs(), outputs());
     let config = ir.permitted.names();
     let codes_at = literal::count(config.iter().take_while(|name| *name != "max_step_codes").count());
-    let check_words = emit::config::check_words();
     let description = description::text(ir, "legs", &inputs, &outputs, &config);
     let (input_words, output_words, config_words) =
         (literal::count(inputs.len()), literal::count(outputs.len()), literal::count(config.len()));
@@ -32,7 +31,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
 
         use specgen_runtime::{CodeLimits, Law, Real as _};
 
-        use crate::{Config, ConfigError, LEGS, Real, SetpointKind, State, TickInput, TickOutput, permitted};
+        use crate::{Config, ConfigError, LEGS, Real, SetpointKind, State, TickInput, TickOutput};
 
         /// Words of a tick's input.
         pub const INPUT_WORDS: usize = #input_words;
@@ -87,7 +86,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
             /// # Errors
             /// The first word that is out of range.
             pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
-                #check_words
+                Self::check(words)?;
                 let law = match words[0] {
                     0 => Law::Invhys,
                     1 => Law::Ewma,

@@ -44,7 +44,7 @@ pub fn emit(ir: &Ir, d: &PlatformDefaults) -> TokenStream {
 
         use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction #import_law};
 
-        use crate::words::CONFIG_CODES;
+        use crate::words::{CONFIG_CODES, CONFIG_WORDS};
         use crate::{Real, limits, permitted};
 
         /// ρ̂ of a leg, m/V; from `actuator`. Mode P takes the leg as linear: u = q/ρ̂.

@@ -4,7 +4,7 @@
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use crate::emit::{self, description, literal};
+use crate::emit::{description, literal};
 use crate::ir::{Ir, TaskSpace};
 
 /// Vectors of the input that a command brings, and those that are measured.
@@ -33,7 +33,6 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let config = ir.permitted.names();
     let at = |first: &str| literal::count(config.iter().take_while(|name| *name != first).count());
     let (weights_at, codes_at, gains_at) = (at("level_weight"), at("max_step_codes"), at("kp[0]"));
-    let check_words = emit::config::check_words();
     let bias: Vec<String> = task.law.bias.iter().map(|value| format!("{value:?}")).collect();
     let description =
         description::text(ir, "platform", &inputs, &outputs, &config) + &format!("bias={}\n", bias.join(","));
@@ -49,7 +48,7 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
 
         use crate::config::Environment;
         use crate::task_space::MODES_TO_LEGS;
-        use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput, permitted};
+        use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput};
 
         /// Words of a tick's input.
         pub const INPUT_WORDS: usize = #input_words;
@@ -120,7 +119,7 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
             /// # Errors
             /// The first word that is out of range.
             pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
-                #check_words
+                Self::check(words)?;
                 let Some(mode) = ControlMode::from_word(words[0]) else {
                     return Err(ConfigError { word: 0 });
                 };
