@@ -5,18 +5,17 @@
 
 use specgen_runtime::Permitted;
 use specgen_runtime::snapshot::Sizes;
-use crate::{CONFIG_WORDS, Real};
+use crate::Real;
 
-/// Range of each word of [`crate::CONFIG_NAMES`], both ends included; `code_min` is at most `code_max`.
-pub const SETTINGS: [Permitted<Real>; CONFIG_WORDS] = [
-    Permitted::Whole(0, 2),
-    Permitted::Whole(0, 1),
-    Permitted::Number(0.0, 1.0),
-    Permitted::Number(0.0, 1.0),
-    Permitted::Whole(1, 1000000),
-    Permitted::Whole(1, 3495),
-    Permitted::Whole(0, 43690),
-    Permitted::Whole(0, 43690),
+/// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
+/// most `code_max`.
+pub const SETTINGS: [(Permitted<Real>, usize); 6] = [
+    (Permitted::Whole(0, 2), 1),
+    (Permitted::Whole(0, 1), 1),
+    (Permitted::Number(0.0, 1.0), 2),
+    (Permitted::Whole(1, 1000000), 1),
+    (Permitted::Whole(1, 3495), 1),
+    (Permitted::Whole(0, 43690), 2),
 ];
 
 /// Largest numbers of a state, under any of these settings.
@@ -25,3 +24,16 @@ pub const STATE: Sizes = Sizes {
     reading: 4.8e-5,
     stiffness: 1000000000000000.0,
 };
+
+/// Range of a word of the settings; none beyond the last.
+#[must_use]
+pub fn of(word: usize) -> Option<&'static Permitted<Real>> {
+    let mut end = 0;
+    for (permitted, words) in &SETTINGS {
+        end += *words;
+        if word < end {
+            return Some(permitted);
+        }
+    }
+    None
+}
