@@ -6,6 +6,7 @@
 //! Files that every controller has are emitted here; what differs between six legs with their own gauges and a platform in
 //! task space lies in `legs` and `platform`.
 
+mod config;
 mod description;
 mod dynamics;
 mod format;
@@ -19,6 +20,7 @@ mod limits;
 mod literal;
 mod machine_words;
 mod manifest;
+mod permitted;
 mod platform;
 mod rest;
 mod sensing;
@@ -47,6 +49,7 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
         ("src/integrity.rs", integrity::emit(ir)),
         ("src/kinematics.rs", kinematics::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
+        ("src/permitted.rs", permitted::emit(ir)),
         ("src/supervision.rs", supervision::emit(ir)),
         ("src/waves.rs", waves::emit(ir)),
     ];

@@ -3,12 +3,15 @@
 //! Plain data. Lowering fills it, emitters print it and do no arithmetic of their own. `specgen dump-ir` shows it.
 //! Numbers are already rounded to the controller's scalar, so that the text is the constant.
 
+mod permitted;
 mod task_space;
 
 use serde::Serialize;
 
+pub use permitted::*;
 use specgen_runtime::Platform;
 use specgen_runtime::dynamics::Leg;
+use specgen_runtime::supervisor::TIMERS;
 pub use task_space::*;
 
 /// Number of legs.
@@ -80,6 +83,8 @@ pub struct Ir {
     pub supervision: Supervision,
     /// Config at start-up.
     pub defaults: Defaults,
+    /// What a Config may hold, and how large the numbers of a state may become.
+    pub permitted: Permitted,
     /// Control in task space; none for six legs with their own gauges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub task_space: Option<TaskSpace>,
@@ -346,10 +351,13 @@ pub struct Supervision {
     pub ramp_step: i32,
     /// Ticks from one to the next.
     pub ramp_every: u32,
-    /// Counts at which a condition is a cause: gauge not finite, gauge range, voltage, slew, missed tick, converter.
-    pub patience: [u32; 6],
+    /// Ticks without a request over a link after which its host is lost.
+    pub host_ticks: u32,
+    /// Counts at which a condition is a cause: gauge not finite, gauge range, voltage, slew, missed tick, converter, host gone,
+    /// converter silent.
+    pub patience: [u32; TIMERS],
     /// What a tick with the condition counts.
-    pub weight: [u32; 6],
+    pub weight: [u32; TIMERS],
     /// m.
     pub stuck_motion: f64,
     /// Samples.

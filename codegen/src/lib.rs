@@ -31,6 +31,7 @@ pub mod reproduce;
 pub mod requirements;
 pub mod robust;
 pub mod served;
+pub mod settings;
 pub mod spec;
 pub mod stability;
 pub mod target;

@@ -8,6 +8,7 @@ mod gauge_converter;
 mod integrity;
 mod kinematics;
 mod linear;
+mod permitted;
 mod rate;
 mod sensing;
 pub mod setpoint;
@@ -95,13 +96,14 @@ pub fn lower(
         dynamics: dynamics::lower(model, scalar)?,
         supervision: supervision::lower(model, &hysteresis, &actuation, max_step, scalar)?,
         hysteresis,
-        actuation,
         bounds: Bounds {
             pose: [tx, ty, tz, rx, ry, rz].map(round),
             leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
             sensor: model.sensor.range.map(round),
         },
         gauge_converter,
+        permitted: permitted::lower(&actuation, max_step, model.sensor.range, task_space.as_ref(), scalar),
+        actuation,
         defaults,
         task_space,
         integrity,

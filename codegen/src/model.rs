@@ -14,6 +14,15 @@ pub use task_space::{
     TrajectoryKind,
 };
 
+/// Largest gain and stiffness that a spec may say, in SI units: products with it stay finite in both scalars.
+pub const LARGEST_GAIN: f64 = 1e15;
+/// Most control ticks of a run.
+pub const LARGEST_RUN_INTERVAL: i32 = 1_000_000;
+/// Furthest that a workspace or a pose may reach from rest, m.
+pub const LARGEST_TRAVEL: f64 = 0.1;
+/// The same of angles, rad: the controller's series for small angles are sized by it.
+pub const LARGEST_TURN: f64 = 0.5;
+
 /// A spec that passed every check that needs no computation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
@@ -113,6 +122,8 @@ pub struct Supervisor {
     pub slew_time: Option<f64>,
     /// Within a second.
     pub missed_ticks: u32,
+    /// Silence of a host until the machine holds, and until it ramps down, s.
+    pub host_lost: Option<[f64; 2]>,
 }
 
 impl Model {

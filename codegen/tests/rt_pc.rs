@@ -16,10 +16,10 @@ use std::time::{Duration, Instant};
 use host_sim::controller::{Controller, Supervised, TickController};
 use serde_json::Value;
 use specgen::{compile, emit, target, workspace};
-use specgen_link::client::ClientError;
 use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
 use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
+mod clients;
 mod host;
 use host::{Host, Record};
 
@@ -34,6 +34,8 @@ const LINK_LOST: u8 = 9;
 /// Requests to it.
 const ARM: u8 = 1;
 const RUN: u8 = 2;
+const HOLD: u8 = 3;
+const RAMP_DOWN: u8 = 4;
 /// Bit of a platform's status: it goes to its bias pose, or plays.
 const BUSY: u32 = 1 << 18;
 
@@ -225,6 +227,7 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
     );
 
     a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(&bench);
+    clients::nobody_keeps_others_from_ramping_down(&bench);
     a_record_that_finds_no_room_brings_the_machine_down(&bench);
     a_card_is_read_driven_and_switched_off(&bench);
 }
@@ -249,7 +252,6 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     // The host library adds sizes of its own to it.
     assert!(machine.controller().text().as_bytes().starts_with(&description) && description.len() > 100);
     host.wait("a tick", |status| status.tick > 0 && status.phase == DISARMED);
-    assert!(matches!(Host::open(&link, 2), Err(ClientError::Refused(Refusal::Busy))), "one host at a time");
     for request in [Request::LockstepReset { config: Bytes(&[]) }, Request::LockstepStage { index: 0 }] {
         assert_eq!(host.refused(&request), Refusal::Unsupported);
     }
@@ -259,7 +261,12 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
 
     host.done(&Request::Supervise { request: ARM });
     host.wait("armed", |status| status.phase == HOLDING);
-    // A line may slow it down, but the orders are the host's.
+    // Others may look and slow it down, but the orders are the host's.
+    let mut other = Host::open(&link, 2).unwrap();
+    assert_eq!(other.refused(&Request::Supervise { request: RUN }), Refusal::Busy);
+    assert_eq!(other.refused(&Request::Setpoint { words: Bytes(&command) }), Refusal::Busy);
+    other.done(&Request::Supervise { request: HOLD });
+    drop(other);
     assert!(lines.ask("run").starts_with("error: a host over the link has the orders"));
     assert_eq!(lines.ask("hold"), "ok");
     host.done(&Request::Supervise { request: RUN });
@@ -334,7 +341,7 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     let output = running.end("TERM");
     let (summary, record) = bench.check(&output, "b.rec");
     assert_eq!((&summary["last_phase"], &summary["skipped"]), (&"Disarmed".into(), &0.into()), "{summary}");
-    assert_eq!((output.status.code(), &summary["link"]["refused_hosts"]), (Some(1), &1.into()), "{summary}");
+    assert_eq!((output.status.code(), &summary["link"]["hosts"]), (Some(1), &2.into()), "{summary}");
     assert!(
         summary["link"]["errors"].as_u64().unwrap() >= 2 && summary["failure"].as_str().unwrap().contains("link lost")
     );

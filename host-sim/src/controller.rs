@@ -105,7 +105,7 @@ impl fmt::Display for ControllerError {
             Self::Config { name, word } => {
                 write!(
                     f,
-                    "the controller refuses configuration word `{name}` = {word:016x}; its range is in the spec's documentation"
+                    "the controller refuses configuration word `{name}` = {word:016x}; docs/settings.md has its range, which the spec limits"
                 )
             }
         }

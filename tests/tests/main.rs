@@ -34,6 +34,7 @@ mod requirements;
 mod sensing;
 mod sensing_emitted;
 mod setpoint;
+mod settings;
 mod spec_corpus;
 mod spec_errors;
 mod spec_fuzz;

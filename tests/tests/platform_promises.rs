@@ -8,6 +8,7 @@ use host_sim::controller::{Controller, TickController};
 use host_sim::word::Scalar;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use specgen::ir::Range;
 use specgen_tests::Emitted;
 
 const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
@@ -52,7 +53,7 @@ impl Fuzz {
     }
 
     /// Settings that are permitted, most of them absurd.
-    fn settings(&mut self, controller: &Controller, codes: [i64; 2]) -> Vec<u64> {
+    fn settings(&mut self, controller: &Controller, codes: [i64; 2], slew: u64) -> Vec<u64> {
         let description = controller.description();
         let mut words = controller.default_config();
         if self.below(4) == 0 {
@@ -64,11 +65,11 @@ impl Fuzz {
                 "mode" => self.below(7) as f64,
                 "interaction" => self.below(3) as f64,
                 "level_weight" | "drift_weight" => self.unit(),
-                "max_step_codes" => 1.0 + self.below(3000) as f64,
+                "max_step_codes" => 1.0 + self.below(slew) as f64,
                 // Both limits anywhere, the lower one in the lower half.
                 "code_min" => (codes[0] + self.below((codes[1] - codes[0]) as u64 / 2) as i64) as f64,
                 "code_max" => (codes[1] - self.below((codes[1] - codes[0]) as u64 / 2) as i64) as f64,
-                "environment_rest" => self.symmetric(),
+                "environment_rest" => 0.1 * self.symmetric(),
                 // The largest gain, rounded to f32, is still permitted.
                 "kp" | "ki" | "kv" | "position_kp" | "position_ki" | "position_kv" | "environment_stiffness" => {
                     self.magnitude(0.999e15)
@@ -125,6 +126,7 @@ fn fuzz(name: &str, edits: &[(&str, &str)]) {
     let actuation = &emitted.compiled.ir.actuation;
     let codes = [i64::from(actuation.code_min), i64::from(actuation.code_max)];
     let [low, high] = emitted.compiled.model.actuator.voltage;
+    let slew = i64::from(emitted.compiled.ir.defaults.max_step);
 
     let mut fuzz = Fuzz { rng: ChaCha8Rng::seed_from_u64(17), scalar: description.scalar };
     let mut input = vec![0; description.input_names.len()];
@@ -137,7 +139,7 @@ fn fuzz(name: &str, edits: &[(&str, &str)]) {
             previous = [codes[0]; 6];
         }
         if tick % STRETCH == 0 {
-            let words = fuzz.settings(&controller, codes);
+            let words = fuzz.settings(&controller, codes, slew as u64);
             controller.configure(&words).unwrap_or_else(|error| panic!("{name}, tick {tick}: {error}"));
             step = words[max_step] as i64;
             calm = fuzz.below(3) == 0;
@@ -163,7 +165,7 @@ fn fuzz(name: &str, edits: &[(&str, &str)]) {
     let ticks = ticks();
     println!("{name}: {ticks} ticks, {healthy} without and {faulty} with a fault, largest step {largest} codes");
     assert!(healthy > ticks / 20 && faulty > ticks / 20, "{name}: {healthy} without, {faulty} with a fault");
-    assert!(largest > 2000, "{name}: the slew limit was never felt: {largest}");
+    assert!(largest > slew * 9 / 10 && largest <= slew, "{name}: {largest} of {slew} codes a tick");
 }
 
 #[test]
@@ -184,28 +186,29 @@ fn every_setting_out_of_range_is_refused_by_its_name() {
         let mut controller = emitted.controller();
         let description = controller.description().clone();
         let good = controller.default_config();
-        let (min, max) = (emitted.compiled.ir.actuation.code_min, emitted.compiled.ir.actuation.code_max);
+        let table = &emitted.compiled.ir.permitted;
+        assert_eq!(table.names(), description.config_names);
         let real = |value: f64| description.scalar.encode(value);
         let never = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY].map(real);
         let mut refused = 0;
-        for (place, name) in description.config_names.iter().enumerate() {
-            let stem = name.split('[').next().unwrap_or(name);
+        for (place, (name, range)) in table.words().enumerate() {
             // Words just and far outside the range, and its ends, which are permitted.
-            let (beyond, ends): (Vec<u64>, Vec<u64>) = match stem {
-                "mode" => (vec![7, 8, u64::MAX], (0..7).collect()),
-                "interaction" => (vec![3, u64::MAX], (0..3).collect()),
-                "level_weight" | "drift_weight" => {
-                    ([-0.001, 1.000_001].map(real).into_iter().chain(never).collect(), [0.0, 1.0].map(real).into())
+            let (beyond, ends): (Vec<u64>, Vec<u64>) = match range {
+                Range::Whole(least, most) => {
+                    let (least, most) = (i64::from(least), i64::from(most));
+                    (vec![(least - 1) as u64, (most + 1) as u64, u64::MAX, 1 << 31], vec![least as u64, most as u64])
                 }
-                "max_step_codes" => (vec![0, u64::MAX, 1 << 31], vec![1, (1 << 31) - 1]),
-                "code_min" => (vec![(max + 1) as u64, u64::MAX, i64::from(min - 1) as u64], vec![min as u64]),
-                "code_max" => (vec![(max + 1) as u64, u64::MAX, i64::from(min - 1) as u64], vec![max as u64]),
-                "environment_rest" => {
-                    ([-1.001, 1.001].map(real).into_iter().chain(never).collect(), [-1.0, 1.0].map(real).into())
+                Range::Number(least, most) => {
+                    let below = if least < 0.0 { 1.001 * least } else { -1e-30 };
+                    ([below, 1.001 * most].map(real).into_iter().chain(never).collect(), [least, most].map(real).into())
                 }
-                _ => {
-                    ([-1e-30, 1.001e15].map(real).into_iter().chain(never).collect(), [0.0, 0.999e15].map(real).into())
-                }
+            };
+            // The lower code limit alone may not go above the upper one, nor the other way round.
+            let name = name.as_str();
+            let ends = match name {
+                "code_min" => vec![ends[0]],
+                "code_max" => vec![ends[1]],
+                _ => ends,
             };
             for word in beyond {
                 let mut words = good.clone();
@@ -288,6 +291,8 @@ fn words_come_back() {
         tried[place] = match words[place] {
             // Mode and interaction.
             _ if place < 2 => random >> 61,
+            // A step, of 1747 codes at most.
+            _ if place == 4 => random >> 53,
             // Codes.
             1..100_000 => random >> 47,
             // Numbers: other low bits.

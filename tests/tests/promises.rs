@@ -90,7 +90,8 @@ fn settings_that_would_break_a_promise_are_refused() {
     let mut controller = emitted.controller();
     let good = controller.default_config();
     let (min, max) = (emitted.compiled.ir.actuation.code_min, emitted.compiled.ir.actuation.code_max);
-    let bad: [(&str, u64); 15] = [
+    let step = emitted.compiled.ir.defaults.max_step as u64;
+    let bad: [(&str, u64); 17] = [
         ("mode", 3),
         ("setpoint_kind", 2),
         ("level_weight", f64::NAN.to_bits()),
@@ -101,8 +102,11 @@ fn settings_that_would_break_a_promise_are_refused() {
         ("drift_weight", 2f64.to_bits()),
         ("run_interval", 0),
         ("run_interval", u64::MAX),
+        ("run_interval", 1_000_001),
         ("max_step_codes", 0),
         ("max_step_codes", u64::MAX),
+        // What `actuator.slew_rate` permits, and a code more.
+        ("max_step_codes", step + 1),
         ("code_min", (max + 1) as u64),
         ("code_max", (max + 1) as u64),
         ("code_max", (min as i64 - 1) as u64),
@@ -122,6 +126,7 @@ fn settings_that_would_break_a_promise_are_refused() {
             let weight = |k: usize| f64::from_bits(words[k]);
             assert!((0.0..=1.0).contains(&weight(2)) && (0.0..=1.0).contains(&weight(3)));
             assert!(words[6] <= words[7] && words[7] <= max as u64 && words[4] > 0);
+            assert!((1..=step).contains(&words[5]));
         }
     }
 }

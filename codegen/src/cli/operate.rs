@@ -206,7 +206,8 @@ fn finish(ended: Result<(), Ended>, machine: &mut Machine<impl Port>, name: &str
     match ended {
         Ok(()) => {
             if machine.is_powered() {
-                let text = "the amplifiers are on; without its host the machine holds from now on";
+                let text =
+                    "the amplifiers are on; without its host the machine holds, then ramps down (supervisor.host_lost)";
                 ui.progress(&format!("{name}: {}: {text}", machine.stands()));
             }
             let result = result(machine);
@@ -218,9 +219,9 @@ fn finish(ended: Result<(), Ended>, machine: &mut Machine<impl Port>, name: &str
         }
         Err(Ended::Fault(text)) => Err(Failure::Judged { message: format!("{name}: {text}"), result: result(machine) }),
         Err(Ended::Failed(failure)) => Err(failure),
-        Err(Ended::Link(error)) => {
-            Err(Failure::Environment(format!("{name}: {error}; the machine holds by itself if it lost its host")))
-        }
+        Err(Ended::Link(error)) => Err(Failure::Environment(format!(
+            "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
+        ))),
         Err(Ended::Interrupted) => match machine.go_down(ui) {
             Ok(text) => Err(Failure::Interrupted { message: format!("interrupted; {text}"), result: result(machine) }),
             Err(error) => Err(Failure::Environment(format!("{name}: interrupted, and then: {error}"))),

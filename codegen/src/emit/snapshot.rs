@@ -31,7 +31,7 @@ pub fn emit(imports: &TokenStream, input: &TokenStream, leg: &Leg, state: &Token
 
         use crate::hysteresis::{GRID, Memory};
         use crate::supervised::{MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, Supervisor, supervise};
-        use crate::{CONFIG_WORDS, Config, LEGS, LegState, Real, State, limits};
+        use crate::{CONFIG_WORDS, Config, LEGS, LegState, Real, State, limits, permitted};
 
         /// Words of a [`Machine`].
         pub const MACHINE_STATE_WORDS: usize = <State as Snapshot>::WORDS + <Supervisor as Snapshot>::WORDS;
@@ -58,7 +58,7 @@ pub fn emit(imports: &TokenStream, input: &TokenStream, leg: &Leg, state: &Token
             /// # Errors
             /// The first word that no machine holds: not finite, none of its kind, a code out of limits, no staircase of extrema.
             pub fn load(words: &[u64; MACHINE_STATE_WORDS]) -> Result<Self, Invalid> {
-                let mut reader = Reader::new(words);
+                let mut reader = Reader::new(words).within(permitted::STATE);
                 let mut machine = Self::new();
                 machine.state.restore(&mut reader)?;
                 machine.supervisor.restore(&mut reader)?;

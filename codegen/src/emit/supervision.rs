@@ -10,12 +10,13 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let s = &ir.supervision;
     let real = |value| literal::real(ir.scalar, value);
     let count = |value: u32| literal::count(value as usize);
-    let counts = |values: &[u32; 6]| {
+    let counts = |values: &[u32]| {
         let values = values.iter().map(|value| count(*value));
         quote! { [#(#values),*] }
     };
     let (arm_ticks, rest) = (count(s.arm_ticks), literal::integer(s.rest));
     let (ramp_step, ramp_every) = (literal::integer(s.ramp_step), count(s.ramp_every));
+    let host_ticks = count(s.host_ticks);
     let (patience, weight) = (counts(&s.patience), counts(&s.weight));
     let (stuck_motion, stuck_samples) = (real(s.stuck_motion), count(s.stuck_samples));
     let (disagreement, disagreement_samples) = (real(s.disagreement), count(s.disagreement_samples));
@@ -60,6 +61,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
             tracking: [#tracking],
             tracking_samples: #tracking_samples,
         };
+        /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
+        pub const HOST_TICKS: u32 = #host_ticks;
         #of_kind
     }
 }

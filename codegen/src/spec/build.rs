@@ -150,6 +150,7 @@ fn supervisor(f: &Fields) -> Option<Supervisor> {
         voltage_time: number("voltage_time"),
         slew_time: number("slew_time"),
         missed_ticks: f.whole("supervisor.missed_ticks")?,
+        host_lost: f.list("supervisor.host_lost"),
     })
 }
 

@@ -3,14 +3,13 @@
 use controller::Config;
 use controller::snapshot::recorder::Recorder;
 use controller::supervised::{Cause, Machine, MachineInput, MachineOutput, Phase, Request, supervise};
+use controller::supervision::HOST_TICKS;
 use controller::waves::{self, Wave};
 use specgen_link::Silence;
 use specgen_runtime::wave::Stage;
 
 use crate::words::{COMMAND_WORDS, PERIOD_NANOSECONDS};
 
-/// The link is lost after so long without a request, ns: 0.1 s.
-const LINK_TIMEOUT: u32 = 100_000_000;
 /// A lock-step is over after so long without a request, ns: 2 s, for its host also computes, and nothing moves meanwhile.
 #[cfg(feature = "lockstep")]
 const LOCKSTEP_TIMEOUT: u32 = 2_000_000_000;
@@ -116,7 +115,7 @@ impl Exchange {
             config: Config::new(),
             report: Report::NONE,
             beat: 0,
-            silence: Silence::new(LINK_TIMEOUT.div_ceil(PERIOD_NANOSECONDS)),
+            silence: Silence::new(HOST_TICKS),
             recorder: None,
             wave: None,
             lockstep: None,

@@ -4,17 +4,11 @@
 //! What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build.
 
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
-use crate::words::{CONFIG_CODES, CONFIG_GAINS, CONFIG_WEIGHTS};
-use crate::{Real, limits};
+use crate::words::{CONFIG_CODES, CONFIG_WORDS};
+use crate::{Real, limits, permitted};
 
 /// ρ̂ of a leg, m/V; from `actuator`. Mode P takes the leg as linear: u = q/ρ̂.
 pub const LEG_GAIN: Real = 6.31e-7;
-
-/// Largest gain, stiffness and weight that a [`Config`] takes: products with it stay finite in both scalars.
-pub const LARGEST_GAIN: Real = 1e15;
-
-/// Largest |component| of the pose at which the environment is unloaded, m and rad.
-pub const LARGEST_REST: Real = 1.0;
 
 /// A value that a [`Config`] cannot hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -191,109 +185,83 @@ impl Config {
     /// The same with other weights per tick.
     ///
     /// # Errors
-    /// A weight outside [0, 1]. That they are stable on the platform is for the
+    /// A weight outside its range in [`permitted::SETTINGS`]. That they are stable on the platform is for the
     /// compiler to check, not for this function.
     pub fn with_weights(
         self,
         level_weight: Real,
         drift_weight: Real,
     ) -> Result<Self, ConfigError> {
-        if !(0.0..=1.0).contains(&level_weight) {
-            return Err(ConfigError {
-                word: CONFIG_WEIGHTS,
-            });
-        }
-        if !(0.0..=1.0).contains(&drift_weight) {
-            return Err(ConfigError {
-                word: CONFIG_WEIGHTS + 1,
-            });
-        }
-        Ok(Self {
+        Self {
             level_weight,
             drift_weight,
             ..self
-        })
-    }
-
-    /// The same with other code limits.
-    ///
-    /// # Errors
-    /// A step below one code, or limits that leave the spec's voltage limits or are empty.
-    pub const fn with_code_limits(
-        self,
-        code_limits: CodeLimits,
-    ) -> Result<Self, ConfigError> {
-        if code_limits.max_step < 1 {
-            return Err(ConfigError { word: CONFIG_CODES });
         }
-        if code_limits.min < limits::CODES[0] || code_limits.min > limits::CODES[1] {
-            return Err(ConfigError {
-                word: CONFIG_CODES + 1,
-            });
-        }
-        if code_limits.max < code_limits.min || code_limits.max > limits::CODES[1] {
-            return Err(ConfigError {
-                word: CONFIG_CODES + 2,
-            });
-        }
-        Ok(Self { code_limits, ..self })
+            .checked()
     }
 
     /// The same with other gains for P/F and for P alone.
     ///
     /// # Errors
-    /// A gain that is negative, not finite or above [`LARGEST_GAIN`]. That they are stable on the platform is for
-    /// the compiler to check, not for this function.
+    /// A gain outside its range in [`permitted::SETTINGS`]. That they are stable on the platform is for the compiler
+    /// to check, not for this function.
     pub fn with_gains(
         self,
         gains: Gains<Real>,
         position_gains: Gains<Real>,
     ) -> Result<Self, ConfigError> {
-        let mut word = CONFIG_GAINS;
-        for set in [&gains, &position_gains] {
-            for gain in [&set.proportional, &set.integral, &set.derivative] {
-                within(gain, 0.0, LARGEST_GAIN, word)?;
-                word += 6;
-            }
-        }
         let damps = [damps(&gains), damps(&position_gains)];
-        Ok(Self {
+        Self {
             gains,
             position_gains,
             damps,
             ..self
-        })
+        }
+            .checked()
     }
 
     /// The same with another environment.
     ///
     /// # Errors
-    /// A stiffness that is negative, not finite or above [`LARGEST_GAIN`], or a pose beyond [`LARGEST_REST`].
+    /// A stiffness or a pose outside its range.
     pub fn with_environment(
         self,
         environment: Environment,
     ) -> Result<Self, ConfigError> {
-        within(&environment.stiffness, 0.0, LARGEST_GAIN, CONFIG_GAINS + 36)?;
-        within(&environment.rest, -LARGEST_REST, LARGEST_REST, CONFIG_GAINS + 42)?;
-        Ok(Self { environment, ..self })
+        Self { environment, ..self }.checked()
     }
-}
 
-/// Every value is within the range, or the word of the first that is not.
-fn within(
-    values: &[Real; 6],
-    low: Real,
-    high: Real,
-    first_word: usize,
-) -> Result<(), ConfigError> {
-    for (axis, value) in values.iter().enumerate() {
-        if !(low..=high).contains(value) {
+    /// The same with other code limits.
+    ///
+    /// # Errors
+    /// A step below one code or above `actuator.slew_rate`, or limits that leave the spec's voltage limits or are empty.
+    pub fn with_code_limits(self, code_limits: CodeLimits) -> Result<Self, ConfigError> {
+        Self { code_limits, ..self }.checked()
+    }
+
+    /// These settings, if each is within its range.
+    #[inline(never)]
+    fn checked(self) -> Result<Self, ConfigError> {
+        Self::check(&self.to_words())?;
+        Ok(self)
+    }
+
+    /// Every word is within its range, or the first that is not.
+    #[inline(never)]
+    pub(crate) fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
+        for (word, value) in words.iter().enumerate() {
+            match permitted::of(word) {
+                Some(permitted) if permitted.takes(*value) => {}
+                _ => return Err(ConfigError { word }),
+            }
+        }
+        if words[CONFIG_CODES + 2] < words[CONFIG_CODES + 1] {
             return Err(ConfigError {
-                word: first_word + axis,
+                word: CONFIG_CODES + 2,
             });
         }
+        Ok(())
     }
-    Ok(())
 }
 
 /// Whether any k_v is other than zero.

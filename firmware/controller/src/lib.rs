@@ -34,6 +34,7 @@ pub mod kinematics;
 pub mod limits;
 mod machine_words;
 
+pub mod permitted;
 pub mod sensing;
 pub mod setpoint;
 pub mod snapshot;
@@ -47,7 +48,7 @@ pub mod task_space;
 pub mod waves;
 mod words;
 
-pub use config::{Config, ConfigError, Environment, LARGEST_GAIN, LARGEST_REST, LEG_GAIN};
+pub use config::{Config, ConfigError, Environment, LEG_GAIN};
 pub use specgen_runtime::setpoint::{Command, CommandKind, Target};
 pub use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
 pub use state::{LegState, State};

@@ -13,7 +13,7 @@ use specgen_runtime::recorder::{Recorder, Row};
 pub use specgen_runtime::snapshot::Invalid;
 use specgen_runtime::snapshot::{Reader, Snapshot, Writer};
 use specgen_runtime::setpoint::{CommandKind, Generator};
-use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, LARGEST_STIFFNESS};
+use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
 use specgen_runtime::{
     ControlMode, Estimate, Integral, Interaction, NotchState, Rate, Transfer,
 };
@@ -21,7 +21,7 @@ use crate::hysteresis::{GRID, Memory};
 use crate::supervised::{
     MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, Supervisor, supervise,
 };
-use crate::{CONFIG_WORDS, Config, LEGS, LegState, Real, State, limits};
+use crate::{CONFIG_WORDS, Config, LEGS, LegState, Real, State, limits, permitted};
 
 /// Words of a [`Machine`].
 pub const MACHINE_STATE_WORDS: usize = <State as Snapshot>::WORDS
@@ -51,7 +51,7 @@ impl Machine {
     /// # Errors
     /// The first word that no machine holds: not finite, none of its kind, a code out of limits, no staircase of extrema.
     pub fn load(words: &[u64; MACHINE_STATE_WORDS]) -> Result<Self, Invalid> {
-        let mut reader = Reader::new(words);
+        let mut reader = Reader::new(words).within(permitted::STATE);
         let mut machine = Self::new();
         machine.state.restore(&mut reader)?;
         machine.supervisor.restore(&mut reader)?;
@@ -150,7 +150,7 @@ impl Snapshot for LegState {
             return Err(words.refused());
         }
         self.requested = words.real(LARGEST_PLACE)?;
-        self.excess = words.real(LARGEST_PLACE)?;
+        self.excess = words.real(words.sizes().request)?;
         Ok(())
     }
 }
@@ -206,11 +206,11 @@ impl Snapshot for State {
         }
         words.reals(&mut self.pose, LARGEST_PLACE)?;
         words.reals(&mut self.error, LARGEST_PLACE)?;
-        words.reals(&mut self.deflection, LARGEST_PLACE)?;
+        words.reals(&mut self.deflection, words.sizes().request)?;
         words.reals(&mut self.demand, LARGEST_PLACE)?;
-        words.reals(&mut self.load, LARGEST_PLACE)?;
+        words.reals(&mut self.load, words.sizes().request)?;
         words.reals(&mut self.wrench, LARGEST)?;
-        words.reals(&mut self.environment.stiffness, LARGEST_STIFFNESS)?;
+        words.reals(&mut self.environment.stiffness, words.sizes().stiffness)?;
         words.reals(&mut self.environment.rest, LARGEST_PLACE)?;
         self.rate.restore(words)?;
         self.generator.restore(words)?;

@@ -214,6 +214,9 @@ fn stand(
     if faults == 0 && compares(supervisor.phase) {
         supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, None));
     }
+    if !supervisor.phase.is_powered() {
+        state.load = [0.0; LEGS];
+    }
     supervisor.see(faults, 0, &input.gauge, &[0; LEGS], 1);
     faults << 8
 }

@@ -12,8 +12,8 @@ pub const PLAN: Plan<Real> = Plan {
     rest: 0,
     ramp_step: 4,
     ramp_every: 1,
-    patience: [100, 100, 5000, 500, 20001, 100],
-    weight: [1, 1, 1, 1, 10000, 1],
+    patience: [100, 100, 5000, 500, 20001, 100, 99001, 100000],
+    weight: [1, 1, 1, 1, 10000, 1, 1, 1],
     stuck_motion: 2.2e-8,
     stuck_samples: 84,
     disagreement: 1.2e-5,
@@ -21,6 +21,9 @@ pub const PLAN: Plan<Real> = Plan {
     tracking: [1e-5, 1e-5, 1.04e-5, 8e-5, 7.000000000000001e-5, 0.0001],
     tracking_samples: 167,
 };
+
+/// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
+pub const HOST_TICKS: u32 = 1000;
 
 /// Reading of each gauge (rows) per displacement of each leg (columns) at rest, m/m; from `gauge` and `geometry`.
 pub const READINGS_PER_LEG: [[Real; 6]; 6] = [

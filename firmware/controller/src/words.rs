@@ -237,6 +237,7 @@ impl Config {
     /// # Errors
     /// The first word that is out of range.
     pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
+        Self::check(words)?;
         let Some(mode) = ControlMode::from_word(words[0]) else {
             return Err(ConfigError { word: 0 });
         };
@@ -244,9 +245,9 @@ impl Config {
             return Err(ConfigError { word: 1 });
         };
         let limits = CodeLimits {
-            max_step: code(words[CONFIG_CODES]),
-            min: code(words[CONFIG_CODES + 1]),
-            max: code(words[CONFIG_CODES + 2]),
+            max_step: words[CONFIG_CODES] as i32,
+            min: words[CONFIG_CODES + 1] as i32,
+            max: words[CONFIG_CODES + 2] as i32,
         };
         let gains = |first: usize| Gains {
             proportional: six(words, first),
@@ -308,11 +309,6 @@ fn six(words: &[u64], first: usize) -> [Real; 6] {
         *value = Real::from_word(*word);
     }
     vector
-}
-
-/// A code from its word; anything that is no code becomes −1, which no limit accepts.
-fn code(word: u64) -> i32 {
-    if word > i32::MAX as u64 { -1 } else { word as i32 }
 }
 
 /// A counter from its word.

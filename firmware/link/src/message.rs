@@ -172,7 +172,7 @@ pub enum Refusal {
     State,
     /// The answer does not fit into a message.
     TooLong,
-    /// Another host has the device.
+    /// Another host has the orders, or there are more of them than are carried out: hold and ramp-down are taken all the same.
     Busy,
 }
 

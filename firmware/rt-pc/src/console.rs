@@ -12,6 +12,9 @@ use crate::handover::{Order, Row};
 use crate::operator::{Operator, Said};
 use crate::words::Places;
 
+/// Orders that may wait for room in the ring: the loop takes one a tick.
+const MOST_ORDERS: usize = 64;
+
 /// Why something is not done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum No {
@@ -142,6 +145,11 @@ impl Console {
     /// Stops the recorder.
     pub fn stop_recorder(&mut self) {
         self.order(Order::StopRecorder);
+    }
+
+    /// Whether the loop has orders enough for now.
+    pub fn is_full(&self) -> bool {
+        self.orders.len() >= MOST_ORDERS
     }
 
     /// Puts an order behind the others; its number.

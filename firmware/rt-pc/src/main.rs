@@ -26,6 +26,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 
+use controller::supervision::HOST_TICKS;
 use controller::{CONFIG_NAMES, CONFIG_WORDS, Config};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use specgen_rt::account::Account;
@@ -39,7 +40,7 @@ use control::{Loop, Timing};
 use devices::Device;
 use devices::simulated::Simulated;
 use handover::Shared;
-use operator::Operator;
+use operator::{Operator, Patience};
 use options::{Asked, Options};
 use service::{Link, Service, Socket};
 use summary::Summary;
@@ -114,13 +115,14 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     let timing = Timing {
         period,
         limit: (period as f64 * options.late_after) as u64,
-        silence: options.link_silence.div_ceil(period),
+        silence: options.link_silence.map_or(u64::from(HOST_TICKS), |silence| silence.div_ceil(period)),
         elastic: options.elastic,
     };
     let places = Places::find().map_err(|error| environment(error.to_string()))?;
     // Somebody or something is there to end it.
     let attended = options.socket.is_some() || options.link.is_some() || options.duration.is_some();
-    let mut operator = Operator::new(places.clone(), attended, options.link_silence);
+    let patience = Patience { silence: timing.silence * period, idle: options.link_idle };
+    let mut operator = Operator::new(places.clone(), attended, patience);
     if options.arm {
         operator.plan(&options.set, clock::now()).map_err(|error| usage(format!("--set: {error}")))?;
     }
@@ -234,12 +236,12 @@ fn configure(assignments: &[String]) -> Result<Config, String> {
             place.ok_or_else(|| format!("--config: no setting `{name}`; there are {}", CONFIG_NAMES.join(", ")))?;
         let number: f64 =
             value.parse().map_err(|_| format!("--config: `{name}`: expected a number, found `{value}`"))?;
-        words[place] = words::setting(name, number).ok_or_else(|| {
+        words[place] = words::setting(place, number).ok_or_else(|| {
             format!("--config: `{name}`: expected a finite number, or a whole one from 0 where it is a choice or a code; found `{value}`")
         })?;
     }
     Config::from_words(&words).map_err(|error| {
         let name = CONFIG_NAMES.get(error.word).copied().unwrap_or("?");
-        format!("--config: the controller refuses `{name}`; its range is in the spec's documentation")
+        format!("--config: `{name}` is out of its range: expected {}", words::range(error.word))
     })
 }

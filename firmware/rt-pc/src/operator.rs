@@ -1,7 +1,7 @@
 //! What is asked of the machine, and when: by the command line's plan, by lines on a socket, over a link, by signals.
 //!
 //! There is one state of it, whoever asks. A host that has ordered something over a link has the orders for as long as it is
-//! heard; lines may then only slow the machine down. An operator only asks. Whether a request is granted is the supervisor's business, and each step here waits for what it says.
+//! heard and goes on ordering; others may then only slow the machine down. An operator only asks. Whether a request is granted is the supervisor's business, and each step here waits for what it says.
 
 use controller::supervised::{Cause, MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, Phase, Request};
 use specgen_rt::clock::SECOND;
@@ -35,13 +35,42 @@ pub struct Said {
     pub late: u64,
 }
 
+/// A connection over a link; no number is given twice in a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HostId(pub u64);
+
+/// Why a host does not get the orders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Denied {
+    /// The program is ramping down to end.
+    Ending,
+    /// Another host has them.
+    Others,
+}
+
+/// For how long a host over a link has the orders, ns.
+#[derive(Debug, Clone, Copy)]
+pub struct Patience {
+    /// It may be silent for so long.
+    pub silence: u64,
+    /// It may be there without ordering anything for so long.
+    pub idle: u64,
+}
+
 /// Who gave the last order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Owner {
     /// The plan, or lines.
     Here,
-    /// A host over a link, which was last heard at this time, ns.
-    Link(u64),
+    /// A host over a link.
+    Host {
+        id: HostId,
+        /// When it was last heard, and when it last ordered something, ns.
+        heard: u64,
+        ordered: u64,
+        /// Its connection has ended.
+        left: bool,
+    },
 }
 
 /// Where the plan stands.
@@ -77,19 +106,17 @@ pub struct Operator {
     owner: Owner,
     /// Requests over the link.
     requests: u64,
-    /// Lines took the orders from a silent host.
-    evicted: bool,
-    /// A host may be silent for so long, ns.
-    patience: u64,
+    /// The host from which the orders were taken last.
+    evicted: Option<HostId>,
+    patience: Patience,
     /// After a fault the loop goes on, for somebody will look at it or end it.
     attended: bool,
 }
 
 impl Operator {
-    /// An operator without a plan. If the plan fails the loop goes on where it is `attended`, else it ends. A host over a link
-    /// may be silent for `patience`, ns.
+    /// An operator without a plan. If the plan fails the loop goes on where it is `attended`, else it ends.
     #[must_use]
-    pub fn new(places: Places, attended: bool, patience: u64) -> Self {
+    pub fn new(places: Places, attended: bool, patience: Patience) -> Self {
         Self {
             places,
             words: [0; MACHINE_INPUT_WORDS],
@@ -101,7 +128,7 @@ impl Operator {
             changed: true,
             owner: Owner::Here,
             requests: 0,
-            evicted: false,
+            evicted: None,
             patience,
             attended,
         }
@@ -220,10 +247,19 @@ impl Operator {
             ));
         }
         if !linked {
-            self.evicted |= self.is_links();
-            self.owner = Owner::Here;
+            self.give(Owner::Here);
         }
         Ok(())
+    }
+
+    /// Gives the orders to somebody; a host that had them is to come anew.
+    fn give(&mut self, owner: Owner) {
+        if let Owner::Host { id, .. } = self.owner
+            && !matches!(owner, Owner::Host { id: next, .. } if next == id)
+        {
+            self.evicted = Some(id);
+        }
+        self.owner = owner;
     }
 
     /// Asks for something by hand: a plan is over, but for the way down.
@@ -240,61 +276,97 @@ impl Operator {
         matches!(self.step, Step::GoingDown | Step::Over)
     }
 
-    /// Whether a host over a link has the orders and is there.
+    /// Whether a host over a link has the orders: it is there, and has ordered something lately.
     #[must_use]
     pub fn linked(&self, now: u64) -> bool {
-        matches!(self.owner, Owner::Link(heard) if now.saturating_sub(heard) <= self.patience)
+        match self.owner {
+            Owner::Here => false,
+            Owner::Host { heard, ordered, left, .. } => {
+                let Patience { silence, idle } = self.patience;
+                !left && now.saturating_sub(heard) <= silence && now.saturating_sub(ordered) <= idle
+            }
+        }
     }
 
-    /// Whether the silence of the link matters: its host has ordered something.
+    /// Whether the silence of the link matters: a host has ordered something.
     #[must_use]
     pub fn is_links(&self) -> bool {
-        matches!(self.owner, Owner::Link(_))
+        matches!(self.owner, Owner::Host { .. })
     }
 
-    /// Whether lines took the orders from a silent host since this was asked last.
-    pub fn take_evicted(&mut self) -> bool {
-        std::mem::take(&mut self.evicted)
+    /// Whether this host gave the last order.
+    #[must_use]
+    pub fn is_hosts(&self, host: HostId) -> bool {
+        matches!(self.owner, Owner::Host { id, .. } if id == host)
     }
 
-    /// Another number with every request, where the silence of the link matters; else 0.
+    /// Whether the orders were taken from this host.
+    #[must_use]
+    pub fn is_evicted(&self, host: HostId) -> bool {
+        self.evicted == Some(host)
+    }
+
+    /// Another number with every request of the host that has the orders; 0 where nobody's silence matters.
     #[must_use]
     pub fn link_number(&self) -> u64 {
         if self.is_links() { self.requests } else { 0 }
     }
 
-    /// A host over the link was heard.
-    pub fn heard(&mut self, now: u64) {
-        self.requests += 1;
-        if self.is_links() {
-            self.owner = Owner::Link(now);
+    /// A host was heard.
+    pub fn heard(&mut self, host: HostId, now: u64) {
+        if let Owner::Host { id, heard, .. } = &mut self.owner
+            && *id == host
+        {
+            *heard = now;
+            self.requests += 1;
         }
     }
 
-    /// A host over the link comes anew: if the last one had the orders, nothing is asked for.
-    pub fn greeted(&mut self) {
-        if self.is_links() && !self.is_ending() {
+    /// A host comes anew: what one that is not there any more asked for is not asked for on its behalf.
+    pub fn greeted(&mut self, host: HostId, now: u64) {
+        if self.is_links() && self.may_order(host, now) && !self.is_ending() {
             self.ask(Request::None);
         }
     }
 
-    /// The host over the link has gone. A machine that is off does not miss it.
-    pub fn left(&mut self, last: Option<&Said>) {
-        if last.is_none_or(|said| said.phase == Phase::Disarmed && !said.on) {
-            self.owner = Owner::Here;
+    /// A host has gone. A machine that is off does not miss it.
+    pub fn left(&mut self, host: HostId, last: Option<&Said>) {
+        if let Owner::Host { id, left, .. } = &mut self.owner
+            && *id == host
+        {
+            *left = true;
+            if last.is_none_or(|said| said.phase == Phase::Disarmed && !said.on) {
+                self.owner = Owner::Here;
+            }
         }
     }
 
-    /// The host over the link gets the orders, if there are any to give.
-    pub fn take_for_link(&mut self, now: u64) -> bool {
-        if !self.is_ending() {
-            self.owner = Owner::Link(now);
-            self.step = Step::Free;
-        }
-        !self.is_ending()
+    /// Whether nobody else has the orders.
+    #[must_use]
+    pub fn may_order(&self, host: HostId, now: u64) -> bool {
+        self.is_hosts(host) || !self.linked(now)
     }
 
-    /// The host over the link asks; it has the orders.
+    /// A host gets the orders.
+    ///
+    /// # Errors
+    /// There are none to give, or another host has them.
+    pub fn take_for_host(&mut self, host: HostId, now: u64) -> Result<(), Denied> {
+        if self.is_ending() {
+            return Err(Denied::Ending);
+        }
+        if !self.may_order(host, now) {
+            return Err(Denied::Others);
+        }
+        if !self.is_hosts(host) {
+            self.requests += 1;
+        }
+        self.give(Owner::Host { id: host, heard: now, ordered: now, left: false });
+        self.step = Step::Free;
+        Ok(())
+    }
+
+    /// A host asks: it has the orders, or slows the machine down.
     pub fn ask_by_link(&mut self, request: Request) {
         self.ask(request);
     }
@@ -368,13 +440,16 @@ mod tests {
     use super::*;
 
     const PATIENCE: u64 = 100;
+    const IDLE: u64 = 1000;
+    const A: HostId = HostId(1);
+    const B: HostId = HostId(2);
 
     fn said(phase: Phase, on: bool) -> Said {
         Said { phase, cause: Cause::None, on, status: 0, tick: 7, orders: 0, waving: false, late: 0 }
     }
 
     fn operator() -> Operator {
-        Operator::new(Places::find().unwrap(), false, PATIENCE)
+        Operator::new(Places::find().unwrap(), false, Patience { silence: PATIENCE, idle: IDLE })
     }
 
     #[test]
@@ -414,7 +489,7 @@ mod tests {
 
     #[test]
     fn where_somebody_looks_a_fault_does_not_end_the_loop() {
-        let mut operator = Operator::new(Places::find().unwrap(), true, PATIENCE);
+        let mut operator = Operator::new(Places::find().unwrap(), true, Patience { silence: PATIENCE, idle: IDLE });
         operator.plan(&[], 0).unwrap();
         operator.hear(&said(Phase::Faulted, false), 1);
         operator.hear(&said(Phase::Faulted, false), 2);
@@ -453,31 +528,52 @@ mod tests {
     #[test]
     fn a_host_has_the_orders_while_it_is_heard_and_lines_may_only_slow_the_machine_down() {
         let mut operator = operator();
-        operator.heard(0);
-        operator.left(None);
+        operator.heard(A, 0);
+        operator.left(A, None);
         assert!(operator.obey("arm", 1).is_ok() && operator.link_number() == 0, "one that only looks has no orders");
-        assert!(operator.take_for_link(10));
+        operator.take_for_host(A, 10).unwrap();
         operator.ask_by_link(Request::Run);
         assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run.word());
         for line in ["arm", "run", "none", "acknowledge", "set setpoint[0]=0"] {
             assert!(operator.obey(line, 10 + PATIENCE).unwrap_err().contains("a host over the link has the orders"));
         }
-        assert!(operator.obey("hold", 20).is_ok() && operator.linked(20));
-        operator.heard(200);
-        // Gone while something moves: it is missed until lines take over.
-        operator.left(Some(&said(Phase::Running, true)));
+        assert_eq!(operator.take_for_host(B, 10 + PATIENCE), Err(Denied::Others));
+        assert!(operator.obey("hold", 20).is_ok() && operator.linked(20) && !operator.is_evicted(A));
+        operator.heard(A, 200);
+        let number = operator.link_number();
+        operator.heard(B, 250);
+        assert_eq!(operator.link_number(), number, "another host is not the one that is missed");
+        // Silent while something moves: it is missed until somebody takes over.
         assert!(operator.linked(200 + PATIENCE) && !operator.linked(201 + PATIENCE) && operator.link_number() > 0);
-        assert!(!operator.take_evicted());
-        assert!(operator.obey("ramp-down", 500).is_ok() && operator.take_evicted() && operator.link_number() == 0);
+        assert!(operator.obey("ramp-down", 500).is_ok() && operator.is_evicted(A) && operator.link_number() == 0);
+        // Gone while something moves: missed, and everybody may take over at once.
+        operator.take_for_host(B, 600).unwrap();
+        operator.left(B, Some(&said(Phase::Running, true)));
+        assert!(operator.link_number() > 0 && !operator.linked(600));
         // Gone while nothing can move: not missed.
-        assert!(operator.take_for_link(600));
-        operator.left(Some(&said(Phase::Disarmed, false)));
+        operator.take_for_host(A, 600).unwrap();
+        operator.left(A, Some(&said(Phase::Disarmed, false)));
         assert_eq!(operator.link_number(), 0);
         operator.go_down(700);
         assert!(
-            !operator.take_for_link(701)
+            operator.take_for_host(A, 701) == Err(Denied::Ending)
                 && operator.obey("run", 701).is_err()
                 && operator.obey("ramp-down", 701).is_ok()
         );
+    }
+
+    #[test]
+    fn a_host_that_orders_nothing_for_long_loses_the_orders_to_the_next() {
+        let mut operator = operator();
+        operator.take_for_host(A, 0).unwrap();
+        for now in (0..=IDLE).step_by(50) {
+            operator.heard(A, now);
+        }
+        assert_eq!(operator.take_for_host(B, IDLE), Err(Denied::Others));
+        operator.heard(A, IDLE + 1);
+        // It still has them while nobody asks, and its silence would be noticed.
+        assert!(operator.is_hosts(A) && operator.link_number() > 0);
+        operator.take_for_host(B, IDLE + 1).unwrap();
+        assert!(operator.is_evicted(A) && operator.is_hosts(B));
     }
 }

@@ -34,7 +34,8 @@ Operation
   --config NAME=VALUE  a setting for this run, such as mode=6
   --socket PATH        listen for lines: status, set, arm, run, hold, ramp-down, acknowledge, stop
   --link PATH          answer the link protocol of boards, for `specgen operate --socket PATH`
-  --link-silence MS    a host that ordered something over the link and is silent for so long is lost (default 100)
+  --link-silence MS    a host that ordered something over the link and is silent for so long is lost (default: host_lost of the spec)
+  --link-idle S        a host that ordered nothing for so long loses the orders to the next that does (default 60)
   --record FILE        write every tick of the run to FILE, for `specgen replay`
   --capture FILE       write what the recorder kept around a fault, or a trigger over the link, to FILE
   --json               print the summary as JSON
@@ -91,7 +92,9 @@ pub struct Options {
     /// Socket of the link.
     pub link: Option<PathBuf>,
     /// ns.
-    pub link_silence: u64,
+    pub link_silence: Option<u64>,
+    /// A host that is there may order nothing for so long, ns.
+    pub link_idle: u64,
     /// File of the record.
     pub record: Option<PathBuf>,
     /// File of the recorder.
@@ -135,7 +138,8 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
         config: Vec::new(),
         socket: None,
         link: None,
-        link_silence: 100_000_000,
+        link_silence: None,
+        link_idle: 60_000_000_000,
         record: None,
         capture: None,
         json: false,
@@ -172,8 +176,9 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             Long("config") => options.config.push(parser.value()?.string()?),
             Long("socket") => options.socket = Some(parser.value()?.into()),
             Long("link") => options.link = Some(parser.value()?.into()),
+            Long("link-idle") => options.link_idle = (number(&mut parser, "--link-idle", 0.1, 86_400.0)? * 1e9) as u64,
             Long("link-silence") => {
-                options.link_silence = (number(&mut parser, "--link-silence", 1.0, 60_000.0)? * 1e6) as u64;
+                options.link_silence = Some((number(&mut parser, "--link-silence", 1.0, 60_000.0)? * 1e6) as u64);
             }
             Long("capture") => options.capture = Some(parser.value()?.into()),
             Long("record") => options.record = Some(parser.value()?.into()),

@@ -1,5 +1,6 @@
 //! The thread beside the loop, without a deadline: writes the record, hears operators, carries the plan on.
 
+mod clients;
 mod desk;
 mod link;
 mod listener;

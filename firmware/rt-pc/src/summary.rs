@@ -89,10 +89,10 @@ impl Summary<'_> {
                 None => Ok(()),
             };
         }
-        if let Some(Traffic { hosts, requests, errors, refused }) = &self.outcome.link {
+        if let Some(Traffic { hosts, requests, errors, closed }) = &self.outcome.link {
             let _ = writeln!(
                 text,
-                "link: {requests} requests of {hosts} hosts, {errors} frames not believed, {refused} hosts refused beside another"
+                "link: {requests} requests of {hosts} hosts, {errors} frames not believed, {closed} hosts closed: others took the orders or the room"
             );
         }
         text
@@ -139,8 +139,8 @@ impl Summary<'_> {
             .collect();
         let link = self.outcome.link.map_or_else(
             || "null".to_owned(),
-            |Traffic { hosts, requests, errors, refused }| {
-                format!("{{ \"hosts\": {hosts}, \"requests\": {requests}, \"errors\": {errors}, \"refused_hosts\": {refused} }}")
+            |Traffic { hosts, requests, errors, closed }| {
+                format!("{{ \"hosts\": {hosts}, \"requests\": {requests}, \"errors\": {errors}, \"closed_hosts\": {closed} }}")
             },
         );
         let missing: Vec<String> = self.missing_rights.iter().map(|text| quoted(text)).collect();

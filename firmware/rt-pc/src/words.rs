@@ -3,9 +3,11 @@
 //! Places are found by the names that the controller gives its words, so that this is the same for six legs and for platforms.
 
 use controller::Real;
+use controller::permitted;
 use controller::sensing::gauge_reading;
 use controller::supervised::{MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS};
 use specgen_hal::CHANNELS;
+use specgen_runtime::Permitted;
 
 /// Words of one supervised tick.
 pub type Words = [u64; MACHINE_INPUT_WORDS];
@@ -125,14 +127,25 @@ pub fn word_of(index: usize, value: f64) -> Option<u64> {
     if name.contains('[') { Some(word(value as Real)) } else { integer(value) }
 }
 
-/// Settings that are choices or codes; all others are numbers.
-const INTEGERS: [&str; 7] =
-    ["mode", "interaction", "setpoint_kind", "run_interval", "max_step_codes", "code_min", "code_max"];
-
-/// The word of `value` in the setting `name`.
+/// The word of `value` in the setting with this place in `CONFIG_NAMES`.
 #[must_use]
-pub fn setting(name: &str, value: f64) -> Option<u64> {
-    if INTEGERS.contains(&name) { integer(value) } else { value.is_finite().then(|| word(value as Real)) }
+pub fn setting(place: usize, value: f64) -> Option<u64> {
+    match permitted::of(place)? {
+        Permitted::Whole(..) => integer(value),
+        Permitted::Number(..) => value.is_finite().then(|| word(value as Real)),
+    }
+}
+
+/// What the setting with this place may be, in words.
+#[must_use]
+pub fn range(place: usize) -> String {
+    match permitted::of(place) {
+        Some(Permitted::Whole(least, most)) => {
+            format!("a whole number from {least} to {most}, and code_min at most code_max")
+        }
+        Some(Permitted::Number(least, most)) => format!("a number from {least:?} to {most:?}"),
+        None => "a setting of this controller".to_owned(),
+    }
 }
 
 fn integer(value: f64) -> Option<u64> {

@@ -3,7 +3,8 @@
 //! The integral is kept as the force it exerts (N, N m), not as ∫e: a change of gain then moves nothing.
 
 use crate::digest::Digest;
-use crate::real::Real;
+use crate::real::{Real, saturate};
+use crate::snapshot::LARGEST;
 
 /// Diagonal gains of (7): x, y, z, θx, θy, θz.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,11 +59,27 @@ impl<T: Real> Integral<T> {
         growth
     }
 
-    /// Adds a tick's growth.
+    /// Adds a tick's growth. No force grows beyond [`LARGEST`]: some of the permitted gains would take it there, and from there
+    /// to where numbers end.
     #[inline]
     pub fn grow(&mut self, growth: &[T; 6]) {
+        let mut size = T::ZERO;
         for (force, growth) in self.force.iter_mut().zip(growth) {
             *force = *force + *growth;
+            size = size + force.abs();
+        }
+        // Where the sum is within the bound so is each, and one comparison does for all.
+        let largest = T::from_f64(LARGEST);
+        if size > largest {
+            self.bound(largest);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn bound(&mut self, largest: T) {
+        for force in &mut self.force {
+            *force = saturate(*force, -largest, largest);
         }
     }
 

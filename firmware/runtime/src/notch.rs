@@ -10,7 +10,7 @@
 
 use crate::digest::Digest;
 use crate::real::Real;
-use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
+use crate::snapshot::{Invalid, Reader, Snapshot, Writer};
 
 /// H(z) = 1 − g (1 − z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²): what the bilinear transformation makes of the notch. At z = 1 it is 1
 /// whatever the rounding of g, a₁ and a₂.
@@ -74,6 +74,6 @@ impl<T: Real> Snapshot for NotchState<T> {
     }
 
     fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        words.reals(self.delays.as_flattened_mut(), LARGEST_PLACE)
+        words.reals(self.delays.as_flattened_mut(), words.sizes().request)
     }
 }

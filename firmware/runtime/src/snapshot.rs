@@ -9,12 +9,22 @@ use crate::feedback::Integral;
 use crate::motion::Motion;
 use crate::real::Real;
 
-/// Largest |place| that is loaded, m and rad, and what is counted alike (estimates, errors, deflections).
+/// Largest |place| that is loaded, m and rad: poses, set-points, displacements.
 pub const LARGEST_PLACE: f64 = 16.0;
 /// Largest |rate|, |acceleration| or |force| that is loaded, in SI units.
 pub const LARGEST: f64 = 1e9;
-/// Largest stiffness of an environment that is loaded, N/m and N m/rad: that of a `Config`.
-pub const LARGEST_STIFFNESS: f64 = 1e15;
+
+/// How large the numbers of a state may be where settings and gauges decide about it; the emitted `permitted::STATE`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sizes {
+    /// What the law asks for or withholds, m and rad: deflection, load, excess, offset of a change of mode, estimates, and what
+    /// the notch remembers of them. Gains may make it larger than any place.
+    pub request: f64,
+    /// Word of a gauge: m, or V with a calibration.
+    pub reading: f64,
+    /// Stiffness of the environment, N/m and N m/rad.
+    pub stiffness: f64,
+}
 
 /// Something that later ticks depend on.
 pub trait Snapshot {
@@ -125,13 +135,27 @@ fn clear(words: &mut [u64]) {
 pub struct Reader<'a> {
     words: &'a [u64],
     count: usize,
+    sizes: Sizes,
 }
 
 impl<'a> Reader<'a> {
     /// From the first of `words` on.
     #[must_use]
     pub fn new(words: &'a [u64]) -> Self {
-        Self { words, count: 0 }
+        let sizes = Sizes { request: LARGEST_PLACE, reading: LARGEST_PLACE, stiffness: LARGEST };
+        Self { words, count: 0, sizes }
+    }
+
+    /// The same for a state with numbers of these sizes.
+    #[must_use]
+    pub fn within(self, sizes: Sizes) -> Self {
+        Self { sizes, ..self }
+    }
+
+    /// How large the numbers of the state may be.
+    #[must_use]
+    pub fn sizes(&self) -> Sizes {
+        self.sizes
     }
 
     /// Words read so far.
@@ -220,8 +244,9 @@ impl<T: Real> Snapshot for Estimate<T> {
     }
 
     fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        self.level = words.real(LARGEST_PLACE)?;
-        self.drift = words.real(LARGEST_PLACE)?;
+        let largest = words.sizes().request;
+        self.level = words.real(largest)?;
+        self.drift = words.real(largest)?;
         Ok(())
     }
 }

@@ -30,7 +30,7 @@ mod snapshot;
 mod watch;
 
 pub use approach::Approach;
-pub use debounce::{Debounce, TIMED};
+pub use debounce::{Debounce, TIMED, TIMERS};
 pub use kinds::{
     CONVERTER, Cause, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, RAMPS_DOWN, Request, STOP, SWITCHES_OFF,
 };

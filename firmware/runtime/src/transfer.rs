@@ -2,7 +2,7 @@
 
 use crate::digest::Digest;
 use crate::real::Real;
-use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
+use crate::snapshot::{Invalid, Reader, Snapshot, Writer};
 
 /// An offset on each leg's request that fades exponentially, m. Zero at reset.
 #[derive(Debug, Clone, Copy)]
@@ -81,7 +81,7 @@ impl<T: Real> Snapshot for Transfer<T> {
     }
 
     fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        words.reals(&mut self.offset, LARGEST_PLACE)?;
+        words.reals(&mut self.offset, words.sizes().request)?;
         self.active = words.flag()?;
         Ok(())
     }

@@ -31,6 +31,7 @@ tracking_time     = \"3.6 ms\"
 voltage_time      = \"2 ms\"
 slew_time         = \"1 ms\"
 missed_ticks      = 2
+host_lost         = [\"0.4 ms\", \"1.4 ms\"]
 
 [timing]
 ";
@@ -217,7 +218,7 @@ impl Bench {
             let step = (code - before).abs();
             assert!(step <= self.max_step, "tick {}: leg {leg} moves by {step} codes", self.tick);
         }
-        assert!(self.word.phase <= FAULTED && self.word.cause <= 12, "tick {}: {:?}", self.tick, self.word);
+        assert!(self.word.phase <= FAULTED && self.word.cause <= 14, "tick {}: {:?}", self.tick, self.word);
         let powered = matches!(self.word.phase, ARMING | RUNNING | HOLDING | RAMPING);
         assert_eq!(self.word.amplifier_on, powered, "tick {}: amplifiers", self.tick);
         if matches!(self.word.phase, HOLDING | ARMING) {

@@ -6,6 +6,7 @@ mod bench;
 mod bits;
 mod document;
 mod fuzz;
+mod lost;
 mod oracle;
 mod refusals;
 mod sequences;

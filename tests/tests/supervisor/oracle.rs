@@ -12,6 +12,8 @@ pub struct Bounds {
     pub slew_ticks: i64,
     pub samples: i64,
     pub ticks_per_second: i64,
+    /// Ticks until a host that is lost is gone, and until a converter is silent.
+    pub gone_ticks: [i64; 2],
     /// Of each axis, or of each leg: m, rad.
     pub tracking: [f64; 6],
     pub gauge_range: [f64; 2],
@@ -31,6 +33,8 @@ impl Bounds {
             slew_ticks: 5,
             samples: 3,
             ticks_per_second: 5000,
+            // A host is lost after 2 ticks, in the third of silence; 7 ticks of silence are 1.4 ms.
+            gone_ticks: [6, 7],
             tracking: [6e-6; 6],
             gauge_range: [-2e-6, 48e-6],
         }
@@ -45,6 +49,7 @@ impl Bounds {
             slew_ticks: 10,
             samples: 6,
             ticks_per_second: 10_000,
+            gone_ticks: [11, 14],
             tracking: workspace.map(|full| 0.1 * full),
             gauge_range,
         }
@@ -62,7 +67,7 @@ enum Act {
 fn act(cause: u8) -> Act {
     match cause {
         10 | 12 => Act::Off,
-        1..=4 => Act::Ramp,
+        1..=4 | 13 | 14 => Act::Ramp,
         _ => Act::Hold,
     }
 }
@@ -88,7 +93,7 @@ pub struct Oracle {
     good: u32,
     /// Causes that the readings of the last tick showed, and their counts by cause.
     seen: Vec<u8>,
-    counts: [i64; 13],
+    counts: [i64; 15],
     channels: [Channel; 6],
     lasted: Vec<u8>,
     turn: usize,
@@ -105,7 +110,7 @@ impl Oracle {
             arm_waits: false,
             good: 0,
             seen: Vec::new(),
-            counts: [0; 13],
+            counts: [0; 15],
             channels: Default::default(),
             lasted: Vec::new(),
             turn: 0,
@@ -128,16 +133,24 @@ impl Oracle {
             }
         }
         let mut lasted = std::mem::take(&mut self.lasted);
-        for cause in [1, 2, 6, 7, 8, 11_u8] {
+        for cause in [1, 2, 6, 7, 8, 11, 13, 14_u8] {
+            // A host that is lost, a converter that does not answer: after a while nobody waits for them.
+            let shown = match cause {
+                13 => 9,
+                14 => 11,
+                other => other,
+            };
             let (limit, weight) = match cause {
+                13 => (self.bounds.gone_ticks[0], 1),
+                14 => (self.bounds.gone_ticks[1], 1),
                 6 => (self.bounds.voltage_ticks, 1),
                 7 => (self.bounds.slew_ticks, 1),
                 8 => (self.bounds.ticks_per_second + 1, self.bounds.ticks_per_second),
                 _ => (self.bounds.gauge_ticks, 1),
             };
             let count = &mut self.counts[usize::from(cause)];
-            *count = if present.contains(&cause) { (*count + weight).min(limit) } else { (*count - 1).max(0) };
-            if present.contains(&cause) && *count == limit {
+            *count = if present.contains(&shown) { (*count + weight).min(limit) } else { (*count - 1).max(0) };
+            if present.contains(&shown) && *count == limit {
                 lasted.push(cause);
             }
         }
@@ -200,7 +213,7 @@ impl Oracle {
         self.cause = cause;
         self.good = 0;
         if phase != HOLDING && phase != RAMPING {
-            self.counts = [0; 13];
+            self.counts = [0; 15];
             self.channels = Default::default();
             self.lasted.clear();
         }

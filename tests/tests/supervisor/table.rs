@@ -3,7 +3,7 @@
 use super::bench::*;
 use std::collections::BTreeMap;
 
-const NAMES: [&str; 13] = [
+const NAMES: [&str; 15] = [
     "none",
     "gauge not finite",
     "gauge range",
@@ -17,6 +17,8 @@ const NAMES: [&str; 13] = [
     "integrity",
     "converter",
     "emergency stop",
+    "host gone",
+    "converter silent",
 ];
 
 /// What is wrong from now on, tick by tick, for one cause.
@@ -88,6 +90,9 @@ fn expected(cause: u8, phase: u8) -> Option<(u8, u8)> {
         ARMING => Some((FAULTED, cause)),
         HOLDING | RUNNING if off => Some((FAULTED, cause)),
         _ if ramp => Some((FAULTED, cause)),
+        // It holds, and once nobody is waited for any more it ramps down.
+        _ if cause == 9 => Some((FAULTED, 13)),
+        _ if cause == 11 => Some((FAULTED, 14)),
         _ => Some((HOLDING, cause)),
     }
 }

@@ -5,7 +5,7 @@ use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
 use specgen::compile::{Compiled, compile};
-use specgen::{diagnostic, emit, spec, workspace};
+use specgen::{diagnostic, emit, settings, spec, workspace};
 use std::path::Path;
 
 /// Seed of the gauge noise in the committed records.
@@ -45,13 +45,20 @@ pub fn schema(_: &Path) -> Result<Files, String> {
     Ok(Files::from([("platform.schema.json".to_owned(), spec::json_schema())]))
 }
 
-/// References printed from the key table and the registry of findings.
+/// References printed from the key table, the registry of findings and the table of settings.
 pub fn docs(root: &Path) -> Result<Files, String> {
     Ok(Files::from([
         ("traceability.md".to_owned(), trace::markdown(root)?),
         ("spec-reference.md".to_owned(), spec::reference_markdown()),
         ("diagnostics.md".to_owned(), diagnostic::reference_markdown()),
+        ("settings.md".to_owned(), settings(root)?),
     ]))
+}
+
+/// The ranges of settings, of a platform and of six legs.
+fn settings(root: &Path) -> Result<String, String> {
+    let of = |spec: &str| compiled(&root.join("specs").join(spec));
+    Ok(settings::markdown(&of("reference.toml")?.ir, &of("legs.toml")?.ir))
 }
 
 /// The controller of the reference spec.

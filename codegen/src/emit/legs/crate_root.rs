@@ -40,6 +40,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod kinematics;
         pub mod limits;
         mod machine_words;
+        pub mod permitted;
         pub mod sensing;
         pub mod snapshot;
         pub mod stages;

@@ -20,17 +20,8 @@ pub fn outputs() -> Vec<String> {
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let (inputs, outputs) = (inputs(), outputs());
-    let config = [
-        "mode",
-        "setpoint_kind",
-        "level_weight",
-        "drift_weight",
-        "run_interval",
-        "max_step_codes",
-        "code_min",
-        "code_max",
-    ]
-    .map(str::to_owned);
+    let config = ir.permitted.names();
+    let codes_at = literal::count(config.iter().take_while(|name| *name != "max_step_codes").count());
     let description = description::text(ir, "legs", &inputs, &outputs, &config);
     let (input_words, output_words, config_words) =
         (literal::count(inputs.len()), literal::count(outputs.len()), literal::count(config.len()));
@@ -54,6 +45,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] = [#(#outputs),*];
         /// Names of the settings. `mode` is 0 invhys, 1 ewma, 2 pcc; `setpoint_kind` is 0 pose, 1 leg.
         pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = [#(#config),*];
+        /// First word of the code limits in [`CONFIG_NAMES`].
+        pub(crate) const CONFIG_CODES: usize = #codes_at;
 
         /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
         pub const DESCRIPTION: &str = #description;
@@ -93,6 +86,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
             /// # Errors
             /// The first word that is out of range.
             pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
+                Self::check(words)?;
                 let law = match words[0] {
                     0 => Law::Invhys,
                     1 => Law::Ewma,
@@ -104,13 +98,16 @@ pub fn emit(ir: &Ir) -> TokenStream {
                     1 => SetpointKind::Leg,
                     _ => return Err(ConfigError { word: 1 }),
                 };
-                let run_interval = if words[4] > u32::MAX as u64 { 0 } else { words[4] as u32 };
-                let limits = CodeLimits { max_step: code(words[5]), min: code(words[6]), max: code(words[7]) };
+                let limits = CodeLimits {
+                    max_step: words[CONFIG_CODES] as i32,
+                    min: words[CONFIG_CODES + 1] as i32,
+                    max: words[CONFIG_CODES + 2] as i32,
+                };
                 Self::new()
                     .with_law(law)
                     .with_setpoint(setpoint)
                     .with_weights(Real::from_word(words[2]), Real::from_word(words[3]))?
-                    .with_run_interval(run_interval)?
+                    .with_run_interval(words[4] as u32)?
                     .with_code_limits(limits)
             }
 
@@ -138,11 +135,6 @@ pub fn emit(ir: &Ir) -> TokenStream {
                     limits.max as u32 as u64,
                 ]
             }
-        }
-
-        /// A code from its word; anything that is no code becomes −1, which no limit accepts.
-        fn code(word: u64) -> i32 {
-            if word > i32::MAX as u64 { -1 } else { word as i32 }
         }
     }
 }

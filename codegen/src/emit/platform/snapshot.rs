@@ -8,7 +8,7 @@ use crate::emit::snapshot;
 pub fn emit() -> TokenStream {
     let imports = quote! {
         use specgen_runtime::setpoint::{CommandKind, Generator};
-        use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, LARGEST_STIFFNESS};
+        use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
         use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, NotchState, Rate, Transfer};
     };
     let input = quote! {
@@ -32,7 +32,7 @@ pub fn emit() -> TokenStream {
         save: quote! { words.reals(&[self.requested, self.excess]); },
         restore: quote! {
             self.requested = words.real(LARGEST_PLACE)?;
-            self.excess = words.real(LARGEST_PLACE)?;
+            self.excess = words.real(words.sizes().request)?;
         },
     };
     let state = quote! {
@@ -89,11 +89,11 @@ pub fn emit() -> TokenStream {
                 }
                 words.reals(&mut self.pose, LARGEST_PLACE)?;
                 words.reals(&mut self.error, LARGEST_PLACE)?;
-                words.reals(&mut self.deflection, LARGEST_PLACE)?;
+                words.reals(&mut self.deflection, words.sizes().request)?;
                 words.reals(&mut self.demand, LARGEST_PLACE)?;
-                words.reals(&mut self.load, LARGEST_PLACE)?;
+                words.reals(&mut self.load, words.sizes().request)?;
                 words.reals(&mut self.wrench, LARGEST)?;
-                words.reals(&mut self.environment.stiffness, LARGEST_STIFFNESS)?;
+                words.reals(&mut self.environment.stiffness, words.sizes().stiffness)?;
                 words.reals(&mut self.environment.rest, LARGEST_PLACE)?;
                 self.rate.restore(words)?;
                 self.generator.restore(words)?;

@@ -78,6 +78,10 @@ pub fn emit() -> TokenStream {
             if faults == 0 && compares(supervisor.phase) {
                 supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, None));
             }
+            if !supervisor.phase.is_powered() {
+                // What it knew of a load ends with the run: arming begins without.
+                state.load = [0.0; LEGS];
+            }
             supervisor.see(faults, 0, &input.gauge, &[0; LEGS], 1);
             faults << 8
         }

@@ -12,8 +12,6 @@ const COMMAND_VECTORS: [&str; 3] = ["setpoint", "setpoint_rate", "setpoint_accel
 const MEASURED_VECTORS: [&str; 2] = ["gauge", "wrench"];
 const OUTPUT_VECTORS: [&str; 9] =
     ["voltage", "requested", "demand", "level", "drift", "dac_code", "pose", "target", "load"];
-const GAIN_VECTORS: [&str; 8] =
-    ["kp", "ki", "kv", "position_kp", "position_ki", "position_kv", "environment_stiffness", "environment_rest"];
 
 /// Names of the input words.
 pub fn inputs() -> Vec<String> {
@@ -32,12 +30,9 @@ pub fn outputs() -> Vec<String> {
 
 pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let (inputs, outputs) = (inputs(), outputs());
-    let mut config: Vec<String> =
-        ["mode", "interaction", "level_weight", "drift_weight", "max_step_codes", "code_min", "code_max"]
-            .map(str::to_owned)
-            .to_vec();
-    let gains_at = literal::count(config.len());
-    config.extend(description::vectors(&GAIN_VECTORS));
+    let config = ir.permitted.names();
+    let at = |first: &str| literal::count(config.iter().take_while(|name| *name != first).count());
+    let (weights_at, codes_at, gains_at) = (at("level_weight"), at("max_step_codes"), at("kp[0]"));
     let bias: Vec<String> = task.law.bias.iter().map(|value| format!("{value:?}")).collect();
     let description =
         description::text(ir, "platform", &inputs, &outputs, &config) + &format!("bias={}\n", bias.join(","));
@@ -69,8 +64,8 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         /// neglected, 1 modelled, 2 measured. `kp`, `ki`, `kv` are the gains of P/F, `position_…` those of P.
         pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = [#(#config),*];
         /// First word of the weights, of the code limits and of the gains in [`CONFIG_NAMES`].
-        pub(crate) const CONFIG_WEIGHTS: usize = 2;
-        pub(crate) const CONFIG_CODES: usize = 4;
+        pub(crate) const CONFIG_WEIGHTS: usize = #weights_at;
+        pub(crate) const CONFIG_CODES: usize = #codes_at;
         pub(crate) const CONFIG_GAINS: usize = #gains_at;
         /// First measured word in [`INPUT_NAMES`].
         const INPUT_MEASURED: usize = 21;
@@ -124,6 +119,7 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
             /// # Errors
             /// The first word that is out of range.
             pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
+                Self::check(words)?;
                 let Some(mode) = ControlMode::from_word(words[0]) else {
                     return Err(ConfigError { word: 0 });
                 };
@@ -131,9 +127,9 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
                     return Err(ConfigError { word: 1 });
                 };
                 let limits = CodeLimits {
-                    max_step: code(words[CONFIG_CODES]),
-                    min: code(words[CONFIG_CODES + 1]),
-                    max: code(words[CONFIG_CODES + 2]),
+                    max_step: words[CONFIG_CODES] as i32,
+                    min: words[CONFIG_CODES + 1] as i32,
+                    max: words[CONFIG_CODES + 2] as i32,
                 };
                 let gains = |first: usize| Gains {
                     proportional: six(words, first),
@@ -193,11 +189,6 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
                 *value = Real::from_word(*word);
             }
             vector
-        }
-
-        /// A code from its word; anything that is no code becomes −1, which no limit accepts.
-        fn code(word: u64) -> i32 {
-            if word > i32::MAX as u64 { -1 } else { word as i32 }
         }
 
         /// A counter from its word.

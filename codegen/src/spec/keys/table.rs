@@ -2,6 +2,7 @@
 
 use super::{Dimension, Item, Key, Kind, MAX_TABLES, Presence, Range, SCHEMA_VERSION, Section, Shape};
 use crate::identify::MAX_GRID;
+use crate::model::{LARGEST_GAIN, LARGEST_RUN_INTERVAL, LARGEST_TRAVEL, LARGEST_TURN};
 use Presence::{Default, Form, InsteadOf, Optional, Required, Rule};
 
 const fn row(
@@ -28,6 +29,7 @@ const fn integer(min: i64, max: i64) -> Shape {
 }
 
 const TIMEOUT: Shape = one(Dimension::TIME, Range::closed(1e-6, 60.0), "ms");
+const SILENCE: Item = item(Dimension::TIME, Range::closed(1e-6, 3600.0), "ms");
 const RADIUS: Range = Range::closed(1e-3, 10.0);
 const JOINT_ANGLE: Range = Range::open(0.0, 2.0 * std::f64::consts::FRAC_PI_3);
 const CIRCLES: &str = "joint circles";
@@ -49,10 +51,9 @@ const FACTORS: Shape = Shape::List(&[RATIO; 2]);
 const CREEP_TIME: Item = item(Dimension::TIME, Range::closed(1e-6, 1e5), "ms");
 const CREEP_TIMES: Shape = Shape::Leading(1, &[CREEP_TIME; 6]);
 const CREEP_WEIGHTS: Shape = Shape::Leading(1, &[Item::Number(Range::closed(0.0, 1.0)); 6]);
-const TRAVEL: Item = item(Dimension::LENGTH, Range::closed(0.0, 0.1), "um");
-// The controller's series for small angles are sized by this bound.
-const TURN: Item = item(Dimension::ANGLE, Range::closed(0.0, 0.5), "mrad");
-const GAIN: Range = Range::closed(0.0, 1e15);
+const TRAVEL: Item = item(Dimension::LENGTH, Range::closed(0.0, LARGEST_TRAVEL), "um");
+const TURN: Item = item(Dimension::ANGLE, Range::closed(0.0, LARGEST_TURN), "mrad");
+const GAIN: Range = Range::closed(0.0, LARGEST_GAIN);
 const BYTES: Shape = one(Dimension::MEMORY, Range::closed(1.0, 1_099_511_627_776.0), "KiB");
 
 const fn gains(along: Dimension, along_unit: &'static str, about: Dimension, about_unit: &'static str) -> [Item; 6] {
@@ -116,8 +117,8 @@ const fn six(along: Item, about: Item) -> [Item; 6] {
 }
 
 const POSE: &[Item] = &six(
-    item(Dimension::LENGTH, Range::closed(-0.1, 0.1), "um"),
-    item(Dimension::ANGLE, Range::closed(-0.5, 0.5), "urad"),
+    item(Dimension::LENGTH, Range::closed(-LARGEST_TRAVEL, LARGEST_TRAVEL), "um"),
+    item(Dimension::ANGLE, Range::closed(-LARGEST_TURN, LARGEST_TURN), "urad"),
 );
 const FRAME: &[Item] = &six(CENTER, item(Dimension::ANGLE, Range::closed(-TURN_AROUND, TURN_AROUND), "rad"));
 const TURN_AROUND: f64 = std::f64::consts::PI;
@@ -271,7 +272,7 @@ pub const SECTIONS: &[Section] = &[
             row("level_bandwidth", BANDWIDTH, InsteadOf("level_weight"), "", "\"450 rad/s\"", "The same as a bandwidth: weight = bandwidth x period x run_interval."),
             row("drift_weight", WEIGHT, InsteadOf("drift_bandwidth"), "omega_2", "0.011", "Weight of a new reading in the drift estimate, per run: (AII.6)."),
             row("drift_bandwidth", BANDWIDTH, InsteadOf("drift_weight"), "", "\"20 rad/s\"", "The same as a bandwidth."),
-            row("run_interval", integer(1, 1_000_000), Default("1"), "", "1", "Control ticks per run."),
+            row("run_interval", integer(1, LARGEST_RUN_INTERVAL as i64), Default("1"), "", "1", "Control ticks per run."),
             row("gain_ratio", Shape::List(&[RATIO; 2]), Default("[0.9, 1.1]"), "lambda", "[0.9, 1.1]", "Smallest and largest true gain over modelled gain for which the loop must be stable: (AII.18), (AII.19)."),
         ],
     },
@@ -407,6 +408,7 @@ pub const SECTIONS: &[Section] = &[
             row("voltage_time", TIMEOUT, Rule("500 ms, at least a period"), "", "\"500 ms\"", "Time that a leg may stay at a limit of its voltage or table."),
             row("slew_time", TIMEOUT, Rule("50 ms, at least a period"), "", "\"50 ms\"", "Time that a leg may stay at the limit of its slew rate."),
             row("missed_ticks", integer(1, 1000), Default("3"), "", "3", "Missed ticks within a second that are a fault."),
+            row("host_lost", Shape::List(&[SILENCE; 2]), Rule("[\"100 ms\", \"10 s\"]"), "", "[\"100 ms\", \"10 s\"]", "How long a host that has the orders may be silent until the machine holds, and until it ramps down and switches off. A converter that stays silent holds after `gauge_time`, and ramps down after the second time."),
         ],
     },
     Section {

@@ -26,6 +26,7 @@ pub const PART: Part = Part {
         "src/options.rs",
         "src/record.rs",
         "src/service.rs",
+        "src/service/clients.rs",
         "src/service/desk.rs",
         "src/service/link.rs",
         "src/service/listener.rs",

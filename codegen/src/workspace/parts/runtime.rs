@@ -32,6 +32,7 @@ pub const PART: Part = Part {
         "src/mode.rs",
         "src/motion.rs",
         "src/notch.rs",
+        "src/permitted.rs",
         "src/real.rs",
         "src/record.rs",
         "src/recorder.rs",

@@ -10,6 +10,7 @@ use specgen_runtime::wave::{self, Settings};
 
 use crate::capture::CAPACITY;
 use crate::console::{Console, No};
+use crate::operator::{Denied, HostId};
 
 /// Bytes of a piece of something longer.
 const CHUNK: usize = 960;
@@ -19,29 +20,24 @@ const _: () = assert!(CHUNK + 24 < specgen_link::MESSAGE);
 pub struct Desk<'a> {
     /// What is asked of the run.
     pub console: &'a mut Console,
+    /// Who asks.
+    pub host: HostId,
+    /// Events that this host has not been told.
+    pub events: &'a mut u32,
     /// Now, ns.
     pub now: u64,
     /// Settings in an answer.
     pub words: [u8; size_of::<[u64; CONFIG_WORDS]>()],
 }
 
-/// Answers every request with this refusal.
-pub struct Closed(pub Refusal);
-
-impl Device for Closed {
-    fn execute(&mut self, _: &Request<'_>) -> Reply<'_> {
-        Reply::Refused(self.0)
-    }
-}
-
 impl<'a> Desk<'a> {
     /// At the console.
-    pub fn new(console: &'a mut Console, now: u64) -> Self {
-        Self { console, now, words: [0; size_of::<[u64; CONFIG_WORDS]>()] }
+    pub fn new(console: &'a mut Console, host: HostId, events: &'a mut u32, now: u64) -> Self {
+        Self { console, host, events, now, words: [0; size_of::<[u64; CONFIG_WORDS]>()] }
     }
 
     fn status(&mut self) -> Reply<'static> {
-        let events = self.console.take_events();
+        let events = core::mem::take(self.events);
         // Before the first tick it is as at power-up.
         let said = self.console.said.as_ref();
         Reply::Status(Status {
@@ -57,18 +53,29 @@ impl<'a> Desk<'a> {
         })
     }
 
-    /// Gives the orders to the link, then does `what`.
+    /// Gives the orders to this host, then does `what`.
     fn ordered(&mut self, what: impl FnOnce(&mut Self) -> Result<(), Refusal>) -> Reply<'static> {
-        if !self.console.operator.take_for_link(self.now) {
-            return Reply::Refused(Refusal::State);
-        }
-        what(self).map_or_else(Reply::Refused, |()| Reply::Done)
+        // One that orders faster than the loop obeys is not to delay what others have to say.
+        let done = if self.console.is_full() { Err(Refusal::Busy) } else { self.take().and_then(|()| what(self)) };
+        done.map_or_else(Reply::Refused, |()| Reply::Done)
     }
 
+    fn take(&mut self) -> Result<(), Refusal> {
+        self.console.operator.take_for_host(self.host, self.now).map_err(|denied| match denied {
+            Denied::Ending => Refusal::State,
+            Denied::Others => Refusal::Busy,
+        })
+    }
+
+    /// What slows the machine down is obeyed whoever has the orders.
     fn supervise(&mut self, request: u8) -> Result<(), Refusal> {
         let wanted = Wanted::from_word(u64::from(request));
         if wanted.word() != u64::from(request) {
             return Err(Refusal::Word { index: 0 });
+        }
+        match (self.take(), wanted) {
+            (Ok(()), _) | (Err(Refusal::Busy), Wanted::Hold) | (Err(_), Wanted::RampDown) => {}
+            (refused, _) => return refused,
         }
         self.console.operator.ask_by_link(wanted);
         Ok(())
@@ -108,7 +115,9 @@ impl<'a> Desk<'a> {
     }
 
     fn recorder(&mut self, action: RecorderAction) -> Reply<'static> {
+        let others = !self.console.operator.may_order(self.host, self.now) || self.console.is_full();
         let done = match action {
+            action if others && action != RecorderAction::Look => return Reply::Refused(Refusal::Busy),
             RecorderAction::Look => Ok(()),
             RecorderAction::Arm { after } => self.console.arm_recorder(after),
             RecorderAction::Trigger => {
@@ -149,10 +158,10 @@ fn piece(whole: &[u8], offset: u32) -> Reply<'_> {
 
 impl Device for Desk<'_> {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
-        self.console.operator.heard(self.now);
+        self.console.operator.heard(self.host, self.now);
         match *request {
             Request::Hello => {
-                self.console.operator.greeted();
+                self.console.operator.greeted(self.host, self.now);
                 Reply::Identity(Identity {
                     config_words: CONFIG_WORDS as u16,
                     input_words: MACHINE_INPUT_WORDS as u16,
@@ -164,7 +173,7 @@ impl Device for Desk<'_> {
             }
             Request::Describe { offset } => piece(DESCRIPTION.as_bytes(), offset),
             Request::Status => self.status(),
-            Request::Supervise { request } => self.ordered(|desk| desk.supervise(request)),
+            Request::Supervise { request } => self.supervise(request).map_or_else(Reply::Refused, |()| Reply::Done),
             Request::Setpoint { words } => self.ordered(|desk| desk.command(words)),
             Request::ReadConfig => match put_words(&self.console.config().to_words(), &mut self.words) {
                 Some(words) => Reply::Config { words },

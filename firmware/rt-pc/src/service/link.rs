@@ -1,34 +1,31 @@
-//! The link on a Unix socket: the frames of `specgen-link`, one host at a time.
+//! The link on a Unix socket: the frames of `specgen-link`. Several hosts may look; one has the orders.
 
-use std::io::{self, Read, Write};
-use std::os::fd::{AsFd, BorrowedFd};
-use std::os::unix::net::UnixStream;
+use std::io::{self, Write};
+use std::os::fd::BorrowedFd;
 use std::path::Path;
 
-use specgen_link::{Counters, Device, Endpoint, Refusal};
+use specgen_link::{Counters, Endpoint};
 
-use super::desk::{Closed, Desk};
+use super::clients::{Client, Clients, room};
+use super::desk::Desk;
 use super::listener::Listener;
 use crate::console::Console;
+use crate::operator::HostId;
 
-/// Hosts that are told at once that another one is there; more are closed.
-const GUESTS: usize = 4;
-/// Bytes that are taken from a connection in a round.
-const ROUND: usize = 1 << 16;
 /// Bytes that a connection may leave unread: more than any answer, and hosts ask one thing at a time.
 const UNREAD: usize = 1 << 14;
 
 /// What came over the link in a run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Traffic {
-    /// Hosts that connected, those that were refused included.
+    /// Hosts that connected.
     pub hosts: u64,
     /// Requests carried out or refused.
     pub requests: u64,
     /// Frames that were not believed.
     pub errors: u64,
-    /// Hosts that found another one there.
-    pub refused: u64,
+    /// Hosts that were closed: they lost the orders, or others needed the room.
+    pub closed: u64,
 }
 
 impl Traffic {
@@ -40,16 +37,16 @@ impl Traffic {
 
 /// The socket with its connections.
 pub struct Link {
-    listener: Listener,
-    host: Option<Line>,
-    guests: Vec<Line>,
+    hosts: Clients<Line>,
     traffic: Traffic,
 }
 
 struct Line {
-    stream: UnixStream,
+    id: HostId,
     endpoint: Box<Endpoint>,
     unsent: Vec<u8>,
+    /// Events since they were last told to this host.
+    events: u32,
 }
 
 impl Link {
@@ -58,97 +55,73 @@ impl Link {
     /// # Errors
     /// As [`Listener::open`].
     pub fn listen(path: &Path) -> io::Result<Self> {
-        let listener = Listener::open(path, "--link")?;
-        Ok(Self { listener, host: None, guests: Vec::new(), traffic: Traffic::default() })
+        let hosts = Clients::new(Listener::open(path, "--link")?);
+        Ok(Self { hosts, traffic: Traffic::default() })
     }
 
     /// Answers what came since the last call. Never waits.
     pub fn serve(&mut self, console: &mut Console, now: u64) {
-        // First, so that one who has gone makes room for the next.
-        self.serve_host(console, now);
-        while let Some(stream) = self.listener.accept() {
-            self.traffic.hosts += 1;
-            let line = Line { stream, endpoint: Box::default(), unsent: Vec::new() };
-            if self.host.is_none() {
-                self.host = Some(line);
-                self.serve_host(console, now);
-            } else {
-                self.traffic.refused += 1;
-                if self.guests.len() < GUESTS {
-                    self.guests.push(line);
-                }
+        let Self { hosts, traffic } = self;
+        let fresh = || {
+            traffic.hosts += 1;
+            Line { id: HostId(traffic.hosts), endpoint: Box::default(), unsent: Vec::new(), events: 0 }
+        };
+        let crowded = hosts.accept(now, fresh, |line| console.operator.is_hosts(line.id));
+        traffic.closed += crowded.len() as u64;
+        let events = console.take_events();
+        let gone = hosts.serve(|client| {
+            client.state.events |= events;
+            // One that another took the orders from is to come anew, so that it does not go on as if nothing had happened.
+            if console.operator.is_evicted(client.state.id) {
+                traffic.closed += 1;
+                return Err(io::ErrorKind::ConnectionAborted.into());
             }
-        }
-        let traffic = &mut self.traffic;
-        self.guests.retain_mut(|guest| {
-            let stays = guest.serve(&mut Closed(Refusal::Busy)).is_ok();
-            if !stays {
-                traffic.add(guest.endpoint.counters());
-            }
-            stays
+            serve(client, console, now)
         });
-    }
-
-    fn serve_host(&mut self, console: &mut Console, now: u64) {
-        // One from whom lines took the orders is to come anew.
-        let evicted = console.operator.take_evicted();
-        let Some(mut host) = self.host.take() else { return };
-        if !evicted && host.serve(&mut Desk::new(console, now)).is_ok() {
-            self.host = Some(host);
-        } else {
-            self.traffic.add(host.endpoint.counters());
-            console.operator.left(console.said.as_ref());
+        for line in crowded.iter().chain(&gone) {
+            traffic.add(line.endpoint.counters());
+            console.operator.left(line.id, console.said.as_ref());
         }
     }
 
     /// What to wait for.
     pub fn descriptors(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
-        let lines = self.host.iter().chain(&self.guests).map(|line| line.stream.as_fd());
-        std::iter::once(self.listener.descriptor()).chain(lines)
+        self.hosts.descriptors()
     }
 
     /// What came in all.
     pub fn traffic(&self) -> Traffic {
         let mut traffic = self.traffic;
-        for line in self.host.iter().chain(&self.guests) {
-            traffic.add(line.endpoint.counters());
+        for client in self.hosts.iter() {
+            traffic.add(client.state.endpoint.counters());
         }
         traffic
     }
 }
 
-impl Line {
-    /// An error ends the connection.
-    fn serve(&mut self, device: &mut impl Device) -> io::Result<()> {
-        let mut bytes = [0; 4096];
-        let mut taken = 0;
-        while taken < ROUND && self.unsent.len() < UNREAD {
-            match self.stream.read(&mut bytes) {
-                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
-                Ok(count) => {
-                    taken += count;
-                    for byte in &bytes[..count] {
-                        if let Some(answer) = self.endpoint.push(*byte, device) {
-                            self.unsent.extend_from_slice(answer);
-                        }
-                    }
-                }
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
+/// An error ends the connection.
+fn serve(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Result<()> {
+    if client.state.unsent.len() < UNREAD {
+        let mut bytes = room();
+        let said = client.read(&mut bytes, now)?;
+        let Line { id, endpoint, unsent, events } = &mut client.state;
+        let mut desk = Desk::new(console, *id, events, now);
+        for byte in said {
+            if let Some(answer) = endpoint.push(*byte, &mut desk) {
+                unsent.extend_from_slice(answer);
             }
         }
-        while !self.unsent.is_empty() {
-            match self.stream.write(&self.unsent) {
-                Ok(count) => {
-                    self.unsent.drain(..count);
-                }
-                // Nobody waits for a host that does not read; what it asked for last is still there for it.
-                Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(())
     }
+    while !client.state.unsent.is_empty() {
+        match client.stream.write(&client.state.unsent) {
+            Ok(count) => {
+                client.state.unsent.drain(..count);
+            }
+            // Nobody waits for a host that does not read; what it asked for last is still there for it.
+            Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
 }

@@ -6,23 +6,36 @@ use crate::digest::Digest;
 
 /// Causes that are timed tick by tick, in the order of [`Plan::patience`]. Those of the watch are counted in samples there; all
 /// others act at once.
-pub const TIMED: [Cause; 6] = [
+pub const TIMED: [Cause; TIMERS] = [
     Cause::GaugeNotFinite,
     Cause::GaugeRange,
     Cause::VoltageSaturation,
     Cause::SlewSaturation,
     Cause::MissedTick,
     Cause::Converter,
+    Cause::HostGone,
+    Cause::ConverterSilent,
 ];
+/// How many these are.
+pub const TIMERS: usize = 8;
 
 /// Causes that act in the tick in which they are seen.
 const AT_ONCE: u32 = Cause::LinkLost.bit() | Cause::Integrity.bit() | Cause::EmergencyStop.bit();
+
+/// The bit of the condition that a cause waits for: its own, or that of the cause before it in time.
+const fn condition(cause: Cause) -> u32 {
+    match cause {
+        Cause::HostGone => Cause::LinkLost.bit(),
+        Cause::ConverterSilent => Cause::Converter.bit(),
+        own => own.bit(),
+    }
+}
 
 /// Leaky counts: a condition that comes and goes counts, too, if it is there more often than not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Debounce {
     /// Of each of [`TIMED`].
-    pub counts: [u32; 6],
+    pub counts: [u32; TIMERS],
 }
 
 impl Default for Debounce {
@@ -35,7 +48,7 @@ impl Debounce {
     /// Nothing counted.
     #[must_use]
     pub const fn new() -> Self {
-        Self { counts: [0; 6] }
+        Self { counts: [0; TIMERS] }
     }
 
     /// Counts the conditions that are `present` (bits of causes) and returns the causes that have lasted.
@@ -56,7 +69,7 @@ impl Debounce {
         let mut any = 0;
         for (index, (cause, count)) in TIMED.iter().zip(&mut self.counts).enumerate() {
             let patience = plan.patience[index];
-            if present & cause.bit() == 0 {
+            if present & condition(*cause) == 0 {
                 *count = count.saturating_sub(1);
             } else {
                 // Held at the patience, so that it is forgotten as fast as it was learned.

@@ -154,11 +154,15 @@ pub enum Cause {
     Converter,
     /// [`STOP`].
     EmergencyStop,
+    /// [`LINK_LOST`] for so long that nobody is waited for any more.
+    HostGone,
+    /// [`CONVERTER`] for so long.
+    ConverterSilent,
 }
 
 impl Cause {
     /// All but [`Cause::None`], in the order of their words.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::GaugeNotFinite,
         Self::GaugeRange,
         Self::GaugeStuck,
@@ -171,10 +175,13 @@ impl Cause {
         Self::Integrity,
         Self::Converter,
         Self::EmergencyStop,
+        Self::HostGone,
+        Self::ConverterSilent,
     ];
 
     /// 0 none, 1 gauge not finite, 2 gauge range, 3 gauge stuck, 4 gauge disagreement, 5 tracking error, 6 voltage
-    /// saturation, 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop.
+    /// saturation, 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop,
+    /// 13 host gone, 14 converter silent.
     #[inline]
     #[must_use]
     pub const fn word(self) -> u64 {
@@ -192,6 +199,8 @@ impl Cause {
             Self::Integrity => 10,
             Self::Converter => 11,
             Self::EmergencyStop => 12,
+            Self::HostGone => 13,
+            Self::ConverterSilent => 14,
         }
     }
 
@@ -212,6 +221,8 @@ impl Cause {
             Self::Integrity => "integrity",
             Self::Converter => "converter",
             Self::EmergencyStop => "emergency stop",
+            Self::HostGone => "host gone",
+            Self::ConverterSilent => "converter silent",
         }
     }
 
@@ -239,6 +250,8 @@ impl Cause {
             10 => Self::Integrity,
             11 => Self::Converter,
             12 => Self::EmergencyStop,
+            13 => Self::HostGone,
+            14 => Self::ConverterSilent,
             _ => return None,
         })
     }
@@ -247,8 +260,12 @@ impl Cause {
 /// Causes that take the amplifiers off at once, in any phase.
 pub const SWITCHES_OFF: u32 = Cause::Integrity.bit() | Cause::EmergencyStop.bit();
 /// Causes that bring the codes to rest, then take the amplifiers off.
-pub const RAMPS_DOWN: u32 =
-    Cause::GaugeNotFinite.bit() | Cause::GaugeRange.bit() | Cause::GaugeStuck.bit() | Cause::GaugeDisagreement.bit();
+pub const RAMPS_DOWN: u32 = Cause::GaugeNotFinite.bit()
+    | Cause::GaugeRange.bit()
+    | Cause::GaugeStuck.bit()
+    | Cause::GaugeDisagreement.bit()
+    | Cause::HostGone.bit()
+    | Cause::ConverterSilent.bit();
 /// Causes that hold the codes.
 pub const HOLDS: u32 = Cause::TrackingError.bit()
     | Cause::VoltageSaturation.bit()
@@ -267,13 +284,13 @@ mod tests {
             assert_eq!(Phase::from_word(word).map(Phase::word), Some(word));
             assert_eq!(Request::from_word(word).word(), word);
         }
-        for word in 0..13 {
+        for word in 0..15 {
             assert_eq!(Cause::from_word(word).map(Cause::word), Some(word));
         }
         for (index, cause) in (1..).zip(Cause::ALL) {
             assert_eq!(cause.word(), index);
         }
-        assert_eq!((Phase::from_word(6), Cause::from_word(13)), (None, None));
+        assert_eq!((Phase::from_word(6), Cause::from_word(15)), (None, None));
         assert_eq!((Request::from_word(6), Request::from_word(u64::MAX)), (Request::Hold, Request::Hold));
     }
 }

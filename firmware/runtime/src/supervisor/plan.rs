@@ -1,5 +1,7 @@
 //! What the spec fixes about the supervisor.
 
+use super::debounce::TIMERS;
+
 /// Constants of the supervisor; from `supervisor`. Six gauges are looked at in turn, so what they show is counted in samples, one
 /// in six ticks.
 #[derive(Debug, Clone, Copy)]
@@ -13,9 +15,9 @@ pub struct Plan<T> {
     /// See [`Plan::ramp_step`].
     pub ramp_every: u32,
     /// For each of [`super::TIMED`], the count at which the condition is a cause, ≥ 1.
-    pub patience: [u32; 6],
+    pub patience: [u32; TIMERS],
     /// For each of them, what a tick with the condition counts; one without it takes 1 off.
-    pub weight: [u32; 6],
+    pub weight: [u32; TIMERS],
     /// Motion along a gauge that the codes sent must have caused before an unchanged word means that the gauge is stuck, m.
     pub stuck_motion: T,
     /// Samples after that, ≥ 1.

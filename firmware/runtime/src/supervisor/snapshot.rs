@@ -1,18 +1,16 @@
 //! The supervisor as words.
 
-use super::{Approach, Cause, Channel, Debounce, Phase, Request, Supervisor, Watch};
+use super::{Approach, Cause, Channel, Debounce, Phase, Request, Supervisor, TIMERS, Watch};
 use crate::real::Real;
-use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
+use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Sizes, Snapshot, Writer};
 
-/// Largest |word of a gauge| that is loaded: m, or V where the spec gives a calibration.
-const LARGEST_WORD: f64 = 1e6;
 /// Words of a channel.
 const CHANNEL: usize = 7;
 /// Words of the way to a set-point.
 const APPROACH: usize = 7;
 
 impl<T: Real> Snapshot for Supervisor<T> {
-    const WORDS: usize = 3 + 3 + 3 + 6 + 6 * CHANNEL + 6 + APPROACH;
+    const WORDS: usize = 3 + 3 + 3 + TIMERS + 6 * CHANNEL + 6 + APPROACH;
 
     fn save(&self, words: &mut Writer<'_>) {
         // By name and all of them, so that a field that is added is not forgotten.
@@ -67,10 +65,12 @@ impl<T: Real> Snapshot for Supervisor<T> {
         {
             *word = words.counter()?;
         }
+        let Sizes { request, reading, .. } = words.sizes();
         for channel in &mut self.watch.channels {
-            channel.word = words.real(LARGEST_WORD)?;
+            channel.word = words.real(reading)?;
             channel.known = words.flag()?;
-            words.reals(&mut channel.expected, LARGEST_PLACE)?;
+            // Displacement less the known load, which a gain may have made large.
+            words.reals(&mut channel.expected, request)?;
             for count in [&mut channel.stuck, &mut channel.disagreed, &mut channel.astray] {
                 *count = words.counter()?;
             }

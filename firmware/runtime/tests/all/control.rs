@@ -132,3 +132,21 @@ fn modes_say_what_is_at_work() {
     assert_eq!(ControlMode::PF(Law::Pcc).law(), Law::Pcc);
     assert_eq!(ControlMode::P.law(), Law::Invhys);
 }
+
+/// The largest gains take the integral to its bound and no further, and errors of the other sign lead back from there.
+#[test]
+fn an_integral_grows_no_further_than_a_state_may() {
+    let growth = specgen_runtime::Integral::growth(
+        &[1e15_f32, 1e15, 0.0, 1.0, 2e14, 1e15],
+        1e-4,
+        &[1e-3, -1e-3, 1.0, 0.0, 1e-3, 16.0],
+    );
+    let mut integral = specgen_runtime::Integral::<f32>::new();
+    for _ in 0..1000 {
+        integral.grow(&growth);
+        assert!(integral.force.iter().all(|force| force.abs() <= 1e9), "{:?}", integral.force);
+    }
+    assert_eq!(integral.force.map(f32::abs), [1e9, 1e9, 0.0, 0.0, 1e9, 1e9]);
+    integral.grow(&growth.map(|value| -value));
+    assert!(integral.force[0] < 1e9 && integral.force[1] > -1e9 && integral.force[5] < 0.0);
+}

@@ -8,8 +8,8 @@ const PLAN: Plan<f64> = Plan {
     rest: 0,
     ramp_step: 5,
     ramp_every: 1,
-    patience: [5, 5, 10, 5, 201, 3],
-    weight: [1, 1, 1, 1, 100, 1],
+    patience: [5, 5, 10, 5, 201, 3, 40, 50],
+    weight: [1, 1, 1, 1, 100, 1, 1, 1],
     stuck_motion: 1e-8,
     stuck_samples: 3,
     disagreement: 1e-6,
@@ -54,7 +54,12 @@ fn lasts(cause: Cause, shows: impl Fn(u32) -> bool) -> Option<u32> {
     let mut debounce = Debounce::new();
     let mut busy = false;
     (0..2000).find(|tick| {
-        let present = if shows(*tick) { cause.bit() } else { 0 };
+        let shown = match cause {
+            Cause::HostGone => Cause::LinkLost,
+            Cause::ConverterSilent => Cause::Converter,
+            own => own,
+        };
+        let present = if shows(*tick) { shown.bit() } else { 0 };
         debounce.count(&PLAN, present, &mut busy) & cause.bit() != 0
     })
 }

@@ -4,7 +4,8 @@
 //! What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build.
 
 use specgen_runtime::{CodeLimits, Law};
-use crate::{Real, limits};
+use crate::words::{CONFIG_CODES, CONFIG_WORDS};
+use crate::{Real, limits, permitted};
 
 /// ρ̂ of a leg, m/V; from `actuator`. The virtual drive of (AII.1) is X = q̂/ρ̂; the tick itself needs only q̂.
 pub const LEG_GAIN: Real = 6.31e-7;
@@ -118,57 +119,58 @@ impl Config {
     /// The same with other weights per run.
     ///
     /// # Errors
-    /// A weight outside [0, 1]. That they are stable on the platform is for the
+    /// A weight outside its range in [`permitted::SETTINGS`]. That they are stable on the platform is for the
     /// compiler to check, not for this function.
     pub fn with_weights(
         self,
         level_weight: Real,
         drift_weight: Real,
     ) -> Result<Self, ConfigError> {
-        if !(0.0..=1.0).contains(&level_weight) {
-            return Err(ConfigError { word: 2 });
-        }
-        if !(0.0..=1.0).contains(&drift_weight) {
-            return Err(ConfigError { word: 3 });
-        }
-        Ok(Self {
+        Self {
             level_weight,
             drift_weight,
             ..self
-        })
+        }
+            .checked()
     }
 
     /// The same with another run interval.
     ///
     /// # Errors
-    /// An interval of zero ticks.
-    pub const fn with_run_interval(
-        self,
-        run_interval: u32,
-    ) -> Result<Self, ConfigError> {
-        if run_interval == 0 {
-            return Err(ConfigError { word: 4 });
-        }
-        Ok(Self { run_interval, ..self })
+    /// An interval outside its range.
+    pub fn with_run_interval(self, run_interval: u32) -> Result<Self, ConfigError> {
+        Self { run_interval, ..self }.checked()
     }
 
     /// The same with other code limits.
     ///
     /// # Errors
-    /// A step below one code, or limits that leave the spec's voltage limits or are empty.
-    pub const fn with_code_limits(
-        self,
-        code_limits: CodeLimits,
-    ) -> Result<Self, ConfigError> {
-        if code_limits.max_step < 1 {
-            return Err(ConfigError { word: 5 });
+    /// A step below one code or above `actuator.slew_rate`, or limits that leave the spec's voltage limits or are empty.
+    pub fn with_code_limits(self, code_limits: CodeLimits) -> Result<Self, ConfigError> {
+        Self { code_limits, ..self }.checked()
+    }
+
+    /// These settings, if each is within its range.
+    #[inline(never)]
+    fn checked(self) -> Result<Self, ConfigError> {
+        Self::check(&self.to_words())?;
+        Ok(self)
+    }
+
+    /// Every word is within its range, or the first that is not.
+    #[inline(never)]
+    pub(crate) fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
+        for (word, value) in words.iter().enumerate() {
+            match permitted::of(word) {
+                Some(permitted) if permitted.takes(*value) => {}
+                _ => return Err(ConfigError { word }),
+            }
         }
-        if code_limits.min < limits::CODES[0] || code_limits.min > limits::CODES[1] {
-            return Err(ConfigError { word: 6 });
+        if words[CONFIG_CODES + 2] < words[CONFIG_CODES + 1] {
+            return Err(ConfigError {
+                word: CONFIG_CODES + 2,
+            });
         }
-        if code_limits.max < code_limits.min || code_limits.max > limits::CODES[1] {
-            return Err(ConfigError { word: 7 });
-        }
-        Ok(Self { code_limits, ..self })
+        Ok(())
     }
 }

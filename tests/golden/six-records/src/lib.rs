@@ -31,6 +31,7 @@ pub mod kinematics;
 pub mod limits;
 mod machine_words;
 
+pub mod permitted;
 pub mod sensing;
 pub mod snapshot;
 pub mod stages;

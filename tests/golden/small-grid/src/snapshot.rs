@@ -18,7 +18,7 @@ use crate::hysteresis::{GRID, Memory};
 use crate::supervised::{
     MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, Supervisor, supervise,
 };
-use crate::{CONFIG_WORDS, Config, LEGS, LegState, Real, State, limits};
+use crate::{CONFIG_WORDS, Config, LEGS, LegState, Real, State, limits, permitted};
 
 /// Words of a [`Machine`].
 pub const MACHINE_STATE_WORDS: usize = <State as Snapshot>::WORDS
@@ -48,7 +48,7 @@ impl Machine {
     /// # Errors
     /// The first word that no machine holds: not finite, none of its kind, a code out of limits, no staircase of extrema.
     pub fn load(words: &[u64; MACHINE_STATE_WORDS]) -> Result<Self, Invalid> {
-        let mut reader = Reader::new(words);
+        let mut reader = Reader::new(words).within(permitted::STATE);
         let mut machine = Self::new();
         machine.state.restore(&mut reader)?;
         machine.supervisor.restore(&mut reader)?;

@@ -12,8 +12,8 @@ pub const PLAN: Plan<Real> = Plan {
     rest: 0,
     ramp_step: 8,
     ramp_every: 1,
-    patience: [50, 50, 2500, 250, 10001, 50],
-    weight: [1, 1, 1, 1, 5000, 1],
+    patience: [50, 50, 2500, 250, 10001, 50, 49501, 50000],
+    weight: [1, 1, 1, 1, 5000, 1, 1, 1],
     stuck_motion: 7.62939453125e-9,
     stuck_samples: 42,
     disagreement: 1.2e-5,
@@ -21,6 +21,9 @@ pub const PLAN: Plan<Real> = Plan {
     tracking: [1.2e-5, 1.2e-5, 1.2e-5, 1.2e-5, 1.2e-5, 1.2e-5],
     tracking_samples: 84,
 };
+
+/// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
+pub const HOST_TICKS: u32 = 500;
 
 /// What is left after a tick of the way to the set-point when the law begins; from `supervisor.arm_time`.
 pub const APPROACH_KEEP: Real = 0.9980019986673331;

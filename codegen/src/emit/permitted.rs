@@ -1,0 +1,63 @@
+//! `src/permitted.rs`: the table of what settings may be. Reads [`ir::Permitted`](crate::ir::Permitted).
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use super::literal;
+use crate::ir::{Ir, Range, Scalar};
+
+pub fn emit(ir: &Ir) -> TokenStream {
+    let table = &ir.permitted;
+    // Most gains have one range: a row for each would take a kilobyte of flash.
+    let ranges: Vec<Range> = table.words().map(|(_, range)| range).collect();
+    let rows: Vec<TokenStream> = ranges
+        .chunk_by(|a, b| a == b)
+        .map(|alike| {
+            let (range, words) = (of_range(ir.scalar, alike[0]), literal::count(alike.len()));
+            quote! { (#range, #words) }
+        })
+        .collect();
+    let count = literal::count(rows.len());
+    let [request, reading, stiffness] =
+        [table.state.request, table.state.reading, table.state.stiffness].map(|most| literal::real(Scalar::F64, most));
+    quote! {
+        #![doc = " What settings may be, and how large the numbers of a state may become: nothing beyond the limits of the spec."]
+
+        use specgen_runtime::Permitted;
+        use specgen_runtime::snapshot::Sizes;
+
+        use crate::Real;
+
+        /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
+        /// most `code_max`.
+        pub const SETTINGS: [(Permitted<Real>, usize); #count] = [#(#rows),*];
+        /// Largest numbers of a state, under any of these settings.
+        pub const STATE: Sizes = Sizes { request: #request, reading: #reading, stiffness: #stiffness };
+
+        /// Range of a word of the settings; none beyond the last.
+        #[must_use]
+        pub fn of(word: usize) -> Option<&'static Permitted<Real>> {
+            let mut end = 0;
+            for (permitted, words) in &SETTINGS {
+                end += *words;
+                if word < end {
+                    return Some(permitted);
+                }
+            }
+            None
+        }
+    }
+}
+
+fn of_range(scalar: Scalar, range: Range) -> TokenStream {
+    match range {
+        Range::Whole(least, most) => {
+            let (least, most) = (literal::integer(least), literal::integer(most));
+            quote! { Permitted::Whole(#least, #most) }
+        }
+        Range::Number(least, most) => {
+            let (least, most) = (literal::real(scalar, least), literal::real(scalar, most));
+            quote! { Permitted::Number(#least, #most) }
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! What settings may be and how large the numbers of a state may become: one table for the emitted `Config`, its snapshots and
+//! `docs/settings.md`.
+
+use serde::Serialize;
+
+use super::LEGS;
+
+/// The table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Permitted {
+    /// In the order of the emitted `CONFIG_NAMES`.
+    pub settings: Vec<Setting>,
+    /// Numbers of a state that settings and gauges decide about.
+    pub state: State,
+}
+
+/// One setting, or six of a kind.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Setting {
+    /// Name; of six, without the index.
+    pub name: &'static str,
+    /// Whether there are six of it.
+    pub six: bool,
+    /// Unit; empty without dimension. Of six, that of the first three and of the others.
+    pub unit: [&'static str; 2],
+    /// Least and largest value, of the first three and of the others.
+    pub range: [Range; 2],
+    /// What it is.
+    pub doc: &'static str,
+    /// Where the bounds come from.
+    pub from: &'static str,
+}
+
+/// Least and largest value.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Range {
+    /// Of a choice, a count or a code.
+    Whole(i32, i32),
+    /// Of a number.
+    Number(f64, f64),
+}
+
+/// Largest magnitudes; the constants of [`specgen_runtime::snapshot::Sizes`], where each is explained.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct State {
+    /// m and rad.
+    pub request: f64,
+    /// m, or V with a calibration.
+    pub reading: f64,
+    /// N/m and N m/rad.
+    pub stiffness: f64,
+}
+
+impl Setting {
+    /// Its words: name and range.
+    pub fn words(&self) -> impl Iterator<Item = (String, Range)> {
+        let Self { name, six, range: [first, last], .. } = *self;
+        (0..if six { LEGS } else { 1 }).map(move |index| {
+            let range = if index < LEGS / 2 { first } else { last };
+            (if six { format!("{name}[{index}]") } else { name.to_owned() }, range)
+        })
+    }
+}
+
+impl Permitted {
+    /// Every word of the settings: name and range.
+    pub fn words(&self) -> impl Iterator<Item = (String, Range)> {
+        self.settings.iter().flat_map(Setting::words)
+    }
+
+    /// Names of the words, in order.
+    #[must_use]
+    pub fn names(&self) -> Vec<String> {
+        self.words().map(|(name, _)| name).collect()
+    }
+}
