@@ -4,7 +4,9 @@
 //! Set-points: limits of bias, moves and streams, user frames, trajectories.
 #![allow(clippy::approx_constant)]
 
-use specgen_runtime::setpoint::{Axis, MoveLimits, Parallel, Plan, Segment, Trajectory};
+use specgen_runtime::setpoint::{
+    Axis, MoveLimits, Parallel, Plan, Segment, StopLimits, Trajectory,
+};
 use crate::Real;
 
 /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
@@ -26,6 +28,16 @@ pub const PLAN: Plan<Real, Parallel> = Plan {
         ],
         jerk: [
             1000000000000.0, 1000000000000.0, 1000000000000.0, 100000000000.0, 100000000000.0, 100000000000.0,
+        ],
+    },
+    stop: StopLimits {
+        acceleration: [
+            18666666.666666664, 18666666.666666664, 18666666.666666664, 1866666.6666666665,
+            1866666.6666666665, 1866666.6666666665,
+        ],
+        jerk: [
+            65333333.33333332, 65333333.33333332, 65333333.33333332, 6533333.333333331, 6533333.333333331,
+            6533333.333333331,
         ],
     },
     stream_step: [

@@ -9,4 +9,5 @@ mod fuzz;
 mod oracle;
 mod refusals;
 mod sequences;
+mod stops;
 mod table;

@@ -277,21 +277,22 @@ fn um(axis: usize, value: f64) -> String {
 
 /// Three digits, rounded down.
 fn down(value: f64) -> f64 {
-    let scale = scale(value);
-    libm::floor(value * scale) / scale
+    three_digits(value, libm::floor)
 }
 
 /// Three digits, rounded up.
 fn up(value: f64) -> f64 {
-    let scale = scale(value);
-    libm::ceil(value * scale) / scale
+    three_digits(value, libm::ceil)
 }
 
-fn scale(value: f64) -> f64 {
+fn three_digits(value: f64, whole: fn(f64) -> f64) -> f64 {
     if value <= 0.0 {
-        return 1.0;
+        return 0.0;
     }
-    libm::pow(10.0, 2.0 - libm::floor(libm::log10(value)))
+    // By whole powers of ten, so that the number shown is that number.
+    let places = 2.0 - libm::floor(libm::log10(value));
+    let step = libm::pow(10.0, places.abs());
+    if places < 0.0 { whole(value / step) * step } else { whole(value * step) / step }
 }
 
 /// The stops as text for `specgen check`.
