@@ -17,6 +17,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
     let (stop_acceleration, stop_jerk) = (six(&s.stop_acceleration_limit), six(&s.stop_jerk_limit));
     let (stream_step, stream_rate) = (six(&s.stream_step), six(&s.stream_rate));
     let stream_acceleration = six(&s.stream_acceleration);
+    let shortest_stop = Literal::i32_unsuffixed(s.shortest_stop);
     let stale_ticks = Literal::u32_unsuffixed(s.stale_ticks);
     let (frames_type, frames) = frames(scalar, &s.frames);
     let count = literal::count(s.trajectories.len());
@@ -68,6 +69,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
             stop: StopLimits {
                 acceleration: [#stop_acceleration],
                 jerk: [#stop_jerk],
+                shortest: #shortest_stop,
             },
             stream_step: [#stream_step],
             stream_rate: [#stream_rate],

@@ -186,6 +186,8 @@ pub struct Setpoints {
     pub stop_acceleration_limit: [f64; 6],
     /// 1/(J T_s³) of stops.
     pub stop_jerk_limit: [f64; 6],
+    /// Ticks of the shortest stop.
+    pub shortest_stop: i32,
     /// Largest streamed step, m and rad.
     pub stream_step: [f64; 6],
     /// Largest streamed rate, per s.

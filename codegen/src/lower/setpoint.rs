@@ -92,6 +92,7 @@ pub fn lower(
             jerk_limit: limits.jerk.map(round),
             stop_acceleration_limit: stop.acceleration.map(round),
             stop_jerk_limit: stop.jerk.map(round),
+            shortest_stop: stop.shortest,
             stream_step: core::array::from_fn(|axis| round(step[axis] + slack(axis))),
             stream_rate: rate.map(|v| round(v * (1.0 + 2.0 * scalar.epsilon()))),
             stream_acceleration: rate.map(|v| round(v / period)),

@@ -55,7 +55,10 @@ pub fn machines(count: usize) -> Vec<Machine> {
         .into_iter()
         .chain(random)
         .take(count)
-        .map(|(name, specimen)| Machine { bench: Bench::new(&format!("stops-{}", name.replace(' ', "-")), specimen, &[]), name })
+        .map(|(name, specimen)| Machine {
+            bench: Bench::new(&format!("stops-{}", name.replace(' ', "-")), specimen, &[]),
+            name,
+        })
         .collect()
 }
 
@@ -63,16 +66,19 @@ fn built_of(change: impl FnOnce(&mut LegParameters)) -> Specimen {
     Specimen::within_tolerances(&PlatformParameters::reference(), &leg(change), 1)
 }
 
-/// What the compiler states of streams: way of a stop from their largest speed, m.
+/// What the compiler states of streams at their largest speed: way of the target in a stop, and by how much the platform may
+/// go beyond it, m.
 pub struct Stated {
     pub way: f64,
+    pub overshoot: f64,
 }
 
 impl Machine {
     pub fn stated(&self) -> Stated {
         let stream = &self.bench.emitted.compiled.stops[0];
         assert_eq!(stream.what, "stream");
-        Stated { way: (0..6).map(|axis| stream.way[axis] * lever(axis)).fold(0.0, f64::max) }
+        let most = |of: &[f64; 6]| (0..6).map(|axis| of[axis] * lever(axis)).fold(0.0, f64::max);
+        Stated { way: most(&stream.way), overshoot: most(&stream.overshoot) }
     }
 
     /// With the platform at rest at the bias.
@@ -129,7 +135,8 @@ impl Run<'_> {
         let mut start = MIDDLE;
         start[axis] -= 0.5 * way;
         self.go_to(start);
-        let mut ran = Ran { axis, share, status: 0, time: 0.0, target: 0.0, pose: 0.0, worst: 0.0, at_15ms: 0.0, at_50ms: 0.0 };
+        let mut ran =
+            Ran { axis, share, status: 0, time: 0.0, target: 0.0, pose: 0.0, worst: 0.0, at_15ms: 0.0, at_50ms: 0.0 };
         let mut last = Request::default();
         for tick in 1..=RISE + cruise {
             last = Request::stream(rising(&start, axis, speed, tick));

@@ -11,6 +11,9 @@ use crate::platform_tables::bench::in_parallel;
 /// Share of the largest speed of a stream: 0.2, 0.5, 1, 2 and 5 mm/s, or ten times as many µrad/s.
 const SPEEDS: [f64; 5] = [0.04, 0.1, 0.2, 0.4, 1.0];
 
+/// What hysteresis that depends on the rate, which the controllers' tables do not hold, leaves of an error at any speed, m.
+const UNMODELLED: f64 = 0.15e-6;
+
 /// Every axis, both ways, at every speed.
 fn stops(machine: &Machine) -> Vec<Ran> {
     let mut ran = Vec::new();
@@ -28,7 +31,7 @@ fn stops(machine: &Machine) -> Vec<Ran> {
 
 #[test]
 fn a_dry_stream_stands_soon_near_and_with_no_leg_limited() {
-    let machines = machines(length(3, usize::MAX));
+    let machines = machines(length(2, usize::MAX));
     let all = in_parallel(machines.len() as u32, |index| stops(&machines[index as usize]));
     for (machine, ran) in machines.iter().zip(&all) {
         let stated = machine.stated();
@@ -52,7 +55,8 @@ fn a_dry_stream_stands_soon_near_and_with_no_leg_limited() {
             let what = format!("{}, axis {}, {} of the largest speed: {one:?}", machine.name, one.axis, one.share);
             assert_eq!(one.status, 0, "{what}");
             assert!(one.time <= 15e-3, "{what}");
-            assert!(one.target <= stated.way * one.share.abs() * 1.000_001, "{what}");
+            let [way, overshoot] = [stated.way, stated.overshoot].map(|most| most * one.share.abs());
+            assert!(one.target <= way * 1.000_001 && one.pose <= way + overshoot + UNMODELLED, "{what}");
             // 1 µm at 1 mm/s and below, 5 µm at 5 mm/s.
             let most = if one.share.abs() <= 0.2 { 1e-6 } else { 5e-6 * one.share.abs() };
             assert!(one.target <= most && one.pose <= most, "{what}");

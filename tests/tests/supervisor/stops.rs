@@ -38,14 +38,16 @@ fn a_platform_in_motion_is_brought_to_rest_before_its_codes_are_held_or_ramped_d
     let patient = [("voltage_time      = \"2 ms\"", "voltage_time      = \"500 ms\"")];
     let emitted = emitted("supervisor-stops", "reference.toml", &patient);
     let setpoints = &emitted.compiled.ir.task_space.as_ref().expect("in task space").setpoints;
-    let limits = StopLimits { acceleration: setpoints.stop_acceleration_limit, jerk: setpoints.stop_jerk_limit };
+    let limits = StopLimits {
+        acceleration: setpoints.stop_acceleration_limit,
+        jerk: setpoints.stop_jerk_limit,
+        shortest: setpoints.shortest_stop,
+    };
     let mut per_tick = [0.0; 6];
     per_tick[0] = SPEED * PERIOD;
     let ticks = limits.ticks(&per_tick) as u32;
     assert!(ticks > 2, "{ticks}");
-    for (request, events, phase) in
-        [(HOLD, 0, HOLDING), (RUN, LINK_LOST, HOLDING), (RAMP_DOWN, 0, RAMPING)]
-    {
+    for (request, events, phase) in [(HOLD, 0, HOLDING), (RUN, LINK_LOST, HOLDING), (RAMP_DOWN, 0, RAMPING)] {
         let (mut bench, count) = streaming(&emitted);
         let from = bench.six("target")[0];
         let mut last = from;

@@ -27,20 +27,37 @@ pub struct Stopping {
     pub coasted: [f64; 6],
     /// Longest time from there to standstill, s.
     pub time: f64,
-    /// Longest way of each axis from there to standstill, m and rad.
+    /// Longest way of the set-point from there to standstill, m and rad.
     pub way: [f64; 6],
+    /// By how much the platform, which follows a lag behind and is corrected for that, may go beyond it, m and rad.
+    pub overshoot: [f64; 6],
+}
+
+/// What decides about the length of a stop.
+struct Conditions {
+    limits: StopLimits<f64>,
+    period: f64,
+    /// Of the amplifiers, s.
+    lag: f64,
 }
 
 impl Stopping {
     /// All axes at their speeds at once.
-    fn at(what: &str, limits: &StopLimits<f64>, speed: [f64; 6], coasting: f64, period: f64) -> Self {
+    fn at(what: &str, conditions: &Conditions, speed: [f64; 6], coasting: f64) -> Self {
+        let Conditions { limits, period, lag } = conditions;
         let time = f64::from(limits.ticks(&speed.map(|v| v * period))) * period;
-        let (coasted, way) = (speed.map(|v| v * coasting), speed.map(|v| v * time * 0.5));
-        Self { what: what.to_owned(), speed, coasted, time, way }
+        let over = |time: f64| speed.map(|v| v * time);
+        let (coasted, way, overshoot) = (over(coasting), over(0.5 * time), over(*lag));
+        Self { what: what.to_owned(), speed, coasted, time, way, overshoot }
+    }
+
+    /// Of the set-point's way, what no limit of stops shortens.
+    fn fixed(&self, axis: usize) -> f64 {
+        self.coasted[axis] + self.overshoot[axis]
     }
 
     fn distance(&self, axis: usize) -> f64 {
-        self.coasted[axis] + self.way[axis]
+        self.fixed(axis) + self.way[axis]
     }
 }
 
@@ -60,7 +77,7 @@ pub fn check(
     let user = User::of(model, task)?;
     let declared = stop::Limits::of(model, task, &user);
     let period = model.timing.period;
-    let limits = declared.reciprocal(period);
+    let conditions = Conditions { limits: declared.reciprocal(period), period, lag: model.amplifier.lag };
     let place = Place { user: &user, platform, stroke };
     let mut findings = Vec::new();
     let mut stops = Vec::new();
@@ -69,18 +86,18 @@ pub fn check(
     for (what, key, speed, coasting) in
         [("stream", "stream_speed", rules.stream_speed, coasting), ("move", "speed", rules.speed, 0.0)]
     {
-        let stop = Stopping::at(what, &limits, speed, coasting, period);
+        let stop = Stopping::at(what, &conditions, speed, coasting);
         let room = core::array::from_fn(|axis| place.room(axis));
         findings.extend(too_long(model, &stop, &room, key, &declared));
         stops.push(stop);
     }
     for (index, trajectory) in task.trajectories.iter().enumerate() {
         let Some(lowered) = setpoints.trajectories.get(index) else { continue };
-        let mut longest = Stopping::at(&trajectory.name, &limits, [0.0; 6], 0.0, period);
+        let mut longest = Stopping::at(&trajectory.name, &conditions, [0.0; 6], 0.0);
         let mut worst: Option<Leaves> = None;
         for stretch in along(&trajectory.kind, &lowered.path) {
             for (pose, rate) in rates(&stretch) {
-                let stop = Stopping::at("", &limits, rate, 0.0, period);
+                let stop = Stopping::at("", &conditions, rate, 0.0);
                 longest.include(&stop);
                 keep(&mut worst, place.leaves(&pose, &stop));
             }
@@ -102,6 +119,7 @@ impl Stopping {
         for axis in 0..6 {
             larger(&mut self.speed[axis], other.speed[axis].abs());
             larger(&mut self.way[axis], other.way[axis].abs());
+            larger(&mut self.overshoot[axis], other.overshoot[axis].abs());
         }
     }
 }
@@ -162,7 +180,7 @@ impl Place<'_> {
 
     /// What a stop from a pose of a trajectory leaves, if anything.
     fn leaves(&self, pose: &[f64; 6], stop: &Stopping) -> Option<Leaves> {
-        let after = |share: f64| core::array::from_fn(|axis| pose[axis] + share * stop.way[axis]);
+        let after = |share: f64| core::array::from_fn(|axis| pose[axis] + share * stop.distance(axis));
         let end: [f64; 6] = after(1.0);
         if self.holds(end, SLACK) {
             return None;
@@ -190,22 +208,17 @@ fn largest(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
 }
 
 /// A stop that no place along its axis has the room for. An axis without any room is kept still, and needs none.
-fn too_long(
-    model: &Model,
-    stop: &Stopping,
-    room: &[f64; 6],
-    name: &str,
-    limits: &stop::Limits,
-) -> Option<Diagnostic> {
+fn too_long(model: &Model, stop: &Stopping, room: &[f64; 6], name: &str, limits: &stop::Limits) -> Option<Diagnostic> {
     let excess = |axis: usize| if room[axis] > 0.0 { stop.distance(axis) / room[axis] } else { 0.0 };
     let worst = (0..6).fold(0, |worst, axis| if excess(axis) > excess(worst) { axis } else { worst });
     if excess(worst) <= 1.0 {
         return None;
     }
+    let to_standstill = format!("{} to standstill", um(worst, stop.way[worst] + stop.overshoot[worst]));
     let coasted = if stop.coasted[worst] > 0.0 {
-        format!("{} until it counts as stale and {} to standstill", um(worst, stop.coasted[worst]), um(worst, stop.way[worst]))
+        format!("{} until it counts as stale and {to_standstill}", um(worst, stop.coasted[worst]))
     } else {
-        format!("{} to standstill", um(worst, stop.way[worst]))
+        to_standstill
     };
     let message = format!(
         "a {} along {} that is stopped at {}/s goes on by {coasted}, but workspace and strokes end {} from the bias pose at the furthest",
@@ -232,7 +245,7 @@ fn harder(model: &Model, stop: &Stopping, room: &[f64; 6], limits: &stop::Limits
     let moving = |axis: &usize| room[*axis] > 0.0;
     // Of all axes, which stop together.
     let time = (0..6).filter(moving).fold(stop.time, |time, axis| {
-        let left = 2.0 * (room[axis] - stop.coasted[axis]) / stop.speed[axis];
+        let left = 2.0 * (room[axis] - stop.fixed(axis)) / stop.speed[axis];
         if left < time { left } else { time }
     });
     let time = libm::floor(time / period) * period;
@@ -241,9 +254,10 @@ fn harder(model: &Model, stop: &Stopping, room: &[f64; 6], limits: &stop::Limits
     }
     let least = limits.at_least(&stop.speed, time);
     let list = |values: [f64; 6], [length, angle]: [&str; 2]| {
-        let each = values.iter().enumerate().map(|(axis, value)| {
-            format!("\"{} {}\"", up(*value), if axis < 3 { length } else { angle })
-        });
+        let each = values
+            .iter()
+            .enumerate()
+            .map(|(axis, value)| format!("\"{} {}\"", up(*value), if axis < 3 { length } else { angle }));
         each.collect::<Vec<_>>().join(", ")
     };
     format!(
@@ -262,7 +276,8 @@ fn leaves_at(model: &Model, index: usize, name: &str, kind: &TrajectoryKind, lea
             ("period", format!("a period of at least {} ms stops within", up(period / leaves.share * 1e3)))
         }
     };
-    let message = format!("trajectory \"{name}\": another command on the way would bring it to rest with {}", leaves.end);
+    let message =
+        format!("trajectory \"{name}\": another command on the way would bring it to rest with {}", leaves.end);
     let help = format!(
         "{mend}; or raise control.setpoint.stop_acceleration and stop_jerk {} times",
         up(1.0 / (leaves.share * leaves.share))
@@ -299,9 +314,8 @@ fn three_digits(value: f64, whole: fn(f64) -> f64) -> f64 {
 #[must_use]
 pub fn describe(stops: &[Stopping]) -> String {
     let list = |values: &[f64; 6], scale: f64, digits: usize| {
-        let each = |values: &[f64]| {
-            values.iter().map(|v| format!("{:.digits$}", v * scale)).collect::<Vec<_>>().join("/")
-        };
+        let each =
+            |values: &[f64]| values.iter().map(|v| format!("{:.digits$}", v * scale)).collect::<Vec<_>>().join("/");
         format!("{} {}", each(&values[..3]), each(&values[3..]))
     };
     let mut text = "  stops, um and urad by axis:\n".to_owned();
@@ -312,11 +326,12 @@ pub fn describe(stops: &[Stopping]) -> String {
             format!("{} until it counts as stale, then ", list(&stop.coasted, 1e6, 2))
         };
         text += &format!(
-            "    {:<9} at {} per ms: {coasted}{} in {:.1} ms\n",
+            "    {:<9} at {} per ms: {coasted}{} in {:.1} ms; the platform up to {} further\n",
             stop.what,
             list(&stop.speed, 1e3, 3),
             list(&stop.way, 1e6, 2),
-            stop.time * 1e3
+            stop.time * 1e3,
+            list(&stop.overshoot, 1e6, 2)
         );
     }
     text

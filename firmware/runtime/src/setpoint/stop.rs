@@ -1,7 +1,7 @@
 //! To standstill from any motion: pose and rate go on without a step, and the way is inside the workspace.
 //!
 //! Over D ticks the rate falls as v (1 − 3σ² + 2σ³), σ = k/D, and the way is D v/2, in the direction of v on every axis.
-//! The deceleration peaks at 1.5 v/D and its slope at 6 v/D². D is the least that keeps both within [`StopLimits`], and is
+//! The deceleration peaks at 1.5 v/D and its slope at 6 v/D². D is the least within [`StopLimits`], and is
 //! halved while the platform would leave the workspace: walls come before comfort. The acceleration that the motion had is
 //! dropped at once.
 
@@ -14,13 +14,15 @@ use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
 /// Halvings of D that are tried: after them a tick is all that is left.
 const HALVINGS: u32 = 21;
 
-/// Reciprocal limits of one tick, by axis: 1/(A T_s²), 1/(J T_s³), per m or rad.
+/// Limits of stops: of one tick, reciprocal and by axis, 1/(A T_s²) and 1/(J T_s³), per m or rad; and the least duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopLimits<T> {
     /// Of deceleration.
     pub acceleration: [T; 6],
     /// Of jerk.
     pub jerk: [T; 6],
+    /// Least D, ≥ 1: a slow motion has limits that it would reach within a tick.
+    pub shortest: i32,
 }
 
 impl<T: Real> StopLimits<T> {
@@ -30,6 +32,7 @@ impl<T: Real> StopLimits<T> {
         let a = largest(rate, &self.acceleration) * T::from_f64(1.5);
         let j = largest(rate, &self.jerk) * T::from_f64(6.0);
         match least(|d: T| d >= a && d * d >= j) {
+            Some(ticks) if ticks < self.shortest => self.shortest,
             Some(ticks) => ticks,
             None => LONGEST,
         }

@@ -229,7 +229,7 @@ fn a_stop_goes_on_without_a_step_in_pose_or_rate_and_keeps_its_limits() {
 fn a_stop_before_a_wall_is_as_short_as_it_must_be_and_stays_inside() {
     let mut plan = plan64();
     // 4 mm/s towards the wall at 50 µm: within these limits it would take 0.6 s and 1.2 mm.
-    plan.stop = StopLimits { acceleration: plan.limits.acceleration, jerk: plan.limits.jerk };
+    plan.stop = StopLimits { acceleration: plan.limits.acceleration, jerk: plan.limits.jerk, shortest: 1 };
     let mut generator = ready(&plan);
     let v = 4e-3;
     let mut last = Target::at(BIAS);

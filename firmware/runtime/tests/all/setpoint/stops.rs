@@ -1,9 +1,7 @@
 //! Stops: their limits are kept in every tick, they end when and where they are said to, and no sooner stop would keep them.
 
 use specgen_runtime::Real;
-use specgen_runtime::setpoint::{
-    BUSY, Command, CommandKind, Generator, Parallel, Plan, STALE, StopLimits, Target,
-};
+use specgen_runtime::setpoint::{BUSY, Command, CommandKind, Generator, Parallel, Plan, STALE, StopLimits, Target};
 
 use super::support::*;
 use crate::common::Random;
@@ -14,11 +12,12 @@ fn limits(random: &mut Random) -> [[f64; 6]; 2] {
     [log(1e-2, 1e3), log(1e2, 1e7)]
 }
 
-fn with<T: Real>([acceleration, jerk]: &[[f64; 6]; 2]) -> Plan<T, Parallel> {
+fn with<T: Real>([acceleration, jerk]: &[[f64; 6]; 2], shortest: i32) -> Plan<T, Parallel> {
     let mut plan = plan::<T, _>(Parallel, vec![]);
     plan.stop = StopLimits {
         acceleration: six(acceleration.map(|a| 1.0 / (a * PERIOD * PERIOD))),
         jerk: six(jerk.map(|j| 1.0 / (j * PERIOD * PERIOD * PERIOD))),
+        shortest,
     };
     plan.bound = six([1.0; 6]);
     plan.bias = six([0.0; 6]);
@@ -36,12 +35,13 @@ fn streaming<T: Real>(plan: &Plan<T, Parallel>, rate: &[f64; 6]) -> (Generator<T
     (generator, order, first)
 }
 
-fn hold_to_limits<T: Real + Into<f64>>(slack: f64) {
+fn hold_to_limits<T: Real + Into<f64> + std::fmt::Debug>(slack: f64) {
     let mut random = Random(41);
     let mut lengths = [0; 3];
     for _ in 0..2000 {
         let limits = limits(&mut random);
-        let plan = with::<T>(&limits);
+        let shortest = if random.unit() < 0.5 { 1 } else { 1 + random.below(20) as i32 };
+        let plan = with::<T>(&limits, shortest);
         let moving = random.unit();
         let rate: [f64; 6] = std::array::from_fn(|axis| {
             let share = if random.unit() < 0.5 { moving * (2.0 * random.unit() - 1.0) } else { 0.0 };
@@ -70,7 +70,10 @@ fn hold_to_limits<T: Real + Into<f64>>(slack: f64) {
                 assert!(a.abs() <= most * (1.0 + slack), "axis {axis}: {a} of {most}");
                 assert!((a - before).abs() <= jerk * PERIOD * (1.0 + slack) + slack * most, "axis {axis}: jerk");
                 assert!((v - rate_before).abs() <= most * PERIOD * (1.0 + slack) + slack * rate[axis].abs());
-                assert!(v * rate[axis] >= 0.0 && v.abs() <= rate[axis].abs() * (1.0 + slack), "never back, never faster");
+                assert!(
+                    v * rate[axis] >= 0.0 && v.abs() <= rate[axis].abs() * (1.0 + slack),
+                    "never back, never faster"
+                );
             }
             last = target;
         }
@@ -80,11 +83,14 @@ fn hold_to_limits<T: Real + Into<f64>>(slack: f64) {
             let way = per_tick * f64::from(ticks) * 0.5;
             assert!((end - begin - way).abs() <= slack * (way.abs() + 1e-3), "axis {axis}: {} {way}", end - begin);
         }
+        assert!(ticks >= shortest);
         // A tick less would break a limit: 1.5 v/D of deceleration or 6 v/D² of jerk.
         let d = f64::from(ticks - 1) * PERIOD;
-        let broken = |axis: usize| 1.5 * rate[axis].abs() / d > limits[0][axis] * (1.0 - slack)
-            || 6.0 * rate[axis].abs() / (d * d) > limits[1][axis] * (1.0 - slack);
-        assert!(ticks == 1 || (0..6).any(broken), "{ticks} ticks are too many");
+        let broken = |axis: usize| {
+            1.5 * rate[axis].abs() / d > limits[0][axis] * (1.0 - slack)
+                || 6.0 * rate[axis].abs() / (d * d) > limits[1][axis] * (1.0 - slack)
+        };
+        assert!(ticks == shortest || (0..6).any(broken), "{ticks} ticks are too many");
     }
     assert!(lengths.iter().all(|count| *count > 20), "short, middle and long stops: {lengths:?}");
 }
@@ -106,7 +112,7 @@ fn moves_do_not_know_the_limits_of_stops_nor_stops_those_of_moves() {
     };
     let usual = plan::<f64, _>(Parallel, vec![]);
     let mut gentle = plan::<f64, _>(Parallel, vec![]);
-    gentle.stop = StopLimits { acceleration: gentle.limits.acceleration, jerk: gentle.limits.jerk };
+    gentle.stop = StopLimits { acceleration: gentle.limits.acceleration, jerk: gentle.limits.jerk, shortest: 1 };
     let mut lively = plan::<f64, _>(Parallel, vec![]);
     lively.limits.acceleration = lively.limits.acceleration.map(|limit| 0.5 * limit);
     let [a, b, c] = [&usual, &gentle, &lively].map(|plan| run(plan, 700));

@@ -3,7 +3,8 @@
 
 use specgen_runtime::Real;
 use specgen_runtime::setpoint::{
-    Axis, Command, CommandKind, Frames, Generator, MoveLimits, Plan, Row, Segment, StopLimits, Table, Target, Trajectory,
+    Axis, Command, CommandKind, Frames, Generator, MoveLimits, Plan, Row, Segment, StopLimits, Table, Target,
+    Trajectory,
 };
 
 /// 10 kHz.
@@ -39,6 +40,7 @@ pub fn plan<T: Real, F: Frames<T>>(frames: F, trajectories: Vec<Trajectory<T>>) 
         stop: StopLimits {
             acceleration: scaled(STOP_ACCELERATION, PERIOD * PERIOD),
             jerk: scaled(STOP_JERK, PERIOD * PERIOD * PERIOD),
+            shortest: 1,
         },
         stream_step: six(STREAM_SPEED.map(|v| v * PERIOD * (1.0 + 1e-5))),
         stream_rate: six(STREAM_SPEED),
