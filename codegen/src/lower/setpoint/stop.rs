@@ -16,7 +16,7 @@ use crate::model::{Model, TaskSpace};
 use crate::stability::platform::{ModalBasis, RestDynamics};
 
 /// Share of the period of the lowest mode that a stop takes at least.
-const PERIODS: f64 = 0.5;
+const PERIODS: f64 = 0.4;
 /// Time constants of the amplifier that it takes at least.
 const LAGS: f64 = 4.0;
 /// Share of `actuator.slew_rate` that it takes at most: the local gain of a stack differs from its mean by a quarter.

@@ -1,15 +1,17 @@
 //! How far the platform goes on when a motion is stopped, from every speed that the spec declares; and that it stands within
 //! workspace and strokes then.
 
+mod refusal;
+
 use serde::Serialize;
 use specgen_runtime::Platform;
 use specgen_runtime::setpoint::StopLimits;
 
 use super::poses::{Stretch, along};
-use super::{AXES, User, finding, stop};
-use crate::diagnostic::{Diagnostic, Severity, codes};
+use super::{AXES, User, amount, stop};
+use crate::diagnostic::Diagnostic;
 use crate::ir::Setpoints;
-use crate::model::{Model, TaskSpace, TrajectoryKind};
+use crate::model::{Model, TaskSpace};
 
 /// Bisections of the room that an axis has.
 const BISECTIONS: u32 = 40;
@@ -65,8 +67,8 @@ impl Stopping {
 /// do, m.
 ///
 /// # Errors
-/// A stop that ends outside workspace or strokes: of a stream or a move wherever along its axis it is begun, of a trajectory
-/// at some tick of it.
+/// A stop that ends outside workspace or strokes: of a stream or a move along an axis from the bias pose, whichever way there
+/// is more room; of a trajectory at some tick of it.
 pub fn check(
     model: &Model,
     task: &TaskSpace,
@@ -88,7 +90,7 @@ pub fn check(
     {
         let stop = Stopping::at(what, &conditions, speed, coasting);
         let room = core::array::from_fn(|axis| place.room(axis));
-        findings.extend(too_long(model, &stop, &room, key, &declared));
+        findings.extend(refusal::too_long(model, &stop, &room, key, &declared));
         stops.push(stop);
     }
     for (index, trajectory) in task.trajectories.iter().enumerate() {
@@ -102,7 +104,7 @@ pub fn check(
                 keep(&mut worst, place.leaves(&pose, &stop));
             }
         }
-        findings.extend(worst.map(|leaves| leaves_at(model, index, &trajectory.name, &trajectory.kind, &leaves)));
+        findings.extend(worst.map(|leaves| refusal::leaves(model, index, &trajectory.name, &trajectory.kind, &leaves)));
         stops.push(longest);
     }
     if findings.is_empty() { Ok(stops) } else { Err(findings) }
@@ -132,8 +134,6 @@ fn rates(stretch: &Stretch) -> impl Iterator<Item = ([f64; 6], [f64; 6])> + '_ {
 
 /// Where a stop of a trajectory would leave.
 struct Leaves {
-    /// How far beyond the end, over it.
-    excess: f64,
     /// Part of the stop's way that is within.
     share: f64,
     /// Where, in words.
@@ -142,7 +142,7 @@ struct Leaves {
 
 fn keep(slot: &mut Option<Leaves>, found: Option<Leaves>) {
     if let Some(found) = found
-        && slot.as_ref().is_none_or(|old| found.excess > old.excess)
+        && slot.as_ref().is_none_or(|old| found.share < old.share)
     {
         *slot = Some(found);
     }
@@ -187,10 +187,10 @@ impl Place<'_> {
         }
         let share = largest(1.0, |share| self.holds(after(share), SLACK));
         let end = match self.user.outside(end) {
-            Some((axis, value)) => format!("{} at {}, outside the workspace", AXES[axis], super::amount(axis, value)),
+            Some((axis, value)) => format!("{} at {}, outside the workspace", AXES[axis], amount(axis, value)),
             None => "a leg beyond its stroke".to_owned(),
         };
-        Some(Leaves { excess: 1.0 - share, share, end })
+        Some(Leaves { share, end })
     }
 }
 
@@ -205,109 +205,6 @@ fn largest(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
         if holds(middle) { good = middle } else { bad = middle }
     }
     good
-}
-
-/// A stop that no place along its axis has the room for. An axis without any room is kept still, and needs none.
-fn too_long(model: &Model, stop: &Stopping, room: &[f64; 6], name: &str, limits: &stop::Limits) -> Option<Diagnostic> {
-    let excess = |axis: usize| if room[axis] > 0.0 { stop.distance(axis) / room[axis] } else { 0.0 };
-    let worst = (0..6).fold(0, |worst, axis| if excess(axis) > excess(worst) { axis } else { worst });
-    if excess(worst) <= 1.0 {
-        return None;
-    }
-    let to_standstill = format!("{} to standstill", um(worst, stop.way[worst] + stop.overshoot[worst]));
-    let coasted = if stop.coasted[worst] > 0.0 {
-        format!("{} until it counts as stale and {to_standstill}", um(worst, stop.coasted[worst]))
-    } else {
-        to_standstill
-    };
-    let message = format!(
-        "a {} along {} that is stopped at {}/s goes on by {coasted}, but workspace and strokes end {} from the bias pose at the furthest",
-        stop.what,
-        AXES[worst],
-        um(worst, stop.speed[worst]),
-        um(worst, room[worst])
-    );
-    let slower = down(stop.speed[worst] / excess(worst) * 1e6);
-    let unit = if worst < 3 { "um" } else { "urad" };
-    let mut help = format!("at most {slower} {unit}/s fits");
-    help += &harder(model, stop, room, limits);
-    if stop.coasted[worst] > 0.0 {
-        help += "; or lower control.setpoint.stale_ticks";
-    }
-    let keys = [format!("control.setpoint.{name}[{worst}]"), format!("control.setpoint.{name}")];
-    let keys: Vec<&str> = keys.iter().map(String::as_str).chain(["control.setpoint", "control"]).collect();
-    Some(Diagnostic::at(&model.spans, &keys, (Severity::Error, codes::STOP_LEAVES), message, help))
-}
-
-/// The least limits with which the stop fits on every axis, as lines of a spec; nothing if what goes by before it is too long.
-fn harder(model: &Model, stop: &Stopping, room: &[f64; 6], limits: &stop::Limits) -> String {
-    let period = model.timing.period;
-    let moving = |axis: &usize| room[*axis] > 0.0;
-    // Of all axes, which stop together.
-    let time = (0..6).filter(moving).fold(stop.time, |time, axis| {
-        let left = 2.0 * (room[axis] - stop.fixed(axis)) / stop.speed[axis];
-        if left < time { left } else { time }
-    });
-    let time = libm::floor(time / period) * period;
-    if time < period {
-        return String::new();
-    }
-    let least = limits.at_least(&stop.speed, time);
-    let list = |values: [f64; 6], [length, angle]: [&str; 2]| {
-        let each = values
-            .iter()
-            .enumerate()
-            .map(|(axis, value)| format!("\"{} {}\"", up(*value), if axis < 3 { length } else { angle }));
-        each.collect::<Vec<_>>().join(", ")
-    };
-    format!(
-        "; or set stop_acceleration = [{}] and stop_jerk = [{}] or more, as far as legs and amplifiers follow",
-        list(least.acceleration, ["m/s^2", "rad/s^2"]),
-        list(least.jerk, ["m/s^3", "rad/s^3"])
-    )
-}
-
-fn leaves_at(model: &Model, index: usize, name: &str, kind: &TrajectoryKind, leaves: &Leaves) -> Diagnostic {
-    let (key, mend) = match kind {
-        TrajectoryKind::Paper { frequency, .. } => {
-            ("frequency", format!("at most {} Hz stops within", down(frequency * leaves.share)))
-        }
-        TrajectoryKind::Waveform { period, .. } => {
-            ("period", format!("a period of at least {} ms stops within", up(period / leaves.share * 1e3)))
-        }
-    };
-    let message =
-        format!("trajectory \"{name}\": another command on the way would bring it to rest with {}", leaves.end);
-    let help = format!(
-        "{mend}; or raise control.setpoint.stop_acceleration and stop_jerk {} times",
-        up(1.0 / (leaves.share * leaves.share))
-    );
-    finding(model, Severity::Error, codes::STOP_LEAVES, &format!("trajectory[{index}].{key}"), message, help)
-}
-
-/// A length in µm or an angle in µrad.
-fn um(axis: usize, value: f64) -> String {
-    super::amount(axis, value)
-}
-
-/// Three digits, rounded down.
-fn down(value: f64) -> f64 {
-    three_digits(value, libm::floor)
-}
-
-/// Three digits, rounded up.
-fn up(value: f64) -> f64 {
-    three_digits(value, libm::ceil)
-}
-
-fn three_digits(value: f64, whole: fn(f64) -> f64) -> f64 {
-    if value <= 0.0 {
-        return 0.0;
-    }
-    // By whole powers of ten, so that the number shown is that number.
-    let places = 2.0 - libm::floor(libm::log10(value));
-    let step = libm::pow(10.0, places.abs());
-    if places < 0.0 { whole(value / step) * step } else { whole(value * step) / step }
 }
 
 /// The stops as text for `specgen check`.
