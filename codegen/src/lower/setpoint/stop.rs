@@ -1,7 +1,7 @@
 //! Limits of stops: given, or derived from what legs and amplifiers follow.
 //!
 //! Derived limits let a stop from the largest declared speed take the time t, and just reach both: a = 1.5 v/t, j = 6 v/t²
-//! (see `specgen_runtime::setpoint::Stop`). Stops from lower speeds are shorter, but none by more than half. t is the least time in which
+//! (see `specgen_runtime::setpoint::Stop`). Stops from lower speeds are shorter, but take two thirds of it at least. t is the least time in which
 //! * a share of a period of the platform's lowest mode goes by: shorter stops ring with what the feed-forward of the
 //!   inertia leaves, as large as the stiffness is uncertain;
 //! * the amplifiers follow;
@@ -23,8 +23,8 @@ const LAGS: f64 = 4.0;
 const SLEW: f64 = 1.0 / 1.3;
 /// Share of the stroke by which inertia bends a leg at most, all axes stopping at once.
 const BENT: f64 = 0.05;
-/// A stop from the largest speed over the shortest one, in time.
-const SHORTEST: i32 = 2;
+/// Share of the time of a stop from the largest speed that the shortest one takes, over three.
+const SHORTEST_THIRDS: i32 = 2;
 /// Peak deceleration and peak jerk of a stop from a rate of 1 that takes a time of 1.
 const PEAK: f64 = 1.5;
 const SLOPE: f64 = 6.0;
@@ -73,7 +73,7 @@ impl Limits {
             shortest: 1,
         };
         // A slow motion has the room to be stopped as gently as the legs like it.
-        limits.shortest = (limits.ticks(&self.speed.map(|v| v * period)) / SHORTEST).max(1);
+        limits.shortest = (limits.ticks(&self.speed.map(|v| v * period)) * SHORTEST_THIRDS / 3).max(1);
         limits
     }
 }

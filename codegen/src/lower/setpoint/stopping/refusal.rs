@@ -6,7 +6,13 @@ use crate::diagnostic::{Diagnostic, Severity, codes};
 use crate::model::{Model, TrajectoryKind};
 
 /// A stop that its axis has no room for. An axis without any room at all is kept still, and needs none.
-pub(super) fn too_long(model: &Model, stop: &Stopping, room: &[f64; 6], name: &str, limits: &stop::Limits) -> Option<Diagnostic> {
+pub(super) fn too_long(
+    model: &Model,
+    stop: &Stopping,
+    room: &[f64; 6],
+    name: &str,
+    limits: &stop::Limits,
+) -> Option<Diagnostic> {
     let excess = |axis: usize| if room[axis] > 0.0 { stop.distance(axis) / room[axis] } else { 0.0 };
     let worst = (0..6).fold(0, |worst, axis| if excess(axis) > excess(worst) { axis } else { worst });
     if excess(worst) <= 1.0 {
@@ -100,4 +106,3 @@ fn three_digits(value: f64, whole: fn(f64) -> f64) -> f64 {
     let step = libm::pow(10.0, places.abs());
     if places < 0.0 { whole(value / step) * step } else { whole(value * step) / step }
 }
-

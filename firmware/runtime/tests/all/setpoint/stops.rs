@@ -114,10 +114,9 @@ fn moves_do_not_know_the_limits_of_stops_nor_stops_those_of_moves() {
     let mut gentle = plan::<f64, _>(Parallel, vec![]);
     gentle.stop = StopLimits { acceleration: gentle.limits.acceleration, jerk: gentle.limits.jerk, shortest: 1 };
     let mut lively = plan::<f64, _>(Parallel, vec![]);
-    lively.limits.acceleration = lively.limits.acceleration.map(|limit| 0.5 * limit);
+    lively.limits.jerk = lively.limits.jerk.map(|limit| 0.5 * limit);
     let [a, b, c] = [&usual, &gentle, &lively].map(|plan| run(plan, 700));
-    assert_eq!(a.0, b.0);
-    assert_ne!(a.0, c.0);
+    assert!(a.0 == b.0 && a.0 != c.0);
     let way = |(moved, stop): &(Vec<Target<f64>>, Vec<Target<f64>>)| stop[3999].pose[0] - moved[699].pose[0];
     // 100 µm/s within 10 mm/s² take 15 ms and with 1 m/s³ 24.5 ms; within the limits of stops 0.3 ms.
     assert!((way(&b) - 100e-6 * 24.5e-3 / 2.0).abs() < 1e-8, "{:e}", way(&b));
