@@ -16,9 +16,9 @@ use crate::model::{Model, TaskSpace};
 use crate::stability::platform::{ModalBasis, RestDynamics};
 
 /// Share of the period of the lowest mode that a stop takes at least.
-const PERIODS: f64 = 0.4;
+const PERIODS: f64 = 0.35;
 /// Time constants of the amplifier that it takes at least.
-const LAGS: f64 = 4.0;
+const LAGS: f64 = 3.4;
 /// Share of `actuator.slew_rate` that it takes at most: the local gain of a stack differs from its mean by a quarter.
 const SLEW: f64 = 1.0 / 1.3;
 /// Share of the stroke by which inertia bends a leg at most, all axes stopping at once.
