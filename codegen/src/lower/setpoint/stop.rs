@@ -83,6 +83,7 @@ fn larger(a: f64, b: f64) -> f64 {
 }
 
 /// t, s, for stops from `speed` (per s, m and rad, along the user's axes).
+#[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
 fn shortest_time(model: &Model, task: &TaskSpace, user: &User, speed: &[f64; 6]) -> f64 {
     let mut time = larger(2.0 * model.timing.period, LAGS * model.amplifier.lag);
     // A platform that has no dynamics is refused elsewhere.
