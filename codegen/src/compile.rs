@@ -9,7 +9,8 @@ use crate::everett::EverettTable;
 use crate::identify;
 use crate::ir::{Ir, Setpoints};
 use crate::lint::{self, paths::PathDemand};
-use crate::lower::{PoseNoise, lower, platform, pose_noise, scalar, setpoint};
+use crate::lower::setpoint::{self, Stopping};
+use crate::lower::{PoseNoise, lower, platform, pose_noise, scalar};
 use crate::model::{Model, RateDependence, TrajectoryKind};
 use crate::reach::{self, Reach};
 use crate::spec::{self, SpecSource};
@@ -38,6 +39,8 @@ pub struct Compiled {
     pub reach: Option<Reach>,
     /// What each trajectory asks of the legs, in the order of the spec.
     pub demands: Vec<PathDemand>,
+    /// How far stops go, from every declared speed.
+    pub stops: Vec<Stopping>,
     /// Noise of the measured pose, with gauges that see the platform.
     pub pose_noise: Option<PoseNoise>,
     /// Every constant of the controller.
@@ -95,10 +98,10 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
     findings.extend(design.iter().flat_map(|design| design.findings.clone()));
     findings.extend(setpoints.warnings.iter().cloned());
     identified.texts.extend(setpoints.texts.iter().cloned());
-    let (reach, demands) = match check_reach(&model, &setpoints, &identified.tables) {
-        Ok((reach, demands, found)) => {
+    let (reach, demands, stops) = match check_reach(&model, &setpoints, &identified.tables) {
+        Ok(Reached { reach, demands, stops, findings: found }) => {
             findings.extend(found);
-            (reach, demands)
+            (reach, demands, stops)
         }
         Err(found) => {
             findings.extend(found);
@@ -124,6 +127,7 @@ pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
         design,
         reach,
         demands,
+        stops,
         pose_noise,
         ir,
         files,
@@ -142,11 +146,18 @@ pub(crate) fn check_stability(model: &Model) -> Result<(Option<Margins>, Option<
     }
 }
 
-/// Reach, what each trajectory asks of the legs, and warnings.
-type Reached = (Option<Reach>, Vec<PathDemand>, Vec<Diagnostic>);
+/// What the legs reach and make.
+struct Reached {
+    reach: Option<Reach>,
+    /// What each trajectory asks of the legs.
+    demands: Vec<PathDemand>,
+    stops: Vec<Stopping>,
+    /// Warnings.
+    findings: Vec<Diagnostic>,
+}
 
-/// Where the legs reach, and that trajectories stay there: as far as both the data sheet's stroke and every leg's table
-/// allow. And that stacks and amplifiers make them.
+/// Where the legs reach, and that trajectories and stops stay there: as far as both the data sheet's stroke and every leg's
+/// table allow. And that stacks and amplifiers make them.
 fn check_reach(model: &Model, lowered: &LoweredSetpoints, tables: &[EverettTable]) -> Result<Reached, Vec<Diagnostic>> {
     let largest = tables.iter().map(|table| table.node(table.grid, 0));
     let stroke = largest.fold(model.actuator.stroke, |a, b| if b < a { b } else { a });
@@ -154,7 +165,7 @@ fn check_reach(model: &Model, lowered: &LoweredSetpoints, tables: &[EverettTable
         // Legs may be driven one by one where they do not hold a platform: then there is no pose to look at.
         let legs = platform(model).ok().map(|platform| reach::check_legs(model, &platform, stroke));
         let (reach, found) = legs.map_or_else(|| (None, Vec::new()), |(reach, found)| (Some(reach), found));
-        return Ok((reach, Vec::new(), found));
+        return Ok(Reached { reach, demands: Vec::new(), stops: Vec::new(), findings: found });
     };
     let platform = platform(model)?;
     let mut errors = Vec::new();
@@ -169,11 +180,16 @@ fn check_reach(model: &Model, lowered: &LoweredSetpoints, tables: &[EverettTable
             errors.extend(found);
         }
     }
+    let stops = setpoint::check_stops(model, task, setpoints, &platform, stroke);
+    let stops = stops.unwrap_or_else(|found| {
+        errors.extend(found);
+        Vec::new()
+    });
     let refused = !errors.is_empty() || asked.iter().any(|finding| finding.severity == Severity::Error);
     match reach {
         Ok((reach, mut found)) if !refused => {
             found.extend(asked);
-            Ok((Some(reach), demands, found))
+            Ok(Reached { reach: Some(reach), demands, stops, findings: found })
         }
         _ => Err(errors.into_iter().chain(asked).collect()),
     }

@@ -26,6 +26,7 @@ mod platform_budgets;
 mod platform_faults;
 mod platform_promises;
 mod platform_refusals;
+mod platform_stops;
 mod platform_tables;
 mod promises;
 mod rate_options;

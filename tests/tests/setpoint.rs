@@ -13,7 +13,9 @@ use specgen::spec::{self, SpecSource};
 use specgen::waveform::{self, Waveform};
 use specgen_runtime::Real;
 use specgen_runtime::setpoint as runtime;
-use specgen_runtime::setpoint::{BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Plan, Target};
+use specgen_runtime::setpoint::{
+    BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Plan, StopLimits, Target,
+};
 use specgen_tests::{Emitted, compile_edited, repository};
 
 const F32: (&str, &str) = ("scalar = \"f64\"", "scalar = \"f32\"");
@@ -101,6 +103,11 @@ fn plan<T: Real>(model: &Model, setpoints: &ir::Setpoints) -> Plan<T, Parallel> 
             speed: six(setpoints.speed_limit),
             acceleration: six(setpoints.acceleration_limit),
             jerk: six(setpoints.jerk_limit),
+        },
+        stop: StopLimits {
+            acceleration: six(setpoints.stop_acceleration_limit),
+            jerk: six(setpoints.stop_jerk_limit),
+            shortest: setpoints.shortest_stop,
         },
         stream_step: six(setpoints.stream_step),
         stream_rate: six(setpoints.stream_rate),

@@ -92,6 +92,8 @@ fn every_value_of_the_reference_is_in_si() {
             speed: [1e-4, 1e-4, 1e-4, 1e-3, 1e-3, 1e-3],
             acceleration: [0.01, 0.01, 0.01, 0.1, 0.1, 0.1],
             jerk: [1.0, 1.0, 1.0, 10.0, 10.0, 10.0],
+            stop_acceleration: None,
+            stop_jerk: None,
             stream_speed: [5e-3, 5e-3, 5e-3, 0.05, 0.05, 0.05],
             stale_ticks: 10,
         },

@@ -45,6 +45,7 @@ const TABLE: &[(&str, f64)] = &[
     ("codegen all::platform_stability", 13.7),
     ("codegen all::records", 13.1),
     ("codegen all::operate", 12.6),
+    ("tests all::platform_stops", 12.0),
     ("tests all::paper_tables", 11.4),
     ("codegen all::firmware", 11.2),
     ("tests all::integrity", 10.3),

@@ -8,6 +8,7 @@ use serde_json::json;
 
 use super::ui::{Failure, Ui};
 use crate::compile::{self, Compiled, Refused};
+use crate::lower::setpoint;
 use crate::{lint, precision, reach, stability};
 
 /// Arguments of `check`.
@@ -33,7 +34,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         describe(&compiled),
         precision::describe(&precision, compiled.ir.scalar)
     );
-    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "reach": compiled.reach, "pose_noise": compiled.pose_noise, "records": compiled.records, "trajectories": compiled.demands, "precision": precision, "precision_ratio": {
+    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "reach": compiled.reach, "pose_noise": compiled.pose_noise, "records": compiled.records, "trajectories": compiled.demands, "stops": compiled.stops, "precision": precision, "precision_ratio": {
         "legs": precision.legs.ratio(),
         "commanded": precision.commanded.ratio(),
         "measured": precision.measured.map(|figures| figures.ratio()),
@@ -76,6 +77,9 @@ pub fn describe(compiled: &Compiled) -> String {
             compiled.model.actuator.slew_rate * 1e-3,
             demand.deflection * 1e9
         );
+    }
+    if !compiled.stops.is_empty() {
+        text.push_str(&setpoint::describe_stops(&compiled.stops));
     }
     if let (Some(noise), Some(task)) = (&compiled.pose_noise, &compiled.ir.task_space) {
         let list = |values: &[f64]| values.iter().map(|v| format!("{:.1}", v * 1e9)).collect::<Vec<_>>().join("/");

@@ -182,6 +182,8 @@ codes! {
         "Rows of a table are a whole number of ticks apart, a sinusoid is slower than half the tick rate, and no trajectory is longer than about four million ticks.";
     WAVEFORM_CLOSED_TWICE = "E0457", "last row given twice",
         "A table that repeats goes from its last row to its first: a last row that is the first again would make it stand still for a row.";
+    STOP_LEAVES = "E0459", "a stop that leaves workspace or strokes",
+        "A stream that runs dry goes on with its last rate until it counts as stale, and then comes to rest within the limits of stops; so does any motion that another command ends. Along each axis alone, from the bias pose in its better direction, a stop from the largest declared speed must end within workspace and strokes, and a stop from any tick of a trajectory.";
     TRAJECTORY_CORNERS = "W0458", "trajectory with corners",
         "Where the slope changes at once the platform rings, whatever the controller. The paper's trajectories have such corners.";
     WAVEFORM_HEADER = "E0460", "a table of poses without its columns",

@@ -14,8 +14,10 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
     let (period, rate, square_rate) = (real(s.period), real(s.rate), real(s.square_rate));
     let (bias, home, bound) = (six(&s.bias), six(&s.home), six(&ir.bounds.pose));
     let (speed, acceleration, jerk) = (six(&s.speed_limit), six(&s.acceleration_limit), six(&s.jerk_limit));
+    let (stop_acceleration, stop_jerk) = (six(&s.stop_acceleration_limit), six(&s.stop_jerk_limit));
     let (stream_step, stream_rate) = (six(&s.stream_step), six(&s.stream_rate));
     let stream_acceleration = six(&s.stream_acceleration);
+    let shortest_stop = Literal::i32_unsuffixed(s.shortest_stop);
     let stale_ticks = Literal::u32_unsuffixed(s.stale_ticks);
     let (frames_type, frames) = frames(scalar, &s.frames);
     let count = literal::count(s.trajectories.len());
@@ -39,7 +41,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
     if has(|path| matches!(path, Path::Table { .. })) {
         imports.extend(["Row", "Table"]);
     }
-    imports.push("Trajectory");
+    imports.extend(["StopLimits", "Trajectory"]);
     imports.sort_unstable();
     let imports = imports.into_iter().map(|name| format_ident!("{name}"));
     quote! {
@@ -63,6 +65,11 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
                 speed: [#speed],
                 acceleration: [#acceleration],
                 jerk: [#jerk],
+            },
+            stop: StopLimits {
+                acceleration: [#stop_acceleration],
+                jerk: [#stop_jerk],
+                shortest: #shortest_stop,
             },
             stream_step: [#stream_step],
             stream_rate: [#stream_rate],

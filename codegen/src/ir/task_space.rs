@@ -184,6 +184,12 @@ pub struct Setpoints {
     pub acceleration_limit: [f64; 6],
     /// 1/(J T_s³).
     pub jerk_limit: [f64; 6],
+    /// 1/(A T_s²) of stops, 1/m and 1/rad.
+    pub stop_acceleration_limit: [f64; 6],
+    /// 1/(J T_s³) of stops.
+    pub stop_jerk_limit: [f64; 6],
+    /// Ticks of the shortest stop.
+    pub shortest_stop: i32,
     /// Largest streamed step, m and rad.
     pub stream_step: [f64; 6],
     /// Largest streamed rate, per s.

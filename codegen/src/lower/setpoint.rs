@@ -6,9 +6,12 @@ mod paper;
 mod poses;
 mod segments;
 mod spline;
+mod stop;
+mod stopping;
 mod table;
 
 pub use poses::{Stretch, stretches};
+pub use stopping::{Stopping, check as check_stops, describe as describe_stops};
 
 use specgen_runtime::setpoint::{Frames as _, MoveLimits, Profile, Target, Tool, Work};
 
@@ -73,6 +76,7 @@ pub fn lower(
     if !findings.is_empty() {
         return Err(findings);
     }
+    let stop = stop::Limits::of(model, task, &user).reciprocal(period);
     // A step of exactly the limit must pass after its rounding.
     let [step, rate] = [rules.stream_speed.map(|v| v * period), rules.stream_speed];
     let slack = |axis: usize| 4.0 * scalar.epsilon() * user.bound[axis];
@@ -86,6 +90,9 @@ pub fn lower(
             speed_limit: limits.speed.map(round),
             acceleration_limit: limits.acceleration.map(round),
             jerk_limit: limits.jerk.map(round),
+            stop_acceleration_limit: stop.acceleration.map(round),
+            stop_jerk_limit: stop.jerk.map(round),
+            shortest_stop: stop.shortest,
             stream_step: core::array::from_fn(|axis| round(step[axis] + slack(axis))),
             stream_rate: rate.map(|v| round(v * (1.0 + 2.0 * scalar.epsilon()))),
             stream_acceleration: rate.map(|v| round(v / period)),
@@ -140,15 +147,25 @@ impl User {
         Ok(Self { frames, bias, home, bound: [tx, ty, tz, rx, ry, rz] })
     }
 
+    /// Rate of the platform's pose at rest when the user's axis moves at a rate of 1.
+    fn column(&self, axis: usize) -> [f64; 6] {
+        let mut user = Target::new();
+        user.rate[axis] = 1.0;
+        self.platform(&user).map_or([0.0; 6], |platform| platform.rate)
+    }
+
+    /// The platform's set-point of a user's, without the bias; none if an angle is beyond what is meant.
+    fn platform(&self, user: &Target<f64>) -> Option<Target<f64>> {
+        match self.frames {
+            Frames::Parallel => Some(*user),
+            Frames::Tool { point, largest_angle } => Tool { point, largest_angle }.to_platform(user),
+            Frames::Work { axes, point, largest_angle } => Work { axes, point, largest_angle }.to_platform(user),
+        }
+    }
+
     /// Pose of the platform from rest at a user's pose, with the bias.
     fn pose(&self, user: [f64; 6]) -> Option<[f64; 6]> {
-        let target = Target::at(user);
-        let platform = match self.frames {
-            Frames::Parallel => Some(target),
-            Frames::Tool { point, largest_angle } => Tool { point, largest_angle }.to_platform(&target),
-            Frames::Work { axes, point, largest_angle } => Work { axes, point, largest_angle }.to_platform(&target),
-        }?;
-        let mut pose = platform.pose;
+        let mut pose = self.platform(&Target::at(user))?.pose;
         for (value, bias) in pose.iter_mut().zip(self.bias) {
             *value += bias;
         }

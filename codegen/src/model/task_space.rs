@@ -96,6 +96,10 @@ pub struct SetpointRules {
     pub acceleration: [f64; 6],
     /// Of bias and moves, per s³.
     pub jerk: [f64; 6],
+    /// Largest deceleration of stops, per s². None: the compiler derives it.
+    pub stop_acceleration: Option<[f64; 6]>,
+    /// Their largest jerk, per s³. None: the compiler derives it.
+    pub stop_jerk: Option<[f64; 6]>,
     /// A streamed step beyond `stream_speed` · T_s is a jump, per s.
     pub stream_speed: [f64; 6],
     /// A stream without a fresh set-point for this many ticks is stale, at least 1.

@@ -51,6 +51,8 @@ pub(super) fn task_space(f: &Fields) -> Option<Option<TaskSpace>> {
             speed: f.list("control.setpoint.speed")?,
             acceleration: f.list("control.setpoint.acceleration")?,
             jerk: f.list("control.setpoint.jerk")?,
+            stop_acceleration: f.list("control.setpoint.stop_acceleration"),
+            stop_jerk: f.list("control.setpoint.stop_jerk"),
             stream_speed: f.list("control.setpoint.stream_speed")?,
             stale_ticks: f.whole("control.setpoint.stale_ticks")?,
         },

@@ -77,6 +77,8 @@ pub fn model() -> (Model, TaskSpace) {
             speed: [1e-3; 6],
             acceleration: [1.0; 6],
             jerk: [1e3; 6],
+            stop_acceleration: None,
+            stop_jerk: None,
             stream_speed: [1e-2; 6],
             stale_ticks: 100,
         },

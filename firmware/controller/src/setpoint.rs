@@ -4,7 +4,9 @@
 //! Set-points: limits of bias, moves and streams, user frames, trajectories.
 #![allow(clippy::approx_constant)]
 
-use specgen_runtime::setpoint::{Axis, MoveLimits, Parallel, Plan, Segment, Trajectory};
+use specgen_runtime::setpoint::{
+    Axis, MoveLimits, Parallel, Plan, Segment, StopLimits, Trajectory,
+};
 use crate::Real;
 
 /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
@@ -27,6 +29,17 @@ pub const PLAN: Plan<Real, Parallel> = Plan {
         jerk: [
             1000000000000.0, 1000000000000.0, 1000000000000.0, 100000000000.0, 100000000000.0, 100000000000.0,
         ],
+    },
+    stop: StopLimits {
+        acceleration: [
+            15866666.666666664, 15866666.666666664, 15866666.666666664, 1586666.6666666663,
+            1586666.6666666663, 1586666.6666666663,
+        ],
+        jerk: [
+            47203333.33333332, 47203333.33333332, 47203333.33333332, 4720333.33333333, 4720333.33333333,
+            4720333.33333333,
+        ],
+        shortest: 8,
     },
     stream_step: [
         5.000000000000444e-7, 5.000000000000444e-7, 5.000000000000462e-7, 5.000000000000355e-6,

@@ -24,7 +24,7 @@ pub use crate::motion::Motion as Target;
 pub use frames::{Frames, Parallel, Tool, Work};
 pub use generator::{BUSY, Generator, REFUSED, STALE};
 pub use profile::{LONGEST, MoveLimits, Profile};
-pub use stop::Stop;
+pub use stop::{Stop, StopLimits};
 pub use trajectory::{Axis, Row, Segment, Table, Trajectory};
 
 /// What the user wants done.
@@ -85,8 +85,10 @@ pub struct Plan<T: Real, F> {
     pub home: [T; 6],
     /// Largest |pose component| given out, the bias included, m and rad.
     pub bound: [T; 6],
-    /// Limits of bias, moves and stops.
+    /// Limits of bias and moves.
     pub limits: MoveLimits<T>,
+    /// Limits of stops.
+    pub stop: StopLimits<T>,
     /// Largest step of a stream in a tick, m and rad.
     pub stream_step: [T; 6],
     /// Largest rate that a stream may state, m/s and rad/s.

@@ -1,6 +1,7 @@
 //! Platforms that no controller may be made for: each is refused before anything is written, at its place in the file, with
 //! what was expected, and with a mend that is itself accepted when it is put into the spec.
 
+mod stops;
 mod support;
 
 use std::fs;

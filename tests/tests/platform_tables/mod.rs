@@ -3,7 +3,7 @@
 //! figure.
 
 mod behaviour;
-mod bench;
+pub mod bench;
 mod limits;
 mod oracle;
 mod tables;

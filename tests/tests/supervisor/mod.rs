@@ -10,4 +10,5 @@ mod lost;
 mod oracle;
 mod refusals;
 mod sequences;
+mod stops;
 mod table;

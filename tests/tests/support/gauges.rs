@@ -39,6 +39,8 @@ pub fn model(probes: [Probe; 6]) -> Model {
             speed: [1e-3; 6],
             acceleration: [1.0; 6],
             jerk: [1e3; 6],
+            stop_acceleration: None,
+            stop_jerk: None,
             stream_speed: [1.0; 6],
             stale_ticks: 10,
         },

@@ -7,7 +7,7 @@ use crate::emit::supervised::{self, Parts};
 
 pub fn emit() -> TokenStream {
     let imports = quote! {
-        use specgen_runtime::setpoint::Generator;
+        use specgen_runtime::setpoint::{CommandKind, Generator};
         use specgen_runtime::{Estimate, Integral, NotchState, Real as _, Transfer};
 
         use crate::setpoint::PLAN as SETPOINTS;
@@ -59,7 +59,8 @@ pub fn emit() -> TokenStream {
             supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
         }
 
-        /// Codes held or on their way to rest, the law suspended; pose and rate are still measured. Returns the status.
+        /// Codes held or on their way to rest, the law suspended; pose and rate are still measured. A motion that was under way
+        /// is first brought to rest by the law, within the limits of stops. Returns the status.
         #[cold]
         #[inline(never)]
         fn stand(
@@ -70,12 +71,19 @@ pub fn emit() -> TokenStream {
             channel: usize,
             expected: Real,
         ) -> u32 {
-            move_codes(config, state, supervisor);
-            for leg in &mut state.legs {
-                leg.requested = leg.memory.displacement();
-            }
-            let faults = sense(config, state, &input.gauge);
-            if faults == 0 && compares(supervisor.phase) {
+            let stops = matches!(supervisor.phase, Phase::Holding | Phase::RampingDown) && state.generator.can_stop();
+            let faults = if stops {
+                let mut hold = *input;
+                hold.command.kind = CommandKind::Hold;
+                (advance(config, state, &hold) & GAUGE_FAULT) >> 8
+            } else {
+                move_codes(config, state, supervisor);
+                for leg in &mut state.legs {
+                    leg.requested = leg.memory.displacement();
+                }
+                sense(config, state, &input.gauge)
+            };
+            if faults == 0 && !stops && compares(supervisor.phase) {
                 supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, None));
             }
             if !supervisor.phase.is_powered() {

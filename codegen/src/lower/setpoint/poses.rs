@@ -25,7 +25,21 @@ pub struct Stretch {
 /// Frames that [`super::lower`] refuses.
 pub fn stretches(model: &Model, task: &TaskSpace, setpoints: &Setpoints) -> Result<Vec<Vec<Stretch>>, Vec<Diagnostic>> {
     let user = User::of(model, task)?;
-    let along = |kind: &TrajectoryKind, path: &Path| match (kind, path) {
+    let lowered = task.trajectories.iter().zip(&setpoints.trajectories);
+    Ok(lowered
+        .map(|(declared, lowered)| {
+            let mut stretches = along(&declared.kind, &lowered.path);
+            for stretch in &mut stretches {
+                stretch.poses = stretch.poses.iter().filter_map(|pose| user.pose(*pose)).collect();
+            }
+            stretches
+        })
+        .collect())
+}
+
+/// The same of one trajectory, in the user's coordinates.
+pub(super) fn along(kind: &TrajectoryKind, path: &Path) -> Vec<Stretch> {
+    match (kind, path) {
         (TrajectoryKind::Paper { path, as_printed, frequency }, _) => {
             analytic(*frequency, &paper::pieces(*path, *as_printed, *frequency))
         }
@@ -37,17 +51,7 @@ pub fn stretches(model: &Model, task: &TaskSpace, setpoints: &Setpoints) -> Resu
             vec![Stretch { interval: period / f64::from(A_ROW), poses }]
         }
         (TrajectoryKind::Waveform { .. }, Path::Segments { .. }) => Vec::new(),
-    };
-    let lowered = task.trajectories.iter().zip(&setpoints.trajectories);
-    Ok(lowered
-        .map(|(declared, lowered)| {
-            let mut stretches = along(&declared.kind, &lowered.path);
-            for stretch in &mut stretches {
-                stretch.poses = stretch.poses.iter().filter_map(|pose| user.pose(*pose)).collect();
-            }
-            stretches
-        })
-        .collect())
+    }
 }
 
 fn analytic(frequency: f64, pieces: &[paper::Piece]) -> Vec<Stretch> {

@@ -309,6 +309,8 @@ pub const SECTIONS: &[Section] = &[
             row("speed", Shape::List(SPEEDS), Default(SLOW_SPEED), "", SLOW_SPEED, "Largest speed of bias and point-to-point moves."),
             row("acceleration", Shape::List(ACCELERATIONS), Default(SLOW_ACCELERATION), "", SLOW_ACCELERATION, "Their largest acceleration."),
             row("jerk", Shape::List(JERKS), Default(SLOW_JERK), "", SLOW_JERK, "Their largest jerk."),
+            row("stop_acceleration", Shape::List(ACCELERATIONS), Rule("derived from the platform's modes, `amplifier.lag`, `actuator.slew_rate` and `actuator.stroke`, for a stop from `stream_speed`"), "", "[\"5 m/s^2\", \"5 m/s^2\", \"5 m/s^2\", \"50 rad/s^2\", \"50 rad/s^2\", \"50 rad/s^2\"]", "Largest deceleration of stops: of a stream that runs dry or is not believed, and of any motion that another command ends. The rate falls smoothly, from v to 0 in 1.5 v over this at least, over half of v times that time, and never within less than two thirds of the time that a stop from the largest declared speed takes; `specgen check` states the distances."),
+            row("stop_jerk", Shape::List(JERKS), Rule("the jerk at which a stop from the largest declared speed just reaches `stop_acceleration`"), "", "[\"1e4 m/s^3\", \"1e4 m/s^3\", \"1e4 m/s^3\", \"1e5 rad/s^3\", \"1e5 rad/s^3\", \"1e5 rad/s^3\"]", "Their largest jerk."),
             row("stream_speed", Shape::List(SPEEDS), Default(STREAM_SPEED), "", STREAM_SPEED, "A streamed set-point further from the last one than this in a period is a jump, and refused."),
             row("stale_ticks", integer(1, 1_000_000), Default("10"), "", "10", "A stream that brings nothing new for so many ticks is stale, and the last set-point is held."),
         ],

@@ -121,6 +121,17 @@ impl<T: Real> Generator<T> {
         }
     }
 
+    /// Whether a motion is under way that the command to hold brings to rest within the limits of stops; the way to the bias
+    /// is none.
+    #[must_use]
+    pub fn can_stop(&self) -> bool {
+        match self.phase {
+            Phase::Reset | Phase::Bias | Phase::Hold => false,
+            Phase::Stream => self.rate != [T::ZERO; 6],
+            Phase::Move | Phase::Approach(_) | Phase::Play(_) | Phase::Stop => true,
+        }
+    }
+
     /// Set-point at the end of the interval before the last [`Generator::tick`], or after it: from rest and with the bias.
     #[inline]
     #[must_use]

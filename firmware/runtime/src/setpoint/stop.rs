@@ -1,11 +1,11 @@
 //! To standstill from any motion: pose and rate go on without a step, and the way is inside the workspace.
 //!
 //! Over D ticks the rate falls as v (1 − 3σ² + 2σ³), σ = k/D, and the way is D v/2, in the direction of v on every axis.
-//! The deceleration peaks at 1.5 v/D and its slope at 6 v/D². D is the least that keeps both within the limits of moves,
-//! and is halved while the platform would leave the workspace: walls come before comfort. The acceleration that the motion
-//! had is dropped at once.
+//! The deceleration peaks at 1.5 v/D and its slope at 6 v/D². D is the least within [`StopLimits`], and is
+//! halved while the platform would leave the workspace: walls come before comfort. The acceleration that the motion had is
+//! dropped at once.
 
-use super::profile::{LONGEST, MoveLimits, largest, least};
+use super::profile::{LONGEST, largest, least};
 use super::{Frames, Plan, Target};
 use crate::digest::Digest;
 use crate::real::Real;
@@ -13,6 +13,31 @@ use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
 
 /// Halvings of D that are tried: after them a tick is all that is left.
 const HALVINGS: u32 = 21;
+
+/// Limits of stops: of one tick, reciprocal and by axis, 1/(A T_s²) and 1/(J T_s³), per m or rad; and the least duration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StopLimits<T> {
+    /// Of deceleration.
+    pub acceleration: [T; 6],
+    /// Of jerk.
+    pub jerk: [T; 6],
+    /// Least D, ≥ 1: a slow motion has limits that it would reach within a tick.
+    pub shortest: i32,
+}
+
+impl<T: Real> StopLimits<T> {
+    /// D of a stop from `rate` (m and rad per tick), at most [`LONGEST`]. The way of each axis is D/2 times its rate.
+    #[must_use]
+    pub fn ticks(&self, rate: &[T; 6]) -> i32 {
+        let a = largest(rate, &self.acceleration) * T::from_f64(1.5);
+        let j = largest(rate, &self.jerk) * T::from_f64(6.0);
+        match least(|d: T| d >= a && d * d >= j) {
+            Some(ticks) if ticks < self.shortest => self.shortest,
+            Some(ticks) => ticks,
+            None => LONGEST,
+        }
+    }
+}
 
 /// A stop under way.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,16 +68,11 @@ impl<T: Real> Stop<T> {
     /// The stop from `pose` (m, rad) at `rate` (per s), in the user's frames.
     #[must_use]
     pub fn plan<F: Frames<T>>(plan: &Plan<T, F>, pose: &[T; 6], rate: &[T; 6]) -> Self {
-        let mut stop = Self { start: *pose, rate: *rate, ticks: LONGEST, tick: 0 };
+        let mut stop = Self { start: *pose, rate: *rate, ticks: 1, tick: 0 };
         for rate in &mut stop.rate {
             *rate = *rate * plan.period;
         }
-        let MoveLimits { acceleration, jerk, .. } = &plan.limits;
-        let a = largest(&stop.rate, acceleration) * T::from_f64(1.5);
-        let j = largest(&stop.rate, jerk) * T::from_f64(6.0);
-        if let Some(ticks) = least(|d: T| d >= a && d * d >= j) {
-            stop.ticks = ticks;
-        }
+        stop.ticks = plan.stop.ticks(&stop.rate);
         for _ in 0..HALVINGS {
             if stop.ticks == 1 || plan.admitted(&stop.end()).is_some() {
                 break;

@@ -1,13 +1,14 @@
 //! The set-point generator: what it does on command and what it refuses; in [`promises`] what it promises whatever the
-//! command, in [`frames`] the user's frames.
+//! command, in [`frames`] the user's frames, in [`stops`] how it comes to rest.
 
 mod frames;
 mod promises;
+mod stops;
 mod support;
 
 use crate::common::Random;
 use specgen_runtime::setpoint::{
-    BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Plan, Profile, REFUSED, STALE, Target,
+    BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Plan, Profile, REFUSED, STALE, StopLimits, Target,
 };
 use support::*;
 
@@ -201,7 +202,7 @@ fn another_goal_is_gone_to_after_the_move() {
 }
 
 #[test]
-fn a_stop_goes_on_without_a_step_in_pose_or_rate_and_keeps_the_limits_of_moves() {
+fn a_stop_goes_on_without_a_step_in_pose_or_rate_and_keeps_its_limits() {
     let plan = plan64();
     for interrupted_after in [1, 50, 100, 150, 500, 1000] {
         let mut generator = ready(&plan);
@@ -211,12 +212,12 @@ fn a_stop_goes_on_without_a_step_in_pose_or_rate_and_keeps_the_limits_of_moves()
             before = generator.next(&plan, &order).0;
         }
         let stop = run(&mut generator, &plan, &hold());
-        assert!((stop[0].rate[0] - before.rate[0]).abs() <= ACCELERATION[0] * PERIOD, "{interrupted_after}");
+        assert!((stop[0].rate[0] - before.rate[0]).abs() <= STOP_ACCELERATION[0] * PERIOD, "{interrupted_after}");
         let mut last = before;
         for target in &stop {
             let step = target.pose[0] - last.pose[0];
             assert!(step >= 0.0 && step <= before.rate[0] * PERIOD * (1.0 + 1e-9), "{step:e}");
-            assert!(target.acceleration[0].abs() <= ACCELERATION[0] * (1.0 + 1e-9));
+            assert!(target.acceleration[0].abs() <= STOP_ACCELERATION[0] * (1.0 + 1e-9));
             last = *target;
         }
         assert_eq!(last, Target::at(last.pose));
@@ -226,9 +227,10 @@ fn a_stop_goes_on_without_a_step_in_pose_or_rate_and_keeps_the_limits_of_moves()
 
 #[test]
 fn a_stop_before_a_wall_is_as_short_as_it_must_be_and_stays_inside() {
-    let plan = plan64();
+    let mut plan = plan64();
+    // 4 mm/s towards the wall at 50 µm: within these limits it would take 0.6 s and 1.2 mm.
+    plan.stop = StopLimits { acceleration: plan.limits.acceleration, jerk: plan.limits.jerk, shortest: 1 };
     let mut generator = ready(&plan);
-    // 4 mm/s towards the wall at 50 µm: the gentle stop would take 0.6 s and 1.2 mm.
     let v = 4e-3;
     let mut last = Target::at(BIAS);
     for sequence in 1..=100 {

@@ -3,7 +3,8 @@
 
 use specgen_runtime::Real;
 use specgen_runtime::setpoint::{
-    Axis, Command, CommandKind, Frames, Generator, MoveLimits, Plan, Row, Segment, Table, Target, Trajectory,
+    Axis, Command, CommandKind, Frames, Generator, MoveLimits, Plan, Row, Segment, StopLimits, Table, Target,
+    Trajectory,
 };
 
 /// 10 kHz.
@@ -11,6 +12,8 @@ pub const PERIOD: f64 = 100e-6;
 pub const SPEED: [f64; 6] = [100e-6, 100e-6, 100e-6, 1e-3, 1e-3, 1e-3];
 pub const ACCELERATION: [f64; 6] = [10e-3, 10e-3, 10e-3, 0.1, 0.1, 0.1];
 pub const JERK: [f64; 6] = [1.0, 1.0, 1.0, 10.0, 10.0, 10.0];
+pub const STOP_ACCELERATION: [f64; 6] = [5.0, 5.0, 5.0, 50.0, 50.0, 50.0];
+pub const STOP_JERK: [f64; 6] = [13e3, 13e3, 13e3, 130e3, 130e3, 130e3];
 pub const STREAM_SPEED: [f64; 6] = [5e-3, 5e-3, 5e-3, 50e-3, 50e-3, 50e-3];
 pub const BOUND: [f64; 6] = [50e-6, 50e-6, 60e-6, 0.3e-3, 0.3e-3, 0.4e-3];
 pub const BIAS: [f64; 6] = [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0];
@@ -33,6 +36,11 @@ pub fn plan<T: Real, F: Frames<T>>(frames: F, trajectories: Vec<Trajectory<T>>) 
             speed: scaled(SPEED, PERIOD),
             acceleration: scaled(ACCELERATION, PERIOD * PERIOD),
             jerk: scaled(JERK, PERIOD * PERIOD * PERIOD),
+        },
+        stop: StopLimits {
+            acceleration: scaled(STOP_ACCELERATION, PERIOD * PERIOD),
+            jerk: scaled(STOP_JERK, PERIOD * PERIOD * PERIOD),
+            shortest: 1,
         },
         stream_step: six(STREAM_SPEED.map(|v| v * PERIOD * (1.0 + 1e-5))),
         stream_rate: six(STREAM_SPEED),
