@@ -36,6 +36,7 @@ fn leg(change: impl FnOnce(&mut LegParameters)) -> LegParameters {
 
 /// The first `count` of: the reference machine, legs of other hysteresis on the reference platform, random machines.
 pub fn machines(count: usize) -> Vec<Machine> {
+    #[allow(clippy::type_complexity)] // A table of four.
     let kinds: [(&str, fn() -> Specimen); 4] = [
         ("reference", Specimen::reference),
         // Thresholds that widen by a third at 5 mm/s.
