@@ -68,7 +68,7 @@ fn supervised(folder: &Path) -> Supervised {
 /// Writes the workspace of six legs; its image, if it is wanted.
 fn built(folder: &Path, image: bool) -> Option<Image> {
     let compiled = specgen::compile::compile(Path::new(&spec("legs.toml"))).unwrap();
-    specgen::workspace::write_scratch(folder, &compiled.files).unwrap();
+    drop(specgen::workspace::write(folder, &compiled.files).unwrap());
     image.then(|| target::build_pil(folder, Mcu::Mps2An500, &folder.join("target")).unwrap())
 }
 

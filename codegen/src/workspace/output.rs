@@ -112,8 +112,12 @@ fn stage(work: &Path, files: &BTreeMap<String, String>) -> Result<(), WriteError
 fn put_manifest(work: &Path, manifest: &Manifest, folder: &Path) -> io::Result<()> {
     let beside = work.join(NEXT_MANIFEST);
     fs::write(&beside, manifest.text())?;
-    sync(&beside)?;
-    fs::rename(&beside, folder.join(MANIFEST))?;
+    let moved = sync(&beside).and_then(|()| fs::rename(&beside, folder.join(MANIFEST)));
+    if moved.is_err() {
+        // Nothing stays of what could not be done.
+        let _ = fs::remove_file(&beside);
+    }
+    moved?;
     sync(folder)
 }
 

@@ -221,26 +221,22 @@ pub fn emit(ir: &Ir) -> TokenStream {
         }
 
         /// Gives what the first request of a mode lacks to where the legs stand, m of each leg, to what the mode would itself
-        /// come to hold it with: the estimates, else the integral. Where there is neither it becomes an offset that fades,
-        /// which estimates would learn against.
-        #[inline]
+        /// come to hold it with: the estimates, else the integral if every axis has one. Else it becomes an offset that fades.
+        #[cold]
         fn hand_over(config: &Config, state: &mut State, held: &[Real; LEGS]) {
             let mode = config.mode();
-            let mut left = *held;
+            let mut offset = [0.0; LEGS];
             if mode.law() != Law::Invhys {
+                // At once: an offset that fades would be learned against.
                 for (estimate, held) in state.estimates.iter_mut().zip(transform(&LEGS_TO_MODES, held)) {
                     estimate.level -= held;
                 }
-                left = [0.0; LEGS];
-            } else if mode.feeds_back() {
-                let force = transform(&LEGS_TO_WRENCH, held);
-                let gain = &config.active_gains().integral;
-                let taken = each(|axis| if gain[axis] > 0.0 { force[axis] } else { 0.0 });
-                state.integral.grow(&taken);
-                let moved = transform(&WRENCH_TO_LEGS, &taken);
-                left = each(|leg| held[leg] - moved[leg]);
+            } else if mode.feeds_back() && config.active_gains().integral.iter().all(|gain| *gain > 0.0) {
+                state.integral.grow(&transform(&LEGS_TO_WRENCH, held));
+            } else {
+                offset = *held;
             }
-            state.transfer.begin(left);
+            state.transfer.begin(offset);
         }
 
         /// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.

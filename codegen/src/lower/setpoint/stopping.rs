@@ -17,6 +17,8 @@ use crate::model::{Model, TaskSpace};
 const BISECTIONS: u32 = 40;
 /// A stop beside a wall is shortened while it runs; a trajectory up to the wall itself is not refused for that.
 const SLACK: f64 = 0.01;
+/// Room of an axis that is none, as a share of the workspace: a leg that stands at the end of its stroke has as much by rounding.
+const LEAST_ROOM: f64 = 1e-6;
 
 /// The longest stop of one kind of motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -164,18 +166,19 @@ impl Place<'_> {
         inside && self.platform.displacements(&there).iter().all(|leg| *leg >= low && *leg <= high)
     }
 
-    /// How far the user's axis alone can go from the bias pose in its better direction, m or rad.
+    /// How far the user's axis alone can go from the bias pose in its better direction, m or rad; 0 where rounding alone lets it.
     fn room(&self, axis: usize) -> f64 {
+        let group = if axis < 3 { 0..3 } else { 3..6 };
+        let far = 4.0 * self.user.bound[group].iter().sum::<f64>();
         let [forth, back] = [1.0, -1.0].map(|sign| {
-            let group = if axis < 3 { 0..3 } else { 3..6 };
-            let far = 4.0 * self.user.bound[group].iter().sum::<f64>();
             largest(far, |by| {
                 let mut pose = self.user.home;
                 pose[axis] += sign * by;
                 self.holds(pose, 1e-9)
             })
         });
-        if back > forth { back } else { forth }
+        let room = if back > forth { back } else { forth };
+        if room > LEAST_ROOM * far { room } else { 0.0 }
     }
 
     /// What a stop from a pose of a trajectory leaves, if anything.

@@ -139,7 +139,7 @@ const SLOW_SPEED: &str = "[\"100 um/s\", \"100 um/s\", \"100 um/s\", \"1 mrad/s\
 const SLOW_ACCELERATION: &str =
     "[\"10 mm/s^2\", \"10 mm/s^2\", \"10 mm/s^2\", \"100 mrad/s^2\", \"100 mrad/s^2\", \"100 mrad/s^2\"]";
 const SLOW_JERK: &str = "[\"1 m/s^3\", \"1 m/s^3\", \"1 m/s^3\", \"10 rad/s^3\", \"10 rad/s^3\", \"10 rad/s^3\"]";
-const STREAM_SPEED: &str = "[\"5 mm/s\", \"5 mm/s\", \"5 mm/s\", \"50 mrad/s\", \"50 mrad/s\", \"50 mrad/s\"]";
+const STREAM_SPEED: &str = "[\"1 mm/s\", \"1 mm/s\", \"1 mm/s\", \"10 mrad/s\", \"10 mrad/s\", \"10 mrad/s\"]";
 
 /// Every section, in the order of the reference. Sections that hold others come before them.
 // One row a line: this is a table.
@@ -288,7 +288,7 @@ pub const SECTIONS: &[Section] = &[
             row("velocity_cutoff", BANDWIDTH, Rule("0.6 pi rad / period"), "", "\"9e3 rad/s\"", "First-order low-pass of the pose derivative, below half the tick rate (pi rad / period)."),
             row("interaction", Shape::One(Item::Choice(&["none", "modelled", "measured"])), Default("\"none\""), "", "\"none\"", "Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words."),
             row("lead", one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Default("\"0 ms\""), "", "\"0.2 ms\"", "Time by which the leg displacements are asked for early, in proportion to their rate: about the amplifier lag less one period. Takes out part of the lag of fast motion; a set-point that steps is overshot by step x lead / period for one tick."),
-            row("transfer_time", one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("\"50 ms\""), "", "\"50 ms\"", "Time constant with which the offset of a change of mode fades, where neither estimates nor an integral take it over: in F with Invhys."),
+            row("transfer_time", one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("\"50 ms\""), "", "\"50 ms\"", "Time constant with which the offset of a change of mode fades, where neither estimates nor an integral on every axis take it over, as in F with Invhys."),
         ],
     },
     Section {

@@ -44,6 +44,7 @@ fn serve(client: &mut Client<Vec<u8>>, console: &mut Console, now: u64) -> io::R
     let mut bytes = room();
     let said = client.read(&mut bytes, now)?;
     client.state.extend_from_slice(said);
+    let mut answers = String::new();
     while let Some(end) = client.state.iter().position(|byte| *byte == b'\n') {
         let line: Vec<u8> = client.state.drain(..=end).collect();
         let line = String::from_utf8_lossy(&line);
@@ -51,9 +52,12 @@ fn serve(client: &mut Client<Vec<u8>>, console: &mut Console, now: u64) -> io::R
             "status" => status(console.said.as_ref()),
             line => console.obey(line, now).unwrap_or_else(|error| format!("error: {error}")),
         };
-        // A reader that does not read is closed: nobody waits for it.
-        client.stream.write_all(format!("{answer}\n").as_bytes())?;
+        answers += &answer;
+        answers.push('\n');
     }
+    // In one piece: many small ones fill the socket long before their bytes do. A reader that does not read is closed: nobody
+    // waits for it.
+    client.stream.write_all(answers.as_bytes())?;
     // What is left has no end yet.
     if client.state.len() > LONGEST {
         let _ = client.stream.write_all(b"error: a line has at most 4096 bytes\n");

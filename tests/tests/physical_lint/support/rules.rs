@@ -122,6 +122,7 @@ const OF_PARTS: &[Rule] = &[
         text: "\"0.35 ms\"",
         raises: "\"0.51 ms\"",
         passes: "\"0.49 ms\"",
+        also: &["E0459"],
         ..RULE
     },
     Rule {

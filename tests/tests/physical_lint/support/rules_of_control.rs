@@ -130,7 +130,7 @@ pub(super) const OF_CONTROL: &[Rule] = &[
         text: "speed        = [\"100 um/s\"",
         raises: "speed        = [\"47 mm/s\"",
         passes: "speed        = [\"46 mm/s\"",
-        also: &["W0842"],
+        also: &["W0842", "E0459"],
         ..RULE
     },
     Rule {
@@ -157,6 +157,7 @@ pub(super) const OF_CONTROL: &[Rule] = &[
         text: "[\"5 mm/s\"",
         raises: "[\"1.01 m/s\"",
         passes: "[\"0.99 m/s\"",
+        also: &["E0459"],
         ..RULE
     },
     Rule {
@@ -175,7 +176,7 @@ pub(super) const OF_CONTROL: &[Rule] = &[
         raises: "\"0.0903 V/ms\"",
         passes: "\"0.0907 V/ms\"",
         line: Some("frequency = \"1 Hz\""),
-        also: &["W0809", "W0840", "W0851"],
+        also: &["W0809", "W0840", "W0851", "E0459"],
         ..RULE
     },
     Rule {
@@ -184,6 +185,7 @@ pub(super) const OF_CONTROL: &[Rule] = &[
         text: "\"40 V/ms\"",
         raises: "\"0.152 V/ms\"",
         passes: "\"0.154 V/ms\"",
+        also: &["E0459"],
         line: Some("frequency = \"1 Hz\""),
         ..RULE
     },
@@ -205,7 +207,7 @@ pub(super) const OF_CONTROL: &[Rule] = &[
         text: "kind      = \"case-1\"\nfrequency = \"1 Hz\"",
         raises: "kind      = \"case-1\"\nfrequency = \"336 Hz\"",
         passes: "kind      = \"case-1\"\nfrequency = \"332 Hz\"",
-        also: &["W0854"],
+        also: &["W0854", "E0459"],
         line: Some("frequency = \"336 Hz\""),
         ..RULE
     },
@@ -216,6 +218,7 @@ pub(super) const OF_CONTROL: &[Rule] = &[
         text: "kind      = \"case-1\"\nfrequency = \"1 Hz\"",
         raises: "kind      = \"case-1\"\nfrequency = \"73 Hz\"",
         passes: "kind      = \"case-1\"\nfrequency = \"72 Hz\"",
+        also: &["E0459"],
         line: Some("frequency = \"73 Hz\""),
         ..RULE
     },
