@@ -29,15 +29,15 @@ pub struct Environment {
 /// Checked settings. Every value it holds keeps the tick within its promises.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    mode: ControlMode,
-    interaction: Interaction,
-    level_weight: Real,
-    drift_weight: Real,
-    code_limits: CodeLimits,
-    gains: Gains<Real>,
-    position_gains: Gains<Real>,
-    environment: Environment,
-    damps: [bool; 2],
+    pub(crate) mode: ControlMode,
+    pub(crate) interaction: Interaction,
+    pub(crate) level_weight: Real,
+    pub(crate) drift_weight: Real,
+    pub(crate) code_limits: CodeLimits,
+    pub(crate) gains: Gains<Real>,
+    pub(crate) position_gains: Gains<Real>,
+    pub(crate) environment: Environment,
+    pub(crate) damps: [bool; 2],
 }
 
 impl Default for Config {
@@ -265,7 +265,7 @@ impl Config {
 }
 
 /// Whether any k_v is other than zero.
-const fn damps(gains: &Gains<Real>) -> bool {
+pub(crate) const fn damps(gains: &Gains<Real>) -> bool {
     let [x, y, z, tilt_x, tilt_y, tilt_z] = gains.derivative;
     x != 0.0 || y != 0.0 || z != 0.0 || tilt_x != 0.0 || tilt_y != 0.0 || tilt_z != 0.0
 }

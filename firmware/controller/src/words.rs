@@ -7,7 +7,7 @@
 use specgen_runtime::linear::{each, transform};
 use specgen_runtime::setpoint::{Command, CommandKind, Target};
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Real as _};
-use crate::config::Environment;
+use crate::config::{Environment, damps};
 use crate::task_space::MODES_TO_LEGS;
 use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput};
 
@@ -244,30 +244,30 @@ impl Config {
         let Some(interaction) = Interaction::from_word(words[1]) else {
             return Err(ConfigError { word: 1 });
         };
-        let limits = CodeLimits {
-            max_step: words[CONFIG_CODES] as i32,
-            min: words[CONFIG_CODES + 1] as i32,
-            max: words[CONFIG_CODES + 2] as i32,
-        };
-        let gains = |first: usize| Gains {
+        let set = |first: usize| Gains {
             proportional: six(words, first),
             integral: six(words, first + 6),
             derivative: six(words, first + 12),
         };
-        let environment = Environment {
-            stiffness: six(words, CONFIG_GAINS + 36),
-            rest: six(words, CONFIG_GAINS + 42),
-        };
-        Self::new()
-            .with_mode(mode)
-            .with_interaction(interaction)
-            .with_weights(
-                Real::from_word(words[CONFIG_WEIGHTS]),
-                Real::from_word(words[CONFIG_WEIGHTS + 1]),
-            )?
-            .with_code_limits(limits)?
-            .with_gains(gains(CONFIG_GAINS), gains(CONFIG_GAINS + 18))?
-            .with_environment(environment)
+        let (gains, position_gains) = (set(CONFIG_GAINS), set(CONFIG_GAINS + 18));
+        Ok(Self {
+            mode,
+            interaction,
+            level_weight: Real::from_word(words[CONFIG_WEIGHTS]),
+            drift_weight: Real::from_word(words[CONFIG_WEIGHTS + 1]),
+            code_limits: CodeLimits {
+                max_step: words[CONFIG_CODES] as i32,
+                min: words[CONFIG_CODES + 1] as i32,
+                max: words[CONFIG_CODES + 2] as i32,
+            },
+            damps: [damps(&gains), damps(&position_gains)],
+            gains,
+            position_gains,
+            environment: Environment {
+                stiffness: six(words, CONFIG_GAINS + 36),
+                rest: six(words, CONFIG_GAINS + 42),
+            },
+        })
     }
 
     /// Words in the order of [`CONFIG_NAMES`].
