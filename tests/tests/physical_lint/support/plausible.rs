@@ -178,7 +178,7 @@ pub fn platform(random: &mut ChaCha8Rng, folder: &Path, index: usize) -> String 
     text += &format!("\n[hysteresis]\ngrid = {grid}\nmemory = {}\nrecords = [\"{name}\"]\n", draw.one_of(&[32, 64]));
     if control {
         text += &format!(
-            "\n[adaptation]\nmode = \"{}\"\n\n[control]\nmodal_damping = {}\nlead = \"{} us\"\n\n[control.setpoint]\nbias = [\"0 um\", \"0 um\", \"{} um\", \"0 urad\", \"0 urad\", \"0 urad\"]\n",
+            "\n[adaptation]\nmode = \"{}\"\n\n[control]\nmodal_damping = {}\nlead = \"{} us\"\n\n[control.setpoint]\nbias = [\"0 um\", \"0 um\", \"{} um\", \"0 urad\", \"0 urad\", \"0 urad\"]\nSTREAM_SPEED\n",
             draw.one_of(&["invhys", "ewma", "pcc"]),
             digits(draw.between(0.015, 0.05)),
             digits((lag * draw.between(0.0, 0.8)).max(0.1 * period) * um),
@@ -209,9 +209,18 @@ pub fn platform(random: &mut ChaCha8Rng, folder: &Path, index: usize) -> String 
             .collect();
         fs::write(folder.join(format!("circle-{index}.csv")), format!("x_um,y_um\n{}\n", rows.join("\n")))
             .expect("written");
+        let row = draw.one_of(&[1.0, 2.0, 5.0, 10.0]);
         text += &format!(
-            "\n[[trajectory]]\nname = \"circle\"\nkind = \"waveform\"\nfile = \"circle-{index}.csv\"\nperiod = \"{} ms\"\nrepeat = true\n",
-            draw.one_of(&[1.0, 2.0, 5.0, 10.0])
+            "\n[[trajectory]]\nname = \"circle\"\nkind = \"waveform\"\nfile = \"circle-{index}.csv\"\nperiod = \"{row} ms\"\nrepeat = true\n"
+        );
+        // Whoever declares a fast path lets it pass.
+        let fastest = size.map(|size| 1.1 * TAU / 100.0 * size * um / row);
+        let [x, y] = fastest.map(|speed| digits(speed.max(1.0)));
+        text = text.replace(
+            "STREAM_SPEED",
+            &format!(
+                "stream_speed = [\"{x} mm/s\", \"{y} mm/s\", \"1 mm/s\", \"10 mrad/s\", \"10 mrad/s\", \"10 mrad/s\"]"
+            ),
         );
     } else {
         // A bandwidth well below what a resonance of 5 % damping stands.
