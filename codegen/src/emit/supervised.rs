@@ -9,13 +9,15 @@ pub struct Parts {
     pub imports: TokenStream,
     /// The functions `begin`, `stand`, `expectation`, `look`.
     pub functions: TokenStream,
+    /// What else than to run and to stand: further branches that give the status.
+    pub stops: TokenStream,
     /// The control law: what binds `status`.
     pub law: TokenStream,
     /// Field of the input with the gauges' words.
     pub gauges: TokenStream,
 }
 
-pub fn emit(Parts { imports, functions, law, gauges }: &Parts) -> TokenStream {
+pub fn emit(Parts { imports, functions, stops, law, gauges }: &Parts) -> TokenStream {
     quote! {
         #![doc = " The control law under its supervisor: what every target calls."]
 
@@ -108,7 +110,7 @@ pub fn emit(Parts { imports, functions, law, gauges }: &Parts) -> TokenStream {
             let (phase, cause) = (supervisor.phase, supervisor.cause);
             let status = if phase == Phase::Running {
                 run(config, state, supervisor, &input.tick, channel, [expected, target])
-            } else {
+            } #stops else {
                 stand(config, state, supervisor, &input.tick, channel, expected)
             };
             // Of the state and at the end: what is as large as an output is slow to move.

@@ -28,7 +28,7 @@
 
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, transform};
-use specgen_runtime::setpoint::Command;
+use specgen_runtime::setpoint::{Command, CommandKind};
 use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState};
 use crate::dynamics::Load;
 use crate::hysteresis::{TABLES, Table};
@@ -83,12 +83,17 @@ pub struct TickOutput {
 
 /// One control tick. See the module for the timing.
 pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
-    let status = advance(config, state, input);
+    let status = advance(config, state, input.command.kind, input);
     outputs(state, status)
 }
 
-/// The work of a tick; returns its status.
-pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> u32 {
+/// The work of a tick, with `kind` in place of that of the command; returns its status.
+pub(crate) fn advance(
+    config: &Config,
+    state: &mut State,
+    kind: CommandKind,
+    input: &TickInput,
+) -> u32 {
     let entered = enter_mode(config, state);
     let gauge_faults = sense(config, state, &input.gauge);
     if gauge_faults == 0 {
@@ -96,7 +101,7 @@ pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> 
     }
     let wrench_good = take_wrench(config, state, &input.wrench);
     let damping = damping(config, state);
-    let setpoint_status = state.generator.tick(&PLAN, &input.command);
+    let setpoint_status = state.generator.tick_as(&PLAN, kind, &input.command);
     let Load { displacement: demand, force } = known_load(config, state);
     let correction = correction(config, state);
     state.load = each(|leg| {
@@ -109,8 +114,7 @@ pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> 
     }
     let mut request = each(|leg| demand[leg] + state.load[leg] + correction[leg]);
     if entered {
-        let held = each(|leg| state.legs[leg].requested - request[leg]);
-        hand_over(config, state, &held);
+        hand_over(config, state, &request);
         request = each(|leg| state.legs[leg].requested);
     } else {
         state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
@@ -186,26 +190,27 @@ fn enter_mode(config: &Config, state: &mut State) -> bool {
     true
 }
 
-/// Gives what the first request of a mode lacks to where the legs stand, m of each leg, to what the mode would itself
+/// Gives what the first `request` of a mode (m of each leg) lacks to where the legs stand to what the mode would itself
 /// come to hold it with: the estimates, else the integral if every axis has one. Else it becomes an offset that fades.
 #[cold]
-fn hand_over(config: &Config, state: &mut State, held: &[Real; LEGS]) {
+fn hand_over(config: &Config, state: &mut State, request: &[Real; LEGS]) {
+    let held = each(|leg| state.legs[leg].requested - request[leg]);
     let mode = config.mode();
     let mut offset = [0.0; LEGS];
     if mode.law() != Law::Invhys {
         for (estimate, held) in state
             .estimates
             .iter_mut()
-            .zip(transform(&LEGS_TO_MODES, held))
+            .zip(transform(&LEGS_TO_MODES, &held))
         {
             estimate.level -= held;
         }
     } else if mode.feeds_back()
         && config.active_gains().integral.iter().all(|gain| *gain > 0.0)
     {
-        state.integral.grow(&transform(&LEGS_TO_WRENCH, held));
+        state.integral.grow(&transform(&LEGS_TO_WRENCH, &held));
     } else {
-        offset = *held;
+        offset = held;
     }
     state.transfer.begin(offset);
 }

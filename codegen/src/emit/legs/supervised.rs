@@ -118,6 +118,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
     supervised::emit(&Parts {
         imports,
         functions,
+        // Legs have no rate that would have to be brought to rest.
+        stops: TokenStream::new(),
         law: quote! {
             let approached;
             let given = if supervisor.approach.is_done() {

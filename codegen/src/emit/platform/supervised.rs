@@ -59,8 +59,17 @@ pub fn emit() -> TokenStream {
             supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
         }
 
-        /// Codes held or on their way to rest, the law suspended; pose and rate are still measured. A motion that was under way
-        /// is first brought to rest by the law, within the limits of stops. Returns the status.
+        /// A motion that was under way when the law was to be suspended, brought to rest by it within the limits of stops. Returns
+        /// the status.
+        #[cold]
+        #[inline(never)]
+        fn come_to_rest(config: &Config, state: &mut State, supervisor: &mut Supervisor, input: &TickInput) -> u32 {
+            let faults = advance(config, state, CommandKind::Hold, input) & GAUGE_FAULT;
+            supervisor.see(faults >> 8, 0, &input.gauge, &[0; LEGS], 1);
+            faults
+        }
+
+        /// Codes held or on their way to rest, the law suspended; pose and rate are still measured. Returns the status.
         #[cold]
         #[inline(never)]
         fn stand(
@@ -71,19 +80,12 @@ pub fn emit() -> TokenStream {
             channel: usize,
             expected: Real,
         ) -> u32 {
-            let stops = matches!(supervisor.phase, Phase::Holding | Phase::RampingDown) && state.generator.can_stop();
-            let faults = if stops {
-                let mut hold = *input;
-                hold.command.kind = CommandKind::Hold;
-                (advance(config, state, &hold) & GAUGE_FAULT) >> 8
-            } else {
-                move_codes(config, state, supervisor);
-                for leg in &mut state.legs {
-                    leg.requested = leg.memory.displacement();
-                }
-                sense(config, state, &input.gauge)
-            };
-            if faults == 0 && !stops && compares(supervisor.phase) {
+            move_codes(config, state, supervisor);
+            for leg in &mut state.legs {
+                leg.requested = leg.memory.displacement();
+            }
+            let faults = sense(config, state, &input.gauge);
+            if faults == 0 && compares(supervisor.phase) {
                 supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, None));
             }
             if !supervisor.phase.is_powered() {
@@ -123,7 +125,12 @@ pub fn emit() -> TokenStream {
     supervised::emit(&Parts {
         imports,
         functions,
-        law: quote! { let status = advance(config, state, input); },
+        stops: quote! {
+            else if matches!(phase, Phase::Holding | Phase::RampingDown) && state.generator.can_stop() {
+                come_to_rest(config, state, supervisor, &input.tick)
+            }
+        },
+        law: quote! { let status = advance(config, state, input.command.kind, input); },
         gauges: quote! { gauge },
     })
 }

@@ -149,14 +149,20 @@ impl<T: Real> Generator<T> {
     /// Brings [`Generator::target`] to the end of the coming interval; returns [`REFUSED`], [`STALE`], [`BUSY`].
     #[inline]
     pub fn tick<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>) -> u32 {
+        self.tick_as(plan, command.kind, command)
+    }
+
+    /// As [`Generator::tick`], with `kind` in place of that of the command, which need not be copied for it.
+    #[inline]
+    pub fn tick_as<F: Frames<T>>(&mut self, plan: &Plan<T, F>, kind: CommandKind, command: &Command<T>) -> u32 {
         let fresh = command.sequence != self.sequence;
         self.sequence = command.sequence;
-        let streams = command.kind == CommandKind::Stream;
+        let streams = kind == CommandKind::Stream;
         if streams && matches!(self.phase, Phase::Stream | Phase::Hold | Phase::Stop) {
             return self.stream(plan, command, fresh);
         }
         self.age = 0;
-        let status = self.obey(plan, command);
+        let status = self.obey(plan, kind, command);
         self.advance(plan, status)
     }
 
@@ -199,8 +205,8 @@ impl<T: Real> Generator<T> {
 
     /// Begins and ends motions as the command wants; returns the status of a refusal.
     #[inline]
-    fn obey<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>) -> u32 {
-        let played = match command.kind {
+    fn obey<F: Frames<T>>(&mut self, plan: &Plan<T, F>, kind: CommandKind, command: &Command<T>) -> u32 {
+        let played = match kind {
             CommandKind::Trajectory => Some(command.selector),
             _ => None,
         };
@@ -215,12 +221,12 @@ impl<T: Real> Generator<T> {
             }
             Phase::Bias | Phase::Stop => {}
             Phase::Stream => self.begin_stop(plan),
-            Phase::Move if command.kind == CommandKind::Move => {}
+            Phase::Move if kind == CommandKind::Move => {}
             Phase::Approach(index) | Phase::Play(index) if played == Some(index) => {}
             Phase::Move | Phase::Approach(_) | Phase::Play(_) => self.begin_stop(plan),
             Phase::Hold => {}
         }
-        let accepted = match command.kind {
+        let accepted = match kind {
             CommandKind::Hold | CommandKind::Stream => true,
             CommandKind::Unknown => false,
             CommandKind::Move => self.phase != Phase::Hold || self.begin_move(plan, &command.target.pose, Phase::Move),
