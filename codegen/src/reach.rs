@@ -21,6 +21,7 @@ use crate::model::{Model, TaskSpace};
 pub use boxes::Boxes;
 pub use conditioning::Conditioning;
 pub use findings::describe;
+pub(crate) use travel::largest;
 
 /// Interior poses that are looked at beside the corners.
 const INTERIOR_POSES: u32 = 128;

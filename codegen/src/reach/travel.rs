@@ -59,25 +59,12 @@ impl Legs<'_> {
         let steepest = slopes.iter().map(|row| row[axis].abs()).fold(0.0, |a: f64, b| if b > a { b } else { a });
         let far = 2.0 * self.stroke / steepest;
         let far = if axis >= 3 && far > LARGEST_ANGLE { LARGEST_ANGLE } else { far };
-        pose[axis] + sign * self.largest(far, |by| self.holds(&moved(by)))
-    }
-
-    /// Largest value up to `far` below which `holds`, by bisection; 0 if nowhere.
-    fn largest(&self, far: f64, holds: impl Fn(f64) -> bool) -> f64 {
-        if holds(far) {
-            return far;
-        }
-        let (mut good, mut bad) = (0.0, far);
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * (good + bad);
-            if holds(middle) { good = middle } else { bad = middle }
-        }
-        good
+        pose[axis] + sign * largest(far, |by| self.holds(&moved(by)))
     }
 
     /// Part of the box, shrunk towards `bias`, of which all corners are in reach.
     pub(super) fn share(&self, bias: &Pose, bounds: &Pose) -> f64 {
-        self.largest(1.0, |share| {
+        largest(1.0, |share| {
             corners().all(|signs| {
                 let corner = core::array::from_fn(|i| bias[i] + share * (signs[i] * bounds[i] - bias[i]));
                 self.holds(&corner)
@@ -87,7 +74,7 @@ impl Legs<'_> {
 
     /// Largest part, up to 1, of a box of half widths `half` about `centre` of which all corners are in reach.
     pub(super) fn corners_within(&self, centre: &Pose, half: &Pose) -> f64 {
-        self.largest(1.0, |share| {
+        largest(1.0, |share| {
             corners().all(|signs| self.holds(&core::array::from_fn(|i| centre[i] + share * signs[i] * half[i])))
         })
     }
@@ -141,6 +128,19 @@ impl Legs<'_> {
         path.shift = (path.poses > 0 && lowest <= highest).then_some([lowest, highest]);
         path
     }
+}
+
+/// Largest value up to `far` below which `holds`, by bisection; 0 if nowhere.
+pub(crate) fn largest(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    if holds(far) {
+        return far;
+    }
+    let (mut good, mut bad) = (0.0, far);
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (good + bad);
+        if holds(middle) { good = middle } else { bad = middle }
+    }
+    good
 }
 
 /// Signs of the 64 corners of a box.

@@ -12,7 +12,7 @@ use crate::lock;
 /// The lock in the work folder; its text names the owner.
 const LOCK: &str = "lock";
 /// A run that only writes is over by then; one that builds is not waited for.
-const PATIENCE: Duration = Duration::from_secs(5);
+const TIMEOUT: Duration = Duration::from_secs(5);
 const ROUND: Duration = Duration::from_millis(20);
 
 /// The right to write an output folder and to build in it, until this is dropped.
@@ -36,7 +36,7 @@ impl Hold {
                 Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::NotFound) => {}
                 Err(error) => return Err(WriteError::io("write", dir, error)),
             }
-            if start.elapsed() > PATIENCE {
+            if start.elapsed() > TIMEOUT {
                 return Err(WriteError::Busy { dir: dir.to_owned(), owner: owner(&work.join(LOCK)) });
             }
             std::thread::sleep(ROUND);

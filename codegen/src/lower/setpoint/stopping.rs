@@ -4,6 +4,7 @@
 mod refusal;
 
 use serde::Serialize;
+use specgen_numerics::displacements;
 use specgen_runtime::Platform;
 use specgen_runtime::setpoint::StopLimits;
 
@@ -12,9 +13,8 @@ use super::{AXES, User, amount, stop};
 use crate::diagnostic::Diagnostic;
 use crate::ir::Setpoints;
 use crate::model::{Model, TaskSpace};
+use crate::reach::largest;
 
-/// Bisections of the room that an axis has.
-const BISECTIONS: u32 = 40;
 /// A stop beside a wall is shortened while it runs; a trajectory up to the wall itself is not refused for that.
 const SLACK: f64 = 0.01;
 /// Room of an axis that is none, as a share of the workspace: a leg that stands at the end of its stroke has as much by rounding.
@@ -163,7 +163,7 @@ impl Place<'_> {
         let Some(there) = self.user.pose(pose) else { return false };
         let inside = there.iter().zip(&self.user.bound).all(|(value, bound)| value.abs() <= (1.0 + slack) * bound);
         let [low, high] = [-slack * self.stroke, (1.0 + slack) * self.stroke];
-        inside && self.platform.displacements(&there).iter().all(|leg| *leg >= low && *leg <= high)
+        inside && displacements(self.platform, &there).iter().all(|leg| *leg >= low && *leg <= high)
     }
 
     /// How far the user's axis alone can go from the bias pose in its better direction, m or rad; 0 where rounding alone lets it.
@@ -195,19 +195,6 @@ impl Place<'_> {
         };
         Some(Leaves { share, end })
     }
-}
-
-/// Largest value up to `far` below which `holds`, by bisection; 0 if nowhere.
-fn largest(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
-    if holds(far) {
-        return far;
-    }
-    let (mut good, mut bad) = (0.0, far);
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (good + bad);
-        if holds(middle) { good = middle } else { bad = middle }
-    }
-    good
 }
 
 /// The stops as text for `specgen check`.
