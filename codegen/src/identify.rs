@@ -23,7 +23,6 @@ mod grid_choice;
 mod least_squares;
 mod limits;
 pub mod linear;
-pub mod nnls;
 mod normal;
 mod prior;
 pub mod rate;
@@ -48,6 +47,7 @@ use findings::Findings;
 use normal::Normal;
 use regressor::Plane;
 use residual::Residual;
+use specgen_numerics::nnls;
 
 pub use cause::{Cause, Source};
 pub use coverage::{MAX_GRID, Region};

@@ -80,7 +80,7 @@ fn the_same_seed_gives_the_same_bytes_whatever_the_number_of_threads() {
         };
         let (first, files) = run("1", "a", "5");
         assert!(files.len() >= 5 && !first.is_empty());
-        for (threads, output) in [("2", "b"), ("2", "c"), ("1", "d"), ("3", "e")] {
+        for (threads, output) in support::length(&[("2", "b")][..], &[("2", "b"), ("2", "c"), ("1", "d"), ("3", "e")]) {
             assert_eq!(run(threads, output, "5"), (first.clone(), files.clone()), "{spec}, {threads} threads");
         }
         // The comparison can fail.

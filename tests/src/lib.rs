@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use host_sim::controller::{Controller, TickController};
 use host_sim::description::Description;
@@ -47,7 +46,7 @@ pub fn scratch(name: &str) -> PathBuf {
 /// would let one wait for the other.
 #[must_use]
 pub fn image_target() -> PathBuf {
-    builds().join(format!("build-{}", std::env::var("SPECGEN_TEST_WORKER").unwrap_or_default()))
+    builds().join(format!("build-{}", worker()))
 }
 
 /// How much of what only gains by length is run: the short length in the test run, the long one where `SPECGEN_SOAK` is set, as
@@ -69,8 +68,57 @@ pub struct Emitted {
     pub dir: PathBuf,
 }
 
-/// One build at a time: cargo would lock anyway, and print about it.
-static BUILD: Mutex<()> = Mutex::new(());
+/// Where workspaces are built, one after the other: cargo names crates by their place, so what a workspace shares with the one
+/// before, above all the runtime, is compiled once. A folder for each worker of the test run.
+struct Stage {
+    folder: PathBuf,
+    _lock: fs::File,
+}
+
+impl Stage {
+    /// Puts a workspace there. Files that are there with the same content keep their time, by which cargo goes.
+    fn of(workspace: &Path) -> Self {
+        let folder = builds().join(format!("stage-{}", worker()));
+        fs::create_dir_all(&folder).expect("target is writable");
+        let lock = fs::File::create(folder.join(".lock")).expect("target is writable");
+        lock.lock().expect("a lock");
+        let folder = folder.join("workspace");
+        let (wanted, there) = (files(workspace), files(&folder));
+        for (path, content) in &wanted {
+            if there.get(path) != Some(content) {
+                let path = folder.join(path);
+                fs::create_dir_all(path.parent().expect("below the stage")).expect("target is writable");
+                fs::write(path, content).expect("target is writable");
+            }
+        }
+        for path in there.keys().filter(|path| !wanted.contains_key(*path)) {
+            fs::remove_file(folder.join(path)).expect("target is writable");
+        }
+        Self { folder, _lock: lock }
+    }
+}
+
+fn worker() -> String {
+    std::env::var("SPECGEN_TEST_WORKER").unwrap_or_default()
+}
+
+/// Files below `dir` with their content, by path relative to it, but for what cargo built there.
+fn files(dir: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut open = vec![dir.to_owned()];
+    while let Some(folder) = open.pop() {
+        for entry in fs::read_dir(folder).into_iter().flatten().map_while(Result::ok) {
+            let path = entry.path();
+            if path.is_dir() {
+                open.extend((path != dir.join("target")).then_some(path));
+            } else {
+                let name = path.strip_prefix(dir).expect("below it").to_owned();
+                files.insert(name, fs::read(&path).expect("a file"));
+            }
+        }
+    }
+    files
+}
 
 impl Emitted {
     /// Compiles a spec of `specs/` with `edits` (old text, new text) and writes its workspace to a folder of its own.
@@ -113,10 +161,8 @@ impl Emitted {
     /// If it does not build.
     #[must_use]
     pub fn library(&self) -> PathBuf {
-        let _one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
-        // A target folder of its own: cargo names the crates of a workspace by their place in it, so two workspaces would
-        // take each other's builds for their own.
-        target::host::build_library(&self.dir, &self.dir.join("target")).unwrap_or_else(|error| panic!("{error}"))
+        let stage = Stage::of(&self.dir);
+        target::host::build_library(&stage.folder, &image_target()).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// The emitted crate, loaded.
@@ -142,8 +188,8 @@ impl Emitted {
             }
             panic!("{missing}");
         }
-        let _one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
-        Some(target::build_image(&self.dir, mcu, &image_target()).unwrap_or_else(|error| panic!("{error}")))
+        let stage = Stage::of(&self.dir);
+        Some(target::build_image(&stage.folder, mcu, &image_target()).unwrap_or_else(|error| panic!("{error}")))
     }
 
     /// Input rows of every kind that a tick may meet, for leg or pose set-points.
@@ -252,21 +298,10 @@ pub fn integers(trace: &Trace, name: &str) -> Vec<u64> {
 /// Text files below `dir`, by path relative to it.
 ///
 /// # Panics
-/// If one cannot be read.
+/// If one is no text.
 #[must_use]
 pub fn sources(dir: &Path) -> BTreeMap<String, String> {
-    let mut files = BTreeMap::new();
-    let mut open = vec![dir.to_owned()];
-    while let Some(folder) = open.pop() {
-        for entry in fs::read_dir(&folder).expect("a folder").map_while(Result::ok) {
-            let path = entry.path();
-            if path.is_dir() {
-                open.push(path);
-            } else {
-                let name = path.strip_prefix(dir).expect("below it").display().to_string();
-                files.insert(name, fs::read_to_string(&path).expect("text"));
-            }
-        }
-    }
-    files
+    let text =
+        |(path, content): (PathBuf, Vec<u8>)| (path.display().to_string(), String::from_utf8(content).expect("text"));
+    files(dir).into_iter().map(text).collect()
 }

@@ -5,8 +5,8 @@
 use crate::identify_support::{Relays, generator, random_table, uniform};
 use nalgebra::DMatrix;
 use specgen::identify::Staircase;
-use specgen::identify::nnls;
 use specgen::identify::regressor::{Plane, evaluate};
+use specgen_numerics::nnls;
 
 const RANGE: [f64; 2] = [-90.0, 90.0];
 

@@ -6,6 +6,7 @@ mod generated;
 mod packages;
 mod progress;
 mod run;
+mod schema;
 mod setup;
 mod skips;
 mod soak;

@@ -6,6 +6,7 @@
 //! | [`Matrix`], [`Matrix6`] | dense matrices, eigenvalues, modes of mass and stiffness, exponential |
 //! | [`Double`] | numbers of 106 bits: the reference for rounding errors |
 //! | [`Traced`] | numbers that record every operation: bounds of rounding errors over a box of poses |
+//! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
 //! | [`Kernels`], [`displacements`], [`jacobian`] | the controller's kernels on these numbers, compiled here |
 //!
 //! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
@@ -16,6 +17,7 @@ mod exponential;
 mod form;
 mod kernels;
 mod matrix;
+pub mod nnls;
 mod symmetric;
 mod traced;
 

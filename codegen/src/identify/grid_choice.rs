@@ -15,8 +15,9 @@ use super::findings::Findings;
 use super::normal::{Normal, Weighting, accumulate};
 use super::record::Record;
 use super::regressor::Plane;
-use super::{DeadTime, Options, coverage, dead_time, nnls, prior, selection};
+use super::{DeadTime, Options, coverage, dead_time, prior, selection};
 use crate::diagnostic::Diagnostic;
+use specgen_numerics::nnls;
 
 /// Grids that are tried.
 pub const TRIED: [usize; 9] = [6, 8, 12, 16, 20, 24, 32, 40, 48];

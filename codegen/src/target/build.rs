@@ -86,9 +86,8 @@ fn build_program(
     let package = dir.join(folder);
     let place = if folder == EMULATED { mcu.machine() } else { mcu.part().name };
     let what = format!("{} for {place}", package.display());
-    // A folder per part: they differ in flags only, and cargo would build everything again at each change.
-    let target_dir = target_dir.join(place);
-    let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &[], locked: true };
+    // Parts share the folder: cargo keeps what was made with other flags, and what runs on the host is made once.
+    let request = BuildRequest { package: &package, target_dir, rustc_args: &[], locked: true };
     let cpu = format!("-Ctarget-cpu={}", mcu.core());
     // A package may have several images; the one that is meant comes last.
     let link = |command: &mut Command| {
@@ -114,7 +113,7 @@ fn build_program(
 }
 
 impl Mcu {
-    /// QEMU's name of the machine with this core, which is also the folder name of its builds.
+    /// QEMU's name of the machine with this core.
     #[must_use]
     pub fn machine(self) -> &'static str {
         self.part().machine

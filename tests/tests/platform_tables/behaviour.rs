@@ -6,6 +6,7 @@ use host_sim::platform::scenario::{PLATFORM_MODES, select};
 use host_sim::platform::{PlatformScenario, Specimen, UserFrames};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use specgen::machine;
+use specgen_tests::length;
 
 use super::bench::{BIAS, Bench, PERIOD, in_parallel, paper, reference_machine};
 
@@ -64,7 +65,7 @@ fn an_over_range_demand_leaves_nothing_behind() {
     let mut scenario = bench.scenario();
     scenario.options.record = Record::Samples;
     let mut controller = bench.controller();
-    for (name, mode) in [PLATFORM_MODES[0], PLATFORM_MODES[4], PLATFORM_MODES[5], PLATFORM_MODES[6]] {
+    for (name, mode) in length(&[0, 6][..], &[0, 4, 5, 6]).iter().map(|mode| PLATFORM_MODES[*mode]) {
         let mut words = controller.default_config();
         for (word, value) in [("mode", f64::from(mode)), ("code_max", (LOWERED / LSB).floor())] {
             controller.description().set_config(&mut words, word, value).expect("a setting");
@@ -322,10 +323,10 @@ fn a_change_of_mode_in_motion_disturbs_no_more_than_the_modes_themselves() {
     let path = paper(PaperPath::Case1, 1.0);
     let pairs: Vec<(u32, u32)> =
         (0..7).flat_map(|from| (0..7).map(move |to| (from, to))).filter(|(from, to)| from != to).collect();
-    let ticks = [7000, 9000, 11_000];
+    let ticks = length(&[7000][..], &[7000, 9000, 11_000]);
     let found = in_parallel(42, |pair| {
         let (from, to) = pairs[pair as usize];
-        ticks.map(|tick| excursion(&scenario, bench, from, to, &path, tick))
+        ticks.iter().map(|tick| excursion(&scenario, bench, from, to, &path, *tick)).collect::<Vec<_>>()
     });
     // What each mode is off by where nothing changes.
     let mut usual = [0.0_f64; 7];

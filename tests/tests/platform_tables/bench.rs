@@ -13,7 +13,7 @@ use host_sim::platform::rig::{Noise, RunOptions};
 use host_sim::platform::{PlatformScenario, Specimen};
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen::stability::platform::Design;
-use specgen_tests::Emitted;
+use specgen_tests::{Emitted, length};
 
 /// Control period of the reference spec, s.
 pub const PERIOD: f64 = 1e-4;
@@ -144,7 +144,9 @@ impl Pair {
 }
 
 /// How many.
-pub const PLANTS: u32 = 12;
+pub fn plants() -> u32 {
+    length(3, 12)
+}
 
 fn of(what: &str, number: u32, edits: &[(&str, &str)]) -> Bench {
     let specimen = Specimen::random(SEED, number);
@@ -156,7 +158,7 @@ fn of(what: &str, number: u32, edits: &[(&str, &str)]) -> Bench {
 pub fn random_machines() -> &'static [Pair] {
     static MACHINES: OnceLock<Vec<Pair>> = OnceLock::new();
     MACHINES.get_or_init(|| {
-        in_parallel(PLANTS, |number| Pair { notched: of("notch", number, &[]), number, plain: OnceLock::new() })
+        in_parallel(plants(), |number| Pair { notched: of("notch", number, &[]), number, plain: OnceLock::new() })
     })
 }
 

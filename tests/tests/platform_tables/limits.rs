@@ -9,7 +9,7 @@ use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDy
 
 use specgen_tests::length;
 
-use super::bench::{BIAS, Bench, PERIOD, PLANTS, SEED, in_parallel, median, random_machines};
+use super::bench::{BIAS, Bench, PERIOD, SEED, in_parallel, median, plants, random_machines};
 
 /// A small step of the demand on every axis, then rest.
 struct Nudge;
@@ -124,7 +124,7 @@ const COMBINED: (u32, Law) = (6, Law::Combined(Adapting::Pcc));
 #[test]
 fn predicted_limits_are_those_of_the_machine() {
     let machines = random_machines();
-    let count = length(2, 4);
+    let count = length(1, 4);
     let cases = [
         ("weights, F ewma", EWMA, 0),
         ("weights, F pcc", PCC, 0),
@@ -171,7 +171,7 @@ fn damping(closed_loop: &ClosedLoop) -> [f64; 6] {
 #[test]
 fn no_start_rule_is_unstable_on_any_machine() {
     let machines = random_machines();
-    let count = length(4, PLANTS);
+    let count = length(2, plants());
     let unstable: Vec<String> = in_parallel(count, |number| {
         let pair = &machines[number as usize];
         let (notched, plain) = (&pair.notched, pair.plain());

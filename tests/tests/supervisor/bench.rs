@@ -3,6 +3,7 @@
 use host_sim::controller::{MachineWord, Supervised, TickController};
 use host_sim::word::Scalar;
 use specgen_tests::Emitted;
+use std::collections::BTreeMap;
 
 pub const DISARMED: u8 = 0;
 pub const ARMING: u8 = 1;
@@ -79,6 +80,8 @@ pub struct Bench {
     pub readings_per_leg: Option<[[f64; 6]; 6]>,
     limits: [f64; 2],
     max_step: i64,
+    inputs: BTreeMap<String, usize>,
+    outputs: BTreeMap<String, usize>,
     /// Code at rest.
     pub rest: i64,
     config: Vec<u64>,
@@ -97,8 +100,10 @@ impl Bench {
         let ir = &emitted.compiled.ir;
         let rest = i64::from(ir.supervision.rest);
         let mut output = vec![0; machine.output_names().len()];
-        let first = machine.output_names().iter().position(|name| name == "dac_code[0]").expect("an output word");
-        output[first..first + 6].fill(rest as u64);
+        let places = |names: Vec<String>| (0..).zip(names).map(|(place, name)| (name, place)).collect();
+        let (inputs, outputs): (_, BTreeMap<String, usize>) =
+            (places(machine.input_names()), places(machine.output_names()));
+        output[outputs["dac_code[0]"]..][..6].fill(rest as u64);
         Self {
             kind,
             scalar: description.scalar,
@@ -118,6 +123,8 @@ impl Bench {
             limits: emitted.compiled.model.actuator.voltage,
             max_step: i64::from(ir.defaults.max_step),
             config,
+            inputs,
+            outputs,
         }
     }
 
@@ -126,11 +133,11 @@ impl Bench {
     }
 
     pub fn input_at(&self, name: &str) -> usize {
-        self.machine.input_names().iter().position(|found| found == name).expect("an input word")
+        self.inputs[name]
     }
 
     pub fn at(&self, name: &str) -> usize {
-        self.machine.output_names().iter().position(|found| found == name).expect("an output word")
+        self.outputs[name]
     }
 
     pub fn six(&self, name: &str) -> [f64; 6] {

@@ -60,18 +60,18 @@ fn compare(name: &str, kind: Kind, more: &[(&str, &str)], mcu: Mcu, sequences: u
 
 #[test]
 fn sequences_of_six_legs_have_the_same_bits_on_the_m7() {
-    compare("supervisor-bits-legs", Kind::Legs, &[], Mcu::Mps2An500, specgen_tests::length(500, 10_000));
+    compare("supervisor-bits-legs", Kind::Legs, &[], Mcu::Mps2An500, specgen_tests::length(150, 10_000));
 }
 
 #[test]
 fn sequences_of_a_platform_have_the_same_bits_on_the_m7() {
-    compare("supervisor-bits-platform", Kind::Platform, &[], Mcu::Mps2An500, specgen_tests::length(500, 10_000));
+    compare("supervisor-bits-platform", Kind::Platform, &[], Mcu::Mps2An500, specgen_tests::length(150, 10_000));
 }
 
 #[test]
 fn sequences_in_f32_have_the_same_bits_on_the_m4f() {
     let f32 = ("scalar   = \"f64\"", "scalar   = \"f32\"");
-    compare("supervisor-bits-f32", Kind::Legs, &[f32], Mcu::Mps2An386, specgen_tests::length(500, 2_000));
+    compare("supervisor-bits-f32", Kind::Legs, &[f32], Mcu::Mps2An386, specgen_tests::length(150, 2_000));
 }
 
 /// The comparison can fail: one ulp of one constant of the supervisor is found.

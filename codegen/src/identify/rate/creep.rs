@@ -12,9 +12,9 @@ use nalgebra::DMatrix;
 use super::forward::{kept, parts};
 use super::prepare::Prepared;
 use super::{CreepTerm, RateModel, fit, mixed};
-use crate::identify::nnls::Failure;
 use crate::identify::regressor::Plane;
 use crate::identify::trend::Line;
+use specgen_numerics::nnls::Failure;
 
 /// Fewest and most creep operators; between them, one a decade of the time constants.
 const TERMS: [f64; 2] = [3.0, 6.0];

@@ -6,10 +6,10 @@ use super::{RateModel, creep, mixed};
 use crate::everett::EverettTable;
 use crate::identify::dead_time;
 use crate::identify::findings::Findings;
-use crate::identify::nnls::{self, Failure};
 use crate::identify::normal::weights_to_nodes;
 use crate::identify::prior;
 use crate::identify::regressor::Plane;
+use specgen_numerics::nnls::{self, Failure};
 
 /// Longest dead time tried, sampling intervals of the fastest sampled record.
 const LONGEST: usize = 16;

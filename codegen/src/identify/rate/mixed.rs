@@ -5,7 +5,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::identify::nnls::{self, Failure};
+use specgen_numerics::nnls::{self, Failure};
 
 /// Minimises ½ wᵀGw − bᵀw with the first `bounded` entries of w ≥ 0. `gram` is symmetric, both triangles filled.
 pub(super) fn solve(gram: &DMatrix<f64>, rhs: &[f64], bounded: usize) -> Result<Vec<f64>, Failure> {
