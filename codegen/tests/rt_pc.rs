@@ -11,6 +11,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use host_sim::controller::{Controller, Supervised, TickController};
@@ -57,8 +58,10 @@ impl Bench {
         let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["rt-pc"]);
         let root = folder.path().join("controller");
         workspace::write_scratch(&root, &files).unwrap();
-        // Kept between runs and shared by both specs, so that dependencies are compiled once.
-        let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc").join(spec);
+        // Kept between runs and shared by both specs, so that dependencies are compiled once; the programs are called alike.
+        static BUILD: Mutex<()> = Mutex::new(());
+        let one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc");
         let cargo = |verb: &[&str]| {
             let mut command = Command::new("cargo");
             command.args(verb).args(["--release", "--locked", "--quiet", "--features", "comedi"]);
@@ -76,7 +79,10 @@ impl Bench {
             cargo(&["test"]);
         }
         cargo(&["build"]);
-        let library = target::host::build_library(&root, &kept).unwrap();
+        let binary = folder.path().join("rt-pc");
+        fs::copy(kept.join("release/rt-pc"), &binary).unwrap();
+        let library = target::host::build_library(&root, &root.join("target")).unwrap();
+        drop(one);
         let name = format!("test-{}-{}", spec.trim_end_matches(".toml"), std::process::id());
         // Under real-time priority where that is granted: other tests want the processors too.
         let plant = |more: &[&str]| {
@@ -88,7 +94,7 @@ impl Bench {
         let plant = plant(if granted.is_ok_and(|status| status.success()) { &["--priority", "50"] } else { &[] });
         let place = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
         wait_for("the machine", || place.exists());
-        Self { binary: kept.join("release/rt-pc"), folder, library, plant, name, spec: spec_file }
+        Self { binary, folder, library, plant, name, spec: spec_file }
     }
 
     fn path(&self, name: &str) -> PathBuf {

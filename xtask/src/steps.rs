@@ -139,7 +139,8 @@ fn lints(root: &Path) -> Outcome {
     // In release, so that build scripts and macros are those of the tests. Boards are built from an emitted workspace by their
     // tests.
     let own: &[&str] = &["--workspace", "--all-targets"];
-    let alone = ["--manifest-path", REAL_TIME, "--all-targets", "--locked"];
+    // Into the same folder: most of its dependencies are those of the workspace.
+    let alone = ["--manifest-path", REAL_TIME, "--all-targets", "--locked", "--target-dir", "target"];
     for scope in [own, &alone] {
         let clippy = [&["clippy", "--release", "--quiet"], scope, &["--", "-D", "warnings"]].concat();
         let outcome = expect_success(cargo(root, &clippy), "mend what is reported above");
