@@ -191,7 +191,7 @@ fn ctrl_c_keeps_what_was_run_and_says_so() {
     let folder = Folder::new();
     let mut child = folder
         .command()
-        .args(["robust", "legs.toml", "--draws", "2000", "--threads", "1"])
+        .args(["robust", "legs.toml", "--draws", "2000", "--frequency", "10", "--threads", "1"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

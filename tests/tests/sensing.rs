@@ -88,7 +88,7 @@ fn random_layouts_that_are_accepted_are_exact_too() {
     let mut random = Random::new(11);
     let (mut accepted, mut refused) = (0, 0);
     let mut worst = [0.0_f64; 2];
-    while accepted < 60 {
+    while accepted < specgen_tests::length(20, 60) {
         let mut model = model(random.layout());
         // These may look anywhere, so their readings may be large.
         model.sensor.range = [-500e-6, 500e-6];
