@@ -3,10 +3,10 @@
 mod binaries;
 mod fresh;
 mod generated;
+mod judged;
 mod packages;
 mod progress;
 mod run;
-mod schema;
 mod setup;
 mod skips;
 mod soak;

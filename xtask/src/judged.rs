@@ -1,0 +1,107 @@
+//! Tests in workspaces of their own, whose dependencies take longer to compile than all they do. They are run where something
+//! that they judge has changed since it was last found good, and in the soak.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::run::{Outcome, cargo, expect_success};
+
+/// Beside the manifest: SHA-256 of all that was found good last.
+const JUDGED: &str = "judged.txt";
+
+/// Such tests.
+pub struct Trial {
+    /// Of the workspace; all of its own sources are judged.
+    pub manifest: &'static str,
+    /// What else is: files by folder and how their names end.
+    pub judges: &'static [(&'static str, &'static str)],
+}
+
+impl Trial {
+    /// Runs it, unless all that it would judge is what was judged last.
+    pub fn unless_unchanged(&self, root: &Path) -> Outcome {
+        match self.digest(root) {
+            Ok(digest) if fs::read_to_string(self.kept(root)).is_ok_and(|kept| kept.trim() == digest) => {
+                println!("found good before, and unchanged since: {digest}");
+                Outcome::Passed
+            }
+            Ok(_) => self.run(root),
+            Err(error) => Outcome::Failed(error.to_string()),
+        }
+    }
+
+    /// Runs it with its lints, and writes down what was found good.
+    pub fn run(&self, root: &Path) -> Outcome {
+        let package = ["--quiet", "--locked", "--all-targets", "--manifest-path", self.manifest];
+        for (command, more) in [("clippy", &["--", "-D", "warnings"][..]), ("test", &[])] {
+            let outcome = expect_success(cargo(root, &[&[command], &package[..], more].concat()), "see above");
+            if !matches!(outcome, Outcome::Passed) {
+                return outcome;
+            }
+        }
+        match self.digest(root).and_then(|digest| fs::write(self.kept(root), format!("{digest}\n"))) {
+            Ok(()) => Outcome::Passed,
+            Err(error) => Outcome::Failed(format!("{}: {error}", self.kept(root).display())),
+        }
+    }
+
+    fn folder(&self) -> &'static str {
+        self.manifest.trim_end_matches("/Cargo.toml")
+    }
+
+    fn kept(&self, root: &Path) -> PathBuf {
+        root.join(self.folder()).join(JUDGED)
+    }
+
+    /// Of all that is judged: names and contents.
+    fn digest(&self, root: &Path) -> io::Result<String> {
+        let own = [(self.folder(), ".rs"), (self.folder(), ".toml"), (self.folder(), ".lock")];
+        let mut files = Vec::new();
+        for (folder, end) in self.judges.iter().copied().chain(own) {
+            for entry in fs::read_dir(root.join(folder))? {
+                let name = entry?.file_name();
+                if name.to_string_lossy().ends_with(end) {
+                    files.push(Path::new(folder).join(name));
+                }
+            }
+        }
+        files.sort();
+        let mut judged = Vec::new();
+        for file in files {
+            let content = fs::read(root.join(&file))?;
+            judged.extend(format!("{} {}\n", file.display(), content.len()).into_bytes());
+            judged.extend(content);
+        }
+        Ok(specgen::workspace::sha256(&judged))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_of_anything_that_is_judged_is_seen() {
+        let trial = Trial { manifest: "trial/Cargo.toml", judges: &[("specs", ".toml"), ("specs", "schema.json")] };
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path();
+        let files =
+            ["specs/platform.schema.json", "specs/a.toml", "trial/lib.rs", "trial/Cargo.toml", "trial/Cargo.lock"];
+        for file in files {
+            fs::create_dir_all(root.join(file).parent().unwrap()).unwrap();
+            fs::write(root.join(file), file).unwrap();
+        }
+        let before = trial.digest(root).unwrap();
+        fs::write(trial.kept(root), &before).unwrap();
+        assert_eq!(trial.digest(root).unwrap(), before);
+        assert!(matches!(trial.unless_unchanged(root), Outcome::Passed));
+        for file in files {
+            fs::write(root.join(file), "other").unwrap();
+            assert_ne!(trial.digest(root).unwrap(), before, "{file}");
+            fs::write(root.join(file), file).unwrap();
+        }
+        fs::write(root.join("specs/c.toml"), "").unwrap();
+        assert_ne!(trial.digest(root).unwrap(), before, "a new spec");
+    }
+}
