@@ -1,4 +1,8 @@
-//! Pieces of the supervisor on their own: codes of converters, steps to rest, debounce, approach.
+//! The supervisor: in [`sequences`] against a state machine of its own text; here pieces of it on their own: codes of converters,
+//! steps to rest, debounce, approach.
+
+mod oracle;
+mod sequences;
 
 use specgen_runtime::GaugeConverter;
 use specgen_runtime::supervisor::{Approach, Cause, Debounce, Plan, TIMED, toward};
