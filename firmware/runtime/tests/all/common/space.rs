@@ -30,3 +30,23 @@ pub fn rotation(angles: [f64; 3]) -> Matrix {
     let z = [[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]];
     product(&product(&z, &y), &x)
 }
+
+/// The inverse of a matrix, row by row, with pivots.
+pub fn inverse(matrix: &[[f64; 6]; 6]) -> [[f64; 6]; 6] {
+    let mut left = *matrix;
+    let mut right: [[f64; 6]; 6] = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+    for k in 0..6 {
+        let pivot = (k..6).max_by(|a, b| left[*a][k].abs().total_cmp(&left[*b][k].abs())).expect("a row");
+        left.swap(k, pivot);
+        right.swap(k, pivot);
+        let by = 1.0 / left[k][k];
+        left[k] = left[k].map(|x| x * by);
+        right[k] = right[k].map(|x| x * by);
+        for i in (0..6).filter(|i| *i != k) {
+            let factor = left[i][k];
+            left[i] = std::array::from_fn(|j| left[i][j] - factor * left[k][j]);
+            right[i] = std::array::from_fn(|j| right[i][j] - factor * right[k][j]);
+        }
+    }
+    right
+}
