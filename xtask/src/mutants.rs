@@ -157,7 +157,10 @@ mod tests {
     fn names_do_not_depend_on_lines_and_tell_mutants_of_one_kind_apart() {
         let list = "a/b.rs:7:9: replace + with - in f\na/b.rs:7:30: replace + with - in f\na/b.rs:9:1: replace g -> T with 0: x\n";
         let found: Vec<String> = names(list).into_values().collect();
-        assert_eq!(found, [format!("{PLUS} #2"), format!("{PLUS} #1"), "a/b.rs: replace g -> T with 0: x #1".to_owned()]);
+        assert_eq!(
+            found,
+            [format!("{PLUS} #2"), format!("{PLUS} #1"), "a/b.rs: replace g -> T with 0: x #1".to_owned()]
+        );
         let moved = list.replace(":7:", ":8:");
         assert_eq!(names(&moved).into_values().collect::<Vec<_>>(), found);
     }

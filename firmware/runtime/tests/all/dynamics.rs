@@ -361,8 +361,7 @@ fn mass_coriolis_and_gravity_are_those_of_lagrange() {
         let found = platform.gravity(pose);
         assert!(apart(&found, &gravity, norm(&gravity)) < 1e-8, "{found:?} {gravity:?}");
         // All of them at once, and half of the weight.
-        let all: Six =
-            std::array::from_fn(|k| inner(&expected[k], acceleration) + coriolis[k] + 0.5 * gravity[k]);
+        let all: Six = std::array::from_fn(|k| inner(&expected[k], acceleration) + coriolis[k] + 0.5 * gravity[k]);
         let found = platform.generalised_force(motion, 0.5);
         assert!(apart(&found, &all, norm(&all)) < 1e-7, "{found:?} {all:?}");
     });
@@ -374,7 +373,8 @@ fn leg_forces_do_the_work_of_the_generalised_force_less_that_of_a_wrench() {
     let wrench = [3.0, -5.0, 7.0, 0.2, -0.4, 0.6];
     everywhere(|machine, _, platform, motion| {
         let jacobian = machine.jacobian(&motion.pose);
-        let work = |force: &Six| -> Six { std::array::from_fn(|k| (0..6).map(|leg| jacobian[leg][k] * force[leg]).sum()) };
+        let work =
+            |force: &Six| -> Six { std::array::from_fn(|k| (0..6).map(|leg| jacobian[leg][k] * force[leg]).sum()) };
         let expected = platform.generalised_force(motion, 1.0);
         let force = platform.leg_forces(motion);
         assert!(apart(&work(&force), &expected, norm(&expected)) < 1e-12);

@@ -57,13 +57,8 @@ fn legs() -> ([Vector; 6], [Vector; 6]) {
 fn leg_displacements_are_differences_of_lengths_and_lead_back_to_the_pose() {
     let (joint, rest) = legs();
     let length = |v: Vector| dot(v, v).sqrt();
-    let kernel = Legs {
-        rest_leg: rest,
-        platform_joint: joint,
-        rest_length: rest.map(length),
-        series: SERIES,
-        newton_steps: 5,
-    };
+    let kernel =
+        Legs { rest_leg: rest, platform_joint: joint, rest_length: rest.map(length), series: SERIES, newton_steps: 5 };
     // At rest: directions and their moments.
     let jacobian: [Six; 6] = std::array::from_fn(|leg| {
         let s = rest[leg].map(|x| x / length(rest[leg]));
@@ -146,8 +141,7 @@ fn kernel(layout: &[Gauge; 6], passes: usize) -> Gauges<'static, f64> {
         let mixed = |i: usize, j: usize| 0.5 * (m[i] * c[j] + m[j] * c[i]);
         [square(0), square(1), square(2), mixed(0, 1), mixed(0, 2), mixed(1, 2)]
     });
-    let curvature =
-        inverse.map(|row| std::array::from_fn(|column| (0..6).map(|k| row[k] * products[k][column]).sum()));
+    let curvature = inverse.map(|row| std::array::from_fn(|column| (0..6).map(|k| row[k] * products[k][column]).sum()));
     Gauges {
         direction,
         normal,
@@ -216,4 +210,13 @@ fn maps_are_matrices_and_keep_the_sign_of_zero() {
     assert_eq!(transform(&unit, &[0.0; 6]).map(f64::to_bits), [0; 6]);
     // A constant of zero takes nothing in, not even what is no number.
     assert_eq!(transform(&unit, &[1.0, f64::NAN, 2.0, 3.0, 4.0, 5.0])[0], 1.0);
+}
+
+#[test]
+fn series_without_coefficients_are_their_first_terms() {
+    let none = Series::<f64> { sine: &[], versine: &[] }.attitude([0.1, -0.2, 0.3]);
+    assert_eq!((none.sine, none.versine), ([0.1, -0.2, 0.3], [0.0; 3]));
+    let one = Series { sine: &[-0.5], versine: &[0.5, 2.0] }.attitude([0.5, -0.5, 1.0]);
+    assert_eq!(one.sine, [0.5 * (1.0 - 0.125), -0.5 * (1.0 - 0.125), 0.5]);
+    assert_eq!(one.versine, [0.25 * (0.5 + 0.5), 0.25 * (0.5 + 0.5), 2.5]);
 }

@@ -279,7 +279,8 @@ fn blocks_and_rows_are_those_of_a_recorder_that_keeps_lists() {
 fn a_memory_that_is_too_small_is_refused_with_what_is_needed() {
     let least = PREAMBLE + LONGEST_ROW;
     assert_eq!((LAYOUT.preamble(), LAYOUT.longest_row()), (PREAMBLE, LONGEST_ROW));
-    let refused = |words: usize, blocks: usize, layout: Layout| Recorder::new(&mut vec![0; words], blocks, layout).err();
+    let refused =
+        |words: usize, blocks: usize, layout: Layout| Recorder::new(&mut vec![0; words], blocks, layout).err();
     assert_eq!(refused(2 * least, 2, LAYOUT), None);
     assert_eq!(refused(2 * least - 1, 2, LAYOUT), Some(Unfit::TooSmall(2 * least)));
     assert_eq!(refused(3 * least - 1, 3, LAYOUT), Some(Unfit::TooSmall(3 * least)));
@@ -314,7 +315,8 @@ fn files_are_as_documented() {
         let text = "k=value\nlonger=texts".get(..length).unwrap();
         let bytes = gathered(|out| write_header(text, out));
         let padded = length.div_ceil(8) * 8;
-        let mut expected = [&FILE_MAGIC[..], &FORMAT.to_le_bytes(), &(padded as u32).to_le_bytes(), text.as_bytes()].concat();
+        let mut expected =
+            [&FILE_MAGIC[..], &FORMAT.to_le_bytes(), &(padded as u32).to_le_bytes(), text.as_bytes()].concat();
         expected.resize(16 + padded, b'\n');
         let sum = crc(&expected);
         expected.extend(sum.to_le_bytes());

@@ -206,9 +206,8 @@ fn every_word_of_a_generator_counts() {
         let Words(words) = words(phase, 0, u64::MAX);
         assert_eq!(save(&restore(&fresh, &words).unwrap()), words);
     }
-    let digests: Vec<u64> = (0..8)
-        .map(|phase| digest(|digest| restore(&fresh, &words(phase, 0, 1).0).unwrap().digest(digest)))
-        .collect();
+    let digests: Vec<u64> =
+        (0..8).map(|phase| digest(|digest| restore(&fresh, &words(phase, 0, 1).0).unwrap().digest(digest))).collect();
     assert!((0..8).all(|a| (0..a).all(|b| digests[a] != digests[b])), "phases that a digest does not tell apart");
     numbers_within(&fresh, (2..8).chain(14..38), LARGEST_PLACE);
     numbers_within(&fresh, (8..14).chain(38..50), LARGEST);

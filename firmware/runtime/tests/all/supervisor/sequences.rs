@@ -20,7 +20,8 @@ fn platform_bounds() -> Bounds {
 
 fn plan(bounds: &Bounds) -> Plan<f64> {
     let second = bounds.ticks_per_second as u32;
-    let [gauge, voltage, slew] = [bounds.gauge_ticks, bounds.voltage_ticks, bounds.slew_ticks].map(|ticks| ticks as u32);
+    let [gauge, voltage, slew] =
+        [bounds.gauge_ticks, bounds.voltage_ticks, bounds.slew_ticks].map(|ticks| ticks as u32);
     let [host, converter] = bounds.gone_ticks.map(|ticks| ticks as u32);
     let samples = bounds.samples as u32;
     Plan {
