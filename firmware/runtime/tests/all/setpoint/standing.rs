@@ -1,6 +1,6 @@
 //! Where a generator begins, when it may stand still at once, and when it has to stop first.
 
-use specgen_runtime::setpoint::{BUSY, Command, CommandKind, Frames, Generator, Parallel, Plan, Target, Tool};
+use specgen_runtime::setpoint::{BUSY, Command, CommandKind, Frames, Generator, Parallel, Target, Tool};
 use specgen_runtime::snapshot::{Reader, Snapshot, Writer};
 
 use super::support::*;
