@@ -1,6 +1,8 @@
 //! Where a generator begins, when it may stand still at once, and when it has to stop first.
 
-use specgen_runtime::setpoint::{BUSY, Command, CommandKind, Frames, Generator, Parallel, Target, Tool};
+use specgen_runtime::setpoint::{
+    BUSY, Command, CommandKind, Frames, Generator, LONGEST, MoveLimits, Parallel, Profile, Target, Tool,
+};
 use specgen_runtime::snapshot::{Reader, Snapshot, Writer};
 
 use super::support::*;
@@ -143,4 +145,22 @@ fn poses_are_admitted_with_the_bias_and_only_within_the_bound() {
     let turned = tool.frames.to_platform(&user).unwrap();
     assert!(tool.admit(&user, &mut target));
     assert_eq!(target, Target { pose: biased(turned.pose), ..turned });
+}
+
+#[test]
+fn commands_have_words_and_other_words_are_none() {
+    let kinds = [CommandKind::Hold, CommandKind::Stream, CommandKind::Move, CommandKind::Trajectory];
+    for (word, kind) in (0..).zip(kinds) {
+        assert_eq!(CommandKind::from_word(word), kind);
+    }
+    assert_eq!([4, u64::MAX].map(CommandKind::from_word), [CommandKind::Unknown; 2]);
+}
+
+/// The way that takes the longest phase at full speed is one, a way that takes a tick more is none.
+#[test]
+fn no_way_takes_longer_than_the_longest_phase() {
+    let limits = |speed: i32| MoveLimits { speed: [f64::from(speed); 6], acceleration: [1.0; 6], jerk: [1.0; 6] };
+    let way = [0.0, 1.0, 0.0, -0.5, 0.0, 0.0];
+    assert_eq!(Profile::plan(&way, &limits(LONGEST)).map(|profile| profile.ticks()), Some(LONGEST + 2));
+    assert_eq!(Profile::plan(&way, &limits(LONGEST + 1)), None);
 }
