@@ -24,7 +24,7 @@ struct Group {
 }
 
 const GROUPS: [Group; 2] = [
-    Group { package: "specgen-runtime", arguments: [&[], &[]], one_in: 16, bar: 90 },
+    Group { package: "specgen-runtime", arguments: [&[], &["--tests"]], one_in: 16, bar: 90 },
     Group { package: "specgen", arguments: [&[], &["--lib"]], one_in: 100, bar: 85 },
 ];
 
