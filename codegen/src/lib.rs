@@ -12,7 +12,6 @@ pub mod diagnostic;
 pub mod doctor;
 pub mod emit;
 pub mod everett;
-pub mod fingerprint;
 pub mod identify;
 pub mod interrupt;
 pub mod ir;

@@ -5,7 +5,7 @@ use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
 use specgen::compile::{Compiled, compile};
-use specgen::{diagnostic, emit, fingerprint, settings, spec, workspace};
+use specgen::{diagnostic, emit, settings, spec, workspace};
 use std::path::Path;
 
 /// Seed of the gauge noise in the committed records.
@@ -66,7 +66,7 @@ pub fn reference_controller(root: &Path) -> Result<Files, String> {
     Ok(emit::emit(&compiled(&root.join("specs/reference.toml"))?.ir))
 }
 
-/// IR and emitted crate of small specs, and fingerprints of many; what is the same for every spec stands in `firmware/controller` already.
+/// IR and emitted crate of small specs; what is the same for every spec stands in `firmware/controller` already.
 pub fn goldens(root: &Path) -> Result<Files, String> {
     let mut files = Files::new();
     for name in GOLDENS {
@@ -81,7 +81,6 @@ pub fn goldens(root: &Path) -> Result<Files, String> {
             files.insert(format!("{name}/{path}"), text);
         }
     }
-    files.insert("fingerprints.txt".to_owned(), fingerprint::fingerprints(&root.join("specs"))?);
     Ok(files)
 }
 
