@@ -94,12 +94,14 @@ fn follow(bench: &mut Bench, mut oracle: Oracle, max_step: i64, sequences: u32) 
         let anew = oracle.begins_anew(ran);
         let word = bench.word;
         assert_eq!(
-            (word.phase, word.cause, bench.conditions()),
-            (oracle.phase, oracle.cause, oracle.conditions),
-            "tick {}: request {}, events {:x}: {oracle:?}",
+            (word.phase, word.cause),
+            (oracle.phase, oracle.cause),
+            "tick {}: request {}, events {:x}, conditions {:x}, of the oracle {:x}: {oracle:?}",
             bench.tick,
             bench.input[more],
-            bench.input[more + 1]
+            bench.input[more + 1],
+            bench.conditions(),
+            oracle.conditions
         );
         met.insert((word.phase, word.cause));
         ticks += 1;
