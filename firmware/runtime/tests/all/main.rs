@@ -10,6 +10,7 @@ mod dynamics;
 mod geometry;
 mod preisach;
 mod rate;
+mod real;
 mod recorder;
 mod setpoint;
 mod snapshot;
