@@ -4,6 +4,7 @@ mod binaries;
 mod fresh;
 mod generated;
 mod judged;
+mod mutants;
 mod packages;
 mod progress;
 mod run;
@@ -19,7 +20,8 @@ const USAGE: &str = "usage: cargo xtask COMMAND
 
   setup   installs what the tests need: a cross compiler for Cortex-M and QEMU
   test    setup, then formatting, lints, every test, documentation, freshness of generated files, lock files and licences
-  soak    every test at full length, and known defects of packages, for releases; writes tests/soak.txt
+  soak    every test at full length, mutants, and known defects of packages, for releases; writes tests/soak.txt
+  mutants code changed one operator at a time, to see whether a test notices; a sample, `K/N` for another, `all` for all
   bless   writes the generated files that are committed anew
   fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
 
@@ -32,6 +34,8 @@ fn main() -> ExitCode {
         ["setup"] => steps::setup(),
         ["test"] => steps::test(&root()),
         ["soak"] => steps::soak(&root()),
+        ["mutants"] => steps::mutants(&root(), None),
+        ["mutants", sample] => steps::mutants(&root(), Some(sample)),
         ["bless"] => steps::bless(&root()),
         ["fresh", "--help" | "-h"] => {
             println!("{}", fresh::usage());

@@ -33,7 +33,7 @@ pub fn component(name: &str, subcommand: &str) -> Result<(), Outcome> {
 }
 
 /// A failure, unless the user allows that something is missing.
-fn missing(why: String) -> Outcome {
+pub fn missing(why: String) -> Outcome {
     if std::env::var_os(target::ALLOW_MISSING).is_some_and(|value| value == "1") {
         Outcome::Skipped(why)
     } else {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use crate::binaries::{self, Binary, Mode, Ran};
 use crate::judged::Trial;
 use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::{generated, packages, setup, soak};
+use crate::{generated, mutants, packages, setup, soak};
 
 /// Its own workspace, built for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
@@ -88,8 +88,16 @@ pub fn soak(root: &Path) -> ExitCode {
         binaries::test(root, &binaries, Mode { soak: true, ..Mode::default() }, &mut ran)
     });
     let took = start.elapsed();
+    report.step("mutants", || mutants::run(root, None));
     let good = !report.has_failed();
     report.step("record of the soak", || soak::write(root, &ran, took, good));
+    report.finish()
+}
+
+/// `cargo xtask mutants`
+pub fn mutants(root: &Path, sample: Option<&str>) -> ExitCode {
+    let mut report = Report::new(1);
+    report.step("mutants", || mutants::run(root, sample));
     report.finish()
 }
 

@@ -5,19 +5,9 @@ use host_sim::word::Scalar;
 use specgen_tests::Emitted;
 use std::collections::BTreeMap;
 
-pub const DISARMED: u8 = 0;
-pub const ARMING: u8 = 1;
-pub const RUNNING: u8 = 2;
-pub const HOLDING: u8 = 3;
-pub const RAMPING: u8 = 4;
-pub const FAULTED: u8 = 5;
-
-pub const NOTHING: u64 = 0;
-pub const ARM: u64 = 1;
-pub const RUN: u64 = 2;
-pub const HOLD: u64 = 3;
-pub const RAMP_DOWN: u64 = 4;
-pub const ACKNOWLEDGE: u64 = 5;
+pub use super::oracle::{
+    ACKNOWLEDGE, ARM, ARMING, DISARMED, FAULTED, HOLD, HOLDING, NOTHING, RAMP_DOWN, RAMPING, RUN, RUNNING,
+};
 
 /// Short times, so that a sequence gets somewhere; `timing.period` of the two kinds.
 const SECTION: &str = "[supervisor]

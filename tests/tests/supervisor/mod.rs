@@ -7,6 +7,7 @@ mod bits;
 mod document;
 mod fuzz;
 mod lost;
+#[path = "../../../firmware/runtime/tests/all/supervisor/oracle.rs"]
 mod oracle;
 mod refusals;
 mod sequences;

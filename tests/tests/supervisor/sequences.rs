@@ -96,11 +96,12 @@ fn follow(bench: &mut Bench, mut oracle: Oracle, max_step: i64, sequences: u32) 
         assert_eq!(
             (word.phase, word.cause),
             (oracle.phase, oracle.cause),
-            "tick {}: request {}, events {:x}, conditions {:x}: {oracle:?}",
+            "tick {}: request {}, events {:x}, conditions {:x}, of the oracle {:x}: {oracle:?}",
             bench.tick,
             bench.input[more],
             bench.input[more + 1],
-            bench.conditions()
+            bench.conditions(),
+            oracle.conditions
         );
         met.insert((word.phase, word.cause));
         ticks += 1;

@@ -138,7 +138,10 @@ impl<T: Real> Snapshot for Stop<T> {
         words.reals(&mut self.start, LARGEST_PLACE)?;
         words.reals(&mut self.rate, LARGEST_PLACE)?;
         self.ticks = words.count_to(LONGEST)?;
+        if self.ticks == 0 {
+            return Err(words.refused());
+        }
         self.tick = words.count_to(LONGEST)?;
-        if self.ticks == 0 { Err(words.refused()) } else { Ok(()) }
+        Ok(())
     }
 }

@@ -293,4 +293,17 @@ mod tests {
         assert_eq!((Phase::from_word(6), Cause::from_word(15)), (None, None));
         assert_eq!((Request::from_word(6), Request::from_word(u64::MAX)), (Request::Hold, Request::Hold));
     }
+
+    #[test]
+    fn amplifiers_are_on_where_codes_may_stand_above_rest_and_every_kind_has_a_name_of_its_own() {
+        let phases: [Phase; 6] = core::array::from_fn(|word| Phase::from_word(word as u64).unwrap_or(Phase::Faulted));
+        assert_eq!(phases.map(Phase::is_powered), [false, true, true, true, true, false]);
+        let told_apart = |names: &[&str]| {
+            let apart = (0..names.len()).all(|a| (0..a).all(|b| names[a] != names[b]));
+            apart && names.iter().all(|name| !name.is_empty())
+        };
+        assert!(told_apart(&phases.map(Phase::name)));
+        assert!(told_apart(&Cause::ALL.map(Cause::name)));
+        assert_eq!(Cause::None.name(), "");
+    }
 }

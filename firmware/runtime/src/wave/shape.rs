@@ -208,7 +208,6 @@ impl Cursor {
             Shape::Sine { tone } | Shape::Chirp { tone, .. } => {
                 Self { phase: tone.phase, step: tone.step, ..Self::new() }
             }
-            Shape::Triangle { step, .. } => Self { step: *step, ..Self::new() },
             _ => Self::new(),
         }
     }

@@ -1,9 +1,8 @@
 //! R, T(θ) and the leg Jacobian against quaternions and central differences.
 
-use crate::common::Random;
+use crate::common::{Random, cross, times};
 use specgen_runtime::Attitude;
 
-type Matrix = [[f64; 3]; 3];
 /// Scalar first.
 type Quaternion = [f64; 4];
 
@@ -38,14 +37,6 @@ fn conjugate(q: Quaternion) -> Quaternion {
 fn turned(q: Quaternion, v: [f64; 3]) -> [f64; 3] {
     let [_, x, y, z] = product(product(q, [0.0, v[0], v[1], v[2]]), conjugate(q));
     [x, y, z]
-}
-
-fn times(m: &Matrix, v: [f64; 3]) -> [f64; 3] {
-    m.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn angles(random: &mut Random) -> [f64; 3] {

@@ -114,12 +114,23 @@ fn a_transfer_fades_to_nothing_without_subnormal_numbers() {
     let mut transfer = Transfer::<f32>::new();
     transfer.begin([1e-6, -1e-6, 1e-30, 0.0, 5e-7, -3e-8]);
     let mut ticks = 0;
+    assert!(transfer.is_active() && !Transfer::<f32>::new().is_active());
     while *transfer.offset() != [0.0; 6] {
+        assert!(transfer.is_active());
         transfer.fade(0.99, 1e-15);
         assert!(transfer.offset().iter().all(|offset| *offset == 0.0 || offset.is_normal()));
         ticks += 1;
         assert!(ticks < 3000);
     }
+    assert!(!transfer.is_active());
+    // What is exactly negligible is.
+    let mut exact = Transfer::<f64>::new();
+    exact.begin([1.0, -1.0, 0.0, 0.0, 0.0, 0.75]);
+    exact.fade(0.5, 0.5);
+    assert_eq!((*exact.offset(), exact.is_active()), ([0.0; 6], false));
+    exact.begin([2.0, -1.0, 0.0, 0.0, 0.0, 0.75]);
+    exact.fade(0.5, 0.5);
+    assert_eq!((*exact.offset(), exact.is_active()), ([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], true));
     // ln(1e-9)/ln(0.99)
     assert!((2000..2100).contains(&ticks), "{ticks}");
 }

@@ -60,3 +60,30 @@ fn limits_that_move_past_the_present_code_are_come_back_to_at_the_slew_rate() {
         }
     }
 }
+
+/// A converter of either polarity, and a grid that begins elsewhere: straight lines through what they say, and the code of a drive
+/// is the nearest of its own.
+#[test]
+fn voltages_and_drives_lie_on_straight_lines_from_code_zero() {
+    for (volts, cells, codes) in [(-20.0, -3.0, 400.0), (5.0, 2.5, 64.0)] {
+        let dac = Dac {
+            volts_at_zero: volts,
+            volts_per_code: 0.0025,
+            cells_at_zero: cells,
+            cells_per_code: 1.0 / codes,
+            codes_per_cell: codes,
+        };
+        let limits = CodeLimits { min: 0, max: 65_535, max_step: 65_535 };
+        for code in [0, 1, 2, 20_000, 65_535] {
+            let part = f64::from(code);
+            assert!((dac.voltage(code) - (volts + part * 0.0025)).abs() < 1e-12, "{code}");
+            assert!((dac.drive(code) - (cells + part / codes)).abs() < 1e-12, "{code}");
+            for offset in [-0.4, 0.0, 0.4] {
+                assert_eq!(dac.code(dac.drive(code) + offset / codes, 9, limits).0, code, "{code} {offset}");
+            }
+        }
+    }
+    // Where a converter starts at zero so do both, without a sum.
+    assert_eq!((DAC.drive(0), DAC.voltage(0)), (0.0, 0.0));
+    assert_eq!((DAC.drive(1), DAC.voltage(3)), (DAC.cells_per_code, 3.0 * DAC.volts_per_code));
+}

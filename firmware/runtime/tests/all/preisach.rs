@@ -311,3 +311,16 @@ fn following_is_solving_and_applying_to_the_bit() {
     }
     follows_as_its_halves_do::<64>(&table(&weights), 12, 400);
 }
+
+/// As if the drive had been applied after negative saturation.
+#[test]
+fn a_memory_that_has_risen_is_one_that_was_driven_there() {
+    let table = table(&random_weights(5, N));
+    for drive in [0.5, 7.0, 31.75] {
+        let mut driven = Memory::new();
+        let displacement = driven.apply(&table, drive);
+        let risen = Memory::risen(drive, displacement);
+        assert_eq!(digest(&risen), digest(&driven));
+        assert_eq!((risen.drive(), risen.displacement(), risen.highest()), (drive, displacement, drive));
+    }
+}

@@ -287,3 +287,43 @@ fn creep_is_passive() {
         assert!(re / power > 1.0, "{period}");
     }
 }
+
+#[test]
+fn legs_that_have_risen_are_where_their_drive_is_and_creep_from_there() {
+    let table = CreepEverett { still: table(&random_weights(4, N)), creep: creep() };
+    let full = table.still.full_displacement();
+    let mut risen = CreepMemory::<f64, 64, 3>::risen(12.0, table.still.value(12.0, 0.0));
+    assert_eq!((risen.drive(), risen.displacement(), risen.highest()), (12.0, table.still.value(12.0, 0.0), 12.0));
+    assert_eq!(risen.states(), &[0.0; 3]);
+    // All of the creep is to come, as after a first tick of a driven one.
+    let mut driven = CreepMemory::<f64, 64, 3>::new();
+    for _ in 0..5 {
+        assert_eq!(risen.apply(&table, 12.0).to_bits(), driven.apply(&table, 12.0).to_bits());
+    }
+    // Reach: what the static model must make of it, from none to all.
+    let carried: f64 = risen.states().iter().zip(creep().carried).map(|(x, c)| x * c).sum();
+    let ends = [carried, carried + full * creep().direct];
+    for (demand, reached) in [
+        (ends[0] - 1e-12, false),
+        (ends[0] + 1e-12, true),
+        (ends[1] - 1e-12, true),
+        (ends[1] + 1e-12, false),
+        (f64::NAN, false),
+    ] {
+        assert_eq!(risen.reaches(&table, demand), reached, "{demand:e} of {ends:?}");
+    }
+
+    let (.., table) = dynamic(2, 0.3);
+    let full = table.still.full_displacement();
+    let (still, rate) = (table.still.value(9.0, 0.0), table.rate.value(9.0, 0.0));
+    let mut risen = Dynamic::risen(9.0, still, rate);
+    assert_eq!((risen.drive(), risen.displacement(), risen.highest()), (9.0, still, 9.0));
+    let mut driven = Dynamic::new();
+    driven.apply(&table, 9.0);
+    for drive in [9.0, 11.0, 4.0, 9.5] {
+        assert_eq!(risen.apply(&table, drive).to_bits(), driven.apply(&table, drive).to_bits(), "{drive}");
+    }
+    for (demand, reached) in [(-1e-12, false), (0.0, true), (full, true), (full + 1e-12, false), (f64::NAN, false)] {
+        assert_eq!(risen.reaches(&table, demand), reached, "{demand:e}");
+    }
+}

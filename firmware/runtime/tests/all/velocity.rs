@@ -114,3 +114,18 @@ fn a_gap_dies_away_and_its_jump_is_no_rate() {
     rate.update(&filter, &[5.0; 6]);
     assert!(rate.value()[0] < after);
 }
+
+#[test]
+fn at_rest_nothing_is_remembered() {
+    let filter = filter(2000.0);
+    let mut rate = Rate::<f64>::new();
+    for pose in [1.0, 1.1, 1.3] {
+        rate.update(&filter, &[pose; 6]);
+    }
+    assert!(rate.value()[0] > 0.0);
+    rate.rest();
+    assert_eq!(rate.value(), &[0.0; 6]);
+    // The next pose is a first one.
+    rate.update(&filter, &[9.0; 6]);
+    assert_eq!(rate.value(), &[0.0; 6]);
+}

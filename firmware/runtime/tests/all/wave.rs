@@ -1,6 +1,7 @@
 //! Waves: their shapes against textbook formulas, their derivatives against differences, their limits, and their ends.
 
 use specgen_runtime::Motion;
+use specgen_runtime::setpoint::{MoveLimits, Parallel, Plan, StopLimits};
 use specgen_runtime::wave::{AxisWave, Limits, Refused, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of};
 
 const PERIOD: f64 = 1e-4;
@@ -232,4 +233,133 @@ fn words_read_back_and_any_words_are_refused_or_keep_their_limits() {
         }
     }
     assert!(taken > 500, "{taken}");
+}
+
+/// Words of an axis: kind, offset, amplitude, four more.
+const AXIS: usize = 7;
+
+#[test]
+fn what_is_refused_is_named_by_a_word_and_told_from_it() {
+    assert_eq!(Refused::Busy.word(), None);
+    for axis in 0..6 {
+        let first = 6 + axis * AXIS;
+        for (behind, refused) in [(1, Refused::Range(axis)), (2, Refused::Rate(axis)), (3, Refused::Acceleration(axis))]
+        {
+            assert_eq!(refused.word(), Some(first + behind));
+            assert_eq!(Refused::of_word(first + behind), refused);
+        }
+        for behind in [0, 4, 5, 6] {
+            assert_eq!(Refused::of_word(first + behind), Refused::Word(first + behind));
+        }
+    }
+    for word in [0, 5, 6 + 6 * AXIS + 1, 6 + 6 * AXIS + 2, 6 + 6 * AXIS + 3, WORDS] {
+        assert_eq!(Refused::of_word(word), Refused::Word(word));
+        assert_eq!(Refused::Word(word).word(), Some(word));
+    }
+}
+
+/// For each kind of shape, what its words may be and the first that each may not.
+#[test]
+fn every_word_of_a_shape_has_its_bounds() {
+    let (half, most) = ((1_u64 << 63) - 1, 1_u64 << 30);
+    let number = f64::to_bits;
+    let with = |kind: u64, amplitude: f64, rest: [u64; 4]| {
+        let mut words = Settings::<f64>::still().to_words();
+        words[6..6 + AXIS].copy_from_slice(&[
+            kind,
+            number(1e-6),
+            number(amplitude),
+            rest[0],
+            rest[1],
+            rest[2],
+            rest[3],
+        ]);
+        Settings::<f64>::from_words(&words).map(|settings| {
+            assert_eq!(settings.to_words(), words);
+            settings.axes[0].shape
+        })
+    };
+    let refused = |word: usize| Err(Refused::Word(6 + word));
+    assert_eq!(with(0, 0.0, [0; 4]), Ok(Shape::Constant));
+    assert_eq!(with(1, -2e-6, [most, 0, 0, 0]), Ok(Shape::Ramp { amplitude: -2e-6, ticks: 1 << 30 }));
+    assert_eq!(with(2, 2e-6, [half, 0, 0, 0]), Ok(Shape::Triangle { amplitude: 2e-6, step: half }));
+    let tone = Tone { amplitude: 2e-6, phase: u64::MAX, step: 1 << 40 };
+    assert_eq!(with(3, 2e-6, [1 << 40, u64::MAX, 0, 0]), Ok(Shape::Sine { tone }));
+    let chirp = |sweep: i64, ticks: u64| with(4, 2e-6, [1 << 40, u64::MAX, sweep as u64, ticks]);
+    assert_eq!(chirp(-(1 << 38), 4), Ok(Shape::Chirp { tone, sweep: -(1 << 38), ticks: 4 }));
+    // Neither below zero nor to half a turn, and no sweep that overflows on the way.
+    for (sweep, ticks) in [(-(1 << 38) - 1, 4), (1 << 62, 2), (i64::MAX, 1), (i64::MAX, 2), (i64::MIN, 1)] {
+        assert_eq!(chirp(sweep, ticks), refused(6), "{sweep} in {ticks}");
+    }
+    assert_eq!(with(5, 0.0, [4, 12, 0, 0]), Ok(Shape::Multisine { first: 4, count: 12 }));
+    assert_eq!(with(5, 0.0, [TONES as u64, 0, 0, 0]), Ok(Shape::Multisine { first: TONES, count: 0 }));
+    let reversals = Shape::Reversals { amplitude: -2e-6, levels: 1 << 10, ticks: 1 << 19 };
+    assert_eq!(with(6, -2e-6, [1 << 10, 1 << 19, 0, 0]), Ok(reversals));
+    for (kind, amplitude, rest, word) in [
+        (7, 0.0, [0; 4], 0),
+        (2, -1e-9, [1, 0, 0, 0], 2),
+        (3, -1e-9, [1, 0, 0, 0], 2),
+        (4, -1e-9, [1, 0, 0, 1], 2),
+        (0, f64::NAN, [0; 4], 2),
+        (0, 0.0, [1, 0, 0, 0], 3),
+        (0, 0.0, [0, 0, 0, 1], 6),
+        (1, 0.0, [0; 4], 3),
+        (1, 0.0, [most + 1, 0, 0, 0], 3),
+        (1, 0.0, [1, 1, 0, 0], 4),
+        (2, 0.0, [half + 1, 0, 0, 0], 3),
+        (2, 0.0, [half, 1, 0, 0], 4),
+        (3, 0.0, [half + 1, 0, 0, 0], 3),
+        (3, 0.0, [half, 0, 1, 0], 5),
+        (4, 0.0, [1, 0, 0, 0], 6),
+        (5, 0.0, [TONES as u64 + 1, 0, 0, 0], 3),
+        (5, 0.0, [4, 13, 0, 0], 4),
+        (5, 0.0, [0, 0, 1, 0], 5),
+        (6, 0.0, [0, 1, 0, 0], 3),
+        (6, 0.0, [1, 0, 0, 0], 4),
+        (6, 0.0, [1 << 10, (1 << 19) + 1, 0, 0], 4),
+        (6, 0.0, [1, 1, 1, 0], 5),
+    ] {
+        assert_eq!(with(kind, amplitude, rest), refused(word), "kind {kind}: {rest:?}");
+    }
+    let mut words = Settings::<f64>::still().to_words();
+    for (place, bad) in [
+        (0, number(17.0)),
+        (6 + 6 * AXIS, number(-1e-9)),
+        (6 + 6 * AXIS + 2, half + 1),
+        (WORDS - 2, 0),
+        (WORDS - 1, most + 1),
+    ] {
+        let good = std::mem::replace(&mut words[place], bad);
+        assert_eq!(Settings::<f64>::from_words(&words), Err(Refused::Word(place)));
+        words[place] = good;
+    }
+}
+
+/// Those of the streams: the bound less the bias, on either side.
+#[test]
+fn limits_are_those_of_the_streams_about_the_bias() {
+    let plan = Plan::<f64, Parallel> {
+        period: PERIOD,
+        rate: 1.0 / PERIOD,
+        square_rate: 1.0 / (PERIOD * PERIOD),
+        bias: [0.0, 1e-6, -2e-6, 0.0, 0.0, 0.0],
+        home: [0.0; 6],
+        bound: [1e-5, 2e-5, 3e-5, 1e-3, 2e-3, 3e-3],
+        limits: MoveLimits { speed: [1.0; 6], acceleration: [1.0; 6], jerk: [1.0; 6] },
+        stop: StopLimits { acceleration: [1.0; 6], jerk: [1.0; 6], shortest: 1 },
+        stream_step: [1.0; 6],
+        stream_rate: [2.0; 6],
+        stream_acceleration: [3.0; 6],
+        stale_ticks: 1,
+        frames: Parallel,
+        trajectories: &[],
+    };
+    let expected = Limits {
+        low: [-1e-5, -(2e-5 + 1e-6), -(3e-5 - 2e-6), -1e-3, -2e-3, -3e-3],
+        high: [1e-5, 2e-5 - 1e-6, 3e-5 + 2e-6, 1e-3, 2e-3, 3e-3],
+        rate: [2.0; 6],
+        acceleration: [3.0; 6],
+        ticks_per_second: 1.0 / PERIOD,
+    };
+    assert_eq!(Limits::of(&plan), expected);
 }

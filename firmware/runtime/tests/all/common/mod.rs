@@ -1,6 +1,9 @@
 //! Tables, drives and the brute-force oracle for the Preisach tests.
 #![allow(dead_code)] // each test binary uses its own part
 
+mod space;
+
+pub use space::*;
 use specgen_runtime::Everett;
 
 /// 64-bit linear congruential generator (Knuth's constants): a fixed sequence, whatever the platform.

@@ -2,24 +2,7 @@
 
 use specgen_runtime::setpoint::{Frames, Target, Tool, Work};
 
-use crate::common::Random;
-
-fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
-}
-
-fn transpose(a: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
-}
-
-/// Rz Ry Rx, factor by factor.
-pub fn rotation(angles: [f64; 3]) -> [[f64; 3]; 3] {
-    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(f64::sin_cos);
-    let x = [[1.0, 0.0, 0.0], [0.0, cx, -sx], [0.0, sx, cx]];
-    let y = [[cy, 0.0, sy], [0.0, 1.0, 0.0], [-sy, 0.0, cy]];
-    let z = [[cz, -sz, 0.0], [sz, cz, 0.0], [0.0, 0.0, 1.0]];
-    product(&product(&z, &y), &x)
-}
+use crate::common::{Random, product, rotation, transpose};
 
 const POINT: [f64; 3] = [7e-3, -5e-3, 40e-3];
 const AXES: [f64; 3] = [0.4, -0.3, 1.1];

@@ -1,8 +1,9 @@
 //! The set-point generator: what it does on command and what it refuses; in [`promises`] what it promises whatever the
-//! command, in [`frames`] the user's frames, in [`stops`] how it comes to rest.
+//! command, in [`frames`] the user's frames, in [`stops`] how it comes to rest, in [`standing`] where it begins and stands.
 
 mod frames;
 mod promises;
+mod standing;
 mod stops;
 mod support;
 

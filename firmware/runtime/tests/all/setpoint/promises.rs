@@ -5,10 +5,9 @@ use specgen_runtime::setpoint::{
     BUSY, Command, CommandKind, Frames, Generator, Parallel, Plan, REFUSED, STALE, Target, Tool, Work,
 };
 
-use super::frames::rotation;
 use super::plan64;
 use super::support::*;
-use crate::common::Random;
+use crate::common::{Random, rotation};
 
 /// Any word that a link may deliver: mostly plausible, now and then anything.
 fn random_command<T: Real>(random: &mut Random, last: &Target<T>, previous: &Command<T>) -> Command<T> {

@@ -1,6 +1,19 @@
-//! The state machine once more, in other words: from `docs/supervisor.md`, not from the runtime.
+//! The state machine once more, in other words: from `docs/supervisor.md`, not from the runtime. The tests of the emitted
+//! controllers use it too.
 
-use super::bench::*;
+pub const DISARMED: u8 = 0;
+pub const ARMING: u8 = 1;
+pub const RUNNING: u8 = 2;
+pub const HOLDING: u8 = 3;
+pub const RAMPING: u8 = 4;
+pub const FAULTED: u8 = 5;
+
+pub const NOTHING: u64 = 0;
+pub const ARM: u64 = 1;
+pub const RUN: u64 = 2;
+pub const HOLD: u64 = 3;
+pub const RAMP_DOWN: u64 = 4;
+pub const ACKNOWLEDGE: u64 = 5;
 
 /// What the section of `bench` makes of a spec.
 #[derive(Debug, Clone)]
@@ -19,9 +32,9 @@ pub struct Bounds {
     pub gauge_range: [f64; 2],
 }
 
-const DISAGREEMENT: f64 = 20e-6;
+pub const DISAGREEMENT: f64 = 20e-6;
 /// Ten times the noise of 2.2 nm, which is more than ten steps of the converter.
-const STUCK_MOTION: f64 = 22e-9;
+pub const STUCK_MOTION: f64 = 22e-9;
 
 impl Bounds {
     /// Six legs of a stroke of 60 µm at a period of 200 µs.
@@ -91,6 +104,10 @@ pub struct Oracle {
     request: u64,
     arm_waits: bool,
     good: u32,
+    /// What is present, by the bits of causes, and from bit 16 on the gauges or legs concerned.
+    pub conditions: u64,
+    /// Gauges that the last tick did not believe, legs that it held back.
+    concerned: u64,
     /// Causes that the readings of the last tick showed, and their counts by cause.
     seen: Vec<u8>,
     counts: [i64; 15],
@@ -109,6 +126,8 @@ impl Oracle {
             request: 0,
             arm_waits: false,
             good: 0,
+            conditions: 0,
+            concerned: 0,
             seen: Vec::new(),
             counts: [0; 15],
             channels: Default::default(),
@@ -131,6 +150,10 @@ impl Oracle {
             if self.channels.iter().any(|channel| channel.present[kind]) {
                 present.push(cause);
             }
+        }
+        self.conditions = present.iter().fold(self.concerned << 16, |bits, cause| bits | 1 << cause);
+        for (gauge, channel) in self.channels.iter().enumerate() {
+            self.conditions |= u64::from(channel.present.contains(&true)) << (16 + gauge);
         }
         let mut lasted = std::mem::take(&mut self.lasted);
         for cause in [1, 2, 6, 7, 8, 11, 13, 14_u8] {
@@ -238,6 +261,7 @@ impl Oracle {
         max_step: i64,
     ) {
         self.seen.clear();
+        self.concerned = 0;
         let turn = self.turn;
         self.turn = (turn + 1) % 6;
         let mut believed = true;
@@ -245,14 +269,17 @@ impl Oracle {
             let reading = readings[leg];
             if !reading.is_finite() {
                 self.seen.push(1);
+                self.concerned |= 1 << leg;
                 believed = false;
             } else if !(self.bounds.gauge_range[0]..=self.bounds.gauge_range[1]).contains(&reading) {
                 self.seen.push(2);
+                self.concerned |= 1 << leg;
                 believed = false;
             }
             if self.phase == RUNNING && status >> leg & 1 == 1 {
                 let slewed = (codes[1][leg] - codes[0][leg]).abs() >= max_step;
                 self.seen.push(if slewed { 7 } else { 6 });
+                self.concerned |= 1 << leg;
             }
         }
         if !believed || !matches!(self.phase, ARMING | RUNNING | HOLDING) {

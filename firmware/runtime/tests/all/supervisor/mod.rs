@@ -1,4 +1,8 @@
-//! Pieces of the supervisor on their own: codes of converters, steps to rest, debounce, approach.
+//! The supervisor: in [`sequences`] against a state machine of its own text; here pieces of it on their own: codes of converters,
+//! steps to rest, debounce, approach.
+
+mod oracle;
+mod sequences;
 
 use specgen_runtime::GaugeConverter;
 use specgen_runtime::supervisor::{Approach, Cause, Debounce, Plan, TIMED, toward};
@@ -80,6 +84,38 @@ fn conditions_become_causes_when_they_have_lasted() {
     for cause in [Cause::LinkLost, Cause::Integrity, Cause::EmergencyStop] {
         assert_eq!(lasts(cause, |_| true), Some(0), "{cause:?}");
     }
+}
+
+/// What is counted too much is not remembered longer: two missed ticks, then one when they are forgotten.
+#[test]
+fn a_count_is_forgotten_as_fast_as_its_patience_lasts() {
+    let (mut debounce, mut busy) = (Debounce::new(), false);
+    let mut tick = |present: u32| debounce.count(&PLAN, present, &mut busy) & Cause::MissedTick.bit() != 0;
+    assert_eq!([1, 1, 1, 1].map(|_| tick(Cause::MissedTick.bit())), [false, false, true, true]);
+    for _ in 0..201 {
+        assert!(!tick(0));
+    }
+    assert_eq!([1, 1, 1].map(|_| tick(Cause::MissedTick.bit())), [false, false, true]);
+}
+
+/// A way of 1 is halved until a quarter of it would be left, which is none.
+#[test]
+fn the_last_of_an_approach_is_left_out_and_not_its_last_but_one() {
+    let mut approach = Approach::new();
+    approach.begin([1.0, -1.0, 0.25, 0.0, 4.0, 1.0]);
+    let asked = [2.0, 0.0, 0.0, 0.0, 0.0, -1.0];
+    let ways = [
+        [1.0, -1.0, 0.25, 0.0, 4.0, 1.0],
+        [1.5, -0.5, 0.0, 0.0, 2.0, 0.0],
+        [2.0, 0.0, 0.0, 0.0, 1.0, -0.5],
+        [2.0, 0.0, 0.0, 0.0, 0.5, -1.0],
+        [2.0, 0.0, 0.0, 0.0, 0.0, -1.0],
+    ];
+    for (tick, way) in ways.into_iter().enumerate() {
+        assert!(!approach.is_done() || tick == 4, "tick {tick}");
+        assert_eq!(approach.setpoint(&asked, true, 0.5, 0.25), way, "tick {tick}");
+    }
+    assert!(approach.is_done());
 }
 
 #[test]

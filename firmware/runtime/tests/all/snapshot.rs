@@ -1,0 +1,384 @@
+//! States as words: every word of every state comes back, is part of the digest, and is refused where no state holds it.
+
+use std::fmt::Debug;
+
+use specgen_runtime::setpoint::{Generator, LONGEST, Profile, Stop};
+use specgen_runtime::snapshot::{Invalid, LARGEST, LARGEST_PLACE, Reader, Sizes, Snapshot, Writer};
+use specgen_runtime::supervisor::{Approach, Supervisor, TIMERS};
+use specgen_runtime::{
+    CreepMemory, Digest, DynamicMemory, Estimate, Integral, Motion, NotchState, Rate, ReversalMemory, Transfer,
+};
+
+const SIZES: Sizes = Sizes { request: 32.0, reading: 8.0, stiffness: 2.0 };
+const GARBAGE: u64 = 0x5555_5555_5555_5555;
+
+fn save<S: Snapshot>(state: &S) -> Vec<u64> {
+    let mut words = vec![GARBAGE; S::WORDS + 3];
+    let mut writer = Writer::new(&mut words);
+    state.save(&mut writer);
+    assert_eq!(writer.count(), S::WORDS);
+    assert_eq!(words[S::WORDS..], [GARBAGE; 3]);
+    words.truncate(S::WORDS);
+    words
+}
+
+fn restore<S: Snapshot + Clone>(fresh: &S, words: &[u64]) -> Result<S, Invalid> {
+    let mut state = fresh.clone();
+    let mut reader = Reader::new(words).within(SIZES);
+    state.restore(&mut reader)?;
+    assert_eq!(reader.count(), S::WORDS);
+    Ok(state)
+}
+
+fn digest(add: impl FnOnce(&mut Digest)) -> u64 {
+    let mut digest = Digest::new();
+    add(&mut digest);
+    digest.finish()
+}
+
+/// Words for a state: numbers that are all different and small, whole numbers, flags.
+#[derive(Default)]
+struct Words(Vec<u64>);
+
+impl Words {
+    fn reals(mut self, count: usize) -> Self {
+        for _ in 0..count {
+            self.0.push((0.001 * (self.0.len() + 1) as f64).to_bits());
+        }
+        self
+    }
+
+    fn whole(mut self, words: &[u64]) -> Self {
+        self.0.extend(words);
+        self
+    }
+
+    /// Counters that are all different.
+    fn counters(mut self, count: usize) -> Self {
+        for _ in 0..count {
+            self.0.push(1000 + self.0.len() as u64);
+        }
+        self
+    }
+}
+
+/// Restores `words` into `fresh`; then every word with every bit flipped, which is refused there or kept and seen in the digest,
+/// but for the places that are `derived`; then with every word missing.
+fn every_word_counts<S: Snapshot + Clone + Debug>(
+    fresh: &S,
+    Words(words): Words,
+    add: impl Fn(&S, &mut Digest),
+    derived: &[usize],
+) {
+    assert_eq!(words.len(), S::WORDS);
+    let state = restore(fresh, &words).unwrap();
+    assert_eq!(save(&state), words);
+    assert_ne!(save(fresh), words);
+    let of = |state: &S| digest(|digest| add(state, digest));
+    for place in 0..S::WORDS {
+        let mut taken = 0;
+        for bit in 0..64 {
+            let mut other = words.clone();
+            other[place] ^= 1 << bit;
+            match restore(fresh, &other) {
+                Ok(changed) => {
+                    taken += 1;
+                    assert_eq!(save(&changed)[place], other[place], "word {place}, bit {bit}");
+                    let told = of(&changed) != of(&state);
+                    assert_eq!(told, !derived.contains(&place), "word {place}, bit {bit}: {changed:?}");
+                }
+                Err(Invalid { word }) => assert!(word >= place, "word {place}, bit {bit}: refused at {word}"),
+            }
+        }
+        assert!(taken > 0, "word {place}");
+        assert_eq!(restore(fresh, &words[..place]).err(), Some(Invalid { word: place }));
+    }
+}
+
+/// At these places numbers up to `largest` and no others.
+fn numbers_within<S: Snapshot + Clone + Debug>(state: &S, places: impl IntoIterator<Item = usize>, largest: f64) {
+    let words = save(state);
+    for place in places {
+        let with = |value: f64| {
+            let mut words = words.clone();
+            words[place] = value.to_bits();
+            restore(state, &words).err()
+        };
+        let beyond = largest * (1.0 + f64::EPSILON);
+        for good in [largest, -largest, -0.0] {
+            assert_eq!(with(good), None, "word {place}: {good}");
+        }
+        for bad in [beyond, -beyond, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!(with(bad), Some(Invalid { word: place }), "word {place}: {bad}");
+        }
+    }
+}
+
+/// At a place whole numbers from `least` to `most` and no others.
+fn whole_within<S: Snapshot + Clone + Debug>(state: &S, place: usize, least: u64, most: u64) {
+    let words = save(state);
+    let with = |word: u64| {
+        let mut words = words.clone();
+        words[place] = word;
+        restore(state, &words).err()
+    };
+    for good in [least, most] {
+        assert_eq!(with(good), None, "word {place}: {good}");
+    }
+    for bad in [least.wrapping_sub(1), most + 1, u64::MAX] {
+        assert_eq!(with(bad), Some(Invalid { word: place }), "word {place}: {bad}");
+    }
+}
+
+#[test]
+fn every_word_of_the_small_states_counts() {
+    let motion = Motion::<f64>::new();
+    every_word_counts(&motion, Words::default().reals(18), Motion::digest, &[]);
+    numbers_within(&motion, 0..6, LARGEST_PLACE);
+    numbers_within(&motion, 6..18, LARGEST);
+    let estimate = Estimate::<f64>::new();
+    every_word_counts(&estimate, Words::default().reals(2), Estimate::digest, &[]);
+    numbers_within(&estimate, 0..2, SIZES.request);
+    let integral = Integral::<f64>::new();
+    every_word_counts(&integral, Words::default().reals(6), Integral::digest, &[]);
+    numbers_within(&integral, 0..6, LARGEST);
+    let notch = NotchState::<f64>::new();
+    every_word_counts(&notch, Words::default().reals(12), NotchState::digest, &[]);
+    numbers_within(&notch, 0..12, SIZES.request);
+    let transfer = Transfer::<f64>::new();
+    every_word_counts(&transfer, Words::default().reals(6).whole(&[1]), Transfer::digest, &[]);
+    numbers_within(&transfer, 0..6, SIZES.request);
+    let rate = Rate::<f64>::new();
+    every_word_counts(&rate, Words::default().reals(12).whole(&[1]), Rate::digest, &[]);
+    numbers_within(&rate, 0..6, LARGEST_PLACE);
+    numbers_within(&rate, 6..12, LARGEST);
+}
+
+#[test]
+fn every_word_of_a_supervisor_counts() {
+    let mut words = Words::default().whole(&[4, 13, 5, 0, 1, 1]).counters(3 + TIMERS);
+    for _ in 0..6 {
+        words = words.reals(1).whole(&[1]).reals(2).counters(3);
+    }
+    let words = words.whole(&[3]).counters(5).whole(&[1]).reals(6);
+    let fresh = Supervisor::<f64>::new();
+    every_word_counts(&fresh, words, Supervisor::digest, &[]);
+    let channels = 9 + TIMERS;
+    for channel in 0..6 {
+        let first = channels + 7 * channel;
+        numbers_within(&fresh, [first], SIZES.reading);
+        numbers_within(&fresh, first + 2..first + 4, SIZES.request);
+    }
+    let end = channels + 6 * 7;
+    numbers_within(&fresh, end + 7..end + 13, LARGEST_PLACE);
+    for (place, most) in [(0, 5), (1, 14), (2, 5), (end, 6), (end + 6, 2)] {
+        whole_within(&fresh, place, 0, most);
+    }
+}
+
+/// What a digest leaves out follows from the rest: the course from its goal and its start.
+#[test]
+fn every_word_of_a_generator_counts() {
+    let stop = Words::default().reals(12).whole(&[40, 7]);
+    every_word_counts(&Stop::<f64>::new(), stop, |_, _| (), &(0..14).collect::<Vec<_>>());
+    let profile = Words::default().whole(&[5, 9, 77]).reals(3);
+    every_word_counts(&Profile::<f64>::new(), profile, |_, _| (), &[0, 1, 2, 3, 4, 5]);
+    let longest = LONGEST as u64;
+    for (place, most) in [(0, longest), (1, longest), (2, 3 * longest)] {
+        whole_within(&Profile::<f64>::new(), place, 0, most);
+    }
+    whole_within(&Stop::<f64>::new(), 12, 1, longest);
+    whole_within(&Stop::<f64>::new(), 13, 0, longest);
+    numbers_within(&Profile::<f64>::new(), 3..6, 1.0);
+    numbers_within(&Stop::<f64>::new(), 0..12, LARGEST_PLACE);
+
+    let fresh = Generator::<f64>::new();
+    let words = |phase: u64, index: u64, finished: u64| {
+        let start = Words::default().whole(&[phase, index]).reals(30 + 18).whole(&[5, 9, 77]).reals(3).whole(&[8]);
+        start.reals(12).whole(&[40, 7, 3, 11, finished]).counters(2)
+    };
+    let course = [50, 51, 53, 54, 55];
+    for phase in [5, 6] {
+        every_word_counts(&fresh, words(phase, 2, 1), Generator::digest, &course);
+    }
+    // The others have no index; the word is read and forgotten.
+    for phase in [0, 1, 2, 3, 4, 7] {
+        let Words(words) = words(phase, 0, u64::MAX);
+        assert_eq!(save(&restore(&fresh, &words).unwrap()), words);
+    }
+    let digests: Vec<u64> =
+        (0..8).map(|phase| digest(|digest| restore(&fresh, &words(phase, 0, 1).0).unwrap().digest(digest))).collect();
+    assert!((0..8).all(|a| (0..a).all(|b| digests[a] != digests[b])), "phases that a digest does not tell apart");
+    numbers_within(&fresh, (2..8).chain(14..38), LARGEST_PLACE);
+    numbers_within(&fresh, (8..14).chain(38..50), LARGEST);
+    for (place, most) in [(0, 7), (56, 1 << 30), (71, 1 << 30), (72, 1 << 30), (74, u32::MAX.into())] {
+        whole_within(&fresh, place, 0, most);
+    }
+    let finished = |word: u64| restore(&fresh, &words(6, 0, word).0).err();
+    assert_eq!([finished(u32::MAX.into()), finished(u64::MAX)], [None; 2]);
+    assert_eq!([1 << 32, u64::MAX - 1].map(finished), [Some(Invalid { word: 73 }); 2]);
+}
+
+/// Room for 24 extrema, five of them used.
+const CAP: usize = 24;
+const USED: usize = 5;
+const STAIRS: [f64; USED] = [0.0, 20.0, 3.0, 15.0, 6.0];
+
+fn staircase(len: u64, drive: f64, extrema: &[f64]) -> Words {
+    let mut words = Words::default().whole(&[len, 3, drive.to_bits(), 0.02_f64.to_bits()]);
+    for numbers in [extrema, &[0.01, 0.05, 0.02, 0.04, 0.03]] {
+        let mut stairs = [0; CAP];
+        for (word, number) in stairs.iter_mut().zip(numbers) {
+            *word = number.to_bits();
+        }
+        words = words.whole(&stairs);
+    }
+    words
+}
+
+/// The words of a state of rate-dependent legs begin with those of the staircase. Room that is not used is zero.
+#[test]
+fn every_word_of_the_reversal_memories_counts() {
+    type Plain = ReversalMemory<f64, CAP>;
+    let used = |Words(words): &Words| -> Vec<usize> {
+        let rooms = [4, 4 + CAP, Plain::WORDS];
+        (0..words.len()).filter(|place| rooms.iter().all(|room| !(room + USED..room + CAP).contains(place))).collect()
+    };
+    fn check<S: Snapshot + Clone + Debug>(fresh: &S, words: Words, used: &[usize], add: impl Fn(&S, &mut Digest)) {
+        let state = restore(fresh, &words.0).unwrap();
+        assert_eq!(save(&state), words.0);
+        let of = |state: &S| digest(|digest| add(state, digest));
+        for place in 0..words.0.len() {
+            // The length takes extrema with it.
+            let mut other = words.0.clone();
+            other[place] = if place == 0 { 4 } else { other[place] ^ 1 };
+            let changed = restore(fresh, &other).map(|state| (of(&state), save(&state)[place]));
+            if place == 4 || (used.contains(&place) && place > 0) {
+                // p₀ is zero and nothing else.
+                let expected = if place == 4 { None } else { Some(other[place]) };
+                assert_eq!(changed.ok().map(|(_, word)| word), expected, "word {place}");
+                assert!(changed.is_err() || changed.unwrap().0 != of(&state), "word {place}");
+            } else if place > 0 {
+                assert_eq!(changed, Ok((of(&state), 0)), "word {place} is room");
+            }
+            assert_eq!(restore(fresh, &words.0[..place]).err(), Some(Invalid { word: place }));
+        }
+    }
+    let plain = || staircase(USED as u64, 10.0, &STAIRS);
+    check(&Plain::new(), plain(), &used(&plain()), ReversalMemory::digest);
+    let dynamic = || {
+        let mut words = plain().reals(CAP);
+        words.0[Plain::WORDS + USED..].fill(0);
+        words.reals(2).whole(&[1])
+    };
+    check(&DynamicMemory::<f64, CAP>::new(), dynamic(), &used(&dynamic()), DynamicMemory::digest);
+    let creep = || plain().reals(3 + 1);
+    let all: Vec<usize> = used(&plain()).into_iter().chain(Plain::WORDS..Plain::WORDS + 4).collect();
+    check(&CreepMemory::<f64, CAP, 3>::new(), creep(), &all, CreepMemory::digest);
+    let restored = restore(&Plain::new(), &plain().0).unwrap();
+    assert_eq!((restored.highest(), restored.drive(), restored.depth(), restored.dropped()), (20.0, 10.0, USED, 3));
+    assert_eq!(restore(&CreepMemory::<f64, CAP, 3>::new(), &creep().0).unwrap().highest(), 20.0);
+    assert_eq!(restore(&DynamicMemory::<f64, CAP>::new(), &dynamic().0).unwrap().highest(), 20.0);
+    whole_within(&restored, 1, 0, u32::MAX.into());
+    numbers_within(&restored, [3].into_iter().chain(4 + CAP..Plain::WORDS), LARGEST_PLACE);
+}
+
+#[test]
+fn only_a_staircase_is_taken_for_one() {
+    let taken = |len: u64, drive: f64, extrema: &[f64]| {
+        restore(&ReversalMemory::<f64, CAP>::new(), &staircase(len, drive, extrema).0).map_err(|Invalid { word }| word)
+    };
+    let refused = 4 + CAP - 1;
+    // Steps may be of no height.
+    for (drive, extrema) in [
+        (10.0, STAIRS),
+        (6.0, STAIRS),
+        (15.0, STAIRS),
+        (5.0, [0.0, 20.0, 0.0, 15.0, 5.0]),
+        (7.0, [0.0, 15.0, 3.0, 15.0, 3.0]),
+        (6.0, [0.0, 6.0, 6.0, 6.0, 6.0]),
+    ] {
+        let memory = taken(5, drive, &extrema).unwrap();
+        assert_eq!((memory.drive(), memory.highest()), (drive, extrema[1]), "{extrema:?}");
+    }
+    for (drive, extrema) in [
+        (5.9, STAIRS),
+        (15.1, STAIRS),
+        (10.0, [1.0, 20.0, 3.0, 15.0, 6.0]),
+        (10.0, [-1.0, 20.0, 3.0, 15.0, 6.0]),
+        (10.0, [0.0, 20.0, -1.0, 15.0, 6.0]),
+        (10.0, [0.0, 20.0, 3.0, 20.1, 6.0]),
+        (10.0, [0.0, 20.0, 3.0, 15.0, 2.9]),
+        (10.0, [0.0, 20.0, 20.1, 20.05, 10.0]),
+        (10.0, [0.0, 20.0, 3.0, 2.9, 3.0]),
+        (10.0, [0.0, -1.0, 3.0, 15.0, 6.0]),
+    ] {
+        assert_eq!(taken(5, drive, &extrema).err(), Some(refused), "{drive} {extrema:?}");
+    }
+    // Alone, the drive is all there is; with a maximum, that is the highest.
+    assert_eq!(taken(1, 10.0, &[0.0]).unwrap().highest(), 10.0);
+    assert_eq!(taken(2, 10.0, &[0.0, 12.0]).unwrap().highest(), 12.0);
+    assert_eq!(taken(1, -0.1, &[0.0]).err(), Some(refused));
+    // From none to more than there is room for.
+    let full: Vec<f64> = (0..CAP).map(|k| if k % 2 == 0 { k as f64 } else { 100.0 - k as f64 }).collect();
+    assert_eq!(taken(CAP as u64, 50.0, &full).unwrap().depth(), CAP);
+    assert_eq!([0, CAP as u64 + 1].map(|len| taken(len, 50.0, &full).err()), [Some(0); 2]);
+}
+
+#[test]
+fn a_way_to_a_set_point_reads_back_from_its_words_and_nothing_else_does() {
+    let words: [u64; 7] = Words::default().whole(&[2]).reals(6).0.try_into().unwrap();
+    let of = |words: &[u64; 7]| Approach::<f64>::from_words(words);
+    for stage in 0..3 {
+        let mut words = words;
+        words[0] = stage;
+        let approach = of(&words).unwrap();
+        assert_eq!((approach.to_words(), approach.is_done()), (words, stage == 0));
+    }
+    for (place, bad) in [(0, 3), (0, u64::MAX), (1, f64::NAN.to_bits()), (6, f64::INFINITY.to_bits())] {
+        let mut words = words;
+        words[place] = bad;
+        assert!(of(&words).is_none(), "word {place}");
+    }
+}
+
+#[test]
+fn a_writer_keeps_what_fits_and_counts_all() {
+    let mut words = [GARBAGE; 5];
+    let mut writer = Writer::new(&mut words);
+    writer.word(9);
+    writer.flag(true);
+    writer.reals(&[1.0_f32, 2.0]);
+    // No part of what does not fit.
+    writer.reals(&[3.0_f64, 4.0]);
+    writer.first_reals(&[5.0_f64, 6.0], 1);
+    writer.real(7.0_f64);
+    assert_eq!(writer.count(), 9);
+    assert_eq!(words, [9, 1, 1.0_f32.to_bits().into(), 2.0_f32.to_bits().into(), GARBAGE]);
+    for count in 0..=30 {
+        let (mut words, values) = ([GARBAGE; 31], [1.5_f64; 30]);
+        let mut writer = Writer::new(&mut words);
+        writer.first_reals(&values, count);
+        assert_eq!(writer.count(), 30);
+        let expected: Vec<u64> = (0..30).map(|k| if k < count { 1.5_f64.to_bits() } else { 0 }).collect();
+        assert_eq!((&words[..30], words[30]), (&expected[..], GARBAGE), "{count}");
+    }
+}
+
+#[test]
+fn a_reader_takes_what_is_asked_for_and_names_what_is_not() {
+    let half = u64::from(0.5_f32.to_bits());
+    let words = [7, 7, 1, 2, u64::from(u32::MAX), 1 << 32, half, half | 1 << 40, 3, 0];
+    let mut reader = Reader::new(&words);
+    assert_eq!(reader.sizes(), Sizes { request: LARGEST_PLACE, reading: LARGEST_PLACE, stiffness: LARGEST });
+    assert_eq!(reader.refused(), Invalid { word: 0 });
+    assert_eq!((reader.word(7), reader.word(6)), (Ok(7), Err(Invalid { word: 1 })));
+    assert_eq!((reader.flag(), reader.flag()), (Ok(true), Err(Invalid { word: 3 })));
+    assert_eq!((reader.counter(), reader.counter()), (Ok(u32::MAX), Err(Invalid { word: 5 })));
+    assert_eq!((reader.real::<f32>(0.5), reader.real::<f32>(1.0)), (Ok(0.5), Err(Invalid { word: 7 })));
+    assert_eq!((reader.count_to(3), reader.count_to(-1)), (Ok(3), Ok(0)));
+    assert_eq!((reader.count(), reader.refused()), (10, Invalid { word: 9 }));
+    assert_eq!((reader.flag(), reader.count()), (Err(Invalid { word: 10 }), 11));
+    assert_eq!(Reader::new(&words).within(SIZES).sizes(), SIZES);
+    assert_eq!([6, 0, -1].map(|most| Reader::new(&words).count_to(most)), [Err(Invalid { word: 0 }); 3]);
+}

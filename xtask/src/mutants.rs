@@ -1,0 +1,182 @@
+//! Mutants: operators and bodies changed one at a time (cargo-mutants, `.cargo/mutants.toml`), and whether a test notices. Those that
+//! none notices are in [`LIST`] with a reason each.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::run::Outcome;
+use crate::setup;
+
+/// Mutants that survive: names, each list of them followed by an indented reason. `#` begins a remark.
+const LIST: &str = "tests/mutants.txt";
+const INSTALL: &str = "cargo install cargo-mutants --locked";
+
+/// What is run together.
+struct Group {
+    package: &'static str,
+    /// What cargo-mutants is told beside the package, before and behind its `--`.
+    arguments: [&'static [&'static str]; 2],
+    /// The sample that is run unless another is asked for: one in so many.
+    one_in: u32,
+    /// Least share of the mutants to be noticed, in percent.
+    bar: usize,
+}
+
+const GROUPS: [Group; 1] = [Group { package: "specgen-runtime", arguments: [&[], &["--tests"]], one_in: 16, bar: 90 }];
+
+/// `cargo xtask mutants [K/N | all]`: the K-th sample of one in N, or all of them.
+pub fn run(root: &Path, sample: Option<&str>) -> Outcome {
+    let works = cargo_mutants(root, &["--version"]).output().is_ok_and(|output| output.status.success());
+    if !works {
+        return setup::missing(format!("cargo-mutants is not installed; install it with: {INSTALL}"));
+    }
+    let text = std::fs::read_to_string(root.join(LIST)).unwrap_or_default();
+    let listed = match read(&text) {
+        Ok(listed) => listed,
+        Err(why) => return Outcome::Failed(format!("{LIST}: {why}")),
+    };
+    let mut wrong = Vec::new();
+    let mut known = BTreeSet::new();
+    for group in &GROUPS {
+        match group.run(root, sample, &listed, &mut known) {
+            Ok(found) => wrong.extend(found),
+            Err(why) => return Outcome::Failed(why),
+        }
+    }
+    wrong.extend(listed.difference(&known).map(|name| format!("there is no such mutant any more: {name}")));
+    for line in &wrong {
+        println!("{line}");
+    }
+    if wrong.is_empty() { Outcome::Passed } else { Outcome::Failed(format!("see above; the list is {LIST}")) }
+}
+
+fn cargo_mutants(root: &Path, arguments: &[&str]) -> Command {
+    let mut command = crate::run::cargo(root, &["mutants"]);
+    command.args(arguments);
+    command
+}
+
+impl Group {
+    /// Runs a sample and says what differs from the list. All mutants that there are become `known`.
+    fn run(
+        &self,
+        root: &Path,
+        sample: Option<&str>,
+        listed: &BTreeSet<String>,
+        known: &mut BTreeSet<String>,
+    ) -> Result<Vec<String>, String> {
+        let package = ["--package", self.package];
+        let output = cargo_mutants(root, &[&["--list"], &package[..]].concat()).output().map_err(|e| e.to_string())?;
+        let names = names(&String::from_utf8_lossy(&output.stdout));
+        known.extend(names.values().cloned());
+
+        let results = PathBuf::from("target/mutants").join(self.package);
+        let default = format!("0/{}", self.one_in);
+        let mut command = cargo_mutants(root, &package);
+        command.args(["--colors", "never", "--no-times", "--output"]).arg(&results).args(self.arguments[0]);
+        match sample {
+            Some("all") => {}
+            sample => {
+                command.args(["--sharding", "round-robin", "--shard", sample.unwrap_or(&default)]);
+            }
+        }
+        command.arg("--").args(self.arguments[1]);
+        std::fs::create_dir_all(root.join(&results)).map_err(|error| format!("{}: {error}", results.display()))?;
+        let status = command.status().map_err(|error| error.to_string())?;
+        // 2 and 3: some were missed, or did not end.
+        if !matches!(status.code(), Some(0 | 2 | 3)) {
+            return Err(format!("cargo mutants --package {}: {status}; see above", self.package));
+        }
+        let of = |file: &str| -> Vec<String> {
+            let path = root.join(&results).join("mutants.out").join(file);
+            let text = std::fs::read_to_string(path).unwrap_or_default();
+            text.lines().filter_map(|line| names.get(line).cloned()).collect()
+        };
+        // A mutant that does not end is one that is noticed.
+        let noticed = [of("caught.txt"), of("timeout.txt")].concat();
+        Ok(self.judge(&noticed, &of("missed.txt"), listed))
+    }
+
+    fn judge(&self, noticed: &[String], missed: &[String], listed: &BTreeSet<String>) -> Vec<String> {
+        let all = noticed.len() + missed.len();
+        println!("{}: {} of {all} mutants noticed, {} survive", self.package, noticed.len(), missed.len());
+        let mut wrong = Vec::new();
+        if 100 * noticed.len() < self.bar * all {
+            wrong.push(format!("{}: less than {} % of the mutants are noticed", self.package, self.bar));
+        }
+        let new = missed.iter().filter(|name| !listed.contains(*name));
+        wrong.extend(new.map(|name| format!("survives and is not on the list: {name}")));
+        let caught = noticed.iter().filter(|name| listed.contains(*name));
+        wrong.extend(caught.map(|name| format!("is on the list and no longer survives: {name}")));
+        wrong
+    }
+}
+
+/// Names that last, by those of cargo-mutants: without line and column, which every change above moves, but with a number where
+/// a function has several mutants of one kind.
+fn names(list: &str) -> BTreeMap<String, String> {
+    let mut count: BTreeMap<String, u32> = BTreeMap::new();
+    let lines = list.lines().filter_map(|line| {
+        let mut parts = line.splitn(4, ':');
+        let (file, what) = (parts.next()?, parts.nth(2)?);
+        let name = format!("{file}:{what}");
+        let number = count.entry(name.clone()).or_default();
+        *number += 1;
+        Some((line.to_owned(), format!("{name} #{number}")))
+    });
+    lines.collect()
+}
+
+/// The names in the list; an error where one has no reason.
+fn read(text: &str) -> Result<BTreeSet<String>, String> {
+    let mut names = BTreeSet::new();
+    let mut without = None;
+    for line in text.lines().filter(|line| !line.trim().is_empty() && !line.starts_with('#')) {
+        if line.starts_with(' ') {
+            without = None;
+        } else if names.insert(line.to_owned()) {
+            without = Some(line);
+        } else {
+            return Err(format!("listed twice: {line}"));
+        }
+    }
+    without.map_or(Ok(names), |line| Err(format!("a reason is missing, as an indented line below: {line}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLUS: &str = "a/b.rs: replace + with - in f";
+
+    #[test]
+    fn names_do_not_depend_on_lines_and_tell_mutants_of_one_kind_apart() {
+        let list = "a/b.rs:7:9: replace + with - in f\na/b.rs:7:30: replace + with - in f\na/b.rs:9:1: replace g -> T with 0: x\n";
+        let found: Vec<String> = names(list).into_values().collect();
+        assert_eq!(
+            found,
+            [format!("{PLUS} #2"), format!("{PLUS} #1"), "a/b.rs: replace g -> T with 0: x #1".to_owned()]
+        );
+        let moved = list.replace(":7:", ":8:");
+        assert_eq!(names(&moved).into_values().collect::<Vec<_>>(), found);
+    }
+
+    #[test]
+    fn a_list_has_a_reason_for_every_name() {
+        let names = read("# remark\na #1\nb #1\n    one reason for both\n\nc #1\n    another\n").unwrap();
+        assert_eq!(names.into_iter().collect::<Vec<_>>(), ["a #1", "b #1", "c #1"]);
+        assert!(read("a #1\n    why\nb #1\n").is_err_and(|why| why.ends_with(": b #1")));
+        assert!(read("a #1\na #1\n    why\n").is_err());
+    }
+
+    #[test]
+    fn what_is_not_as_listed_is_told() {
+        let group = Group { package: "p", arguments: [&[], &[]], one_in: 1, bar: 50 };
+        let strings = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let listed: BTreeSet<String> = strings(&["a", "b"]).into_iter().collect();
+        assert!(group.judge(&strings(&["c"]), &strings(&["a"]), &listed).is_empty());
+        assert_eq!(group.judge(&strings(&["b", "c"]), &strings(&["d"]), &listed).len(), 2);
+        assert_eq!(group.judge(&strings(&["c"]), &strings(&["a", "b"]), &listed).len(), 1);
+    }
+}
