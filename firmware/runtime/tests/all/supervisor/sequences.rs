@@ -265,7 +265,8 @@ fn phases_causes_and_conditions_of_random_sequences_are_those_of_the_oracle() {
 #[test]
 fn an_oracle_of_any_other_time_or_bound_is_told_apart() {
     let bounds = Bounds::legs();
-    let changes: [(&str, fn(&mut Bounds)); 9] = [
+    type Change = (&'static str, fn(&mut Bounds));
+    let changes: [Change; 9] = [
         ("arm", |bounds| bounds.arm_ticks += 1),
         ("gauge", |bounds| bounds.gauge_ticks += 1),
         ("voltage", |bounds| bounds.voltage_ticks += 1),
