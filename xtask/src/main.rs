@@ -2,6 +2,7 @@
 
 mod binaries;
 mod fresh;
+mod fuzz;
 mod generated;
 mod packages;
 mod progress;
@@ -19,6 +20,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   setup   installs what the tests need: a cross compiler for Cortex-M and QEMU
   test    setup, then formatting, lints, every test, documentation, freshness of generated files, lock files and licences
   soak    every test at full length, and known defects of packages, for releases; writes tests/soak.txt
+  fuzz    SECONDS [TARGET]: what comes from outside, under a fuzzer guided by coverage; `fuzz keep` keeps what it found
   bless   writes the generated files that are committed anew
   fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
 
@@ -37,15 +39,18 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         ["fresh", ref arguments @ ..] => fresh::fresh(&root(), arguments),
+        ["fuzz", ref arguments @ ..] => fuzz::command(&root(), arguments).unwrap_or_else(misused),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");
             ExitCode::SUCCESS
         }
-        _ => {
-            eprintln!("{USAGE}");
-            ExitCode::from(2)
-        }
+        _ => misused(),
     }
+}
+
+fn misused() -> ExitCode {
+    eprintln!("{USAGE}");
+    ExitCode::from(2)
 }
 
 /// The repository: this crate stands directly below it.

@@ -1,0 +1,209 @@
+//! Both ends of the link, each with the other end out of its mind.
+
+use std::cell::RefCell;
+use std::io;
+use std::rc::Rc;
+use std::time::Duration;
+
+use controller::Config;
+use controller::limits::CODES;
+use controller::supervised::Machine;
+use specgen::operate::Session;
+use specgen_board::{Board, Desk, Exchange, Noticed, Stopwatch, Visit, recorder};
+use specgen_hal::{Amplifiers, Fault, Gauges};
+use specgen_link::client::{Patience, Port};
+use specgen_link::{Endpoint, Kind, Receiver, RecorderAction, VERSION};
+use specgen_runtime::supervisor::Request;
+
+/// The input is a script of both ends.
+pub fn link(input: &[u8]) {
+    device(input);
+    host(input);
+}
+
+/// What a script says next: what to do, and bytes for it.
+fn next<'a>(script: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
+    let (&[what, low, high], rest) = script.split_first_chunk()?;
+    let length = usize::from(u16::from_le_bytes([low, high]) % 1200).min(rest.len());
+    let (bytes, rest) = rest.split_at(length);
+    *script = rest;
+    Some((what, bytes))
+}
+
+/// A frame of a header and a message, as `specgen_link` describes it.
+fn frame(header: [u8; 6], message: &[u8]) -> Vec<u8> {
+    let mut body = [&header, message].concat();
+    let crc = body.iter().fold(u32::MAX, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| if crc & 1 == 1 { crc >> 1 ^ 0x82f6_3b78 } else { crc >> 1 })
+    });
+    body.extend((!crc).to_le_bytes());
+    let mut out = Vec::new();
+    for piece in body.split(|byte| *byte == 0) {
+        let mut rest = piece;
+        while let Some((whole, after)) = rest.split_at_checked(254) {
+            out.push(255);
+            out.extend_from_slice(whole);
+            rest = after;
+        }
+        out.push(rest.len() as u8 + 1);
+        out.extend_from_slice(rest);
+    }
+    out.push(0);
+    out
+}
+
+fn header(kind: u8, session: u16, sequence: u16) -> [u8; 6] {
+    let ([session_low, session_high], [sequence_low, sequence_high]) = (session.to_le_bytes(), sequence.to_le_bytes());
+    [VERSION, kind, session_low, session_high, sequence_low, sequence_high]
+}
+
+/// Converters: codes of the gauges, and what the amplifiers were told last.
+#[derive(Clone, Default)]
+struct Parts(Rc<RefCell<State>>);
+
+#[derive(Default)]
+struct State {
+    gauges: [i32; 6],
+    fails: bool,
+    written: Option<[i32; 6]>,
+    enabled: bool,
+}
+
+impl Gauges for Parts {
+    const BITS: u32 = 17;
+
+    fn read(&mut self) -> Result<[i32; 6], Fault> {
+        let state = self.0.borrow();
+        if state.fails { Err(Fault::Blank) } else { Ok(state.gauges) }
+    }
+}
+
+impl Amplifiers for Parts {
+    const BITS: u32 = 16;
+
+    fn write(&mut self, codes: &[i32; 6]) -> Result<(), Fault> {
+        let mut state = self.0.borrow_mut();
+        assert!(codes.iter().all(|code| (CODES[0]..=CODES[1]).contains(code)), "voltage: {codes:?}");
+        if let (true, Some(last)) = (state.enabled, state.written) {
+            let most = Config::new().code_limits().max_step;
+            assert!(
+                codes.iter().zip(last).all(|(code, last)| (code - last).abs() <= most),
+                "slew: {last:?} to {codes:?}"
+            );
+        }
+        state.written = Some(*codes);
+        Ok(())
+    }
+
+    fn enable(&mut self, on: bool) -> Result<(), Fault> {
+        self.0.borrow_mut().enabled = on;
+        Ok(())
+    }
+}
+
+/// A board keeps voltage and slew limits and answers in frames, whatever its line and its gauges say.
+fn device(mut script: &[u8]) {
+    let parts = Parts::default();
+    let mut machine = Box::new(Machine::new());
+    let mut board = Board::new(parts.clone(), parts.clone(), &mut machine, true);
+    let mut exchange = Exchange::new();
+    let mut tape = vec![0; 4000];
+    exchange.recorder = recorder(Box::leak(core::mem::take(&mut tape).into_boxed_slice()));
+    board.start(&mut exchange.report);
+    let (mut desk, mut endpoint, mut host) = (Desk::new(Stopwatch::NONE), Endpoint::new(), Receiver::new());
+    let (mut sequence, mut ticks) = (0, 0);
+    while let Some((what, bytes)) = next(&mut script) {
+        let sent = match what % 4 {
+            0 => bytes.to_vec(),
+            1 => frame(header(0, 1, sequence), bytes),
+            2 => match bytes.split_first_chunk() {
+                Some((header, message)) => frame(*header, message),
+                None => continue,
+            },
+            _ => {
+                let [count, fails, low, high] = *bytes.first_chunk().unwrap_or(&[0; 4]);
+                let mut state = parts.0.borrow_mut();
+                state.fails = fails == 1;
+                state.gauges = [i32::from(u16::from_le_bytes([low, high])) * 2; 6];
+                drop(state);
+                let count = u32::from(count).min(2000 - ticks);
+                ticks += count;
+                (0..count).for_each(|_| drop(board.tick(&mut exchange, Noticed::default())));
+                continue;
+            }
+        };
+        let before = endpoint.counters().executed;
+        for byte in sent {
+            let mut with =
+                |action: &mut dyn FnMut(&mut Exchange, &mut Machine)| action(&mut exchange, board.machine_mut());
+            let reply = endpoint.push(byte, &mut Visit { desk: &mut desk, with: &mut with });
+            for byte in reply.unwrap_or_default() {
+                if let Some(answer) = host.push(*byte) {
+                    assert_eq!(answer.unwrap().0.kind, Kind::Reply);
+                }
+            }
+        }
+        if endpoint.counters().executed != before {
+            sequence += 1;
+        }
+    }
+}
+
+/// A device that answers what the script says.
+struct Answers<'a> {
+    script: &'a [u8],
+    asked: Receiver,
+    session: u16,
+    sequence: u16,
+    coming: Vec<u8>,
+}
+
+impl Port for Answers<'_> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        for byte in bytes {
+            if let Some(request) = self.asked.push(*byte) {
+                let (header, _) = request.unwrap();
+                (self.session, self.sequence) = (header.session, header.sequence);
+            }
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], _limit: Duration) -> io::Result<usize> {
+        if self.coming.is_empty() {
+            let (what, bytes) = next(&mut self.script).ok_or(io::ErrorKind::UnexpectedEof)?;
+            self.coming = match what % 4 {
+                0 => bytes.to_vec(),
+                1 => frame(header(1, self.session, self.sequence), bytes),
+                2 => frame(header(2, 0, 0), bytes),
+                _ => frame(header(1, self.session, self.sequence.wrapping_sub(1)), bytes),
+            };
+        }
+        let count = self.coming.len().min(buffer.len());
+        buffer[..count].copy_from_slice(&self.coming[..count]);
+        self.coming.drain(..count);
+        Ok(count)
+    }
+}
+
+/// A host gets through, or says why not.
+fn host(script: &[u8]) {
+    let port = Answers { script, asked: Receiver::new(), session: 0, sequence: 0, coming: Vec::new() };
+    let patience = Patience { limit: Duration::from_secs(1000), attempts: 1 };
+    let mut session = match Session::open(port, patience, None) {
+        Ok(session) => session,
+        Err(why) => return assert!(!why.to_string().is_empty()),
+    };
+    let assigned = session.assign(&[("setpoint[0]".to_owned(), "1e-6".to_owned())]);
+    let steps: [&mut dyn FnMut(&mut Session<Answers>) -> bool; 6] = [
+        &mut |session| session.supervise(Request::Arm).is_ok(),
+        &mut |session| session.config().is_ok(),
+        &mut |session| session.recorder(RecorderAction::Look).is_ok(),
+        &mut |session| session.download().is_ok(),
+        &mut |session| session.command(assigned.clone().unwrap_or_default()).is_ok(),
+        &mut |session| session.poll().is_ok(),
+    ];
+    for step in steps {
+        let _ = step(&mut session);
+    }
+}
