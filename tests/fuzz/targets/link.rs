@@ -101,14 +101,38 @@ impl Amplifiers for Parts {
     }
 }
 
+/// Memory of a recorder. A board has it for ever; here it is given back after each input, of which there are millions.
+struct Tape(*mut [u64]);
+
+#[allow(unsafe_code)]
+impl Tape {
+    fn new() -> Self {
+        Self(Box::into_raw(vec![0; 4000].into_boxed_slice()))
+    }
+
+    /// To be called once, by what is dropped before this is.
+    fn words(&self) -> &'static mut [u64] {
+        // SAFETY: it is there until this is dropped, and nobody else has it.
+        unsafe { &mut *self.0 }
+    }
+}
+
+#[allow(unsafe_code)]
+impl Drop for Tape {
+    fn drop(&mut self) {
+        // SAFETY: made by `Box::into_raw`, and given back once.
+        drop(unsafe { Box::from_raw(self.0) });
+    }
+}
+
 /// A board keeps voltage and slew limits and answers in frames, whatever its line and its gauges say.
 fn device(mut script: &[u8]) {
     let parts = Parts::default();
+    let tape = Tape::new();
     let mut machine = Box::new(Machine::new());
     let mut board = Board::new(parts.clone(), parts.clone(), &mut machine, true);
     let mut exchange = Exchange::new();
-    let mut tape = vec![0; 4000];
-    exchange.recorder = recorder(Box::leak(core::mem::take(&mut tape).into_boxed_slice()));
+    exchange.recorder = recorder(tape.words());
     board.start(&mut exchange.report);
     let (mut desk, mut endpoint, mut host) = (Desk::new(Stopwatch::NONE), Endpoint::new(), Receiver::new());
     let (mut sequence, mut ticks) = (0, 0);

@@ -18,7 +18,9 @@ pub const TARGETS: [(&str, fn(&[u8])); 5] =
 /// A spec is accepted, or refused with findings that can be shown; what is accepted has a physical lint.
 fn spec(input: &[u8]) {
     let text = String::from_utf8_lossy(input).into_owned();
-    let source = SpecSource { display_name: "fuzz.toml".to_owned(), text, dir: PathBuf::from("specs") };
+    // The repository's, from its root or from the tests' folder: the records that a spec names are looked for there.
+    let dir = ["specs", "../specs"].map(PathBuf::from).into_iter().find(|dir| dir.is_dir()).unwrap_or_default();
+    let source = SpecSource { display_name: "fuzz.toml".to_owned(), text, dir };
     let (model, findings) = spec::load(&source);
     assert_eq!(model.is_none(), findings.iter().any(|finding| finding.severity == Severity::Error), "{findings:?}");
     shown(&findings, &source);

@@ -244,6 +244,9 @@ fn every_code<T: Real + Into<f64>>(constants: [f64; 5], full_scale: i32) {
         assert!(volts >= last && volts >= lowest && volts <= highest, "{code}: {volts} after {last}");
         assert!(volts != 0.0 || volts.is_sign_positive(), "{code}: −0");
         last = volts;
+        let exact = constants[0] + f64::from(code) * constants[1];
+        let epsilon = if T::SINGLE { f64::from(f32::EPSILON) } else { f64::EPSILON };
+        assert!((volts - exact).abs() <= 2.0 * epsilon * (constants[0].abs() + highest.abs()), "{code}: {volts}");
         // A grid whose codes a scalar can tell apart: what a code stands for is that code again.
         if full_scale < 1 << 16 || !T::SINGLE {
             assert_eq!(dac.code(dac.drive(code), code, NO_LIMITS), (code, false));
