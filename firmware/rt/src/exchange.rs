@@ -18,6 +18,7 @@
 mod mapping;
 mod words;
 
+// `words` takes these from here.
 use core::hint;
 use core::sync::atomic::{self, Ordering};
 use std::fmt;
