@@ -1,7 +1,7 @@
 //! Fuzzing guided by coverage: `tests/fuzz` under libFuzzer, with debug assertions and overflow checks.
 //!
 //! Inputs that are worth keeping stand in `tests/fuzz/corpus`, those of a run in `target/fuzz`, from which `keep` takes the
-//! smallest set that reaches all that was reached.
+//! smallest set that reaches every edge of the program that was reached.
 
 use std::fs;
 use std::path::Path;
@@ -94,7 +94,7 @@ fn run(root: &Path, target: &str, seconds: u32) -> Outcome {
     expect_success(fuzzer, &mend)
 }
 
-/// Makes the smallest set of inputs that reaches what all of them reach the kept one.
+/// Makes the smallest set of inputs that reaches every edge that any of them reaches the kept one.
 fn keep(root: &Path, target: &str) -> Outcome {
     let (found, kept) = (root.join(WORK).join(target), root.join(CORPUS).join(target));
     let fresh = root.join(WORK).join(format!("kept-{target}"));
@@ -103,7 +103,7 @@ fn keep(root: &Path, target: &str) -> Outcome {
         return Outcome::Failed(format!("{}: {error}", fresh.display()));
     }
     let mut merge = fuzzer(root, target);
-    merge.args(["-set_cover_merge=1", "-verbosity=0"]).arg(format!("-max_len={LONGEST}"));
+    merge.args(["-set_cover_merge=1", "-use_counters=0", "-verbosity=0"]).arg(format!("-max_len={LONGEST}"));
     let outcome = expect_success(merge.args([&fresh, &kept, &found]), "see above");
     if !matches!(outcome, Outcome::Passed) {
         return outcome;
