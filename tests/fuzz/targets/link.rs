@@ -5,15 +5,20 @@ use std::io;
 use std::rc::Rc;
 use std::time::Duration;
 
-use controller::Config;
 use controller::limits::CODES;
+use controller::sensing::CONVERTER;
 use controller::supervised::Machine;
+use controller::supervision::READINGS_PER_LEG;
+use controller::{Config, LEGS, LegState};
 use specgen::operate::Session;
 use specgen_board::{Board, Desk, Exchange, Noticed, Stopwatch, Visit, recorder};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::client::{Patience, Port};
 use specgen_link::{Endpoint, Kind, Receiver, RecorderAction, VERSION};
 use specgen_runtime::supervisor::Request;
+
+/// Most ticks of a board: 0.6 s, enough to arm and run.
+const TICKS: u32 = 6000;
 
 /// The input is a script of both ends.
 pub fn link(input: &[u8]) {
@@ -67,6 +72,18 @@ struct State {
     fails: bool,
     written: Option<[i32; 6]>,
     enabled: bool,
+}
+
+impl Parts {
+    /// What the gauges read next.
+    fn read(&self, legs: &[LegState; LEGS], off: i32, fails: bool) {
+        let mut state = self.0.borrow_mut();
+        state.fails = fails;
+        for (code, row) in state.gauges.iter_mut().zip(READINGS_PER_LEG) {
+            let reading: f64 = row.iter().zip(legs).map(|(part, leg)| part * leg.memory.displacement()).sum();
+            *code = ((reading - CONVERTER.at_zero) / CONVERTER.per_code) as i32 + off;
+        }
+    }
 }
 
 impl Gauges for Parts {
@@ -145,14 +162,15 @@ fn device(mut script: &[u8]) {
                 None => continue,
             },
             _ => {
+                // Up to 2040 ticks, in which the gauges read what the legs' models say, off by so much, or nothing at all.
                 let [count, fails, low, high] = *bytes.first_chunk().unwrap_or(&[0; 4]);
-                let mut state = parts.0.borrow_mut();
-                state.fails = fails == 1;
-                state.gauges = [i32::from(u16::from_le_bytes([low, high])) * 2; 6];
-                drop(state);
-                let count = u32::from(count).min(2000 - ticks);
+                let count = (u32::from(count) * 8).min(TICKS - ticks);
                 ticks += count;
-                (0..count).for_each(|_| drop(board.tick(&mut exchange, Noticed::default())));
+                for _ in 0..count {
+                    let off = i32::from(i16::from_le_bytes([low, high])) * 4;
+                    parts.read(&board.machine().state.legs, off, fails == 1);
+                    board.tick(&mut exchange, Noticed::default());
+                }
                 continue;
             }
         };
