@@ -31,11 +31,11 @@ const COVERAGE: [&str; 5] = [
 ];
 
 /// What to do with a target.
-type Work = dyn Fn(&str) -> Outcome;
+type Work<'a> = Box<dyn Fn(&str) -> Outcome + 'a>;
 
 /// `cargo xtask fuzz [SECONDS [TARGET]]`, `cargo xtask fuzz keep`; none if the arguments are something else.
 pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
-    let (targets, work): (Vec<&str>, Box<Work>) = match *arguments {
+    let (targets, work): (Vec<&str>, Work) = match *arguments {
         ["keep"] => (TARGETS.to_vec(), Box::new(|target| keep(root, target))),
         [seconds, ref only @ ..] if only.len() < 2 => {
             let seconds = seconds.parse().ok()?;
@@ -104,7 +104,8 @@ fn keep(root: &Path, target: &str) -> Outcome {
     }
     let mut merge = fuzzer(root, target);
     merge.args(["-set_cover_merge=1", "-use_counters=0", "-verbosity=0"]).arg(format!("-max_len={LONGEST}"));
-    let outcome = expect_success(merge.args([&fresh, &kept, &found]), "see above");
+    merge.args([&fresh, &kept, &found]);
+    let outcome = expect_success(merge, "see above");
     if !matches!(outcome, Outcome::Passed) {
         return outcome;
     }
