@@ -236,16 +236,12 @@ fn host(script: &[u8]) {
         Ok(session) => session,
         Err(why) => return assert!(!why.to_string().is_empty()),
     };
-    let assigned = session.assign(&[("setpoint[0]".to_owned(), "1e-6".to_owned())]);
-    let steps: [&mut dyn FnMut(&mut Session<Answers>) -> bool; 6] = [
-        &mut |session| session.supervise(Request::Arm).is_ok(),
-        &mut |session| session.config().is_ok(),
-        &mut |session| session.recorder(RecorderAction::Look).is_ok(),
-        &mut |session| session.download().is_ok(),
-        &mut |session| session.command(assigned.clone().unwrap_or_default()).is_ok(),
-        &mut |session| session.poll().is_ok(),
-    ];
-    for step in steps {
-        let _ = step(&mut session);
-    }
+    let words = session.assign(&[("setpoint[0]".to_owned(), "1e-6".to_owned())]).unwrap_or_default();
+    // Each has its own answer, and none is owed anything by those before it.
+    let _ = session.supervise(Request::Arm);
+    let _ = session.config();
+    let _ = session.recorder(RecorderAction::Look);
+    let _ = session.download();
+    let _ = session.command(words);
+    let _ = session.poll();
 }

@@ -11,8 +11,11 @@ use specgen::operate::{Order, read_wave};
 use specgen::spec::{self, SpecSource};
 use specgen::{lint, waveform};
 
-/// The targets by name; a name is also that of the folder of their kept inputs.
-pub const TARGETS: [(&str, fn(&[u8])); 5] =
+/// A target and its name, which is also that of the folder of its kept inputs.
+type Target = (&'static str, fn(&[u8]));
+
+/// All targets.
+pub const TARGETS: [Target; 5] =
     [("spec", spec), ("csv", csv), ("record", record::record), ("link", link::link), ("operator", operator)];
 
 /// A spec is accepted, or refused with findings that can be shown; what is accepted has a physical lint.
