@@ -2,6 +2,7 @@
 
 mod binaries;
 mod fresh;
+mod fuzz;
 mod generated;
 mod judged;
 mod mutants;
@@ -22,6 +23,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   test    setup, then formatting, lints, every test, documentation, freshness of generated files, lock files and licences
   soak    every test at full length, mutants, and known defects of packages, for releases; writes tests/soak.txt
   mutants code changed one operator at a time, to see whether a test notices; a sample, `K/N` for another, `all` for all
+  fuzz    SECONDS [TARGET]: what comes from outside, under a fuzzer guided by coverage; `fuzz keep` keeps what it found
   bless   writes the generated files that are committed anew
   fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
 
@@ -42,15 +44,18 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         ["fresh", ref arguments @ ..] => fresh::fresh(&root(), arguments),
+        ["fuzz", ref arguments @ ..] => fuzz::command(&root(), arguments).unwrap_or_else(misused),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");
             ExitCode::SUCCESS
         }
-        _ => {
-            eprintln!("{USAGE}");
-            ExitCode::from(2)
-        }
+        _ => misused(),
     }
+}
+
+fn misused() -> ExitCode {
+    eprintln!("{USAGE}");
+    ExitCode::from(2)
 }
 
 /// The repository: this crate stands directly below it.

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::run::{Outcome, cargo};
 
 /// Licences that ask for no more than their text and the names of authors to be passed on, as SPDX spells them.
-const ALLOWED: [&str; 13] = [
+const ALLOWED: [&str; 14] = [
     "0BSD",
     "Apache-2.0",
     "Apache-2.0 WITH LLVM-exception",
@@ -20,6 +20,7 @@ const ALLOWED: [&str; 13] = [
     "ISC",
     "MIT",
     "MIT-0",
+    "NCSA",
     "Unicode-3.0",
     "Unlicense",
     "Zlib",
@@ -120,7 +121,8 @@ fn one(words: &mut &[&str]) -> Option<bool> {
     }
 }
 
-fn host() -> String {
+/// The system that this runs on, as rustc names it.
+pub fn host() -> String {
     let output = Command::new("rustc").arg("-vV").output();
     let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
     text.lines().find_map(|line| line.strip_prefix("host: ")).unwrap_or_default().to_owned()

@@ -7,7 +7,7 @@ use std::time::Instant;
 use crate::binaries::{self, Binary, Mode, Ran};
 use crate::judged::Trial;
 use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::{generated, mutants, packages, setup, soak};
+use crate::{fuzz, generated, mutants, packages, setup, soak};
 
 /// Its own workspace, built for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
@@ -20,9 +20,10 @@ const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 /// Its own workspace, because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
 /// Workspaces of their own with lock files of their own.
-const STANDING_ALONE: [&str; 5] = [FIRMWARE, REAL_TIME, SCHEMA, BOARDS[0], BOARDS[1]];
+const STANDING_ALONE: [&str; 7] = [FIRMWARE, REAL_TIME, SCHEMA, fuzz::MANIFEST, LOOM, BOARDS[0], BOARDS[1]];
 /// Every lock file there is.
-const LOCKED: [&str; 7] = ["Cargo.toml", FIRMWARE, REAL_TIME, SCHEMA, BOARDS[0], BOARDS[1], LINK_PROOF];
+const LOCKED: [&str; 9] =
+    ["Cargo.toml", FIRMWARE, REAL_TIME, SCHEMA, fuzz::MANIFEST, LOOM, BOARDS[0], BOARDS[1], LINK_PROOF];
 /// Its own workspace, built by a test.
 const LINK_PROOF: &str = "firmware/link/tests/proof/Cargo.toml";
 /// Its own workspace, because of its dependencies too.
@@ -30,6 +31,12 @@ const SCHEMA: &str = "tests/schema/Cargo.toml";
 /// The published schema under a validator that others wrote.
 const PUBLISHED_SCHEMA: Trial =
     Trial { manifest: SCHEMA, judges: &[("specs", "schema.json"), ("specs", ".toml"), ("specs/features", ".toml")] };
+/// And this one.
+const LOOM: &str = "firmware/rt/tests/loom/Cargo.toml";
+/// What orders memory that two processes share, under a model checker.
+const SHARED_MEMORY: Trial = Trial { manifest: LOOM, judges: &[("firmware/rt/src/exchange", ".rs")] };
+/// Time that the soak gives each target of the fuzzer, s.
+const FUZZING: u32 = 300;
 /// Members of the workspace that people write.
 const HAND_WRITTEN: [&str; 11] = [
     "specgen",
@@ -54,7 +61,7 @@ pub fn setup() -> ExitCode {
 
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
-    let mut report = Report::new(9 + LOCKED.len());
+    let mut report = Report::new(10 + LOCKED.len());
     report.step("cross compiler and QEMU", setup::microcontroller);
     let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
     report.step("formatting", || formatting(root));
@@ -63,6 +70,7 @@ pub fn test(root: &Path) -> ExitCode {
     report.step("examples in the documentation", || binaries::examples(root));
     report.step("lints", || lints(root));
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
+    report.step("orders of shared memory", || SHARED_MEMORY.unless_unchanged(root));
     report.step("documentation", || {
         let mut doc = cargo(root, &["doc", "--release", "--workspace", "--no-deps", "--quiet"]);
         doc.env("RUSTDOCFLAGS", "-D warnings");
@@ -77,10 +85,13 @@ pub fn test(root: &Path) -> ExitCode {
 
 /// `cargo xtask soak`
 pub fn soak(root: &Path) -> ExitCode {
-    let mut report = Report::new(6);
+    let mut report = Report::new(10);
     report.step("cross compiler and QEMU", setup::microcontroller);
     report.step("known defects of packages", || packages::advisories(root, &LOCKED));
     report.step("published schema", || PUBLISHED_SCHEMA.run(root));
+    report.step("orders of shared memory", || SHARED_MEMORY.run(root));
+    report.step("fuzzing", || fuzz::all(root, FUZZING));
+    report.step("tests with every check", || checked(root));
     let binaries = compiled(root, &mut report);
     let mut ran = Ran::default();
     let start = Instant::now();
@@ -99,6 +110,21 @@ pub fn mutants(root: &Path, sample: Option<&str>) -> ExitCode {
     let mut report = Report::new(1);
     report.step("mutants", || mutants::run(root, sample));
     report.finish()
+}
+
+/// Debug assertions and overflow checks where they can find something: what runs in every tick or reads what comes from outside.
+fn checked(root: &Path) -> Outcome {
+    let kernels = ["runtime", "link", "hal", "board", "rt"].map(|name| format!("--package=specgen-{name}"));
+    let kernels: Vec<&str> = kernels.iter().map(String::as_str).chain(["--package=host-sim"]).collect();
+    let readers = ["--package=specgen-tests", "--", "spec_", "fuzz_", "identify_bad_input"];
+    for scope in [&kernels[..], &["--package=specgen", "--lib"], &readers] {
+        let test = [&["test", "--profile=checked", "--locked", "--quiet"], scope].concat();
+        let outcome = expect_success(cargo(root, &test), "see the test above");
+        if !matches!(outcome, Outcome::Passed) {
+            return outcome;
+        }
+    }
+    Outcome::Passed
 }
 
 /// Every test binary; none where they do not compile, which fails.
@@ -133,7 +159,8 @@ fn formatting(root: &Path) -> Outcome {
     }
     // Not `--all`: the emitted controller is formatted by specgen itself.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
-    let excluded = [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA].into_iter().chain(BOARDS);
+    let excluded =
+        [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, LOOM].into_iter().chain(BOARDS);
     let excluded = excluded.map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
         let mend = format!("run: cargo fmt {}", scope.join(" "));

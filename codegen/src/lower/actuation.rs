@@ -61,3 +61,73 @@ fn finding(model: &Model, code: &'static str, key: &str, message: String, help: 
     let place = model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec);
     Diagnostic { severity: Severity::Error, code, key: key.to_owned(), place, message, help }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use specgen_runtime::{Dac, Real};
+
+    use super::*;
+    use crate::spec::{self, SpecSource};
+
+    /// Codes whose voltage is within `volts` as the controller computes it; every code is asked.
+    fn within<T: Real + Into<f64>>(actuation: &Actuation, volts: [f64; 2]) -> [i32; 2] {
+        let [volts_at_zero, volts_per_code, cells_at_zero, cells_per_code, codes_per_cell] = [
+            actuation.volts_at_zero,
+            actuation.volts_per_code,
+            actuation.cells_at_zero,
+            actuation.cells_per_code,
+            actuation.codes_per_cell,
+        ]
+        .map(T::from_f64);
+        let dac = Dac { volts_at_zero, volts_per_code, cells_at_zero, cells_per_code, codes_per_cell };
+        let inside = |code: &i32| (volts[0]..=volts[1]).contains(&dac.voltage(*code).into());
+        let all: Vec<i32> = (0..1 << actuation.bits).filter(inside).collect();
+        let (first, last) = (all[0], all[all.len() - 1]);
+        assert_eq!(all.len() as i32, last - first + 1, "no code between two that are inside is outside");
+        [first, last]
+    }
+
+    /// Together with `firmware/runtime/tests/all/dac_exact.rs` (no code leaves the limits or moves by more than the step, whatever
+    /// comes in): no voltage leaves `actuator.voltage`, and none moves faster than `actuator.slew_rate`.
+    #[test]
+    fn the_codes_within_the_limits_are_those_of_voltages_within_the_limits_and_the_step_is_no_faster_than_the_slew_rate()
+     {
+        let specs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../specs");
+        let source = SpecSource::read(&specs.join("reference.toml")).unwrap();
+        let mut model = spec::load(&source).0.unwrap();
+        let mut tried = 0;
+        for bits in [12, 13, 15, 16, 18, 20, 24] {
+            for range in [[0.0, 150.0], [-30.0, 150.0], [-0.1, 100.1], [-1e3 / 3.0, 1e3]] {
+                for volts in [[0.0, 100.0], [-20.0, 130.0], [-0.1, 99.999_999], range, [100.0 / 3.0, 70.1]] {
+                    let [low, high] = volts;
+                    if low < range[0] || high > range[1] {
+                        continue;
+                    }
+                    model.dac.bits = bits;
+                    (model.dac.range, model.actuator.voltage) = (range, volts);
+                    for scalar in [Scalar::F32, Scalar::F64] {
+                        let (actuation, max_step) = lower(&model, scalar).unwrap();
+                        let inside = match scalar {
+                            Scalar::F32 => within::<f32>(&actuation, volts),
+                            Scalar::F64 => within::<f64>(&actuation, volts),
+                        };
+                        assert_eq!(
+                            [actuation.code_min, actuation.code_max],
+                            inside,
+                            "{bits} {range:?} {volts:?} {scalar:?}"
+                        );
+                        let code = (range[1] - range[0]) / f64::from((1 << bits) - 1);
+                        let fastest = f64::from(max_step) * code / model.timing.period;
+                        assert!(
+                            max_step >= 1 && (max_step == 1 || fastest <= model.actuator.slew_rate * (1.0 + 1e-15))
+                        );
+                        tried += 1;
+                    }
+                }
+            }
+        }
+        assert!(tried > 100, "{tried}");
+    }
+}

@@ -16,14 +16,19 @@
 #![allow(unsafe_code)] // Mapping and futex calls; each says why it is sound. The words themselves are atomics.
 
 mod mapping;
+mod words;
 
-use core::sync::atomic::{AtomicU32, AtomicU64, Ordering, fence};
+// `words` takes these from here.
+use core::hint;
+use core::sync::atomic::{self, Ordering};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::clock;
 use mapping::{Mapping, Unfit};
+use words::Words;
+pub use words::{Actuation, Sensing};
 
 /// "SPGPLANT" in little-endian bytes.
 const MAGIC: u64 = u64::from_le_bytes(*b"SPGPLANT");
@@ -35,58 +40,6 @@ const TRIES: usize = 10_000;
 
 /// Six legs, six gauges.
 pub const CHANNELS: usize = 6;
-
-/// What the controller gives out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Actuation {
-    /// A number that differs from one run of a controller to the next.
-    pub session: u64,
-    /// Tick of the session whose interval begins, from 0.
-    pub tick: u64,
-    /// Amplifiers on.
-    pub enable: bool,
-    /// Converter codes.
-    pub codes: [i32; CHANNELS],
-}
-
-/// What the machine gives out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Sensing {
-    /// Session that it follows.
-    pub session: u64,
-    /// Tick of the session at whose beginning it is read.
-    pub tick: u64,
-    /// Converter codes of the gauges.
-    pub codes: [i32; CHANNELS],
-    /// Force and torque on the platform as bits of f64, N and N m; 0 without a sensor.
-    pub wrench: [u64; CHANNELS],
-}
-
-/// Words of the file, in order.
-#[repr(C)]
-struct Words {
-    magic: AtomicU64,
-    version: AtomicU64,
-    /// First half of the SHA-256 of the spec.
-    digest: [AtomicU64; 2],
-    /// Process of the machine's side; 0 once it has ended in order.
-    server: AtomicU64,
-    /// Session and tick that the controller waits for.
-    wanted: [AtomicU64; 2],
-    actuation_count: AtomicU64,
-    actuation: [AtomicU64; 3 + CHANNELS],
-    sensing_count: AtomicU64,
-    sensing: [AtomicU64; 2 + 2 * CHANNELS],
-    /// What the machine's side sleeps on, and the controller's.
-    bells: [Bell; 2],
-}
-
-/// A count that the other side raises, and whether somebody sleeps on it.
-#[repr(C)]
-struct Bell {
-    count: AtomicU32,
-    sleepers: AtomicU32,
-}
 
 /// Why a machine cannot be reached.
 #[derive(Debug)]
@@ -257,26 +210,12 @@ impl Server {
     /// `seen`; none after `patience` (ns). It looks for `look` (ns) before it sleeps.
     #[must_use]
     pub fn wait(&self, seen: &mut u32, look: u64, patience: u64) -> Option<(Actuation, [u64; 2])> {
-        let words = self.mapping.words();
-        *seen = wait_for(&words.bells[0], *seen, look, patience)?;
-        let mut block = [0; 3 + CHANNELS];
-        read_block(&words.actuation_count, &words.actuation, &mut block)?;
-        let [session, tick, enable, codes @ ..] = block;
-        let wanted = [&words.wanted[0], &words.wanted[1]].map(|word| word.load(Ordering::Acquire));
-        Some((Actuation { session, tick, enable: enable == 1, codes: codes.map(|code| code as i32) }, wanted))
+        self.mapping.words().wait(seen, look, patience)
     }
 
     /// Gives a reading out.
     pub fn publish(&self, sensing: &Sensing) {
-        let words = self.mapping.words();
-        let mut block = [0; 2 + 2 * CHANNELS];
-        (block[0], block[1]) = (sensing.session, sensing.tick);
-        for k in 0..CHANNELS {
-            block[2 + k] = u64::from(sensing.codes[k] as u32);
-            block[2 + CHANNELS + k] = sensing.wrench[k];
-        }
-        write_block(&words.sensing_count, &words.sensing, &block);
-        ring(&words.bells[1]);
+        self.mapping.words().publish(sensing);
     }
 }
 
@@ -309,50 +248,14 @@ impl Client {
     }
 
     /// The reading at the beginning of `tick`; none if the machine does not give it within `patience` (ns).
+    #[must_use]
     pub fn sense(&self, tick: u64, patience: u64) -> Option<Sensing> {
-        let words = self.mapping.words();
-        let deadline = clock::now().saturating_add(patience);
-        let mut asked = false;
-        loop {
-            let bell = words.bells[1].count.load(Ordering::Acquire);
-            let mut block = [0; 2 + 2 * CHANNELS];
-            if read_block(&words.sensing_count, &words.sensing, &mut block).is_some()
-                && block[0] == self.session
-                && block[1] == tick
-            {
-                let at = |first: usize| core::array::from_fn(|k| block[first + k]);
-                let codes: [u64; CHANNELS] = at(2);
-                return Some(Sensing {
-                    session: block[0],
-                    tick: block[1],
-                    codes: codes.map(|code| code as u32 as i32),
-                    wrench: at(2 + CHANNELS),
-                });
-            }
-            if !asked {
-                words.wanted[1].store(tick, Ordering::Relaxed);
-                words.wanted[0].store(self.session, Ordering::Release);
-                ring(&words.bells[0]);
-                asked = true;
-            }
-            let left = deadline.saturating_sub(clock::now());
-            if left == 0 {
-                return None;
-            }
-            let _ = wait_for(&words.bells[1], bell, LOOK, left);
-        }
+        self.mapping.words().sense(self.session, tick, patience)
     }
 
     /// Gives codes out for the interval that begins with `tick`.
     pub fn actuate(&self, tick: u64, enable: bool, codes: &[i32; CHANNELS]) {
-        let words = self.mapping.words();
-        let mut block = [0; 3 + CHANNELS];
-        (block[0], block[1], block[2]) = (self.session, tick, u64::from(enable));
-        for (word, code) in block[3..].iter_mut().zip(codes) {
-            *word = u64::from(*code as u32);
-        }
-        write_block(&words.actuation_count, &words.actuation, &block);
-        ring(&words.bells[0]);
+        self.mapping.words().actuate(self.session, tick, enable, codes);
     }
 
     /// Whether the machine's process has ended, in order or not.
@@ -360,65 +263,6 @@ impl Client {
     pub fn is_abandoned(&self) -> bool {
         let process = self.mapping.words().server.load(Ordering::Acquire);
         process == 0 || !is_alive(process)
-    }
-}
-
-/// Writes a block that one side alone writes: the counter is odd meanwhile.
-fn write_block<const N: usize>(count: &AtomicU64, words: &[AtomicU64; N], block: &[u64; N]) {
-    let before = count.load(Ordering::Relaxed);
-    count.store(before.wrapping_add(1), Ordering::Relaxed);
-    fence(Ordering::Release);
-    for (word, value) in words.iter().zip(block) {
-        word.store(*value, Ordering::Relaxed);
-    }
-    count.store(before.wrapping_add(2), Ordering::Release);
-}
-
-/// A block that belongs together; none if the other side is stuck halfway.
-fn read_block<const N: usize>(count: &AtomicU64, words: &[AtomicU64; N], block: &mut [u64; N]) -> Option<()> {
-    for _ in 0..TRIES {
-        let before = count.load(Ordering::Acquire);
-        if before & 1 == 0 {
-            for (value, word) in block.iter_mut().zip(words) {
-                *value = word.load(Ordering::Relaxed);
-            }
-            fence(Ordering::Acquire);
-            if count.load(Ordering::Relaxed) == before {
-                return Some(());
-            }
-        }
-        core::hint::spin_loop();
-    }
-    None
-}
-
-fn ring(bell: &Bell) {
-    // In one order with the sleeper's: either it sees the new count, or it is seen here.
-    bell.count.fetch_add(1, Ordering::SeqCst);
-    if bell.sleepers.load(Ordering::SeqCst) > 0 {
-        mapping::wake(&bell.count);
-    }
-}
-
-/// The bell's count once it is no more `seen`; none after `patience` (ns). Sleeps after `look` (ns).
-fn wait_for(bell: &Bell, seen: u32, look: u64, patience: u64) -> Option<u32> {
-    let start = clock::now();
-    loop {
-        let count = bell.count.load(Ordering::Acquire);
-        if count != seen {
-            return Some(count);
-        }
-        let waited = clock::now().saturating_sub(start);
-        if waited >= patience {
-            return None;
-        }
-        if waited < look {
-            core::hint::spin_loop();
-        } else {
-            bell.sleepers.fetch_add(1, Ordering::SeqCst);
-            mapping::sleep(&bell.count, seen, patience - waited);
-            bell.sleepers.fetch_sub(1, Ordering::SeqCst);
-        }
     }
 }
 

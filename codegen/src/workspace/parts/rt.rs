@@ -16,6 +16,7 @@ pub const PART: Part = Part {
         "src/exchange.rs",
         "src/exchange/mapping.rs",
         "src/exchange/tests.rs",
+        "src/exchange/words.rs",
         "src/histogram.rs",
         "src/lib.rs",
         "src/scheduling.rs",

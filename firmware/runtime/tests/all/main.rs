@@ -6,6 +6,7 @@ mod attitude;
 mod common;
 mod control;
 mod dac;
+mod dac_exact;
 mod dynamics;
 mod geometry;
 mod preisach;

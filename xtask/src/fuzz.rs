@@ -1,0 +1,141 @@
+//! Fuzzing guided by coverage: `tests/fuzz` under libFuzzer, with debug assertions and overflow checks.
+//!
+//! Inputs that are worth keeping stand in `tests/fuzz/corpus`, those of a run in `target/fuzz`, from which `keep` takes the
+//! smallest set that reaches every edge of the program that was reached.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, ExitCode};
+
+use crate::packages::host;
+use crate::run::{Outcome, Report, cargo, expect_success};
+
+/// Its own workspace.
+pub const MANIFEST: &str = "tests/fuzz/Cargo.toml";
+/// Names of the targets: `TARGETS` of `tests/fuzz/targets`.
+const TARGETS: [&str; 5] = ["spec", "csv", "record", "link", "operator"];
+/// Inputs that are kept, a folder for each target.
+const CORPUS: &str = "tests/fuzz/corpus";
+/// Inputs of earlier runs, a folder for each target, and the build.
+const WORK: &str = "target/fuzz";
+/// Longest input, bytes: every spec of the repository fits.
+const LONGEST: usize = 16_384;
+/// Counters of edges, and of what comparisons compare: what libFuzzer is guided by. No sanitizer: the product forbids `unsafe`
+/// but for a few calls of the system, which no target reaches.
+const COVERAGE: [&str; 5] = [
+    "-Cpasses=sancov-module",
+    "-Cllvm-args=-sanitizer-coverage-level=4",
+    "-Cllvm-args=-sanitizer-coverage-inline-8bit-counters",
+    "-Cllvm-args=-sanitizer-coverage-pc-table",
+    "-Cllvm-args=-sanitizer-coverage-trace-compares",
+];
+
+/// What to do with a target.
+type Work<'a> = Box<dyn Fn(&str) -> Outcome + 'a>;
+
+/// `cargo xtask fuzz [SECONDS [TARGET]]`, `cargo xtask fuzz keep`; none if the arguments are something else.
+pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
+    let (targets, work): (Vec<&str>, Work) = match *arguments {
+        ["keep"] => (TARGETS.to_vec(), Box::new(|target| keep(root, target))),
+        [seconds, ref only @ ..] if only.len() < 2 => {
+            let seconds = seconds.parse().ok()?;
+            let targets: Vec<&str> = TARGETS.into_iter().filter(|name| only.is_empty() || only == [*name]).collect();
+            (targets, Box::new(move |target| run(root, target, seconds)))
+        }
+        _ => return None,
+    };
+    if targets.is_empty() {
+        return None;
+    }
+    let mut report = Report::new(1 + targets.len());
+    report.step("building the targets", || build(root));
+    for target in targets {
+        if !report.has_failed() {
+            report.step(target, || work(target));
+        }
+    }
+    Some(report.finish())
+}
+
+/// Every target for so many seconds, as one step.
+pub fn all(root: &Path, seconds: u32) -> Outcome {
+    let mut outcome = build(root);
+    for target in TARGETS {
+        if matches!(outcome, Outcome::Passed) {
+            println!("{target}");
+            outcome = run(root, target, seconds);
+        }
+    }
+    outcome
+}
+
+fn build(root: &Path) -> Outcome {
+    let mut build = cargo(root, &["build", "--release", "--locked", "--manifest-path", MANIFEST, "--target", &host()]);
+    // For a target, so that build scripts and macros do without.
+    build.env("CARGO_TARGET_DIR", root.join(WORK)).env("CARGO_ENCODED_RUSTFLAGS", COVERAGE.join("\u{1f}"));
+    expect_success(build, "see above")
+}
+
+/// Fuzzes from the kept inputs on; what is new is added to those of earlier runs.
+fn run(root: &Path, target: &str, seconds: u32) -> Outcome {
+    let (found, kept) = (root.join(WORK).join(target), root.join(CORPUS).join(target));
+    let failed = root.join(WORK).join(format!("failed-{target}-"));
+    if let Err(error) = fs::create_dir_all(&found).and_then(|()| fs::create_dir_all(&kept)) {
+        return Outcome::Failed(format!("{}: {error}", found.display()));
+    }
+    let mut fuzzer = fuzzer(root, target);
+    fuzzer.args([&format!("-max_total_time={seconds}"), "-print_final_stats=1", "-verbosity=0", "-timeout=10"]);
+    fuzzer.arg(format!("-max_len={LONGEST}")).arg(format!("-artifact_prefix={}", failed.display()));
+    fuzzer.arg(found).arg(&kept);
+    let mend = format!(
+        "an input that fails is named above; move it to {CORPUS}/{target}, where the tests repeat it: \
+         cargo test --release -p specgen-tests fuzz_corpus"
+    );
+    expect_success(fuzzer, &mend)
+}
+
+/// Makes the smallest set of inputs that reaches every edge that any of them reaches the kept one.
+fn keep(root: &Path, target: &str) -> Outcome {
+    let (found, kept) = (root.join(WORK).join(target), root.join(CORPUS).join(target));
+    let fresh = root.join(WORK).join(format!("kept-{target}"));
+    let _ = fs::remove_dir_all(&fresh);
+    if let Err(error) = fs::create_dir_all(&fresh).and_then(|()| fs::create_dir_all(&found)) {
+        return Outcome::Failed(format!("{}: {error}", fresh.display()));
+    }
+    let mut merge = fuzzer(root, target);
+    merge.args(["-set_cover_merge=1", "-use_counters=0", "-verbosity=0"]).arg(format!("-max_len={LONGEST}"));
+    merge.args([&fresh, &kept, &found]);
+    let outcome = expect_success(merge, "see above");
+    if !matches!(outcome, Outcome::Passed) {
+        return outcome;
+    }
+    match replace(&fresh, &kept) {
+        Ok(count) => {
+            println!("{count} inputs");
+            Outcome::Passed
+        }
+        Err(error) => Outcome::Failed(format!("{}: {error}", kept.display())),
+    }
+}
+
+/// Puts the files of one folder in the place of another's, but for those that once failed; how many there are now.
+fn replace(fresh: &Path, kept: &Path) -> std::io::Result<usize> {
+    for entry in fs::read_dir(kept)? {
+        let entry = entry?;
+        if !entry.file_name().to_string_lossy().starts_with("failed-") {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    for entry in fs::read_dir(fresh)? {
+        let entry = entry?;
+        fs::copy(entry.path(), kept.join(entry.file_name()))?;
+    }
+    Ok(fs::read_dir(kept)?.count())
+}
+
+fn fuzzer(root: &Path, target: &str) -> Command {
+    let program = root.join(WORK).join(host()).join("release/fuzz");
+    let mut command = Command::new(program);
+    command.current_dir(root).env("SPECGEN_FUZZ", target);
+    command
+}
