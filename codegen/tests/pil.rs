@@ -7,6 +7,7 @@
 mod board;
 
 use crate::support;
+use rustix::process::Signal;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::AtomicBool;
@@ -174,9 +175,9 @@ fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
     let (_one, folder) = workspace();
     let (image, ..) = legs(&folder);
     let emulator = Emulator::find().unwrap();
-    for (signal, word) in [("KILL", "the emulator ended"), ("STOP", "no answer within")] {
+    for (signal, word) in [(Signal::KILL, "the emulator ended"), (Signal::STOP, "no answer within")] {
         let pipes = Pipes::start(&emulator, &image).unwrap();
-        let process = pipes.process().to_string();
+        let process = pipes.process();
         let patience = Patience { limit: Duration::from_secs(2), attempts: 1 };
         let mut lockstep = Lockstep::open(supervised(&folder), pipes, patience, &NEVER).unwrap();
         lockstep.reset();
@@ -187,7 +188,7 @@ fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
             lockstep.step(&input, &mut output);
         }
         assert!(lockstep.stop().is_none());
-        assert!(Command::new("kill").args([&format!("-{signal}"), &process]).status().unwrap().success());
+        support::send(signal, process);
         let start = Instant::now();
         lockstep.step(&input, &mut output);
         let stop = lockstep.take_stop().unwrap();
@@ -195,7 +196,7 @@ fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
         assert!(start.elapsed() < Duration::from_secs(5));
         assert!(output.iter().all(|word| *word == u64::MAX), "voltages that no machine takes");
         drop(lockstep);
-        assert!(!Path::new("/proc").join(&process).exists(), "{signal}: the emulator is left running");
+        assert!(!Path::new("/proc").join(process.to_string()).exists(), "{signal:?}: the emulator is left running");
     }
     let nonsense = Image { elf: b"no image".to_vec(), ..image };
     let pipes = Pipes::start(&emulator, &nonsense).unwrap();
@@ -229,7 +230,7 @@ fn ctrl_c_ends_it_with_what_was_done_and_leaves_no_emulator() {
         std::thread::sleep(Duration::from_millis(5));
     };
     std::thread::sleep(Duration::from_secs(1));
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    support::send(Signal::INT, child.id());
     let output = child.wait_with_output().unwrap();
     let printed = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(130), "{printed}");

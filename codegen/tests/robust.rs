@@ -202,8 +202,7 @@ fn ctrl_c_keeps_what_was_run_and_says_so() {
         line.clear();
         assert_ne!(stderr.read_line(&mut line).unwrap(), 0, "it ended before it was interrupted");
     }
-    let process = child.id().to_string();
-    assert!(std::process::Command::new("kill").args(["-INT", &process]).status().unwrap().success());
+    crate::support::send(rustix::process::Signal::INT, child.id());
     let mut said = String::new();
     stderr.read_to_string(&mut said).unwrap();
     let output = child.wait_with_output().unwrap();

@@ -15,6 +15,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use host_sim::controller::{Controller, Supervised, TickController};
+use rustix::process::Signal;
 use serde_json::Value;
 use specgen::{compile, emit, target, workspace};
 use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
@@ -162,8 +163,8 @@ fn wait_for(what: &str, mut there: impl FnMut() -> bool) {
     }
 }
 
-fn signal(process: &Child, name: &str) {
-    assert!(Command::new("kill").args([&format!("-{name}"), &process.id().to_string()]).status().unwrap().success());
+fn signal(process: &Child, name: Signal) {
+    crate::support::send(name, process.id());
 }
 
 /// A run that goes on until it is told, or until the test fails.
@@ -175,7 +176,7 @@ impl Running {
     }
 
     /// Sends it a signal and waits for its end.
-    fn end(mut self, name: &str) -> Output {
+    fn end(mut self, name: Signal) -> Output {
         let mut running = self.0.take().unwrap();
         assert!(running.try_wait().unwrap().is_none(), "it runs until it is told");
         signal(&running, name);
@@ -346,7 +347,7 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     wait_for("the way down", || lines.ask("status").contains("phase=Faulted cause=LinkLost amplifiers=0"));
     assert_eq!((lines.ask("none").as_str(), lines.ask("acknowledge").as_str()), ("ok", "ok"));
     wait_for("the acknowledgement", || lines.ask("status").contains("phase=Disarmed"));
-    let output = running.end("TERM");
+    let output = running.end(Signal::TERM);
     let (summary, record) = bench.check(&output, "b.rec");
     assert_eq!((&summary["last_phase"], &summary["skipped"]), (&"Disarmed".into(), &0.into()), "{summary}");
     assert_eq!((output.status.code(), &summary["link"]["hosts"]), (Some(1), &2.into()), "{summary}");
@@ -470,13 +471,13 @@ fn legs_are_moved_by_lines_and_a_machine_that_is_killed_is_a_converter_that_does
     let start = tick(&ask("status"));
     wait_for("half a second of its time", || tick(&ask("status")) > start + 2_500);
 
-    signal(&bench.plant, "KILL");
+    signal(&bench.plant, Signal::KILL);
     bench.plant.wait().unwrap();
     // The first reading is waited for, the next ones are not.
     std::thread::sleep(Duration::from_millis(1_000));
     let start = tick(&ask("status"));
     wait_for("ticks without a machine", || tick(&ask("status")) > start + 100);
-    let output = running.end("INT");
+    let output = running.end(Signal::INT);
     let (summary, record) = bench.check(&output, "legs.rec");
     assert!(summary["device_faults"].as_u64().unwrap() > 0, "{summary}");
     assert!(output.status.code() == Some(1) && summary["failure"].as_str().unwrap().contains("converter"), "{summary}");

@@ -232,8 +232,7 @@ fn ctrl_c_keeps_the_best_so_far_and_says_so() {
     while !stderr.lines().last().is_some_and(|line| line.starts_with("cma: ")) {
         assert_ne!(lines.read_line(&mut stderr).unwrap(), 0, "it ended before it was interrupted: {stderr}");
     }
-    let process = child.id().to_string();
-    assert!(std::process::Command::new("kill").args(["-INT", &process]).status().unwrap().success());
+    support::send(rustix::process::Signal::INT, child.id());
     lines.read_to_string(&mut stderr).unwrap();
     let output = child.wait_with_output().unwrap();
     let run = Run {

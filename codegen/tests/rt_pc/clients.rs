@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use rustix::process::Signal;
 use specgen_link::{Refusal, Request};
 
 use super::host::Host;
@@ -87,7 +88,7 @@ pub fn nobody_keeps_others_from_ramping_down(bench: &Bench) {
     drop((idle, quiet));
     under_a_flood(&site);
     one_that_never_returns_is_not_waited_for(&site);
-    running.end("TERM");
+    running.end(Signal::TERM);
 }
 
 /// Stopped while it has the orders and its machine runs.
@@ -99,7 +100,7 @@ fn a_stopped_operate_loses_the_orders(site: &Site) {
         let mut operate = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let mut lines = Lines::new(&site.socket);
         wait_for("running", || lines.ask("status").contains("phase=Running"));
-        signal(&operate, "STOP");
+        signal(&operate, Signal::STOP);
         if by_line {
             site.down_by_line("operate stopped");
         } else {
@@ -107,7 +108,7 @@ fn a_stopped_operate_loses_the_orders(site: &Site) {
         }
         // Silent for longer than a host may be, it loses the orders to a line: it finds its connection closed, and does not go on.
         wait_for("the orders", || lines.ask("none") == "ok");
-        signal(&operate, "CONT");
+        signal(&operate, Signal::CONT);
         let status = operate.wait().unwrap();
         assert!(!status.success(), "it lost the orders: {status}");
     }

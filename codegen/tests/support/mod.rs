@@ -6,6 +6,7 @@
 pub mod commands;
 pub mod unprivileged;
 
+use rustix::process::{Pid, Signal, kill_process};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -192,6 +193,12 @@ pub fn digest(bytes: &[u8]) -> String {
 pub fn contents(root: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = listing(root).into_keys().filter(|path| root.join(path).is_file());
     files.map(|path| (path.clone(), fs::read(root.join(path)).unwrap())).collect()
+}
+
+/// Sends a signal; a bare machine has no program that does.
+#[track_caller]
+pub fn send(signal: Signal, process: u32) {
+    kill_process(Pid::from_raw(process.cast_signed()).unwrap(), signal).unwrap();
 }
 
 /// How much of what only gains by length is run: the long length in the soak.
