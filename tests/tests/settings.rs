@@ -140,7 +140,7 @@ fn hostile(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, Str
     let mut config = bench.machine.controller().default_config();
     let mut codes = [i64::from(ir.supervision.rest); 6];
     let (mut met, mut request, mut beside, mut sequence) = (Met::default(), 0, 0, 0);
-    for tick in 0..specgen_tests::length(20_000, 5_000_000) as u32 {
+    for tick in 0..specgen_tests::length(60_000, 5_000_000) as u32 {
         if tick % STRETCH == 0 {
             let mut words = draw.settings(&ir.permitted);
             if draw.below(3) == 0 {
