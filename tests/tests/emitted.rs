@@ -132,14 +132,15 @@ fn every_example_spec_builds_without_a_warning_and_without_a_panic_path() {
     for (index, spec) in specs().into_iter().enumerate() {
         let name = format!("example-{}", spec.replace(['/', '.'], "-"));
         // Every second links, in the soak all. Most options are in the controllers of other tests, too.
-        if specgen_tests::length(index % 2 == 0, true) {
-            let _ = Emitted::new(&name, &spec, &[]).library();
+        if specgen_tests::length(index % 2 != 0, false) {
+            continue;
         }
+        let emitted = Emitted::new(&name, &spec, &[]);
+        let _ = emitted.library();
         // Warnings of every fourth, in the soak of all: what is emitted differs little.
         if specgen_tests::length(index % 4 != 0, false) {
             continue;
         }
-        let emitted = Emitted::new(&name, &spec, &[]);
         // The other packages are copied: the same in every output.
         let packages: &[&str] = if index == 0 { &["--workspace"] } else { &["--package", "controller"] };
         let built = Command::new(env!("CARGO"))

@@ -2,7 +2,7 @@
 //! smallest set that reaches all that was ever reached.
 
 #[path = "../fuzz/targets/mod.rs"]
-mod targets;
+pub mod targets;
 
 use std::fs;
 

@@ -7,6 +7,7 @@
 
 use std::fs;
 
+use crate::fuzz_corpus::targets;
 use crate::support::specs::{every_key, folder_with_records, root, source, spec_files};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
@@ -164,15 +165,9 @@ impl Mutator {
 }
 
 fn assert_sound(finding: &Diagnostic, text: &str) {
-    assert!(!finding.message.is_empty() && !finding.help.is_empty(), "{finding:?}");
-    assert!(codes::find(finding.code).is_some(), "{finding:?}");
-    match &finding.place {
-        Place::Spec(span) => {
-            assert!(span.start <= span.end && span.end <= text.len(), "{finding:?} in {} bytes", text.len());
-            assert!(text.is_char_boundary(span.start) && text.is_char_boundary(span.end), "{finding:?}");
-        }
-        Place::Whole => assert_eq!(finding.code, codes::TRUNCATED),
-        Place::File { .. } => panic!("loading reads no other file: {finding:?}"),
+    targets::assert_sound(finding, text);
+    if matches!(finding.place, Place::Whole) {
+        assert_eq!(finding.code, codes::TRUNCATED);
     }
 }
 

@@ -42,7 +42,7 @@ fn shown(findings: &[Diagnostic], source: &SpecSource) {
 }
 
 /// A finding about a spec has a known code, words, and a place within its text.
-fn assert_sound(finding: &Diagnostic, text: &str) {
+pub fn assert_sound(finding: &Diagnostic, text: &str) {
     assert!(!finding.message.is_empty() && !finding.help.is_empty(), "{finding:?}");
     assert!(codes::find(finding.code).is_some(), "{finding:?}");
     match &finding.place {
