@@ -7,9 +7,8 @@ use crate::identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
 use specgen::identify::regressor::{Plane, evaluate};
-use specgen::identify::{
-    DeadTime, Identified, Options, Record, Source, Staircase, choose_grid, draw, identify, validate,
-};
+use specgen::identify::{DeadTime, Identified, Options, Record, Source, Staircase, choose_grid, identify, validate};
+use specgen::report::identification;
 
 const RANGE: [f64; 2] = [0.0, 100.0];
 const RATE: f64 = 1000.0;
@@ -215,7 +214,7 @@ fn the_part_of_the_plane_that_no_curve_enters_is_given_as_regions_and_drawn_hatc
         let (truth, fitted) = (table.node(up, 0), found.table.node(up, 0));
         assert!((truth - fitted).abs() < 1e-3 * table.node(16, 0), "{up}: {truth:e} {fitted:e}");
     }
-    let svg = draw::everett(&found, None, None);
+    let svg = identification::everett(&found, None, None);
     assert_eq!(svg.matches("url(#hatch)").count(), region.cells + 1, "each cell, and the legend");
 }
 

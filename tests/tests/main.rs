@@ -9,6 +9,7 @@ mod dynamics;
 mod emitted;
 mod features;
 mod figures;
+mod floors;
 mod fuzz_corpus;
 mod identify_bad_input;
 mod identify_faults;

@@ -216,7 +216,7 @@ impl Job<'_> {
             command.env(SOAK, "1");
         }
         if mode.tools_missing {
-            command.env(specgen::target::ALLOW_MISSING, "1");
+            command.env(specgen_toolchain::ALLOW_MISSING, "1");
         }
         match command.output() {
             Ok(output) => {
@@ -252,7 +252,7 @@ mod tests {
         let mut seen = 0;
         for folder in [
             "tests/tests",
-            "codegen/tests",
+            "codegen/cli/tests",
             "host-sim/oracle/tests/all",
             "firmware/runtime/tests/all",
             "firmware/link/tests/all",

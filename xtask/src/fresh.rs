@@ -11,7 +11,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use root::{Caller, Root};
-use specgen::interrupt;
+use specgen_language::interrupt;
 
 /// The README's main job.
 const MAIN_JOB: &str = "cargo run --release -- specs/reference.toml -o out/reference --setup";

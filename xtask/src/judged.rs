@@ -73,7 +73,7 @@ impl Trial {
             judged.extend(format!("{} {}\n", file.display(), content.len()).into_bytes());
             judged.extend(content);
         }
-        Ok(specgen::workspace::sha256(&judged))
+        Ok(specgen_toolchain::sha256(&judged))
     }
 }
 

@@ -1,7 +1,7 @@
 //! What has to be on the machine before anything can be tested.
 
 use crate::run::Outcome;
-use specgen::target;
+use specgen_toolchain as target;
 use std::process::{Command, Stdio};
 
 /// The cross compiler and QEMU, installed if need be.

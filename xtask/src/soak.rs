@@ -47,7 +47,7 @@ fn text(ran: &Ran, took: Duration, commit: &str, changed: bool, date: &str) -> S
         ran.tests.len(),
         ran.skipped.len(),
         took.as_secs_f64() / 60.0,
-        specgen::workspace::sha256(results.as_bytes()),
+        specgen_toolchain::sha256(results.as_bytes()),
     )
 }
 

@@ -38,9 +38,16 @@ const SHARED_MEMORY: Trial = Trial { manifest: LOOM, judges: &[("firmware/rt/src
 /// Time that the soak gives each target of the fuzzer, s.
 const FUZZING: u32 = 300;
 /// Members of the workspace that people write.
-const HAND_WRITTEN: [&str; 11] = [
+const HAND_WRITTEN: [&str; 18] = [
     "specgen",
     "specgen-numerics",
+    "specgen-language",
+    "specgen-identify",
+    "specgen-toolchain",
+    "specgen-compiler",
+    "specgen-studies",
+    "specgen-operate",
+    "specgen-report",
     "specgen-runtime",
     "specgen-hal",
     "specgen-link",
@@ -117,7 +124,9 @@ fn checked(root: &Path) -> Outcome {
     let kernels = ["runtime", "link", "hal", "board", "rt"].map(|name| format!("--package=specgen-{name}"));
     let kernels: Vec<&str> = kernels.iter().map(String::as_str).chain(["--package=host-sim"]).collect();
     let readers = ["--package=specgen-tests", "--", "spec_", "fuzz_", "identify_bad_input"];
-    for scope in [&kernels[..], &["--package=specgen", "--lib"], &readers] {
+    let compiler = ["language", "identify", "compiler", "studies"].map(|name| format!("--package=specgen-{name}"));
+    let compiler: Vec<&str> = compiler.iter().map(String::as_str).chain(["--lib"]).collect();
+    for scope in [&kernels[..], &compiler, &readers] {
         let test = [&["test", "--profile=checked", "--locked", "--quiet"], scope].concat();
         let outcome = expect_success(cargo(root, &test), "see the test above");
         if !matches!(outcome, Outcome::Passed) {

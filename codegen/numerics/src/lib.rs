@@ -6,6 +6,7 @@
 //! | [`Matrix`], [`Matrix6`] | dense matrices, eigenvalues, modes of mass and stiffness, exponential |
 //! | [`Double`] | numbers of 106 bits: the reference for rounding errors |
 //! | [`Traced`] | numbers that record every operation: bounds of rounding errors over a box of poses |
+//! | [`ewma_limit`], [`pcc_limit`] | Jury limits of the run-to-run laws |
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
 //! | [`Kernels`], [`displacements`], [`jacobian`] | the controller's kernels on these numbers, compiled here |
 //!
@@ -15,6 +16,7 @@ mod double;
 mod eigenvalues;
 mod exponential;
 mod form;
+mod jury;
 mod kernels;
 mod matrix;
 pub mod nnls;
@@ -25,6 +27,7 @@ pub use double::Double;
 pub use eigenvalues::{eigenvalues, spectral_radius};
 pub use exponential::exponential;
 pub use form::magnitude;
+pub use jury::{ewma_limit, pcc_limit};
 pub use kernels::{Kernels, displacements, jacobian};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
 pub use symmetric::{generalized_modes, inverse_of_modes, symmetric_eigen};

@@ -6,7 +6,7 @@
 
 use cortex_m_semihosting::{nr, syscall};
 
-/// Why the run ended: the emulator's exit status. `codegen/src/target/emulator.rs` of specgen has the words.
+/// Why the run ended: the emulator's exit status. `codegen/toolchain/src/emulator.rs` of specgen has the words.
 #[derive(Clone, Copy)]
 pub enum Exit {
     /// 0: all ticks ran and all files are written.

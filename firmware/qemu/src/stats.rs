@@ -1,5 +1,5 @@
 //! `stats.bin`: what was measured, as little-endian 64-bit words. This table is the format's only
-//! description; `codegen/src/target/replay.rs` of specgen reads it and refuses another version.
+//! description; `codegen/toolchain/src/replay.rs` of specgen reads it and refuses another version.
 //!
 //! | word | meaning |
 //! | --- | --- |

@@ -6,8 +6,8 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use specgen::interrupt::{self, Scratch};
-use specgen::target::{TRIPLE, find_program};
+use specgen_language::interrupt::{self, Scratch};
+use specgen_toolchain::{TRIPLE, find_program};
 
 /// What Rust itself needs to link programs.
 const C_LINKER: [&str; 2] = ["gcc", "libc6-dev"];

@@ -4,8 +4,9 @@ use super::{Files, trace};
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
-use specgen::compile::{Compiled, compile};
-use specgen::{diagnostic, emit, settings, spec, workspace};
+use specgen_compiler::compile::{Compiled, compile};
+use specgen_compiler::{emit, settings, workspace};
+use specgen_language::{diagnostic, spec};
 use std::path::Path;
 
 /// Seed of the gauge noise in the committed records.

@@ -1,0 +1,199 @@
+//! The command line: arguments in, text or JSON out, exit code.
+//!
+//! Exit codes: 0 good, 1 the spec, a record or a budget fails, 2 usage, 3 environment (a missing tool, a full disk),
+//! 130 ended by Ctrl-C, with the best so far where a part of the work is a result.
+
+mod build;
+mod cache;
+mod check;
+mod completions;
+mod doctor;
+mod dynamics;
+mod examples;
+mod file;
+mod firmware;
+mod identify;
+mod identify_rate;
+mod operate;
+mod pil;
+mod plant;
+mod replay;
+mod report;
+mod reproduce;
+mod robust;
+mod sim;
+mod tune;
+mod ui;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::error::{ContextKind, ErrorKind};
+use clap::{Args, CommandFactory, Parser, Subcommand};
+
+use specgen_language::interrupt;
+use specgen_toolchain as target;
+use ui::{Failure, Ui};
+
+/// Compiles one description of a piezo-driven Stewart platform into a `no_std` Rust controller.
+#[derive(Parser, Debug)]
+#[command(
+    version,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    max_term_width = 120,
+    override_usage = "specgen [OPTIONS] <SPEC>\n       specgen <COMMAND>",
+    after_help = examples::MAIN
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    build: build::Arguments,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Options of every command.
+#[derive(Args, Debug, Clone, Copy)]
+struct Common {
+    /// Print the result as JSON on standard output.
+    #[arg(long, global = true)]
+    json: bool,
+    /// Build anew: take no build that was kept, and keep none.
+    #[arg(long, global = true)]
+    no_cache: bool,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Report every finding about a spec; write nothing.
+    Check(check::Arguments),
+    /// Build for one target, check the image, hold it against the budget.
+    Build(firmware::Arguments),
+    /// Say who takes the memory of an image, and what its tick reaches.
+    Size(firmware::SizeArguments),
+    /// Build, check, and write the image to a board by probe-rs.
+    Flash(firmware::FlashArguments),
+    /// Run the paper's experiments with the emitted controller against a simulated machine.
+    Sim(sim::Arguments),
+    /// Tune gains and weights on the simulated loop with the emitted controller.
+    Tune(tune::Arguments),
+    /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
+    Robust(robust::Arguments),
+    /// Write one HTML file about a spec: the paper's figures from the emitted controller, error budget, margins, findings.
+    Report(report::Arguments),
+    /// Run the paper's whole list of experiments, from specs in the binary: ours beside the paper's, with remarks.
+    Reproduce(reproduce::Arguments),
+    /// Close the loop of a simulated machine with the program of a microcontroller, emulated or at a serial port.
+    Pil(pil::Arguments),
+    /// Operate a machine over the link: arm, run, set-points, settings, waves, records; from a script or line by line.
+    Operate(operate::Arguments),
+    /// Run a record of a target again on the host and compare every tick by bits; export it as CSV.
+    Replay(replay::Arguments),
+    /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
+    Dynamics(dynamics::Arguments),
+    /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
+    Identify(identify::Arguments),
+    /// Simulate the reversal-curve experiment that `identify` needs, on the reference leg or another.
+    Forc(sim::ForcArguments),
+    /// Serve the simulated machine of a spec to a real-time controller on this computer.
+    Plant(plant::Arguments),
+    /// Measure how well this computer keeps time, and say what to change for real time.
+    Doctor(doctor::Arguments),
+    /// Print the intermediate representation of a spec: every constant of its controller.
+    #[command(after_help = examples::DUMP_IR)]
+    DumpIr {
+        /// The spec file.
+        spec: PathBuf,
+    },
+    /// Show how much of what was built is kept, or remove it.
+    Cache(cache::Arguments),
+    /// Print a script that completes commands, options and files in a shell.
+    Completions(completions::Arguments),
+}
+
+/// The command line as clap sees it: commands, options and their help.
+#[must_use]
+pub fn command() -> clap::Command {
+    Cli::command()
+}
+
+/// Runs the command that the process was started with.
+#[must_use]
+pub fn run() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return refuse_arguments(error),
+    };
+    let mut ui = Ui::new(cli.common.json);
+    interrupt::catch(move || Ui::new(cli.common.json).failed(&Failure::ended_early()));
+    if cli.common.no_cache {
+        target::cache::switch_off();
+    }
+    let done = match &cli.command {
+        None => build::run(&cli.build, &mut ui),
+        Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
+        Some(Command::Build(arguments)) => firmware::run(arguments, &mut ui),
+        Some(Command::Size(arguments)) => firmware::run_size(arguments, &mut ui),
+        Some(Command::Flash(arguments)) => firmware::run_flash(arguments, &mut ui),
+        Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
+        Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
+        Some(Command::Robust(arguments)) => robust::run(arguments, &mut ui),
+        Some(Command::Report(arguments)) => report::run(arguments, &mut ui),
+        Some(Command::Reproduce(arguments)) => reproduce::run(arguments, &mut ui),
+        Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
+        Some(Command::Operate(arguments)) => operate::run(arguments, &mut ui),
+        Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
+        Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
+        Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
+        Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
+        Some(Command::Plant(arguments)) => plant::run(arguments, &mut ui),
+        Some(Command::Doctor(arguments)) => doctor::run(arguments, &mut ui),
+        Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),
+        Some(Command::Cache(arguments)) => cache::run(arguments, &ui),
+        Some(Command::Completions(arguments)) => {
+            completions::run(arguments, command(), &ui);
+            Ok(())
+        }
+    };
+    if done.is_err() {
+        interrupt::settle();
+    }
+    // What is said from here on is the last word.
+    interrupt::heed();
+    if let Some(trouble) = target::cache::trouble() {
+        ui.progress(&format!("warning: {trouble}"));
+    }
+    let code = done.map_or_else(|failure| ui.failed(&failure), |()| 0);
+    ExitCode::from(ui.not_all_out().unwrap_or(code))
+}
+
+/// Help and version, or why the arguments make no sense.
+fn refuse_arguments(error: clap::Error) -> ExitCode {
+    let error = match error.kind() {
+        // `specgen chek platform.toml`: clap would speak of a subcommand `platform.toml`.
+        ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => {
+            let mut command = command();
+            let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+            let message =
+                format!("one spec file is expected, or a command ({}) with its own arguments", names.join(", "));
+            command.error(ErrorKind::ArgumentConflict, message)
+        }
+        _ => error,
+    };
+    // Nothing was parsed, so the arguments are asked themselves.
+    if error.use_stderr() && std::env::args_os().any(|argument| argument == "--json") {
+        let text = error.render().to_string();
+        let message = text.trim().trim_start_matches("error: ").to_owned();
+        return ExitCode::from(Ui::new(true).failed(&Failure::Usage(message)));
+    }
+    error.exit()
+}
+
+fn dump_ir(spec: &std::path::Path, ui: &mut Ui) -> Result<(), Failure> {
+    let compiled = specgen_compiler::compile::compile(spec)?;
+    ui.findings(Some(&compiled.source), &compiled.findings);
+    ui.result(&specgen_compiler::workspace::ir_text(&compiled.ir), serde_json::json!(compiled.ir));
+    Ok(())
+}

@@ -1,0 +1,270 @@
+//! The main job: spec to a workspace, built and checked, and measured where the tools for it are there.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::controller::{Controller, TickController};
+use serde::Serialize;
+use serde_json::json;
+
+use super::check::describe;
+use super::ui::{Failure, Ui};
+use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::workspace;
+use specgen_studies::verify::{self, Inspection, Measurement};
+use specgen_toolchain as target;
+use specgen_toolchain::budget::{self, group};
+
+/// Ticks of the exercise that is run on host and emulated machine.
+pub(super) const TICKS: u32 = 20_000;
+
+/// Arguments of the main job.
+#[derive(Args, Debug)]
+pub struct Arguments {
+    /// The spec file.
+    #[arg(required = true)]
+    spec: Option<PathBuf>,
+    /// Output folder; `<name>-controller` if not given. Must be new, empty, or an unchanged earlier output.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Write the source only.
+    #[arg(long)]
+    no_build: bool,
+    /// First bring what is missing for the microcontroller (cross compiler, emulator): by rustup or apt, else into the user's
+    /// cache. Where that fails, the job goes on without.
+    #[arg(long, conflicts_with = "no_build")]
+    setup: bool,
+    /// Exit with code 3 where what needs a missing cross compiler or emulator is left out.
+    #[arg(long, conflicts_with = "no_build")]
+    require_target: bool,
+}
+
+/// What was made.
+#[derive(Debug, Serialize)]
+struct Summary {
+    name: String,
+    digest: String,
+    output: String,
+    files: usize,
+    tables: usize,
+    table_bytes: usize,
+    host_library: Option<String>,
+    measurement: Option<Measurement>,
+    /// What the image shows without being run, where it could not be.
+    image: Option<Inspection>,
+    /// What was left out, why, and what brings it.
+    missing: Option<String>,
+    over_budget: Vec<String>,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let Some(spec) = &arguments.spec else {
+        // clap demands it unless there is a subcommand.
+        return Err(Failure::Usage("name a spec file".to_owned()));
+    };
+    let set_up = if arguments.setup { target::provision::provision(&mut |step| ui.progress(step)).err() } else { None };
+    if let Some(error) = &set_up {
+        ui.progress(&format!("{error}; going on without"));
+    }
+    let compiled = compile::compile(spec)?;
+    ui.findings(Some(&compiled.source), &compiled.findings);
+    let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
+    let _hold = workspace::write(&output, &compiled.files)?;
+    ui.progress(&format!("wrote {} files to {}", compiled.files.len(), output.display()));
+
+    let mut summary = Summary::of(&compiled, &output);
+    // What was written is whole, whatever follows.
+    let built = if arguments.no_build {
+        summary.missing = Some("not built: --no-build".to_owned());
+        Ok(())
+    } else {
+        build(&compiled, &output, &mut summary, ui)
+    };
+    let refused = match built {
+        Ok(()) => None,
+        Err(Failure::Target(error)) if error.is_of_a_tool() => {
+            // Set-up knows more of the same tool: what was tried.
+            let missing = format!("left out: {}: {}", summary.undone(), set_up.unwrap_or(error));
+            summary.missing = Some(missing.clone());
+            arguments.require_target.then_some(missing)
+        }
+        Err(Failure::Target(error)) => Some(error.to_string()),
+        Err(failure) => return Err(failure),
+    };
+    summary.over_budget = over_budget(&compiled, &summary);
+    let text = summary.text(&compiled);
+    let failure = match (summary.verdict(), refused) {
+        (Some(message), _) => Failure::Judged { message, result: json!(summary) },
+        (None, Some(message)) => Failure::Incomplete { message, result: json!(summary) },
+        (None, None) => {
+            ui.result(&text, json!(summary));
+            return Ok(());
+        }
+    };
+    if !ui.is_json() {
+        ui.out(&text);
+    }
+    Err(failure)
+}
+
+/// Host library, image, and the exercise on both.
+fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> Result<(), Failure> {
+    let target_dir = output.join("target");
+    ui.progress("building the host library");
+    let library = target::host::build_library(output, &target_dir)?;
+    summary.host_library = Some(library.display().to_string());
+    let sim = |error: host_sim::controller::ControllerError| Failure::Environment(error.to_string());
+    let mut controller = Controller::load(&library).map_err(sim)?;
+    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS)
+        .map_err(|error| Failure::Environment(error.to_string()))?;
+
+    let toolchain = target::toolchain::find()?;
+    let mcu = compiled.model.target.mcu;
+    ui.progress(&format!("building and measuring for {}", mcu.part().machine));
+    let image = target::build::build_image_with(&toolchain, output, mcu, &target_dir)?;
+    match verify::measure(&image, &controller.default_config(), &host) {
+        Ok(measurement) => summary.measurement = Some(measurement),
+        Err(error) => {
+            summary.image = Some(verify::inspect(&image)?);
+            return Err(error.into());
+        }
+    }
+    Ok(())
+}
+
+impl Summary {
+    fn of(compiled: &Compiled, output: &Path) -> Self {
+        let hysteresis = &compiled.ir.hysteresis;
+        let nodes: usize = hysteresis.tables.iter().map(Vec::len).sum();
+        Self {
+            name: compiled.ir.name.clone(),
+            digest: compiled.ir.digest.clone(),
+            output: output.display().to_string(),
+            files: compiled.files.len(),
+            tables: hysteresis.tables.len(),
+            table_bytes: nodes * compiled.ir.scalar.bits() as usize / 8,
+            host_library: None,
+            measurement: None,
+            image: None,
+            missing: None,
+            over_budget: Vec::new(),
+        }
+    }
+
+    /// What a missing tool leaves out.
+    fn undone(&self) -> &'static str {
+        match (&self.host_library, &self.image) {
+            (None, _) => "building",
+            (_, None) => "the image for the microcontroller (memory, stack, instructions, comparison of bits)",
+            (_, Some(_)) => "running the image (instructions, stack seen, comparison of bits)",
+        }
+    }
+
+    /// Why what was made must not be used, if so.
+    fn verdict(&self) -> Option<String> {
+        if let Some(difference) = self.measurement.as_ref().and_then(|m| m.first_difference.as_ref()) {
+            return Some(format!(
+                "the emulated machine computes other bits than the host: {difference}; report this as a defect of specgen with the spec"
+            ));
+        }
+        (!self.over_budget.is_empty()).then(|| format!("over budget: {}", self.over_budget.join("; ")))
+    }
+
+    fn text(&self, compiled: &Compiled) -> String {
+        let mut out = String::new();
+        let target = &compiled.model.target;
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            out,
+            "{} → {} (f{}, digest {})",
+            self.name,
+            self.output,
+            compiled.ir.scalar.bits(),
+            &self.digest[..16]
+        );
+        out.push_str(&describe(compiled));
+        let _ = writeln!(
+            out,
+            "  tables: {} Everett table{} of N = {}, {} bytes",
+            self.tables,
+            if self.tables == 1 { "" } else { "s" },
+            compiled.ir.hysteresis.grid,
+            group(self.table_bytes as u64)
+        );
+        if let Some(library) = &self.host_library {
+            let _ = writeln!(out, "  host library: {library} (links only without a panic path)");
+        }
+        let of = |budget: Option<u64>| budget.map_or(String::new(), |b| format!(" of {}", group(b)));
+        let bound = |bytes: Option<u64>| {
+            bytes.map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(target.stack)))
+        };
+        let flash = |out: &mut String, [all, code, constants, tick]: [u64; 4]| {
+            let _ = writeln!(
+                out,
+                "    flash         {}{} bytes: {} code, {} constants; a tick reaches {} bytes of code",
+                group(all),
+                of(target.flash),
+                group(code),
+                group(constants),
+                group(tick)
+            );
+        };
+        if let Some(i) = &self.image {
+            let _ = writeln!(out, "  {} ({}), not run:", i.machine, i.compiler);
+            flash(&mut out, [i.flash, i.code, i.constants, i.tick_code]);
+            let _ = writeln!(out, "    RAM           {}{} bytes static, without State", group(i.ram), of(target.ram));
+            let _ = writeln!(out, "    stack a tick  {} (static)", bound(i.stack_bound));
+        }
+        if let Some(m) = &self.measurement {
+            let _ = writeln!(out, "  {} ({}):", m.machine, m.compiler);
+            flash(&mut out, [m.flash, m.code, m.constants, m.tick_code]);
+            let _ = writeln!(
+                out,
+                "    RAM           {}{} bytes, of which State {}",
+                group(m.ram),
+                of(target.ram),
+                group(m.state)
+            );
+            let _ =
+                writeln!(out, "    stack a tick  {} (static), {} seen", bound(m.stack_bound), group(m.stack_painted));
+            for stage in &m.stages {
+                let budget = if stage.name == "step" { of(target.instructions) } else { String::new() };
+                let _ = writeln!(
+                    out,
+                    "    {:<13} {}{budget} instructions mean, {} to {} ({} calls)",
+                    stage.name,
+                    group(stage.mean.round() as u64),
+                    group(stage.min),
+                    group(stage.max),
+                    group(stage.calls)
+                );
+            }
+            match &m.first_difference {
+                None => {
+                    let _ =
+                        writeln!(out, "    host and {} agree in every bit over {} ticks", m.machine, group(m.ticks));
+                }
+                Some(difference) => {
+                    let _ = writeln!(out, "    host and {} DIFFER: {difference}", m.machine);
+                }
+            }
+        }
+        if let Some(missing) = &self.missing {
+            let _ = writeln!(out, "  {missing}");
+        }
+        out
+    }
+}
+
+/// What exceeds the spec's `[target.budget]` or the part, and what the image must not do, in words.
+fn over_budget(compiled: &Compiled, summary: &Summary) -> Vec<String> {
+    let (used, checks) = match (&summary.measurement, &summary.image) {
+        (Some(m), _) => (&m.used, &m.checks),
+        (None, Some(i)) => (&i.used, &i.checks),
+        (None, None) => return Vec::new(),
+    };
+    let mut over = budget::over(&compiled.model.target, used);
+    over.extend(checks.faults.iter().map(|fault| fault.text.clone()));
+    over
+}

@@ -1,0 +1,99 @@
+//! `specgen check`: every finding about a spec, nothing written.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::ui::{Failure, Ui};
+use crate::{lint, precision, reach, stability};
+use specgen_compiler::compile::{self, Compiled, Refused};
+use specgen_compiler::lower::setpoint;
+
+/// Arguments of `check`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::CHECK)]
+pub struct Arguments {
+    /// The spec file.
+    spec: PathBuf,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let compiled = compile::compile(&arguments.spec)?;
+    let precision = precision::of(&compiled.model, &compiled.ir)
+        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
+    let mut findings = compiled.findings.clone();
+    findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
+    findings.extend(lint::estimated(&compiled.model));
+    findings.extend(compiled.reach.iter().flat_map(|reach| reach::notes(&compiled.model, reach)));
+    ui.findings(Some(&compiled.source), &findings);
+    let text = format!(
+        "{} is good\n{}{}",
+        compiled.source.display_name,
+        describe(&compiled),
+        precision::describe(&precision, compiled.ir.scalar)
+    );
+    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "reach": compiled.reach, "pose_noise": compiled.pose_noise, "records": compiled.records, "trajectories": compiled.demands, "stops": compiled.stops, "precision": precision, "precision_ratio": {
+        "legs": precision.legs.ratio(),
+        "commanded": precision.commanded.ratio(),
+        "measured": precision.measured.map(|figures| figures.ratio()),
+    } }));
+    Ok(())
+}
+
+/// What identification and the stability check found, a line each.
+pub fn describe(compiled: &Compiled) -> String {
+    let mut text = String::new();
+    for (name, report) in compiled.model.hysteresis.records.iter().zip(&compiled.records) {
+        let what = report.as_ref().map_or_else(|| "a table, taken as it is".to_owned(), super::identify::summary);
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "  record {name}: {what}");
+    }
+    if let Some(margins) = &compiled.margins
+        && let (Some(limit), Some(largest)) = (margins.static_gain_limit, margins.largest_level_weight)
+    {
+        let _ = writeln!(
+            text,
+            "  adaptation: λ < {limit:.3} without leg dynamics; sampled leg has spectral radius {:.4}; \
+             stable up to level weight {largest:.4} (here {})",
+            margins.spectral_radius, compiled.model.adaptation.level_weight
+        );
+    }
+    if let Some(design) = &compiled.design {
+        text.push_str(&stability::platform::describe(design));
+    }
+    if let Some(reach) = &compiled.reach {
+        text.push_str(&reach::describe(reach, compiled.design.is_some()));
+    }
+    for demand in &compiled.demands {
+        let current = demand.current.map_or_else(String::new, |amperes| format!(", {:.3} A", amperes));
+        let _ = writeln!(
+            text,
+            "  trajectory {}: legs at up to {:.1} um/s, which takes {:.3} of {:.3} V/ms{current}; inertia bends them by {:.2} nm",
+            demand.name,
+            demand.leg_speed * 1e6,
+            demand.slew * 1e-3,
+            compiled.model.actuator.slew_rate * 1e-3,
+            demand.deflection * 1e9
+        );
+    }
+    if !compiled.stops.is_empty() {
+        text.push_str(&setpoint::describe_stops(&compiled.stops));
+    }
+    if let (Some(noise), Some(task)) = (&compiled.pose_noise, &compiled.ir.task_space) {
+        let list = |values: &[f64]| values.iter().map(|v| format!("{:.1}", v * 1e9)).collect::<Vec<_>>().join("/");
+        let _ = writeln!(
+            text,
+            "  gauges: {:.2} nm rms each with quantisation; pose {} nm and {} nrad rms; legs {} nm rms; found in {} passes to {:.1e} m, {:.1e} rad",
+            noise.reading * 1e9,
+            list(&noise.pose[..3]),
+            list(&noise.pose[3..]),
+            list(&noise.leg),
+            task.sensing.passes,
+            task.sensing.remainder[0],
+            task.sensing.remainder[1]
+        );
+    }
+    text
+}

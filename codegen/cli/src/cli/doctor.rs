@@ -1,0 +1,151 @@
+//! `specgen doctor`: whether this computer can run a controller in real time, and what to change.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+use specgen_rt::histogram::time_text;
+
+use super::sim::environment;
+use super::ui::{Failure, Ui};
+use specgen_compiler::compile;
+use specgen_operate::doctor::latency::{self, Measured};
+use specgen_operate::doctor::{Files, Finding, Grade, equipment, system};
+
+/// Period of the measurement without a spec, ns: 10 kHz.
+const PERIOD: u64 = 100_000;
+
+/// Arguments of `doctor`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::DOCTOR)]
+pub struct Arguments {
+    /// A spec, whose period the computer is judged by; 100 µs without one.
+    spec: Option<PathBuf>,
+    /// How long wake-ups are measured, s.
+    #[arg(long, value_name = "S", default_value_t = 3.0, value_parser = seconds, allow_negative_numbers = true)]
+    seconds: f64,
+    /// Measure on this processor.
+    #[arg(long, value_name = "N")]
+    cpu: Option<usize>,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let expected = || format!("expected a time from 0.1 to 86400 s, found `{text}`");
+    text.parse().ok().filter(|time| (0.1..=86_400.0).contains(time)).ok_or_else(expected)
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let mut period = PERIOD;
+    if let Some(spec) = &arguments.spec {
+        let compiled = compile::compile(spec)?;
+        ui.findings_in_brief(&compiled.source, &compiled.findings);
+        period = (compiled.model.timing.period * 1e9) as u64;
+    }
+    ui.progress(&format!("measuring wake-ups every {} for {} s", time_text(period), arguments.seconds));
+    let measured = latency::measure(period, arguments.seconds, arguments.cpu).map_err(environment)?;
+
+    let files = Files::of_this_computer();
+    let mut findings = system::findings(&files);
+    findings.push(system::timer());
+    findings.extend(system::rights(measured.priority.as_ref().copied(), measured.memory.as_ref().copied()));
+    findings.push(management(&measured));
+    findings.extend(equipment::devices(&files));
+    findings.extend(equipment::tools());
+
+    let (grade, verdict) = judge(&measured, period);
+    let mut text = String::new();
+    for finding in &findings {
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(text, "{} {:<17} {}", mark(finding.grade), finding.subject, finding.found);
+        if let Some(mend) = &finding.mend {
+            let _ = writeln!(text, "{:27}→ {mend}", "");
+        }
+    }
+    let _ = writeln!(text, "wake-ups, from the planned time to running");
+    let quantiles = [(0.5, "median"), (0.99, "99 %"), (0.999, "99.9 %")];
+    let shares = quantiles.map(|(share, name)| format!("{name} {}", time_text(measured.delays.quantile(share))));
+    let _ = writeln!(text, "  {}, longest {}", shares.join(", "), time_text(measured.delays.largest()));
+    text += &measured.delays.to_text();
+    let _ = writeln!(text, "{} {verdict}", mark(grade));
+
+    let value = json!({
+        "period_ns": period,
+        "findings": findings,
+        "latency": measured.figures(),
+        "processors_kept_awake": measured.awake,
+        "preempted": measured.preempted,
+        "verdict": { "grade": grade, "text": verdict },
+    });
+    // Without a spec nothing is asked for that could be refused.
+    if grade == Grade::Bad && arguments.spec.is_some() {
+        if !ui.is_json() {
+            ui.out(&text);
+        }
+        return Err(Failure::Judged { message: verdict, result: value });
+    }
+    ui.result(&text, value);
+    Ok(())
+}
+
+fn management(measured: &Measured) -> Finding {
+    let subject = "firmware";
+    match measured.management_interrupts {
+        Some(0) => Finding {
+            subject,
+            grade: Grade::Good,
+            found: "no system management interrupts meanwhile".to_owned(),
+            mend: None,
+        },
+        Some(count) => Finding {
+            subject,
+            grade: Grade::Warning,
+            found: format!("{count} system management interrupts meanwhile"),
+            mend: Some(
+                "switch USB legacy support, sensors and power management off in the firmware's set-up".to_owned(),
+            ),
+        },
+        None => Finding {
+            subject,
+            grade: Grade::Unknown,
+            found: "system management interrupts are not counted here".to_owned(),
+            mend: Some(
+                "`modprobe msr` as root on an Intel processor, then again; `hwlatdetect` finds what is left".to_owned(),
+            ),
+        },
+    }
+}
+
+/// What the measurement means for a loop of this period.
+fn judge(measured: &Measured, period: u64) -> (Grade, String) {
+    let longest = measured.delays.largest();
+    let hertz = 1e9 / period as f64;
+    let within = format!("{} of {} periods of {}", measured.skipped, measured.planned, time_text(period));
+    if measured.skipped > 0 {
+        let share = measured.skipped as f64 / measured.planned as f64;
+        return (
+            Grade::Bad,
+            format!("{hertz:.0} Hz: {within} were slept through ({:.2} %): ticks would be missed", share * 100.0),
+        );
+    }
+    if longest * 2 > period {
+        let longest = time_text(longest);
+        return (
+            Grade::Warning,
+            format!("{hertz:.0} Hz: no period was missed, but the longest delay of {longest} makes outputs late"),
+        );
+    }
+    (
+        Grade::Good,
+        format!("{hertz:.0} Hz: every wake-up within half a period, the longest after {}", time_text(longest)),
+    )
+}
+
+fn mark(grade: Grade) -> &'static str {
+    match grade {
+        Grade::Good => "good   ",
+        Grade::Unknown => "unknown",
+        Grade::Warning => "warning",
+        Grade::Bad => "bad    ",
+    }
+}

@@ -1,0 +1,223 @@
+//! `specgen dynamics`: M, C ḣ, G, J and leg forces of a platform at given states, by the model that its controller uses.
+
+use std::f64::consts::FRAC_PI_4;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::controller::{Controller, Dynamics};
+use nalgebra::{Rotation3, Vector3};
+use serde_json::{Value, json};
+use specgen_runtime::Motion;
+
+use super::file::write_file;
+use super::ui::{Failure, Ui};
+use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::lower;
+use specgen_compiler::workspace;
+use specgen_language::interrupt::Scratch;
+use specgen_language::model::Model;
+use specgen_toolchain as target;
+
+/// Leg lengths over those at rest.
+const LENGTH_RATIOS: std::ops::RangeInclusive<f64> = 0.7..=1.3;
+/// Longest file of states, bytes.
+const LARGEST: u64 = 64 << 20;
+
+/// Arguments of `dynamics`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::DYNAMICS)]
+pub struct Arguments {
+    /// The spec file.
+    spec: PathBuf,
+    /// States: JSON (a list, or an object with a list `vectors`, of objects with `h`, `hd`, `hdd`), or CSV with 18 columns (pose,
+    /// rate, acceleration). m, rad, s.
+    #[arg(long, value_name = "FILE")]
+    states: PathBuf,
+    /// Poses are from rest; without it their z counts from the base frame.
+    #[arg(long)]
+    from_rest: bool,
+    /// Compute with the emitted controller, built for this host, instead of with its model at full precision.
+    #[arg(long)]
+    generated: bool,
+    /// Write the result (JSON) here instead of printing it.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// A state as given, with its name.
+struct State {
+    id: String,
+    given: [[f64; 6]; 3],
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let states = read_states(&arguments.states)?;
+    let compiled = compile::compile(&arguments.spec)?;
+    ui.findings(Some(&compiled.source), &compiled.findings);
+    let platform = lower::platform(&compiled.model)
+        .map_err(|findings| compile::Refused { source: Some(compiled.source.clone()), findings })?;
+    let generated = if arguments.generated { Some(Generated::build(&compiled, ui)?) } else { None };
+    let height = if arguments.from_rest { 0.0 } else { compiled.model.geometry.height };
+    let mut vectors = Vec::with_capacity(states.len());
+    for state in &states {
+        let [mut pose, rate, acceleration] = state.given;
+        pose[2] -= height;
+        within_range(&compiled.model, &pose)
+            .map_err(|text| Failure::Gate(format!("{}: state {}: {text}", arguments.states.display(), state.id)))?;
+        let result = match &generated {
+            Some(generated) => generated
+                .controller
+                .dynamics(&pose, &rate, &acceleration)
+                .map_err(|error| Failure::Environment(error.to_string()))?,
+            None => {
+                let motion = Motion { pose, rate, acceleration };
+                Dynamics {
+                    jacobian: platform.jacobian(&pose),
+                    mass: platform.mass_matrix(&pose),
+                    coriolis: platform.coriolis(&pose, &rate),
+                    gravity: platform.gravity(&pose),
+                    leg_forces: platform.leg_forces(&motion),
+                    displacements: platform.displacements(&pose),
+                }
+            }
+        };
+        vectors.push(vector(state, &result, &platform.rest_lengths()));
+    }
+    let document = json!({
+        "units": "SI",
+        "pose": if arguments.from_rest { "from rest" } else { "absolute" },
+        "computed_by": if arguments.generated { "emitted controller" } else { "model, f64" },
+        "vectors": vectors,
+    });
+    match &arguments.output {
+        Some(path) => {
+            write_file(path, format!("{document:#}\n").as_bytes())?;
+            let text = format!("wrote {} states to {}\n", states.len(), path.display());
+            ui.result(&text, json!({ "states": states.len(), "file": path.display().to_string() }));
+        }
+        None => ui.result(&format!("{document:#}\n"), document),
+    }
+    Ok(())
+}
+
+/// The range that the dynamics are exact in, see [`specgen_runtime::dynamics`]. Lengths by the textbook formula: outside, the
+/// kernel's own are wrong.
+fn within_range(model: &Model, pose: &[f64; 6]) -> Result<(), String> {
+    let [x, y, z, a, b, c] = *pose;
+    if [a, b, c].iter().any(|angle| angle.abs() > FRAC_PI_4) {
+        return Err(format!("an angle is beyond ±{FRAC_PI_4:.4} rad, for which the dynamics are made"));
+    }
+    let turn = Rotation3::from_euler_angles(a, b, c);
+    let geometry = &model.geometry;
+    for (leg, (base, joint)) in geometry.base_joints.iter().zip(&geometry.platform_joints).enumerate() {
+        let (base, joint) = (Vector3::from(*base), Vector3::from(*joint));
+        let rest = (Vector3::new(0.0, 0.0, geometry.height) + joint - base).norm();
+        let ratio = (Vector3::new(x, y, geometry.height + z) + turn * joint - base).norm() / rest;
+        if !LENGTH_RATIOS.contains(&ratio) {
+            return Err(format!(
+                "leg {} has {ratio:.3} of its length at rest, beyond {} to {}, for which the dynamics are made; is the pose absolute or \
+                 from rest (--from-rest)?",
+                leg + 1,
+                LENGTH_RATIOS.start(),
+                LENGTH_RATIOS.end()
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The emitted controller, loaded.
+struct Generated {
+    controller: Controller,
+    /// Holds the library while it is loaded.
+    _scratch: Scratch,
+}
+
+impl Generated {
+    fn build(compiled: &Compiled, ui: &mut Ui) -> Result<Self, Failure> {
+        let environment = |error: &dyn std::fmt::Display| Failure::Environment(error.to_string());
+        let scratch = Scratch::new().map_err(|error| environment(&error))?;
+        let folder = scratch.path().join("controller");
+        workspace::write_scratch(&folder, &compiled.files)?;
+        ui.progress("building the emitted controller for this host");
+        let library = target::host::build_library(&folder, &scratch.path().join("target"))?;
+        let controller = Controller::load(&library).map_err(|error| environment(&error))?;
+        Ok(Self { controller, _scratch: scratch })
+    }
+}
+
+/// One state in the layout of the reference vectors.
+fn vector(state: &State, result: &Dynamics, rest_lengths: &[f64; 6]) -> Value {
+    let [pose, rate, acceleration] = &state.given;
+    let lengths: Vec<f64> = rest_lengths.iter().zip(result.displacements).map(|(l, d)| l + d).collect();
+    let force: Vec<f64> = result
+        .mass
+        .iter()
+        .zip(result.coriolis.iter().zip(result.gravity))
+        .map(|(row, (c, g))| row.iter().zip(acceleration).fold(0.0, |sum, (m, a)| sum + m * a) + c + g)
+        .collect();
+    json!({
+        "id": state.id,
+        "h": pose, "hd": rate, "hdd": acceleration,
+        "leg_lengths": lengths,
+        "leg_displacements": result.displacements,
+        "J": result.jacobian, "M": result.mass, "Cv": result.coriolis, "G": result.gravity, "F": force,
+        "leg_forces": result.leg_forces,
+    })
+}
+
+fn read_states(path: &Path) -> Result<Vec<State>, Failure> {
+    let shown = path.display();
+    let refuse = |text: String| Failure::Gate(format!("{shown}: {text}"));
+    let size = fs::metadata(path).map_err(|error| refuse(format!("cannot be read: {error}")))?.len();
+    if size > LARGEST {
+        return Err(refuse(format!("{size} bytes; at most {LARGEST} are read")));
+    }
+    let text = fs::read_to_string(path).map_err(|error| refuse(format!("cannot be read: {error}")))?;
+    let states = if text.trim_start().starts_with(['{', '[']) { from_json(&text) } else { from_csv(&text) };
+    let states = states.map_err(refuse)?;
+    if states.is_empty() {
+        return Err(refuse("no states in it".to_owned()));
+    }
+    Ok(states)
+}
+
+fn from_json(text: &str) -> Result<Vec<State>, String> {
+    let document: Value = serde_json::from_str(text).map_err(|error| format!("not JSON: {error}"))?;
+    let list = document.get("vectors").unwrap_or(&document).as_array();
+    let list = list.ok_or("expected a list of states, or an object with a list `vectors`")?;
+    let state = |(index, value): (usize, &Value)| {
+        let id = value.get("id").and_then(Value::as_str).map_or_else(|| index.to_string(), str::to_owned);
+        let six = |key: &str| -> Result<[f64; 6], String> {
+            let numbers = value.get(key).and_then(Value::as_array);
+            let numbers: Option<Vec<f64>> = numbers.and_then(|list| list.iter().map(Value::as_f64).collect());
+            let numbers = numbers.and_then(|list| <[f64; 6]>::try_from(list).ok());
+            numbers.ok_or_else(|| format!("state {id}: `{key}` must be six numbers"))
+        };
+        Ok(State { given: [six("h")?, six("hd")?, six("hdd")?], id })
+    };
+    list.iter().enumerate().map(state).collect()
+}
+
+fn from_csv(text: &str) -> Result<Vec<State>, String> {
+    let mut states = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        // A line of names may come first.
+        let is_header = index == 0 && line.starts_with(|c: char| c.is_ascii_alphabetic());
+        if line.is_empty() || line.starts_with('#') || is_header {
+            continue;
+        }
+        let numbers: Option<Vec<f64>> =
+            line.split(',').map(|cell| cell.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
+        match numbers.as_deref() {
+            Some([a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r]) => {
+                let given = [[*a, *b, *c, *d, *e, *f], [*g, *h, *i, *j, *k, *l], [*m, *n, *o, *p, *q, *r]];
+                states.push(State { id: states.len().to_string(), given });
+            }
+            _ => return Err(format!("line {}: expected 18 finite numbers: pose, rate, acceleration", index + 1)),
+        }
+    }
+    Ok(states)
+}

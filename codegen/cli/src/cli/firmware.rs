@@ -1,0 +1,364 @@
+//! `build --target`, `size` and `flash`: a workspace with one target, built, checked, and held against its budget.
+
+mod flash;
+mod size;
+mod text;
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use clap::builder::PossibleValuesParser;
+use host_sim::controller::{Controller, TickController};
+use serde::Serialize;
+use serde_json::json;
+
+use super::build::TICKS;
+use super::ui::{Failure, Ui};
+use crate::{emit, workspace};
+use specgen_compiler::compile::{self, Compiled, Refused};
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::model::Mcu;
+use specgen_studies::verify::{self, Measurement};
+use specgen_toolchain::budget::{self, Used};
+use specgen_toolchain::checks::{self, Checked, Rules};
+use specgen_toolchain::size::{Size, size as measure_size};
+use specgen_toolchain::targets::{Kind, NAMES, Target};
+use specgen_toolchain::{self as target, Image, TargetError};
+
+pub use flash::{Arguments as FlashArguments, run as run_flash};
+pub use size::{Arguments as SizeArguments, run as run_size};
+
+/// What every command here takes of a spec.
+#[derive(Args, Debug)]
+pub struct Common {
+    /// What to build for; the spec's `target.mcu` decides if not given.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(NAMES))]
+    target: Option<String>,
+    /// Output folder; `<name>-controller` if not given. Must be new, empty, or an unchanged earlier output.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Where cargo builds for microcontrollers; `target` in the output folder if not given. Share it between outputs to
+    /// build less.
+    #[arg(long, value_name = "DIR")]
+    target_dir: Option<PathBuf>,
+    /// With lock-step for `specgen pil --port`: the host may step the machine of a board that stands at rest. For boards.
+    #[arg(long)]
+    lockstep: bool,
+    /// Do not run the emulator: no instruction counts, no comparison of bits.
+    #[arg(long)]
+    no_measure: bool,
+}
+
+/// Arguments of `build`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::BUILD)]
+pub struct Arguments {
+    /// The spec file.
+    spec: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What was built for a target.
+#[derive(Debug, Serialize)]
+struct Made {
+    name: String,
+    digest: String,
+    target: &'static str,
+    /// What it was built for.
+    board: String,
+    output: String,
+    /// Library, image or program.
+    artifact: String,
+    /// `rustc --version` of the cross compiler.
+    compiler: Option<String>,
+    size: Option<Size>,
+    checks: Option<Checked>,
+    measurement: Option<Measurement>,
+    used: Option<Used>,
+    /// What differs from what the spec says, or was left out.
+    notes: Vec<String>,
+    /// What is over budget or must not be: nothing is flashed then.
+    failures: Vec<String>,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let (compiled, made) = make(&arguments.spec, &arguments.common, any, ui)?;
+    judge(&made, &text::of(&compiled, &made), ui)
+}
+
+/// Shows what was made; an error if it must not be used.
+fn judge(made: &Made, text: &str, ui: &mut Ui) -> Result<(), Failure> {
+    if made.failures.is_empty() {
+        ui.result(text, json!(made));
+        return Ok(());
+    }
+    if !ui.is_json() {
+        ui.out(text);
+    }
+    Err(Failure::Judged { message: refusal(made), result: json!(made) })
+}
+
+/// What every ELF file begins with.
+const ELF: [u8; 4] = [0x7f, b'E', b'L', b'F'];
+
+/// The file if it is an ELF image; none if it is something else, which can only be a spec.
+fn read_image(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
+    let mut file = match std::fs::File::open(path) {
+        Ok(file) => file,
+        // The compiler has the words for a spec that cannot be read.
+        Err(_) => return Ok(None),
+    };
+    let mut bytes = Vec::new();
+    let reading = |error| TargetError::io("reading", path, error);
+    // A spec may be a pipe or a device; only what begins as an image is read to its end.
+    if file.by_ref().take(ELF.len() as u64).read_to_end(&mut bytes).is_err() || bytes != ELF {
+        return Ok(None);
+    }
+    file.read_to_end(&mut bytes).map_err(reading)?;
+    Ok(Some(bytes))
+}
+
+/// Why an image must not be used.
+fn refusal(made: &Made) -> String {
+    let list: String = made.failures.iter().map(|failure| format!("\n  {failure}")).collect();
+    format!("{} for {} is refused:{list}", made.target, made.board)
+}
+
+/// Every target will do.
+fn any(_: Target) -> Result<(), Failure> {
+    Ok(())
+}
+
+/// Compiles, writes, builds, checks, measures. A target that the command does not `accept` is refused before anything is written.
+fn make(
+    spec: &Path,
+    common: &Common,
+    accept: fn(Target) -> Result<(), Failure>,
+    ui: &mut Ui,
+) -> Result<(Compiled, Made), Failure> {
+    let compiled = compile::compile(spec)?;
+    ui.findings(Some(&compiled.source), &compiled.findings);
+    let declared = compiled.model.target.mcu;
+    // clap lets only known names through.
+    let target = common.target.as_deref().and_then(Target::named).unwrap_or_else(|| Target::of(declared));
+    accept(target)?;
+    if let Kind::Board(mcu) = target.kind
+        && let Some(finding) = wrong_part(&compiled, mcu, target)
+    {
+        return Err(Refused { source: Some(compiled.source), findings: vec![finding] }.into());
+    }
+    if common.lockstep && !matches!(target.kind, Kind::Board(_)) {
+        let boards = "stm32h743, stm32f4";
+        let message = format!("--lockstep is for the targets {boards}; {} has it in any case or never", target.name);
+        return Err(Failure::Usage(message));
+    }
+    let part = workspace::parts::PARTS.iter().find(|part| part.folder == target.folder);
+    if part.is_none_or(|part| part.files.is_empty()) {
+        return Err(Failure::Environment(format!("this specgen was built without the firmware for {}", target.name)));
+    }
+    // What is missing is said before anything is written.
+    if matches!(target.kind, Kind::Emulated | Kind::Board(_)) {
+        target::toolchain::find()?;
+    }
+    let output = common.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
+    let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &[target.folder]);
+    let _hold = workspace::write(&output, &files)?;
+    ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
+    let target_dir = common.target_dir.clone().unwrap_or_else(|| output.join("target"));
+    let folders = Folders { output: &output, target: &target_dir };
+    let made = build(&compiled, target, &folders, common, ui)?;
+    Ok((compiled, made))
+}
+
+/// An image for another core than the spec's would compute other bits, or in software.
+fn wrong_part(compiled: &Compiled, mcu: Mcu, target: Target) -> Option<Diagnostic> {
+    let (declared, part) = (compiled.model.target.mcu.part(), mcu.part());
+    if (declared.core, declared.double) == (part.core, part.double) {
+        return None;
+    }
+    let scalar = if part.double { "" } else { ", and in [controller]: scalar = \"f32\"" };
+    Some(Diagnostic::at(
+        &compiled.model.spans,
+        &["target.mcu", "target"],
+        (Severity::Error, codes::WRONG_PART),
+        format!(
+            "the spec is for {} ({}), but target {} is the {} with {} ({})",
+            declared.name, declared.core, target.name, part.board, part.name, part.core
+        ),
+        format!(
+            "write, in [target]: mcu = \"{}\"{scalar}; or build with --target {}",
+            part.name,
+            Target::of(compiled.model.target.mcu).name
+        ),
+    ))
+}
+
+/// Where things are.
+#[derive(Clone, Copy)]
+struct Folders<'a> {
+    output: &'a Path,
+    /// Of cargo.
+    target: &'a Path,
+}
+
+fn build(
+    compiled: &Compiled,
+    target: Target,
+    folders: &Folders<'_>,
+    common: &Common,
+    ui: &Ui,
+) -> Result<Made, Failure> {
+    let Folders { output, target: target_dir } = *folders;
+    let measure = !common.no_measure;
+    let declared = compiled.model.target.mcu;
+    let mut made = Made {
+        name: compiled.ir.name.clone(),
+        digest: compiled.ir.digest.clone(),
+        target: target.name,
+        board: String::new(),
+        output: output.display().to_string(),
+        artifact: String::new(),
+        compiler: None,
+        size: None,
+        checks: None,
+        measurement: None,
+        used: None,
+        notes: Vec::new(),
+        failures: Vec::new(),
+    };
+    match target.kind {
+        Kind::Host => {
+            ui.progress("building the host library");
+            made.board = "this machine".to_owned();
+            made.artifact = target::host::build_library(output, &output.join("target"))?.display().to_string();
+        }
+        Kind::Program => {
+            ui.progress(&format!("building {} for this machine", target.folder));
+            made.board = "this machine".to_owned();
+            made.artifact = target::host::build_program(output, target.folder, target_dir)?.display().to_string();
+        }
+        Kind::Emulated => {
+            made.board = declared.part().machine.to_owned();
+            let toolchain = target::toolchain::find()?;
+            ui.progress(&format!("building for {}", made.board));
+            let image = target::build::build_image_with(&toolchain, output, declared, target_dir)?;
+            examine(&mut made, &image, true, output)?;
+            if measure {
+                made.measurement = emulate(compiled, folders, Some(&image), &mut made.notes, ui)?;
+            }
+        }
+        Kind::Board(mcu) => {
+            made.board = mcu.part().board.to_owned();
+            let toolchain = target::toolchain::find()?;
+            ui.progress(&format!("building for {}", made.board));
+            let image =
+                target::build::build_folder(&toolchain, output, target.folder, mcu, target_dir, common.lockstep)?;
+            examine(&mut made, &image, false, output)?;
+            if mcu != declared {
+                made.notes.push(format!(
+                    "the spec declares {}; built for {} of the same core, whose memory is the limit where no budget is declared",
+                    declared.part().name,
+                    mcu.part().name
+                ));
+            }
+            if measure {
+                made.measurement = emulate(compiled, folders, None, &mut made.notes, ui)?;
+            }
+        }
+    }
+    hold_against_budget(&mut made, compiled, target);
+    Ok(made)
+}
+
+/// Size and checks of an image, and the image under a name that stays.
+fn examine(made: &mut Made, image: &Image, whole_image: bool, output: &Path) -> Result<(), Failure> {
+    let folder = output.join("target");
+    std::fs::create_dir_all(&folder).map_err(|error| TargetError::io("creating", &folder, error))?;
+    let kept = folder.join(format!("{}.elf", made.target));
+    target::host::write_whole(&kept, &image.elf)?;
+    made.artifact = kept.display().to_string();
+    made.compiler = Some(image.compiler.clone());
+    let rules = Rules { single: !image.mcu.part().double, whole_image };
+    made.size = Some(measure_size(&image.elf)?);
+    made.checks = Some(checks::check(&image.elf, None, rules)?);
+    Ok(())
+}
+
+/// The exercise on the host and on the emulated machine of the same core, if there is an emulator.
+fn emulate(
+    compiled: &Compiled,
+    folders: &Folders<'_>,
+    image: Option<&Image>,
+    notes: &mut Vec<String>,
+    ui: &Ui,
+) -> Result<Option<Measurement>, Failure> {
+    let tools = match target::available() {
+        Ok(tools) => tools,
+        Err(error) if error.is_of_a_tool() => {
+            notes.push(format!("instructions not counted: {error}"));
+            return Ok(None);
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let mcu = compiled.model.target.mcu;
+    let Folders { output, target: target_dir } = *folders;
+    ui.progress(&format!("counting instructions on {}", mcu.part().machine));
+    let library = target::host::build_library(output, &output.join("target"))?;
+    let environment = |error: String| Failure::Environment(error);
+    let mut controller = Controller::load(&library).map_err(|error| environment(error.to_string()))?;
+    let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS)
+        .map_err(|error| environment(error.to_string()))?;
+    let built;
+    let image = match image {
+        Some(image) => image,
+        None => {
+            built = target::build::build_image_with(&tools.toolchain, output, mcu, target_dir)?;
+            &built
+        }
+    };
+    Ok(Some(verify::measure(image, &controller.default_config(), &host)?))
+}
+
+/// Fills in what fails: budget, checks, bits.
+fn hold_against_budget(made: &mut Made, compiled: &Compiled, target: Target) {
+    let measured = made.measurement.as_ref();
+    let used = match (target.kind, &made.size, &made.checks) {
+        // The image is the one that was measured.
+        (Kind::Emulated, _, _) if measured.is_some() => measured.map(|m| m.used.clone()),
+        (_, Some(size), Some(checks)) => Some(Used {
+            flash: size.flash(),
+            flash_by: size.owners.iter().map(|owner| (owner.name.clone(), owner.flash())).collect(),
+            ram: size.ram() + checks.stack.unwrap_or(0),
+            ram_by: size
+                .variables
+                .iter()
+                .cloned()
+                .chain([("stack of a tick".to_owned(), checks.stack.unwrap_or(0))])
+                .collect(),
+            stack: checks.stack,
+            stack_by: checks.path.clone(),
+            instructions: measured.and_then(|m| m.used.instructions),
+            instructions_by: measured.map(|m| m.used.instructions_by.clone()).unwrap_or_default(),
+        }),
+        _ => None,
+    };
+    if let Some(used) = &used {
+        let mut limits = compiled.model.target.clone();
+        if let Kind::Board(mcu) = target.kind {
+            limits.mcu = mcu;
+        }
+        made.failures.extend(budget::over(&limits, used));
+    }
+    made.used = used;
+    let faults = made.checks.iter().chain(measured.map(|m| &m.checks)).flat_map(|checks| &checks.faults);
+    for text in faults.map(|fault| &fault.text) {
+        if !made.failures.contains(text) {
+            made.failures.push(text.clone());
+        }
+    }
+    if let Some(difference) = measured.and_then(|m| m.first_difference.as_ref()) {
+        made.failures.push(format!("the emulated machine computes other bits than the host: {difference}"));
+    }
+}

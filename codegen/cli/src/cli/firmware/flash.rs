@@ -1,0 +1,166 @@
+//! `specgen flash`: builds and checks an image, then lets probe-rs write it.
+
+use std::io::{BufRead, IsTerminal, Write};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use clap::Args;
+use serde_json::json;
+
+use super::{Common, make, read_image, refusal, text};
+use crate::cli::ui::{Failure, Ui};
+use specgen_language::model::{self, Mcu};
+use specgen_toolchain::budget;
+use specgen_toolchain::checks::{self, Rules};
+use specgen_toolchain::find_program;
+use specgen_toolchain::size::size;
+use specgen_toolchain::targets::{Kind, Target};
+
+/// The program that talks to the debug probe.
+const PROBE_RS: &str = "probe-rs";
+/// How to get it.
+const INSTALL: &str = "cargo install probe-rs-tools --locked";
+
+/// Arguments of `flash`.
+#[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::FLASH)]
+pub struct Arguments {
+    /// A spec, which is built first, or an ELF image that `specgen build` made.
+    #[arg(value_name = "SPEC|ELF")]
+    file: PathBuf,
+    #[command(flatten)]
+    common: Common,
+    /// The amplifiers are off: do not ask.
+    #[arg(long)]
+    yes: bool,
+    /// Which debug probe, as `probe-rs list` names it, if several are connected.
+    #[arg(long, value_name = "VID:PID:SERIAL")]
+    probe: Option<String>,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let ready = match read_image(&arguments.file)? {
+        Some(elf) => of_image(arguments, &elf, ui)?,
+        None => of_spec(arguments, ui)?,
+    };
+    let Ready { image, mcu } = ready;
+    let part = mcu.part();
+    let Some(chip) = part.chip else {
+        return Err(not_a_board(part.board));
+    };
+    let probe: Vec<&str> = arguments.probe.iter().flat_map(|probe| ["--probe", probe.as_str()]).collect();
+    let download = [&["download", "--chip", chip, "--verify"], &probe[..], &[image.as_str()]].concat();
+    let reset = [&["reset", "--chip", chip], &probe[..]].concat();
+    let commands = format!("  {PROBE_RS} {}\n  {PROBE_RS} {}", download.join(" "), reset.join(" "));
+    let Some(program) = find_program(PROBE_RS) else {
+        return Err(Failure::Environment(format!(
+            "{PROBE_RS} is not installed (looked for on PATH), so nothing was flashed; {image} is checked. \
+             Install it with: {INSTALL}\nthen, with the amplifiers off, run this again, or by hand:\n{commands}"
+        )));
+    };
+    if !arguments.yes {
+        confirm(ui, part.board)?;
+    }
+    for (what, words) in [("writing", download), ("restarting", reset)] {
+        ui.progress(&format!("{what}: {PROBE_RS} {}", words.join(" ")));
+        // Its progress is for the eyes; on standard output stands our result alone.
+        let output = Command::new(&program).args(&words).stdin(Stdio::null()).stdout(std::io::stderr()).status();
+        match output {
+            Ok(status) if status.success() => {}
+            Ok(status) => {
+                return Err(Failure::Environment(format!(
+                    "{PROBE_RS} failed ({status}) at {what} {image}; the flash may hold part of an image: keep the amplifiers \
+                     off, check cable and power of the board, and run again:\n{commands}"
+                )));
+            }
+            Err(error) => {
+                return Err(Failure::Environment(format!("{} cannot be run: {error}", program.display())));
+            }
+        }
+    }
+    ui.result(
+        &format!("flashed {image} to {} ({chip}), verified and restarted\n", part.board),
+        json!({ "flashed": image, "board": part.board, "chip": chip }),
+    );
+    Ok(())
+}
+
+/// An image that passed every check.
+struct Ready {
+    image: String,
+    mcu: Mcu,
+}
+
+fn of_spec(arguments: &Arguments, ui: &mut Ui) -> Result<Ready, Failure> {
+    let (compiled, made) = make(&arguments.file, &arguments.common, a_board, ui)?;
+    if !ui.is_json() {
+        ui.out(&text::of(&compiled, &made));
+    }
+    if !made.failures.is_empty() {
+        let message = format!("{}\nnothing was flashed", refusal(&made));
+        return Err(Failure::Judged { message, result: json!(made) });
+    }
+    match Target::named(made.target).map(|target| target.kind) {
+        Some(Kind::Board(mcu)) => Ok(Ready { image: made.artifact, mcu }),
+        _ => Err(not_a_board(&made.board)),
+    }
+}
+
+/// The same checks for an image at hand. Which part it is for, it does not say.
+fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Failure> {
+    let named = arguments.common.target.as_deref().and_then(Target::named).map(|target| target.kind);
+    let Some(Kind::Board(mcu)) = named else {
+        return Err(Failure::Usage("an image does not say which board it is for: name it by --target".to_owned()));
+    };
+    let part = mcu.part();
+    let checked = checks::check(elf, None, Rules { single: !part.double, whole_image: false })?;
+    let size = size(elf)?;
+    let limits = model::Target { mcu, flash: None, ram: None, stack: None, instructions: None };
+    let used = budget::Used { flash: size.flash(), ram: size.ram(), stack: checked.stack, ..budget::Used::default() };
+    let mut failures: Vec<String> = checked.faults.iter().map(|fault| fault.text.clone()).collect();
+    failures.extend(budget::over(&limits, &used));
+    if size.identity.is_none() {
+        failures
+            .push("it holds no identity of a controller: was it made by specgen, and does it check itself?".to_owned());
+    }
+    if !ui.is_json() {
+        ui.out(&(text::sections(&size) + &text::checked(&checked)));
+    }
+    let image = arguments.file.display().to_string();
+    if failures.is_empty() {
+        return Ok(Ready { image, mcu });
+    }
+    let list: String = failures.iter().map(|failure| format!("\n  {failure}")).collect();
+    let message = format!("{image} is refused for {}:{list}\nnothing was flashed", part.board);
+    Err(Failure::Judged { message, result: json!({ "image": image, "failures": failures }) })
+}
+
+fn a_board(target: Target) -> Result<(), Failure> {
+    if matches!(target.kind, Kind::Board(_)) { Ok(()) } else { Err(not_a_board(target.name)) }
+}
+
+fn not_a_board(name: &str) -> Failure {
+    Failure::Usage(format!(
+        "nothing was flashed: {name} is no board with a debug probe; name one by --target stm32h743 or --target stm32f4"
+    ))
+}
+
+/// A controller that starts with its amplifiers on could move the platform.
+fn confirm(ui: &Ui, board: &str) -> Result<(), Failure> {
+    if ui.is_json() || !std::io::stdin().is_terminal() {
+        return Err(Failure::Usage(
+            "nothing was flashed: switch the amplifiers off, then say so by --yes (nobody is there to be asked)"
+                .to_owned(),
+        ));
+    }
+    let mut prompt = std::io::stderr();
+    let _ = write!(prompt, "Are the amplifiers of {board} switched off? [y/N] ");
+    let _ = prompt.flush();
+    let mut answer = String::new();
+    let read = std::io::stdin().lock().read_line(&mut answer);
+    if read.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes") {
+        Ok(())
+    } else {
+        Err(Failure::Usage("nothing was flashed: switch the amplifiers off and run again".to_owned()))
+    }
+}

@@ -1,0 +1,64 @@
+//! `specgen identify`: measured records in, tables, spec lines, figures and plots out.
+//!
+//! `specgen identify RECORD` identifies the Everett table; other kinds have a command of their own. A record that has the
+//! name of such a command is given as `./linear`.
+
+mod everett;
+mod gauge;
+mod linear;
+mod plot;
+mod response;
+mod stiffness;
+
+use clap::{Args, Subcommand};
+
+use super::ui::{Failure, Ui};
+use specgen_compiler::compile::Refused;
+use specgen_language::diagnostic::Diagnostic;
+
+pub use everett::summary;
+pub(super) use everett::{grid, range};
+
+/// Arguments of `identify`.
+#[derive(Args, Debug)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    override_usage = "specgen identify [OPTIONS] --drive <MIN:MAX> <RECORD>\n       specgen identify <COMMAND>",
+    after_help = super::examples::IDENTIFY
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    kind: Option<Kind>,
+    #[command(flatten)]
+    everett: everett::EverettArguments,
+}
+
+#[derive(Subcommand, Debug)]
+enum Kind {
+    /// The linear relation Y = ρX + δ of records at several frequencies, λ and the weights that are stable over it.
+    Linear(linear::Arguments),
+    /// Frequency response from a swept sine, multisine or noise: resonance, damping, lag, dead time.
+    Response(response::Arguments),
+    /// Calibration of a gauge from its voltage and a reference.
+    Gauge(gauge::Arguments),
+    /// Axial stiffness from force and displacement at constant drive.
+    Stiffness(stiffness::Arguments),
+    /// Compare rate-dependent models on records of one leg at several rates.
+    Rate(super::identify_rate::Arguments),
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    match &arguments.kind {
+        Some(Kind::Linear(arguments)) => linear::run(arguments, ui),
+        Some(Kind::Response(arguments)) => response::run(arguments, ui),
+        Some(Kind::Gauge(arguments)) => gauge::run(arguments, ui),
+        Some(Kind::Stiffness(arguments)) => stiffness::run(arguments, ui),
+        Some(Kind::Rate(arguments)) => super::identify_rate::run(arguments, ui),
+        None => everett::run(&arguments.everett, ui),
+    }
+}
+
+fn refused(findings: Vec<Diagnostic>) -> Failure {
+    Failure::from(Refused { source: None, findings })
+}

@@ -1,0 +1,75 @@
+//! `specgen identify gauge`.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use clap::Args;
+use serde_json::json;
+
+use super::plot::Plot;
+use super::refused;
+use crate::cli::file::write_file;
+use crate::cli::ui::{Failure, Ui};
+
+use specgen_identify::gauge;
+use specgen_report::identification as figure;
+
+/// Arguments of `identify gauge`.
+#[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::GAUGE)]
+pub struct Arguments {
+    /// CSV with columns gauge_V and reference_um, and time_s if there is one.
+    record: PathBuf,
+    /// Degree of the polynomial, 1 to 5; chosen by cross-validation if not given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=5))]
+    degree: Option<u8>,
+    /// Write the calibration as a table (CSV: gauge_V, reference_um, means over even steps) here, for other programs.
+    #[arg(long, value_name = "FILE")]
+    table: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let shown = arguments.record.display().to_string();
+    let report = gauge::calibrate(&arguments.record, &shown, arguments.degree.map(usize::from)).map_err(refused)?;
+    ui.findings(None, &report.warnings);
+    let errors: Vec<String> =
+        report.held_out_rms.iter().enumerate().map(|(k, e)| format!("{}: {:.3} nm", k + 1, e * 1e9)).collect();
+    let chosen = if arguments.degree.is_some() { "as given" } else { report.rule };
+    let mut text = format!(
+        "{shown}: {} samples, {:.4} V to {:.4} V, {:.4} µm to {:.4} µm\n  held-out error by degree: {}\n  degree {} ({chosen})\n  residual {:.3} nm rms, {:.3} nm at most (at {})\n",
+        report.samples,
+        report.volts[0],
+        report.volts[1],
+        report.reference[0] * 1e6,
+        report.reference[1] * 1e6,
+        errors.join(", "),
+        report.degree,
+        report.residual_rms * 1e9,
+        report.residual_max * 1e9,
+        report.residual_max_at
+    );
+    let hysteresis = report.hysteresis.map_or_else(
+        || "not known: the reference never turns back".to_owned(),
+        |h| format!("{:.3} nm between the ways up and down", h * 1e9),
+    );
+    // Writing to a String cannot fail.
+    let _ = write!(
+        text,
+        "  hysteresis {hysteresis}\n  monotonic over these voltages: least slope {:.1} % of the mean slope\nlines for the spec, in [sensor] for all gauges or in [[gauge]] for this one:\n{}\n",
+        report.least_slope_percent,
+        gauge::spec_line(&report)
+    );
+    if let Some(path) = &arguments.table {
+        let rows = report.table.iter().fold("gauge_V,reference_um\n".to_owned(), |mut rows, [v, y]| {
+            let _ = writeln!(rows, "{v:?},{:?}", y * 1e6);
+            rows
+        });
+        write_file(path, rows.as_bytes())?;
+        let _ = writeln!(text, "wrote {}", path.display());
+    }
+    text.push_str(&arguments.plot.write("Gauge calibration", || figure::gauge(&report))?);
+    ui.result(&text, json!({ "report": report, "calibration": gauge::spec_line(&report) }));
+    Ok(())
+}

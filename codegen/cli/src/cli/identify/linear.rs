@@ -1,0 +1,200 @@
+//! `specgen identify linear`.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::plot::Plot;
+use super::refused;
+use crate::cli::ui::{Failure, Ui};
+use specgen_compiler::compile::{self, Refused};
+use specgen_identify as identify;
+use specgen_identify::linear::{self, LinearReport, PAPER_PROPORTION};
+use specgen_language::model::Model;
+use specgen_language::spec::{self, SpecSource};
+use specgen_report::identification as figure;
+
+/// Weights per run that the paper prints.
+const PAPER: [f64; 2] = [0.252, 0.011];
+
+/// Arguments of `identify linear`.
+#[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::LINEAR)]
+pub struct Arguments {
+    /// Records at one frequency each: CSV with columns time_s, drive_V, displacement_um. The drive may be that of an
+    /// inverse hysteresis model, as in the paper.
+    #[arg(required = true)]
+    records: Vec<PathBuf>,
+    /// Frequencies of the records, Hz, in their order; found in the records if not given.
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = frequency)]
+    frequency: Vec<f64>,
+    /// Frequency at which the model's gain ρ̂ is taken, Hz; the lowest one if not given.
+    #[arg(long, value_name = "HZ", value_parser = frequency)]
+    reference: Option<f64>,
+    /// Judge the weights of this spec, on its sampled loop, over the λ found.
+    #[arg(long, value_name = "SPEC")]
+    spec: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
+}
+
+fn frequency(text: &str) -> Result<f64, String> {
+    match text.trim().trim_end_matches("Hz").trim().parse::<f64>() {
+        Ok(f) if (1e-6..=1e6).contains(&f) => Ok(f),
+        _ => Err(format!("expected a frequency in Hz above zero, found `{text}`")),
+    }
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let (records, frequencies) = (&arguments.records, &arguments.frequency);
+    if !frequencies.is_empty() && frequencies.len() != records.len() {
+        return Err(Failure::Usage(format!(
+            "--frequency names {} frequencies for {} records",
+            frequencies.len(),
+            records.len()
+        )));
+    }
+    let mut read = Vec::new();
+    let mut relations = Vec::new();
+    let mut bad = Vec::new();
+    for (k, path) in records.iter().enumerate() {
+        let shown = path.display().to_string();
+        let found = identify::read_record(path, &shown).and_then(|record| {
+            let relation = linear::relation(&record, frequencies.get(k).copied())?;
+            Ok((record, relation))
+        });
+        match found {
+            Ok((record, relation)) => {
+                ui.findings(None, &record.warnings);
+                read.push(record);
+                relations.push(relation);
+            }
+            Err(findings) => bad.extend(findings),
+        }
+    }
+    if !bad.is_empty() {
+        return Err(refused(bad));
+    }
+    let report = linear::together(relations, arguments.reference).map_err(refused)?;
+    let mut text = table(&report);
+    let judged = match &arguments.spec {
+        None => {
+            static_verdict(&report, &mut text);
+            Value::Null
+        }
+        Some(path) => judge(path, &report, &mut text)?,
+    };
+    lines(&report, &judged, &mut text);
+    text.push_str(&arguments.plot.write("Linear relation", || figure::linear(&report, &read))?);
+    ui.result(&text, json!({ "report": report, "gain_ratio": report.gain_ratio_for_spec(), "spec": judged }));
+    Ok(())
+}
+
+fn table(report: &LinearReport) -> String {
+    let mut text =
+        "Y = ρX + δ\n  frequency Hz      ρ µm/V   ± std err        δ µm   loop µm     %  correlation  cycles  record\n"
+            .to_owned();
+    for r in &report.relations {
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(
+            text,
+            "  {:>12.4}  {:>10.6}  {:>10.6}  {:>10.4}  {:>8.4}  {:>4.1}  {:>11.5}  {:>6}  {}",
+            r.frequency,
+            r.gain * 1e6,
+            r.gain_error * 1e6,
+            r.offset * 1e6,
+            r.loop_width * 1e6,
+            r.loop_percent,
+            r.correlation,
+            r.cycles,
+            r.record
+        );
+    }
+    let _ = writeln!(
+        text,
+        "reference: ρ̂ = {:.6} µm/V, at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4} (two standard errors included)",
+        report.reference_gain * 1e6,
+        report.reference_frequency,
+        report.gain_ratio[0],
+        report.gain_ratio[1]
+    );
+    text
+}
+
+fn static_verdict(report: &LinearReport, text: &mut String) {
+    let yes = |stable: bool| if stable { "stable" } else { "not stable" };
+    let _ = writeln!(
+        text,
+        "on a leg without dynamics: EWMA (AII.18, corrected to 0 < λω < 2) up to ω = {:.4}, ω = {} is {}; \
+         PCC (AII.19) up to ω1 = {:.4} with ω2 = {:.4} ω1, ω1 = {}, ω2 = {} is {}",
+        report.largest_ewma_weight,
+        PAPER[0],
+        yes(report.ewma_is_stable(PAPER[0])),
+        report.largest_pcc_weight,
+        PAPER_PROPORTION,
+        PAPER[0],
+        PAPER[1],
+        yes(report.pcc_is_stable(PAPER[0], PAPER[1]))
+    );
+    text.push_str(
+        "the resonance and lag of the leg lower these limits: --spec judges the sampled loop of a platform\n",
+    );
+}
+
+/// Stability of the spec's own weights over the λ found.
+fn judge(path: &Path, report: &LinearReport, text: &mut String) -> Result<Value, Failure> {
+    let source = SpecSource::read(path).map_err(|finding| refused(vec![finding]))?;
+    let (model, findings) = spec::load(&source);
+    let Some(mut model) = model else {
+        return Err(Failure::from(Refused { source: Some(source), findings }));
+    };
+    model.adaptation.gain_ratio = report.gain_ratio_for_spec();
+    let name = path.display();
+    let stacks = f64::from(model.actuator.stacks);
+    let verdict = match compile::check_stability(&model) {
+        Ok((margins, design)) => {
+            if let (Some(margins), Some(level)) = (&margins, level(&model)) {
+                let largest = margins
+                    .largest_level_weight
+                    .map_or_else(String::new, |w| format!("; stable up to level weight {w:.4}"));
+                let _ = writeln!(
+                    text,
+                    "{name}: its weights (level {level}, drift {}) are stable over this λ; spectral radius {:.4}{largest}",
+                    model.adaptation.drift_weight, margins.spectral_radius
+                );
+            } else {
+                let _ = writeln!(text, "{name}: its adaptation is stable over this λ");
+            }
+            json!({ "stable": true, "margins": margins, "design": design.is_some() })
+        }
+        Err(found) => {
+            let _ = writeln!(text, "{name}: its weights are NOT stable over this λ");
+            for finding in &found {
+                let _ = writeln!(text, "  {}: {}\n    help: {}", finding.code, finding.message, finding.help);
+            }
+            json!({ "stable": false, "findings": found.iter().map(|f| json!({"code": f.code, "message": f.message, "help": f.help})).collect::<Vec<_>>() })
+        }
+    };
+    Ok(json!({ "stacks": stacks, "verdict": verdict }))
+}
+
+fn level(model: &Model) -> Option<f64> {
+    (model.adaptation.level_weight > 0.0).then_some(model.adaptation.level_weight)
+}
+
+fn lines(report: &LinearReport, judged: &Value, text: &mut String) {
+    let [low, high] = report.gain_ratio_for_spec();
+    let stacks = judged["stacks"].as_f64();
+    let gain = report.reference_gain * 1e6 / stacks.unwrap_or(1.0);
+    let note = match stacks {
+        Some(n) if n > 1.0 => format!("of one stack: the record's, divided by {n}"),
+        Some(_) => "of one stack".to_owned(),
+        None => "if the record is of one stack; divide by actuator.stacks if it is of a leg".to_owned(),
+    };
+    let _ = write!(
+        text,
+        "lines for the spec:\n[actuator]\nstack_gain = \"{gain:.6} um/V\"  # {note}\n[adaptation]\ngain_ratio = [{low:.3}, {high:.3}]\n"
+    );
+}

@@ -1,0 +1,157 @@
+//! `specgen identify rate`: records at several rates in, a comparison of rate-dependent models and spec lines out.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+
+use super::file::write_file;
+use super::identify::{grid, range};
+use super::ui::{Failure, Ui};
+use specgen_compiler::compile::Refused;
+use specgen_identify::rate::{RateIdentified, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
+use specgen_identify::{Options, read_record, write_table_csv};
+
+/// Arguments of `identify rate`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::RATE)]
+pub struct Arguments {
+    /// Records of one leg at different rates, at least two: CSV with columns time_s, drive_V, displacement_um.
+    #[arg(required = true, value_name = "RECORD")]
+    records: Vec<PathBuf>,
+    /// Voltage range of the tables, V, such as 0:100 or -90:90.
+    #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true)]
+    drive: [f64; 2],
+    /// Cells per axis of the Preisach grid.
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = grid, allow_negative_numbers = true)]
+    grid: usize,
+    /// A further record, in no fit, to judge the options by.
+    #[arg(long, value_name = "RECORD")]
+    hold_out: Option<PathBuf>,
+    /// Write NAME.toml (lines of a spec) and the tables NAME-static.csv, NAME-mu0.csv and so on beside it.
+    #[arg(short, long, value_name = "NAME")]
+    output: Option<PathBuf>,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let refused = |findings| Failure::from(Refused { source: None, findings });
+    let read = |path: &PathBuf| read_record(path, &path.display().to_string());
+    let mut records = Vec::new();
+    let mut errors = Vec::new();
+    for path in &arguments.records {
+        match read(path) {
+            Ok(record) => records.push(record),
+            Err(found) => errors.extend(found),
+        }
+    }
+    let hold_out = match arguments.hold_out.as_ref().map(read).transpose() {
+        Ok(record) => record,
+        Err(found) => {
+            errors.extend(found);
+            None
+        }
+    };
+    if !errors.is_empty() {
+        return Err(refused(errors));
+    }
+    ui.progress(&format!("{} fits of {} records", 4 * (records.len() + 1), records.len()));
+    let options = Options::new(arguments.grid, arguments.drive);
+    let identified = identify_rate(&records, hold_out.as_ref(), &options).map_err(refused)?;
+    ui.findings(None, &identified.warnings);
+    let mut text = table(&identified.report);
+    if let Some(output) = &arguments.output {
+        for path in write(output, &identified)? {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "wrote {}", path.display());
+        }
+    }
+    ui.result(&text, json!({ "report": identified.report }));
+    Ok(())
+}
+
+/// Tables first, then the lines that name them.
+fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Failure> {
+    let name = output.file_name().map(|name| name.to_string_lossy().into_owned()).ok_or_else(|| {
+        Failure::Usage(format!("`{}` names no file: give a name such as models/leg1", output.display()))
+    })?;
+    let beside = |file: &str| output.with_file_name(file);
+    let best = identified.report.verdict.best;
+    let mut files: Vec<(PathBuf, String)> = Vec::new();
+    let mut lines = format!(
+        "# Rate dependence of the leg, from `specgen identify rate`. The option in force has the lowest error on rates that it was\n\
+         # not fitted on. Tables are named relative to the spec.\n[hysteresis]\n# {}\n",
+        identified.report.verdict.text.replace('\n', "\n# ")
+    );
+    for (option, model) in &identified.models {
+        let table = match option {
+            RateOption::Static => format!("{name}-static.csv"),
+            RateOption::DeadTime => format!("{name}-dead-time.csv"),
+            RateOption::DynamicPreisach => format!("{name}-mu0.csv"),
+            RateOption::Creep => format!("{name}-creep.csv"),
+        };
+        let rate_table = format!("{name}-mu1.csv");
+        files.push((beside(&table), write_table_csv(&model.still)));
+        if let Some(rate) = &model.rate {
+            files.push((beside(&rate_table), write_rate_csv(rate)));
+        }
+        let block = spec_lines(*option, model, &table, &rate_table);
+        let prefix = if *option == best { "" } else { "# " };
+        let _ = writeln!(lines, "\n# {}", option.name());
+        for line in block.lines() {
+            let _ = writeln!(lines, "{prefix}{line}");
+        }
+    }
+    files.push((beside(&format!("{name}.toml")), lines));
+    for (path, text) in &files {
+        write_file(path, text.as_bytes())?;
+    }
+    Ok(files.into_iter().map(|(path, _)| path).collect())
+}
+
+fn table(report: &RateReport) -> String {
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    for record in &report.records {
+        let _ = writeln!(
+            text,
+            "{}: {} curves, median {:.0} V/s, {} samples, range {:.3} µm, noise {:.3} % of it",
+            record.record,
+            record.frequency_text(),
+            record.speed,
+            record.samples,
+            record.range * 1e6,
+            record.noise_percent
+        );
+    }
+    if let Some(held) = &report.hold_out {
+        let _ = writeln!(text, "{}: held out of every fit", held.record);
+    }
+    let heads: Vec<String> = report.records.iter().map(|r| format!("{:>9}", r.frequency_text())).collect();
+    let heads = heads.concat();
+    let _ = writeln!(text, "\nrms error in % of the range, grid {}", report.grid);
+    let held = if report.hold_out.is_some() { "  held out" } else { "" };
+    let width = heads.chars().count();
+    let _ = writeln!(text, "{:<20}{:>width$}   {:>width$}{held}", "", "fitted on all", "fitted on the others");
+    let _ = writeln!(text, "{:<20}{heads}   {heads}", "model");
+    for option in &report.options {
+        let cells = |values: &[f64]| values.iter().map(|v| format!("{v:>9.3}")).collect::<String>();
+        let held = option.hold_out.map(|v| format!("{v:>10.3}")).unwrap_or_default();
+        let _ =
+            writeln!(text, "{:<20}{}   {}{held}", option.option.name(), cells(&option.fitted), cells(&option.left_out));
+    }
+    text.push('\n');
+    for option in report.options.iter().filter(|o| o.dead_time > 0.0 || !o.creep.is_empty()) {
+        let creep: Vec<String> =
+            option.creep.iter().map(|c| format!("{:.4} at {:.4} s", c.weight, c.time_constant)).collect();
+        let creep = match option.option {
+            RateOption::Creep if creep.is_empty() => "; no creep weight helps".to_owned(),
+            RateOption::Creep => format!("; creep {}", creep.join(", ")),
+            _ => String::new(),
+        };
+        let _ = writeln!(text, "{}: dead time {:.3} ms{creep}", option.option.name(), option.dead_time * 1e3);
+    }
+    let _ = writeln!(text, "{}", report.verdict.text);
+    let _ = writeln!(text, "lowest error on rates not fitted on: {}", report.verdict.best.name());
+    text
+}

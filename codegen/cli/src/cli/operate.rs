@@ -1,0 +1,230 @@
+//! `specgen operate`: one session with a machine over the link, from the command line, a script, or line by line.
+
+mod machine;
+
+use std::io::{BufRead, IsTerminal};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+
+use clap::{ArgGroup, Args};
+use serde_json::{Value, json};
+use specgen_link::client::{Patience, Port};
+
+use super::ui::{Failure, Ui};
+use machine::{Ended, Machine};
+use specgen_compiler::compile;
+use specgen_language::interrupt;
+use specgen_operate::pil::{BAUD, OpenError, SerialLine};
+use specgen_operate::{ALIVE, Order, Session, SocketLine};
+
+/// Arguments of `operate`.
+#[derive(Args, Debug)]
+#[command(
+    group(ArgGroup::new("line").required(true).args(["port", "socket"])),
+    after_help = super::examples::OPERATE
+)]
+pub struct Arguments {
+    /// A board at this serial port.
+    #[arg(long, value_name = "DEVICE")]
+    port: Option<PathBuf>,
+    /// Its rate, baud.
+    #[arg(long, default_value_t = BAUD, requires = "port", conflicts_with = "socket", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
+    baud: u32,
+    /// A program that serves the link at this Unix socket.
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+    /// Commands from this file, one a line; `#` begins a comment.
+    #[arg(long, value_name = "FILE")]
+    script: Option<PathBuf>,
+    /// The spec that the device was built from (a name that ends in .toml), then commands, each one argument. Without any,
+    /// commands come from standard input.
+    #[arg(value_name = "SPEC] [COMMAND")]
+    words: Vec<String>,
+}
+
+/// Where commands come from.
+enum Source {
+    /// All of them are known.
+    List(Vec<Order>),
+    /// Lines as they come; somebody is there to see what happens.
+    Lines,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    // `wave x.toml` is a command.
+    let is_spec = |word: &&String| word.ends_with(".toml") && Order::parse(word).is_err();
+    let spec = arguments.words.first().filter(is_spec);
+    let commands = arguments.words.get(usize::from(spec.is_some())..).unwrap_or_default();
+    let source = source(arguments, commands)?;
+    let compiled = match spec {
+        Some(spec) => {
+            let compiled = compile::compile(spec.as_ref())?;
+            ui.findings_in_brief(&compiled.source, &compiled.findings);
+            Some(compiled)
+        }
+        None => None,
+    };
+    if let Source::List(orders) = &source {
+        for order in orders {
+            if let Order::WriteConfig(spec) = order {
+                compile::compile(spec)?;
+            }
+        }
+    }
+    let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.as_str());
+    // The machine is not to be left alone.
+    interrupt::heed();
+    match (&arguments.port, &arguments.socket) {
+        (Some(path), _) => {
+            let line = SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?;
+            operate(line, Patience::SERIAL, &path.display().to_string(), digest, source, ui)
+        }
+        (None, Some(path)) => {
+            let line = SocketLine::open(path).map_err(Failure::Environment)?;
+            operate(line, Patience::SERIAL, &path.display().to_string(), digest, source, ui)
+        }
+        // One of the two is required.
+        (None, None) => Err(Failure::Usage("name the device with --port or --socket".to_owned())),
+    }
+}
+
+/// Every command is read before anything is asked of the machine: a mistake in the last line stops the first.
+fn source(arguments: &Arguments, commands: &[String]) -> Result<Source, Failure> {
+    let mut orders = Vec::new();
+    for command in commands {
+        orders.extend(Order::parse(command).map_err(Failure::Usage)?);
+    }
+    match &arguments.script {
+        Some(_) if !commands.is_empty() => Err(Failure::Usage(
+            "commands as arguments and --script exclude each other: put all of them into the script".to_owned(),
+        )),
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .map_err(|error| Failure::Usage(format!("could not read `{}`: {error}", path.display())))?;
+            for (index, line) in text.lines().enumerate() {
+                let place = |error| Failure::Usage(format!("{}:{}: {error}", path.display(), index + 1));
+                orders.extend(Order::parse(line).map_err(place)?);
+            }
+            Ok(Source::List(orders))
+        }
+        None if commands.is_empty() => Ok(Source::Lines),
+        None => Ok(Source::List(orders)),
+    }
+}
+
+fn operate(
+    line: impl Port,
+    patience: Patience,
+    name: &str,
+    digest: Option<&str>,
+    source: Source,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let session = Session::open(line, patience, digest).map_err(|error| match error {
+        OpenError::Other(text) => Failure::Gate(format!("{name}: {text}")),
+        OpenError::Link(_) => Failure::Environment(format!("{name}: {error}")),
+    })?;
+    if digest.is_none() {
+        let text = format!("{name}: not compared with a spec; name it to be sure that the device runs its controller");
+        ui.progress(&text);
+    }
+    let mut machine = Machine::new(session, interrupt::heed());
+    if let Source::List(orders) = &source {
+        // A mistake in the last of them would leave the machine alone in the middle.
+        machine.check(orders)?;
+    }
+    let ended = match source {
+        Source::List(orders) => list(&orders, &mut machine, ui),
+        Source::Lines => lines(&mut machine, ui),
+    };
+    finish(ended, &mut machine, name, ui)
+}
+
+fn list(orders: &[Order], machine: &mut Machine<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
+    for order in orders {
+        machine.obey(order, ui)?;
+    }
+    // A request that was the last one is to be seen by a tick before the link goes silent, and what it does to be told.
+    machine.look()
+}
+
+/// Lines from standard input, the machine looked at meanwhile. What is wrong with a line ends nothing.
+fn lines(machine: &mut Machine<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
+    machine.attended = true;
+    let lines = reader();
+    if std::io::stdin().is_terminal() {
+        ui.progress(&format!("{}; commands, one a line; end with Ctrl-D", machine.stands()));
+    }
+    loop {
+        let line = match lines.recv_timeout(ALIVE) {
+            Ok(line) => line,
+            Err(RecvTimeoutError::Timeout) => {
+                machine.look()?;
+                machine.tell(ui);
+                continue;
+            }
+            Err(RecvTimeoutError::Disconnected) => return machine.look(),
+        };
+        let done = match Order::parse(&line) {
+            Ok(None) => Ok(()),
+            Ok(Some(order)) => machine.obey(&order, ui),
+            Err(text) => Err(Ended::Refused(text)),
+        };
+        let text = match done {
+            Ok(()) => continue,
+            Err(Ended::Refused(text) | Ended::Fault(text)) => text,
+            Err(Ended::Failed(Failure::Environment(text) | Failure::Gate(text) | Failure::Usage(text))) => text,
+            Err(Ended::Failed(Failure::Refused(refused))) => {
+                ui.findings(refused.source.as_ref(), &refused.findings);
+                "the spec is refused".to_owned()
+            }
+            Err(other) => return Err(other),
+        };
+        machine.note(&line, json!({ "error": text }), &format!("error: {text}"), ui);
+    }
+}
+
+/// A thread that waits for lines, so that the link does not.
+fn reader() -> Receiver<String> {
+    let (sender, receiver) = channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines() {
+            let Ok(line) = line else { return };
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    receiver
+}
+
+/// Says how it ended. Ctrl-C brings the machine down first.
+fn finish(ended: Result<(), Ended>, machine: &mut Machine<impl Port>, name: &str, ui: &mut Ui) -> Result<(), Failure> {
+    let result = |machine: &mut Machine<_>| -> Value {
+        json!({ "device": name, "answers": std::mem::take(&mut machine.answers), "status": machine.status() })
+    };
+    match ended {
+        Ok(()) => {
+            if machine.is_powered() {
+                let text =
+                    "the amplifiers are on; without its host the machine holds, then ramps down (supervisor.host_lost)";
+                ui.progress(&format!("{name}: {}: {text}", machine.stands()));
+            }
+            let result = result(machine);
+            ui.result("", result);
+            Ok(())
+        }
+        Err(Ended::Refused(text)) => {
+            Err(Failure::Judged { message: format!("{name}: {text}"), result: result(machine) })
+        }
+        Err(Ended::Fault(text)) => Err(Failure::Judged { message: format!("{name}: {text}"), result: result(machine) }),
+        Err(Ended::Failed(failure)) => Err(failure),
+        Err(Ended::Link(error)) => Err(Failure::Environment(format!(
+            "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
+        ))),
+        Err(Ended::Interrupted) => match machine.go_down(ui) {
+            Ok(text) => Err(Failure::Interrupted { message: format!("interrupted; {text}"), result: result(machine) }),
+            Err(error) => Err(Failure::Environment(format!("{name}: interrupted, and then: {error}"))),
+        },
+    }
+}

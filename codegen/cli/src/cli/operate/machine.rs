@@ -1,0 +1,344 @@
+//! A machine in a session: orders carried out one after the other, faults noticed, the link kept alive.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use host_sim::controller::MachineWord;
+use serde_json::{Value, json};
+use specgen_link::client::{ClientError, Port};
+use specgen_link::{RecorderStatus, Refusal, Status};
+use specgen_runtime::supervisor::{Phase, Request};
+
+use crate::cli::file::{check_place, write_file};
+use crate::cli::ui::{Failure, Ui};
+use specgen_compiler::compile;
+use specgen_operate::{Order, Session, Until, read_wave, refused_wave};
+
+/// How long ramping down may take.
+const DOWN: Duration = Duration::from_secs(60);
+
+/// Why a session ends before its orders do.
+pub enum Ended {
+    /// An order makes no sense here, or the device refuses it.
+    Refused(String),
+    /// The machine faulted, or did not do in time what was waited for.
+    Fault(String),
+    /// As any command can fail.
+    Failed(Failure),
+    /// The link failed.
+    Link(ClientError),
+    /// Ctrl-C.
+    Interrupted,
+}
+
+impl From<ClientError> for Ended {
+    fn from(error: ClientError) -> Self {
+        match error {
+            ClientError::Refused(_) => Self::Refused(error.to_string()),
+            other => Self::Link(other),
+        }
+    }
+}
+
+/// A machine.
+pub struct Machine<P> {
+    session: Session<P>,
+    interrupted: &'static AtomicBool,
+    /// What was told last of phase and cause.
+    told: (u8, u8),
+    /// Somebody looks at it: a fault is told, and ends nothing.
+    pub attended: bool,
+    /// For programs.
+    pub answers: Vec<Value>,
+}
+
+impl<P: Port> Machine<P> {
+    pub fn new(session: Session<P>, interrupted: &'static AtomicBool) -> Self {
+        let told = (session.status().phase, session.status().cause);
+        Self { session, interrupted, told, attended: false, answers: Vec::new() }
+    }
+
+    /// Phase and cause in words.
+    pub fn stands(&self) -> String {
+        let Status { phase, cause, amplifier_on, .. } = *self.session.status();
+        MachineWord { phase, cause, amplifier_on }.to_string()
+    }
+
+    pub fn is_powered(&self) -> bool {
+        self.session.status().amplifier_on
+    }
+
+    /// For programs.
+    pub fn status(&self) -> Value {
+        let status = self.session.status();
+        json!({
+            "tick": status.tick,
+            "phase": status.phase,
+            "cause": status.cause,
+            "stands": self.stands(),
+            "amplifiers_on": status.amplifier_on,
+            "status": status.status,
+            "events": status.events,
+            "late": status.late,
+            "link_errors": status.link.errors(),
+            "damaged_frames": self.session.damaged(),
+        })
+    }
+
+    /// Asks how it stands. A fault that is new ends what nobody attends to.
+    pub fn look(&mut self) -> Result<(), Ended> {
+        if self.interrupted.load(Ordering::Relaxed) {
+            return Err(Ended::Interrupted);
+        }
+        let before = self.session.status().phase;
+        self.session.poll()?;
+        let faulted = Phase::Faulted.word() as u8;
+        let status = self.session.status();
+        if !self.attended && status.phase == faulted && before != faulted {
+            return Err(Ended::Fault(format!("the machine is {}, at tick {}", self.stands(), status.tick)));
+        }
+        Ok(())
+    }
+
+    /// Tells of a phase that is new.
+    pub fn tell(&mut self, ui: &Ui) {
+        let status = self.session.status();
+        let now = (status.phase, status.cause);
+        if now != self.told {
+            self.told = now;
+            ui.progress(&format!("tick {}: {}", status.tick, self.stands()));
+        }
+    }
+
+    /// Keeps the answer of a line for programs, or shows it.
+    pub fn note(&mut self, line: &str, value: Value, text: &str, ui: &Ui) {
+        self.answers.push(json!({ "command": line, "answer": value }));
+        if !ui.is_json() && !text.is_empty() {
+            ui.out(&format!("{}\n", text.trim_end()));
+        }
+    }
+
+    /// Refuses `orders` if one of them makes no sense whatever the device does: names, numbers, waves, files that cannot be.
+    pub fn check(&self, orders: &[Order]) -> Result<(), Failure> {
+        let nonsense = |text: String| Failure::Usage(format!("{text}; nothing was asked of the machine"));
+        orders.iter().try_for_each(|order| match order {
+            Order::Set(assignments) => self.session.assign(assignments).map(|_| ()).map_err(nonsense),
+            Order::Wave(path) => self.wave_of(path).map(|_| ()).map_err(nonsense),
+            Order::Download(path) => check_place(path),
+            _ => Ok(()),
+        })
+    }
+
+    /// Carries an order out.
+    pub fn obey(&mut self, order: &Order, ui: &Ui) -> Result<(), Ended> {
+        self.look()?;
+        let (value, text) = match order {
+            Order::Status => (self.status(), self.text()),
+            Order::Ask(request) => {
+                self.session.supervise(*request)?;
+                (json!("done"), String::new())
+            }
+            Order::Set(assignments) => {
+                let words = self.session.assign(assignments).map_err(Ended::Refused)?;
+                self.session.command(words).map_err(waving)?;
+                (json!("done"), String::new())
+            }
+            Order::Wait { until, limit } => {
+                self.wait(*until, *limit, ui)?;
+                (json!(self.stands()), String::new())
+            }
+            Order::Config => self.config()?,
+            Order::WriteConfig(spec) => {
+                self.write_config(spec)?;
+                (json!("done"), String::new())
+            }
+            Order::Record(action) => recorder(&self.session.recorder(*action)?, self.session.period()),
+            Order::Download(path) => self.download(path)?,
+            Order::Wave(path) => {
+                self.wave(path)?;
+                (json!("done"), String::new())
+            }
+            Order::StopWave => {
+                self.session.stop_wave()?;
+                (json!("done"), String::new())
+            }
+        };
+        self.note(&format!("{order:?}"), value, &text, ui);
+        self.look()?;
+        self.tell(ui);
+        Ok(())
+    }
+
+    fn text(&self) -> String {
+        let status = self.session.status();
+        let on = if status.amplifier_on { "on" } else { "off" };
+        let mut text = format!(
+            "tick {}, {:.4} s: {}, amplifiers {on}, status {:#x}",
+            status.tick,
+            status.tick as f64 * self.session.period(),
+            self.stands(),
+            status.status
+        );
+        // Writing to a String cannot fail, here and below.
+        let _ = write!(text, "; events {:#x}, {} late ticks", status.events, status.late);
+        let _ = write!(text, ", {} damaged frames", status.link.errors() + self.session.damaged());
+        text
+    }
+
+    fn wait(&mut self, until: Until, limit: Duration, ui: &Ui) -> Result<(), Ended> {
+        let start = Instant::now();
+        loop {
+            let there = match until {
+                Until::Phase(phase) => u64::from(self.session.status().phase) == phase.word(),
+                Until::Passed(time) => start.elapsed() >= time,
+            };
+            if there {
+                return Ok(());
+            }
+            if let Until::Phase(phase) = until
+                && start.elapsed() >= limit
+            {
+                return Err(Ended::Fault(format!(
+                    "the machine is still {} after {} s, expected {}",
+                    self.stands(),
+                    limit.as_secs_f64(),
+                    phase.name()
+                )));
+            }
+            std::thread::sleep(self.session.due());
+            self.look()?;
+            self.tell(ui);
+        }
+    }
+
+    fn config(&mut self) -> Result<(Value, String), Ended> {
+        let words = self.session.config()?;
+        let description = self.session.description();
+        let (mut map, mut text) = (serde_json::Map::new(), String::new());
+        for (name, word) in description.config_names.iter().zip(words) {
+            let value = match host_sim::word::WordKind::of(name) {
+                host_sim::word::WordKind::Integer => json!(word),
+                host_sim::word::WordKind::Real => json!(description.scalar.decode(word)),
+            };
+            let _ = writeln!(text, "{name} = {value}");
+            map.insert(name.clone(), value);
+        }
+        Ok((Value::Object(map), text))
+    }
+
+    /// The settings of a spec; its tables stay in the spec.
+    fn write_config(&mut self, path: &Path) -> Result<(), Ended> {
+        // Compiling takes its time, in which the link is not to be lost.
+        let compiled = std::thread::scope(|scope| {
+            let work = scope.spawn(|| compile::compile(path));
+            while !work.is_finished() {
+                self.look()?;
+                std::thread::sleep(super::ALIVE);
+            }
+            match work.join() {
+                Ok(compiled) => compiled.map_err(|refused| Ended::Failed(refused.into())),
+                // The hook has said where.
+                Err(_) => Err(Ended::Failed(Failure::Environment("the compiler of specs failed".to_owned()))),
+            }
+        })?;
+        let (ours, theirs) = (&compiled.ir, self.session.description());
+        let words = &compiled.ir.integrity.settings;
+        if ours.scalar.bits() != theirs.scalar.bits() || words.len() != theirs.config_names.len() {
+            return Err(Ended::Refused(format!(
+                "{} has {} settings in f{}, the device {} in f{}: write the settings of a spec of the same kind and scalar",
+                path.display(),
+                words.len(),
+                ours.scalar.bits(),
+                theirs.config_names.len(),
+                theirs.scalar.bits()
+            )));
+        }
+        let words = words.clone();
+        self.session.write_config(&words).map_err(|error| match error {
+            ClientError::Refused(Refusal::Word { index }) => {
+                let names = &self.session.description().config_names;
+                let name = names.get(usize::from(index)).map_or("?", String::as_str);
+                Ended::Refused(format!("the device refuses `{name}` of {}: out of its range there", path.display()))
+            }
+            other => other.into(),
+        })
+    }
+
+    fn download(&mut self, path: &Path) -> Result<(Value, String), Ended> {
+        let bytes = self.session.download().map_err(|error| match error {
+            ClientError::Refused(Refusal::State) => {
+                Ended::Refused("it still records; `record stop` first, or wait for the trigger".to_owned())
+            }
+            other => other.into(),
+        })?;
+        write_file(path, &bytes).map_err(Ended::Failed)?;
+        let text = format!("wrote {} bytes to {}", bytes.len(), path.display());
+        Ok((json!({ "file": path.display().to_string(), "bytes": bytes.len() }), text))
+    }
+
+    fn wave_of(&self, path: &Path) -> Result<(Vec<u64>, [u64; 6]), String> {
+        let name = path.display();
+        let text = std::fs::read_to_string(path).map_err(|error| format!("could not read `{name}`: {error}"))?;
+        let single = self.session.description().scalar.bits() == 32;
+        read_wave(&text, self.session.period(), single).map_err(|error| format!("{name}: {}", error.trim_end()))
+    }
+
+    fn wave(&mut self, path: &Path) -> Result<(), Ended> {
+        let name = path.display();
+        let (words, center) = self.wave_of(path).map_err(Ended::Refused)?;
+        self.session.start_wave(&words, &center).map_err(|error| match error {
+            ClientError::Refused(Refusal::Word { index }) => Ended::Refused(format!("{name}: {}", refused_wave(index))),
+            ClientError::Refused(Refusal::State) => Ended::Refused(format!(
+                "{name}: not now; the machine must be running and stand at the wave's center, with no wave or move under way: {}",
+                self.stands()
+            )),
+            other => other.into(),
+        })
+    }
+
+    /// Ramps down and waits until the amplifiers are off; what came of it.
+    pub fn go_down(&mut self, ui: &Ui) -> Result<String, ClientError> {
+        ui.progress("interrupted: ramping down");
+        self.session.supervise(Request::RampDown)?;
+        let start = Instant::now();
+        while start.elapsed() < DOWN {
+            self.session.poll()?;
+            self.tell(ui);
+            let status = self.session.status();
+            let off = [Phase::Disarmed, Phase::Faulted].map(|phase| phase.word() as u8).contains(&status.phase);
+            if off && !status.amplifier_on {
+                return Ok(format!("the machine is {}, amplifiers off", self.stands()));
+            }
+            std::thread::sleep(self.session.due());
+        }
+        Ok(format!("the machine is still {} after {} s", self.stands(), DOWN.as_secs()))
+    }
+}
+
+/// Why set-points are refused while a wave makes them.
+fn waving(error: ClientError) -> Ended {
+    match error {
+        ClientError::Refused(Refusal::State) => {
+            Ended::Refused("not while a wave is under way or a host steps the machine; `wave stop` first".to_owned())
+        }
+        other => other.into(),
+    }
+}
+
+/// How a recorder stands.
+fn recorder(status: &RecorderStatus, period: f64) -> (Value, String) {
+    let RecorderStatus { running, triggered, ticks, capacity } = *status;
+    let does = match (running, triggered) {
+        (true, false) => "records, waits for its trigger",
+        (true, true) => "records what comes after the trigger",
+        (false, true) => "is complete",
+        (false, false) => "is stopped",
+    };
+    let text = format!(
+        "the recorder {does}; it holds {ticks} ticks, {:.4} s; {capacity} fit whatever changes",
+        f64::from(ticks) * period
+    );
+    (json!({ "running": running, "triggered": triggered, "ticks": ticks, "capacity": capacity }), text)
+}

@@ -1,0 +1,136 @@
+//! What a run found, for people and for programs.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use host_sim::platform::table::{MachiningTable, PoseTable};
+use host_sim::table::TrackingTable;
+use serde::Serialize;
+use serde_json::Value;
+
+use specgen_compiler::compile::Compiled;
+use specgen_operate::pil::{Cost, Difference};
+
+/// Everything that a run found.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    /// Name of the spec.
+    pub name: String,
+    /// Its digest.
+    pub digest: String,
+    /// What was in the loop.
+    pub device: String,
+    /// Ticks that host and device computed alike.
+    pub ticks: u64,
+    /// The first that they did not.
+    pub first_difference: Option<Difference>,
+    /// Control interval, s.
+    pub interval: f64,
+    /// Time that the loops took, s.
+    pub seconds: f64,
+    /// Of these, waiting for the device.
+    #[serde(serialize_with = "as_seconds")]
+    pub waited: Duration,
+    /// Frames from the device that came damaged, and were asked for again.
+    pub damaged_frames: u32,
+    /// What costs are counted in; empty if they are not.
+    pub counted: &'static str,
+    /// Per stage.
+    pub costs: Vec<Cost>,
+    /// Static bound of a tick's stack, bytes; none for a board, or if the call graph cannot be bounded.
+    pub stack_bound: Option<u64>,
+    /// Legs: errors of the trajectory.
+    pub tracking: TrackingTable,
+    /// Platform, free motion.
+    #[serde(serialize_with = "rows")]
+    pub free_motion: PoseTable,
+    /// Platform, against a work part.
+    pub machining: Value,
+    /// Errors in words.
+    #[serde(skip)]
+    pub errors: String,
+}
+
+fn as_seconds<S: serde::Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(time.as_secs_f64())
+}
+
+fn rows<S: serde::Serializer>(table: &PoseTable, serializer: S) -> Result<S::Ok, S::Error> {
+    table.rows.serialize(serializer)
+}
+
+impl Report {
+    /// Before the first tick.
+    pub fn new(compiled: &Compiled, device: String, stack_bound: Option<u64>) -> Self {
+        Self {
+            name: compiled.ir.name.clone(),
+            digest: compiled.ir.digest.clone(),
+            device,
+            ticks: 0,
+            first_difference: None,
+            interval: compiled.model.timing.period,
+            seconds: 0.0,
+            waited: Duration::ZERO,
+            damaged_frames: 0,
+            counted: "",
+            costs: Vec::new(),
+            stack_bound,
+            tracking: TrackingTable::default(),
+            free_motion: PoseTable::default(),
+            machining: Value::Null,
+            errors: String::new(),
+        }
+    }
+
+    /// Puts the table of free motion before what else is said of errors.
+    pub fn write_free_motion(&mut self) {
+        let text = format!("Tables 5 to 8, beside the paper's\n{}", self.free_motion.to_text());
+        self.errors.insert_str(0, &text);
+    }
+
+    /// The same of work parts.
+    pub fn write_machining(&mut self, table: &MachiningTable) {
+        self.errors.insert_str(0, &format!("Table 9\n{}", table.to_text()));
+        self.machining = serde_json::json!(table);
+    }
+
+    /// Closed-loop ticks in a second of this machine's time.
+    fn rate(&self) -> f64 {
+        if self.seconds > 0.0 { self.ticks as f64 / self.seconds } else { 0.0 }
+    }
+
+    pub fn text(&self) -> String {
+        let mut out = format!(
+            "{}: {} in the loop; host and device equal in every bit of {} ticks\n",
+            self.name, self.device, self.ticks
+        );
+        out.push_str(&self.errors);
+        // Writing to a String cannot fail, here and below.
+        if !self.costs.is_empty() {
+            let _ = writeln!(out, "{:<18}{:>10}{:>10}{:>12}{:>10}", self.counted, "calls", "min", "mean", "max");
+            for cost in &self.costs {
+                let _ = writeln!(
+                    out,
+                    "  {:<16}{:>10}{:>10}{:>12.1}{:>10}",
+                    cost.name, cost.calls, cost.min, cost.mean, cost.max
+                );
+            }
+        }
+        if let Some(whole) = self.costs.first().filter(|whole| whole.stack > 0) {
+            let bound = self.stack_bound.map_or_else(String::new, |bound| format!(", static bound {bound} bytes"));
+            let _ = writeln!(out, "stack of a tick: {} bytes seen{bound}", whole.stack);
+        }
+        if self.damaged_frames > 0 {
+            let _ = writeln!(out, "{} frames came damaged and were asked for again", self.damaged_frames);
+        }
+        let rate = self.rate();
+        let _ = writeln!(
+            out,
+            "{rate:.0} steps/s in closed loop, {:.2} × real time at {} Hz; {:.0} % of it waiting for the device",
+            rate * self.interval,
+            (1.0 / self.interval).round(),
+            100.0 * self.waited.as_secs_f64() / if self.seconds > 0.0 { self.seconds } else { 1.0 },
+        );
+        out
+    }
+}

@@ -1,0 +1,270 @@
+//! What is run in the loop: the scenarios of `sim`, with a lock-step for a controller.
+
+use std::fmt::Write as _;
+
+use host_sim::closed_loop::Rig;
+use host_sim::plant::{LegPlant, NoiseParameters};
+use host_sim::platform::rig::{Noise, PlatformRun};
+use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select as select_platform};
+use host_sim::platform::table::{AXES, MachiningTable, PoseRow};
+use host_sim::platform::{PlatformScenario, WorkPart};
+use host_sim::scenario::{MODES, select as select_legs};
+use host_sim::table::TrackingRow;
+use host_sim::trajectory::{LegTrajectory, PaperLeg, PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
+use specgen_link::client::Port;
+use specgen_runtime::setpoint::{REFUSED, STALE};
+
+use super::report::Report;
+use super::{Arguments, Broken, timed};
+use crate::cli::sim;
+use crate::cli::ui::{Failure, Ui};
+use specgen_compiler::compile::Compiled;
+use specgen_language::model::TaskSpace;
+use specgen_operate::pil::Lockstep;
+use specgen_studies::machine;
+
+/// Operating frequency unless asked otherwise, Hz.
+const FREQUENCY: f64 = 10.0;
+/// The same against a work part.
+const MACHINING_FREQUENCY: f64 = 1.0;
+/// Control ticks per period of the leg trajectory, unless asked otherwise.
+const SAMPLES: u32 = 500;
+
+/// What to run.
+pub enum Plan {
+    /// The leg trajectory.
+    Legs {
+        /// Names with the values of the `mode` word.
+        modes: Vec<(&'static str, u32)>,
+        frequency: f64,
+        samples: u32,
+    },
+    /// A path of the paper, streamed.
+    Path {
+        name: &'static str,
+        path: PaperPath,
+        part: Option<WorkPart>,
+        modes: Vec<(&'static str, u32)>,
+        frequency: f64,
+    },
+    /// A trajectory on board.
+    Board { name: String, selector: u32, mode: Option<(&'static str, u32)> },
+}
+
+impl Plan {
+    /// The plan of the arguments.
+    ///
+    /// # Errors
+    /// Arguments that make no sense for the spec.
+    pub fn of(arguments: &Arguments, compiled: &Compiled) -> Result<Self, Failure> {
+        match &compiled.model.task_space {
+            Some(task) => Self::platform(arguments, task),
+            None => Self::legs(arguments, compiled),
+        }
+    }
+
+    fn legs(arguments: &Arguments, compiled: &Compiled) -> Result<Self, Failure> {
+        if arguments.scenario.is_some() || arguments.trajectory.is_some() {
+            return Err(Failure::Usage(
+                "--scenario and --trajectory are for a platform that six gauges see; this spec has no [control]: its one scenario is the leg trajectory"
+                    .to_owned(),
+            ));
+        }
+        let modes = match &arguments.mode {
+            Some(name) => vec![mode(name, &MODES)?],
+            None => sim::legs::modes(&compiled.model.adaptation),
+        };
+        let frequency = arguments.frequency.unwrap_or(FREQUENCY);
+        Ok(Self::Legs { modes, frequency, samples: arguments.samples.unwrap_or(SAMPLES) })
+    }
+
+    fn platform(arguments: &Arguments, task: &TaskSpace) -> Result<Self, Failure> {
+        if arguments.samples.is_some() {
+            return Err(Failure::Usage(
+                "--samples is for legs with their own gauges; a spec with [control] runs at its timing.period"
+                    .to_owned(),
+            ));
+        }
+        let wanted = arguments.mode.as_deref().map(|name| mode(name, &PLATFORM_MODES)).transpose()?;
+        if let Some(name) = &arguments.trajectory {
+            if arguments.frequency.is_some() {
+                return Err(Failure::Usage(
+                    "--frequency is for the paper's cases; the spec gives the frequency of its own trajectories"
+                        .to_owned(),
+                ));
+            }
+            let selector = sim::platform::selector(task, name)?;
+            return Ok(Self::Board { name: name.clone(), selector, mode: wanted });
+        }
+        let (name, path, part) = match arguments.scenario.as_deref().unwrap_or("case-1") {
+            "case-1" => ("case-1", PaperPath::Case1, None),
+            "case-2" => ("case-2", PaperPath::Case2, None),
+            "glass" => ("glass", PaperPath::Machining, Some(WorkPart::glass())),
+            "aluminium" => ("aluminium", PaperPath::Machining, Some(WorkPart::aluminium())),
+            other => {
+                return Err(Failure::Usage(format!(
+                    "there is no scenario `{other}`; expected case-1, case-2, glass or aluminium, or --trajectory with one of the spec's own"
+                )));
+            }
+        };
+        let usual = match part {
+            None => FREE_MODES.to_vec(),
+            Some(_) => vec![PLATFORM_MODES[0], PLATFORM_MODES[3], PLATFORM_MODES[6]],
+        };
+        let frequency = arguments.frequency.unwrap_or(if part.is_some() { MACHINING_FREQUENCY } else { FREQUENCY });
+        Ok(Self::Path { name, path, part, modes: wanted.map_or(usual, |mode| vec![mode]), frequency })
+    }
+
+    /// Runs it; what is found goes into the report.
+    pub fn run<P: Port>(
+        &self,
+        lockstep: &mut Lockstep<P>,
+        report: &mut Report,
+        compiled: &Compiled,
+        arguments: &Arguments,
+        ui: &Ui,
+    ) -> Result<(), Broken> {
+        match self {
+            Self::Legs { modes, frequency, samples } => {
+                let rig = legs(compiled, *samples, arguments, ui)?;
+                let trajectory = Start::of(PaperLeg { frequency: *frequency }, arguments.seconds);
+                let interval = 1.0 / frequency / f64::from(*samples);
+                report.interval = interval;
+                for &(mode, word) in modes {
+                    ui.progress(&format!("leg trajectory at {frequency} Hz, {mode}"));
+                    select_legs(lockstep, word).map_err(host_sim::closed_loop::RunError::from)?;
+                    let mut rig = rig.clone();
+                    let run = timed(&mut report.seconds, || rig.run(lockstep, &trajectory, interval))?;
+                    report.tracking.rows.push(TrackingRow::of(mode, *frequency, &run.tracking));
+                }
+                report.errors = format!("tracking error of the leg trajectory, T − Y\n{}", report.tracking.to_text());
+                Ok(())
+            }
+            Self::Path { name, path, part, modes, frequency } => {
+                let trajectory = PaperPose { path: *path, reading: Reading::Corrected, frequency: *frequency };
+                let trajectory = Start::of(trajectory, arguments.seconds);
+                let scenario = platform(compiled, arguments, ui)?;
+                let mut machining = MachiningTable::default();
+                for &(mode, word) in modes {
+                    ui.progress(&format!("{name} at {frequency} Hz, {mode}"));
+                    select_platform(lockstep, word).map_err(host_sim::closed_loop::RunError::from)?;
+                    let run = timed(&mut report.seconds, || match part {
+                        None => scenario.run(lockstep, &trajectory),
+                        Some(part) => scenario.machine(lockstep, &trajectory, *part),
+                    })?;
+                    refused(name, &run, report);
+                    match part {
+                        None => report.free_motion.rows.push(PoseRow::of(name, mode, *frequency, &run.errors)),
+                        Some(_) => machining.push(name, mode, &run.errors),
+                    }
+                }
+                if part.is_none() {
+                    report.write_free_motion();
+                } else {
+                    report.write_machining(&machining);
+                }
+                Ok(())
+            }
+            Self::Board { name, selector, mode } => {
+                let scenario = platform(compiled, arguments, ui)?;
+                if let Some((_, word)) = mode {
+                    select_platform(lockstep, *word).map_err(host_sim::closed_loop::RunError::from)?;
+                }
+                ui.progress(&format!("playing {name} on board"));
+                let limit = arguments.seconds.unwrap_or(sim::platform::PLAYED);
+                let run = timed(&mut report.seconds, || scenario.play(lockstep, *selector, limit))?;
+                report.errors = on_board(name, &run);
+                refused(name, &run, report);
+                Ok(())
+            }
+        }
+    }
+}
+
+fn mode(name: &str, known: &[(&'static str, u32)]) -> Result<(&'static str, u32), Failure> {
+    known.iter().find(|(known, _)| *known == name).copied().ok_or_else(|| {
+        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
+        Failure::Usage(format!("there is no mode `{name}` for this spec; expected one of {}", names.join(", ")))
+    })
+}
+
+/// Six legs at rest, with their gauges zeroed.
+fn legs(compiled: &Compiled, samples: u32, arguments: &Arguments, ui: &Ui) -> Result<Rig<LegPlant>, Broken> {
+    let parameters = arguments.plant.leg()?;
+    let noise = if arguments.plant.no_noise { NoiseParameters::NONE } else { parameters.noise };
+    ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
+    let legs = std::array::from_fn(|_| parameters.clone());
+    let mut scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, samples);
+    Ok(scenario.rig_mut().clone())
+}
+
+fn platform(compiled: &Compiled, arguments: &Arguments, ui: &Ui) -> Result<PlatformScenario, Broken> {
+    let model = &compiled.model;
+    // A plan of a platform is made of a spec that has one.
+    let Some(task) = &model.task_space else {
+        return Err(Failure::Usage("this spec has no [control]".to_owned()).into());
+    };
+    let seed = arguments.plant.seed;
+    let specimen = machine::specimen(model, task, &arguments.plant.leg()?, Some(seed));
+    let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
+    ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
+    Ok(machine::scenario(model, task, &specimen, &noise, seed))
+}
+
+/// Says if the controller held instead of following.
+fn refused(name: &str, run: &PlatformRun, report: &mut Report) {
+    if run.status & (REFUSED | STALE) != 0 {
+        let _ = writeln!(
+            report.errors,
+            "{name}: the controller refused set-points (status {:#x}), as it did on the host",
+            run.status
+        );
+    }
+}
+
+fn on_board(name: &str, run: &PlatformRun) -> String {
+    let (rms, peak) = (run.errors.rms_nano(), run.errors.peak_nano());
+    let mut text = format!("{name}, on board: true pose against the controller's target\n");
+    for (axis, name) in AXES.iter().enumerate() {
+        let unit = if axis < 3 { "nm" } else { "nrad" };
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "  {name:<3}{:>10.2} {unit} rms{:>10.2} {unit} peak", rms[axis], peak[axis]);
+    }
+    text
+}
+
+/// The start of a trajectory, or all of it.
+struct Start<T> {
+    whole: T,
+    seconds: f64,
+}
+
+impl<T> Start<T> {
+    fn of(whole: T, seconds: Option<f64>) -> Self {
+        Self { whole, seconds: seconds.unwrap_or(f64::INFINITY) }
+    }
+
+    fn cut(&self, duration: f64) -> f64 {
+        if self.seconds < duration { self.seconds } else { duration }
+    }
+}
+
+impl<T: LegTrajectory> LegTrajectory for Start<T> {
+    fn duration(&self) -> f64 {
+        self.cut(self.whole.duration())
+    }
+
+    fn displacements(&self, time: f64) -> [f64; 6] {
+        self.whole.displacements(time)
+    }
+}
+
+impl<T: PoseTrajectory> PoseTrajectory for Start<T> {
+    fn duration(&self) -> f64 {
+        self.cut(self.whole.duration())
+    }
+
+    fn target(&self, time: f64) -> PoseTarget {
+        self.whole.target(time)
+    }
+}

@@ -1,0 +1,127 @@
+//! `specgen plant`: the simulated machine of a spec in shared memory, for the real-time target on the same computer.
+
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use host_sim::platform::rig::Noise;
+use serde_json::json;
+use specgen_rt::clock::{self, SECOND};
+use specgen_rt::exchange::{self, OpenError, Server};
+use specgen_rt::histogram::{Histogram, time_text};
+use specgen_rt::scheduling;
+
+use super::sim::{PlantArguments, environment};
+use super::ui::{Failure, Ui};
+use specgen_compiler::compile::{self, Compiled};
+use specgen_language::interrupt;
+use specgen_operate::served::{Machine, Served};
+use specgen_studies::machine;
+
+/// How long it waits for a controller before it looks whether it is to end, ns.
+const PATIENCE: u64 = SECOND / 10;
+/// Samples per period of the paper's trajectory, which is not run here.
+const NO_TRAJECTORY: u32 = 1;
+
+/// Arguments of `plant`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::PLANT)]
+pub struct Arguments {
+    /// The spec file.
+    spec: PathBuf,
+    /// Name under which a controller finds the machine.
+    #[arg(long, default_value = "plant")]
+    name: String,
+    /// End after this time, s; at Ctrl-C if not given.
+    #[arg(long, value_name = "S", value_parser = seconds, allow_negative_numbers = true)]
+    seconds: Option<f64>,
+    /// Keep it on this processor: another one than the controller's.
+    #[arg(long, value_name = "N")]
+    cpu: Option<usize>,
+    /// SCHED_FIFO priority, below the controller's; an ordinary process if not given.
+    #[arg(long, value_name = "P", allow_negative_numbers = true, value_parser = clap::value_parser!(u8).range(1..=98))]
+    priority: Option<u8>,
+    #[command(flatten)]
+    plant: PlantArguments,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let expected = || format!("expected a time from 0.01 to 10000000 s, found `{text}`");
+    text.parse().ok().filter(|time| (0.01..=1e7).contains(time)).ok_or_else(expected)
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let path = exchange::path_of(&arguments.name).map_err(|error| Failure::Usage(format!("--name: {error}")))?;
+    let compiled = compile::compile(&arguments.spec)?;
+    ui.findings_in_brief(&compiled.source, &compiled.findings);
+    let machine = prepared(arguments, &compiled, ui)?;
+    let mut served = Served::new(machine, &compiled.model, &compiled.ir);
+    for refused in
+        [arguments.cpu.map_or(Ok(()), scheduling::pin), arguments.priority.map_or(Ok(()), scheduling::set_fifo)]
+    {
+        refused.map_err(environment)?;
+    }
+    // Whatever ends it, the file is to go, and what was served is told.
+    let stop = interrupt::heed();
+    let server = Server::create(&path, &compiled.ir.digest).map_err(|error| match error {
+        OpenError::Served { .. } => Failure::Usage(error.to_string()),
+        error => environment(error),
+    })?;
+    let [name, own] = [&compiled.ir.name, &arguments.name];
+    ui.progress(&format!("machine of {name} at {}: start rt-pc --sim {own}; Ctrl-C ends it", path.display()));
+
+    // Where there is a processor to spare it does not sleep between two ticks: waking it costs the controller time. Under
+    // SCHED_FIFO it has to, or the kernel stops it for 50 ms in every second.
+    let period = (compiled.model.timing.period * 1e9) as u64;
+    let spare = std::thread::available_parallelism().map_or(1, usize::from) > 1;
+    let look = if spare && arguments.priority.is_none() { 2 * period } else { 0 };
+    let mut times = Histogram::new();
+    let end = arguments.seconds.map(|seconds| clock::now() + (seconds * SECOND as f64) as u64);
+    let mut seen = 0;
+    while !stop.load(Ordering::Relaxed) && end.is_none_or(|end| clock::now() < end) {
+        if let Some((actuation, wanted)) = server.wait(&mut seen, look, PATIENCE) {
+            let start = clock::now();
+            let sensing = served.answer(&actuation, wanted);
+            server.publish(&sensing);
+            times.add(clock::now() - start);
+        }
+    }
+    let text = format!(
+        "{name}: {} ticks for {} controllers; a tick took {} (median), {} (99 %), {} (longest) of {}\n",
+        served.ticks,
+        served.sessions,
+        time_text(times.quantile(0.5)),
+        time_text(times.quantile(0.99)),
+        time_text(times.largest()),
+        time_text(period),
+    );
+    let value = json!({
+        "digest": compiled.ir.digest,
+        "ticks": served.ticks,
+        "controllers": served.sessions,
+        "p50_ns": times.quantile(0.5),
+        "p99_ns": times.quantile(0.99),
+        "max_ns": times.largest(),
+    });
+    ui.result(&text, value);
+    Ok(())
+}
+
+/// The machine after its pre-cycle, with the gauges zeroed.
+fn prepared(arguments: &Arguments, compiled: &Compiled, ui: &Ui) -> Result<Machine, Failure> {
+    let (seed, leg) = (arguments.plant.seed, arguments.plant.leg()?);
+    ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
+    Ok(match &compiled.model.task_space {
+        Some(task) => {
+            let specimen = machine::specimen(&compiled.model, task, &leg, Some(seed));
+            let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
+            let scenario = machine::scenario(&compiled.model, task, &specimen, &noise, seed);
+            Machine::Platform(Box::new(scenario.rig().clone()))
+        }
+        None => {
+            let (leg, noise) = arguments.plant.read()?;
+            let legs = std::array::from_fn(|_| leg.clone());
+            Machine::Legs(Box::new(machine::legs(&compiled.model, &legs, &noise, seed, NO_TRAJECTORY).rig().clone()))
+        }
+    })
+}

@@ -1,0 +1,192 @@
+//! `specgen robust`: corners and random draws of declared uncertainties, quantiles of the error, a gate for builds.
+
+mod report;
+mod trajectory;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+
+use super::file::{claim, write_folder};
+use super::sim::{PlantArguments, emitted, environment, frequency};
+use super::ui::{Failure, Ui};
+use specgen_compiler::compile::{self, Compiled};
+use specgen_language::interrupt;
+use specgen_language::spec::quantity::{self, Dimension};
+use specgen_studies::robust::factors::Given;
+use specgen_studies::robust::{Factors, Gate, Plan, Study};
+
+/// Part of the stroke beyond which an error counts as diverged, unless asked otherwise.
+const BOUND: f64 = 0.05;
+/// Lines of progress of a run whose output is not looked at.
+const LINES: usize = 20;
+
+/// Arguments of `robust`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::ROBUST)]
+pub struct Arguments {
+    /// The spec file.
+    spec: PathBuf,
+    /// Random machines, besides the corners.
+    #[arg(long = "draws", value_name = "N", alias = "samples", default_value_t = 100, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    draws: u32,
+    /// Range of an uncertainty, in place of that of [robust] or the default: `mass=5%`, `gain=0.9:1.1`, `delay_ticks=1`.
+    /// Of mass, stiffness, damping, gain, hysteresis, creep, lag, noise (factors) and delay_ticks.
+    #[arg(long, value_name = "NAME=RANGE", value_parser = Given::parse)]
+    vary: Vec<Given>,
+    /// What is followed: case-1, case-2, machining or multisine, or a trajectory of the spec by its name; without
+    /// [control] leg or multisine. The first of them if not given.
+    #[arg(long, value_name = "NAME")]
+    trajectory: Option<String>,
+    /// Operating frequency of the paper's trajectory or highest of the multisine, Hz; 10 if not given. A trajectory of the
+    /// spec has its own.
+    #[arg(long, value_name = "HZ", value_parser = frequency, allow_negative_numbers = true)]
+    frequency: Option<f64>,
+    /// Run one machine alone: the seed of a draw, or the name of a corner.
+    #[arg(long, value_name = "SEED|NAME")]
+    replay: Option<String>,
+    /// Gate: largest rms error of the translation, or of legs, such as "30 nm"; that of [robust] if not given.
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
+    max_error: Option<f64>,
+    /// Gate: largest rms error of the angles, such as "100 nrad"; for a spec with [control].
+    #[arg(long, value_name = "ANGLE", value_parser = angle, allow_hyphen_values = true)]
+    max_orientation: Option<f64>,
+    /// Quantile of the draws that the gate compares, %; the largest of draws and corners if not given.
+    #[arg(long, value_name = "PERCENT", value_parser = percent, allow_negative_numbers = true)]
+    quantile: Option<f64>,
+    /// Error beyond which a run counts as diverged; 5 % of the stroke if not given.
+    #[arg(long, value_name = "LENGTH", value_parser = length, allow_hyphen_values = true)]
+    diverged_above: Option<f64>,
+    /// Worker threads; as many as the machine has if not given. The result does not depend on it.
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    threads: Option<u32>,
+    /// Write runs (CSV) and report (JSON) here.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    plant: PlantArguments,
+}
+
+fn measure(text: &str, dimension: Dimension, example: &str) -> Result<f64, String> {
+    let found = quantity::parse(text).ok().filter(|found| found.dimension == dimension && found.value > 0.0);
+    found
+        .map(|found| found.value)
+        .ok_or_else(|| format!("expected a quantity above zero such as {example}, found `{text}`"))
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    measure(text, Dimension::LENGTH, "\"30 nm\"")
+}
+
+fn angle(text: &str) -> Result<f64, String> {
+    measure(text, Dimension::ANGLE, "\"100 nrad\"")
+}
+
+fn percent(text: &str) -> Result<f64, String> {
+    let found = text.trim().trim_end_matches('%').trim().parse().ok().filter(|x| *x > 0.0 && *x <= 100.0);
+    found.ok_or_else(|| format!("expected a percentage above 0, up to 100, found `{text}`"))
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let begun = Instant::now();
+    let leg = arguments.plant.leg()?;
+    let compiled = compile::compile(&arguments.spec)?;
+    ui.findings(Some(&compiled.source), &compiled.findings);
+    let followed = trajectory::chosen(arguments, &compiled)?;
+    let gate = gate(arguments, &compiled)?;
+    let factors = Factors::of(&compiled.model, &arguments.vary);
+    let seed = arguments.plant.seed;
+    let plan = match &arguments.replay {
+        Some(name) => Plan::alone(&factors, name, seed).map_err(Failure::Usage)?,
+        None => Plan::new(&factors, arguments.draws, seed),
+    };
+    let threads = arguments.threads.map_or_else(
+        || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        |threads| threads as usize,
+    );
+    let _claimed = arguments.output.as_deref().map(claim).transpose()?;
+    let controller = emitted(&compiled, ui)?;
+    let study = Study {
+        compiled: &compiled,
+        controller: &controller,
+        leg: &leg,
+        trajectory: followed.choice,
+        noise: !arguments.plant.no_noise,
+        bound: arguments.diverged_above.unwrap_or(BOUND * compiled.model.actuator.stroke),
+    };
+    // The machines that are done make a result.
+    let stop = interrupt::heed();
+    let all = plan.members.len();
+    let started = Instant::now();
+    let mut shown = 0;
+    let runs = study.run_all(&plan, threads, stop, |done| {
+        let lines = done * LINES / all;
+        if lines > shown || ui.is_terminal() {
+            shown = lines;
+            let elapsed = started.elapsed().as_secs_f64();
+            let left = elapsed * (all - done) as f64 / done as f64;
+            let rate = done as f64 / elapsed.max(1e-9);
+            ui.rate(&format!("robust: {done} of {all} machines, {rate:.1} a second, {left:.0} s left"));
+        }
+    });
+    ui.rate_done();
+    let runs = runs.map_err(environment)?;
+
+    let reasons = gate.reasons(&runs);
+    let report = report::Report {
+        arguments,
+        compiled: &compiled,
+        factors: &factors,
+        followed: &followed,
+        study: &study,
+        gate: &gate,
+        reasons: &reasons,
+        planned: all,
+        runs: &runs,
+    };
+    let value = report.value();
+    if let Some(folder) = &arguments.output {
+        let files = [
+            ("runs.csv".to_owned(), report.csv().into_bytes()),
+            ("report.json".to_owned(), format!("{value:#}\n").into_bytes()),
+        ];
+        write_folder(folder, &files)?;
+        ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
+    }
+    ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
+    let text = report.text();
+    if runs.len() < all {
+        if !ui.is_json() {
+            ui.out(&text);
+        }
+        let message =
+            format!("interrupted: the figures are of {} of {all} machines, and no gate is passed", runs.len());
+        return Err(Failure::Interrupted { message, result: value });
+    }
+    if !reasons.is_empty() {
+        if !ui.is_json() {
+            ui.out(&text);
+        }
+        return Err(Failure::Judged { message: format!("not robust: {}", reasons.join("; ")), result: value });
+    }
+    ui.result(&text, value);
+    Ok(())
+}
+
+/// Of the options, else of the spec.
+fn gate(arguments: &Arguments, compiled: &Compiled) -> Result<Gate, Failure> {
+    let declared = &compiled.model.robust;
+    if arguments.max_orientation.is_some() && compiled.model.task_space.is_none() {
+        return Err(Failure::Usage(
+            "--max-orientation is for a spec with [control]; legs with their own gauges have --max-error".to_owned(),
+        ));
+    }
+    let orientation = if compiled.model.task_space.is_some() { declared.max_orientation } else { None };
+    Ok(Gate {
+        error_nm: arguments.max_error.or(declared.max_error).map(|error| error * 1e9),
+        orientation_nrad: arguments.max_orientation.or(orientation).map(|error| error * 1e9),
+        // Of one machine there is one figure.
+        quantile: arguments.quantile.filter(|_| arguments.replay.is_none()),
+    })
+}

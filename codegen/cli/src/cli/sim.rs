@@ -1,0 +1,166 @@
+//! `specgen sim`: the paper's experiments with the emitted controller; `specgen forc`: the experiment that records reversal
+//! curves. Both on simulated machines that are not of the controller's model class.
+
+pub(super) mod legs;
+pub(super) mod platform;
+mod record;
+
+use std::fmt::Display;
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::controller::Controller;
+use host_sim::forc::ReversalExperiment;
+use host_sim::noise::Gauge;
+use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
+use serde_json::json;
+
+use super::file::{check_place, claim, write_file};
+use super::ui::{Failure, Ui};
+use specgen_compiler::compile;
+use specgen_compiler::workspace;
+use specgen_language::interrupt::Scratch;
+use specgen_toolchain as target;
+
+/// Arguments of `sim`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::SIM)]
+pub struct Arguments {
+    /// The spec file.
+    spec: PathBuf,
+    /// Write traces and tables here; only print without it.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    plant: PlantArguments,
+    /// Without [control]: control ticks per period of the trajectory, 500 if not given.
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    samples: Option<u32>,
+    /// With [control]: operating frequencies of cases 1 and 2, Hz; 1 and 10 if not given. 0.1 takes ten times as long as 1.
+    #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = frequency, allow_negative_numbers = true)]
+    frequency: Option<Vec<f64>>,
+    /// With [control]: play this trajectory of the spec on board, instead of the paper's experiments.
+    #[arg(long, value_name = "NAME")]
+    trajectory: Option<String>,
+    /// With [control]: control intervals by which voltages reach the amplifiers late.
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=100))]
+    latency: u32,
+    /// Instead of the experiments: a wave on all axes under the supervisor, every tick of it recorded in this file for
+    /// `specgen replay`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "samples", "frequency", "trajectory"])]
+    record: Option<PathBuf>,
+    /// Length of that wave, s.
+    #[arg(long, value_name = "S", default_value_t = 1.0, requires = "record", allow_negative_numbers = true)]
+    seconds: f64,
+}
+
+/// A frequency at which a trajectory has a sensible length.
+pub(super) fn frequency(text: &str) -> Result<f64, String> {
+    let expected = || format!("expected a frequency from 0.001 to 1000 Hz, found `{text}`");
+    let hertz: f64 = text.trim().trim_end_matches("Hz").trim().parse().map_err(|_| expected())?;
+    if (1e-3..=1e3).contains(&hertz) { Ok(hertz) } else { Err(expected()) }
+}
+
+/// Which leg is simulated.
+#[derive(Args, Debug)]
+pub struct PlantArguments {
+    /// Leg parameters (JSON); the reference leg if not given. With [control]: the shape of the legs' hysteresis, scaled to
+    /// what the spec says of them.
+    #[arg(long, value_name = "FILE")]
+    pub(super) plant: Option<PathBuf>,
+    /// Without noise and quantisation of gauge and amplifier.
+    #[arg(long)]
+    pub(super) no_noise: bool,
+    /// Seed of the noise, and with [control] of the tolerances of the machine.
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true)]
+    pub(super) seed: u64,
+}
+
+impl PlantArguments {
+    pub(super) fn leg(&self) -> Result<LegParameters, Failure> {
+        match &self.plant {
+            Some(path) => LegParameters::load(path).map_err(|error| Failure::Gate(error.to_string())),
+            None => Ok(LegParameters::reference()),
+        }
+    }
+
+    pub(super) fn read(&self) -> Result<(LegParameters, NoiseParameters), Failure> {
+        let parameters = self.leg()?;
+        let noise = if self.no_noise { NoiseParameters::NONE } else { parameters.noise };
+        Ok((parameters, noise))
+    }
+}
+
+pub(super) fn environment(error: impl Display) -> Failure {
+    Failure::Environment(error.to_string())
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    // A bad plant file is told before the minutes of the rest.
+    arguments.plant.read()?;
+    let compiled = compile::compile(&arguments.spec)?;
+    ui.findings(Some(&compiled.source), &compiled.findings);
+    let task = compiled.model.task_space.as_ref();
+    match task {
+        Some(task) => platform::check(arguments, task)?,
+        None => legs::check(arguments)?,
+    }
+    // A place that cannot be is told before the minutes of the rest, too.
+    let _claimed = arguments.output.as_deref().map(claim).transpose()?;
+    arguments.record.as_deref().map_or(Ok(()), check_place)?;
+    let mut controller = emitted(&compiled, ui)?;
+    if let Some(path) = &arguments.record {
+        return record::run(arguments, path, &compiled, controller, ui);
+    }
+    match task {
+        Some(task) => platform::run(arguments, &compiled, task, &mut controller, ui),
+        None => legs::run(arguments, &compiled, &mut controller, ui),
+    }
+}
+
+/// The emitted controller, built for this host from the same files that the main job writes. What it was built in is gone
+/// when this returns; the library stays loaded.
+pub(super) fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controller, Failure> {
+    let scratch = Scratch::new().map_err(environment)?;
+    let workspace = scratch.path().join("controller");
+    workspace::write_scratch(&workspace, &compiled.files)?;
+    ui.progress("building the emitted controller for this host");
+    let library = target::host::build_library(&workspace, &scratch.path().join("target"))?;
+    Controller::load(&library).map_err(environment)
+}
+
+/// Arguments of `forc`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::FORC)]
+pub struct ForcArguments {
+    /// File to write: CSV with time_s, drive_V, displacement_um.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Reversal curves, and cells per axis of the grid that they identify.
+    #[arg(long, default_value_t = 32, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=256))]
+    grid: u32,
+    /// Slope of the drive, V/s: records at several rates are what `identify rate` needs.
+    #[arg(long, value_name = "V/S", default_value_t = 20.0, allow_negative_numbers = true, value_parser = slope)]
+    rate: f64,
+    #[command(flatten)]
+    plant: PlantArguments,
+}
+
+/// Slopes from one sweep in hours to one in milliseconds.
+fn slope(text: &str) -> Result<f64, String> {
+    let expected = || format!("expected a slope from 0.1 to 100000 V/s, found `{text}`");
+    text.parse().ok().filter(|rate| (0.1..=1e5).contains(rate)).ok_or_else(expected)
+}
+
+pub fn run_forc(arguments: &ForcArguments, ui: &mut Ui) -> Result<(), Failure> {
+    let (parameters, noise) = arguments.plant.read()?;
+    let mut leg = LegPlant::new(&parameters);
+    let mut gauge = Gauge::new(&noise, arguments.plant.seed, 0);
+    let record = ReversalExperiment { rate: arguments.rate, ..ReversalExperiment::reference(arguments.grid) }
+        .run(&mut leg, &mut gauge);
+    let rows = record.rows.len();
+    write_file(&arguments.output, record.to_csv().as_bytes())?;
+    let text = format!("wrote {rows} rows to {}\n", arguments.output.display());
+    ui.result(&text, json!({ "rows": rows, "file": arguments.output.display().to_string() }));
+    Ok(())
+}

@@ -1,0 +1,222 @@
+//! `specgen sim --record`: a run under the supervisor with every tick recorded. The set-points come from the wave generator
+//! that the targets have.
+
+use std::cell::RefCell;
+use std::io::BufWriter;
+use std::path::Path;
+
+use host_sim::closed_loop::RunError;
+use host_sim::controller::{Controller, Supervised, TickController};
+use host_sim::platform::rig::{Bench, Noise, Request};
+use host_sim::record::{Ended, Recorded, Writer};
+use host_sim::scenario::select;
+use host_sim::trajectory::{LegTrajectory, PoseTarget};
+use serde_json::json;
+use specgen_runtime::record::Layout;
+use specgen_runtime::recorder::{Recorder, Settings as Recording};
+use specgen_runtime::wave::{AxisWave, Limits, Settings, Shape, Tone, Wave, step_of};
+
+use super::{Arguments, environment};
+use crate::cli::file::{PendingFile, unwritten};
+use crate::cli::ui::{Failure, Ui};
+use specgen_compiler::compile::Compiled;
+use specgen_language::model::TaskSpace;
+use specgen_studies::machine;
+
+/// Blocks of the recorder, and words of each: a tenth of a second at 10 kHz.
+const BLOCKS: usize = 2;
+const BLOCK: usize = 1 << 15;
+/// Frequencies of the axes, Hz: none is a multiple of another.
+const FREQUENCIES: [f64; 6] = [1.0, 1.3, 1.7, 2.1, 2.3, 2.9];
+/// Share of the room that an axis swings by: the third axis (z, or a leg), the others. The legs share their stroke.
+const SHARES: [f64; 2] = [0.2, 0.03];
+/// Way to the bias pose, at most, s.
+const ARMING: f64 = 60.0;
+
+/// Runs and records.
+pub(super) fn run(
+    arguments: &Arguments,
+    path: &Path,
+    compiled: &Compiled,
+    controller: Controller,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let period = compiled.model.timing.period;
+    let seconds = arguments.seconds;
+    let ticks = (seconds / period).round();
+    if !(1.0..1e9).contains(&ticks) {
+        return Err(Failure::Usage(format!(
+            "--seconds {seconds} is {ticks} ticks of {period} s; expected 1 to 10^9 ticks"
+        )));
+    }
+    let text = controller.text().to_owned();
+    let machine = Supervised::new(controller).map_err(environment)?;
+    let layout = Layout {
+        config: machine.controller().description().config_names.len(),
+        input: machine.input_names().len(),
+        state: machine.state_words(),
+    };
+    // A machine of long memory needs longer blocks.
+    let block = if BLOCK < 2 * layout.preamble() { 2 * layout.preamble() } else { BLOCK };
+    let mut memory = vec![0; BLOCKS * block];
+    let mut recorder = Recorder::new(&mut memory, BLOCKS, layout)
+        .map_err(|unfit| Failure::Environment(format!("the recorder does not fit this controller: {unfit:?}")))?;
+    recorder.start(Recording::STREAM);
+    let file = BufWriter::with_capacity(1 << 20, PendingFile::create(path)?);
+    let mut writer = Writer::new(file, &text).map_err(|error| unwritten(path, &error))?;
+    let mut recorded = Recorded::new(machine, &mut recorder, &mut writer).map_err(environment)?;
+    recorded.reset();
+    ui.progress(&format!("recording {seconds} s of a wave on all axes under the supervisor"));
+    let wave = wave(compiled, ticks as i32)?;
+    let ran = match &compiled.model.task_space {
+        Some(task) => platform(arguments, compiled, task, &mut recorded, wave, ticks as u64),
+        None => legs(arguments, compiled, &mut recorded, wave, seconds),
+    };
+    let ended = match (recorded.ended().is_some(), ran) {
+        // It ended the run by itself, and says why.
+        (true, _) | (false, Ok(())) => recorded.finish(),
+        (false, Err(error)) => return Err(environment(error)),
+    };
+    ended.map_err(|ended| match ended {
+        Ended::Io(error) => unwritten(path, &error),
+        Ended::Controller(error) => environment(error),
+        Ended::Supervisor { tick, word } => {
+            Failure::Gate(format!("tick {tick}: instead of running the machine is {word}; nothing was written"))
+        }
+    })?;
+    let file = writer.finish().map_err(|error| unwritten(path, &error))?;
+    let file = file.into_inner().map_err(|error| unwritten(path, &error))?;
+    file.keep()?;
+    let bytes = std::fs::metadata(path).map(|found| found.len()).unwrap_or_default();
+    let ticks = recorder.tick();
+    let text = format!(
+        "wrote {ticks} ticks, {:.3} s, to {}: {:.1} MB, {:.0} bytes a tick\n",
+        ticks as f64 * period,
+        path.display(),
+        bytes as f64 / 1e6,
+        bytes as f64 / ticks as f64
+    );
+    ui.result(&text, json!({ "ticks": ticks, "bytes": bytes, "file": path.display().to_string() }));
+    Ok(())
+}
+
+/// A wave of all axes within the limits of the spec; smaller where it would be too fast.
+fn wave(compiled: &Compiled, ticks: i32) -> Result<Wave<f64>, Failure> {
+    let (ir, period) = (&compiled.ir, compiled.model.timing.period);
+    let mut settings = Settings::still();
+    let limits = match &ir.task_space {
+        Some(task) => {
+            let setpoints = &task.setpoints;
+            settings.center = setpoints.home;
+            let range = |sign: f64| std::array::from_fn(|axis| sign * ir.bounds.pose[axis] - setpoints.bias[axis]);
+            Limits {
+                low: range(-1.0),
+                high: range(1.0),
+                rate: setpoints.stream_rate,
+                acceleration: setpoints.stream_acceleration,
+                ticks_per_second: setpoints.rate,
+            }
+        }
+        None => {
+            // Where the gauge sees the leg and the stack moves it; the bounds of set-points are wider than both.
+            let high = compiled.model.actuator.stroke.min(ir.bounds.sensor[1]).min(ir.bounds.leg[1]);
+            let low = ir.bounds.sensor[0].max(ir.bounds.leg[0]);
+            // A leg follows no faster than its amplifier lets it; what accelerates it is not limited by the spec.
+            let rate = compiled.model.actuator.slew_rate * compiled.model.actuator.leg_gain();
+            Limits {
+                low: [low; 6],
+                high: [high; 6],
+                rate: [rate; 6],
+                acceleration: [1e6; 6],
+                ticks_per_second: 1.0 / period,
+            }
+        }
+    };
+    settings.ticks = ticks;
+    settings.ramp_ticks = if ticks < 20 { 1 } else { ticks / 10 };
+    let on_legs = ir.task_space.is_none();
+    let mut share = 1.0;
+    for _ in 0..20 {
+        for axis in 0..6 {
+            let room = limits.high[axis] - settings.center[axis];
+            let below = settings.center[axis] - limits.low[axis];
+            let room = if on_legs || room < below { room } else { below };
+            let amplitude = share * SHARES[usize::from(axis != 2 && !on_legs)] * room;
+            let tone = Tone { amplitude, phase: 0, step: step_of(FREQUENCIES[axis], period) };
+            let offset = if on_legs { 0.4 * room } else { 0.0 };
+            settings.axes[axis] = AxisWave { offset, shape: Shape::Sine { tone } };
+        }
+        let mut wave = Wave::new(limits);
+        if wave.set(&settings).is_ok() {
+            wave.start();
+            return Ok(wave);
+        }
+        share /= 2.0;
+    }
+    Err(Failure::Gate(
+        "no wave fits between the bias pose and the limits of the workspace and of streams; widen control.setpoint.stream_speed".to_owned(),
+    ))
+}
+
+fn platform(
+    arguments: &Arguments,
+    compiled: &Compiled,
+    task: &TaskSpace,
+    controller: &mut Recorded<'_, '_>,
+    mut wave: Wave<f64>,
+    ticks: u64,
+) -> Result<(), RunError> {
+    let seed = arguments.plant.seed;
+    let leg = host_sim::plant::LegParameters::reference();
+    let specimen = machine::specimen(&compiled.model, task, &leg, Some(seed));
+    let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
+    let mut rig = machine::scenario(&compiled.model, task, &specimen, &noise, seed).rig().clone();
+    let mut bench = Bench::new(&mut rig, controller, compiled.model.timing.period, arguments.latency as usize)?;
+    bench.arm(ARMING)?;
+    for _ in 0..ticks {
+        let request = match wave.advance() {
+            Some(motion) => {
+                Request::stream(PoseTarget { pose: motion.pose, rate: motion.rate, acceleration: motion.acceleration })
+            }
+            None => Request::default(),
+        };
+        bench.tick(&request)?;
+    }
+    Ok(())
+}
+
+fn legs(
+    arguments: &Arguments,
+    compiled: &Compiled,
+    controller: &mut Recorded<'_, '_>,
+    wave: Wave<f64>,
+    seconds: f64,
+) -> Result<(), RunError> {
+    let (parameters, noise) = (host_sim::plant::LegParameters::reference(), host_sim::plant::NoiseParameters::NONE);
+    let noise = if arguments.plant.no_noise { noise } else { parameters.noise };
+    let legs = std::array::from_fn(|_| parameters.clone());
+    let scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, 1);
+    let law = controller.default_config().first().copied().unwrap_or_default();
+    select(controller, u32::try_from(law).unwrap_or_default())?;
+    let wave = LegWave { wave: RefCell::new(wave), seconds };
+    scenario
+        .rig()
+        .clone()
+        .follow(controller, &wave, compiled.model.timing.period, |_, _| std::ops::ControlFlow::Continue(()))
+}
+
+/// A wave as a trajectory that is asked once a tick.
+struct LegWave {
+    wave: RefCell<Wave<f64>>,
+    seconds: f64,
+}
+
+impl LegTrajectory for LegWave {
+    fn duration(&self) -> f64 {
+        self.seconds
+    }
+
+    fn displacements(&self, _time: f64) -> [f64; 6] {
+        self.wave.borrow_mut().advance().map_or([0.0; 6], |motion| motion.pose)
+    }
+}

@@ -1,0 +1,249 @@
+//! What the user sees: results on standard output, findings and progress on standard error.
+
+use std::cell::RefCell;
+use std::io::{self, IsTerminal, Write};
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use specgen_compiler::compile::Refused;
+use specgen_compiler::workspace::WriteError;
+use specgen_language::diagnostic::{self, Diagnostic, Place, Severity};
+use specgen_language::spec::SpecSource;
+use specgen_toolchain::TargetError;
+
+/// Exit code where the machine is to blame: a tool, a disk.
+const ENVIRONMENT: u8 = 3;
+/// Exit code of a command that was ended by Ctrl-C, as shells have it.
+const INTERRUPTED: u8 = 130;
+
+/// Why a command did not succeed, by exit code.
+#[derive(Debug)]
+pub enum Failure {
+    /// The spec or a record is refused.
+    Refused(Box<Refused>),
+    /// A declared budget is exceeded, a comparison failed: exit code 1, in words.
+    Gate(String),
+    /// Arguments that make no sense together.
+    Usage(String),
+    /// The output could not be written.
+    Write(WriteError),
+    /// A tool is missing or failed.
+    Target(TargetError),
+    /// The file system or the simulator said no.
+    Environment(String),
+    /// A gate is not passed, with the figures that say why: exit code 1.
+    Judged {
+        /// Why.
+        message: String,
+        /// For programs; the text is out already.
+        result: Value,
+    },
+    /// What this machine lacks or a tool refuses, after a part of the work is done: exit code 3, with that part.
+    Incomplete {
+        /// What, and why.
+        message: String,
+        /// For programs; the text is out already.
+        result: Value,
+    },
+    /// Ended from outside with a result: what was found so far.
+    Interrupted {
+        /// What is left undone.
+        message: String,
+        /// For programs; the text is out already.
+        result: Value,
+    },
+}
+
+impl Failure {
+    /// Ended by Ctrl-C before there was a result.
+    pub fn ended_early() -> Self {
+        let message = "interrupted: there is no result; every file that is there is whole".to_owned();
+        Self::Interrupted { message, result: Value::Null }
+    }
+}
+
+impl From<Refused> for Failure {
+    fn from(refused: Refused) -> Self {
+        Self::Refused(Box::new(refused))
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        Self::Write(error)
+    }
+}
+
+impl From<TargetError> for Failure {
+    fn from(error: TargetError) -> Self {
+        Self::Target(error)
+    }
+}
+
+/// Output in one of two forms.
+pub struct Ui {
+    json: bool,
+    findings: Vec<Value>,
+    /// Why standard output is not whole.
+    lost: RefCell<Option<io::Error>>,
+}
+
+/// Writes to standard error. A message that nobody can read, on a full disk say, is no reason to end.
+macro_rules! say {
+    ($($text:tt)*) => {
+        let _ = write!(anstream::stderr(), $($text)*);
+    };
+}
+
+impl Ui {
+    /// Text, or one JSON document at the end.
+    pub fn new(json: bool) -> Self {
+        Self { json, findings: Vec::new(), lost: RefCell::new(None) }
+    }
+
+    /// A line about what is being done, for the eyes only.
+    pub fn progress(&self, line: &str) {
+        if !self.json {
+            say!("{line}\n");
+        }
+    }
+
+    /// Shows findings now (text) or keeps them for the document (JSON).
+    pub fn findings(&mut self, source: Option<&SpecSource>, findings: &[Diagnostic]) {
+        if findings.is_empty() {
+            return;
+        }
+        // Findings about data files need no spec to point into.
+        let nothing = SpecSource { display_name: String::new(), text: String::new(), dir: PathBuf::new() };
+        let source = source.unwrap_or(&nothing);
+        if self.json {
+            if let Value::Array(list) = diagnostic::to_json(findings, source) {
+                self.findings.extend(list);
+            }
+        } else {
+            let color = io::stderr().is_terminal();
+            say!("{}", diagnostic::render(findings, source, color));
+        }
+    }
+
+    /// Findings of a spec that a command only looks things up in, for people in one line.
+    pub fn findings_in_brief(&mut self, source: &SpecSource, findings: &[Diagnostic]) {
+        if self.json {
+            self.findings(Some(source), findings);
+        } else if !findings.is_empty() {
+            let (count, s) = (findings.len(), if findings.len() == 1 { "" } else { "s" });
+            say!("{0}: {count} finding{s}, shown by `specgen check {0}`\n", source.display_name);
+        }
+    }
+
+    /// The result: `text` for people, `value` for programs.
+    pub fn result(&self, text: &str, value: Value) {
+        if self.json {
+            self.document(0, value, None);
+        } else {
+            self.out(text);
+        }
+    }
+
+    /// Shows how far something is, in place of the line before where the eyes are at a terminal.
+    pub fn rate(&self, line: &str) {
+        if !self.json {
+            if io::stderr().is_terminal() {
+                say!("\r\x1b[2K{line}");
+            } else {
+                say!("{line}\n");
+            }
+        }
+    }
+
+    /// Ends the line of [`Ui::rate`].
+    pub fn rate_done(&self) {
+        if !self.json && io::stderr().is_terminal() {
+            say!("\n");
+        }
+    }
+
+    /// Whether someone looks at standard error.
+    pub fn is_terminal(&self) -> bool {
+        io::stderr().is_terminal()
+    }
+
+    /// Whether the result is for programs.
+    pub fn is_json(&self) -> bool {
+        self.json
+    }
+
+    /// Plain text on standard output. A closed pipe is the reader's business, not an error of ours.
+    pub fn out(&self, text: &str) {
+        let mut stdout = io::stdout();
+        if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush())
+            && error.kind() != io::ErrorKind::BrokenPipe
+        {
+            self.lost.borrow_mut().get_or_insert(error);
+        }
+    }
+
+    /// Says so and gives the exit code if standard output did not take all that was written to it.
+    pub fn not_all_out(&self) -> Option<u8> {
+        let error = self.lost.take()?;
+        say!("error: could not write to standard output: {error}; what is there of it is not whole\n");
+        Some(ENVIRONMENT)
+    }
+
+    /// Reports a failure; returns the exit code.
+    pub fn failed(&mut self, failure: &Failure) -> u8 {
+        let (code, message) = match failure {
+            Failure::Refused(refused) => {
+                self.findings(refused.source.as_ref(), &refused.findings);
+                (1, format!("{} is refused; nothing was written", refused_file(refused)))
+            }
+            Failure::Gate(text) => (1, text.clone()),
+            Failure::Usage(text) => (2, text.clone()),
+            Failure::Write(error @ (WriteError::Occupied { .. } | WriteError::NotAFolder { .. })) => {
+                (1, error.to_string())
+            }
+            Failure::Write(error) => (ENVIRONMENT, error.to_string()),
+            Failure::Target(error) => (ENVIRONMENT, error.to_string()),
+            Failure::Environment(text) => (ENVIRONMENT, text.clone()),
+            Failure::Judged { message, .. } => (1, message.clone()),
+            Failure::Incomplete { message, .. } => (ENVIRONMENT, message.clone()),
+            Failure::Interrupted { message, .. } => (INTERRUPTED, message.clone()),
+        };
+        if self.json {
+            let result = match failure {
+                Failure::Interrupted { result, .. }
+                | Failure::Judged { result, .. }
+                | Failure::Incomplete { result, .. } => result.clone(),
+                _ => Value::Null,
+            };
+            self.document(code, result, Some(&message));
+        } else {
+            say!("error: {message}\n");
+        }
+        code
+    }
+
+    fn document(&self, exit_code: u8, result: Value, error: Option<&str>) {
+        let document = json!({
+            "specgen": env!("CARGO_PKG_VERSION"),
+            "exit_code": exit_code,
+            "error": error,
+            "findings": self.findings,
+            "result": result,
+        });
+        self.out(&format!("{document:#}\n"));
+    }
+}
+
+/// The file that is to blame, as its user named it. A spec that names a bad record is refused itself.
+fn refused_file(refused: &Refused) -> &str {
+    if let Some(source) = &refused.source {
+        return &source.display_name;
+    }
+    let first = refused.findings.iter().find(|finding| finding.severity == Severity::Error);
+    match first.map(|finding| &finding.place) {
+        Some(Place::File { path, .. }) => path,
+        _ => "the input",
+    }
+}

@@ -1,0 +1,18 @@
+//! The `specgen` command, and the crates that it is made of under one name.
+//!
+//! ```text
+//! spec (TOML) → model (SI, checked) → tables (identified) → ir (every constant) → emitted crate (text) → built image
+//! ```
+//! Data flows one way, and a crate sees only crates on lower floors; ARCHITECTURE.md has them.
+
+pub mod cli;
+
+pub use specgen_compiler::{
+    compile, emit, ir, lint, lower, precision, reach, requirements, settings, stability, workspace,
+};
+pub use specgen_identify::{self as identify, everett, waveform};
+pub use specgen_language::{diagnostic, interrupt, lock, model, spec};
+pub use specgen_operate::{self as operate, doctor, pil, served};
+pub use specgen_report::{self as report, plot};
+pub use specgen_studies::{machine, paper, reproduce, robust, tuning, verify};
+pub use specgen_toolchain::{self as target, budget};

@@ -1,0 +1,144 @@
+//! What the hand-written documents name is there: links, files, tests, commands and their options.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use crate::support::{Folder, repository};
+
+const DOCUMENTS: [&str; 16] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "docs/bring-up.md",
+    "docs/control-law.md",
+    "docs/guide.md",
+    "docs/hysteresis.md",
+    "docs/identification.md",
+    "docs/images.md",
+    "docs/tuning.md",
+    "docs/robustness.md",
+    "docs/report.md",
+    "docs/pil.md",
+    "docs/supervisor.md",
+    "docs/recorder.md",
+    "docs/rt-pc.md",
+    "docs/spec-reference.md",
+];
+
+fn read(name: &str) -> String {
+    fs::read_to_string(repository().join(name)).unwrap()
+}
+
+/// Texts between backticks, code blocks left out.
+fn quoted(text: &str) -> Vec<String> {
+    let plain: String = text.split("```").step_by(2).collect();
+    plain.split('`').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let mut links = 0;
+    for name in DOCUMENTS {
+        let folder = repository().join(name).parent().unwrap().to_owned();
+        let text = read(name);
+        for part in text.split("](").skip(1) {
+            let target = part.split(')').next().unwrap();
+            if !target.contains("://") {
+                links += 1;
+                let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+                assert!(folder.join(file).exists(), "{name} links to {target}");
+                let is_heading = |line: &str| {
+                    line.starts_with('#') && line.to_lowercase().replace(' ', "-").ends_with(&format!("#-{anchor}"))
+                };
+                let found = anchor.is_empty() || fs::read_to_string(folder.join(file)).unwrap().lines().any(is_heading);
+                assert!(found, "{name} links to {target}");
+            }
+        }
+    }
+    assert!(links > 5, "{links} links");
+}
+
+#[test]
+fn files_and_folders_that_are_named_exist() {
+    let mut found = 0;
+    for name in DOCUMENTS {
+        for word in quoted(&read(name)) {
+            let tops = ["codegen/", "firmware/", "host-sim/", "specs/", "tests/", "xtask/", "docs/"];
+            let is_path = tops.iter().any(|top| word.starts_with(top)) && !word.contains(['*', ' ']);
+            if is_path {
+                found += 1;
+                assert!(repository().join(&word).exists(), "{name} names {word}");
+            }
+        }
+    }
+    assert!(found > 20, "{found} paths");
+}
+
+/// Modules of tests that figures come from: the word before `--`, or the last, of a call of `cargo test`.
+#[test]
+fn tests_that_figures_come_from_exist() {
+    let folders = ["tests/tests", "codegen/cli/tests"];
+    let mut names = BTreeSet::new();
+    for call in quoted(&read("README.md")) {
+        let Some(words) = call.strip_prefix("… ").or_else(|| call.strip_prefix("cargo test --release -p ")) else {
+            continue;
+        };
+        let last = words.split(" -- ").next().and_then(|filter| filter.split(' ').next_back()).unwrap();
+        if !last.starts_with("specgen-") {
+            names.insert(last.split("::").next().unwrap().to_owned());
+        }
+    }
+    assert!(names.len() > 8, "{names:?}");
+    for name in names {
+        let files = [format!("{name}.rs"), format!("{name}/mod.rs")];
+        let exists =
+            folders.iter().any(|folder| files.iter().any(|file| repository().join(folder).join(file).is_file()));
+        assert!(exists, "README names the test {name}");
+    }
+}
+
+/// Each `specgen …` in the text is a command that there is, with options that its help explains, or the main job on a spec.
+#[test]
+fn commands_and_options_of_the_readme_are_those_of_the_program() {
+    let folder = Folder::new();
+    let main = folder.run(&["--help"]).stdout;
+    let mut commands = 0;
+    for line in quoted(&read("README.md")).iter().filter_map(|word| word.strip_prefix("specgen ")) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let help = if words[0].ends_with(".toml") {
+            assert!(words[0] == "platform.toml" || repository().join(words[0]).is_file(), "{line}");
+            main.clone()
+        } else {
+            let run = folder.run(&[words[0], "--help"]);
+            assert_eq!(run.code, 0, "README names the command {line}");
+            run.stdout
+        };
+        for option in
+            words.iter().map(|word| word.trim_matches(['[', ']', ',', ';'])).filter(|word| word.starts_with('-'))
+        {
+            assert!(help.contains(option), "README: `specgen {line}` has no {option}");
+        }
+        commands += 1;
+    }
+    assert!(commands >= 6, "{commands}");
+}
+
+/// The status bits of the page are those of the emitted controller.
+#[test]
+fn status_bits_are_those_that_are_emitted() {
+    let (page, step) = (read("docs/control-law.md"), read("firmware/controller/src/step.rs"));
+    for (rows, constant, value) in [
+        ("0–5", "LEG_LIMITED", 0x3f_u32),
+        ("8–13", "GAUGE_FAULT", 0x3f00),
+        ("16", "SETPOINT_FAULT", 1 << 16),
+        ("17", "SETPOINT_STALE", 1 << 17),
+        ("18", "GENERATOR_BUSY", 1 << 18),
+        ("19", "WRENCH_FAULT", 1 << 19),
+    ] {
+        assert!(page.contains(&format!("\n| {rows} | ")), "no row {rows}");
+        let line = step.lines().find(|line| line.contains(&format!("const {constant}: u32"))).unwrap();
+        let number = line.split("= ").nth(1).unwrap().trim_end_matches(';').replace('_', "");
+        assert_eq!(u32::from_str_radix(number.trim_start_matches("0x"), 16), Ok(value), "{line}");
+    }
+}

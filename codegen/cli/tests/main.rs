@@ -1,0 +1,30 @@
+//! The command and the compiler as a user meets them, in one binary: a module for each subject.
+
+#[path = "../../../tests/tests/board_support/mod.rs"]
+mod board_support;
+mod build_cache;
+mod cli;
+mod documents;
+mod dynamics_command;
+mod examples;
+mod firmware;
+mod guide;
+mod interrupt;
+mod kills;
+mod microcontroller;
+mod operate;
+mod optional;
+mod output_folder;
+mod pil;
+mod platform_check;
+mod platform_reach;
+mod platform_stability;
+mod rate_specs;
+mod recording;
+mod records;
+mod report;
+mod reproducible;
+mod robust;
+mod rt_pc;
+mod support;
+mod tune;

@@ -1,0 +1,489 @@
+//! The real-time target as a user runs it: the emitted workspace built, its binary in closed loop with `specgen plant`, asked over
+//! link and lines, its records replayed by the host library. Nothing here asserts times: only that every tick is accounted for,
+//! and bits.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+#![cfg(target_os = "linux")]
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use host_sim::controller::{Controller, Supervised, TickController};
+use rustix::process::Signal;
+use serde_json::Value;
+use specgen::{compile, emit, target, workspace};
+use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
+use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
+
+mod clients;
+mod host;
+use host::{Host, Record};
+
+/// Length of the platform's run, s, where another than that of CI is wanted.
+const SECONDS: &str = "SPECGEN_RT_SECONDS";
+
+/// Phases of the supervisor, and its cause of a silent link.
+const DISARMED: u8 = 0;
+const RUNNING: u8 = 2;
+const HOLDING: u8 = 3;
+const LINK_LOST: u8 = 9;
+/// Requests to it.
+const ARM: u8 = 1;
+const RUN: u8 = 2;
+const HOLD: u8 = 3;
+const RAMP_DOWN: u8 = 4;
+/// Bit of a platform's status: it goes to its bias pose, or plays.
+const BUSY: u32 = 1 << 18;
+
+/// A spec's workspace with the built binary, the host library and a running machine.
+struct Bench {
+    folder: tempfile::TempDir,
+    binary: PathBuf,
+    library: PathBuf,
+    plant: Child,
+    name: String,
+    spec: PathBuf,
+}
+
+impl Bench {
+    fn new(spec: &str) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let spec_file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs").join(spec);
+        let compiled = compile::compile(&spec_file).unwrap_or_else(|_| panic!("{spec} compiles"));
+        let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["rt-pc"]);
+        let root = folder.path().join("controller");
+        workspace::write_scratch(&root, &files).unwrap();
+        // Kept between runs and shared by both specs, so that dependencies are compiled once; the programs are called alike.
+        static BUILD: Mutex<()> = Mutex::new(());
+        let one = BUILD.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("rt-pc");
+        let cargo = |verb: &[&str]| {
+            let mut command = Command::new("cargo");
+            command.args(verb).args(["--release", "--locked", "--quiet", "--features", "comedi"]);
+            command.arg("--target-dir").arg(&kept).current_dir(root.join("rt-pc"));
+            for leak in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET", "CARGO_TARGET_DIR"] {
+                command.env_remove(leak);
+            }
+            // Fat link-time optimisation costs the test more than all the rest.
+            command.env("CARGO_PROFILE_RELEASE_LTO", "off").env("CARGO_PROFILE_RELEASE_CODEGEN_UNITS", "16");
+            let output = command.output().unwrap();
+            assert!(output.status.success(), "cargo {verb:?}: {}", String::from_utf8_lossy(&output.stderr));
+        };
+        // Its own tests are those of the emitted copy, which differs little from spec to spec.
+        if crate::support::length(spec == "reference.toml", true) {
+            cargo(&["test"]);
+        }
+        cargo(&["build"]);
+        let binary = folder.path().join("rt-pc");
+        fs::copy(kept.join("release/rt-pc"), &binary).unwrap();
+        let library = target::host::build_library(&root, &root.join("target")).unwrap();
+        drop(one);
+        let name = format!("test-{}-{}", spec.trim_end_matches(".toml"), std::process::id());
+        // Under real-time priority where that is granted: other tests want the processors too.
+        let plant = |more: &[&str]| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
+            command.args(["plant", spec_file.to_str().unwrap(), "--name", &name]).args(more);
+            command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+        };
+        let granted = Command::new("chrt").args(["-f", "50", "true"]).stderr(Stdio::null()).status();
+        let plant = plant(if granted.is_ok_and(|status| status.success()) { &["--priority", "50"] } else { &[] });
+        let place = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
+        wait_for("the machine", || place.exists());
+        Self { binary, folder, library, plant, name, spec: spec_file }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The binary on the simulated machine, recording to `record`.
+    fn command(&self, record: &str) -> Command {
+        // Whatever the umask, nobody else may connect.
+        let mut command = Command::new("sh");
+        command.args(["-c", "umask 0; exec \"$@\"", "sh"]).arg(&self.binary);
+        command.args(["--sim", &self.name, "--allow-no-rt", "--json", "--record"]).arg(self.path(record));
+        command
+    }
+
+    /// The host's own build of the same controller.
+    fn machine(&self) -> Supervised {
+        Supervised::new(Controller::load(&self.library).unwrap()).unwrap()
+    }
+
+    /// Checks what holds of every run, whatever the machine did and however loaded this computer is.
+    fn check(&self, output: &Output, record: &str) -> (Value, Record) {
+        let text = String::from_utf8_lossy(&output.stdout);
+        let summary: Value = serde_json::from_str(&text).unwrap_or_else(|error| {
+            panic!("{error}: {text}\n{}", String::from_utf8_lossy(&output.stderr));
+        });
+        let count = |key: &str| summary[key].as_u64().unwrap();
+        assert_eq!(summary["balances"], true, "{text}");
+        assert_eq!(count("planned"), count("on_time") + count("late") + count("skipped"), "{text}");
+        let causes = summary["causes"].as_array().unwrap();
+        let sum = |key: &str| causes.iter().map(|cause| cause[key].as_u64().unwrap()).sum::<u64>();
+        assert_eq!((sum("late"), sum("skipped")), (count("late"), count("skipped")), "every one has a cause: {text}");
+        assert_eq!((count("allocations"), count("waiting_ticks"), count("lost_rows")), (0, 0, 0), "{text}");
+        let record = Record::new(fs::read(self.path(record)).unwrap());
+        assert_eq!(record.rows.len() as u64, count("on_time") + count("late"), "a row for every tick that was run");
+        // A tick after skipped ones says so, and no other.
+        let events = record.place("events");
+        let missed = record.rows.iter().filter(|row| row.input[events] & 1 == 1).count() as u64;
+        assert!(missed <= count("skipped") && (missed > 0) == (count("skipped") > 0), "{missed}: {text}");
+        let replay = record.replay(&mut self.machine());
+        assert_eq!((&replay.divergence, replay.gaps.len(), replay.digests), (&None, 0, record.rows.len() as u64));
+        (summary, record)
+    }
+
+    /// As a user does it.
+    fn replay(&self, record: &str) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
+        command.arg("replay").arg(self.path(record)).arg("--spec").arg(&self.spec).output().unwrap()
+    }
+}
+
+impl Drop for Bench {
+    fn drop(&mut self) {
+        let _ = self.plant.kill();
+        let _ = self.plant.wait();
+        let _ = fs::remove_file(Path::new("/dev/shm").join(format!("specgen-plant-{}", self.name)));
+    }
+}
+
+fn wait_for(what: &str, mut there: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !there() {
+        assert!(start.elapsed() < Duration::from_secs(60), "{what} does not come");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn signal(process: &Child, name: Signal) {
+    crate::support::send(name, process.id());
+}
+
+/// A run that goes on until it is told, or until the test fails.
+struct Running(Option<Child>);
+
+impl Running {
+    fn new(command: &mut Command) -> Self {
+        Self(Some(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()))
+    }
+
+    /// Sends it a signal and waits for its end.
+    fn end(mut self, name: Signal) -> Output {
+        let mut running = self.0.take().unwrap();
+        assert!(running.try_wait().unwrap().is_none(), "it runs until it is told");
+        signal(&running, name);
+        running.wait_with_output().unwrap()
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(running) = &mut self.0 {
+            let _ = running.kill();
+            let _ = running.wait();
+        }
+    }
+}
+
+/// The socket of lines.
+struct Lines(BufReader<UnixStream>);
+
+impl Lines {
+    fn new(path: &Path) -> Self {
+        let stream = UnixStream::connect(path).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        Self(BufReader::new(stream))
+    }
+
+    fn ask(&mut self, line: &str) -> String {
+        self.0.get_mut().write_all(format!("{line}\n").as_bytes()).unwrap();
+        let mut answer = String::new();
+        self.0.read_line(&mut answer).unwrap();
+        answer.trim().to_owned()
+    }
+}
+
+#[test]
+fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_bit() {
+    let bench = Bench::new("reference.toml");
+    let seconds: f64 = std::env::var(SECONDS).map_or(2.5, |text| text.parse().expect("a number of seconds"));
+    let output =
+        bench.command("a.rec").args(["--seconds", &seconds.to_string(), "--set", "command=3"]).output().unwrap();
+    let (summary, record) = bench.check(&output, "a.rec");
+    // At 10 kHz; the ramp down comes after.
+    assert!(summary["planned"].as_f64().unwrap() > 1e4 * (seconds - 0.1), "{summary}");
+    println!("{summary:#}");
+    println!("{} ticks replayed on the host, outputs and digests equal to the bit", record.rows.len());
+    assert_eq!(output.status.code(), Some(i32::from(!summary["failure"].is_null())), "{summary}");
+
+    // One bit in one word is noticed.
+    let good = bench.replay("a.rec");
+    assert!(good.status.success() && String::from_utf8_lossy(&good.stdout).contains("bit-equal"), "{good:?}");
+    fs::write(bench.path("flipped.rec"), record.flipped()).unwrap();
+    let bad = bench.replay("flipped.rec");
+    let (text, tick) = (String::from_utf8_lossy(&bad.stderr), record.rows.len() - 1);
+    assert!(
+        bad.status.code() == Some(1) && text.contains(&format!("tick {tick}")) && text.contains("dac_code[0]"),
+        "{bad:?}"
+    );
+
+    a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(&bench);
+    clients::nobody_keeps_others_from_ramping_down(&bench);
+    a_record_that_finds_no_room_brings_the_machine_down(&bench);
+    a_card_is_read_driven_and_switched_off(&bench);
+}
+
+/// With time that waits, so that it runs on any computer.
+fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
+    let [socket, link] = ["socket", "link"].map(|name| bench.path(name));
+    let mut command = bench.command("b.rec");
+    command.args(["--elastic", "--patience", "5000", "--link-silence", "1000", "--socket"]).arg(&socket);
+    command.arg("--link").arg(&link).arg("--capture").arg(bench.path("capture.rec"));
+    let running = Running::new(&mut command);
+    wait_for("the link", || link.exists());
+    for path in [&socket, &link] {
+        assert_eq!(fs::metadata(path).unwrap().permissions().mode() & 0o777, 0o600, "{}", path.display());
+    }
+    let mut lines = Lines::new(&socket);
+    many_short_lines_are_no_long_one(&socket);
+
+    let mut host = Host::open(&link, 1).unwrap();
+    let machine = bench.machine();
+    let description = host.fetch(|offset| Request::Describe { offset });
+    // The host library adds sizes of its own to it.
+    assert!(machine.controller().text().as_bytes().starts_with(&description) && description.len() > 100);
+    host.wait("a tick", |status| status.tick > 0 && status.phase == DISARMED);
+    for request in [Request::LockstepReset { config: Bytes(&[]) }, Request::LockstepStage { index: 0 }] {
+        assert_eq!(host.refused(&request), Refusal::Unsupported);
+    }
+    assert_eq!(host.refused(&Request::Supervise { request: 6 }), Refusal::Word { index: 0 });
+    let command = vec![0; 8 * machine.input_names().iter().position(|name| name == "gauge[0]").unwrap()];
+    assert_eq!(host.refused(&Request::Setpoint { words: Bytes(&command[8..]) }), Refusal::Length { expected: 21 });
+
+    host.done(&Request::Supervise { request: ARM });
+    host.wait("armed", |status| status.phase == HOLDING);
+    // Others may look and slow it down, but the orders are the host's.
+    let mut other = Host::open(&link, 2).unwrap();
+    assert_eq!(other.refused(&Request::Supervise { request: RUN }), Refusal::Busy);
+    assert_eq!(other.refused(&Request::Setpoint { words: Bytes(&command) }), Refusal::Busy);
+    other.done(&Request::Supervise { request: HOLD });
+    drop(other);
+    assert!(lines.ask("run").starts_with("error: a host over the link has the orders"));
+    assert_eq!(lines.ask("hold"), "ok");
+    host.done(&Request::Supervise { request: RUN });
+    host.wait("at its bias pose", |status| status.phase == RUNNING && status.status & BUSY == 0);
+
+    // Other settings, all at once or not at all.
+    let mut config = host.config();
+    assert_eq!(config, machine.controller().default_config());
+    let bytes = |words: &[u64]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>();
+    let mode = machine.controller().description().config_names.iter().position(|name| name == "mode").unwrap();
+    config[mode] = 99;
+    assert_eq!(
+        host.refused(&Request::WriteConfig { words: Bytes(&bytes(&config)) }),
+        Refusal::Word { index: mode as u16 }
+    );
+    config[mode] = 5;
+    host.done(&Request::WriteConfig { words: Bytes(&bytes(&config)) });
+    assert_eq!(host.config(), config);
+
+    // A wave of 1 µm along z.
+    let mut wave = Settings::<f64>::still();
+    let tone = Tone { amplitude: 1e-6, phase: 0, step: step_of(20.0, 1e-4) };
+    wave.axes[2] = AxisWave { offset: 0.0, shape: Shape::Sine { tone } };
+    (wave.ramp_ticks, wave.ticks) = (500, 4000);
+    let start = |wave: &Settings<f64>| bytes(&wave.to_words());
+    let mut wide = wave;
+    wide.axes[2].offset = 1.0;
+    let request = |words| Request::Wave { action: WaveAction::Start, words: Bytes(words) };
+    let words = start(&wide);
+    assert_eq!(host.refused(&request(&words)), Refusal::Word { index: 6 + 7 * 2 + 1 });
+    let words = start(&wave);
+    host.done(&request(&words));
+    assert_eq!(host.refused(&request(&words)), Refusal::State, "one wave at a time");
+    assert_eq!(host.refused(&Request::Setpoint { words: Bytes(&command) }), Refusal::State);
+    assert!(lines.ask("set command=0").starts_with("error: "));
+    let tick = host.status().tick;
+    host.wait("the wave", |status| status.tick > tick + 1000);
+
+    // What the recorder has kept since power-up, as the file that it writes.
+    assert_eq!(host.refused(&Request::Download { offset: 0 }), Refusal::State, "it records");
+    let standing = host.recorder(RecorderAction::Look);
+    assert!(standing.running && !standing.triggered && standing.ticks > 1000, "{standing:?}");
+    host.recorder(RecorderAction::Arm { after: 1000 });
+    host.wait("rows before the trigger", |status| status.tick > tick + 2000);
+    host.recorder(RecorderAction::Trigger);
+    wait_for("the end of the recording", || !host.recorder(RecorderAction::Look).running);
+    let standing = host.recorder(RecorderAction::Look);
+    let download = Record::new(host.fetch(|offset| Request::Download { offset }));
+    assert!(
+        standing.triggered && standing.ticks > 1000 && download.rows.len() == standing.ticks as usize,
+        "{standing:?}"
+    );
+    assert_eq!(fs::read(bench.path("capture.rec")).unwrap(), download.bytes);
+    let replay = download.replay(&mut bench.machine());
+    assert_eq!((&replay.divergence, replay.triggers.len(), replay.ticks), (&None, 1, u64::from(standing.ticks)));
+    host.recorder(RecorderAction::Arm { after: 1 });
+
+    // Set-points are taken again once the wave is over.
+    host.wait("the end of the wave", |status| status.tick > tick + 6000);
+    host.done(&Request::Setpoint { words: Bytes(&command) });
+
+    // What is no frame is counted; a host that is killed is missed, and then lines have the orders.
+    host.line().write_all(&[1, 2, 3, 0, 255, 255, 0]).unwrap();
+    assert!(host.status().link.errors() >= 2);
+    drop(host);
+    wait_for("the loss", || lines.ask("status").contains("phase=Holding cause=LinkLost"));
+    assert_eq!(lines.ask("ramp-down"), "ok");
+    // For a cause it ends faulted, until that is acknowledged.
+    wait_for("the way down", || lines.ask("status").contains("phase=Faulted cause=LinkLost amplifiers=0"));
+    assert_eq!((lines.ask("none").as_str(), lines.ask("acknowledge").as_str()), ("ok", "ok"));
+    wait_for("the acknowledgement", || lines.ask("status").contains("phase=Disarmed"));
+    let output = running.end(Signal::TERM);
+    let (summary, record) = bench.check(&output, "b.rec");
+    assert_eq!((&summary["last_phase"], &summary["skipped"]), (&"Disarmed".into(), &0.into()), "{summary}");
+    assert_eq!((output.status.code(), &summary["link"]["hosts"]), (Some(1), &2.into()), "{summary}");
+    assert!(
+        summary["link"]["errors"].as_u64().unwrap() >= 2 && summary["failure"].as_str().unwrap().contains("link lost")
+    );
+    let [setpoint, command] = ["setpoint[2]", "command"].map(|name| record.place(name));
+    let waved = record.rows.iter().filter(|row| row.input[command] == 1);
+    let highest = waved.clone().map(|row| f64::from_bits(row.input[setpoint])).fold(0.0, f64::max);
+    assert!(waved.count() == 4000 && (highest - 1e-6).abs() < 1e-9, "{highest:e}");
+    assert_eq!(record.rows.last().unwrap().supervisor >> 16, 0, "amplifiers off in the last tick");
+    assert!(record.rows.iter().any(|row| row.supervisor >> 8 & 0xff == u32::from(LINK_LOST)));
+}
+
+fn many_short_lines_are_no_long_one(socket: &Path) {
+    let mut lines = Lines::new(socket);
+    lines.0.get_mut().write_all("status\n".repeat(1000).as_bytes()).unwrap();
+    let mut answers = lines.0.lines();
+    assert!((0..1000).all(|_| answers.next().is_some_and(|answer| !answer.unwrap().starts_with("error"))));
+    let mut lines = Lines::new(socket);
+    lines.0.get_mut().write_all(&[b'x'; 5000]).unwrap();
+    assert_eq!(lines.0.lines().next().unwrap().unwrap(), "error: a line has at most 4096 bytes");
+}
+
+/// What a file may be long is limited, as on a full disk.
+fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
+    let script = "ulimit -f 800; trap '' XFSZ; exec \"$@\"";
+    let mut command = Command::new("sh");
+    command.args(["-c", script, "sh"]).arg(&bench.binary).args(["--sim", &bench.name, "--allow-no-rt", "--json"]);
+    command.args(["--elastic", "--patience", "5000", "--set", "command=3", "--record"]).arg(bench.path("cut.rec"));
+    let output = command.output().unwrap();
+    let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let failure = summary["failure"].as_str().unwrap();
+    assert!(
+        output.status.code() == Some(1) && failure.contains("cut.rec: the record is not whole: File too large"),
+        "{summary}"
+    );
+    assert_eq!((&summary["last_phase"], &summary["lost_rows"]), (&"Disarmed".into(), &0.into()), "{summary}");
+    let cut = bench.replay("cut.rec");
+    let text = String::from_utf8_lossy(&cut.stdout);
+    assert!(
+        cut.status.success() && text.contains("the file ends within a block") && text.contains("bit-equal"),
+        "{cut:?}"
+    );
+}
+
+/// The same binary on a library that stands in for comedilib.
+fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rt_pc/fake_comedi.rs");
+    let library = bench.path("libcomedi.so");
+    let built =
+        Command::new("rustc").args(["--edition=2024", "--crate-type=cdylib", "-o"]).arg(&library).arg(source).output();
+    let built = built.unwrap();
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+    let run = |variables: &[(&str, &str)], arguments: &[&str]| {
+        let mut command = Command::new(&bench.binary);
+        command.args(["--allow-no-rt", "--json", "--seconds", "0.4", "--arm", "--comedi-library"]).arg(&library);
+        command.args(["--comedi", "/dev/fake1"]).args(arguments).arg("--record").arg(bench.path("card.rec"));
+        command.env("FAKE_LOG", bench.path("card.log")).envs(variables.iter().copied()).output().unwrap()
+    };
+    // Whether the amplifiers were ever to be on.
+    let was_on = |record: &Record| record.rows.iter().any(|row| row.supervisor >> 16 & 1 == 1);
+    let log = || {
+        let text = fs::read_to_string(bench.path("card.log")).unwrap();
+        let field = |key: &str| text.lines().find_map(|line| line.strip_prefix(key)).unwrap().to_owned();
+        let numbers =
+            ["reads=", "writes1=", "writes2=", "lowest=", "highest="].map(|key| field(key).parse::<u64>().unwrap());
+        (numbers, field("line="), field("configured=") == "true" && field("bad=").is_empty())
+    };
+
+    let two = ["--comedi-out", "/dev/fake1", "--comedi-out", "/dev/fake2"];
+    let output = run(&[], &two);
+    let (_, record) = bench.check(&output, "card.rec");
+    let ([reads, first, second, _, highest], line, sound) = log();
+    let ticks = record.rows.len() as u64;
+    assert_eq!(reads, 6 * ticks);
+    assert_eq!((first, second), (4 * ticks, 2 * ticks));
+    assert!(sound && highest <= 43_690);
+    assert!(line.starts_with('0') && line.ends_with('0') && line.contains('1') == was_on(&record), "{line}");
+
+    // A card that fails in the middle: counted, told to the supervisor, off at the end.
+    let (summary, record) = bench.check(&run(&[("FAKE_FAIL_AFTER", "600")], &two), "card.rec");
+    let (events, ticks) = (record.place("events"), record.rows.len());
+    let broken = record.rows.iter().filter(|row| row.input[events] & 8 != 0).count();
+    assert!(broken > 0 && broken == ticks - 100, "{broken} of {ticks}");
+    assert_eq!(summary["device_faults"], broken);
+    assert!(log().1.ends_with('0'));
+
+    for (variables, arguments, words) in [
+        (&[][..], &[][..], "the cards have 4 analog outputs, six amplifiers need 6"),
+        (&[], &["--comedi-out", "/dev/fake9"], "/dev/fake9: No such device"),
+        (&[("FAKE_HIGHEST", "4095")], &two, "counts to 4095, the spec's sensor.bits to"),
+        (&[], &["--comedi-range", "-20:20"], "has no range of -20 V to 20 V"),
+        (&[], &["--comedi-library", "/nowhere.so"], "no comedilib: "),
+    ] {
+        let output = run(variables, arguments);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(3) && text.contains(words), "{words}: {text}");
+    }
+}
+
+#[test]
+fn legs_are_moved_by_lines_and_a_machine_that_is_killed_is_a_converter_that_does_not_answer() {
+    let mut bench = Bench::new("legs.toml");
+    let socket = bench.path("socket");
+    let mut command = bench.command("legs.rec");
+    command.args(["--elastic", "--patience", "1000", "--socket"]).arg(&socket);
+    let running = Running::new(&mut command);
+    wait_for("the socket", || socket.exists());
+    let mut lines = Lines::new(&socket);
+    let mut ask = |line: &str| lines.ask(line);
+    wait_for("a tick", || ask("status").contains("phase=Disarmed"));
+    assert!(ask("set request=1").starts_with("error: `request`"));
+    assert!(ask("fly").starts_with("error: `fly` is none of"));
+    assert_eq!(ask("arm"), "ok");
+    wait_for("arming", || !ask("status").contains("phase=Disarmed"));
+    assert_eq!(ask("run"), "ok");
+    wait_for("running", || ask("status").contains("phase=Running"));
+    assert_eq!(ask("set setpoint[2]=2e-6"), "ok");
+    let tick = |status: &str| status.split(['=', ' ']).nth(1).unwrap().parse::<u64>().unwrap();
+    let start = tick(&ask("status"));
+    wait_for("half a second of its time", || tick(&ask("status")) > start + 2_500);
+
+    signal(&bench.plant, Signal::KILL);
+    bench.plant.wait().unwrap();
+    // The first reading is waited for, the next ones are not.
+    std::thread::sleep(Duration::from_millis(1_000));
+    let start = tick(&ask("status"));
+    wait_for("ticks without a machine", || tick(&ask("status")) > start + 100);
+    let output = running.end(Signal::INT);
+    let (summary, record) = bench.check(&output, "legs.rec");
+    assert!(summary["device_faults"].as_u64().unwrap() > 0, "{summary}");
+    assert!(output.status.code() == Some(1) && summary["failure"].as_str().unwrap().contains("converter"), "{summary}");
+    let [events, setpoint, measured] = ["events", "setpoint[2]", "displacement[2]"].map(|name| record.place(name));
+    assert_ne!(record.rows.last().unwrap().input[events] & 8, 0, "the supervisor was told");
+    let moved = record.rows.iter().rev().find(|row| row.input[setpoint] != 0 && row.input[events] & 8 == 0).unwrap();
+    let measured = f64::from_bits(moved.input[measured]);
+    assert!(measured > 1e-6, "the leg went: {measured:e}");
+}

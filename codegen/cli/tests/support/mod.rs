@@ -1,0 +1,212 @@
+//! The real binary as a user runs it: on a copy of the specs, with everything it prints looked at.
+
+#![allow(dead_code)] // Each test file uses its part.
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+
+pub mod commands;
+pub mod unprivileged;
+
+use rustix::process::{Pid, Signal, kill_process};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+use specgen::diagnostic::codes;
+
+pub const BINARY: &str = env!("CARGO_BIN_EXE_specgen");
+
+/// The repository's own files.
+pub fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().to_owned()
+}
+
+/// A folder of its own with a copy of the example specs and their records.
+pub struct Folder(tempfile::TempDir);
+
+impl Folder {
+    pub fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        let specs = repository().join("specs");
+        fs::create_dir(folder.path("records")).unwrap();
+        for file in ["reference.toml", "legs.toml", "minimal.toml", "records/leg1.csv", "records/reference-forc.csv"] {
+            fs::copy(specs.join(file), folder.path(file)).unwrap();
+        }
+        folder
+    }
+
+    pub fn path(&self, below: impl AsRef<Path>) -> PathBuf {
+        self.0.path().join(below)
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path(name), content).unwrap();
+    }
+
+    pub fn read(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// Writes `name`: the spec of six legs with each first text replaced by the second.
+    pub fn spec(&self, name: &str, edits: &[(&str, &str)]) {
+        let mut text = self.read("legs.toml");
+        for (old, new) in edits {
+            assert_eq!(text.matches(old).count(), 1, "`{old}` must stand once in legs.toml");
+            text = text.replace(old, new);
+        }
+        self.write(name, text);
+    }
+
+    /// `specgen ARGUMENTS` in this folder.
+    pub fn run(&self, arguments: &[&str]) -> Run {
+        Run::of(self.command().args(arguments))
+    }
+
+    pub fn command(&self) -> Command {
+        let mut command = Command::new(BINARY);
+        command.current_dir(self.0.path());
+        command
+    }
+
+    /// The same with `--json`: exit code and document.
+    pub fn json(&self, arguments: &[&str]) -> Document {
+        let run = Run::of(self.command().args(arguments).arg("--json"));
+        Document::of(&run)
+    }
+
+    pub fn listing(&self) -> Listing {
+        listing(self.0.path())
+    }
+}
+
+/// What a run printed and returned.
+#[derive(Debug)]
+pub struct Run {
+    pub code: i32,
+    pub stdout: String,
+    pub stderr: String,
+}
+
+impl Run {
+    pub fn of(command: &mut Command) -> Self {
+        let output = command.output().unwrap();
+        let run = Self {
+            code: output.status.code().unwrap_or_else(|| panic!("{command:?} ended by a signal: {output:?}")),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        };
+        assert!(!run.stderr.contains("panicked at"), "{command:?}: {}", run.stderr);
+        assert!((0..=3).contains(&run.code), "{command:?}: exit code {}\n{}", run.code, run.stderr);
+        run
+    }
+
+    /// The text must have failed with `code` and say all of `words` on standard error.
+    pub fn says(&self, code: i32, words: &[&str]) {
+        assert_eq!(self.code, code, "{self:#?}");
+        for word in words {
+            assert!(self.stderr.contains(word), "no `{word}` in:\n{}", self.stderr);
+        }
+    }
+}
+
+/// What `--json` printed.
+#[derive(Debug)]
+pub struct Document {
+    pub code: i32,
+    pub value: Value,
+}
+
+impl Document {
+    /// Exactly one document on standard output, true to the exit code, its findings registered and documented.
+    pub fn of(run: &Run) -> Self {
+        let value: Value = serde_json::from_str(&run.stdout)
+            .unwrap_or_else(|error| panic!("not one JSON document: {error}\n{}", run.stdout));
+        assert_eq!(run.stderr, "", "nothing but the document is printed");
+        assert_eq!(value["exit_code"], run.code);
+        assert_eq!(value["error"].is_null(), run.code == 0, "{value:#}");
+        assert_eq!(value["result"].is_null(), run.code != 0, "{value:#}");
+        assert_eq!(value["specgen"], env!("CARGO_PKG_VERSION"));
+        let document = Self { code: run.code, value };
+        let reference = fs::read_to_string(repository().join("docs/diagnostics.md")).unwrap();
+        for finding in document.findings() {
+            let code = finding["code"].as_str().unwrap();
+            assert!(codes::find(code).is_some(), "{code} is not registered");
+            assert!(reference.contains(&format!("\n## {code}: ")), "{code} is not in docs/diagnostics.md");
+            for key in ["message", "help", "severity"] {
+                assert!(finding[key].as_str().is_some_and(|text| !text.is_empty()), "{key} of {finding:#}");
+            }
+            for key in ["file", "line", "column", "key"] {
+                assert!(finding.get(key).is_some(), "{key} of {finding:#}");
+            }
+        }
+        document
+    }
+
+    pub fn findings(&self) -> &[Value] {
+        self.value["findings"].as_array().unwrap()
+    }
+
+    /// The one finding with this code.
+    pub fn finding(&self, code: &str) -> &Value {
+        let with_code = |finding: &&Value| finding["code"] == code;
+        self.findings().iter().find(with_code).unwrap_or_else(|| panic!("no {code} in {:#}", self.value))
+    }
+
+    pub fn error(&self) -> &str {
+        self.value["error"].as_str().unwrap_or_default()
+    }
+}
+
+/// Everything below a folder: kind, permissions, and digest or target.
+pub type Listing = BTreeMap<String, String>;
+
+pub fn listing(root: &Path) -> Listing {
+    fn walk(root: &Path, folder: &Path, out: &mut Listing) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let found = fs::symlink_metadata(&path).unwrap();
+            let what = if found.is_dir() {
+                walk(root, &path, out);
+                "folder".to_owned()
+            } else if found.is_symlink() {
+                format!("link to {}", fs::read_link(&path).unwrap().display())
+            } else {
+                digest(&fs::read(&path).unwrap())
+            };
+            let relative = path.strip_prefix(root).unwrap().to_string_lossy().into_owned();
+            out.insert(relative, format!("{what} {:?}", found.permissions()));
+        }
+    }
+    let mut out = Listing::new();
+    walk(root, root, &mut out);
+    out
+}
+
+/// SHA-256 in hex, computed beside the code under test.
+pub fn digest(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Bytes of every file below a folder.
+pub fn contents(root: &Path) -> BTreeMap<String, Vec<u8>> {
+    let files = listing(root).into_keys().filter(|path| root.join(path).is_file());
+    files.map(|path| (path.clone(), fs::read(root.join(path)).unwrap())).collect()
+}
+
+/// Sends a signal; a bare machine has no program that does.
+#[track_caller]
+pub fn send(signal: Signal, process: u32) {
+    kill_process(Pid::from_raw(process.cast_signed()).unwrap(), signal).unwrap();
+}
+
+/// How much of what only gains by length is run: the long length in the soak.
+pub fn length<T>(short: T, long: T) -> T {
+    if std::env::var_os("SPECGEN_SOAK").is_some() { long } else { short }
+}
+
+/// Says why part of a test did not run.
+pub fn skipped(why: &str) {
+    println!("{}: skipped: {why}", std::thread::current().name().unwrap_or("test"));
+}

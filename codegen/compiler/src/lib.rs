@@ -1,0 +1,17 @@
+//! The checked model to an emitted controller.
+//!
+//! ```text
+//! model → reach, stability, lint, requirements (findings) → lower → ir (every constant) → emit (text) → workspace (folder)
+//! ```
+
+pub mod compile;
+pub mod emit;
+pub mod ir;
+pub mod lint;
+pub mod lower;
+pub mod precision;
+pub mod reach;
+pub mod requirements;
+pub mod settings;
+pub mod stability;
+pub mod workspace;

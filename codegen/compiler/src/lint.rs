@@ -1,0 +1,224 @@
+//! The physical lint: values that are legal one by one and make no sense together.
+//!
+//! Almost every slip in a spec is a unit (a factor of a thousand), a sign, or two axes in each other's place. None of them is
+//! out of range by itself; each is far from what the rest of the platform says. So every rule compares one value with what
+//! others imply, says both numbers, and names the key that it suspects. Thresholds are wide: a factor of a thousand lies far
+//! outside, an unusual platform well inside.
+//!
+//! What needs no such judgement is checked elsewhere: ranges and consistency in [`specgen_language::spec`], reach in [`crate::reach`],
+//! stability in [`crate::stability`], paths in [`crate::lower::setpoint`], gauges in [`crate::lower`].
+
+mod actuator;
+mod alike;
+mod bodies;
+mod budget;
+mod contact;
+mod electronics;
+mod gauge_layout;
+mod gauge_pattern;
+mod gauges;
+mod layout;
+mod motion;
+pub mod paths;
+mod timing;
+mod weights;
+
+pub use budget::{estimated, least};
+
+use specgen_runtime::Platform;
+
+use crate::stability::platform::{ModalBasis, RestDynamics};
+use specgen_language::diagnostic::{Diagnostic, Severity};
+use specgen_language::model::Model;
+
+/// A rule looks at the platform and reports what it finds.
+type Rule = fn(&Facts, &mut Found);
+
+const RULES: &[Rule] = &[
+    layout::joints_apart,
+    layout::joints_turn,
+    layout::base_is_wider,
+    layout::proportions,
+    layout::legs_cross,
+    bodies::leg_parts_have_size,
+    bodies::mass_centres_off_the_joints,
+    bodies::parts_are_bodies,
+    bodies::centre_over_joints,
+    bodies::moments_of_each_axis,
+    bodies::moments_fit_symmetry,
+    bodies::leg_parts_against_platform,
+    actuator::strain,
+    actuator::stiffness_fits_resonance,
+    actuator::slew_spares_the_stacks,
+    actuator::slew_moves_the_legs,
+    actuator::resonance_is_damped,
+    actuator::grid_shows_the_loop,
+    electronics::lag_fits_slew,
+    electronics::current_fits_slew,
+    electronics::amplifier_noise,
+    electronics::converter_step,
+    electronics::converter_range,
+    electronics::rest_without_power,
+    gauges::noise_of_a_step,
+    gauges::range_centred,
+    gauges::range_beyond_zero,
+    gauges::step_against_stroke,
+    gauges::odd_coordinates,
+    gauges::opposite_directions,
+    gauges::size_of_layout,
+    gauge_pattern::out_of_pattern,
+    gauge_layout::slip_of_one,
+    alike::calibrations,
+    alike::calibrations_straight,
+    alike::gains_by_stiffness,
+    alike::gains_in_order,
+    contact::work_piece,
+    contact::lever_of_contact,
+    contact::contact_near_bias,
+    weights::ratio_of_gains,
+    weights::adapts_in_time,
+    weights::drift_behind_level,
+    timing::times_that_do_nothing,
+    timing::lead_of_the_lag,
+    timing::transfer,
+    timing::velocity_filter,
+    timing::ticks_against_modes,
+    motion::moves_within_slew,
+    motion::moves_end,
+    motion::limits_bind,
+    motion::stream_limit_binds,
+    motion::workspace_is_used,
+    budget::tables_fit,
+];
+
+/// What every rule may look at.
+pub(crate) struct Facts<'a> {
+    model: &'a Model,
+    /// The legs at rest; none if they do not hold the platform.
+    legs: Option<Legs>,
+}
+
+/// Legs and modes at rest.
+struct Legs {
+    /// J = ∂l/∂h, 1 and m/rad.
+    jacobian: [[f64; 6]; 6],
+    /// m.
+    lengths: [f64; 6],
+    /// Modes of the platform on its legs, Hz, rising.
+    modes: Option<[f64; 6]>,
+}
+
+impl Legs {
+    fn of(model: &Model, platform: &Platform<f64>) -> Self {
+        let rest = RestDynamics::of(platform);
+        let basis = ModalBasis::of(&rest, model.actuator.axial_stiffness);
+        Self {
+            jacobian: rest.jacobian,
+            lengths: platform.rest_lengths(),
+            modes: basis.map(|basis| basis.frequencies.map(|omega| omega / core::f64::consts::TAU)),
+        }
+    }
+
+    /// Stiffness of each axis of the platform on its legs, N/m and N m/rad: the diagonal of Jᵀ k_a J.
+    fn stiffness(&self, of_leg: f64) -> [f64; 6] {
+        core::array::from_fn(|axis| self.jacobian.iter().fold(0.0, |sum, row| sum + row[axis] * row[axis]) * of_leg)
+    }
+
+    fn shortest(&self) -> f64 {
+        self.lengths.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a })
+    }
+
+    /// Largest leg motion for one of an axis.
+    fn steepest(&self, axis: usize) -> f64 {
+        self.jacobian.iter().map(|row| row[axis].abs()).fold(0.0, |a: f64, b| if b > a { b } else { a })
+    }
+}
+
+/// Every finding about values that do not fit together; in the order of the rules.
+#[must_use]
+pub fn check(model: &Model) -> Vec<Diagnostic> {
+    // Without a platform there is an error already, and the rules that need one are left out.
+    let legs = crate::lower::platform(model).ok().map(|platform| Legs::of(model, &platform));
+    let facts = Facts { model, legs };
+    let mut found = Found { model, list: Vec::new() };
+    for rule in RULES {
+        rule(&facts, &mut found);
+    }
+    found.list
+}
+
+/// Collects findings at their places.
+pub(crate) struct Found<'a> {
+    model: &'a Model,
+    list: Vec<Diagnostic>,
+}
+
+impl<'a> Found<'a> {
+    pub(crate) const fn new(model: &'a Model) -> Self {
+        Self { model, list: Vec::new() }
+    }
+
+    pub(crate) fn list(self) -> Vec<Diagnostic> {
+        self.list
+    }
+
+    fn error(&mut self, code: &'static str, key: &str, message: String, help: &str) {
+        self.push(Severity::Error, code, key, message, help);
+    }
+
+    fn warning(&mut self, code: &'static str, key: &str, message: String, help: &str) {
+        self.push(Severity::Warning, code, key, message, help);
+    }
+
+    /// At `key`; where only its list or its section stands in the spec, there.
+    fn push(&mut self, severity: Severity, code: &'static str, key: &str, message: String, help: &str) {
+        let list = key.rsplit_once('[').filter(|_| key.ends_with(']')).map_or(key, |(list, _)| list);
+        let section = key.rsplit_once('.').map_or(key, |(section, _)| section);
+        let keys = [key, list, section];
+        let mut finding = Diagnostic::at(&self.model.spans, &keys, (severity, code), message, help.to_owned());
+        // The key that is suspected, even where only its section has a place.
+        key.clone_into(&mut finding.key);
+        self.list.push(finding);
+    }
+}
+
+const AXES: [&str; 6] = ["x", "y", "z", "theta_x", "theta_y", "theta_z"];
+
+/// A number for a message: four digits.
+fn figure(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let size = value.abs();
+    if (1e-3..1e6).contains(&size) {
+        let decimals = (3.0 - libm::floor(libm::log10(size))).max(0.0) as usize;
+        let text = format!("{value:.decimals$}");
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    } else {
+        format!("{value:.3e}")
+    }
+}
+
+/// A length or an angle of an axis, with its unit.
+fn amount(axis: usize, value: f64) -> String {
+    format!("{} {}", figure(value * 1e6), if axis < 3 { "um" } else { "urad" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::figure;
+
+    #[test]
+    fn figures_have_four_digits_and_no_more() {
+        for (value, text) in [
+            (0.0, "0"),
+            (150.0, "150"),
+            (0.08, "0.08"),
+            (-1.23456, "-1.235"),
+            (2.5e-9, "2.500e-9"),
+            (123_456.7, "123457"),
+        ] {
+            assert_eq!(figure(value), text);
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Stacks: stroke, strain, stiffness, resonance, slew.
+
+use core::f64::consts::TAU;
+
+use super::{Facts, Found, figure};
+use specgen_language::diagnostic::codes;
+
+/// Stroke of a leg, in leg lengths. Stacks give 0.0015 of their own length; levers in a leg make ten times that.
+const LARGEST_STRAIN: f64 = 0.015;
+/// A leg of this strain or less moves by less than its own thermal expansion over a tenth of a kelvin.
+const SMALLEST_STRAIN: f64 = 1e-6;
+/// What compliance of the mounting takes off a resonance: a factor of four in stiffness.
+const MOUNTING: f64 = 2.0;
+/// A rod fixed at one end resonates at π/2 of what stiffness and mass make; a fifth more for tolerances.
+const FREE_ROD: f64 = 1.9;
+/// Share of the resonance's period in which a stack may be driven over its range: makers of stacks give a third as the least.
+const FASTEST: f64 = 1.0 / 3.0;
+/// A stack that takes longer over its range, s, follows nothing.
+const SLOWEST: f64 = 1.0;
+
+/// Damping ratio of a bare ceramic of a mechanical quality of 2,500. Whatever it is mounted in has more.
+const LEAST_DAMPED: f64 = 2e-4;
+/// Fewer cells to an axis do not show the bend of a branch.
+const COARSEST_GRID: usize = 8;
+
+/// No piezo leg moves by more than a hundredth of its length.
+pub(super) fn strain(facts: &Facts, found: &mut Found) {
+    let Some(legs) = &facts.legs else { return };
+    let (stroke, length) = (facts.model.actuator.stroke, legs.shortest());
+    if (SMALLEST_STRAIN..=LARGEST_STRAIN).contains(&(stroke / length)) {
+        return;
+    }
+    found.warning(
+        codes::STRAIN_ODD,
+        "actuator.stroke",
+        format!(
+            "a stroke of {} um is {} of a leg of {} mm",
+            figure(stroke * 1e6),
+            figure(stroke / length),
+            figure(length * 1e3)
+        ),
+        "stacks give 0.001 to 0.0015 of their own length: check the units of `actuator.stroke` and of [geometry]",
+    );
+}
+
+/// Stiffness and masses bound the resonance of a leg: as bare as its extensible part, or with its share of the platform.
+pub(super) fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
+    let model = facts.model;
+    let own = model.leg.extensible_mass;
+    let of = |mass: f64| libm::sqrt(model.actuator.axial_stiffness / mass) / TAU;
+    let (loaded, bare) = (of(own + model.platform.mass / 6.0), of(own));
+    let resonance = model.actuator.resonance;
+    if resonance >= loaded / MOUNTING && resonance <= bare * FREE_ROD {
+        return;
+    }
+    let sizes = format!(
+        "a leg of {} N/m resonates at {} Hz with its extensible part of {} g alone and at {} Hz with a sixth of the platform",
+        figure(model.actuator.axial_stiffness),
+        figure(bare),
+        figure(own * 1e3),
+        figure(loaded)
+    );
+    found.warning(
+        codes::RESONANCE_ODD,
+        "actuator.resonance",
+        format!("{sizes}; the spec says {} Hz", figure(resonance)),
+        "check the units of `actuator.resonance`, `actuator.axial_stiffness`, `leg.extensible_mass` and `platform.mass`",
+    );
+}
+
+/// A slew limit protects the stacks if they are not driven over their range within a fraction of their own period.
+pub(super) fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
+    let actuator = &facts.model.actuator;
+    let [low, high] = actuator.voltage;
+    let time = (high - low) / actuator.slew_rate;
+    if time * actuator.resonance >= FASTEST {
+        return;
+    }
+    found.warning(
+        codes::SLEW_TOO_FAST,
+        "actuator.slew_rate",
+        format!(
+            "at {} V/ms a stack goes over its range of {} V in {} us; one period of its resonance is {} us",
+            figure(actuator.slew_rate * 1e-3),
+            figure(high - low),
+            figure(time * 1e6),
+            figure(1e6 / actuator.resonance)
+        ),
+        &format!(
+            "a stack that is driven faster than a third of its period overshoots into tension: at most \"{} V/ms\" is usual; check the unit (V/ms or V/s)",
+            figure((high - low) * 3.0 * actuator.resonance * 1e-3)
+        ),
+    );
+}
+
+/// A limit so low that nothing moves.
+pub(super) fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
+    let actuator = &facts.model.actuator;
+    let [low, high] = actuator.voltage;
+    let time = (high - low) / actuator.slew_rate;
+    if time <= SLOWEST {
+        return;
+    }
+    found.warning(
+        codes::SLEW_TOO_SLOW,
+        "actuator.slew_rate",
+        format!(
+            "at {} V/ms a leg takes {} s over its stroke: it moves at {} um/s at most",
+            figure(actuator.slew_rate * 1e-3),
+            figure(time),
+            figure(actuator.slew_rate * actuator.leg_gain() * 1e6)
+        ),
+        "check the unit: V/ms or V/s",
+    );
+}
+
+/// Everything that is built is damped.
+pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
+    let actuator = &facts.model.actuator;
+    if actuator.damping_ratio >= LEAST_DAMPED {
+        return;
+    }
+    found.warning(
+        codes::DAMPING_ODD,
+        "actuator.damping_ratio",
+        format!(
+            "with a damping ratio of {} a leg that is pushed rings for {} s (to a hundredth); a bare ceramic has {} and more",
+            figure(actuator.damping_ratio),
+            figure(libm::log(100.0) / (actuator.damping_ratio * TAU * actuator.resonance)),
+            figure(LEAST_DAMPED)
+        ),
+        "0.01 to 0.2 is usual: measure it with `specgen identify response`; check that it is a ratio, with critical damping as 1",
+    );
+}
+
+/// A table of a few cells is no model of a hysteresis loop.
+pub(super) fn grid_shows_the_loop(facts: &Facts, found: &mut Found) {
+    let grid = facts.model.hysteresis.grid;
+    if grid >= COARSEST_GRID {
+        return;
+    }
+    let [low, high] = facts.model.actuator.voltage;
+    found.warning(
+        codes::GRID_COARSE,
+        "hysteresis.grid",
+        format!(
+            "{grid} intervals of {} V each: within one the model of a leg is a straight line",
+            figure((high - low) / grid as f64)
+        ),
+        "the error of the inverse falls with the square of `hysteresis.grid`: 16 to 32 is usual, and `specgen identify` chooses it by the record",
+    );
+}

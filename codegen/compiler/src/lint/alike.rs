@@ -1,0 +1,157 @@
+//! Values that come six at a time and are much alike: calibrations of gauges, gains by stiffness.
+
+use super::{AXES, Facts, Found, figure};
+use specgen_language::diagnostic::codes;
+use specgen_language::model::Gains;
+
+/// A coefficient of a calibration against the middle one of the six.
+const CALIBRATION_SPREAD: f64 = 3.0;
+/// What a power above the first adds at an end of the range, in spans. Gauges on the market are straight within 0.02.
+const MOST_BENT: f64 = 0.1;
+/// A gain over the stiffness of its axis, against the middle one of the six.
+const GAIN_SPREAD: f64 = 10.0;
+/// Two gains over their stiffness are so many times apart as they stand, and less than that in each other's place.
+const EXCHANGED_NOW: f64 = 5.0;
+const EXCHANGED_THEN: f64 = 1.5;
+
+/// The middle of six magnitudes.
+fn middle(values: [f64; 6]) -> f64 {
+    let mut sorted = values.map(f64::abs);
+    sorted.sort_by(f64::total_cmp);
+    0.5 * (sorted[2] + sorted[3])
+}
+
+/// Gauges of one make have calibrations alike.
+pub(super) fn calibrations(facts: &Facts, found: &mut Found) {
+    let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
+    // Offset and slope; higher powers differ from gauge to gauge.
+    for power in 0..2 {
+        let values: [f64; 6] = core::array::from_fn(|k| calibration[k].get(power).copied().unwrap_or(0.0));
+        let usual = middle(values);
+        let positive = values.iter().filter(|value| **value > 0.0).count();
+        for (gauge, value) in values.into_iter().enumerate() {
+            let far =
+                usual > 0.0 && (value.abs() > CALIBRATION_SPREAD * usual || value.abs() < usual / CALIBRATION_SPREAD);
+            let turned = (positive == 5 && value < 0.0) || (positive == 1 && value > 0.0);
+            if !far && !turned {
+                continue;
+            }
+            found.warning(
+                codes::CALIBRATION_ODD,
+                &format!("gauge[{gauge}].calibration[{power}]"),
+                format!(
+                    "{} of the calibration of gauge {gauge} is {}, while the six have about {}",
+                    ["the offset", "the slope"][power],
+                    ["um", "um/V"].map(|unit| format!("{} {unit}", figure(value * 1e6)))[power],
+                    figure(usual * 1e6)
+                ),
+                "check its unit and its sign against the other gauges; where those have theirs from `sensor.calibration`, that may be the wrong one; a wrong sign makes the loop run away",
+            );
+        }
+    }
+}
+
+/// A gauge is nearly straight: what it adds in higher powers of the voltage is small over its range.
+pub(super) fn calibrations_straight(facts: &Facts, found: &mut Found) {
+    let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
+    let [low, high] = facts.model.sensor.range;
+    for (gauge, powers) in calibration.iter().enumerate() {
+        let [offset, slope, ..] = powers[..] else { continue };
+        // Volts at the ends, by the slope alone.
+        let volts = [low, high].map(|end| libm::fabs((end - offset) / slope));
+        let farthest = if volts[0] > volts[1] { volts[0] } else { volts[1] };
+        for (power, coefficient) in powers.iter().enumerate().skip(2) {
+            let added = libm::fabs(coefficient * libm::pow(farthest, power as f64));
+            if added.is_nan() || added <= MOST_BENT * (high - low) {
+                continue;
+            }
+            let own = format!("gauge[{gauge}].calibration");
+            let key = if found.model.spans.contains_key(&own) { own } else { "sensor.calibration".to_owned() };
+            found.warning(
+                codes::CALIBRATION_BENT,
+                &format!("{key}[{power}]"),
+                format!(
+                    "power {power} of the calibration of gauge {gauge} adds {} um at {} V, on a range of {} um",
+                    figure(added * 1e6),
+                    figure(farthest),
+                    figure((high - low) * 1e6)
+                ),
+                "gauges are straight within a hundredth or two of their range: check the unit of this coefficient (nm/V^2 or um/V^2) and of the slope before it",
+            );
+        }
+    }
+}
+
+/// Gains go with the stiffness of the axes.
+pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
+    let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
+    let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
+    let sections: [(&str, Option<&Gains>); 2] =
+        [("gains", task.gains.as_ref()), ("position_gains", task.position_gains.as_ref())];
+    for (section, gains) in sections {
+        let Some(gains) = gains else { continue };
+        for (name, values) in
+            [("proportional", gains.proportional), ("integral", gains.integral), ("derivative", gains.derivative)]
+        {
+            let ratios: [f64; 6] = core::array::from_fn(|axis| values[axis] / stiffness[axis]);
+            let usual = middle(ratios);
+            for (axis, ratio) in ratios.into_iter().enumerate() {
+                // Zero switches an axis off.
+                if ratio == 0.0 || usual == 0.0 || (1.0 / GAIN_SPREAD..=GAIN_SPREAD).contains(&(ratio / usual)) {
+                    continue;
+                }
+                found.warning(
+                    codes::GAIN_UNEVEN,
+                    &format!("{section}.{name}[{axis}]"),
+                    format!(
+                        "the gain of {} is {}: {} times what the other axes have for their stiffness (its own is {})",
+                        AXES[axis],
+                        figure(values[axis]),
+                        figure(ratio / usual),
+                        figure(stiffness[axis])
+                    ),
+                    &format!("about {:.3e} goes with the others: check the unit", usual * stiffness[axis]),
+                );
+            }
+        }
+    }
+}
+
+/// Two axes with each other's gains: each is off for its stiffness, and both fit when exchanged.
+pub(super) fn gains_in_order(facts: &Facts, found: &mut Found) {
+    let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
+    let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
+    let sections: [(&str, Option<&Gains>); 2] =
+        [("gains", task.gains.as_ref()), ("position_gains", task.position_gains.as_ref())];
+    for (section, gains) in sections {
+        let Some(gains) = gains else { continue };
+        for (name, values) in
+            [("proportional", gains.proportional), ("integral", gains.integral), ("derivative", gains.derivative)]
+        {
+            // Translations among themselves, and rotations: across them the units would not fit.
+            for (a, b) in [(0, 1), (0, 2), (1, 2), (3, 4), (3, 5), (4, 5)] {
+                if values[a] == 0.0 || values[b] == 0.0 {
+                    continue;
+                }
+                let apart = |one: f64, other: f64| libm::fabs(libm::log((one / stiffness[a]) / (other / stiffness[b])));
+                let (now, exchanged) = (apart(values[a], values[b]), apart(values[b], values[a]));
+                if now <= libm::log(EXCHANGED_NOW) || exchanged >= libm::log(EXCHANGED_THEN) {
+                    continue;
+                }
+                found.warning(
+                    codes::GAINS_EXCHANGED,
+                    &format!("{section}.{name}[{a}]"),
+                    format!(
+                        "the gains of {} and {} are {} and {}, while the platform is {} times as stiff along the first as along the second",
+                        AXES[a],
+                        AXES[b],
+                        figure(values[a]),
+                        figure(values[b]),
+                        figure(stiffness[a] / stiffness[b])
+                    ),
+                    &format!("in each other's place they would go with the stiffness: check the order of `{section}.{name}`"),
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! Masses and inertias against sizes.
+
+use super::{Facts, Found, figure};
+use specgen_language::diagnostic::{Diagnostic, codes};
+
+/// Least radius of gyration of a leg part, in leg lengths: that of a disc a fifteenth of the leg long.
+const THINNEST: f64 = 0.02;
+/// Nearest that a mass centre lies to its own joint, in radii of gyration of the part.
+const NEAREST_CENTRE: f64 = 0.02;
+/// Radius of gyration of a part over the way from its joint to its mass centre. A rod from the joint on has 0.58, half its
+/// mass at either end 1, a lump half as long as that 0.29.
+const SOUND_PART: core::ops::RangeInclusive<f64> = 0.25..=1.25;
+/// Radius of gyration about one axis, in radii of the joint circle.
+const SOUND_AXIS: core::ops::RangeInclusive<f64> = 0.1..=3.0;
+/// The same about z: a platform reaches out to its joints. An even disc of their radius has 0.71, one of less than half of it
+/// 0.3, one of twice it 1.41. About x and y a tall load adds its height.
+const SOUND_TURN: core::ops::RangeInclusive<f64> = 0.3..=1.5;
+/// Farthest centre of mass from P_C, in radii of the joint circle: beside the axis, and along it.
+const FARTHEST_CENTRE: [f64; 3] = [1.0, 1.0, 3.0];
+/// How much the moments about x and y differ on a platform that its joints cannot tell x from y on.
+const UNEVEN: f64 = 2.0;
+/// The same, where the moment about z is as one of the two within so much: then that about z is expected to be the odd one.
+const ODD_ONE: f64 = 1.3;
+const AS_THAT_ABOUT_Z: f64 = 1.15;
+/// A leg part against the platform, by mass.
+const SOUND_SHARE: core::ops::RangeInclusive<f64> = 2e-4..=5.0;
+
+fn parts<'a>(facts: &Facts<'a>) -> [(&'static str, &'a f64, &'a f64, &'a f64); 2] {
+    let leg = &facts.model.leg;
+    [
+        ("fixed", &leg.fixed_mass, &leg.fixed_inertia, &leg.fixed_center),
+        ("extensible", &leg.extensible_mass, &leg.extensible_inertia, &leg.extensible_center),
+    ]
+}
+
+/// A part of a leg is as long as a part of a leg. (That it is not longer is checked with the spec.)
+pub(super) fn leg_parts_have_size(facts: &Facts, found: &mut Found) {
+    let Some(legs) = &facts.legs else { return };
+    for (part, mass, inertia, _) in parts(facts) {
+        let (radius, length) = (libm::sqrt(inertia / mass), legs.shortest());
+        if radius >= THINNEST * length {
+            continue;
+        }
+        found.warning(
+            codes::LEG_PART_SMALL,
+            &format!("leg.{part}_inertia"),
+            format!(
+                "the {part} part of a leg has a radius of gyration of {} mm (from {} g and {} g mm^2), in a leg of {} mm",
+                figure(radius * 1e3),
+                figure(mass * 1e3),
+                figure(inertia * 1e9),
+                figure(length * 1e3)
+            ),
+            &format!("check the units of `leg.{part}_inertia` and `leg.{part}_mass`"),
+        );
+    }
+}
+
+/// A part reaches from its joint, so that its mass centre does not lie in it.
+pub(super) fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
+    for (part, mass, inertia, center) in parts(facts) {
+        let radius = libm::sqrt(inertia / mass);
+        // Zero is a choice: a part that is balanced about its joint.
+        if *center == 0.0 || *center >= NEAREST_CENTRE * radius {
+            continue;
+        }
+        found.warning(
+            codes::CENTRE_AT_JOINT,
+            &format!("leg.{part}_center"),
+            format!(
+                "the mass centre of the {part} part lies {} mm from its joint, but the part's radius of gyration is {} mm",
+                figure(center * 1e3),
+                figure(radius * 1e3)
+            ),
+            "check the unit: mm or um",
+        );
+    }
+}
+
+/// Mass, inertia and mass centre of a part are those of one body, which begins at its joint.
+pub(super) fn parts_are_bodies(facts: &Facts, found: &mut Found) {
+    for (part, mass, inertia, center) in parts(facts) {
+        let radius = libm::sqrt(inertia / mass);
+        let key = format!("leg.{part}_inertia");
+        // Zero is a choice: a part that is balanced about its joint. What is far off is said already.
+        let said = |one: &Diagnostic| [key.as_str(), &format!("leg.{part}_center")].contains(&one.key.as_str());
+        if *center == 0.0 || SOUND_PART.contains(&(radius / center)) || found.list.iter().any(said) {
+            continue;
+        }
+        found.warning(
+            codes::LEG_PART_SHAPE,
+            &key,
+            format!(
+                "the {part} part of a leg has a radius of gyration of {} mm (from {} g and {} g mm^2) about a mass centre {} mm from its joint",
+                figure(radius * 1e3),
+                figure(mass * 1e3),
+                figure(inertia * 1e9),
+                figure(center * 1e3)
+            ),
+            &format!(
+                "a rod from the joint on has {} mm there: check `leg.{part}_inertia` (about the mass centre), `leg.{part}_mass` and `leg.{part}_center`",
+                figure(center * 1e3 / libm::sqrt(3.0))
+            ),
+        );
+    }
+}
+
+/// The centre of mass lies above the joints, or near them.
+pub(super) fn centre_over_joints(facts: &Facts, found: &mut Found) {
+    let (body, size) = (&facts.model.platform, facts.model.geometry.joint_radius());
+    for (axis, value) in body.center_of_mass.into_iter().enumerate() {
+        if libm::fabs(value) <= FARTHEST_CENTRE[axis] * size {
+            continue;
+        }
+        found.warning(
+            codes::CENTRE_FAR,
+            &format!("platform.center_of_mass[{axis}]"),
+            format!(
+                "the centre of mass lies {} mm from P_C along {}, on a platform whose joints are {} mm from the middle",
+                figure(value * 1e3),
+                ["x", "y", "z"][axis],
+                figure(size * 1e3)
+            ),
+            "the load would lie outside the legs: check the unit of `platform.center_of_mass` and the order of its axes",
+        );
+    }
+}
+
+/// Each moment by itself. (The largest is checked with the spec.)
+pub(super) fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
+    let (body, size) = (&facts.model.platform, facts.model.geometry.joint_radius());
+    for (axis, moment) in body.inertia.into_iter().enumerate() {
+        let radius = libm::sqrt(moment / body.mass);
+        let sound = if axis == 2 { SOUND_TURN } else { SOUND_AXIS };
+        if sound.contains(&(radius / size)) {
+            continue;
+        }
+        found.warning(
+            codes::MOMENT_ODD,
+            &format!("platform.inertia[{axis}]"),
+            format!(
+                "about {} the platform has a radius of gyration of {} mm (from {} g mm^2 and {} kg), but its joints are {} mm from the middle",
+                ["x", "y", "z"][axis],
+                figure(radius * 1e3),
+                figure(moment * 1e9),
+                figure(body.mass),
+                figure(size * 1e3)
+            ),
+            "check the units of `platform.inertia` and `platform.mass`",
+        );
+    }
+}
+
+/// Joints that look alike along x and y carry a body that does.
+pub(super) fn moments_fit_symmetry(facts: &Facts, found: &mut Found) {
+    let [xx, yy, zz] = facts.model.platform.inertia;
+    let joints = &facts.model.geometry.platform_joints;
+    let spread = |axis: usize| joints.iter().fold(0.0, |sum, joint| sum + joint[axis] * joint[axis]);
+    let (along_x, along_y) = (spread(0), spread(1));
+    let alike = along_x < 1.05 * along_y && along_y < 1.05 * along_x;
+    let ratio = if xx > yy { xx / yy } else { yy / xx };
+    let [from_xx, from_yy] = [xx, yy].map(|moment| libm::fabs(libm::log(moment / zz)));
+    let nearest = if from_xx < from_yy { from_xx } else { from_yy };
+    let exchanged = ratio > ODD_ONE && nearest < libm::log(AS_THAT_ABOUT_Z);
+    if !alike || (ratio <= UNEVEN && !exchanged) {
+        return;
+    }
+    // The odd one of the three is suspected: the one whose fellow is on the third axis.
+    let odd = usize::from(from_yy > from_xx);
+    found.warning(
+        codes::MOMENTS_UNEVEN,
+        &format!("platform.inertia[{odd}]"),
+        format!(
+            "I_xx is {} g mm^2 and I_yy {} g mm^2, {} times apart, on a platform whose joints lie alike along x and y",
+            figure(xx * 1e9),
+            figure(yy * 1e9),
+            figure(ratio)
+        ),
+        "`platform.inertia` is I_xx, I_yy, I_zz in {P}, z along the axis of the hexapod: check their order",
+    );
+}
+
+/// A leg part outweighs the platform by a few times at most.
+pub(super) fn leg_parts_against_platform(facts: &Facts, found: &mut Found) {
+    let platform = facts.model.platform.mass;
+    for (part, mass, _, _) in parts(facts) {
+        if SOUND_SHARE.contains(&(mass / platform)) {
+            continue;
+        }
+        found.warning(
+            codes::LEG_MASS_ODD,
+            &format!("leg.{part}_mass"),
+            format!("the {part} part of a leg weighs {} kg, the platform {} kg", figure(*mass), figure(platform)),
+            &format!("check the units of `leg.{part}_mass` and `platform.mass`: kg or g"),
+        );
+    }
+}

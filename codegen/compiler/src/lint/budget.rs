@@ -1,0 +1,98 @@
+//! Memory that the constants take whatever the code does.
+
+use super::{Facts, Found, figure};
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::model::{Model, Scalar};
+
+/// Least stack of a tick, bytes: six legs and a pose in flight.
+const LEAST_STACK: u64 = 256;
+/// Least instructions of a tick: two sums and a product for every leg and axis of the kinematics and the law.
+const LEAST_INSTRUCTIONS: u64 = 300;
+/// Declared more than this many times over what is needed, a budget checks nothing.
+const LOOSE: u64 = 512;
+
+/// Bytes that tables and reversal memories take, and with them everything that can be said before a build: the rest is
+/// measured by `specgen build`.
+pub fn least(model: &Model) -> [u64; 2] {
+    let scalar = match model.controller.scalar {
+        Scalar::F32 => 4,
+        Scalar::F64 => 8,
+    };
+    let nodes = (model.hysteresis.grid + 1) * (model.hysteresis.grid + 2) / 2;
+    let table = nodes * scalar * model.hysteresis.records.len();
+    // Each reversal is an extremum; six legs remember their own.
+    let memory = 6 * model.hysteresis.memory * scalar;
+    [table as u64, memory as u64]
+}
+
+/// Says what of a declared budget only a build can tell.
+pub fn estimated(model: &Model) -> Option<Diagnostic> {
+    let target = &model.target;
+    if [target.flash, target.ram, target.stack, target.instructions] == [None; 4] {
+        return None;
+    }
+    let [tables, memory] = least(model);
+    Some(Diagnostic::at(
+        &model.spans,
+        &["target.budget"],
+        (Severity::Note, codes::ESTIMATED),
+        format!(
+            "tables take {tables} B of flash, reversal memories {memory} B of RAM; the rest of the budget is not checked here"
+        ),
+        "`specgen SPEC -o DIR` builds the controller and measures flash, RAM, stack and instructions".to_owned(),
+    ))
+}
+
+/// A budget below what the tables take, or so far above it that it checks nothing.
+pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
+    let target = &facts.model.target;
+    let [table, memory] = least(facts.model);
+    let lines = [
+        ("flash", target.flash, table, "the hysteresis tables alone take"),
+        ("ram", target.ram, memory, "the reversal memories alone take"),
+        ("stack", target.stack, LEAST_STACK, "no tick gets by with less than about"),
+    ];
+    for (name, declared, least, what) in lines {
+        let Some(declared) = declared else { continue };
+        let key = format!("target.budget.{name}");
+        if declared < least {
+            found.error(
+                codes::BUDGET_IMPOSSIBLE,
+                &key,
+                format!("`{key}` is {declared} B, but {what} {least} B"),
+                "check the unit (B or KiB); `specgen build` measures what it really takes",
+            );
+        } else if declared > LOOSE * least.max(if name == "stack" { 1024 } else { 4096 }) {
+            found.warning(
+                codes::BUDGET_LOOSE,
+                &key,
+                format!(
+                    "`{key}` is {} MiB; the tables take {} KiB",
+                    figure(declared as f64 / 1_048_576.0),
+                    figure(least as f64 / 1024.0)
+                ),
+                "a budget that no controller can exceed checks nothing: check the unit (KiB or MiB)",
+            );
+        }
+    }
+    if let (Some(flash), Some(ram)) = (target.flash, target.ram)
+        && ram > flash
+    {
+        found.warning(
+            codes::BUDGET_SWAPPED,
+            "target.budget.ram",
+            format!("a budget of {ram} B of RAM and {flash} B of flash"),
+            "code and tables are in flash, which is the larger on every part: are `target.budget.flash` and `target.budget.ram` in each other's place?",
+        );
+    }
+    if let Some(declared) = target.instructions
+        && declared < LEAST_INSTRUCTIONS
+    {
+        found.error(
+            codes::BUDGET_IMPOSSIBLE,
+            "target.budget.instructions",
+            format!("`target.budget.instructions` is {declared}, but the kinematics of six legs alone takes more than {LEAST_INSTRUCTIONS}"),
+            "some thousands are usual; `specgen build` measures what a tick really takes",
+        );
+    }
+}

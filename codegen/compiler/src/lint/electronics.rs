@@ -1,0 +1,146 @@
+//! Amplifier and converter.
+
+use super::{Facts, Found, figure};
+use specgen_language::diagnostic::codes;
+use specgen_language::model::Model;
+
+/// Largest slew rate of a first-order lag is range over time constant: a limit above that never binds.
+const LAG_SLACK: f64 = 1.0;
+/// Noise of an amplifier, of its range.
+const SOUND_NOISE: core::ops::RangeInclusive<f64> = 2e-7..=1e-2;
+/// A converter step of more than this share of the stroke is too coarse for any nanopositioning.
+const COARSEST_STEP: f64 = 1e-3;
+
+/// Range of a converter over that of the stacks: amplifiers are bought for their stacks.
+const WIDEST_RANGE: f64 = 4.0;
+
+/// An amplifier that is so slow never makes the declared slew rate.
+pub(super) fn lag_fits_slew(facts: &Facts, found: &mut Found) {
+    let (amplifier, actuator) = (&facts.model.amplifier, &facts.model.actuator);
+    let [low, high] = actuator.voltage;
+    if amplifier.lag * actuator.slew_rate <= LAG_SLACK * (high - low) {
+        return;
+    }
+    found.warning(
+        codes::LAG_AGAINST_SLEW,
+        "amplifier.lag",
+        format!(
+            "with a lag of {} ms a step over {} V begins at {} V/ms, but `actuator.slew_rate` is {} V/ms",
+            figure(amplifier.lag * 1e3),
+            figure(high - low),
+            figure((high - low) / amplifier.lag * 1e-3),
+            figure(actuator.slew_rate * 1e-3)
+        ),
+        "check the units of `amplifier.lag` (ms or us) and `actuator.slew_rate` (V/ms or V/s)",
+    );
+}
+
+/// What charges a stack: I = C dU/dt.
+pub(super) fn current_fits_slew(facts: &Facts, found: &mut Found) {
+    let model = facts.model;
+    let (Some(capacitance), Some(current)) = (model.actuator.capacitance, model.amplifier.current) else { return };
+    let needed = capacitance * model.actuator.slew_rate;
+    if needed <= current {
+        return;
+    }
+    found.warning(
+        codes::CURRENT_AGAINST_SLEW,
+        "amplifier.current",
+        format!(
+            "{} uF at {} V/ms take {} A, but the amplifier gives {} A",
+            figure(capacitance * 1e6),
+            figure(model.actuator.slew_rate * 1e-3),
+            figure(needed),
+            figure(current)
+        ),
+        &format!(
+            "the amplifier's own limit is {} V/ms: write that as `actuator.slew_rate`, or check `actuator.capacitance` (of a whole leg) and `amplifier.current`",
+            figure(current / capacitance * 1e-3)
+        ),
+    );
+}
+
+/// Noise that would move a leg by much of its stroke, or that no amplifier is free of.
+pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
+    let (noise, actuator) = (facts.model.amplifier.noise, &facts.model.actuator);
+    let [low, high] = actuator.voltage;
+    let share = noise / (high - low);
+    if noise == 0.0 || SOUND_NOISE.contains(&share) {
+        return;
+    }
+    let how = if share > 1e-3 { "more than a hundredth of its range" } else { "quieter than any amplifier" };
+    found.warning(
+        codes::AMPLIFIER_NOISE,
+        "amplifier.noise",
+        format!(
+            "an amplifier noise of {} mV rms on {} V is {how}; it moves a leg by {} nm rms",
+            figure(noise * 1e3),
+            figure(high - low),
+            figure(noise * actuator.leg_gain() * 1e9)
+        ),
+        "check the unit: mV or uV",
+    );
+}
+
+/// One code of the converter in nanometres.
+pub(super) fn converter_step(facts: &Facts, found: &mut Found) {
+    let (dac, actuator) = (&facts.model.dac, &facts.model.actuator);
+    let [low, high] = dac.range;
+    let volts = (high - low) / (libm::exp2(f64::from(dac.bits)) - 1.0);
+    let step = volts * actuator.leg_gain();
+    if step <= COARSEST_STEP * actuator.stroke {
+        return;
+    }
+    found.warning(
+        codes::CONVERTER_COARSE,
+        "dac.bits",
+        format!(
+            "one code of {} mV moves a leg by {} nm, {} of its stroke of {} um",
+            figure(volts * 1e3),
+            figure(step * 1e9),
+            figure(step / actuator.stroke),
+            figure(actuator.stroke * 1e6)
+        ),
+        "a converter of 16 bits or more is usual; check `dac.range` and `dac.bits` too: the range is in volts at the stack",
+    );
+}
+
+/// A converter is not spread over many times what the stacks take.
+pub(super) fn converter_range(facts: &Facts, found: &mut Found) {
+    let ([low, high], [from, to]) = (facts.model.dac.range, facts.model.actuator.voltage);
+    if high - low <= WIDEST_RANGE * (to - from) {
+        return;
+    }
+    let item = usize::from(high - to >= from - low);
+    found.warning(
+        codes::CONVERTER_WIDE,
+        &format!("dac.range[{item}]"),
+        format!(
+            "the converter spans {} V, the stacks take {} V of it",
+            figure(high - low),
+            figure(to - from)
+        ),
+        "two bits and more of the converter are never used: check `dac.range`, in volts at the stack, and `actuator.voltage`",
+    );
+}
+
+/// Amplifiers that are off leave the stacks at 0 V.
+pub(super) fn rest_without_power(facts: &Facts, found: &mut Found) {
+    let model = facts.model;
+    let [low, high] = model.actuator.voltage;
+    let rest = model.rest_voltage();
+    let off = Model::nearest_to_zero(low, high);
+    if rest == off {
+        return;
+    }
+    found.warning(
+        codes::REST_NOT_ZERO,
+        "supervisor.rest_voltage",
+        format!(
+            "the legs rest at {} V, but stacks whose amplifiers are off stand at 0 V: {} um that a leg jumps when they are switched on",
+            figure(rest),
+            figure((rest - off).abs() * model.actuator.leg_gain() * 1e6)
+        ),
+        "leave `supervisor.rest_voltage` out, unless the amplifiers switch on and off slowly by themselves",
+    );
+}

@@ -1,0 +1,129 @@
+//! Whether one slip in the layout of the gauges would explain that it sees a motion badly.
+
+use nalgebra::Matrix6;
+
+use super::{Facts, Found, figure};
+use specgen_language::diagnostic::codes;
+use specgen_language::model::Probe;
+
+/// A layout is suspected if undoing one slip makes its condition this many times better.
+const MUCH_BETTER: f64 = 1.5;
+/// Below this condition a layout is good whatever could be better.
+const GOOD: f64 = 2.0;
+
+/// One change of one gauge: what was mistaken, if it was.
+pub(super) struct Change {
+    pub(super) key: String,
+    pub(super) what: String,
+    pub(super) probe: Probe,
+}
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Signs and coordinates of `vector` in each other's place; what they would be called.
+fn changed(vector: [f64; 3]) -> Vec<([f64; 3], String)> {
+    let mut list = Vec::new();
+    for k in 0..3 {
+        let mut other = vector;
+        other[k] = -vector[k];
+        list.push((other, format!("the sign of {}", AXES[k])));
+        let (a, b) = (k, (k + 1) % 3);
+        let mut other = vector;
+        other.swap(a, b);
+        list.push((other, format!("the order of {} and {}", AXES[a], AXES[b])));
+    }
+    for by in 1..3 {
+        let mut other = vector;
+        other.rotate_left(by);
+        list.push((other, "the order of x, y and z".to_owned()));
+    }
+    list.retain(|(other, _)| *other != vector);
+    list
+}
+
+pub(super) fn changes(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
+    let point = changed(probe.point).into_iter().map(|(point, what)| Change {
+        key: format!("gauge[{gauge}].point"),
+        what,
+        // The target faces the gauge, wherever that is.
+        probe: Probe { point, plane_point: [point[0], point[1], point[2] - height], ..probe.clone() },
+    });
+    let direction = changed(probe.direction).into_iter().map(|(direction, what)| Change {
+        key: format!("gauge[{gauge}].direction"),
+        what,
+        probe: Probe { direction, plane_normal: direction, ..probe.clone() },
+    });
+    point.chain(direction).collect()
+}
+
+/// Best seen over worst seen motion, turns counted at the joint radius; infinite if one is not seen at all.
+fn condition(probes: &[Probe; 6], height: f64, radius: f64) -> f64 {
+    let mut rows = Matrix6::zeros();
+    for (k, probe) in probes.iter().enumerate() {
+        let (n, m) = (probe.direction, probe.plane_normal);
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let start = [probe.point[0], probe.point[1], probe.point[2] - height];
+        let across = dot(m, n);
+        let way = dot(m, core::array::from_fn(|j| probe.plane_point[j] - start[j])) / across;
+        let c: [f64; 3] = core::array::from_fn(|j| start[j] + way * n[j]);
+        let m = m.map(|part| part / across);
+        let turn = [c[1] * m[2] - c[2] * m[1], c[2] * m[0] - c[0] * m[2], c[0] * m[1] - c[1] * m[0]];
+        for j in 0..3 {
+            rows[(k, j)] = m[j];
+            rows[(k, j + 3)] = turn[j] / radius;
+        }
+    }
+    if rows.iter().any(|part| !part.is_finite()) {
+        return f64::INFINITY;
+    }
+    let values = rows.singular_values();
+    if values.min() > 1e-9 { values.max() / values.min() } else { f64::INFINITY }
+}
+
+/// Names the one gauge whose sign or order of coordinates would explain a layout that sees badly.
+pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
+    let Some(task) = &facts.model.task_space else { return };
+    // A slip that puts a gauge out of the pattern of the others is known better from that.
+    if found.list.iter().any(|finding| finding.code == codes::GAUGE_PATTERN) {
+        return;
+    }
+    let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());
+    let now = condition(&task.probes, height, radius);
+    if now <= GOOD {
+        return;
+    }
+    let mut tried: Vec<(f64, Change)> = Vec::new();
+    for (gauge, probe) in task.probes.iter().enumerate() {
+        for change in changes(gauge, probe, height) {
+            let mut probes = task.probes.clone();
+            probes[gauge] = change.probe.clone();
+            tried.push((condition(&probes, height, radius), change));
+        }
+    }
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((best, first)) = tried.first() else { return };
+    if now < MUCH_BETTER * best {
+        return;
+    }
+    // Others do as well, or nearly: the slip may be in any of them.
+    let mut keys: Vec<&str> = Vec::new();
+    for (_, change) in tried.iter().filter(|(other, _)| *other <= 1.2 * best) {
+        if !keys.contains(&change.key.as_str()) {
+            keys.push(&change.key);
+        }
+    }
+    let seen = if now.is_finite() {
+        format!("see one motion {} times better than another", figure(now))
+    } else {
+        "do not see every motion".to_owned()
+    };
+    found.warning(
+        codes::GAUGE_SLIP,
+        &first.key,
+        format!("the gauges {seen}; with {} in `{}` changed it were {} times", first.what, first.key, figure(*best)),
+        &format!(
+            "check signs and order of the coordinates in {}",
+            keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
+        ),
+    );
+}

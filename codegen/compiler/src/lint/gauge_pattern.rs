@@ -1,0 +1,120 @@
+//! Gauges stand in a pattern. One that stands out of it, and would not with one slip undone, has that slip: a chance layout
+//! comes within a thousandth of a pattern once in hundreds.
+
+use super::gauge_layout::{Change, changes};
+use super::{Facts, Found};
+use specgen_language::diagnostic::codes;
+use specgen_language::model::Probe;
+
+/// How near to a pattern counts as in it: points are written with four digits.
+const NEAR: f64 = 2e-3;
+
+/// Whether a gauge keeps to what the others do; none if those have no such pattern.
+type Pattern = fn(&[Probe; 6], usize) -> Option<bool>;
+
+const PATTERNS: [(Pattern, &str); 4] = [
+    (height, "stands at the height of the other five"),
+    (radius, "stands as far from the axis as the other five"),
+    (line, "looks along the axis, along its radius or across it, as the other five do"),
+    (triangle, "makes an equilateral triangle with the other two that look along the axis"),
+];
+
+fn across(probe: &Probe) -> f64 {
+    libm::hypot(probe.point[0], probe.point[1])
+}
+
+fn height(probes: &[Probe; 6], gauge: usize) -> Option<bool> {
+    let size = probes.iter().map(across).fold(0.0, |a: f64, b| if b > a { b } else { a });
+    let one = probes[usize::from(gauge == 0)].point[2];
+    let at = |probe: &Probe| libm::fabs(probe.point[2] - one) <= NEAR * size;
+    let others = probes.iter().enumerate().all(|(other, probe)| other == gauge || at(probe));
+    others.then(|| at(&probes[gauge]))
+}
+
+fn radius(probes: &[Probe; 6], gauge: usize) -> Option<bool> {
+    let one = across(&probes[usize::from(gauge == 0)]);
+    let at = |probe: &Probe| libm::fabs(across(probe) - one) <= NEAR * one;
+    let others = probes.iter().enumerate().all(|(other, probe)| other == gauge || at(probe));
+    others.then(|| at(&probes[gauge]))
+}
+
+fn line(probes: &[Probe; 6], gauge: usize) -> Option<bool> {
+    let straight = |probe: &Probe| {
+        let ([x, y, _], [a, b, c]) = (probe.point, probe.direction);
+        let (along, aside) = (libm::fabs(a * x + b * y), libm::fabs(a * y - b * x));
+        let near = NEAR * across(probe);
+        axial(probe) || (libm::fabs(c) <= NEAR && (along <= near || aside <= near))
+    };
+    let others = probes.iter().enumerate().all(|(other, probe)| other == gauge || straight(probe));
+    others.then(|| straight(&probes[gauge]))
+}
+
+fn axial(probe: &Probe) -> bool {
+    libm::hypot(probe.direction[0], probe.direction[1]) <= NEAR
+}
+
+fn triangle(probes: &[Probe; 6], gauge: usize) -> Option<bool> {
+    let trio: Vec<[f64; 3]> = probes.iter().filter(|probe| axial(probe)).map(|probe| probe.point).collect();
+    let [a, b, c] = trio[..] else { return None };
+    let side = |p: [f64; 3], q: [f64; 3]| libm::hypot(p[0] - q[0], p[1] - q[1]);
+    let (ab, bc, ca) = (side(a, b), side(b, c), side(c, a));
+    let alike = libm::fabs(ab - bc) <= NEAR * ab && libm::fabs(bc - ca) <= NEAR * ab;
+    axial(&probes[gauge]).then_some(ab > 0.0 && alike)
+}
+
+/// A digit too many or too few in a coordinate, or cm for mm.
+fn digits(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
+    let each = (0..3).flat_map(|axis| [(axis, 10.0), (axis, 0.1)]);
+    each.map(|(axis, factor)| {
+        let mut point = probe.point;
+        point[axis] *= factor;
+        Change {
+            key: format!("gauge[{gauge}].point"),
+            what: format!("the digits of {}", ["x", "y", "z"][axis]),
+            probe: Probe { point, plane_point: [point[0], point[1], point[2] - height], ..probe.clone() },
+        }
+    })
+    .collect()
+}
+
+/// Names the gauge whose sign, digits or order of coordinates would put it in line with the others.
+pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
+    let Some(task) = &facts.model.task_space else { return };
+    // How many patterns each change restores, and one of them; changes that break none.
+    let mut restoring: Vec<(usize, &str, Change)> = Vec::new();
+    for gauge in 0..6 {
+        let now = PATTERNS.map(|(pattern, _)| pattern(&task.probes, gauge));
+        if !now.contains(&Some(false)) {
+            continue;
+        }
+        let (probe, height) = (&task.probes[gauge], facts.model.geometry.height);
+        for change in changes(gauge, probe, height).into_iter().chain(digits(gauge, probe, height)) {
+            let mut probes = task.probes.clone();
+            probes[gauge] = change.probe.clone();
+            let then = PATTERNS.map(|(pattern, _)| pattern(&probes, gauge));
+            let breaks = (0..PATTERNS.len()).any(|k| now[k] == Some(true) && then[k] != Some(true));
+            let mended: Vec<usize> =
+                (0..PATTERNS.len()).filter(|k| now[*k] == Some(false) && then[*k] == Some(true)).collect();
+            if let (false, Some(first)) = (breaks, mended.first()) {
+                restoring.push((mended.len(), PATTERNS[*first].1, change));
+            }
+        }
+    }
+    restoring.sort_by_key(|one| core::cmp::Reverse(one.0));
+    let Some((most, pattern, first)) = restoring.first() else { return };
+    let mut keys: Vec<&str> = Vec::new();
+    for (_, _, change) in restoring.iter().filter(|one| one.0 == *most) {
+        if !keys.contains(&change.key.as_str()) {
+            keys.push(&change.key);
+        }
+    }
+    found.warning(
+        codes::GAUGE_PATTERN,
+        &first.key,
+        format!("with {} in `{}` changed, the gauge {pattern}; as it is written it does not", first.what, first.key),
+        &format!(
+            "check signs, digits and order of the coordinates in {}",
+            keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
+        ),
+    );
+}

@@ -1,0 +1,236 @@
+//! Gauges: resolution, range, layout.
+
+use super::{Facts, Found, amount, figure};
+use specgen_language::diagnostic::codes;
+
+/// Noise below this share of a converter step cannot be known.
+const QUIETEST: f64 = 0.02;
+/// A step coarser than this share of the stroke.
+const COARSEST_STEP: f64 = 1e-3;
+/// How far a gauge may reach to one side, in what there is to see there. Gauges come in steps of 2 to 2.5: that is two steps
+/// too wide.
+const FARTHEST: f64 = 5.0;
+/// The two sides of a range that is declared about rest, where one reaches too far; and wherever it reaches.
+const UNEVEN: f64 = 5.0;
+const LOPSIDED: f64 = 100.0;
+/// An end of the range that is not zero but below this share of the whole: nobody sets the zero of a gauge so near.
+const END_AT_ZERO: f64 = 1e-3;
+/// A coordinate that is not zero but below this share of the platform, and above the rounding of a drawing.
+const NEARLY_ZERO: f64 = 2e-3;
+const ROUNDING: f64 = 1e-6;
+/// Lines within this angle of each other are parallel, as a cosine.
+const PARALLEL: f64 = 0.99;
+/// Farthest target from P_C, in joint radii.
+const OUT_OF_TOUCH: f64 = 3.0;
+
+fn step(facts: &Facts) -> f64 {
+    let sensor = &facts.model.sensor;
+    (sensor.range[1] - sensor.range[0]) / libm::exp2(f64::from(sensor.bits))
+}
+
+/// A noise far below the converter's step is a slip of the unit.
+pub(super) fn noise_of_a_step(facts: &Facts, found: &mut Found) {
+    let (noise, step) = (facts.model.sensor.noise, step(facts));
+    if noise == 0.0 || noise >= QUIETEST * step {
+        return;
+    }
+    found.warning(
+        codes::GAUGE_QUIET,
+        "sensor.noise",
+        format!(
+            "a noise of {} nm rms is {} of the converter's step of {} nm",
+            figure(noise * 1e9),
+            figure(noise / step),
+            figure(step * 1e9)
+        ),
+        "nobody can measure a noise so far below the step: check the unit (nm or pm), or leave the noise out",
+    );
+}
+
+/// Both ends of the range in the same unit.
+pub(super) fn range_centred(facts: &Facts, found: &mut Found) {
+    let [low, high] = facts.model.sensor.range;
+    let stroke = facts.model.actuator.stroke;
+    let below = -low;
+    let (lopsided, item) = if facts.model.task_space.is_some() {
+        // Seen from rest, a platform moves both ways.
+        let seen = FARTHEST * farthest_seen(facts);
+        let beyond = |far: f64, near: f64| far > LOPSIDED * near || (far > UNEVEN * near && far > seen);
+        (below > 0.0 && high > 0.0 && (beyond(below, high) || beyond(high, below)), usize::from(high < below))
+    } else {
+        (below > FARTHEST * stroke || high > FARTHEST * stroke, usize::from(high > below))
+    };
+    if !lopsided {
+        return;
+    }
+    found.warning(
+        codes::GAUGE_LOPSIDED,
+        &format!("sensor.range[{item}]"),
+        format!(
+            "the gauge reaches from {} um to {} um, the stroke is {} um",
+            figure(low * 1e6),
+            figure(high * 1e6),
+            figure(stroke * 1e6)
+        ),
+        "check both ends of `sensor.range`, their unit and their digits",
+    );
+}
+
+/// An end of a range in the wrong unit is a tiny one beside the other.
+pub(super) fn range_beyond_zero(facts: &Facts, found: &mut Found) {
+    let model = facts.model;
+    for (name, range, scale, unit) in
+        [("sensor.range", model.sensor.range, 1e6, "um"), ("dac.range", model.dac.range, 1.0, "V")]
+    {
+        for (item, end) in range.into_iter().enumerate() {
+            if end == 0.0 || libm::fabs(end) >= END_AT_ZERO * (range[1] - range[0]) {
+                continue;
+            }
+            found.warning(
+                codes::RANGE_AT_ZERO,
+                &format!("{name}[{item}]"),
+                format!(
+                    "a range from {} {unit} to {} {unit} ends next to 0, but not there",
+                    figure(range[0] * scale),
+                    figure(range[1] * scale)
+                ),
+                &format!("check the unit of this end of `{name}`; write 0 if it is meant to be there"),
+            );
+        }
+    }
+}
+
+/// Largest displacement at any gauge in the workspace, m, to first order: every axis at its bound.
+fn farthest_seen(facts: &Facts) -> f64 {
+    let Some(task) = &facts.model.task_space else { return 0.0 };
+    let (along, turns) = (facts.model.workspace.translation, facts.model.workspace.rotation);
+    task.probes.iter().fold(0.0, |most: f64, probe| {
+        let [x, y, z] = [probe.point[0], probe.point[1], probe.point[2] - facts.model.geometry.height];
+        let n = probe.direction;
+        let lever = [y * n[2] - z * n[1], z * n[0] - x * n[2], x * n[1] - y * n[0]];
+        let seen = (0..3).fold(0.0, |sum, k| sum + libm::fabs(n[k]) * along[k] + libm::fabs(lever[k]) * turns[k]);
+        if seen > most { seen } else { most }
+    })
+}
+
+/// One code of the gauge against the stroke.
+pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
+    let (step, stroke) = (step(facts), facts.model.actuator.stroke);
+    if step <= COARSEST_STEP * stroke {
+        return;
+    }
+    found.warning(
+        codes::GAUGE_COARSE,
+        "sensor.bits",
+        format!(
+            "one code of the gauge is {} nm, {} of the stroke of {} um",
+            figure(step * 1e9),
+            figure(step / stroke),
+            figure(stroke * 1e6)
+        ),
+        "a converter of 16 bits or more is usual; check `sensor.range` and `sensor.bits`",
+    );
+}
+
+/// A coordinate in the wrong unit is a tiny one beside large ones.
+pub(super) fn odd_coordinates(facts: &Facts, found: &mut Found) {
+    let Some(task) = &facts.model.task_space else { return };
+    let radius = facts.model.geometry.joint_radius();
+    for (gauge, probe) in task.probes.iter().enumerate() {
+        let target = format!("gauge[{gauge}].target_point");
+        let given = found.model.spans.contains_key(&target);
+        let points = [(format!("gauge[{gauge}].point"), probe.point), (target, probe.plane_point)];
+        let listed = points.iter().take(1 + usize::from(given));
+        for (key, axis, value) in listed.flat_map(|(key, point)| (0..3).map(move |axis| (key, axis, point[axis]))) {
+            if value.abs() < ROUNDING || value.abs() >= NEARLY_ZERO * radius {
+                continue;
+            }
+            found.warning(
+                codes::COORDINATE_ODD,
+                &format!("{key}[{axis}]"),
+                format!(
+                    "{} of `{key}` is {}, on a platform of {} mm",
+                    ["x", "y", "z"][axis],
+                    amount(0, value),
+                    figure(radius * 1e3)
+                ),
+                "check the unit (mm or um); write \"0 mm\" if it is meant to be in the middle",
+            );
+        }
+    }
+}
+
+/// Parallel gauges that count the same way are the rule; one that counts the other way has a wrong sign, or means to.
+pub(super) fn opposite_directions(facts: &Facts, found: &mut Found) {
+    let Some(task) = &facts.model.task_space else { return };
+    let along = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    for (gauge, probe) in task.probes.iter().enumerate() {
+        let others = task.probes.iter().enumerate().filter(|(other, _)| *other != gauge);
+        let (mut with, mut against) = (0_usize, None);
+        for (other, one) in others {
+            let cosine = along(&probe.direction, &one.direction);
+            with += usize::from(cosine > PARALLEL);
+            if cosine < -PARALLEL {
+                against = Some((other, against.map_or(1, |(_, count)| count + 1)));
+            }
+        }
+        let Some((other, count)) = against else { continue };
+        // Of two, the later one is named; of more, the one that stands alone.
+        if count < with + 1 || (count == with + 1 && gauge < other) {
+            continue;
+        }
+        found.warning(
+            codes::GAUGE_REVERSED,
+            &format!("gauge[{gauge}].direction"),
+            format!("gauge {gauge} counts against gauge {other}, which looks along the same line the other way"),
+            &format!(
+                "a wrong sign makes the loop run away: with the amplifiers off, move the platform by hand and see that the readings go as `gauge[{other}].direction` and `gauge[{gauge}].direction` say; if so, nothing is wrong"
+            ),
+        );
+    }
+}
+
+/// Targets are on the platform.
+pub(super) fn size_of_layout(facts: &Facts, found: &mut Found) {
+    let Some(task) = &facts.model.task_space else { return };
+    let radius = facts.model.geometry.joint_radius();
+    for (gauge, probe) in task.probes.iter().enumerate() {
+        let start = [probe.point[0], probe.point[1], probe.point[2] - facts.model.geometry.height];
+        let (n, m) = (probe.direction, probe.plane_normal);
+        let across = m[0] * n[0] + m[1] * n[1] + m[2] * n[2];
+        let way: f64 = (0..3).fold(0.0, |sum, k| sum + m[k] * (probe.plane_point[k] - start[k])) / across;
+        let pierced: [f64; 3] = core::array::from_fn(|k| start[k] + way * n[k]);
+        let far = libm::sqrt(pierced.iter().fold(0.0, |sum, part| sum + part * part));
+        if far.is_nan() || far <= OUT_OF_TOUCH * radius {
+            if let Some(axis) = aside(&pierced, &n, radius) {
+                found.warning(
+                    codes::GAUGE_FAR,
+                    &format!("gauge[{gauge}].point[{axis}]"),
+                    format!(
+                        "the line of gauge {gauge} meets its target {} mm along {} from P_C, on a platform whose joints are {} mm from it",
+                        figure(pierced[axis] * 1e3),
+                        ["x", "y", "z"][axis],
+                        figure(radius * 1e3)
+                    ),
+                    "check the order and the units of `point`: x, y, z in {B}, whose origin lies in the base",
+                );
+            }
+            continue;
+        }
+        found.warning(
+            codes::GAUGE_FAR,
+            &format!("gauge[{gauge}].point"),
+            format!(
+                "the line of gauge {gauge} meets its target {} mm from P_C, on a platform whose joints are {} mm from it",
+                figure(far * 1e3),
+                figure(radius * 1e3)
+            ),
+            "check `point`, `direction` ({B}) and `target_point`, `target_normal` ({P}, from P_C) of the gauge",
+        );
+    }
+}
+
+/// The axis, across the gauge's line, on which the target stands out from a platform of `radius`.
+fn aside(pierced: &[f64; 3], direction: &[f64; 3], radius: f64) -> Option<usize> {
+    (0..3).find(|axis| direction[*axis].abs() < 0.5 && pierced[*axis].abs() > 1.5 * radius)
+}

@@ -1,0 +1,166 @@
+//! Where the joints are.
+
+use super::{Facts, Found, figure};
+use crate::reach::joints;
+use specgen_language::diagnostic::codes;
+
+/// Two joints of one body nearer than this share of a leg cannot be built: a leg that is a hundred times as long as thick is no
+/// strut, and two stand beside each other.
+const NEAREST: f64 = 1e-2;
+/// Base, platform and height are of one size: none is so many times larger or smaller than what lies between the others.
+const OUT_OF_PROPORTION: f64 = 5.0;
+/// Legs that would be shorter by more than this share with each other's joints cross.
+const CROSSED: f64 = 1e-3;
+
+/// The joints of a pair are two parts that stand beside each other.
+pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
+    let geometry = &facts.model.geometry;
+    let Some(legs) = &facts.legs else { return };
+    for (body, joints) in [("base", &geometry.base_joints), ("platform", &geometry.platform_joints)] {
+        let distance = |a: &[f64; 3], b: &[f64; 3]| libm::hypot(libm::hypot(a[0] - b[0], a[1] - b[1]), a[2] - b[2]);
+        let pairs = (0..6).flat_map(|i| (0..i).map(move |j| (i, j)));
+        let Some((i, j, gap)) = pairs
+            .map(|(i, j)| (j, i, distance(&joints[i], &joints[j])))
+            .reduce(|nearest, one| if one.2 < nearest.2 { one } else { nearest })
+        else {
+            continue;
+        };
+        // Legs that meet in one joint are a layout of their own; a gap that is nearly none is a slip.
+        if gap == 0.0 || gap >= NEAREST * legs.shortest() {
+            continue;
+        }
+        let listed = format!("geometry.{body}_joints[{j}]");
+        let key = if found.model.spans.contains_key(&format!("geometry.{body}_joints")) {
+            listed
+        } else {
+            format!("geometry.{body}_angle")
+        };
+        found.warning(
+            codes::JOINTS_TOUCH,
+            &key,
+            format!(
+                "joints {i} and {j} of the {body} are {} mm apart, for legs of {} mm",
+                figure(gap * 1e3),
+                figure(legs.shortest() * 1e3)
+            ),
+            &format!(
+                "check the unit of `{key}`: an angle of a few degrees sets the joints of a pair some millimetres apart"
+            ),
+        );
+    }
+}
+
+/// The joints of a leg stand what the workspace asks of them.
+pub(super) fn joints_turn(facts: &Facts, found: &mut Found) {
+    let Some(most) = facts.model.leg.joint_angle else { return };
+    let ([x, y, z], [a, b, c]) = (facts.model.workspace.translation, facts.model.workspace.rotation);
+    let [base, platform] = joints::angles(&facts.model.geometry, &[x, y, z, a, b, c]);
+    let (end, angle) = if base > platform { ("base", base) } else { ("platform", platform) };
+    if angle <= most {
+        return;
+    }
+    found.error(
+        codes::JOINT_ANGLE,
+        "leg.joint_angle",
+        format!(
+            "in the declared workspace a joint at the {end} turns by {} mrad, but it may turn by {} mrad",
+            figure(angle * 1e3),
+            figure(most * 1e3)
+        ),
+        "reduce [workspace], or check the unit of `leg.joint_angle` (mrad or deg)",
+    );
+}
+
+/// Hexapods stand on a base that is wider than their platform.
+pub(super) fn base_is_wider(facts: &Facts, found: &mut Found) {
+    let geometry = &facts.model.geometry;
+    let radius = |joints: &[[f64; 3]; 6]| {
+        joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a: f64, b| if b > a { b } else { a })
+    };
+    let (base, platform) = (radius(&geometry.base_joints), radius(&geometry.platform_joints));
+    if platform <= base {
+        return;
+    }
+    let circles = found.model.spans.contains_key("geometry.base_radius");
+    let [key, other] = if circles {
+        ["geometry.base_radius", "geometry.platform_radius"]
+    } else {
+        ["geometry.base_joints", "geometry.platform_joints"]
+    };
+    found.warning(
+        codes::PLATFORM_WIDER,
+        key,
+        format!(
+            "the platform's joints are {} mm from its axis, those of the base {} mm",
+            figure(platform * 1e3),
+            figure(base * 1e3)
+        ),
+        &format!(
+            "check that `{key}` and `{other}` are not in each other's place; a platform wider than its base is possible"
+        ),
+    );
+}
+
+/// Radii and height of a hexapod are of one size.
+pub(super) fn proportions(facts: &Facts, found: &mut Found) {
+    let geometry = &facts.model.geometry;
+    let radius = |joints: &[[f64; 3]; 6]| {
+        joints.iter().map(|joint| libm::hypot(joint[0], joint[1])).fold(0.0, |a: f64, b| if b > a { b } else { a })
+    };
+    let keys = if found.model.spans.contains_key("geometry.base_radius") {
+        ["geometry.base_radius", "geometry.platform_radius", "geometry.height"]
+    } else {
+        ["geometry.base_joints", "geometry.platform_joints", "geometry.height"]
+    };
+    let sizes = [radius(&geometry.base_joints), radius(&geometry.platform_joints), geometry.height];
+    // Against the geometric mean of the two others.
+    let apart: [f64; 3] = core::array::from_fn(|k| {
+        let (a, b) = (sizes[(k + 1) % 3], sizes[(k + 2) % 3]);
+        libm::fabs(libm::log(sizes[k] / libm::sqrt(a * b)))
+    });
+    let odd = (1..3).fold(0, |odd, k| if apart[k] > apart[odd] { k } else { odd });
+    // A platform in the plane of its base is found where the legs are.
+    if !apart[odd].is_finite() || apart[odd] <= libm::log(OUT_OF_PROPORTION) {
+        return;
+    }
+    found.warning(
+        codes::OUT_OF_PROPORTION,
+        keys[odd],
+        format!(
+            "joints are {} mm from the axis on the base and {} mm on the platform, at a height of {} mm",
+            figure(sizes[0] * 1e3),
+            figure(sizes[1] * 1e3),
+            figure(sizes[2] * 1e3)
+        ),
+        &format!("check the unit of `{}`: the three are of one size on most hexapods", keys[odd]),
+    );
+}
+
+/// Legs do not cross. Joints on circles are paired by rule; those of a list may be in another order on one body.
+pub(super) fn legs_cross(facts: &Facts, found: &mut Found) {
+    let geometry = &facts.model.geometry;
+    if !["base", "platform"].iter().any(|body| found.model.spans.contains_key(&format!("geometry.{body}_joints"))) {
+        return;
+    }
+    let length = |base: usize, platform: usize| {
+        let (b, p) = (&geometry.base_joints[base], &geometry.platform_joints[platform]);
+        libm::hypot(libm::hypot(p[0] - b[0], p[1] - b[1]), geometry.height + p[2] - b[2])
+    };
+    for (i, j) in (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j))) {
+        let (now, exchanged) = (length(i, i) + length(j, j), length(i, j) + length(j, i));
+        if exchanged >= now * (1.0 - CROSSED) {
+            continue;
+        }
+        found.warning(
+            codes::LEGS_CROSS,
+            &format!("geometry.platform_joints[{i}]"),
+            format!(
+                "legs {i} and {j} cross: together they are {} mm long, and {} mm if each went to the other's joint",
+                figure(now * 1e3),
+                figure(exchanged * 1e3)
+            ),
+            "`geometry.base_joints` and `geometry.platform_joints` list the legs in the same order: check it on both bodies",
+        );
+        return;
+    }
+}

@@ -1,0 +1,176 @@
+//! Limits of moves and streams against the workspace, the tick and the legs.
+
+use super::{AXES, Facts, Found, amount, figure};
+use specgen_language::diagnostic::codes;
+use specgen_language::model::SetpointRules;
+
+/// A move across the workspace that takes longer than this is not meant, s.
+const LONGEST_MOVE: f64 = 120.0;
+/// How many times over the whole way a limit would have to be kept before it is reached.
+const NEVER: f64 = 4.0;
+/// A limit of jerk that is so much larger than what the acceleration needs ends within a tick.
+const WITHIN_TICK: f64 = 1.0;
+/// Largest bound against what its legs reach, and smallest.
+const SMALLEST_USE: f64 = 5e-3;
+
+fn rules<'a>(facts: &Facts<'a>) -> Option<&'a SetpointRules> {
+    facts.model.task_space.as_ref().map(|task| &task.setpoint)
+}
+
+/// Both ways from the middle, m or rad.
+fn way(facts: &Facts, axis: usize) -> f64 {
+    let workspace = &facts.model.workspace;
+    2.0 * if axis < 3 { workspace.translation[axis] } else { workspace.rotation[axis - 3] }
+}
+
+/// The voltage follows a move at its largest speed.
+pub(super) fn moves_within_slew(facts: &Facts, found: &mut Found) {
+    let (Some(rules), Some(legs)) = (rules(facts), &facts.legs) else { return };
+    let actuator = &facts.model.actuator;
+    for (axis, speed) in rules.speed.into_iter().enumerate() {
+        let slew = legs.steepest(axis) * speed / actuator.leg_gain();
+        if slew <= actuator.slew_rate {
+            continue;
+        }
+        found.warning(
+            codes::MOVE_BEYOND_SLEW,
+            &format!("control.setpoint.speed[{axis}]"),
+            format!(
+                "{}/s along {} needs {} V/ms, but `actuator.slew_rate` is {} V/ms",
+                amount(axis, speed),
+                AXES[axis],
+                figure(slew * 1e-3),
+                figure(actuator.slew_rate * 1e-3)
+            ),
+            &format!(
+                "at most {}/s keeps within the slew rate; check the units of both",
+                amount(axis, speed * actuator.slew_rate / slew)
+            ),
+        );
+    }
+}
+
+/// A move across the workspace ends while somebody waits.
+pub(super) fn moves_end(facts: &Facts, found: &mut Found) {
+    let Some(rules) = rules(facts) else { return };
+    for (axis, speed) in rules.speed.into_iter().enumerate() {
+        let time = way(facts, axis) / speed;
+        if time <= LONGEST_MOVE {
+            continue;
+        }
+        found.warning(
+            codes::MOVE_SLOW,
+            &format!("control.setpoint.speed[{axis}]"),
+            format!(
+                "at {}/s a move across the workspace along {} takes {} s",
+                amount(axis, speed),
+                AXES[axis],
+                figure(time)
+            ),
+            "check the units of `control.setpoint.speed` and [workspace]",
+        );
+    }
+}
+
+/// Speed, acceleration and jerk belong together: each is reached, and none at once.
+#[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
+pub(super) fn limits_bind(facts: &Facts, found: &mut Found) {
+    let Some(rules) = rules(facts) else { return };
+    let tick = facts.model.timing.period;
+    for axis in 0..6 {
+        let (speed, acceleration, jerk) = (rules.speed[axis], rules.acceleration[axis], rules.jerk[axis]);
+        let shown = |value: f64, per: &str| format!("{}/{per}", amount(axis, value));
+        let mut say = |name: &str, value: String, what: String| {
+            found.warning(
+                codes::LIMIT_WITHOUT_EFFECT,
+                &format!("control.setpoint.{name}[{axis}]"),
+                format!("a limit of {value} on {} {what}", AXES[axis]),
+                &format!("check the unit of `control.setpoint.{name}` against the other two limits of moves"),
+            );
+        };
+        if speed / acceleration < WITHIN_TICK * tick {
+            say(
+                "acceleration",
+                shown(acceleration, "s^2"),
+                format!("does nothing: a speed of {} is there within a tick", shown(speed, "s")),
+            );
+        } else if speed * speed / acceleration > NEVER * way(facts, axis) {
+            say(
+                "acceleration",
+                shown(acceleration, "s^2"),
+                format!("is so low that a speed of {} is never reached in the workspace", shown(speed, "s")),
+            );
+        }
+        if acceleration / jerk < WITHIN_TICK * tick {
+            say(
+                "jerk",
+                shown(jerk, "s^3"),
+                format!("does nothing: an acceleration of {} is there within a tick", shown(acceleration, "s^2")),
+            );
+        } else if acceleration * acceleration / jerk > 50.0 * NEVER * speed {
+            say(
+                "jerk",
+                shown(jerk, "s^3"),
+                format!(
+                    "is so low that an acceleration of {} is never reached below a speed of {}",
+                    shown(acceleration, "s^2"),
+                    shown(speed, "s")
+                ),
+            );
+        }
+    }
+}
+
+/// A streamed set-point that may jump across the workspace is not checked at all.
+pub(super) fn stream_limit_binds(facts: &Facts, found: &mut Found) {
+    let Some(rules) = rules(facts) else { return };
+    for (axis, speed) in rules.stream_speed.into_iter().enumerate() {
+        let step = speed * facts.model.timing.period;
+        if step <= way(facts, axis) {
+            continue;
+        }
+        found.warning(
+            codes::STREAM_UNCHECKED,
+            &format!("control.setpoint.stream_speed[{axis}]"),
+            format!(
+                "{}/s lets a stream jump by {} along {} in a tick, more than the whole workspace of {}",
+                amount(axis, speed),
+                amount(axis, step),
+                AXES[axis],
+                amount(axis, way(facts, axis))
+            ),
+            "a jump across the workspace would pass: check the unit",
+        );
+    }
+}
+
+/// A bound that uses next to nothing of what the legs reach.
+#[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
+pub(super) fn workspace_is_used(facts: &Facts, found: &mut Found) {
+    let Some(legs) = &facts.legs else { return };
+    let stroke = facts.model.actuator.stroke;
+    for axis in 0..6 {
+        let bound = 0.5 * way(facts, axis);
+        let reached = 0.5 * stroke / legs.steepest(axis);
+        // Zero locks the axis.
+        if bound == 0.0 || bound >= SMALLEST_USE * reached {
+            continue;
+        }
+        let key = if axis < 3 {
+            format!("workspace.translation[{axis}]")
+        } else {
+            format!("workspace.rotation[{}]", axis - 3)
+        };
+        found.warning(
+            codes::WORKSPACE_TINY,
+            &key,
+            format!(
+                "{} is bound to ±{}, while the legs reach ±{}",
+                AXES[axis],
+                amount(axis, bound),
+                amount(axis, reached)
+            ),
+            "check the unit; write 0 to keep an axis still",
+        );
+    }
+}

@@ -1,0 +1,233 @@
+//! What the declared trajectories ask of stacks and amplifiers.
+//!
+//! Jumps, corners, speed and place of a path are checked where it is lowered, its reach in [`crate::reach`].
+
+use serde::Serialize;
+use specgen_numerics::displacements;
+use specgen_runtime::Platform;
+
+use super::{Found, Legs, figure};
+use crate::lower::setpoint::Stretch;
+use specgen_identify::waveform::Waveform;
+use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
+
+/// The local gain of a stack differs from its mean by about a quarter, so that a path needs this much less slew at best.
+const GAIN_SLACK: f64 = 1.3;
+/// Inertia that bends the legs by more than this share of the stroke.
+const LARGEST_DEFLECTION: f64 = 0.1;
+/// A sinusoid faster than this share of the lowest mode excites it.
+const FASTEST: f64 = 0.2;
+/// A step between two rows that is this many times its neighbours' is a jump.
+const STANDS_OUT: f64 = 4.0;
+/// A step that is none, m and rad.
+const NO_STEP: [f64; 6] = [5e-9, 5e-9, 5e-9, 50e-9, 50e-9, 50e-9];
+
+/// What a trajectory asks of the legs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PathDemand {
+    /// Its name.
+    pub name: String,
+    /// Largest speed of a leg, m/s.
+    pub leg_speed: f64,
+    /// Largest rate of a leg's voltage at its mean gain, V/s.
+    pub slew: f64,
+    /// Largest acceleration of a leg between the corners, m/s².
+    pub leg_acceleration: f64,
+    /// By how much the inertia bends a leg there, m.
+    pub deflection: f64,
+    /// Largest current, A, with `actuator.capacitance`.
+    pub current: Option<f64>,
+}
+
+/// Looks at every trajectory of `task`, whose poses are `paths`, in the order of the spec.
+#[must_use]
+pub fn check(
+    model: &Model,
+    task: &TaskSpace,
+    platform: &Platform<f64>,
+    paths: &[Vec<Stretch>],
+) -> (Vec<PathDemand>, Vec<Diagnostic>) {
+    let mut found = Found::new(model);
+    let legs = Legs::of(model, platform);
+    let mass = platform.mass_matrix(&[0.0; 6]);
+    let inverse = crate::lower::inverse_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
+    let mut demands = Vec::new();
+    for (index, (trajectory, path)) in task.trajectories.iter().zip(paths).enumerate() {
+        let mut demand = PathDemand {
+            name: trajectory.name.clone(),
+            leg_speed: 0.0,
+            slew: 0.0,
+            leg_acceleration: 0.0,
+            deflection: 0.0,
+            current: None,
+        };
+        for stretch in path {
+            look(&mut demand, model, platform, (&mass, &inverse), stretch);
+        }
+        demand.slew = demand.leg_speed / model.actuator.leg_gain();
+        demand.current = model.actuator.capacitance.map(|capacitance| capacitance * demand.slew);
+        let key = match trajectory.kind {
+            TrajectoryKind::Paper { .. } => format!("trajectory[{index}].frequency"),
+            TrajectoryKind::Waveform { .. } => format!("trajectory[{index}].period"),
+        };
+        slew(model, &key, &demand, &mut found);
+        current(model, &key, &demand, &mut found);
+        deflection(model, &key, &demand, &mut found);
+        if let (TrajectoryKind::Paper { frequency, .. }, Some(modes)) = (&trajectory.kind, legs.modes) {
+            excitation(&key, &demand.name, *frequency, modes[0], &mut found);
+        }
+        demands.push(demand);
+    }
+    (demands, found.list())
+}
+
+fn larger(slot: &mut f64, value: f64) {
+    if value > *slot {
+        *slot = value;
+    }
+}
+
+type Matrix = [[f64; 6]; 6];
+
+/// Speeds and accelerations by differences: of leg displacements, whose curvature the poses do not have.
+#[allow(clippy::needless_range_loop)] // Axes and legs by number, as in the equations.
+fn look(
+    demand: &mut PathDemand,
+    model: &Model,
+    platform: &Platform<f64>,
+    (mass, inverse): (&Matrix, &Matrix),
+    stretch: &Stretch,
+) {
+    let dt = stretch.interval;
+    let legs: Vec<[f64; 6]> = stretch.poses.iter().map(|pose| displacements(platform, pose)).collect();
+    for pair in legs.windows(2) {
+        for leg in 0..6 {
+            larger(&mut demand.leg_speed, (pair[1][leg] - pair[0][leg]).abs() / dt);
+        }
+    }
+    let second = |a: f64, b: f64, c: f64| (a - 2.0 * b + c) / (dt * dt);
+    for (three, poses) in legs.windows(3).zip(stretch.poses.windows(3)) {
+        for leg in 0..6 {
+            larger(&mut demand.leg_acceleration, second(three[0][leg], three[1][leg], three[2][leg]).abs());
+        }
+        // f = J⁻ᵀ M ḧ: over the travel of a piezo M and J are those at rest.
+        let acceleration: [f64; 6] =
+            core::array::from_fn(|axis| second(poses[0][axis], poses[1][axis], poses[2][axis]));
+        let wrench: [f64; 6] =
+            core::array::from_fn(|row| (0..6).fold(0.0, |sum, axis| sum + mass[row][axis] * acceleration[axis]));
+        for leg in 0..6 {
+            let force = (0..6).fold(0.0, |sum, axis| sum + inverse[axis][leg] * wrench[axis]);
+            larger(&mut demand.deflection, force.abs() / model.actuator.axial_stiffness);
+        }
+    }
+}
+
+fn slew(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
+    let limit = model.actuator.slew_rate;
+    if demand.slew <= limit / GAIN_SLACK {
+        return;
+    }
+    let message = format!(
+        "`{}` moves a leg at {} um/s, which takes about {} V/ms; `actuator.slew_rate` is {} V/ms",
+        demand.name,
+        figure(demand.leg_speed * 1e6),
+        figure(demand.slew * 1e-3),
+        figure(limit * 1e-3)
+    );
+    let help = format!(
+        "play it {} times slower, or raise `actuator.slew_rate` if amplifier and stack stand it; check its unit (V/ms or V/s)",
+        figure(demand.slew * GAIN_SLACK / limit)
+    );
+    // Beyond doubt only where the mean gain and a quarter more do not do.
+    if demand.slew > limit * GAIN_SLACK {
+        found.error(codes::PATH_BEYOND_SLEW, key, message, &help);
+    } else {
+        found.warning(codes::PATH_NEAR_SLEW, key, message, &help);
+    }
+}
+
+fn current(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
+    let (Some(needed), Some(limit)) = (demand.current, model.amplifier.current) else { return };
+    if needed <= limit / GAIN_SLACK {
+        return;
+    }
+    found.error(
+        codes::PATH_BEYOND_CURRENT,
+        key,
+        format!(
+            "`{}` charges a leg with about {} A (at {} V/ms); `amplifier.current` is {} A",
+            demand.name,
+            figure(needed),
+            figure(demand.slew * 1e-3),
+            figure(limit)
+        ),
+        &format!(
+            "play it {} times slower; or check `actuator.capacitance` and `amplifier.current`",
+            figure(needed * GAIN_SLACK / limit)
+        ),
+    );
+}
+
+fn deflection(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
+    let stroke = model.actuator.stroke;
+    if demand.deflection <= LARGEST_DEFLECTION * stroke {
+        return;
+    }
+    found.warning(
+        codes::PATH_INERTIA,
+        key,
+        format!(
+            "the inertia along `{}` bends a leg by {} um of its stroke of {} um (leg acceleration {} m/s^2)",
+            demand.name,
+            figure(demand.deflection * 1e6),
+            figure(stroke * 1e6),
+            figure(demand.leg_acceleration)
+        ),
+        "play it slower; or check `platform.mass`, `platform.inertia` and `actuator.axial_stiffness`",
+    );
+}
+
+fn excitation(key: &str, name: &str, frequency: f64, mode: f64, found: &mut Found) {
+    if frequency <= FASTEST * mode {
+        return;
+    }
+    found.warning(
+        codes::PATH_EXCITES,
+        key,
+        format!("`{name}` at {} Hz excites the lowest mode of {} Hz", figure(frequency), figure(mode)),
+        "a tenth of the lowest mode is usual: check the unit of the frequency, and `actuator.axial_stiffness`, which makes the mode",
+    );
+}
+
+/// Steps of a table that stand out from those around them: a jump that no speed limit sees.
+#[must_use]
+pub fn steps(waveform: &Waveform) -> Option<Diagnostic> {
+    let rows = &waveform.rows;
+    for axis in 0..6 {
+        let steps: Vec<f64> = rows.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs()).collect();
+        let at = (2..steps.len().saturating_sub(2)).find(|k| {
+            let around = [steps[k - 2], steps[k - 1], steps[k + 1], steps[k + 2]];
+            let largest = around.into_iter().fold(0.0, |a: f64, b| if b > a { b } else { a });
+            // From rest every step is larger than the ones before.
+            largest > 0.0 && steps[*k] > STANDS_OUT * largest && steps[*k] > NO_STEP[axis]
+        });
+        let Some(at) = at else { continue };
+        let scale = 1e6;
+        return Some(Diagnostic {
+            severity: specgen_language::diagnostic::Severity::Warning,
+            code: codes::WAVEFORM_STEP,
+            key: "trajectory".to_owned(),
+            place: specgen_language::diagnostic::Place::File { path: waveform.shown_as.clone(), line: waveform.lines.get(at + 1).copied() },
+            message: format!(
+                "{} steps by {} {} here, by at most {} in the rows around",
+                super::AXES[axis],
+                figure(steps[at] * scale),
+                if axis < 3 { "um" } else { "urad" },
+                figure([steps[at - 2], steps[at - 1], steps[at + 1], steps[at + 2]].into_iter().fold(0.0, f64::max) * scale)
+            ),
+            help: "a jump between two pieces? The platform rings behind it: join the pieces, or spread the step over some rows".to_owned(),
+        });
+    }
+    None
+}

@@ -1,0 +1,159 @@
+//! Model and tables to IR: all arithmetic on constants happens here.
+//!
+//! Trigonometry goes through `libm`, so that the same spec gives the same bytes on every machine.
+
+mod actuation;
+mod dynamics;
+mod gauge_converter;
+mod integrity;
+mod kinematics;
+mod linear;
+mod permitted;
+mod rate;
+mod sensing;
+pub mod setpoint;
+mod supervision;
+mod task_space;
+
+pub use dynamics::{GRAVITY, platform};
+pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
+pub use sensing::{PoseNoise, pose_noise};
+
+use crate::ir::{Bounds, Defaults, Hysteresis, Ir, Law, Scalar, Sensing, Setpoint, Setpoints, TaskSpace};
+use crate::stability::platform::{Design, RestDynamics};
+use specgen_identify::everett::EverettTable;
+use specgen_language::diagnostic::Diagnostic;
+use specgen_language::model::{self, Model};
+use specgen_runtime::Motion;
+
+/// Beyond this many strokes a leg set-point is a mistake, not a demand to saturate on.
+const LEG_SETPOINT_STROKES: f64 = 2.0;
+
+/// Computes every constant of the controller.
+///
+/// `task` is the tuning of a controller in task space and its set-points ([`setpoint::lower`]), none for six legs with their own
+/// gauges; `tables` holds one Everett table for all legs or one for each, `rate_tables` those of the second weight of (6), if the
+/// spec names any; `digest` is the hex digest of spec and records.
+///
+/// # Errors
+/// Findings about values that cannot be turned into a controller (a converter too coarse
+/// for the grid, a workspace too large for the legs), with their place in the spec.
+pub fn lower(
+    model: &Model,
+    task: Option<(&Design, Setpoints)>,
+    tables: &[EverettTable],
+    rate_tables: &[EverettTable],
+    digest: &str,
+) -> Result<Ir, Vec<Diagnostic>> {
+    let scalar = scalar(model);
+    let hysteresis = hysteresis(model, tables, rate_tables, scalar);
+    let (actuation, max_step) = actuation::lower(model, scalar)?;
+    let stroke = model.actuator.stroke;
+    let round = |value| scalar.round(value);
+    let [tx, ty, tz] = model.workspace.translation;
+    let [rx, ry, rz] = model.workspace.rotation;
+    let defaults = Defaults {
+        law: match model.adaptation.mode {
+            model::AdaptationMode::Invhys => Law::Invhys,
+            model::AdaptationMode::Ewma => Law::Ewma,
+            model::AdaptationMode::Pcc => Law::Pcc,
+        },
+        setpoint: match model.controller.setpoint {
+            model::SetpointKind::Pose => Setpoint::Pose,
+            model::SetpointKind::Leg => Setpoint::Leg,
+        },
+        level_weight: round(model.adaptation.level_weight),
+        drift_weight: round(model.adaptation.drift_weight),
+        run_interval: model.adaptation.run_interval,
+        max_step,
+        period: model.timing.period,
+        leg_gain: model.actuator.leg_gain(),
+    };
+    let task_space = match (&model.task_space, task) {
+        (Some(task), Some((design, setpoints))) => Some(task_space(model, task, scalar, design, setpoints)?),
+        _ => None,
+    };
+    let integrity = integrity::lower(
+        integrity::identity(&model.name, digest, scalar),
+        scalar,
+        &hysteresis,
+        &actuation,
+        &defaults,
+        task_space.as_ref(),
+    );
+    let unseen = gauge_converter::unseen(model, task_space.as_ref().map(|task| &task.sensing));
+    if !unseen.is_empty() {
+        return Err(unseen);
+    }
+    let gauge_converter = gauge_converter::lower(model, task_space.as_ref().map(|task| &task.sensing), scalar);
+    Ok(Ir {
+        name: model.name.clone(),
+        digest: digest.to_owned(),
+        specgen_version: env!("CARGO_PKG_VERSION").to_owned(),
+        scalar,
+        kinematics: kinematics::lower(model, scalar)?,
+        dynamics: dynamics::lower(model, scalar)?,
+        supervision: supervision::lower(model, &hysteresis, &actuation, max_step, scalar)?,
+        hysteresis,
+        bounds: Bounds {
+            pose: [tx, ty, tz, rx, ry, rz].map(round),
+            leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
+            sensor: model.sensor.range.map(round),
+        },
+        gauge_converter,
+        permitted: permitted::lower(&actuation, max_step, model.sensor.range, task_space.as_ref(), scalar),
+        actuation,
+        defaults,
+        task_space,
+        integrity,
+    })
+}
+
+/// Arithmetic of the emitted controller.
+#[must_use]
+pub fn scalar(model: &Model) -> Scalar {
+    match model.controller.scalar {
+        model::Scalar::F32 => Scalar::F32,
+        model::Scalar::F64 => Scalar::F64,
+    }
+}
+
+/// The constants of the gauges as a controller of `scalar` holds them.
+///
+/// # Errors
+/// As [`lower`].
+pub fn gauges(model: &Model, task: &model::TaskSpace, scalar: Scalar) -> Result<Sensing, Vec<Diagnostic>> {
+    sensing::lower(model, task, scalar)
+}
+
+/// What a controller in task space has of its own.
+fn task_space(
+    model: &Model,
+    task: &model::TaskSpace,
+    scalar: Scalar,
+    design: &Design,
+    setpoints: Setpoints,
+) -> Result<TaskSpace, Vec<Diagnostic>> {
+    let platform = platform(model)?;
+    let rest = RestDynamics::of(&platform);
+    let rest_force = platform.leg_forces(&Motion::new());
+    Ok(TaskSpace {
+        sensing: sensing::lower(model, task, scalar)?,
+        setpoints,
+        law: task_space::law(model, task, scalar, &rest, &rest_force, design),
+        defaults: task_space::defaults(model, task, scalar, design),
+    })
+}
+
+/// Tables in the layout of the controller, each distinct one once, and what goes with them.
+fn hysteresis(model: &Model, tables: &[EverettTable], rate_tables: &[EverettTable], scalar: Scalar) -> Hysteresis {
+    let (distinct, table_of_leg) = rate::distinct(tables, 1.0, scalar);
+    Hysteresis {
+        grid: model.hysteresis.grid,
+        memory: model.hysteresis.memory,
+        tables: distinct,
+        table_of_leg,
+        rate: rate::lower(model, tables, rate_tables, scalar),
+        lead: rate::lead(model, scalar),
+    }
+}

@@ -1,0 +1,54 @@
+//! Codes of the gauges' converters.
+
+use crate::ir::{GaugeConverter, Scalar, Sensing};
+use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::model::Model;
+
+/// What converters of gauges with a calibration take in without `sensor.input_range`, V.
+const VOLTS: [f64; 2] = [-10.0, 10.0];
+/// A code is an `i32`: of a converter with more bits the targets drop the lowest.
+const MOST_BITS: u32 = 31;
+
+/// The converter's range is that of the gauge, or that of its voltage if there is a calibration.
+pub(super) fn lower(model: &Model, sensing: Option<&Sensing>, scalar: Scalar) -> GaugeConverter {
+    let calibrated = sensing.filter(|sensing| sensing.calibration.is_some());
+    let [low, high] = if calibrated.is_some() { model.sensor.input_range.unwrap_or(VOLTS) } else { model.sensor.range };
+    let bits = if model.sensor.bits > MOST_BITS { MOST_BITS } else { model.sensor.bits };
+    let span = high - low;
+    let believed = sensing.map_or(&[][..], |sensing| &sensing.raw_limits[..]);
+    let lowest = believed.iter().fold(low, |lowest, limits| if limits[0] < lowest { limits[0] } else { lowest });
+    let highest = believed.iter().fold(high, |highest, limits| if limits[1] > highest { limits[1] } else { highest });
+    GaugeConverter {
+        at_zero: scalar.round(low),
+        per_code: scalar.round(span / libm::exp2(f64::from(bits))),
+        highest: (((1_u64 << bits) - 1) & 0x7fff_ffff) as i32,
+        beyond: [scalar.round(lowest - span), scalar.round(highest + span)],
+    }
+}
+
+/// A gauge whose voltage at rest the converter does not take in: nothing it says would be believed.
+pub(super) fn unseen(model: &Model, sensing: Option<&Sensing>) -> Vec<Diagnostic> {
+    let Some(Sensing { calibration: Some(of_gauge), raw_limits, .. }) = sensing else { return Vec::new() };
+    let [low, high] = model.sensor.input_range.unwrap_or(VOLTS);
+    let key = "sensor.input_range";
+    let place = model.spans.get(key).or_else(|| model.spans.get("sensor.calibration"));
+    let unseen = of_gauge.iter().zip(raw_limits).enumerate().filter(|(_, (coefficients, [first, last]))| {
+        let reading = |volts: f64| coefficients.iter().rev().fold(0.0, |sum, c| c + volts * sum);
+        let (from, to) = (if *first > low { *first } else { low }, if *last < high { *last } else { high });
+        // Within the limits the polynomial rises, or falls, all the way.
+        from >= to || reading(from) * reading(to) > 0.0
+    });
+    unseen
+        .map(|(gauge, (_, [first, last]))| Diagnostic {
+            severity: Severity::Error,
+            code: codes::GAUGE_INPUT,
+            key: key.to_owned(),
+            place: place.cloned().map_or(Place::Whole, Place::Spec),
+            message: format!(
+                "gauge {gauge} gives {first:.4} V to {last:.4} V over `sensor.range`, but its converter takes in {low} V to {high} V: \
+                 it does not see the reading zero"
+            ),
+            help: format!("write input_range = [\"{:.3} V\", \"{:.3} V\"] or wider, or check the calibration", first - 1e-3, last + 1e-3),
+        })
+        .collect()
+}

@@ -1,0 +1,140 @@
+//! Checksum of tables and settings, as the controller computes it again when it starts.
+
+use specgen_runtime::Crc32;
+use specgen_toolchain::IDENTITY_MARK;
+
+use crate::ir::{
+    Actuation, Defaults, Gains, Hysteresis, Integrity, Interaction, Law, Mode, Path, PlatformDefaults, RateModel,
+    Scalar, Segment, Setpoint, TaskSpace,
+};
+
+/// One line about where a controller comes from.
+pub(super) fn identity(name: &str, digest: &str, scalar: Scalar) -> String {
+    format!(
+        "{IDENTITY_MARK}specgen {}, platform {name}, f{}, spec {digest}\n",
+        env!("CARGO_PKG_VERSION"),
+        scalar.bits()
+    )
+}
+
+/// The settings as words and the checksum of everything. The order is that of the emitted `integrity.rs`: identity, tables by their
+/// number, tables of the rate, creep, trajectories, settings.
+pub(super) fn lower(
+    identity: String,
+    scalar: Scalar,
+    hysteresis: &Hysteresis,
+    actuation: &Actuation,
+    defaults: &Defaults,
+    task: Option<&TaskSpace>,
+) -> Integrity {
+    let word = |value: &f64| match scalar {
+        Scalar::F32 => u64::from((*value as f32).to_bits()),
+        Scalar::F64 => value.to_bits(),
+    };
+    let mut crc = Crc32::new();
+    crc.bytes(identity.as_bytes());
+    let mut add = |values: &[f64]| values.iter().for_each(|value| crc.word(word(value)));
+    hysteresis.tables.iter().for_each(|table| add(table));
+    match &hysteresis.rate {
+        None => {}
+        Some(RateModel::DynamicPreisach { tables, tolerance: _, table_of_leg: _ }) => {
+            tables.iter().for_each(|table| add(table));
+        }
+        Some(RateModel::Creep { gains, weights, carried, direct }) => {
+            [gains, weights, carried].into_iter().for_each(|values| add(values));
+            add(&[*direct]);
+        }
+    }
+    for trajectory in task.iter().flat_map(|task| &task.setpoints.trajectories) {
+        match &trajectory.path {
+            Path::Segments { segments, .. } => segments.iter().for_each(|segment| of_segment(&mut crc, word, segment)),
+            Path::Table { rows, .. } => {
+                for value in rows.iter().flat_map(|row| row.pose.iter().chain(&row.bend)) {
+                    crc.word(word(value));
+                }
+            }
+        }
+    }
+    let settings = match task {
+        None => of_legs(word, actuation, defaults),
+        Some(task) => of_platform(word, actuation, defaults, &task.defaults),
+    };
+    crc.words(&settings);
+    Integrity { identity, settings, crc: crc.finish() }
+}
+
+fn of_segment(crc: &mut Crc32, word: impl Fn(&f64) -> u64, segment: &Segment) {
+    crc.words(&[u64::from(segment.first), segment.phase, segment.phase_step]);
+    for value in [segment.per_tick, segment.per_second, segment.angular] {
+        crc.word(word(&value));
+    }
+    for axis in &segment.axes {
+        for value in [axis.place, axis.slope].iter().chain(&axis.sine).chain(&axis.cosine) {
+            crc.word(word(value));
+        }
+    }
+}
+
+fn of_law(law: Law) -> u64 {
+    match law {
+        Law::Invhys => 0,
+        Law::Ewma => 1,
+        Law::Pcc => 2,
+    }
+}
+
+/// A code as the emitted `Config::to_words` has it.
+fn of_code(code: i32) -> u64 {
+    u64::from(code.cast_unsigned())
+}
+
+/// `CONFIG_NAMES` of six legs.
+fn of_legs(word: impl Fn(&f64) -> u64, actuation: &Actuation, defaults: &Defaults) -> Vec<u64> {
+    let setpoint = match defaults.setpoint {
+        Setpoint::Pose => 0,
+        Setpoint::Leg => 1,
+    };
+    vec![
+        of_law(defaults.law),
+        setpoint,
+        word(&defaults.level_weight),
+        word(&defaults.drift_weight),
+        u64::from(defaults.run_interval),
+        of_code(defaults.max_step),
+        of_code(actuation.code_min),
+        of_code(actuation.code_max),
+    ]
+}
+
+/// `CONFIG_NAMES` of a platform.
+fn of_platform(
+    word: impl Fn(&f64) -> u64,
+    actuation: &Actuation,
+    defaults: &Defaults,
+    d: &PlatformDefaults,
+) -> Vec<u64> {
+    let mode = match d.mode {
+        Mode::P => 0,
+        Mode::F => 1 + of_law(d.law),
+        Mode::PF => 4 + of_law(d.law),
+    };
+    let interaction = match d.interaction {
+        Interaction::Neglected => 0,
+        Interaction::Modelled => 1,
+        Interaction::Measured => 2,
+    };
+    let gains = |gains: &Gains| [gains.proportional, gains.integral, gains.derivative].concat();
+    let mut settings = vec![
+        mode,
+        interaction,
+        word(&d.level_weight),
+        word(&d.drift_weight),
+        of_code(defaults.max_step),
+        of_code(actuation.code_min),
+        of_code(actuation.code_max),
+    ];
+    let numbers =
+        [gains(&d.gains), gains(&d.position_gains), d.environment_stiffness.to_vec(), d.environment_rest.to_vec()];
+    settings.extend(numbers.iter().flatten().map(word));
+    settings
+}

@@ -1,0 +1,167 @@
+//! The table of what settings may be: nothing beyond what the spec itself says or could say.
+
+use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
+
+use crate::ir::{Actuation, ControlLaw, Notch, Permitted, Range, Scalar, Setting, State, TaskSpace};
+use specgen_language::model::{LARGEST_GAIN, LARGEST_RUN_INTERVAL, LARGEST_TRAVEL, LARGEST_TURN};
+use specgen_numerics::Matrix6;
+
+/// Between what the bounds below say and what is loaded: they neglect what is quadratic, and rounding.
+const MARGIN: f64 = 16.0;
+/// No number of a state is larger: products with constants stay finite in both scalars.
+const FINITE: f64 = 1e30;
+
+/// `max_step` is the slew limit in codes a tick.
+pub(super) fn lower(
+    actuation: &Actuation,
+    max_step: i32,
+    sensor: [f64; 2],
+    task: Option<&TaskSpace>,
+    scalar: Scalar,
+) -> Permitted {
+    let codes = Range::Whole(actuation.code_min, actuation.code_max);
+    let code_limits = [
+        one(
+            "max_step_codes",
+            Range::Whole(1, max_step),
+            "codes",
+            "Largest change of a leg's code in a tick.",
+            "`actuator.slew_rate`",
+        ),
+        one("code_min", codes, "codes", "Lowest code; at most `code_max`.", "`actuator.voltage`"),
+        one("code_max", codes, "codes", "Highest code.", "`actuator.voltage`"),
+    ];
+    let weight = Range::Number(0.0, 1.0);
+    let weights = [
+        one(
+            "level_weight",
+            weight,
+            "",
+            "ω (EWMA) or ω1 (PCC): weight of a new reading in the level estimate.",
+            "`adaptation.level_weight`",
+        ),
+        one(
+            "drift_weight",
+            weight,
+            "",
+            "ω2 (PCC): weight of a new reading in the drift estimate.",
+            "`adaptation.drift_weight`",
+        ),
+    ];
+    let readings = |limits: &[[f64; 2]]| {
+        limits.iter().flatten().fold(0.0, |most: f64, limit| if limit.abs() > most { limit.abs() } else { most })
+    };
+    let (settings, request, reading) = match task {
+        None => {
+            let mut settings = vec![
+                one("mode", Range::Whole(0, 2), "", "0 invhys, 1 ewma, 2 pcc.", "`adaptation.mode`"),
+                one("setpoint_kind", Range::Whole(0, 1), "", "0 pose, 1 leg displacements.", "`controller.setpoint`"),
+            ];
+            settings.extend(weights);
+            settings.push(one(
+                "run_interval",
+                Range::Whole(1, LARGEST_RUN_INTERVAL),
+                "ticks",
+                "Control ticks per run.",
+                "`adaptation.run_interval`",
+            ));
+            settings.extend(code_limits);
+            // Estimates are means of readings less displacements.
+            (settings, LARGEST_PLACE, readings(&[sensor]))
+        }
+        Some(task) => {
+            let mut settings = vec![
+                one(
+                    "mode",
+                    Range::Whole(0, 6),
+                    "",
+                    "0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same.",
+                    "`control.mode`, `adaptation.mode`",
+                ),
+                one(
+                    "interaction",
+                    Range::Whole(0, 2),
+                    "",
+                    "0 neglected, 1 modelled, 2 measured.",
+                    "`control.interaction`",
+                ),
+            ];
+            settings.extend(weights);
+            settings.extend(code_limits);
+            settings.extend(of_gains(scalar));
+            (settings, largest_request(&task.law), readings(&task.sensing.raw_limits))
+        }
+    };
+    Permitted {
+        settings,
+        state: State { request, reading: scalar.round(reading), stiffness: scalar.round(LARGEST_GAIN) },
+    }
+}
+
+fn one(name: &'static str, range: Range, unit: &'static str, doc: &'static str, from: &'static str) -> Setting {
+    Setting { name, six: false, unit: [unit; 2], range: [range; 2], doc, from }
+}
+
+/// Gains of (7) and the environment.
+fn of_gains(scalar: Scalar) -> [Setting; 8] {
+    let round = |value: f64| scalar.round(value);
+    let gain = [Range::Number(0.0, round(LARGEST_GAIN)); 2];
+    let six = |name, unit, doc, from| Setting { name, six: true, unit, range: gain, doc, from };
+    let rest = [LARGEST_TRAVEL, LARGEST_TURN].map(|most| Range::Number(round(-most), round(most)));
+    let (p, i, v) = (["N/m", "N m/rad"], ["N/(m s)", "N m/(rad s)"], ["N s/m", "N m s/rad"]);
+    [
+        six("kp", p, "k_p of P/F.", "`gains.proportional`"),
+        six("ki", i, "k_I of P/F.", "`gains.integral`"),
+        six("kv", v, "k_v of P/F.", "`gains.derivative`"),
+        six("position_kp", p, "k_p of P alone.", "`position_gains.proportional`"),
+        six("position_ki", i, "k_I of P alone.", "`position_gains.integral`"),
+        six("position_kv", v, "k_v of P alone.", "`position_gains.derivative`"),
+        six("environment_stiffness", p, "K_e: stiffness of the work piece.", "`control.environment.stiffness`"),
+        Setting {
+            range: rest,
+            ..six(
+                "environment_rest",
+                ["m", "rad"],
+                "h_e: pose from rest at which it is unloaded.",
+                "`control.environment.rest`",
+            )
+        },
+    ]
+}
+
+/// The largest that a leg is asked for under any settings, and what the estimates and the notch make of it. Poses are taken to be
+/// as large as any, rates and the force of the integral as they are bounded; the largest gain is on every axis.
+fn largest_request(law: &ControlLaw) -> f64 {
+    let (to_modes, to_pose, ring) = match &law.notch {
+        None => (1.0, 1.0, 1.0),
+        Some(notch) => (norm(&notch.pose_to_modes), norm(&notch.modes_to_pose), ring(notch)),
+    };
+    let apart = 2.0 * LARGEST_PLACE;
+    let modal = to_modes * apart;
+    let error = to_pose * ring * modal;
+    let deflection = norm(&law.force_to_modes) * (LARGEST_GAIN * error + LARGEST);
+    // Environment, damping, and all that is measured or computed of the motion.
+    let load = norm(&law.wrench_to_legs) * (LARGEST_GAIN * (apart + 2.0 * LARGEST) + LARGEST) + law.lead.abs() * apart;
+    // A change of mode is bumpless by an offset as large as the request.
+    let request = 2.0 * (apart + load + norm(&law.modes_to_legs) * (deflection + 2.0));
+    let innovation = modal + deflection + norm(&law.legs_to_modes) * 2.0 * request;
+    let largest = MARGIN * ring * innovation;
+    if largest < FINITE { largest } else { FINITE }
+}
+
+/// Largest sum of magnitudes of a row.
+fn norm(matrix: &Matrix6) -> f64 {
+    matrix
+        .iter()
+        .map(|row| row.iter().map(|value| value.abs()).sum())
+        .fold(1.0, |most: f64, sum: f64| if sum > most { sum } else { most })
+}
+
+/// By how much the notch, or what it remembers, may exceed its input: two poles of radius √a₂ ring for 1/(1 − √a₂)² ticks at most.
+fn ring(notch: &Notch) -> f64 {
+    notch.sections.iter().fold(1.0, |most: f64, section| {
+        let fades = 1.0 - libm::sqrt(section.a[1].abs());
+        let rings = 1.0 + 8.0 * section.depth.abs() / (fades * fades);
+        if fades > 0.0 && rings > most { rings } else { most }
+    })
+}

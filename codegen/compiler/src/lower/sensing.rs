@@ -1,0 +1,215 @@
+//! Gauges of the platform to the constants of `specgen_runtime::sensing`, with what could make them useless found first.
+
+mod calibration;
+mod layout;
+mod noise;
+
+pub use noise::{PoseNoise, pose_noise, readings_per_pose};
+
+use specgen_runtime::{Gauges, Series};
+
+use super::kinematics::{bounds, leg_jacobian, series_of, tolerance};
+use super::linear::{grid, norm};
+use crate::ir::{Scalar, Sensing};
+use layout::Layout;
+use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::model::{Model, TaskSpace};
+
+/// More passes than this mean that the pose does not converge.
+const MOST_PASSES: u32 = 12;
+/// What the pose of a reading at the end of the gauges' range may miss that reading by, over the range: beyond the declared
+/// workspace the pose need not be exact, but it must make sense.
+const SOUND_AT_RANGE: f64 = 1e-3;
+
+/// The constants of the gauges.
+///
+/// # Errors
+/// A gauge that misses the platform, gauges that leave a motion unseen, a range that does not hold the workspace, a calibration that
+/// cannot be inverted, a workspace too large.
+pub(super) fn lower(model: &Model, task: &TaskSpace, scalar: Scalar) -> Result<Sensing, Vec<Diagnostic>> {
+    let layout = layout::check(model, &task.probes)?;
+    let mut findings = range_holds_workspace(model, &layout);
+    let raw_limits = calibration::raw_limits(model, task.calibration.as_ref()).map_err(|found| findings.extend(found));
+    let solution = Solution::of(model, &layout, scalar).map_err(|found| findings.extend(found));
+    let (Ok(raw_limits), Ok(solution), true) = (raw_limits, solution, findings.is_empty()) else {
+        return Err(findings);
+    };
+    let round = |value: f64| scalar.round(value);
+    let vectors = |rows: [[f64; 3]; 6]| rows.map(|row| row.map(round));
+    let matrix = |rows: [[f64; 6]; 6]| rows.map(|row| row.map(round));
+    // 1 − α = exp(−ω_c T): the exact sampled first-order low-pass.
+    let phase = task.velocity_cutoff * model.timing.period;
+    Ok(Sensing {
+        direction: vectors(layout.direction),
+        normal: vectors(layout.normal),
+        skew: vectors(layout.skew),
+        pierced: vectors(layout.pierced),
+        inverse: matrix(layout.inverse),
+        curvature: matrix(layout.curvature),
+        passes: solution.passes,
+        remainder: solution.remainder,
+        arc_sine: solution.arc_sine.into_iter().map(round).collect(),
+        arc_tangent: solution.arc_tangent.into_iter().map(round).collect(),
+        calibration: task.calibration.as_ref().map(|of_gauge| calibration::padded(of_gauge, scalar)),
+        raw_limits: raw_limits.map(|limits| limits.map(round)),
+        rate_keep: round(libm::exp(-phase)),
+        rate_gain: round(-libm::expm1(-phase) / model.timing.period),
+    })
+}
+
+/// How many passes and terms the workspace takes.
+struct Solution {
+    passes: u32,
+    remainder: [f64; 2],
+    arc_sine: Vec<f64>,
+    arc_tangent: Vec<f64>,
+}
+
+impl Solution {
+    /// Counted in f64 at 3⁶ poses on the faces of the workspace, and tried at the ends of the gauges' range.
+    fn of(model: &Model, layout: &Layout, scalar: Scalar) -> Result<Self, Vec<Diagnostic>> {
+        let bounds = bounds(model);
+        let tolerance = tolerance(bounds, scalar);
+        let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
+        let (sine, versine) = series_of(largest, Scalar::F64);
+        let series = Series { sine: &sine, versine: &versine };
+        let exact = arcs(largest, Scalar::F64);
+        let mut gauges = layout.gauges(&exact);
+        for passes in 1..=MOST_PASSES {
+            gauges.passes = passes as usize;
+            let error = largest_error(&gauges, &series, bounds);
+            if !error.iter().zip(&tolerance).all(|(error, most)| error <= most) {
+                continue;
+            }
+            if !sound_at_range(&gauges, model.sensor.range) {
+                break;
+            }
+            let most = |part: &[f64]| part.iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
+            let (arc_sine, arc_tangent) = arcs(largest, scalar);
+            return Ok(Self { passes, remainder: [most(&error[..3]), most(&error[3..])], arc_sine, arc_tangent });
+        }
+        Err(vec![finding(
+            model,
+            codes::GAUGES_DIVERGE,
+            "workspace.rotation",
+            format!("the pose cannot be found from the gauges in {MOST_PASSES} passes over the declared workspace and sensor.range"),
+            "the equations of the gauges are solved for small motions: reduce workspace.rotation and workspace.translation, or sensor.range"
+                .to_owned(),
+        )])
+    }
+}
+
+/// Largest error of each coordinate over the workspace, m and rad.
+fn largest_error(gauges: &Gauges<f64>, series: &Series<f64>, bounds: [f64; 6]) -> [f64; 6] {
+    let mut largest = [0.0; 6];
+    for pose in grid(bounds) {
+        let found = gauges.pose(&gauges.readings(series, &pose));
+        for ((largest, found), exact) in largest.iter_mut().zip(&found).zip(&pose) {
+            let error = (found - exact).abs();
+            // A NaN is infinitely wrong.
+            let error = if error.is_nan() { f64::INFINITY } else { error };
+            if error > *largest {
+                *largest = error;
+            }
+        }
+    }
+    largest
+}
+
+/// Whether the pose of every combination of readings at the ends of `range` gives these readings back.
+fn sound_at_range(gauges: &Gauges<f64>, range: [f64; 2]) -> bool {
+    let span = range[1] - range[0];
+    (0..64_u32).all(|corner| {
+        let mut readings = [0.0; 6];
+        for (k, reading) in readings.iter_mut().enumerate() {
+            *reading = range[(corner as usize >> k) & 1];
+        }
+        let pose = gauges.pose(&readings);
+        let angle = norm([pose[3], pose[4], pose[5]]);
+        if angle.is_nan() || angle > 1.0 {
+            return false;
+        }
+        let (sine, versine) = series_of(angle, Scalar::F64);
+        let back = gauges.readings(&Series { sine: &sine, versine: &versine }, &pose);
+        back.iter().zip(&readings).all(|(back, reading)| (back - reading).abs() <= SOUND_AT_RANGE * span)
+    })
+}
+
+/// Coefficients in x² of asin x / x and atan x / x after the leading 1, for angles up to `largest`: what is left out is below a
+/// quarter of the last bit.
+fn arcs(largest: f64, scalar: Scalar) -> (Vec<f64>, Vec<f64>) {
+    let limit = scalar.epsilon() / 4.0;
+    let (mut arc_sine, mut arc_tangent) = (Vec::new(), Vec::new());
+    // The terms of the arc sine fall by less than x² each, so those left out sum to less than the first over 1 − x².
+    let square = libm::pow(libm::sin(largest), 2.0);
+    let (mut binomial, mut power) = (1.0, 1.0);
+    for k in 1..200_u32 {
+        let n = f64::from(k);
+        binomial *= (2.0 * n - 1.0) / (2.0 * n);
+        power *= square;
+        let coefficient = binomial / (2.0 * n + 1.0);
+        if coefficient * power < limit * (1.0 - square) {
+            break;
+        }
+        arc_sine.push(coefficient);
+    }
+    let square = libm::pow(libm::tan(largest), 2.0);
+    let (mut sign, mut power) = (1.0, 1.0);
+    for k in 1..200_u32 {
+        sign = -sign;
+        power *= square;
+        let coefficient = sign / (2.0 * f64::from(k) + 1.0);
+        if coefficient.abs() * power < limit {
+            break;
+        }
+        arc_tangent.push(coefficient);
+    }
+    (arc_sine, arc_tangent)
+}
+
+/// A pose that is accepted must be one that the gauges can read: each axis by itself, up to its bound. Where that way lies
+/// below the reach of every leg, as all poses below rest do, it need not be read.
+fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
+    const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
+    let [low, high] = model.sensor.range;
+    let legs = leg_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
+    let mut worst: Option<(f64, usize, usize, f64)> = None;
+    for (axis, bound) in bounds(model).into_iter().enumerate() {
+        for motion in [-bound, bound] {
+            if legs.iter().all(|leg| leg[axis] * motion < 0.0) {
+                continue;
+            }
+            for (k, sensitivity) in layout.jacobian.iter().enumerate() {
+                let reading = sensitivity[axis] * motion;
+                let beyond = if reading > high { reading - high } else { low - reading };
+                if beyond > 1e-9 * (high - low) && worst.is_none_or(|(most, ..)| beyond > most) {
+                    worst = Some((beyond, axis, k, reading));
+                }
+            }
+        }
+    }
+    let Some((_, axis, k, reading)) = worst else { return Vec::new() };
+    let (name, unit, scale) = if axis < 3 { ("translation", "µm", 1e6) } else { ("rotation", "mrad", 1e3) };
+    vec![finding(
+        model,
+        codes::GAUGE_RANGE,
+        "sensor.range",
+        format!(
+            "within the declared workspace, {} of ±{:.4} {unit} alone takes gauge {k} to {:.3} µm, beyond its range of {:.3} µm to {:.3} µm",
+            AXES[axis],
+            bounds(model)[axis] * scale,
+            reading * 1e6,
+            low * 1e6,
+            high * 1e6
+        ),
+        format!("reduce workspace.{name}, or use gauges whose range takes in {:.3} µm", reading * 1e6),
+    )]
+}
+
+fn finding(model: &Model, code: &'static str, key: &str, message: String, help: String) -> Diagnostic {
+    // A key of a gauge that takes its default has no place of its own; its table may have one.
+    let table = key.split('.').next().unwrap_or(key);
+    let span = model.spans.get(key).or_else(|| model.spans.get(table));
+    let place = span.cloned().map_or(Place::Whole, Place::Spec);
+    Diagnostic { severity: Severity::Error, code, key: key.to_owned(), place, message, help }
+}

@@ -1,0 +1,55 @@
+//! What the noise of the gauges does to the pose.
+
+use super::layout;
+use crate::lower::kinematics::leg_jacobian;
+use specgen_language::diagnostic::Diagnostic;
+use specgen_language::model::Model;
+use specgen_numerics::multiply6;
+
+/// Noise of one gauge reading and what it becomes, rms. Gauges are independent of each other, and the converter's error is spread
+/// evenly over its step.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct PoseNoise {
+    /// Of a reading, quantisation included, m.
+    pub reading: f64,
+    /// Of that, the converter's: a step over √12, m.
+    pub quantisation: f64,
+    /// Of x, y, z (m) and θx, θy, θz (rad), by J⁻¹ of the gauges at rest.
+    pub pose: [f64; 6],
+    /// Of each leg displacement computed from the pose, m.
+    pub leg: [f64; 6],
+}
+
+/// Reading of each gauge (rows) per pose coordinate (columns) at rest, m/m and m/rad; none without gauges that see the platform.
+///
+/// # Errors
+/// Gauges that do not fix the pose.
+pub fn readings_per_pose(model: &Model) -> Result<Option<[[f64; 6]; 6]>, Vec<Diagnostic>> {
+    match &model.task_space {
+        Some(task) => Ok(Some(layout::check(model, &task.probes)?.jacobian)),
+        None => Ok(None),
+    }
+}
+
+/// Pose noise of a platform with gauges; none for one without.
+///
+/// # Errors
+/// Gauges that do not fix the pose.
+pub fn pose_noise(model: &Model) -> Result<Option<PoseNoise>, Vec<Diagnostic>> {
+    let Some(task) = &model.task_space else {
+        return Ok(None);
+    };
+    let layout = layout::check(model, &task.probes)?;
+    let [low, high] = model.sensor.range;
+    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
+    let quantisation = step / libm::sqrt(12.0);
+    let reading = libm::sqrt(model.sensor.noise * model.sensor.noise + quantisation * quantisation);
+    let norm = |row: [f64; 6]| libm::sqrt(row.iter().fold(0.0, |sum, part| sum + part * part));
+    let of_legs = leg_jacobian(&model.geometry).map(|legs| multiply6(&legs, &layout.inverse));
+    Ok(Some(PoseNoise {
+        reading,
+        quantisation,
+        pose: layout.inverse.map(|row| reading * norm(row)),
+        leg: of_legs.map_or([0.0; 6], |legs| legs.map(|row| reading * norm(row))),
+    }))
+}

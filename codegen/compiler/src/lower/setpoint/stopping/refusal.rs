@@ -1,0 +1,108 @@
+//! What is said of a stop that leaves workspace or strokes, and what speed or limits would do.
+
+use super::super::{AXES, amount, finding, stop};
+use super::{Leaves, Stopping};
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::model::{Model, TrajectoryKind};
+
+/// A stop that its axis has no room for. An axis without any room at all is kept still, and needs none.
+pub(super) fn too_long(
+    model: &Model,
+    stop: &Stopping,
+    room: &[f64; 6],
+    name: &str,
+    limits: &stop::Limits,
+) -> Option<Diagnostic> {
+    let excess = |axis: usize| if room[axis] > 0.0 { stop.distance(axis) / room[axis] } else { 0.0 };
+    let worst = (0..6).fold(0, |worst, axis| if excess(axis) > excess(worst) { axis } else { worst });
+    if excess(worst) <= 1.0 {
+        return None;
+    }
+    let to_standstill = format!("{} to standstill", amount(worst, stop.way[worst] + stop.overshoot[worst]));
+    let coasted = if stop.coasted[worst] > 0.0 {
+        format!("{} until it counts as stale and {to_standstill}", amount(worst, stop.coasted[worst]))
+    } else {
+        to_standstill
+    };
+    let message = format!(
+        "a {} along {} that is stopped at {}/s goes on by {coasted}, but workspace and strokes end {} from the bias pose at the furthest",
+        stop.what,
+        AXES[worst],
+        amount(worst, stop.speed[worst]),
+        amount(worst, room[worst])
+    );
+    let slower = down(stop.speed[worst] / excess(worst) * 1e6);
+    let unit = if worst < 3 { "um" } else { "urad" };
+    let mut help = format!("at most {slower} {unit}/s fits");
+    help += &harder(model, stop, room, limits);
+    if stop.coasted[worst] > 0.0 {
+        help += "; or lower control.setpoint.stale_ticks";
+    }
+    let keys = [format!("control.setpoint.{name}[{worst}]"), format!("control.setpoint.{name}")];
+    let keys: Vec<&str> = keys.iter().map(String::as_str).chain(["control.setpoint", "control"]).collect();
+    Some(Diagnostic::at(&model.spans, &keys, (Severity::Error, codes::STOP_LEAVES), message, help))
+}
+
+/// The least limits with which the stop fits on every axis, as lines of a spec; nothing if what goes by before it is too long.
+fn harder(model: &Model, stop: &Stopping, room: &[f64; 6], limits: &stop::Limits) -> String {
+    let period = model.timing.period;
+    let moving = |axis: &usize| room[*axis] > 0.0;
+    // Of all axes, which stop together.
+    let time = (0..6).filter(moving).fold(stop.time, |time, axis| {
+        let left = 2.0 * (room[axis] - stop.fixed(axis)) / stop.speed[axis];
+        if left < time { left } else { time }
+    });
+    let time = libm::floor(time / period) * period;
+    if time < period {
+        return String::new();
+    }
+    let least = limits.at_least(&stop.speed, time);
+    let list = |values: [f64; 6], [length, angle]: [&str; 2]| {
+        let each = values
+            .iter()
+            .enumerate()
+            .map(|(axis, value)| format!("\"{} {}\"", up(*value), if axis < 3 { length } else { angle }));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    format!(
+        "; or set stop_acceleration = [{}] and stop_jerk = [{}] or more, as far as legs and amplifiers follow",
+        list(least.acceleration, ["m/s^2", "rad/s^2"]),
+        list(least.jerk, ["m/s^3", "rad/s^3"])
+    )
+}
+
+/// A stop on the way of trajectory `index`.
+pub(super) fn leaves(model: &Model, index: usize, name: &str, kind: &TrajectoryKind, leaves: &Leaves) -> Diagnostic {
+    let (key, mend) = match kind {
+        TrajectoryKind::Paper { frequency, .. } => {
+            ("frequency", format!("at most {} Hz stops within", down(frequency * leaves.share)))
+        }
+        TrajectoryKind::Waveform { period, .. } => {
+            ("period", format!("a period of at least {} ms stops within", up(period / leaves.share * 1e3)))
+        }
+    };
+    let message =
+        format!("trajectory \"{name}\": another command on the way would bring it to rest with {}", leaves.end);
+    let help = format!("{mend}; or raise control.setpoint.stop_acceleration and stop_jerk");
+    finding(model, Severity::Error, codes::STOP_LEAVES, &format!("trajectory[{index}].{key}"), message, help)
+}
+
+/// Three digits, rounded down.
+fn down(value: f64) -> f64 {
+    three_digits(value, libm::floor)
+}
+
+/// Three digits, rounded up.
+fn up(value: f64) -> f64 {
+    three_digits(value, libm::ceil)
+}
+
+fn three_digits(value: f64, whole: fn(f64) -> f64) -> f64 {
+    if value <= 0.0 {
+        return 0.0;
+    }
+    // By whole powers of ten, so that the number shown is that number.
+    let places = 2.0 - libm::floor(libm::log10(value));
+    let step = libm::pow(10.0, places.abs());
+    if places < 0.0 { whole(value / step) * step } else { whole(value * step) / step }
+}

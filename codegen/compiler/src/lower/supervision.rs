@@ -1,0 +1,285 @@
+//! The supervisor: times to ticks and samples, bounds to SI, and what cannot work.
+
+mod rest;
+
+use super::kinematics::inverse_jacobian;
+use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
+use crate::ir::{Actuation, Hysteresis, Scalar, Supervision};
+use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::model::Model;
+use specgen_numerics::multiply6;
+
+/// Gauges are looked at in turn.
+const CHANNELS: f64 = 6.0;
+/// Samples that a fault of a gauge takes at least.
+const FEWEST_SAMPLES: f64 = 2.0;
+/// Times the noise (rms) that a bound must keep off: what noise alone does once in 10^15 samples.
+const NOISE_MARGIN: f64 = 8.0;
+/// Of `supervisor.stuck_motion` without the key: times the noise, and steps of the gauge's converter.
+const STUCK_MARGIN: f64 = 10.0;
+/// Fewest steps of the converter by which a sound gauge must have moved.
+const FEWEST_STEPS: f64 = 2.0;
+/// Of the stroke, without `supervisor.disagreement`.
+const DISAGREEMENT_SHARE: f64 = 0.2;
+/// Without `supervisor.arm_time`, s.
+const ARM_TIME: f64 = 0.1;
+/// Without `supervisor.host_lost`: silence of a host, or of a converter, after which the machine holds and ramps down, s.
+const HOST_LOST: [f64; 2] = [0.1, 10.0];
+/// Missed ticks are counted over this time, s.
+const MISSED_WINDOW: f64 = 1.0;
+
+/// Every constant of the supervisor.
+///
+/// # Errors
+/// A time that is shorter than it can be seen, a bound below the noise, a ramp faster than the slew rate.
+pub(super) fn lower(
+    model: &Model,
+    hysteresis: &Hysteresis,
+    actuation: &Actuation,
+    max_step: i32,
+    scalar: Scalar,
+) -> Result<Supervision, Vec<Diagnostic>> {
+    let spec = &model.supervisor;
+    let period = model.timing.period;
+    let noise = pose_noise(model)?;
+    let mut findings = Vec::new();
+    let mut times = Times { model, findings: &mut findings };
+    let arm_ticks = times.ticks("arm_time", spec.arm_time, ARM_TIME);
+    let gauge = times.ticks("gauge_time", spec.gauge_time, 0.01);
+    let voltage = times.ticks("voltage_time", spec.voltage_time, 0.5);
+    let slew = times.ticks("slew_time", spec.slew_time, 0.05);
+    let stuck_samples = times.samples("stuck_time", spec.stuck_time, 0.05);
+    let disagreement_samples = times.samples("disagreement_time", spec.disagreement_time, 0.1);
+    let tracking_samples = times.samples("tracking_time", spec.tracking_time, 0.1);
+    let [host_ticks, host_gone, converter_silent] = times.host_lost(gauge);
+    let window = whole(MISSED_WINDOW / period);
+    let missed = window.saturating_mul(spec.missed_ticks - 1).saturating_add(1);
+
+    let (stuck_motion, disagreement) = gauge_bounds(model, &mut findings);
+    let tracking = tracking(model, noise.as_ref(), &mut findings);
+    let (ramp_step, ramp_every) = ramp(model, actuation, max_step, &mut findings);
+    let readings_per_leg = match (readings_per_pose(model)?, inverse_jacobian(&model.geometry)) {
+        (Some(gauges), Some(legs)) => Some(multiply6(&gauges, &legs)),
+        _ => None,
+    };
+    let rest = rest::code(model, actuation);
+    findings.extend(rest::beyond(model));
+    if !findings.is_empty() {
+        return Err(findings);
+    }
+    let round = |value: f64| scalar.round(value);
+    Ok(Supervision {
+        arm_ticks,
+        rest,
+        risen: rest::risen(rest, hysteresis, actuation, scalar),
+        ramp_step,
+        ramp_every,
+        host_ticks,
+        patience: [gauge, gauge, voltage, slew, missed, gauge, host_gone, converter_silent],
+        weight: [1, 1, 1, 1, window, 1, 1, 1],
+        stuck_motion: round(stuck_motion),
+        stuck_samples,
+        disagreement: round(disagreement),
+        disagreement_samples,
+        tracking: tracking.map(round),
+        tracking_samples,
+        readings_per_leg: readings_per_leg.map(|rows| rows.map(|row| row.map(round))),
+        approach_keep: round(libm::exp(-1.0 / f64::from(arm_ticks))),
+    })
+}
+
+/// Times as ticks and samples.
+struct Times<'a> {
+    model: &'a Model,
+    findings: &'a mut Vec<Diagnostic>,
+}
+
+impl Times<'_> {
+    fn ticks(&mut self, key: &str, given: Option<f64>, otherwise: f64) -> u32 {
+        self.counted(key, given, otherwise, 1.0, 1.0)
+    }
+
+    fn samples(&mut self, key: &str, given: Option<f64>, otherwise: f64) -> u32 {
+        self.counted(key, given, otherwise, CHANNELS, FEWEST_SAMPLES)
+    }
+
+    /// Ticks after which a host is lost, those with the event of it after which it is gone, and those after which a converter is
+    /// silent, which holds after `gauge` ticks.
+    fn host_lost(&mut self, gauge: u32) -> [u32; 3] {
+        let given = self.model.supervisor.host_lost;
+        let [hold, down] = given.unwrap_or(HOST_LOST);
+        let hold_ticks = self.ticks("host_lost", None, hold);
+        let least = 1 + if hold_ticks > gauge { hold_ticks } else { gauge };
+        let mut down_ticks = self.ticks("host_lost", None, down);
+        let period = self.model.timing.period;
+        if down_ticks < least || hold < period * (1.0 - 1e-9) {
+            down_ticks = if down_ticks < least { least } else { down_ticks };
+            if given.is_some() {
+                let [hold, down, least_hold, least_down, gauge] = [
+                    hold,
+                    down,
+                    f64::from(hold_ticks) * period,
+                    f64::from(down_ticks) * period,
+                    f64::from(gauge) * period,
+                ]
+                .map(|time| time * 1e3);
+                self.findings.push(finding(
+                    self.model,
+                    codes::SUPERVISOR_TIME,
+                    "host_lost",
+                    format!(
+                        "a host is to be lost after {hold:.6} ms, at least a period, and the machine to ramp down after {down:.6} ms; \
+                         before that it holds, for a converter from {gauge:.6} ms on (gauge_time)"
+                    ),
+                    format!("write host_lost = [\"{least_hold:.6} ms\", \"{least_down:.6} ms\"] or more"),
+                ));
+            }
+        }
+        [hold_ticks, (down_ticks - hold_ticks).saturating_add(1), down_ticks]
+    }
+
+    /// How often something that is looked at every `every` ticks is seen in that time; a time that is given must let it be
+    /// seen `fewest` times.
+    fn counted(&mut self, key: &str, given: Option<f64>, otherwise: f64, every: f64, fewest: f64) -> u32 {
+        let between = every * self.model.timing.period;
+        let least = fewest * between;
+        if let Some(time) = given
+            && time < least * (1.0 - 1e-9)
+        {
+            self.findings.push(finding(
+                self.model,
+                codes::SUPERVISOR_TIME,
+                key,
+                format!(
+                    "`supervisor.{key}` is {:.6} ms, but it takes {:.6} ms at a period of {:.6} ms to be seen",
+                    time * 1e3,
+                    least * 1e3,
+                    self.model.timing.period * 1e3
+                ),
+                format!("write {key} = \"{:.6} ms\" or more, or shorten timing.period", least * 1e3),
+            ));
+        }
+        let time = given.unwrap_or(otherwise);
+        let count = whole(libm::ceil(time / between - 1e-9));
+        let fewest = whole(fewest);
+        if count < fewest { fewest } else { count }
+    }
+}
+
+/// `supervisor.stuck_motion` and `supervisor.disagreement`, m.
+fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
+    let spec = &model.supervisor;
+    let [low, high] = model.sensor.range;
+    let step = (high - low) / libm::exp2(f64::from(model.sensor.bits));
+    let noise = model.sensor.noise;
+    let larger = |a: f64, b: f64| if a > b { a } else { b };
+    let stuck_motion = spec.stuck_motion.unwrap_or_else(|| larger(STUCK_MARGIN * step, STUCK_MARGIN * noise));
+    let least = FEWEST_STEPS * step;
+    if stuck_motion < least * (1.0 - 1e-9) {
+        findings.push(finding(
+            model,
+            codes::SUPERVISOR_BOUND,
+            "stuck_motion",
+            format!(
+                "`supervisor.stuck_motion` is {:.4} nm, but a step of the gauge's converter is {:.4} nm: a sound gauge may not show it",
+                stuck_motion * 1e9,
+                step * 1e9
+            ),
+            format!("write stuck_motion = \"{:.4} nm\" or more", above(least * 1e9)),
+        ));
+    }
+    let disagreement = spec.disagreement.unwrap_or(DISAGREEMENT_SHARE * model.actuator.stroke);
+    let least = NOISE_MARGIN * noise + step;
+    if disagreement < least {
+        findings.push(finding(
+            model,
+            codes::SUPERVISOR_BOUND,
+            "disagreement",
+            format!(
+                "a disagreement of {:.4} nm is below what the gauge's noise and converter make, {:.4} nm",
+                disagreement * 1e9,
+                least * 1e9
+            ),
+            format!(
+                "write disagreement = \"{:.4} nm\" or more; a fifth of the stroke is {:.4} um",
+                above(least * 1e9),
+                DISAGREEMENT_SHARE * model.actuator.stroke * 1e6
+            ),
+        ));
+    }
+    (stuck_motion, disagreement)
+}
+
+/// Bound of each axis, or of each leg.
+fn tracking(model: &Model, noise: Option<&PoseNoise>, findings: &mut Vec<Diagnostic>) -> [f64; 6] {
+    let share = model.supervisor.tracking_error;
+    let (full, noise) = match noise {
+        Some(noise) => {
+            let [x, y, z] = model.workspace.translation;
+            let [a, b, c] = model.workspace.rotation;
+            ([x, y, z, a, b, c], noise.pose)
+        }
+        None => ([model.actuator.stroke; 6], [model.sensor.noise; 6]),
+    };
+    let mut least = 0.0;
+    for (full, noise) in full.iter().zip(&noise) {
+        let needed = NOISE_MARGIN * noise / full;
+        if needed > least {
+            least = needed;
+        }
+    }
+    if share < least {
+        findings.push(finding(
+            model,
+            codes::SUPERVISOR_BOUND,
+            "tracking_error",
+            format!(
+                "a tracking error of {share} of the range is below what the gauges' noise makes of one axis, {least:.6}"
+            ),
+            format!("write tracking_error = {:.6} or more; the default is 0.2", above(least)),
+        ));
+    }
+    full.map(|full| share * full)
+}
+
+/// Codes of a step, and ticks from one to the next: no faster than asked.
+fn ramp(model: &Model, actuation: &Actuation, max_step: i32, findings: &mut Vec<Diagnostic>) -> (i32, u32) {
+    let slew_rate = model.actuator.slew_rate;
+    let [low, high] = model.actuator.voltage;
+    let whole_range = high - low;
+    let rate = model.supervisor.ramp_rate.unwrap_or(if whole_range < slew_rate { whole_range } else { slew_rate });
+    if rate > slew_rate {
+        findings.push(finding(
+            model,
+            codes::SUPERVISOR_RAMP,
+            "ramp_rate",
+            format!("voltages would ramp down at {} V/s, faster than actuator.slew_rate, {} V/s", rate, slew_rate),
+            format!("write ramp_rate = \"{} V/s\" or less", slew_rate),
+        ));
+    }
+    let codes = rate * model.timing.period / actuation.volts_per_code;
+    if codes >= f64::from(max_step) {
+        (max_step, 1)
+    } else if codes >= 1.0 {
+        (codes as i32, 1)
+    } else {
+        (1, whole(libm::ceil(1.0 / codes - 1e-9)))
+    }
+}
+
+/// A little above, for a mend that is itself accepted when printed.
+fn above(value: f64) -> f64 {
+    value * 1.001 + 1e-4
+}
+
+/// A count; what does not fit is as good as never.
+fn whole(value: f64) -> u32 {
+    // Saturates, and a NaN gives 0.
+    value as u32
+}
+
+fn finding(model: &Model, code: &'static str, key: &str, message: String, help: String) -> Diagnostic {
+    let path = format!("supervisor.{key}");
+    let place = model.spans.get(&path).cloned().map_or(Place::Whole, Place::Spec);
+    Diagnostic { severity: Severity::Error, code, key: path, place, message, help }
+}

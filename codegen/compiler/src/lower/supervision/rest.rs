@@ -1,0 +1,56 @@
+//! Where the legs rest.
+
+use crate::ir::{Actuation, Hysteresis, LEGS, RateModel, Rest, Scalar};
+use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::model::Model;
+
+/// The permitted code nearest to the rest voltage.
+pub(super) fn code(model: &Model, actuation: &Actuation) -> i32 {
+    let [low, high] = model.dac.range;
+    let per_code = (high - low) / f64::from((1_i32 << actuation.bits) - 1);
+    // Saturates.
+    let nearest = libm::round((model.rest_voltage() - low) / per_code) as i32;
+    nearest.clamp(actuation.code_min, actuation.code_max)
+}
+
+/// A rest voltage that may not go out.
+pub(super) fn beyond(model: &Model) -> Option<Diagnostic> {
+    let [low, high] = model.actuator.voltage;
+    let rest = model.rest_voltage();
+    if (low..=high).contains(&rest) {
+        return None;
+    }
+    Some(super::finding(
+        model,
+        codes::SUPERVISOR_REST,
+        "rest_voltage",
+        format!("the legs would rest at {rest} V, beyond `actuator.voltage`, {low} V to {high} V"),
+        format!("write rest_voltage = \"{} V\" or a voltage within the limits", Model::nearest_to_zero(low, high)),
+    ))
+}
+
+/// How the legs stand at a code above the lowest.
+pub(super) fn risen(code: i32, hysteresis: &Hysteresis, actuation: &Actuation, scalar: Scalar) -> Option<Rest> {
+    if code == actuation.code_min {
+        return None;
+    }
+    // As the controller computes it.
+    let drive =
+        scalar.round(actuation.cells_at_zero + scalar.round(scalar.round(f64::from(code)) * actuation.cells_per_code));
+    let of_legs = |tables: &[Vec<f64>], table_of_leg: &[usize; LEGS]| {
+        table_of_leg.map(|table| first_rise(&tables[table], hysteresis.grid, drive, scalar))
+    };
+    let rate = match &hysteresis.rate {
+        Some(RateModel::DynamicPreisach { tables, table_of_leg, .. }) => of_legs(tables, table_of_leg),
+        _ => [0.0; LEGS],
+    };
+    Some(Rest { drive, displacement: of_legs(&hysteresis.tables, &hysteresis.table_of_leg), rate })
+}
+
+/// E(`drive`, 0), with the roundings of `specgen_runtime::Everett::rising`. `nodes` as in [`Hysteresis::tables`].
+fn first_rise(nodes: &[f64], grid: usize, drive: f64, scalar: Scalar) -> f64 {
+    let cell = (drive as usize).min(grid - 1);
+    let node = |up: usize| nodes[up * (up + 1) / 2];
+    let slope = scalar.round(node(cell + 1) - node(cell));
+    scalar.round(node(cell) + scalar.round(slope * scalar.round(drive - cell as f64)))
+}

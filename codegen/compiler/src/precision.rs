@@ -1,0 +1,148 @@
+//! What the scalar of the controller costs: rounding errors of leg displacements and of the measured pose, in nanometres per
+//! axis, by analysis and by trial.
+//!
+//! The analysis runs the controller's own kernels on numbers that remember what was rounded where ([`specgen_numerics::Traced`]), over the whole
+//! workspace in 64 parts. The trial runs them in the controller's scalar at corners and random poses of the workspace, against the same kernels on 106 bits
+//! ([`specgen_numerics::Double`]) with constants, series and passes that are exact there. Both count the rounding of constants and the terms and
+//! steps that are left out. Not counted: the set-point generator, calibration of gauges, and the inverse of the
+//! hysteresis, whose voltage leaves the controller in steps of the converter.
+
+mod kinematics;
+mod sensing;
+mod table;
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+use serde::Serialize;
+
+use crate::ir::{Ir, Scalar};
+use crate::lower::PoseNoise;
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::model::Model;
+
+pub use table::{Row, describe, rows};
+
+/// Random poses beside the corners of the workspace.
+const SAMPLES: usize = 3000;
+
+/// Errors of the chosen scalar, m and rad, in the order x, y, z, θx, θy, θz.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Precision {
+    /// Of each leg displacement.
+    pub legs: Figures,
+    /// Of the pose that the legs are sent to.
+    pub commanded: Figures,
+    /// Of the pose computed from the readings of gauges that see the platform.
+    pub measured: Option<Figures>,
+}
+
+/// Largest error of six numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Figures {
+    /// None in the declared workspace is larger.
+    pub bound: [f64; 6],
+    /// Largest found against 106 bits.
+    pub sampled: [f64; 6],
+    /// Largest found against doubles; none where the controller computes in doubles.
+    pub against_f64: Option<[f64; 6]>,
+}
+
+impl Figures {
+    /// Before any sample. `single`: doubles are another measure.
+    fn none(bound: [f64; 6], single: bool) -> Self {
+        Self { bound, sampled: [0.0; 6], against_f64: single.then_some([0.0; 6]) }
+    }
+
+    /// Bound over largest found of each number; none where nothing was found.
+    #[must_use]
+    pub fn ratio(&self) -> [Option<f64>; 6] {
+        core::array::from_fn(|k| (self.sampled[k] > 0.0).then(|| self.bound[k] / self.sampled[k]))
+    }
+}
+
+/// Largest magnitudes so far.
+fn keep(largest: &mut [f64; 6], errors: [f64; 6]) {
+    for (largest, error) in largest.iter_mut().zip(errors) {
+        if error.abs() > *largest {
+            *largest = error.abs();
+        }
+    }
+}
+
+/// Precision of the controller of `model` with the constants `ir`.
+///
+/// # Errors
+/// As lowering: none for a model that was lowered.
+pub fn of(model: &Model, ir: &Ir) -> Result<Precision, Vec<Diagnostic>> {
+    tried(model, ir, 0, SAMPLES)
+}
+
+/// The same with `samples` random poses from `seed` beside the corners.
+///
+/// # Errors
+/// As [`of`].
+pub fn tried(model: &Model, ir: &Ir, seed: u64, samples: usize) -> Result<Precision, Vec<Diagnostic>> {
+    let poses = poses(model, ir.scalar, seed, samples);
+    let (legs, commanded) = kinematics::figures(model, &ir.kinematics, ir.scalar, &poses);
+    let measured = match (&model.task_space, &ir.task_space) {
+        (Some(task), Some(lowered)) => {
+            Some(sensing::figures(model, task, &ir.kinematics, &lowered.sensing, ir.scalar, &poses)?)
+        }
+        _ => None,
+    };
+    Ok(Precision { legs, commanded, measured })
+}
+
+/// Corners of the workspace and seeded random poses in it, as numbers of the scalar.
+fn poses(model: &Model, scalar: Scalar, seed: u64, samples: usize) -> Vec<[f64; 6]> {
+    let bounds = bounds(model);
+    let corners = (0..64_u32)
+        .map(|corner| core::array::from_fn(|axis| if corner >> axis & 1 == 0 { -bounds[axis] } else { bounds[axis] }));
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let inside = (0..samples)
+        .map(|_| bounds.map(|bound| bound * (2.0 * f64::from(random.next_u32()) / f64::from(u32::MAX) - 1.0)))
+        .collect::<Vec<[f64; 6]>>();
+    corners.chain(inside).map(|pose: [f64; 6]| pose.map(|value| scalar.round(value))).collect()
+}
+
+/// The 64 parts of the workspace in which no coordinate changes its sign.
+fn boxes(bounds: &[f64; 6]) -> impl Iterator<Item = [[f64; 2]; 6]> {
+    (0..64_u32).map(|part| {
+        core::array::from_fn(|axis| if part >> axis & 1 == 0 { [-bounds[axis], 0.0] } else { [0.0, bounds[axis]] })
+    })
+}
+
+fn bounds(model: &Model) -> [f64; 6] {
+    let ([x, y, z], [a, b, c]) = (model.workspace.translation, model.workspace.rotation);
+    [x, y, z, a, b, c]
+}
+
+/// Rounding errors beyond the noise of the gauges are worth a warning: another scalar would control better.
+#[must_use]
+pub fn findings(model: &Model, precision: &Precision, noise: Option<&PoseNoise>) -> Vec<Diagnostic> {
+    let (Some(noise), Some(measured)) = (noise, &precision.measured) else { return Vec::new() };
+    let total = |axis: usize| measured.bound[axis] + precision.commanded.bound[axis];
+    let worst =
+        (0..6).fold(
+            0,
+            |worst, axis| {
+                if total(axis) / noise.pose[axis] > total(worst) / noise.pose[worst] { axis } else { worst }
+            },
+        );
+    if noise.pose[worst] == 0.0 || total(worst) <= noise.pose[worst] {
+        return Vec::new();
+    }
+    let unit = if worst < 3 { "nm" } else { "nrad" };
+    vec![Diagnostic::at(
+        &model.spans,
+        &["controller.scalar", "controller"],
+        (Severity::Warning, codes::PRECISION_POOR),
+        format!(
+            "rounding may put {} off by {:.3} {unit}, more than the noise of the gauges of {:.3} {unit} rms",
+            ["x", "y", "z", "theta_x", "theta_y", "theta_z"][worst],
+            total(worst) * 1e9,
+            noise.pose[worst] * 1e9
+        ),
+        "write scalar = \"f64\", or reduce [workspace]".to_owned(),
+    )]
+}

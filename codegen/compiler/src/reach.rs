@@ -1,0 +1,188 @@
+//! What the legs reach: travel of each axis, the declared workspace, the bias, trajectories; and how well the legs hold the
+//! platform there.
+//!
+//! A leg moves between 0 (no voltage, where the gauges are zeroed) and its stroke. Weight and pre-load are left out: what
+//! they do to the rest pose is inside the zero of the gauges. Poses are x, y, z (m), θx, θy, θz (rad) from rest; those of
+//! set-points include the bias. The poses that a hexapod reaches are no box, so corners of the declared workspace beyond
+//! reach are reported and not refused; a bound that its axis alone cannot reach is.
+
+mod boxes;
+mod conditioning;
+mod findings;
+pub mod joints;
+mod travel;
+
+use serde::Serialize;
+use specgen_runtime::Platform;
+
+use specgen_language::diagnostic::Diagnostic;
+use specgen_language::model::{Model, TaskSpace};
+
+pub use boxes::Boxes;
+pub use conditioning::Conditioning;
+pub use findings::describe;
+pub(crate) use travel::largest;
+
+/// Interior poses that are looked at beside the corners.
+const INTERIOR_POSES: u32 = 128;
+/// A leg closer to either end than this part of its stroke has no room for corrections.
+const ROOM: f64 = 0.01;
+
+/// Pose from rest, m and rad.
+pub type Pose = [f64; 6];
+
+/// What is reached.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Reach {
+    /// Largest leg displacement, m; the smallest is 0.
+    pub stroke: f64,
+    /// x, y, z, θx, θy, θz.
+    pub axes: [AxisReach; 6],
+    /// Smallest and largest leg displacement at the bias, m.
+    pub at_bias: [f64; 2],
+    /// Part of the declared workspace, shrunk towards the bias, of which every corner is within reach; 0 to 1.
+    pub share: f64,
+    /// Smallest and largest leg displacement that corners and interior of the declared workspace would need, m.
+    pub demanded: [f64; 2],
+    /// No pose in the declared workspace needs more than this in magnitude, m.
+    pub demanded_bound: f64,
+    /// How well the legs hold the platform.
+    pub conditioning: Conditioning,
+    /// Largest turn of a joint over the declared workspace, rad: at the base, at the platform.
+    pub joint_angles: [f64; 2],
+    /// Largest boxes about the middle of the strokes.
+    pub boxes: Boxes,
+}
+
+/// One axis, all others standing still.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AxisReach {
+    /// Declared bound on its magnitude, m or rad.
+    pub declared: f64,
+    /// Lowest and highest value from the middle of all strokes, m or rad from rest.
+    pub from_middle: [f64; 2],
+    /// The same from the bias; from rest where there is none.
+    pub from_bias: [f64; 2],
+}
+
+/// What a path needs of the legs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PathReach {
+    /// Poses looked at.
+    pub poses: usize,
+    /// Smallest and largest displacement of any leg, m.
+    pub displacement: [f64; 2],
+    /// What could be added to z of every pose with all legs still in their strokes, lowest and highest, m; none: nothing.
+    pub shift: Option<[f64; 2]>,
+}
+
+/// Checks bias and workspace of `model`, whose `[control]` is `task`. `stroke`: what every leg can do, m.
+///
+/// # Errors
+/// A bias out of reach, a bound that its axis cannot reach. (A workspace in which the legs hardly hold the platform has
+/// no `platform`: [`crate::lower::platform`] refuses it.)
+pub fn check(
+    model: &Model,
+    task: &TaskSpace,
+    platform: &Platform<f64>,
+    stroke: f64,
+) -> Result<(Reach, Vec<Diagnostic>), Vec<Diagnostic>> {
+    let bias = task.setpoint.bias;
+    let reach = measure(model, platform, stroke, &bias);
+    let legs = travel::Legs { platform, stroke };
+    let found = findings::of(model, &reach, &legs.shift(core::iter::once(bias)));
+    if found.iter().any(|one| one.severity == specgen_language::diagnostic::Severity::Error) {
+        return Err(found);
+    }
+    Ok((reach, found))
+}
+
+/// Looks at the workspace of `model`, whose legs have gauges of their own and no bias: set-points count from rest, where the
+/// legs stand at the lower end of their strokes. `stroke`: what every leg can do, m.
+///
+/// Nothing is refused here: legs are limited one by one, so a pose beyond reach is approached, not refused.
+#[must_use]
+pub fn check_legs(model: &Model, platform: &Platform<f64>, stroke: f64) -> (Reach, Vec<Diagnostic>) {
+    let reach = measure(model, platform, stroke, &[0.0; 6]);
+    let found = findings::of_legs(model, &reach);
+    (reach, found)
+}
+
+/// Where legs with gauges of their own end before the workspace or after their gauges: for `check`, not for every build.
+#[must_use]
+pub fn notes(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
+    if model.task_space.is_some() { Vec::new() } else { findings::notes_of_legs(model, reach) }
+}
+
+/// What is reached, with set-points about `bias`.
+fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose) -> Reach {
+    let bounds = bounds(model);
+    let legs = travel::Legs { platform, stroke };
+    let lengths = rest_lengths(model);
+    let middle = legs.middle();
+    let from = |pose: &Pose, axis: usize| [legs.travel(pose, axis, -1.0), legs.travel(pose, axis, 1.0)];
+    Reach {
+        stroke,
+        axes: core::array::from_fn(|axis| AxisReach {
+            declared: bounds[axis],
+            from_middle: from(&middle, axis),
+            from_bias: from(bias, axis),
+        }),
+        at_bias: legs.span(bias),
+        share: legs.share(bias, &bounds),
+        demanded: travel::samples(&bounds).map(|pose| legs.span(&pose)).fold([0.0, 0.0], wider),
+        demanded_bound: legs.bound(&bounds, &lengths, model.geometry.joint_radius()),
+        conditioning: Conditioning::over(
+            platform,
+            core::iter::once([0.0; 6]).chain(travel::samples(&bounds)),
+            shortest(&lengths),
+            model.geometry.joint_radius(),
+        )
+        .bounded(&bounds, shortest(&lengths), model.geometry.joint_radius()),
+        joint_angles: joints::angles(&model.geometry, &bounds),
+        boxes: Boxes::of(&legs, middle, &bounds),
+    }
+}
+
+/// Checks the poses of a declared path, bias included. `key`: where the path stands in the spec; `name`: what users call it.
+///
+/// # Errors
+/// [`specgen_language::diagnostic::codes::TRAJECTORY_UNREACHABLE`] at `key`, with the shift in z that would make it fit, if one does.
+pub fn check_poses(
+    model: &Model,
+    platform: &Platform<f64>,
+    stroke: f64,
+    [key, name]: [&str; 2],
+    poses: impl Iterator<Item = Pose>,
+) -> Result<PathReach, Vec<Diagnostic>> {
+    let legs = travel::Legs { platform, stroke };
+    let path = legs.shift(poses);
+    match findings::of_path(model, stroke, [key, name], &path) {
+        None => Ok(path),
+        Some(found) => Err(vec![found]),
+    }
+}
+
+/// Declared bounds of the six axes.
+fn bounds(model: &Model) -> Pose {
+    let ([x, y, z], [a, b, c]) = (model.workspace.translation, model.workspace.rotation);
+    [x, y, z, a, b, c]
+}
+
+/// l₀, m.
+fn rest_lengths(model: &Model) -> [f64; 6] {
+    let geometry = &model.geometry;
+    core::array::from_fn(|leg| {
+        let ([bx, by, bz], [px, py, pz]) = (geometry.base_joints[leg], geometry.platform_joints[leg]);
+        let (x, y, z) = (px - bx, py - by, geometry.height + pz - bz);
+        libm::sqrt(x * x + y * y + z * z)
+    })
+}
+
+fn shortest(lengths: &[f64; 6]) -> f64 {
+    lengths.iter().fold(f64::INFINITY, |a, b| if *b < a { *b } else { a })
+}
+
+fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [if b[0] < a[0] { b[0] } else { a[0] }, if b[1] > a[1] { b[1] } else { a[1] }]
+}

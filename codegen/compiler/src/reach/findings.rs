@@ -1,0 +1,292 @@
+//! What the user is told about reach.
+
+use std::fmt::Write as _;
+
+use super::{PathReach, ROOM, Reach};
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::model::{Model, SetpointKind};
+
+const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
+/// Unit and factor of an axis in messages.
+const fn unit(axis: usize) -> (&'static str, f64) {
+    if axis < 3 { ("um", 1e6) } else { ("urad", 1e6) }
+}
+
+/// Findings about bias and workspace; `bias` is the path that stands still at the bias.
+pub(super) fn of(model: &Model, reach: &Reach, bias: &PathReach) -> Vec<Diagnostic> {
+    let mut findings = Vec::new();
+    findings.extend(of_bias(model, reach, bias));
+    for axis in 0..6 {
+        findings.extend(of_axis(model, reach, axis));
+    }
+    findings.extend(of_condition(model, reach));
+    findings
+}
+
+/// Warnings about legs with their own gauges.
+pub(super) fn of_legs(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
+    of_gauge_ends(model, reach).filter(is_warning).into_iter().chain(of_condition(model, reach)).collect()
+}
+
+/// Notes about them: what is cut short where they end.
+pub(super) fn notes_of_legs(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
+    let cut = (model.controller.setpoint == SetpointKind::Pose).then(|| of_furthest_axis(model, reach)).flatten();
+    cut.into_iter().chain(of_gauge_ends(model, reach).filter(|one| !is_warning(one))).collect()
+}
+
+fn is_warning(finding: &Diagnostic) -> bool {
+    finding.severity > Severity::Note
+}
+
+/// The bound that lies furthest beyond what its axis reaches.
+fn of_furthest_axis(model: &Model, reach: &Reach) -> Option<Diagnostic> {
+    let furthest = |axis: usize| {
+        let [low, high] = reach.axes[axis].from_middle;
+        if -low > high { -low } else { high }
+    };
+    let beyond = |axis: usize| reach.axes[axis].declared / furthest(axis);
+    let worst = (1..6).fold(0, |worst, axis| if beyond(axis) > beyond(worst) { axis } else { worst });
+    if beyond(worst).is_nan() || beyond(worst) <= 1.0 + 1e-9 {
+        return None;
+    }
+    let (table, item) = if worst < 3 { ("workspace.translation", worst) } else { ("workspace.rotation", worst - 3) };
+    let (unit, scale) = unit(worst);
+    let [low, high] = reach.axes[worst].from_middle;
+    Some(finding(
+        model,
+        Severity::Note,
+        codes::LEGS_CUT_SHORT,
+        &[&format!("{table}[{item}]"), table, "workspace"],
+        format!(
+            "no pose reaches |{}| = {:.2} {unit}: from the middle of the strokes, at z = {:.1} um, this axis alone goes from {:.2} to {:.2} {unit}",
+            AXES[worst],
+            reach.axes[worst].declared * scale,
+            reach.boxes.centre[2] * 1e6,
+            low * scale,
+            high * scale
+        ),
+        format!(
+            "set-points beyond are accepted and each leg stops at the end of its stroke; to have them refused, declare at most {:.2} {unit}",
+            libm::floor(furthest(worst) * scale * 100.0) / 100.0
+        ),
+    ))
+}
+
+/// A gauge that sees less than this share of its leg's stroke is hardly meant.
+const LEAST_SEEN: f64 = 0.5;
+
+/// A leg that goes where its gauge does not see it.
+fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
+    let [low, high] = model.sensor.range;
+    if low <= 0.0 && high >= reach.stroke {
+        return None;
+    }
+    let item = usize::from(low <= 0.0);
+    let seen = if high < reach.stroke { high } else { reach.stroke } - if low > 0.0 { low } else { 0.0 };
+    // The paper's gauge sees four fifths; one that sees little is in another unit.
+    let grade = if seen < LEAST_SEEN * reach.stroke {
+        (Severity::Warning, codes::SENSOR_RANGE)
+    } else {
+        (Severity::Note, codes::GAUGE_SHORT_OF_STROKE)
+    };
+    Some(finding(
+        model,
+        grade.0,
+        grade.1,
+        &[&format!("sensor.range[{item}]"), "sensor.range", "sensor"],
+        format!(
+            "the gauge of a leg reads {:.3} um to {:.3} um, but the leg moves from 0 to {:.3} um",
+            low * 1e6,
+            high * 1e6,
+            reach.stroke * 1e6
+        ),
+        "a leg beyond the end of its gauge is a gauge fault: keep set-points within the gauge, or take one that sees the whole stroke".to_owned(),
+    ))
+}
+
+/// Above this condition number one motion is held thirty times worse than another.
+const POOREST: f64 = 30.0;
+
+fn of_condition(model: &Model, reach: &Reach) -> Option<Diagnostic> {
+    let conditioning = &reach.conditioning;
+    if conditioning.worst_bound <= POOREST {
+        return None;
+    }
+    Some(finding(
+        model,
+        Severity::Warning,
+        codes::CONDITION_POOR,
+        &["geometry.height", "geometry"],
+        format!(
+            "the condition number of the legs is {:.1} at rest and may come to {:.1} in the workspace",
+            conditioning.at_rest, conditioning.worst_bound
+        ),
+        "make the height comparable to the radii, close the joint pairs (small base_angle and platform_angle), or reduce [workspace]".to_owned(),
+    ))
+}
+
+fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic> {
+    const KEYS: [&str; 4] = ["control.setpoint.bias[2]", "control.setpoint.bias", "control.setpoint", "control"];
+    let [low, high] = reach.at_bias;
+    if beyond(reach.stroke, reach.at_bias) {
+        let help = advice(bias, "bias");
+        let message = format!(
+            "at the bias the legs would be at {:.3} um to {:.3} um, but they move between 0 and {:.3} um",
+            low * 1e6,
+            high * 1e6,
+            reach.stroke * 1e6
+        );
+        return Some(finding(model, Severity::Error, codes::BIAS_UNREACHABLE, &KEYS, message, help));
+    }
+    let room = ROOM * reach.stroke;
+    if low >= room && high <= reach.stroke - room {
+        return None;
+    }
+    let message = format!(
+        "at the bias a leg stands at {:.3} um of {:.3} um: there is no room for corrections beyond",
+        if low < room { low * 1e6 } else { high * 1e6 },
+        reach.stroke * 1e6
+    );
+    let middle = 0.5 * (reach.axes[2].from_middle[0] + reach.axes[2].from_middle[1]);
+    let help = format!("move the bias towards the middle of the strokes, where z is {:.1} um", middle * 1e6);
+    Some(finding(model, Severity::Warning, codes::NO_ROOM, &KEYS, message, help))
+}
+
+fn of_axis(model: &Model, reach: &Reach, axis: usize) -> Option<Diagnostic> {
+    let one = &reach.axes[axis];
+    let [low, high] = one.from_middle;
+    let furthest = if -low > high { -low } else { high };
+    if one.declared <= furthest * (1.0 + 1e-9) {
+        return None;
+    }
+    let (table, item) = if axis < 3 { ("workspace.translation", axis) } else { ("workspace.rotation", axis - 3) };
+    let key = format!("{table}[{item}]");
+    let (unit, scale) = unit(axis);
+    // Rounded down, so that the number shown is itself accepted.
+    let shown = libm::floor(furthest * scale * 100.0) / 100.0;
+    Some(finding(
+        model,
+        Severity::Error,
+        codes::AXIS_UNREACHABLE,
+        &[&key, table, "workspace"],
+        format!(
+            "no pose reaches |{}| = {:.2} {unit}: from the middle of the strokes, this axis alone goes from {:.2} to {:.2} {unit}",
+            AXES[axis],
+            one.declared * scale,
+            low * scale,
+            high * scale
+        ),
+        format!("at most {shown} {unit}; check the unit, or use legs with more stroke"),
+    ))
+}
+
+/// What is wrong with a path, if anything.
+pub(super) fn of_path(model: &Model, stroke: f64, [key, name]: [&str; 2], path: &PathReach) -> Option<Diagnostic> {
+    if path.poses == 0 || !beyond(stroke, path.displacement) {
+        return None;
+    }
+    let message = format!(
+        "`{name}` needs leg displacements from {:.3} um to {:.3} um, but the legs move between 0 and {:.3} um",
+        path.displacement[0] * 1e6,
+        path.displacement[1] * 1e6,
+        stroke * 1e6
+    );
+    let section = key.split('.').next().unwrap_or(key);
+    Some(finding(
+        model,
+        Severity::Error,
+        codes::TRAJECTORY_UNREACHABLE,
+        &[key, section],
+        message,
+        advice(path, "control.setpoint.bias"),
+    ))
+}
+
+/// Beyond the ends of the strokes by more than rounding; NaN is.
+fn beyond(stroke: f64, [low, high]: [f64; 2]) -> bool {
+    let inside = low >= -1e-9 * stroke && high <= (1.0 + 1e-9) * stroke;
+    !inside
+}
+
+fn advice(path: &PathReach, what: &str) -> String {
+    match path.shift {
+        // Rounded inwards.
+        Some([low, high]) => format!(
+            "add {} um to {} um to z of {what}, and it fits",
+            libm::ceil(low * 1e8) / 100.0,
+            libm::floor(high * 1e8) / 100.0
+        ),
+        None => format!("no z of {what} makes it fit: it is too large for this stroke; check its units, or reduce it"),
+    }
+}
+
+/// The reach as text for `specgen check`. `biased`: set-points count from a bias, else from rest.
+#[must_use]
+pub fn describe(reach: &Reach, biased: bool) -> String {
+    // Rounding errors of a bound at zero are not shown as -0.0.
+    let tenths = |value: f64| libm::round(value * 10.0) / 10.0 + 0.0;
+    let mut text = String::new();
+    // Writing to a String cannot fail.
+    let _ = writeln!(
+        text,
+        "  reach of one axis alone, um and urad ({:.1} um legs): from the middle of the strokes | from {}",
+        reach.stroke * 1e6,
+        if biased { "the bias" } else { "rest" }
+    );
+    for (axis, one) in reach.axes.iter().enumerate() {
+        let scale = unit(axis).1;
+        let _ = writeln!(
+            text,
+            "    {:<3} {:>9.1} to {:>8.1} | {:>9.1} to {:>8.1}   (declared ±{:.1})",
+            AXES[axis],
+            tenths(one.from_middle[0] * scale),
+            tenths(one.from_middle[1] * scale),
+            tenths(one.from_bias[0] * scale),
+            tenths(one.from_bias[1] * scale),
+            one.declared * scale
+        );
+    }
+    if biased {
+        let _ = writeln!(
+            text,
+            "  at the bias the legs stand at {:.1} to {:.1} um; {:.1} % of the declared workspace around it is reached corner by corner",
+            reach.at_bias[0] * 1e6,
+            reach.at_bias[1] * 1e6,
+            reach.share * 100.0
+        );
+    }
+    let conditioning = &reach.conditioning;
+    let _ = writeln!(
+        text,
+        "  condition of J {:.2} at rest, {:.2} at worst, below {:.3} anywhere in the workspace; no singular pose within {:.1} mm of it",
+        conditioning.at_rest,
+        conditioning.worst,
+        conditioning.worst_bound,
+        conditioning.free_of_singularities * 1e3
+    );
+    let [base, platform] = reach.joint_angles.map(|angle| angle * 1e3);
+    let _ = writeln!(text, "  joints turn by up to {base:.3} mrad at the base and {platform:.3} mrad at the platform");
+    let half = |half: &[f64]| half.iter().map(|width| format!("{:.1}", width * 1e6)).collect::<Vec<_>>().join("/");
+    let _ = writeln!(
+        text,
+        "  largest box that is reached about z = {:.1} um, all at once, ± um and urad: {} and {} of the declared shape; {} and {} by volume; {} without rotation",
+        reach.boxes.centre[2] * 1e6,
+        half(&reach.boxes.as_declared[..3]),
+        half(&reach.boxes.as_declared[3..]),
+        half(&reach.boxes.largest[..3]),
+        half(&reach.boxes.largest[3..]),
+        half(&reach.boxes.without_rotation[..3])
+    );
+    text
+}
+
+fn finding(
+    model: &Model,
+    severity: Severity,
+    code: &'static str,
+    keys: &[&str],
+    message: String,
+    help: String,
+) -> Diagnostic {
+    Diagnostic::at(&model.spans, keys, (severity, code), message, help)
+}

@@ -1,0 +1,46 @@
+//! How far the joints of the legs turn.
+
+use super::{Pose, travel};
+use specgen_language::model::Geometry;
+
+/// Largest angle between a leg and its direction at rest over corners and interior of the workspace `bounds`, rad: seen from
+/// the base, and from the platform.
+#[must_use]
+pub fn angles(geometry: &Geometry, bounds: &Pose) -> [f64; 2] {
+    let mut largest = [0.0; 2];
+    for pose in travel::samples(bounds) {
+        let turn = rotation([pose[3], pose[4], pose[5]]);
+        for (base, joint) in geometry.base_joints.iter().zip(&geometry.platform_joints) {
+            let rest: [f64; 3] =
+                core::array::from_fn(|k| joint[k] - base[k] + if k == 2 { geometry.height } else { 0.0 });
+            let turned: [f64; 3] = core::array::from_fn(|row| (0..3).fold(0.0, |sum, k| sum + turn[row][k] * joint[k]));
+            let leg: [f64; 3] =
+                core::array::from_fn(|k| pose[k] + turned[k] - base[k] + if k == 2 { geometry.height } else { 0.0 });
+            // Rᵀ leg: the leg in the platform's own axes.
+            let seen: [f64; 3] = core::array::from_fn(|k| (0..3).fold(0.0, |sum, row| sum + turn[row][k] * leg[row]));
+            for (slot, found) in largest.iter_mut().zip([angle(&rest, &leg), angle(&rest, &seen)]) {
+                if found > *slot {
+                    *slot = found;
+                }
+            }
+        }
+    }
+    largest
+}
+
+/// By sine and cosine, so that a small one keeps its digits.
+fn angle(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    libm::atan2(libm::sqrt(dot(&cross, &cross)), dot(a, b))
+}
+
+/// Rz Ry Rx (AI.1).
+fn rotation([x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
+    let [(sx, cx), (sy, cy), (sz, cz)] = [x, y, z].map(|angle| (libm::sin(angle), libm::cos(angle)));
+    [
+        [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
+        [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
+        [-sy, sx * cy, cx * cy],
+    ]
+}

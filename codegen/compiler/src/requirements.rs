@@ -1,0 +1,78 @@
+//! What the platform is for, against what its converters can do.
+
+use crate::lower::inverse_jacobian;
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::model::Model;
+
+/// Most bits that `dac.bits` takes.
+const MOST_BITS: u32 = 24;
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The finest steps of the converters, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steps {
+    /// A leg for one code.
+    pub leg: f64,
+    /// The platform along x, y, z for half a code on every leg, each with the sign that adds.
+    pub platform: [f64; 3],
+}
+
+/// The steps of the spec's converter; the geometry holds, so there is an inverse.
+#[must_use]
+pub fn steps(model: &Model) -> Steps {
+    let [low, high] = model.dac.range;
+    let code = (high - low) / (libm::ldexp(1.0, model.dac.bits as i32) - 1.0);
+    let leg = code * model.actuator.leg_gain();
+    let inverse = inverse_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
+    let along = |axis: usize| inverse[axis].iter().fold(0.0, |sum, entry| sum + entry.abs()) * leg / 2.0;
+    Steps { leg, platform: [along(0), along(1), along(2)] }
+}
+
+/// Refuses a converter too coarse for `requirements.precision`.
+#[must_use]
+pub fn check(model: &Model) -> Vec<Diagnostic> {
+    let Some(precision) = model.precision else { return Vec::new() };
+    let steps = steps(model);
+    let (mut largest, mut what) = (steps.leg, "one code moves a leg".to_owned());
+    for (axis, step) in AXES.iter().zip(steps.platform) {
+        if step > largest {
+            (largest, what) = (step, format!("half a code on every leg moves the platform along {axis}"));
+        }
+    }
+    if largest <= precision {
+        return Vec::new();
+    }
+    // A step is the range over 2^b − 1.
+    let codes_needed = (libm::ldexp(1.0, model.dac.bits as i32) - 1.0) * largest / precision;
+    let enough = (model.dac.bits..=MOST_BITS).find(|bits| libm::ldexp(1.0, *bits as i32) - 1.0 >= codes_needed);
+    let [low, high] = model.dac.range;
+    let range = (high - low) * precision / largest;
+    let nanometres = |metres: f64| format!("{:.3} nm", metres * 1e9);
+    vec![Diagnostic::at(
+        &model.spans,
+        &["requirements.precision"],
+        (Severity::Error, codes::TOO_FEW_BITS),
+        format!(
+            "{what} by {}, more than the {} of requirements.precision (dac.bits = {} over {} V, {} per code at a leg)",
+            nanometres(largest),
+            nanometres(precision),
+            model.dac.bits,
+            high - low,
+            nanometres(steps.leg)
+        ),
+        match enough {
+            Some(bits) => {
+                format!("dac.bits = {bits} would do; or a `dac.range` of {range:.3} V, or allow {}", up(largest))
+            }
+            None => format!(
+                "no converter that specgen drives has so many bits: allow {}, or narrow `dac.range` to {range:.3} V",
+                up(largest)
+            ),
+        },
+    )]
+}
+
+/// As a value for the spec, rounded up to what is printed.
+fn up(metres: f64) -> String {
+    format!("\"{:.3} nm\"", (metres * 1e12).ceil() / 1e3)
+}

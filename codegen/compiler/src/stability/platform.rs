@@ -1,0 +1,192 @@
+//! Stability and design of a platform controller, decided when compiling.
+//!
+//! The platform rests on six legs of axial stiffness k_a; its modes, together with the amplifier lag, bound how fast
+//! anything may be fed back. Here the modes are found, the notch on them is designed, gains and bandwidths that the spec
+//! leaves out get start values, and every control mode that a running controller can be switched to is checked: the
+//! spectral radius of one tick of the closed loop, with the platform sampled exactly, over the declared interval of λ.
+//!
+//! Pose coordinates are x, y, z (m) and θx, θy, θz (rad) from rest. Not in the model: flexure stiffness, bending of legs,
+//! axial modes inside a leg, hysteresis (λ stands for it), sensor dynamics.
+
+mod closed_loop;
+mod law;
+mod margins;
+mod modes;
+mod notch;
+mod refusal;
+mod report;
+mod rule;
+mod sampled;
+mod search;
+
+use serde::Serialize;
+use specgen_runtime::Platform;
+
+use specgen_language::diagnostic::Diagnostic;
+use specgen_language::model::{Gains, Interaction, Model, TaskSpace};
+use specgen_numerics::Matrix6;
+
+pub use super::LARGEST_RADIUS;
+pub use closed_loop::{ClosedLoop, Conditions};
+pub use law::{Adapting, Law, Tuning};
+pub use margins::{ClosedMode, ModeMargins};
+pub use modes::ModalBasis;
+pub use notch::{Biquad, Notch};
+pub use report::describe;
+pub use rule::bandwidth_limit;
+
+/// Values of λ looked at, evenly spaced over the interval, ends included.
+const RATIOS: u32 = 5;
+
+/// The platform at rest, in pose coordinates from rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RestDynamics {
+    /// M(0), kg, kg m, kg m²; symmetric and positive definite.
+    pub mass: Matrix6,
+    /// J(0) = ∂l/∂h, one row a leg, 1 and m/rad.
+    pub jacobian: Matrix6,
+}
+
+impl RestDynamics {
+    /// M and J of the controller's own model at rest.
+    #[must_use]
+    pub fn of(platform: &Platform<f64>) -> Self {
+        let mass = platform.mass_matrix(&[0.0; 6]);
+        Self {
+            // Symmetric but for rounding, which the modes must not see.
+            mass: core::array::from_fn(|i| core::array::from_fn(|j| 0.5 * (mass[i][j] + mass[j][i]))),
+            jacobian: platform.jacobian(&[0.0; 6]),
+        }
+    }
+}
+
+/// What the analysis decided: numbers for lowering, figures for the user.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Design {
+    /// Of the free platform, by frequency.
+    pub modes: [Mode; 6],
+    /// c_a of a leg, N s/m.
+    pub leg_damping: f64,
+    /// On feedback, if the spec has one.
+    pub notch: Option<Notch>,
+    /// Ω, rad/s: level bandwidth at which EWMA alone becomes unstable.
+    pub bandwidth_limit: f64,
+    /// Gains and bandwidths of F and P/F, given or by the rule.
+    pub combined: Tuning,
+    /// Gains of P alone; its bandwidths are zero.
+    pub position: Tuning,
+    /// Whether the check includes contact with the declared work piece.
+    pub touching: bool,
+    /// Every control mode.
+    pub margins: Vec<ModeMargins>,
+    /// Warnings and notes about what is stable but thin.
+    #[serde(skip)]
+    pub findings: Vec<Diagnostic>,
+}
+
+/// A mode of the platform on its legs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Mode {
+    /// ω, rad/s.
+    pub frequency: f64,
+    /// ζ.
+    pub damping_ratio: f64,
+    /// In pose coordinates, mass-normalised: Vᵀ M V = I.
+    pub shape: [f64; 6],
+}
+
+/// Finds modes, notch, gains and margins of the platform of `model`, whose `[control]` is `task`.
+///
+/// # Errors
+/// What has no modes, or is unstable in some control mode, at the key that is to blame, with a number that would do.
+pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<Design, Vec<Diagnostic>> {
+    let Some(closed_loop) = closed_loop_of(model, task, plant) else {
+        return Err(vec![refusal::no_modes(model)]);
+    };
+    let ratios = model.adaptation.gain_ratio;
+    let limit = bandwidth_limit(&closed_loop);
+    let given = task.gains.as_ref().map(gains);
+    let given = rule::Given { gains: given.as_ref(), bandwidths: task.adaptation };
+    let combined = rule::combined(&closed_loop, limit, given, ratios);
+    let position = task.position_gains.as_ref().map_or_else(|| rule::alone(&closed_loop, limit, ratios), gains);
+    refusal::check(model, task, &closed_loop, &combined, &position)?;
+    let margins: Vec<ModeMargins> = Law::ALL
+        .into_iter()
+        .map(|law| {
+            let tuning = if law == Law::Position { &position } else { &combined };
+            ModeMargins::of(&closed_loop, law, tuning, ratios)
+        })
+        .collect();
+    let mut findings = refusal::thin(model, task, &closed_loop, &margins);
+    findings.extend(refusal::slower_than_position(model, task, &combined, &position));
+    let basis = &closed_loop.basis;
+    Ok(Design {
+        modes: core::array::from_fn(|i| Mode {
+            frequency: basis.frequencies[i],
+            damping_ratio: closed_loop.damping[i],
+            shape: core::array::from_fn(|axis| basis.from_modal[axis][i]),
+        }),
+        leg_damping: 2.0 * task.modal_damping / basis.frequencies[0] * model.actuator.axial_stiffness,
+        notch: closed_loop.notch.clone(),
+        bandwidth_limit: limit,
+        combined,
+        position,
+        touching: closed_loop.environment != [0.0; 6],
+        margins,
+        findings,
+    })
+}
+
+/// The loop of a spec up to its tuning; none if the platform has no six modes.
+#[must_use]
+pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Option<ClosedLoop> {
+    let basis = ModalBasis::of(plant, model.actuator.axial_stiffness)?;
+    // c_a = β k_a with β = 2 ζ/ω_1: damping grows with frequency.
+    let damping = basis.frequencies.map(|frequency| task.modal_damping * frequency / basis.frequencies[0]);
+    let period = model.timing.period;
+    let notch = task.notch_damping.map(|ratio| Notch::of(&basis, &damping, ratio, period));
+    Some(ClosedLoop {
+        basis,
+        damping,
+        period,
+        lag: model.amplifier.lag,
+        notch,
+        velocity_cutoff: task.velocity_cutoff,
+        environment: task.environment.stiffness,
+        measured: task.interaction == Interaction::Measured,
+    })
+}
+
+fn gains(gains: &Gains) -> Tuning {
+    Tuning {
+        proportional: gains.proportional,
+        integral: gains.integral,
+        derivative: gains.derivative,
+        level_bandwidth: 0.0,
+        drift_bandwidth: 0.0,
+    }
+}
+
+/// What every control mode must hold under: λ over its interval, free and touching the declared work piece.
+fn nominal_conditions(closed_loop: &ClosedLoop, [low, high]: [f64; 2]) -> Vec<Conditions> {
+    let contacts: &[bool] = if closed_loop.environment == [0.0; 6] { &[false] } else { &[false, true] };
+    let mut all = Vec::new();
+    for &touching in contacts {
+        for k in 0..RATIOS {
+            let gain_ratio = low + (high - low) * f64::from(k) / f64::from(RATIOS - 1);
+            all.push(Conditions { gain_ratio, touching, ..Conditions::NOMINAL });
+        }
+    }
+    all
+}
+
+fn worst_radius(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &[Conditions]) -> f64 {
+    let mut largest = 0.0;
+    for one in conditions {
+        let radius = closed_loop.spectral_radius(law, tuning, one);
+        if radius > largest {
+            largest = radius;
+        }
+    }
+    largest
+}

@@ -1,0 +1,338 @@
+//! What the user is told about a platform that is unstable, or nearly so.
+
+use core::f64::consts::{PI, TAU};
+
+use super::closed_loop::{ClosedLoop, Conditions};
+use super::law::{Adapting, Law, Tuning};
+use super::margins::ModeMargins;
+use super::search::largest_stable;
+use super::{LARGEST_RADIUS, nominal_conditions, notch, worst_radius};
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::model::{AdaptationMode, ControlMode, Model, TaskSpace};
+
+const ADAPTED: [Law; 2] = [Law::Feedforward(Adapting::Ewma), Law::Feedforward(Adapting::Pcc)];
+const COMBINED: [Law; 3] =
+    [Law::Combined(Adapting::Invhys), Law::Combined(Adapting::Ewma), Law::Combined(Adapting::Pcc)];
+/// Lowest factor looked at.
+const LOWEST: f64 = 1e-4;
+/// What is offered is this part of the limit: at the limit itself nothing could be stable beside it.
+const SLACK: f64 = 0.95;
+/// Below these a margin is thin.
+const THIN_GAIN: f64 = 1.5;
+const THIN_DELAY: f64 = 0.5;
+
+/// A platform that [`super::ModalBasis`] refuses.
+pub(super) fn no_modes(model: &Model) -> Diagnostic {
+    finding(
+        model,
+        Severity::Error,
+        codes::NO_MODES,
+        &["geometry"],
+        "the platform has no six modes on its legs: its mass matrix or K = Jᵀ k_a J at rest is not positive definite"
+            .to_owned(),
+        "check [geometry] (six legs that hold every direction), the masses and inertias, and actuator.axial_stiffness"
+            .to_owned(),
+    )
+}
+
+/// Refuses what is unstable. Each finding offers a number; taking every offer gives a spec that is accepted.
+pub(super) fn check(
+    model: &Model,
+    task: &TaskSpace,
+    closed_loop: &ClosedLoop,
+    combined: &Tuning,
+    position: &Tuning,
+) -> Result<(), Vec<Diagnostic>> {
+    let conditions = nominal_conditions(closed_loop, model.adaptation.gain_ratio);
+    let case = Case { model, closed_loop, conditions: &conditions };
+    if let Some(found) = case.interaction() {
+        return Err(vec![found]);
+    }
+    let mut findings = Vec::new();
+    let mut bandwidths = 1.0;
+    if let Some(unstable) = case.unstable(&ADAPTED, combined) {
+        let largest = case.largest(&ADAPTED, |factor| combined.scaled(1.0, factor));
+        bandwidths = largest.unwrap_or(LOWEST);
+        findings.push(case.bandwidths(task, unstable, combined, largest));
+    }
+    // Gains are judged beside bandwidths that are, or will be, accepted; the rule's are chosen beside accepted ones only.
+    let beside = combined.scaled(1.0, bandwidths);
+    let judged = task.gains.is_some() || findings.is_empty();
+    if let Some(unstable) = case.unstable(&COMBINED, &beside).filter(|_| judged) {
+        let largest = case.largest(&COMBINED, |factor| beside.scaled(factor, 1.0));
+        findings.push(case.gains("gains", task.gains.is_some(), unstable, &beside, largest));
+    }
+    if let Some(unstable) = case.unstable(&[Law::Position], position) {
+        let largest = case.largest(&[Law::Position], |factor| position.scaled(factor, 1.0));
+        findings.push(case.gains("position_gains", task.position_gains.is_some(), unstable, position, largest));
+    }
+    if findings.is_empty() { Ok(()) } else { Err(findings) }
+}
+
+/// A law and its spectral radius.
+type Unstable = (Law, f64);
+
+struct Case<'a> {
+    model: &'a Model,
+    closed_loop: &'a ClosedLoop,
+    conditions: &'a [Conditions],
+}
+
+impl Case<'_> {
+    /// The law with the largest radius, if that is too large.
+    fn unstable(&self, laws: &[Law], tuning: &Tuning) -> Option<Unstable> {
+        let mut worst: Option<Unstable> = None;
+        for &law in laws {
+            let radius = worst_radius(self.closed_loop, law, tuning, self.conditions);
+            if radius > LARGEST_RADIUS && worst.is_none_or(|(_, largest)| radius > largest) {
+                worst = Some((law, radius));
+            }
+        }
+        worst
+    }
+
+    fn largest(&self, laws: &[Law], tuning: impl Fn(f64) -> Tuning) -> Option<f64> {
+        largest_stable(LOWEST, 1.0, 1.2, |factor| self.unstable(laws, &tuning(factor)).is_none())
+            .map(|limit| shown(SLACK * limit))
+            .filter(|factor| self.unstable(laws, &tuning(*factor)).is_none())
+    }
+
+    fn what(&self, (law, radius): Unstable) -> String {
+        let touching = if self.closed_loop.environment == [0.0; 6] { "" } else { ", free or touching the work piece" };
+        let [low, high] = self.model.adaptation.gain_ratio;
+        format!(
+            "control mode {} is unstable on this platform: the loop sampled every {} s, with modes from {:.0} Hz to \
+             {:.0} Hz (damping ratio {:.3} of the first) and an amplifier lag of {} s, has spectral radius {radius:.4} \
+             somewhere in gain_ratio [{low}, {high}]{touching}; it must be below 1",
+            law.name(),
+            self.closed_loop.period,
+            self.closed_loop.basis.frequencies[0] / TAU,
+            self.closed_loop.basis.frequencies[5] / TAU,
+            self.closed_loop.damping[0],
+            self.closed_loop.lag
+        )
+    }
+
+    /// The measured interaction force closes a loop of its own, whatever the gains.
+    fn interaction(&self) -> Option<Diagnostic> {
+        const BARE: [Law; 1] = [Law::Feedforward(Adapting::Invhys)];
+        let unstable = self.unstable(&BARE, &Tuning::NONE)?;
+        let stable_with = |factor: f64| {
+            let softer = ClosedLoop {
+                environment: self.closed_loop.environment.map(|stiffness| stiffness * factor),
+                ..self.closed_loop.clone()
+            };
+            worst_radius(&softer, BARE[0], &Tuning::NONE, self.conditions) <= LARGEST_RADIUS
+        };
+        let largest = largest_stable(LOWEST, 1.0, 1.2, stable_with)
+            .map(|limit| shown(SLACK * limit))
+            .filter(|factor| stable_with(*factor));
+        let help = match largest {
+            Some(factor) => format!(
+                "the measured force of the work piece, fed forward, closes a loop: it is stable up to {factor} times the \
+                 declared stiffness; or set interaction = \"none\" or \"modelled\""
+            ),
+            None => "more damping (control.modal_damping) or a longer period would be needed: check both, \
+                     actuator.axial_stiffness and amplifier.lag"
+                .to_owned(),
+        };
+        let keys = ["control.environment.stiffness", "control.interaction", "control.modal_damping", "control"];
+        Some(finding(self.model, Severity::Error, codes::UNSTABLE_PLATFORM, &keys, self.what(unstable), help))
+    }
+
+    fn bandwidths(&self, task: &TaskSpace, unstable: Unstable, tuning: &Tuning, largest: Option<f64>) -> Diagnostic {
+        if task.adaptation.is_none() {
+            return self.no_tuning(unstable);
+        }
+        let keys = ["adaptation.level_bandwidth", "adaptation.level_weight", "adaptation"];
+        let help = largest.map_or_else(
+            || self.nothing_helps(),
+            |factor| {
+                let drift = if tuning.drift_bandwidth > 0.0 {
+                    format!(" with drift_bandwidth = \"{} rad/s\"", shown(tuning.drift_bandwidth * factor))
+                } else {
+                    String::new()
+                };
+                format!(
+                    "level_bandwidth = \"{} rad/s\"{drift} is stable, {factor} times what is given; a third of that is a \
+                     good start; or leave both out and the compiler chooses",
+                    shown(tuning.level_bandwidth * factor)
+                )
+            },
+        );
+        finding(self.model, Severity::Error, codes::UNSTABLE_PLATFORM, &keys, self.what(unstable), help)
+    }
+
+    fn gains(&self, table: &str, given: bool, unstable: Unstable, tuning: &Tuning, largest: Option<f64>) -> Diagnostic {
+        if !given {
+            return self.no_tuning(unstable);
+        }
+        let integral = format!("{table}.integral");
+        let proportional = format!("{table}.proportional");
+        let derivative = format!("{table}.derivative");
+        let keys = [integral.as_str(), &proportional, &derivative, table, "control"];
+        let help = largest.map_or_else(
+            || self.nothing_helps(),
+            |factor| {
+                let list = |gains: &[f64; 6]| {
+                    let shown: Vec<String> = gains.iter().map(|gain| format!("{:e}", shown(gain * factor))).collect();
+                    shown.join(", ")
+                };
+                format!(
+                    "all of [{table}] × {factor} is stable: in SI units proportional [{}], integral [{}]{}; a third of \
+                     that is a good start; or leave the table out and the compiler chooses",
+                    list(&tuning.proportional),
+                    list(&tuning.integral),
+                    if tuning.derivative == [0.0; 6] {
+                        String::new()
+                    } else {
+                        format!(", derivative [{}]", list(&tuning.derivative))
+                    }
+                )
+            },
+        );
+        finding(self.model, Severity::Error, codes::UNSTABLE_PLATFORM, &keys, self.what(unstable), help)
+    }
+
+    fn no_tuning(&self, unstable: Unstable) -> Diagnostic {
+        let message = format!("the start rule found no values that hold: {}", self.what(unstable));
+        finding(
+            self.model,
+            Severity::Error,
+            codes::NO_TUNING,
+            &["control", "timing.period"],
+            message,
+            self.nothing_helps(),
+        )
+    }
+
+    fn nothing_helps(&self) -> String {
+        let notch = if self.closed_loop.notch.is_some() { "" } else { "a notch (control.notch_damping), " };
+        format!(
+            "no smaller value of these alone is stable: {notch}a shorter timing.period, more control.modal_damping or a \
+             narrower adaptation.gain_ratio would help"
+        )
+    }
+}
+
+/// Warnings about margins that are thin, one for each group of numbers, and about modes that the notch cannot reach.
+pub(super) fn thin(
+    model: &Model,
+    task: &TaskSpace,
+    closed_loop: &ClosedLoop,
+    margins: &[ModeMargins],
+) -> Vec<Diagnostic> {
+    let mut findings = Vec::new();
+    let groups: [(&[Law], &[&str]); 3] = [
+        (&ADAPTED, &["adaptation.level_bandwidth", "adaptation.level_weight", "control"]),
+        (&COMBINED, &["gains.integral", "gains.proportional", "gains", "control"]),
+        (&[Law::Position], &["position_gains.integral", "position_gains", "control"]),
+    ];
+    for (laws, keys) in groups {
+        let worst = margins.iter().filter(|one| laws.contains(&one.law)).find(|one| {
+            one.gain_margin.is_some_and(|gain| gain < THIN_GAIN)
+                || one.delay_margin_ticks.is_some_and(|delay| delay < THIN_DELAY)
+        });
+        if let Some(one) = worst {
+            let or = |value: Option<f64>, text: &str| value.map_or(text.to_owned(), |x| format!("{x:.2}"));
+            let message = format!(
+                "control mode {} is stable with a gain margin of {} and a delay margin of {} ticks",
+                one.law.name(),
+                or(one.gain_margin, "enough"),
+                or(one.delay_margin_ticks, "enough")
+            );
+            let help = "reduce these values, or leave them out: the compiler's own hold at twice the gain".to_owned();
+            findings.push(finding(model, Severity::Warning, codes::THIN_MARGIN, keys, message, help));
+        }
+    }
+    let missed: Vec<String> = closed_loop
+        .basis
+        .frequencies
+        .iter()
+        .filter(|frequency| !notch::in_reach(**frequency, closed_loop.period))
+        .map(|frequency| format!("{:.0} Hz", frequency / TAU))
+        .collect();
+    if task.notch_damping.is_some() && !missed.is_empty() {
+        findings.push(finding(
+            model,
+            Severity::Warning,
+            codes::MODE_NOT_NOTCHED,
+            &["control.notch_damping", "control.notch", "timing.period"],
+            format!(
+                "the notch leaves out the modes at {}: they lie near or above half the tick rate, {:.0} Hz",
+                missed.join(", "),
+                PI / closed_loop.period / TAU
+            ),
+            "shorten timing.period to reach them; the stability check includes them as they are".to_owned(),
+        ));
+    }
+    findings
+}
+
+/// P/F without estimates has its integral alone against what disturbs it, as P has; where that of P is faster, P may be the
+/// more accurate of the two.
+pub(super) fn slower_than_position(
+    model: &Model,
+    task: &TaskSpace,
+    combined: &Tuning,
+    position: &Tuning,
+) -> Option<Diagnostic> {
+    if task.mode != ControlMode::PF || model.adaptation.mode != AdaptationMode::Invhys {
+        return None;
+    }
+    let ratio = combined.integral.iter().zip(&position.integral).fold(1.0, |most: f64, (both, alone)| {
+        let ratio = alone / both;
+        if ratio > most { ratio } else { most }
+    });
+    let message = if ratio.is_infinite() {
+        "P/F with Invhys has an axis without integral, which P has: in contact P may be the more accurate".to_owned()
+    } else {
+        format!(
+            "P/F with Invhys corrects disturbances {ratio:.1} times slower than P: in contact P may be the more accurate"
+        )
+    };
+    (ratio > 1.0).then(|| {
+        finding(
+            model,
+            Severity::Warning,
+            codes::SLOWER_THAN_P,
+            &["adaptation.mode", "adaptation"],
+            message,
+            "write adaptation.mode = \"ewma\" or \"pcc\": their estimates correct what the integral of P/F leaves"
+                .to_owned(),
+        )
+    })
+}
+
+/// Four significant digits, rounded down, so that the number shown is itself accepted.
+fn shown(value: f64) -> f64 {
+    if value == 0.0 {
+        return 0.0;
+    }
+    let scale = libm::pow(10.0, 3.0 - libm::floor(libm::log10(value.abs())));
+    libm::floor(value * scale) / scale
+}
+
+fn finding(
+    model: &Model,
+    severity: Severity,
+    code: &'static str,
+    keys: &[&str],
+    message: String,
+    help: String,
+) -> Diagnostic {
+    Diagnostic::at(&model.spans, keys, (severity, code), message, help)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_shown_are_rounded_down() {
+        for (value, expected) in [(0.123_49, 0.1234), (98_765.0, 98_760.0), (1.0, 1.0), (0.0, 0.0), (4.2e-7, 4.2e-7)] {
+            let found = shown(value);
+            assert!((found - expected).abs() <= 1e-12 * expected && found <= value, "{value}: {found}");
+        }
+    }
+}

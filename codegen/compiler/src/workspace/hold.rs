@@ -1,0 +1,88 @@
+//! One run at a time in an output folder: its work folder, with a lock that ends with the process, however that ends.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use super::error::WriteError;
+use specgen_language::interrupt::{self, Claimed, Guard};
+use specgen_language::lock;
+
+/// The lock in the work folder; its text names the owner.
+const LOCK: &str = "lock";
+/// A run that only writes is over by then; one that builds is not waited for.
+const TIMEOUT: Duration = Duration::from_secs(5);
+const ROUND: Duration = Duration::from_millis(20);
+
+/// The right to write an output folder and to build in it, until this is dropped.
+#[derive(Debug)]
+pub struct Hold {
+    work: PathBuf,
+    _file: File,
+    // Told to interrupts: what goes away with the process.
+    _lock: Guard,
+    _made: Claimed,
+}
+
+impl Hold {
+    /// Makes `work`, the work folder of `dir`, or takes the one of a run that was killed.
+    pub(super) fn take(work: &Path, dir: &Path) -> Result<Self, WriteError> {
+        let start = Instant::now();
+        loop {
+            match Self::attempt(work) {
+                Ok(hold) => return Ok(hold),
+                // Somebody has it, or has just removed it.
+                Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::NotFound) => {}
+                Err(error) => return Err(WriteError::io("write", dir, error)),
+            }
+            if start.elapsed() > TIMEOUT {
+                return Err(WriteError::Busy { dir: dir.to_owned(), owner: owner(&work.join(LOCK)) });
+            }
+            std::thread::sleep(ROUND);
+        }
+    }
+
+    fn attempt(work: &Path) -> io::Result<Self> {
+        let made = Claimed::new(work)?;
+        check_own(work)?;
+        let path = work.join(LOCK);
+        let (mut file, lock) = Guard::file(|| lock::make(&path), |_| path.clone())?;
+        let owner = format!("process {} (`{}`)\n", std::process::id(), command());
+        // A lock without a name locks all the same.
+        let _ = file.set_len(0).and_then(|()| file.write_all(owner.as_bytes()));
+        Ok(Self { work: work.to_owned(), _file: file, _lock: lock, _made: made })
+    }
+}
+
+impl Drop for Hold {
+    fn drop(&mut self) {
+        let _whole = interrupt::whole();
+        // Before the lock ends: whoever waits for it sees that it is no more the one in the folder.
+        let _ = fs::remove_file(self.work.join(LOCK));
+        // One that still holds something is taken up by the next run.
+        let _ = fs::remove_dir(&self.work);
+    }
+}
+
+/// What lies in a work folder comes into the output: it has to be this user's.
+fn check_own(work: &Path) -> io::Result<()> {
+    let found = fs::symlink_metadata(work)?;
+    let refused = |kind, what: &str| Err(io::Error::new(kind, format!("`{}` is {what}", work.display())));
+    match (found.is_dir(), lock::is_own(&found)) {
+        (true, true) => Ok(()),
+        (false, _) => refused(io::ErrorKind::NotADirectory, "no folder, but specgen works there"),
+        (true, false) => refused(io::ErrorKind::PermissionDenied, "another user's"),
+    }
+}
+
+fn command() -> String {
+    let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    words.join(" ")
+}
+
+fn owner(lock: &Path) -> String {
+    let text = fs::read_to_string(lock).unwrap_or_default();
+    let line: String = text.lines().next().unwrap_or_default().chars().filter(|c| !c.is_control()).take(300).collect();
+    if line.is_empty() { "another run of specgen".to_owned() } else { line }
+}

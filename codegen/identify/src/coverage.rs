@@ -1,0 +1,252 @@
+//! Does a record excite the plane that the table covers? Checks that need the drive range and the grid.
+
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::Options;
+use super::branches::Branch;
+use super::findings::Findings;
+use super::record::Record;
+use super::regressor::Plane;
+use super::sanity::{PLAUSIBLE_RANGE, extent};
+use crate::everett::EverettTable;
+use specgen_language::model::MAX_GRID;
+
+/// The record may exceed the declared range by this share of it (amplifier overshoot, ADC noise).
+const BEYOND: f64 = 0.02;
+/// A ratio of ranges this large is a wrong unit, not a wrong experiment.
+const UNIT_RATIO: f64 = 100.0;
+/// Reversal curves below this number identify nothing.
+const MIN_CURVES: usize = 3;
+/// Σ(φ − φ̄)², in samples, from which a cell or a difference of two cells counts as excited.
+const EXCITED: f64 = 0.25;
+
+/// Checks the options and returns the plane.
+pub(crate) fn plane(options: &Options, findings: &mut Findings) -> Option<Plane> {
+    let [low, high] = options.drive;
+    if !(2..=MAX_GRID).contains(&options.grid) {
+        let message = format!("a grid of {} cannot be identified", options.grid);
+        findings.error("E0601", None, message, "choose a grid from 2 to 64; 32 is usual");
+    }
+    if !(low.is_finite() && high.is_finite() && low < high) {
+        let message = format!("the declared drive range {low} V to {high} V is empty or not finite");
+        findings.error("E0602", None, message, "declare the lowest voltage first, then the highest");
+    }
+    if findings.any_error() { None } else { Some(Plane { grid: options.grid, range: [low, high] }) }
+}
+
+/// Compares the drive of the record with the declared range.
+pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Findings) {
+    let [low, high] = plane.range;
+    let span = high - low;
+    let (bottom, top) = extent(&record.drive);
+    let (lowest, highest) = (time_of(record, |u| u <= bottom), time_of(record, |u| u >= top));
+    let found = format!(
+        "the drive goes from {bottom} V (at {lowest} s) to {top} V (at {highest} s), but the table is to cover {low} V to {high} V"
+    );
+    check_displacement_unit(record, findings);
+    let ratio = (top - bottom) / span;
+    let um = record.displacement_range() * 1e6;
+    if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
+        let unit = if ratio > 1.0 { "mV" } else { "kV" };
+        findings.error(
+            "E0603",
+            None,
+            format!("{found}: is the column in {unit}?"),
+            "write the drive in volts at the stack",
+        );
+        return;
+    }
+    if (ratio - 1.0).abs() > 0.2 && (um / span - 1.0).abs() < 0.02 {
+        let message = format!("{found}, and the displacement covers {um:.3}, the span of the drive");
+        findings.error("E0604", None, message, "the columns `drive_V` and `displacement_um` seem to be swapped");
+        return;
+    }
+    if bottom < low - BEYOND * span || top > high + BEYOND * span {
+        let help = "declare the range in which the record was taken, or record again within the declared one";
+        let left = time_of(record, |u| u < low - BEYOND * span || u > high + BEYOND * span);
+        findings.error("E0605", None, format!("{found}; it leaves that range at {left} s"), help);
+    }
+    let interval = plane.interval();
+    if bottom > low + interval {
+        let message = format!("{found}: no cell with a down_threshold below {bottom} V was ever excited");
+        findings.error("E0606", None, message, "let the drive fall to the lower end of its range between the curves");
+    }
+    if top < high - interval {
+        let message = format!("{found}: no cell with an up_threshold above {top} V was ever excited");
+        findings.error("E0606", None, message, "let the last curves rise to the upper end of the drive range");
+    }
+}
+
+/// Time of the first sample whose drive fits, s.
+fn time_of(record: &Record, fits: impl Fn(f64) -> bool) -> f64 {
+    record.drive.iter().position(|u| fits(*u)).map_or(record.time[0], |k| record.time[k])
+}
+
+/// A displacement that no piezo actuator makes refuses the identification: a table in a wrong unit would be believed.
+fn check_displacement_unit(record: &Record, findings: &mut Findings) {
+    let (low, high) = extent(&record.displacement);
+    let range = high - low;
+    if (PLAUSIBLE_RANGE[0]..=PLAUSIBLE_RANGE[1]).contains(&range) {
+        return;
+    }
+    let at = |value: f64| record.displacement.iter().position(|y| *y == value).map_or(0.0, |k| record.time[k]);
+    let unit = if range > PLAUSIBLE_RANGE[1] { "nm" } else { "mm or m" };
+    let message = format!(
+        "the displacement goes from {} um (at {} s) to {} um (at {} s), which no piezo actuator does: is it in {unit}?",
+        low * 1e6,
+        at(low),
+        high * 1e6,
+        at(high)
+    );
+    findings.error("E0623", None, message, "convert the column to micrometres");
+}
+
+/// Number of reversal curves: falls from a reversal. Refuses a record with too few of them for the grid.
+pub(crate) fn check_curves(branches: &[Branch], plane: &Plane, findings: &mut Findings) -> usize {
+    let curves = branches.iter().filter(|b| !b.rising).count();
+    let help = "let the drive rise to a reversal, fall back, and repeat with one reversal per grid interval";
+    if curves < MIN_CURVES.max(plane.grid / 4) {
+        let message = format!(
+            "has {curves} reversal curves; a grid of {} needs at least {}",
+            plane.grid,
+            MIN_CURVES.max(plane.grid / 4)
+        );
+        findings.error("E0607", None, message, help);
+    } else if curves < plane.grid / 2 {
+        let message =
+            format!("has {curves} reversal curves for a grid of {}: weights between them are interpolated", plane.grid);
+        findings.warning("W0608", None, message, help);
+    }
+    curves
+}
+
+/// Which cells the record excites: they switch within a branch, and not only together with their neighbours.
+///
+/// `gram` is Σ(φ − φ̄)(φ − φ̄)ᵀ over the weights, so dᵀGd is what the record holds about the combination d of cells.
+/// Tried are single cells, differences of two neighbours, and the mixed difference of four: rises alone tell rows of
+/// cells apart and falls alone columns, and only a reversal between them tells apart the four.
+pub(crate) fn excited(plane: &Plane, gram: &DMatrix<f64>) -> Vec<bool> {
+    let mut excited = vec![true; gram.nrows()];
+    let mut require = |cells: &[(usize, usize)]| {
+        // Signs of the mixed difference: neighbours alternate.
+        let terms: Vec<(usize, f64)> = cells
+            .iter()
+            .filter(|(up, down)| *up <= plane.grid && down < up)
+            .map(|&(up, down)| (EverettTable::index(up, down), if (up + down) % 2 == 0 { 1.0 } else { -1.0 }))
+            .collect();
+        if terms.len() < cells.len() {
+            return;
+        }
+        let mut energy = 0.0;
+        for &(a, sign_a) in &terms {
+            for &(b, sign_b) in &terms {
+                energy += sign_a * sign_b * gram[(a, b)];
+            }
+        }
+        if energy <= EXCITED {
+            terms.iter().for_each(|&(cell, _)| excited[cell] = false);
+        }
+    };
+    for up in 1..=plane.grid {
+        for down in 0..up {
+            require(&[(up, down)]);
+            require(&[(up, down), (up + 1, down)]);
+            require(&[(up, down), (up, down + 1)]);
+            require(&[(up, down), (up + 1, down), (up, down + 1), (up + 1, down + 1)]);
+        }
+    }
+    excited
+}
+
+/// A part of the plane, connected over the edges of its cells, that a record does not excite.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Region {
+    /// Cells in it.
+    pub cells: usize,
+    /// Share of all cells.
+    pub share: f64,
+    /// up_thresholds from and to, V.
+    pub up: [f64; 2],
+    /// down_thresholds from and to, V.
+    pub down: [f64; 2],
+    /// The cells as (up, down), for drawing: the cell lies below threshold `up` and above threshold `down`.
+    #[serde(skip)]
+    pub members: Vec<(usize, usize)>,
+}
+
+/// Regions named one by one in a message.
+const NAMED: usize = 3;
+
+/// Warns of cells that were not [`excited`], names the parts of the plane they lie in and what the table does there.
+pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Findings) -> Vec<Region> {
+    let regions = regions(plane, excited);
+    if regions.is_empty() {
+        return regions;
+    }
+    let missing = excited.iter().filter(|e| !**e).count();
+    let mut places: Vec<String> = regions
+        .iter()
+        .take(NAMED)
+        .map(|r| {
+            format!(
+                "up_threshold {:.3} to {:.3} V, down_threshold {:.3} to {:.3} V",
+                r.up[0], r.up[1], r.down[0], r.down[1]
+            )
+        })
+        .collect();
+    if regions.len() > NAMED {
+        places.push(format!("{} smaller parts", regions.len() - NAMED));
+    }
+    let message = format!(
+        "{missing} of {} cells of the plane ({:.1} %) were never excited apart from their neighbours ({}): there the record holds only sums of weights. \
+         No weight is added to these sums; within a part the table divides them evenly, a straight line between the measured curves around it",
+        excited.len(),
+        100.0 * missing as f64 / excited.len() as f64,
+        places.join("; "),
+    );
+    findings.warning("W0609", None, message, "add reversal curves that turn back in that part of the range");
+    regions
+}
+
+/// Connected parts of cells that are not excited, the largest first.
+fn regions(plane: &Plane, excited: &[bool]) -> Vec<Region> {
+    let grid = plane.grid;
+    let threshold = |k: usize| plane.range[0] + k as f64 * plane.interval();
+    let mut seen = excited.to_vec();
+    let mut regions = Vec::new();
+    for up in 1..=grid {
+        for down in 0..up {
+            if seen[EverettTable::index(up, down)] {
+                continue;
+            }
+            seen[EverettTable::index(up, down)] = true;
+            let mut members = vec![(up, down)];
+            let mut next = 0;
+            while let Some(&(i, j)) = members.get(next) {
+                next += 1;
+                for (a, b) in [(i + 1, j), (i - 1, j), (i, j + 1), (i, j.wrapping_sub(1))] {
+                    if a <= grid && b < a && !seen[EverettTable::index(a, b)] {
+                        seen[EverettTable::index(a, b)] = true;
+                        members.push((a, b));
+                    }
+                }
+            }
+            members.sort_unstable();
+            let (mut ups, mut downs) = ([up, up], [down, down]);
+            for &(i, j) in &members {
+                ups = [ups[0].min(i), ups[1].max(i)];
+                downs = [downs[0].min(j), downs[1].max(j)];
+            }
+            regions.push(Region {
+                cells: members.len(),
+                share: members.len() as f64 / excited.len() as f64,
+                up: [threshold(ups[0] - 1), threshold(ups[1])],
+                down: [threshold(downs[0]), threshold(downs[1] + 1)],
+                members,
+            });
+        }
+    }
+    regions.sort_by_key(|r| std::cmp::Reverse(r.cells));
+    regions
+}

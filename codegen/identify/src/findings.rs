@@ -1,0 +1,90 @@
+//! Collects findings about one data file, so that one run reports all of them without drowning the reader.
+
+use std::collections::BTreeMap;
+
+use specgen_language::diagnostic::{Diagnostic, Place, Severity};
+
+/// Findings of one kind that are shown one by one; the rest is counted.
+const SHOWN_PER_CODE: usize = 5;
+
+/// Findings about one file.
+#[derive(Debug)]
+pub(crate) struct Findings {
+    path: String,
+    found: Vec<Diagnostic>,
+    count: BTreeMap<&'static str, usize>,
+}
+
+impl Findings {
+    /// An empty collection for the file that the user knows as `path`.
+    pub(crate) fn new(path: &str) -> Self {
+        Self { path: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
+    }
+
+    /// Adds an error about `line`, or about the whole file.
+    pub(crate) fn error(&mut self, code: &'static str, line: Option<usize>, message: String, help: &str) {
+        self.add(Severity::Error, code, line, message, help);
+    }
+
+    /// Adds a warning about `line`, or about the whole file.
+    pub(crate) fn warning(&mut self, code: &'static str, line: Option<usize>, message: String, help: &str) {
+        self.add(Severity::Warning, code, line, message, help);
+    }
+
+    fn add(&mut self, severity: Severity, code: &'static str, line: Option<usize>, message: String, help: &str) {
+        let count = self.count.entry(code).or_insert(0);
+        *count += 1;
+        if *count <= SHOWN_PER_CODE {
+            let place = Place::File { path: self.path.clone(), line };
+            self.found.push(Diagnostic { severity, code, key: String::new(), place, message, help: help.to_owned() });
+        }
+    }
+
+    /// Whether any finding refuses the file.
+    pub(crate) fn any_error(&self) -> bool {
+        self.found.iter().any(|d| d.severity == Severity::Error)
+    }
+
+    /// What a record gave, with the warnings about it, unless a finding refuses it.
+    pub(crate) fn conclude<T>(self, found: Option<T>) -> Result<(T, Vec<Diagnostic>), Vec<Diagnostic>> {
+        let refused = self.any_error();
+        let all = self.into_diagnostics();
+        match found {
+            Some(found) if !refused => Ok((found, all)),
+            _ => Err(all),
+        }
+    }
+
+    /// All findings in the order found, followed by one line for each kind that was cut short.
+    pub(crate) fn into_diagnostics(self) -> Vec<Diagnostic> {
+        let Self { path, mut found, count } = self;
+        for (code, n) in count.into_iter().filter(|(_, n)| *n > SHOWN_PER_CODE) {
+            let severity = found.iter().find(|d| d.code == code).map_or(Severity::Error, |d| d.severity);
+            found.push(Diagnostic {
+                severity,
+                code,
+                key: String::new(),
+                place: Place::File { path: path.clone(), line: None },
+                message: format!("and {} more lines like this ({code})", n - SHOWN_PER_CODE),
+                help: "mend the ones shown and run again".to_owned(),
+            });
+        }
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn repeated_findings_are_counted_instead_of_listed() {
+        let mut findings = Findings::new("a.csv");
+        for line in 2..44 {
+            findings.error("E0506", Some(line), format!("line {line}"), "mend it");
+        }
+        let all = findings.into_diagnostics();
+        assert_eq!(all.len(), SHOWN_PER_CODE + 1);
+        assert!(all[SHOWN_PER_CODE].message.contains("and 37 more lines"), "{}", all[SHOWN_PER_CODE].message);
+    }
+}

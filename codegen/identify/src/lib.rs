@@ -1,0 +1,233 @@
+//! From reversal-curve records to Everett tables.
+//!
+//! ```text
+//! CSV → record (checked samples) → usable part, branches → dead time → normal equations → non-negative weights → table
+//! ```
+//! Model: displacement(t + dead time) = offset of the branch + Σ w_c φ_c(drive), w_c ≥ 0, with one weight per cell of
+//! the plane, the triangles on the diagonal (reversible) included. Each branch between two reversals has a free
+//! offset, so that drift and creep between the curves cannot bend the table. Of a first-order reversal record only
+//! the falls are fitted, with most weight on samples near the thresholds of the grid: the result is the classical
+//! E(u_i, u_j) = f(u_i) − f_{u_i}(u_j) with less noise, for any spacing of the curves, and without negative weights.
+
+mod branches;
+mod cause;
+mod columns;
+mod coverage;
+mod dead_time;
+mod distrust;
+pub mod everett;
+mod export;
+mod findings;
+pub mod gauge;
+mod grid_choice;
+mod least_squares;
+mod limits;
+pub mod linear;
+mod normal;
+mod prior;
+pub mod rate;
+mod record;
+pub mod regressor;
+mod report;
+mod residual;
+pub mod response;
+mod sanity;
+mod selection;
+mod signals;
+mod staircase;
+pub mod stiffness;
+mod sweep;
+mod trace;
+mod trend;
+mod validate;
+pub mod waveform;
+
+use crate::everett::EverettTable;
+use findings::Findings;
+use normal::Normal;
+use regressor::Plane;
+use residual::Residual;
+use specgen_language::diagnostic::Diagnostic;
+use specgen_numerics::nnls;
+
+pub use cause::{Cause, Source};
+pub use coverage::Region;
+pub use export::{is_table_csv, read_table_csv, write_table_csv};
+pub use grid_choice::{GridChoice, Score, choose_grid};
+pub use record::{MAX_FILE_BYTES, Record, parse_record, read_file, read_record};
+pub use report::{Branches, Report};
+pub use sanity::extent;
+pub use specgen_language::model::MAX_GRID;
+pub use staircase::Staircase;
+pub use trace::Trace;
+pub use validate::{Start, StartResult, Validation, validate};
+
+/// What to identify.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// N, intervals per axis, 2 to [`MAX_GRID`].
+    pub grid: usize,
+    /// Range of the thresholds [lowest, highest], V.
+    pub drive: [f64; 2],
+    /// Also remove the drift that the returns to saturation show from within the branches.
+    /// Creep looks like drift there, so leave it off unless the sensor is known to drift within one curve.
+    pub drift: bool,
+    /// How the time by which the displacement lags the drive is found.
+    pub dead_time: DeadTime,
+}
+
+impl Options {
+    /// Usual choices: no drift within a branch, dead time estimated where the record allows it.
+    #[must_use]
+    pub const fn new(grid: usize, drive: [f64; 2]) -> Self {
+        Self { grid, drive, drift: false, dead_time: DeadTime::Estimate }
+    }
+}
+
+/// Dead time between drive and displacement in a record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DeadTime {
+    /// Estimate it if the record holds branches of different rates, else zero.
+    Estimate,
+    /// This many seconds, ≥ 0.
+    Fixed(f64),
+}
+
+/// An identified table and how well it is founded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identified {
+    /// The table, monotone.
+    pub table: EverettTable,
+    /// Figures.
+    pub report: Report,
+    /// Samples and residual behind the first usable one.
+    pub trace: Trace,
+    /// Findings that refuse nothing, those of the record included.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// A residual above this share of the range means that the model does not hold.
+const POOR_FIT_PERCENT: f64 = 3.0;
+
+/// Identifies the Everett table of one record.
+///
+/// # Errors
+/// All findings if the record cannot identify the table: unit or range that contradict `options.drive`, parts of the
+/// range never reached, too few reversal curves.
+pub fn identify(record: &Record, options: &Options) -> Result<Identified, Vec<Diagnostic>> {
+    let mut findings = Findings::new(&record.shown_as);
+    let found = identify_checked(record, options, &mut findings);
+    let refused = findings.any_error();
+    let mut all = record.warnings.clone();
+    all.extend(findings.into_diagnostics());
+    match found {
+        Some((table, report, trace)) if !refused => Ok(Identified { table, report, trace, warnings: all }),
+        _ => Err(all),
+    }
+}
+
+fn identify_checked(
+    record: &Record,
+    options: &Options,
+    findings: &mut Findings,
+) -> Option<(EverettTable, Report, Trace)> {
+    let plane = coverage::plane(options, findings)?;
+    coverage::check_range(record, &plane, findings);
+    if findings.any_error() {
+        return None;
+    }
+    let used = selection::usable(record, &plane, findings)?;
+    let (dead_time, dead_time_basis) = match options.dead_time {
+        DeadTime::Estimate => dead_time::estimate(&plane, record, used.first, &used.branches),
+        DeadTime::Fixed(tau) => (if tau > 0.0 { tau } else { 0.0 }, "given".to_owned()),
+    };
+    let mut displacement = dead_time::delayed(record, dead_time);
+    let (drift, drift_returns) = selection::drift_of_returns(record, &used.branches, &plane);
+    if options.drift {
+        for (y, t) in displacement.iter_mut().zip(&record.time) {
+            *y -= drift * (t - record.time[used.first]);
+        }
+    }
+    let scale = 1.0 / record.displacement_range();
+    let target: Vec<f64> = displacement.iter().map(|y| y * scale).collect();
+    let (mut normal, fitted, excited) = selection::select(&plane, record, &used, &target);
+    let unexcited = coverage::check_excited(&plane, &excited, findings);
+
+    prior::add(plane.grid, &mut normal.gram);
+    let solution = solve(&normal, findings)?;
+    let table = table_of(&plane, &solution.weights, 1.0 / scale);
+
+    let residual = Residual::of(&plane, record, &used, &displacement, &table);
+    let fitted_branches = match fitted {
+        Branches::Descending => selection::falls(&used.branches),
+        Branches::All => used.branches.clone(),
+    };
+    let percent = 100.0 / residual.range;
+    let (fit_rms, fit_max) = trend::rms_and_max(&residual.detrended);
+    let branch_rms = residual.within(&fitted_branches, used.first);
+    let noise_floor = trend::noise_floor(&record.displacement[used.first..]);
+    let gain = residual.range / (plane.range[1] - plane.range[0]);
+    let cause = residual.cause(record, used.first, noise_floor, gain);
+    let report = Report {
+        record: record.shown_as.clone(),
+        grid: plane.grid,
+        samples: record.time.len(),
+        samples_skipped: used.first,
+        samples_fitted: normal.samples,
+        reversal_curves: used.curves,
+        branches: fitted,
+        excited_share: selection::share(&excited),
+        displacement_range: residual.range,
+        fit_rms,
+        fit_max,
+        fit_rms_percent: fit_rms * percent,
+        fit_max_percent: fit_max * percent,
+        branch_rms,
+        branch_rms_percent: branch_rms * percent,
+        offset: residual.line.level,
+        drift,
+        drift_returns,
+        drift_removed: options.drift,
+        dead_time,
+        dead_time_basis,
+        noise_floor,
+        weightless: record.weightless[used.first..].iter().filter(|w| **w).count(),
+        cause,
+        unexcited,
+        zero_weights: solution.weights.iter().filter(|w| **w == 0.0).count(),
+        weights: plane.nodes(),
+        solver_iterations: solution.iterations,
+        kkt_violation: nnls::kkt_violation(&normal.gram, &normal.rhs[0], &solution.weights),
+    };
+    sweep::check(&plane, record, &used, &report, findings);
+    if report.fit_rms_percent > POOR_FIT_PERCENT {
+        let message = format!("the fitted table misses the record by {:.2} % rms of its range", report.fit_rms_percent);
+        findings.warning(
+            "W0611",
+            None,
+            message,
+            "is the record one actuator at one load, without steps or lost samples?",
+        );
+    }
+    let trace = residual.trace(record, used.first, &displacement);
+    Some((table, report, trace))
+}
+
+/// Non-negative weights in units of the target.
+fn solve(normal: &Normal, findings: &mut Findings) -> Option<nnls::Solution> {
+    nnls::solve(&normal.gram, &normal.rhs[0])
+        .map_err(|failure| {
+            let message = format!("the weights cannot be determined ({failure:?})");
+            let help = "choose a smaller grid, or record more reversal curves";
+            findings.error("E0610", None, message, help);
+        })
+        .ok()
+}
+
+/// The table of cell weights that are in units of `unit` (m).
+fn table_of(plane: &Plane, weights: &[f64], unit: f64) -> EverettTable {
+    let mut nodes: Vec<f64> = weights.iter().map(|w| w * unit).collect();
+    normal::weights_to_nodes(plane.grid, &mut nodes);
+    let [drive_min, drive_max] = plane.range;
+    EverettTable { grid: plane.grid, drive_min, drive_max, nodes }
+}

@@ -1,0 +1,148 @@
+//! Rate dependence from records at several rates: what a static table misses, and which of three options mends it.
+//!
+//! ```text
+//! static           y = Γ₀[u]
+//! dead time        y(t + τ) = Γ₀[u]
+//! dynamic Preisach y = Γ₀[u] + u̇ Γ₁[u]                               paper, (6); μ₁ of either sign
+//! creep            y(t + τ) = f + Σ w_j x_j,  τ_j ẋ_j = f − x_j,  f = Γ₀[u],  w_j ≥ 0
+//! ```
+//! All four are fitted to the same samples of all records, every record with the same weight, with a free offset for each
+//! branch while a table is fitted. What tells them apart is the error at a rate that they were not fitted on: each is fitted
+//! again without each of the records in turn. Errors are those of the whole record after one offset and one line.
+
+mod creep;
+mod export;
+mod fit;
+mod forward;
+mod mixed;
+mod normal;
+mod prepare;
+mod report;
+mod score;
+
+use crate::everett::EverettTable;
+use specgen_language::diagnostic::Diagnostic;
+
+use super::findings::Findings;
+use super::record::Record;
+use super::{Options, coverage};
+
+pub use export::{is_rate_csv, read_rate_csv, spec_lines, write_rate_csv};
+pub use report::{HoldOut, Measured, OptionReport, RateReport, Verdict};
+
+/// A way to account for the rate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RateOption {
+    /// One Everett table.
+    Static,
+    /// One table behind a dead time.
+    DeadTime,
+    /// (6).
+    DynamicPreisach,
+    /// Table, creep and dead time.
+    Creep,
+}
+
+impl RateOption {
+    /// Every option, the plainest first.
+    pub const ALL: [Self; 4] = [Self::Static, Self::DeadTime, Self::DynamicPreisach, Self::Creep];
+
+    /// What it is called in a report.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Static => "static",
+            Self::DeadTime => "static, dead time",
+            Self::DynamicPreisach => "dynamic Preisach",
+            Self::Creep => "creep, dead time",
+        }
+    }
+}
+
+/// One creep operator: τ ẋ = f − x, adding w x to the displacement.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct CreepTerm {
+    /// τ, s, > 0.
+    pub time_constant: f64,
+    /// w ≥ 0, of the displacement of the static part.
+    pub weight: f64,
+}
+
+/// A fitted option. What it does not have is empty or zero.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RateModel {
+    /// Γ₀, m.
+    pub still: EverettTable,
+    /// Γ₁, m s/V, on the grid of `still`; its weights are of either sign.
+    pub rate: Option<EverettTable>,
+    /// Creep behind Γ₀, slowest first.
+    pub creep: Vec<CreepTerm>,
+    /// s by which the displacement lags the drive, ≥ 0.
+    pub dead_time: f64,
+}
+
+/// What [`identify_rate`] found.
+#[derive(Debug, Clone)]
+pub struct RateIdentified {
+    /// The options fitted to all records, in the order of [`RateOption::ALL`].
+    pub models: Vec<(RateOption, RateModel)>,
+    /// Figures.
+    pub report: RateReport,
+    /// Findings that refuse nothing.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// Fits every option to `records`, at least two at different rates, and tries each at the rate it was not fitted on.
+///
+/// `hold_out` takes no part in any fit. `options.drift` and `options.dead_time` are not used.
+///
+/// # Errors
+/// All findings if a record cannot identify the table, or if the records have one rate only.
+pub fn identify_rate(
+    records: &[Record],
+    hold_out: Option<&Record>,
+    options: &Options,
+) -> Result<RateIdentified, Vec<Diagnostic>> {
+    let mut all: Vec<Diagnostic> = records.iter().chain(hold_out).flat_map(|r| r.warnings.clone()).collect();
+    let mut refused = false;
+    let mut prepared = Vec::new();
+    let mut plane = None;
+    for record in records {
+        let mut findings = Findings::new(&record.shown_as);
+        plane = coverage::plane(options, &mut findings);
+        if let Some(plane) = &plane {
+            prepared.extend(prepare::prepare(record, plane, &mut findings));
+        }
+        refused |= findings.any_error();
+        all.extend(findings.into_diagnostics());
+    }
+    let Some(plane) = plane.filter(|_| !refused) else { return Err(all) };
+    let shown = records.first().map_or("", |record| &record.shown_as);
+    let mut findings = Findings::new(shown);
+    prepare::check_rates(&prepared, &mut findings);
+    if findings.any_error() {
+        all.extend(findings.into_diagnostics());
+        return Err(all);
+    }
+    let everything: Vec<usize> = (0..prepared.len()).collect();
+    let fitted = fit::all(&plane, &prepared, &everything, &mut findings);
+    let mut left_out = Vec::new();
+    for out in 0..prepared.len() {
+        let others: Vec<usize> = everything.iter().copied().filter(|k| *k != out).collect();
+        left_out.push(fit::all(&plane, &prepared, &others, &mut findings));
+    }
+    let (Some(models), Some(left_out)) = (fitted, left_out.into_iter().collect::<Option<Vec<_>>>()) else {
+        all.extend(findings.into_diagnostics());
+        return Err(all);
+    };
+    let report = match report::report(&plane, &prepared, &models, &left_out, hold_out) {
+        Ok(report) => report,
+        Err(found) => {
+            all.extend(found);
+            return Err(all);
+        }
+    };
+    all.extend(findings.into_diagnostics());
+    Ok(RateIdentified { models: RateOption::ALL.into_iter().zip(models).collect(), report, warnings: all })
+}

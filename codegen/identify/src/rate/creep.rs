@@ -1,0 +1,154 @@
+//! Creep and dead time behind a table: table and linear part are fitted in turn until neither changes much.
+//!
+//! With the table fixed, f and its creep states are known signals; scale of f, weights (≥ 0) and a change of the dead time
+//! follow from one small least-squares problem, in which each record has an offset and a line of its own:
+//! y(t + τ) = s f + Σ w_j x_j − δτ ḟ. With those fixed, the table is fitted to y(t + τ) − Σ w_j x_j, with a free offset for each
+//! branch. One offset for a record would be the same least squares in both steps and finds the weights of a leg that creeps
+//! linearly; on one that does not (the reference leg's creep has thresholds) it trades table for creep without bound and
+//! was far worse in the controller.
+
+use nalgebra::DMatrix;
+
+use super::forward::{kept, parts};
+use super::prepare::Prepared;
+use super::{CreepTerm, RateModel, fit, mixed};
+use crate::regressor::Plane;
+use crate::trend::Line;
+use specgen_numerics::nnls::Failure;
+
+/// Fewest and most creep operators; between them, one a decade of the time constants.
+const TERMS: [f64; 2] = [3.0, 6.0];
+/// Shortest time constant, sampling intervals of the record sampled fastest: anything faster is part of the dead time.
+const SHORTEST: f64 = 20.0;
+/// Longest time constant, share of the longest record: anything slower is a line.
+const LONGEST: f64 = 1.0 / 3.0;
+/// Most turns.
+const TURNS: usize = 60;
+/// A turn that lowers the residual by less than this share is the last.
+const WORTHWHILE: f64 = 2e-4;
+
+/// Fits creep behind the table and dead time of `start`.
+pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Result<RateModel, Failure> {
+    let times = time_constants(records);
+    let mut model = start.clone();
+    let mut before = f64::INFINITY;
+    for _ in 0..TURNS {
+        let signals: Vec<Vec<Vec<f64>>> = records.iter().map(|p| parts(&model, &times, plane, p)).collect();
+        let linear = linear_part(records, &signals, model.dead_time)?;
+        if before.is_finite() && linear.residual > before * (1.0 - WORTHWHILE) {
+            break;
+        }
+        before = linear.residual;
+        model.dead_time = if model.dead_time + linear.later > 0.0 { model.dead_time + linear.later } else { 0.0 };
+        let targets: Vec<Vec<f64>> = records
+            .iter()
+            .zip(&signals)
+            .map(|(p, signals)| {
+                let mut target = p.delayed(model.dead_time);
+                for (weight, x) in linear.weights.iter().zip(&signals[1..]) {
+                    target.iter_mut().zip(x).for_each(|(y, x)| *y -= weight * x);
+                }
+                target
+            })
+            .collect();
+        model.still = fit::table(plane, records, &targets)?;
+        let terms = times.iter().zip(&linear.weights);
+        model.creep = kept(terms.map(|(tau, w)| CreepTerm { time_constant: *tau, weight: w / linear.scale }).collect());
+    }
+    Ok(model)
+}
+
+/// Evenly spaced in their logarithm, slowest first, s.
+fn time_constants(records: &[&Prepared]) -> Vec<f64> {
+    let longest = records.iter().map(|p| p.duration()).fold(0.0, |a, b| if b > a { b } else { a }) * LONGEST;
+    let shortest = records.iter().map(|p| p.interval).fold(longest, |a, b| if b < a { b } else { a }) * SHORTEST;
+    let shortest = if shortest < longest { shortest } else { 0.1 * longest };
+    let wanted = libm::ceil(libm::log10(longest / shortest)) + 1.0;
+    let terms = crate::staircase::saturate(wanted, TERMS) as usize;
+    let ratio = libm::log(shortest / longest) / (terms - 1) as f64;
+    (0..terms).map(|k| rounded(longest * libm::exp(ratio * k as f64))).collect()
+}
+
+/// To three digits: a time constant is chosen, not measured.
+fn rounded(seconds: f64) -> f64 {
+    let digit = libm::pow(10.0, libm::floor(libm::log10(seconds)) - 2.0);
+    (seconds / digit).round() * digit
+}
+
+struct Linear {
+    /// s.
+    scale: f64,
+    /// w_j.
+    weights: Vec<f64>,
+    /// δτ, s.
+    later: f64,
+    /// Mean square that is left, shares of the records added, m².
+    residual: f64,
+}
+
+/// `signals`: f and the creep states of each record.
+fn linear_part(records: &[&Prepared], signals: &[Vec<Vec<f64>>], dead_time: f64) -> Result<Linear, Failure> {
+    // Unknowns: w_j ≥ 0, then s and −δτ.
+    let terms = signals.first().map_or(0, |signals| signals.len() - 1);
+    let unknowns = terms + 2;
+    let mut gram = DMatrix::zeros(unknowns, unknowns);
+    let mut rhs = vec![0.0; unknowns];
+    let mut energy = 0.0;
+    let mut scale_of = vec![0.0; unknowns];
+    for (pass, (p, signals)) in records.iter().zip(signals).chain(records.iter().zip(signals)).enumerate() {
+        let time = &p.record.time[p.first..];
+        let mut columns: Vec<Vec<f64>> = signals[1..].to_vec();
+        columns.push(signals[0].clone());
+        columns.push(derivative(time, &signals[0]));
+        columns.iter_mut().for_each(|column| detrend(time, column));
+        let share = 1.0 / p.samples() as f64;
+        if pass < records.len() {
+            // First pass: the size of each column, so that the small matrix is well scaled.
+            for (scale, column) in scale_of.iter_mut().zip(&columns) {
+                *scale += share * column.iter().fold(0.0, |sum, x| sum + x * x);
+            }
+            continue;
+        }
+        let mut y = p.delayed(dead_time);
+        detrend(time, &mut y);
+        energy += share * y.iter().fold(0.0, |sum, y| sum + y * y);
+        for (a, column) in columns.iter().enumerate() {
+            let size = share / scale_of[a].sqrt();
+            rhs[a] += size * column.iter().zip(&y).fold(0.0, |sum, (x, y)| sum + x * y);
+            for (b, other) in columns.iter().enumerate() {
+                let product = column.iter().zip(other).fold(0.0, |sum, (x, y)| sum + x * y);
+                gram[(a, b)] += size * product / scale_of[b].sqrt();
+            }
+        }
+    }
+    for k in 0..unknowns {
+        gram[(k, k)] += 1e-10;
+    }
+    let target_size = energy.sqrt();
+    let scaled: Vec<f64> = rhs.iter().map(|b| b / target_size).collect();
+    let solution = mixed::solve(&gram, &scaled, terms)?;
+    let explained = solution.iter().zip(&scaled).fold(0.0, |sum, (w, b)| sum + w * b);
+    let value = |k: usize| solution[k] * target_size / scale_of[k].sqrt();
+    Ok(Linear {
+        scale: value(terms),
+        weights: (0..terms).map(value).collect(),
+        later: -value(terms + 1),
+        residual: energy * (1.0 - explained),
+    })
+}
+
+fn detrend(time: &[f64], values: &mut [f64]) {
+    let line = Line::fit(time, values);
+    values.iter_mut().zip(time).for_each(|(y, t)| *y -= line.at(*t));
+}
+
+/// Central difference, one-sided at the ends.
+fn derivative(time: &[f64], f: &[f64]) -> Vec<f64> {
+    let last = f.len().saturating_sub(1);
+    (0..f.len())
+        .map(|k| {
+            let (a, b) = (k.saturating_sub(1), if k < last { k + 1 } else { last });
+            (f[b] - f[a]) / (time[b] - time[a])
+        })
+        .collect()
+}

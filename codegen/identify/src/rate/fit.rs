@@ -1,0 +1,127 @@
+//! Fits of the options to several records at once.
+
+use super::normal::{Normal, accumulate};
+use super::prepare::Prepared;
+use super::{RateModel, creep, mixed};
+use crate::dead_time;
+use crate::everett::EverettTable;
+use crate::findings::Findings;
+use crate::normal::weights_to_nodes;
+use crate::prior;
+use crate::regressor::Plane;
+use specgen_numerics::nnls::{self, Failure};
+
+/// Longest dead time tried, sampling intervals of the fastest sampled record.
+const LONGEST: usize = 16;
+/// Dead times tried per sampling interval.
+const PER_INTERVAL: usize = 2;
+/// Smoothness of μ₁ against that of μ₀ ([`prior`]): μ₁ is a small difference between rates, and there are as many unknowns.
+const RATE_SMOOTHNESS: f64 = 1e3;
+
+/// Every option fitted to the records `chosen`, in the order of [`super::RateOption::ALL`].
+pub(super) fn all(
+    plane: &Plane,
+    prepared: &[Prepared],
+    chosen: &[usize],
+    findings: &mut Findings,
+) -> Option<Vec<RateModel>> {
+    let records: Vec<&Prepared> = chosen.iter().map(|k| &prepared[*k]).collect();
+    let fitted = || -> Result<Vec<RateModel>, Failure> {
+        let still = still(plane, &records, 0.0)?;
+        let dead_time = dead_time(plane, &records)?;
+        let late = self::still(plane, &records, dead_time)?;
+        let dynamic = dynamic(plane, &records)?;
+        let creep = creep::fit(plane, &records, &late)?;
+        Ok(vec![still, late, dynamic, creep])
+    };
+    fitted()
+        .map_err(|failure| {
+            let message = format!("the weights cannot be determined ({failure:?})");
+            findings.error("E0610", None, message, "choose a smaller grid, or record more reversal curves");
+        })
+        .ok()
+}
+
+/// Sum of the normal equations of the records, with one target each and none of the second table.
+pub(super) fn sum(plane: &Plane, records: &[&Prepared], targets: &[Vec<f64>]) -> Option<Normal> {
+    let each = records.iter().zip(targets).map(|(p, y)| accumulate(plane, p, core::slice::from_ref(y), None));
+    each.reduce(|sum, more| sum.add(&more))
+}
+
+/// The table that fits `targets` (m, one for each record) best.
+pub(super) fn table(plane: &Plane, records: &[&Prepared], targets: &[Vec<f64>]) -> Result<EverettTable, Failure> {
+    let mut normal = sum(plane, records, targets).ok_or(Failure::Singular)?;
+    prior::add(plane.grid, &mut normal.gram);
+    // To order one: the tolerances of the solver are relative, and so small weights keep their digits.
+    let scale = 1.0 / size(&normal.rhs[0]);
+    let rhs: Vec<f64> = normal.rhs[0].iter().map(|b| b * scale).collect();
+    Ok(table_of(plane, &nnls::solve(&normal.gram, &rhs)?.weights, 1.0 / scale))
+}
+
+/// One table for all records behind `dead_time` (s).
+fn still(plane: &Plane, records: &[&Prepared], dead_time: f64) -> Result<RateModel, Failure> {
+    let targets: Vec<Vec<f64>> = records.iter().map(|p| p.delayed(dead_time)).collect();
+    Ok(RateModel { still: table(plane, records, &targets)?, rate: None, creep: Vec::new(), dead_time })
+}
+
+/// The dead time (s) with which one table fits all records best, bounds of the weights aside; zero if none helps.
+fn dead_time(plane: &Plane, records: &[&Prepared]) -> Result<f64, Failure> {
+    let interval = records.iter().fold(f64::INFINITY, |least, p| if p.interval < least { p.interval } else { least });
+    let step = interval / PER_INTERVAL as f64;
+    let tried: Vec<f64> = (0..=LONGEST * PER_INTERVAL).map(|k| k as f64 * step).collect();
+    let each = records.iter().map(|p| {
+        let targets: Vec<Vec<f64>> = tried.iter().map(|tau| p.delayed(*tau)).collect();
+        accumulate(plane, p, &targets, None)
+    });
+    let mut normal = each.reduce(|sum, more| sum.add(&more)).ok_or(Failure::Singular)?;
+    prior::add(plane.grid, &mut normal.gram);
+    let residual = dead_time::residuals(normal.gram, &normal.rhs, &normal.energy).ok_or(Failure::Singular)?;
+    let best = dead_time::smallest(&residual);
+    if best == 0 || best + 1 == tried.len() {
+        return Ok(tried[best]);
+    }
+    Ok(tried[best] + dead_time::vertex([residual[best - 1], residual[best], residual[best + 1]], step))
+}
+
+/// (6): μ₀ ≥ 0 and μ₁ of either sign in one fit.
+fn dynamic(plane: &Plane, records: &[&Prepared]) -> Result<RateModel, Failure> {
+    // Rates of order one, so that both halves of the normal matrix are of one size.
+    let unit = records.iter().fold(f64::MIN_POSITIVE, |most, p| if p.speed > most { p.speed } else { most });
+    let each = records.iter().map(|p| accumulate(plane, p, &[p.delayed(0.0)], Some(unit)));
+    let mut normal = each.reduce(|sum, more| sum.add(&more)).ok_or(Failure::Singular)?;
+    let nodes = plane.nodes();
+    for (from, factor) in [(0, 1.0), (nodes, RATE_SMOOTHNESS)] {
+        let mut block = normal.gram.view((from, from), (nodes, nodes)).into_owned();
+        let before = block.clone();
+        prior::add(plane.grid, &mut block);
+        for column in 0..nodes {
+            for row in 0..nodes {
+                let more = block[(row, column)] - before[(row, column)];
+                normal.gram[(from + row, from + column)] += factor * more;
+            }
+        }
+    }
+    let scale = 1.0 / size(&normal.rhs[0]);
+    let rhs: Vec<f64> = normal.rhs[0].iter().map(|b| b * scale).collect();
+    let weights = mixed::solve(&normal.gram, &rhs, nodes)?;
+    let (still, rate) = weights.split_at(nodes);
+    Ok(RateModel {
+        still: table_of(plane, still, 1.0 / scale),
+        rate: Some(table_of(plane, rate, 1.0 / (scale * unit))),
+        creep: Vec::new(),
+        dead_time: 0.0,
+    })
+}
+
+/// Largest absolute value, not zero.
+fn size(values: &[f64]) -> f64 {
+    values.iter().fold(f64::MIN_POSITIVE, |most, v| if v.abs() > most { v.abs() } else { most })
+}
+
+/// The table of weights that are in units of `unit`.
+fn table_of(plane: &Plane, weights: &[f64], unit: f64) -> EverettTable {
+    let mut nodes: Vec<f64> = weights.iter().map(|w| w * unit).collect();
+    weights_to_nodes(plane.grid, &mut nodes);
+    let [drive_min, drive_max] = plane.range;
+    EverettTable { grid: plane.grid, drive_min, drive_max, nodes }
+}

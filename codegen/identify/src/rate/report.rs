@@ -1,0 +1,176 @@
+//! What the comparison of the options tells.
+
+use serde::Serialize;
+
+use super::prepare::Prepared;
+use super::score::{Unknown, on};
+use super::{CreepTerm, RateModel, RateOption};
+use crate::record::Record;
+use crate::regressor::Plane;
+use crate::{sanity, trend};
+use specgen_language::diagnostic::Diagnostic;
+
+/// An option beats the static table on a rate if its error there is lower by this share at least.
+const BEATS: f64 = 0.02;
+
+/// A record of the comparison.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Measured {
+    /// Name of the record.
+    pub record: String,
+    /// Curves per second, Hz.
+    pub frequency: f64,
+    /// Median |u̇|, V/s.
+    pub speed: f64,
+    /// Samples used.
+    pub samples: usize,
+    /// Range of the displacement over them, m.
+    pub range: f64,
+    /// White noise, % of the range: no model can be better.
+    pub noise_percent: f64,
+}
+
+impl Measured {
+    /// The frequency to two digits, with its unit.
+    #[must_use]
+    pub fn frequency_text(&self) -> String {
+        let decimals = if self.frequency < 1.0 { 2 } else { usize::from(self.frequency < 9.95) };
+        format!("{:.decimals$} Hz", self.frequency)
+    }
+}
+
+/// One option. Errors are rms in % of each record's range.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OptionReport {
+    /// Which.
+    pub option: RateOption,
+    /// s.
+    pub dead_time: f64,
+    /// Empty without creep.
+    pub creep: Vec<CreepTerm>,
+    /// Fitted to all records.
+    pub fitted: Vec<f64>,
+    /// Each record by the fit to the others.
+    pub left_out: Vec<f64>,
+    /// On the record that took part in no fit.
+    pub hold_out: Option<f64>,
+}
+
+/// The record that took part in no fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HoldOut {
+    /// Its name.
+    pub record: String,
+}
+
+/// Whether an option predicts a rate that it was not fitted on better than the static table.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// The option with the lowest mean error on rates it was not fitted on.
+    pub best: RateOption,
+    /// Options that beat the static table on every such rate, and on the held-out record if there is one.
+    pub beats_static: Vec<RateOption>,
+    /// The same in words.
+    pub text: String,
+}
+
+/// Result figures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RateReport {
+    /// N.
+    pub grid: usize,
+    /// The records, in the order given.
+    pub records: Vec<Measured>,
+    /// The record held out.
+    pub hold_out: Option<HoldOut>,
+    /// The options, plainest first.
+    pub options: Vec<OptionReport>,
+    /// What follows.
+    pub verdict: Verdict,
+}
+
+/// `left_out[k]` are the options fitted without record k.
+pub(super) fn report(
+    plane: &Plane,
+    prepared: &[Prepared],
+    models: &[RateModel],
+    left_out: &[Vec<RateModel>],
+    hold_out: Option<&Record>,
+) -> Result<RateReport, Vec<Diagnostic>> {
+    let unknown = hold_out.map(|record| Unknown::new(record, plane)).transpose()?;
+    let options: Vec<OptionReport> = RateOption::ALL
+        .into_iter()
+        .zip(models)
+        .enumerate()
+        .map(|(k, (option, model))| OptionReport {
+            option,
+            dead_time: model.dead_time,
+            creep: model.creep.clone(),
+            fitted: prepared.iter().map(|p| on(model, plane, p)).collect(),
+            left_out: prepared.iter().zip(left_out).map(|(p, fits)| on(&fits[k], plane, p)).collect(),
+            hold_out: unknown.as_ref().map(|unknown| unknown.score(model, plane)),
+        })
+        .collect();
+    let records: Vec<Measured> = prepared.iter().map(measured).collect();
+    let verdict = verdict(&records, &options, hold_out);
+    let hold_out = hold_out.map(|record| HoldOut { record: record.shown_as.clone() });
+    Ok(RateReport { grid: plane.grid, records, hold_out, options, verdict })
+}
+
+fn measured(p: &Prepared) -> Measured {
+    let y = &p.record.displacement[p.first..];
+    let (low, high) = sanity::extent(y);
+    Measured {
+        record: p.record.shown_as.clone(),
+        frequency: p.frequency,
+        speed: p.speed,
+        samples: p.samples(),
+        range: high - low,
+        noise_percent: 100.0 * trend::noise_floor(y) / (high - low),
+    }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |sum, v| sum + v) / values.len() as f64
+}
+
+fn verdict(records: &[Measured], options: &[OptionReport], hold_out: Option<&Record>) -> Verdict {
+    let plain = &options[0];
+    let mut best = plain;
+    let mut beats_static = Vec::new();
+    let mut lines = Vec::new();
+    for option in &options[1..] {
+        if mean(&option.left_out) < mean(&best.left_out) {
+            best = option;
+        }
+        let beaten = |ours: f64, theirs: f64| ours < theirs * (1.0 - BEATS);
+        let cases = option
+            .left_out
+            .iter()
+            .zip(&plain.left_out)
+            .zip(records)
+            .map(|((ours, theirs), record)| (record.frequency_text(), *ours, *theirs));
+        let held =
+            option.hold_out.zip(plain.hold_out).map(|(ours, theirs)| ("the held-out record".to_owned(), ours, theirs));
+        let cases: Vec<(String, f64, f64)> = cases.chain(held).collect();
+        let say = |won: bool| -> Vec<String> {
+            let kept = cases.iter().filter(|(_, ours, theirs)| beaten(*ours, *theirs) == won);
+            kept.map(|(name, ours, theirs)| format!("{name} ({ours:.3} against {theirs:.3} %)")).collect()
+        };
+        let (won, lost) = (say(true), say(false));
+        let name = option.option.name();
+        lines.push(if lost.is_empty() {
+            beats_static.push(option.option);
+            format!("{name} beats the static table on what it was not fitted on: {}", won.join(", "))
+        } else if won.is_empty() {
+            format!("{name} does NOT beat the static table on what it was not fitted on: {}", lost.join(", "))
+        } else {
+            format!("{name} beats the static table on {}, but not on {}", won.join(", "), lost.join(", "))
+        });
+    }
+    if beats_static.is_empty() {
+        let held = if hold_out.is_some() { " and the held-out record" } else { "" };
+        lines.push(format!("no option beats the static table on every rate that it was not fitted on{held}"));
+    }
+    Verdict { best: best.option, beats_static, text: lines.join("\n") }
+}

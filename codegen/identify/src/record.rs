@@ -1,0 +1,233 @@
+//! Reads a measured record: a CSV file with the columns `time_s`, `drive_V`, `displacement_um`.
+//!
+//! Every problem of the file is reported in one run. What depends on the declared drive range is checked
+//! later, by [`super::coverage`].
+
+use std::io::Read;
+use std::path::Path;
+
+use super::columns::{self, DISPLACEMENT, DRIVE, NAMES, TIME};
+use super::distrust;
+use super::findings::Findings;
+use super::sanity;
+use specgen_language::diagnostic::Diagnostic;
+
+/// Larger files are refused before they are read.
+pub const MAX_FILE_BYTES: u64 = 256 << 20;
+
+/// A measured record in SI units, checked sample by sample.
+///
+/// The three columns have equal length, at least 100; every value is finite;
+/// time increases strictly and has no gaps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// Name of the file as its user knows it.
+    pub shown_as: String,
+    /// Time, s.
+    pub time: Vec<f64>,
+    /// Drive, V.
+    pub drive: Vec<f64>,
+    /// Displacement, m.
+    pub displacement: Vec<f64>,
+    /// Samples that no fit believes: glitches, and what follows a jump of the drive.
+    pub weightless: Vec<bool>,
+    /// Findings that refuse nothing.
+    pub warnings: Vec<Diagnostic>,
+}
+
+impl Record {
+    /// A record from columns in memory (s, V, m), under the same checks as a file.
+    ///
+    /// # Errors
+    /// The same findings as [`read_record`]; line k + 2 stands for sample k.
+    pub fn from_columns(
+        shown_as: &str,
+        time: Vec<f64>,
+        drive: Vec<f64>,
+        displacement: Vec<f64>,
+    ) -> Result<Self, Vec<Diagnostic>> {
+        let mut findings = Findings::new(shown_as);
+        let n = time.len();
+        if drive.len() != n || displacement.len() != n {
+            let message = format!("columns of {n}, {} and {} samples", drive.len(), displacement.len());
+            findings.error("E0507", None, message, "give columns of equal length");
+            return Err(findings.into_diagnostics());
+        }
+        for (column, name) in [(&time, NAMES[TIME]), (&drive, NAMES[DRIVE]), (&displacement, NAMES[DISPLACEMENT])] {
+            for (k, x) in column.iter().enumerate().filter(|(_, x)| !x.is_finite()) {
+                report_not_finite(&mut findings, k + 2, name, &x.to_string());
+            }
+        }
+        let lines = (2..n + 2).collect();
+        finish(findings, shown_as, lines, [time, drive, displacement])
+    }
+
+    /// Difference of the largest and the smallest displacement, m.
+    #[must_use]
+    pub fn displacement_range(&self) -> f64 {
+        let (low, high) = sanity::extent(&self.displacement);
+        high - low
+    }
+}
+
+/// Reads a record. `shown_as` is how messages name the file.
+///
+/// # Errors
+/// All findings of the file, warnings included, if at least one refuses it.
+pub fn read_record(path: &Path, shown_as: &str) -> Result<Record, Vec<Diagnostic>> {
+    parse_record(&read_file(path, shown_as)?, shown_as)
+}
+
+/// The text of a data file, record or table, without a byte order mark.
+///
+/// # Errors
+/// A finding if it is no regular file, cannot be read, is larger than [`MAX_FILE_BYTES`] or not UTF-8.
+pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    read_text(path, &mut findings).ok_or_else(|| findings.into_diagnostics())
+}
+
+/// A record from the text of its file.
+///
+/// # Errors
+/// As [`read_record`].
+pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    let Some((lines, columns)) = parse(text, &mut findings) else {
+        return Err(findings.into_diagnostics());
+    };
+    let [time, drive, micrometres] = columns;
+    let displacement = micrometres.into_iter().map(|y| y * 1e-6).collect();
+    finish(findings, shown_as, lines, [time, drive, displacement])
+}
+
+fn finish(
+    mut findings: Findings,
+    shown_as: &str,
+    lines: Vec<usize>,
+    columns: [Vec<f64>; 3],
+) -> Result<Record, Vec<Diagnostic>> {
+    // A value that could not be read would only cause a trail of follow-up findings.
+    if !findings.any_error() {
+        sanity::check(&lines, &columns, &mut findings);
+    }
+    if findings.any_error() {
+        return Err(findings.into_diagnostics());
+    }
+    let [time, drive, displacement] = columns;
+    let weightless = distrust::weightless(&lines, &time, &drive, &displacement, &mut findings);
+    let warnings = findings.into_diagnostics();
+    Ok(Record { shown_as: shown_as.to_owned(), time, drive, displacement, weightless, warnings })
+}
+
+/// The text of the file without a byte order mark, or `None` after the reason was reported.
+fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
+    let unreadable = |e: std::io::Error| (format!("cannot be read: {e}"), "name an existing CSV file");
+    let bytes = match read_limited(path) {
+        Ok(bytes) => bytes,
+        Err(e) => {
+            let (message, help) = unreadable(e);
+            findings.error("E0501", None, message, help);
+            return None;
+        }
+    };
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        let message = format!("is larger than {} MiB", MAX_FILE_BYTES >> 20);
+        findings.error("E0502", None, message, "record at a lower rate, or keep every n-th sample");
+        return None;
+    }
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+    let end_of_text = bytes.iter().position(|&b| b == 0);
+    let bad = std::str::from_utf8(bytes).err().map(|e| e.valid_up_to());
+    if let Some(at) = end_of_text.or(bad) {
+        let line = 1 + bytes[..at].iter().filter(|&&b| b == b'\n').count();
+        let message = format!("is not a text file in UTF-8: byte {at} is 0x{:02x}", bytes[at]);
+        findings.error("E0503", Some(line), message, "export the record as CSV text in UTF-8");
+        return None;
+    }
+    Some(String::from_utf8_lossy(bytes).into_owned())
+}
+
+/// At most one byte more than the limit, so that a huge file or a device costs neither time nor memory.
+fn read_limited(path: &Path) -> std::io::Result<Vec<u8>> {
+    let file = std::fs::File::open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
+    let mut bytes = Vec::new();
+    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Line numbers and the three columns in the file's units; `None` if there is no usable header.
+fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 3])> {
+    if text.trim().is_empty() {
+        let help = format!("the first line must be the header `{}`", NAMES.join(","));
+        findings.error("E0504", None, "is empty".to_owned(), &help);
+        return None;
+    }
+    let mut reader =
+        csv::ReaderBuilder::new().flexible(true).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+    let header = match reader.headers() {
+        Ok(header) => header.clone(),
+        Err(e) => {
+            findings.error("E0504", Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
+            return None;
+        }
+    };
+    let header_line = header.position().map_or(1, |p| p.line() as usize);
+    let place = columns::locate(&header, header_line, findings)?;
+    let mut lines = Vec::new();
+    let mut values = [Vec::new(), Vec::new(), Vec::new()];
+    for row in reader.records() {
+        match row {
+            Ok(row) => {
+                let line = row.position().map_or(0, |p| p.line() as usize);
+                lines.push(line);
+                for (column, (&at, name)) in values.iter_mut().zip(place.iter().zip(NAMES)) {
+                    column.push(number(row.get(at), line, name, findings));
+                }
+            }
+            Err(e) => {
+                let line = e.position().map(|p| p.line() as usize);
+                findings.error("E0506", line, format!("cannot be read as CSV: {e}"), "write plain CSV");
+            }
+        }
+    }
+    Some((lines, values))
+}
+
+/// The number in a field, or NaN after the problem was reported.
+pub(crate) fn number(field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> f64 {
+    let Some(field) = field else {
+        findings.error(
+            "E0506",
+            Some(line),
+            format!("`{name}` is missing: the line is too short"),
+            "complete or delete the line",
+        );
+        return f64::NAN;
+    };
+    match field.parse::<f64>() {
+        Ok(x) if x.is_finite() => x,
+        Ok(_) => {
+            report_not_finite(findings, line, name, field);
+            f64::NAN
+        }
+        Err(_) => {
+            let shown: String = field.chars().take(40).collect();
+            let message = format!("`{name}` is `{shown}`, which is not a number");
+            findings.error("E0506", Some(line), message, "write a plain number with a decimal point, such as -12.5e-3");
+            f64::NAN
+        }
+    }
+}
+
+fn report_not_finite(findings: &mut Findings, line: usize, name: &str, shown: &str) {
+    findings.error(
+        "E0508",
+        Some(line),
+        format!("`{name}` is `{shown}`, not a finite number"),
+        "delete the sample, or record again",
+    );
+}

@@ -1,0 +1,352 @@
+//! Frequency response of drive to displacement: Welch's H1 with coherence, and a resonance, lag and dead time fitted to it.
+//!
+//! ```text
+//! record → uniform samples → segments (Hann, half overlapped) → Sxx, Sxy, Syy → H1 = Sxy/Sxx, γ² = |Sxy|²/(Sxx Syy) → fit
+//! H(s) = K · ω0²/(s² + 2ζω0 s + ω0²) · 1/(1 + τs) · e^(−sT)
+//! ```
+//! Weights are the inverse variances of ln H1, 2 n γ²/(1 − γ²) for n averages (Bendat and Piersol, Random Data, 9.1).
+
+mod fit;
+mod welch;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::findings::Findings;
+use super::sanity::{extent, median};
+use super::signals::{self, Signals, Wanted};
+use specgen_language::diagnostic::Diagnostic;
+
+pub use fit::response;
+pub use fit::{Estimate, Fitted};
+pub use welch::Bin;
+
+/// A response and what was fitted to it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ResponseReport {
+    /// Name of the record.
+    pub record: String,
+    /// Samples per second.
+    pub rate: f64,
+    /// Samples in a segment.
+    pub segment: usize,
+    /// Segments averaged.
+    pub segments: usize,
+    /// Width of a bin, Hz.
+    pub resolution: f64,
+    /// Lowest and highest frequency used, Hz.
+    pub band: [f64; 2],
+    /// Bands between them that were left out, Hz, with their mean coherence.
+    pub left_out: Vec<Band>,
+    /// Median coherence of the bins used.
+    pub coherence: f64,
+    /// The fit.
+    pub fitted: Fitted,
+    /// Root mean square of |H1/H − 1| over the bins used, weighted as in the fit, %.
+    pub misfit_percent: f64,
+    /// Bins from zero up, for drawing.
+    #[serde(skip)]
+    pub bins: Vec<Bin>,
+    /// Findings that refuse nothing.
+    #[serde(skip)]
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// A band of frequencies, Hz.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Band {
+    /// From, Hz.
+    pub low: f64,
+    /// To, Hz.
+    pub high: f64,
+    /// Mean coherence in it.
+    pub coherence: f64,
+    /// Whether the drive excites it at all.
+    pub excited: bool,
+}
+
+/// Coherence below which a bin is left out.
+const COHERENT: f64 = 0.6;
+/// Power of the drive, as a share of the strongest bin's, below which a bin counts as not excited.
+const EXCITED: f64 = 1e-6;
+/// Least number of bins to fit, and of averages.
+const BINS: usize = 12;
+const AVERAGES: usize = 4;
+/// The resonance is believed if this share of the bins from 0.7 to 1.3 times its frequency is used.
+const AROUND: f64 = 0.6;
+/// Sampling intervals may differ from the median by this share.
+const UNIFORM: f64 = 0.01;
+/// Share of samples at exactly the largest or smallest displacement that means a limit.
+const AT_LIMIT: f64 = 0.01;
+/// Misfit that calls for a warning, %.
+const POOR: f64 = 15.0;
+/// Bands narrower than this many bins are not named one by one.
+const NARROW: usize = 3;
+
+const COLUMNS: [Wanted; 3] = [
+    Wanted { name: "time_s", required: true },
+    Wanted { name: "drive_V", required: true },
+    Wanted { name: "displacement_um", required: true },
+];
+
+/// Identifies from a record of a swept sine, multisine or noise. `segment`: samples in a segment, a power of two is best.
+///
+/// # Errors
+/// E0630 for a record that is not sampled evenly or too short, E0631 where the coherence is too low (the bands are named),
+/// E0632 if the model cannot be fitted, and those of reading.
+pub fn respond(path: &Path, shown_as: &str, segment: Option<usize>) -> Result<ResponseReport, Vec<Diagnostic>> {
+    of_signals(&signals::read(path, shown_as, &COLUMNS)?, segment)
+}
+
+/// The same from the text of a record.
+///
+/// # Errors
+/// As [`respond`].
+pub fn respond_text(text: &str, shown_as: &str, segment: Option<usize>) -> Result<ResponseReport, Vec<Diagnostic>> {
+    of_signals(&signals::parse(text, shown_as, &COLUMNS)?, segment)
+}
+
+fn of_signals(signals: &Signals, segment: Option<usize>) -> Result<ResponseReport, Vec<Diagnostic>> {
+    let mut findings = Findings::new(&signals.shown_as);
+    let report = responded(signals, segment, &mut findings);
+    let (mut report, warnings) = findings.conclude(report)?;
+    report.warnings = warnings;
+    Ok(report)
+}
+
+fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings) -> Option<ResponseReport> {
+    let rate = sampling_rate(signals, findings)?;
+    check_limits(signals, findings);
+    if findings.any_error() {
+        return None;
+    }
+    let n = signals.lines.len();
+    let segment = segment.unwrap_or_else(|| automatic(n));
+    let averages = if segment < 32 || segment > n { 0 } else { (2 * (n - segment)) / segment + 1 };
+    if averages < AVERAGES {
+        let message = format!(
+            "{n} samples from {} to {} give {averages} segments of {segment}; at least {AVERAGES} are needed for a coherence",
+            signals.place(0),
+            signals.place(n - 1)
+        );
+        findings.error("E0630", None, message, "record longer, or choose a shorter --segment (32 or more)");
+        return None;
+    }
+    let micrometres = signals.column(2);
+    let displacement: Vec<f64> = micrometres.iter().map(|y| y * 1e-6).collect();
+    let bins = welch::h1(signals.column(1), &displacement, rate, segment);
+    let strongest = bins.iter().skip(1).fold(0.0, |m, b| if b.drive_power > m { b.drive_power } else { m });
+    let excited = |b: &Bin| b.drive_power > EXCITED * strongest;
+    let usable = |b: &Bin| b.frequency > 0.0 && excited(b) && b.coherence >= COHERENT;
+    let used: Vec<Bin> = bins.iter().copied().filter(|b| usable(b)).collect();
+    let bands = left_out(&bins, &usable, &excited);
+    if used.len() < BINS {
+        let message = format!("the coherence is below {COHERENT} nearly everywhere: {}", named(&bands));
+        findings.error("E0631", None, message, "drive harder within the linear range, record longer, and check both channels; coherence is lost to noise, to hysteresis at large amplitude and to a wrong channel");
+        return None;
+    }
+    let fitted = fit::fit(&used, averages).map_err(|why| {
+        findings.error("E0632", None, why, "does the record hold the response from well below to above the resonance, displacement rising with the drive?");
+    });
+    let fitted = fitted.ok()?;
+    let band = [used[0].frequency, used[used.len() - 1].frequency];
+    check_resonance(&fitted, band, &bins, &usable, &bands, findings)?;
+    let resolution = rate / segment as f64;
+    if 2.0 * fitted.damping_ratio.value * fitted.resonance.value < 3.0 * resolution {
+        let message = format!(
+            "the resonance is {:.2} Hz wide, a bin {resolution:.2} Hz: the damping ratio comes out too large",
+            2.0 * fitted.damping_ratio.value * fitted.resonance.value
+        );
+        findings.warning("W0633", None, message, "record longer and choose a longer --segment");
+    }
+    let inside: Vec<Band> = bands.into_iter().filter(|b| b.high > band[0] && b.low < band[1]).collect();
+    if !inside.is_empty() {
+        let message = format!("left out of the fit: {}", named(&inside));
+        findings.warning("W0633", None, message, "drive harder there or record longer if the band matters");
+    }
+    let misfit_percent = 100.0 * fit::misfit(&fitted, &used, averages);
+    if misfit_percent > POOR {
+        let message = format!("the fitted model misses the response by {misfit_percent:.0} % rms");
+        findings.warning(
+            "W0634",
+            None,
+            message,
+            "is there more than one resonance in the band? Limit the sweep to the first one",
+        );
+    }
+    let mut coherence: Vec<f64> = used.iter().map(|b| b.coherence).collect();
+    Some(ResponseReport {
+        record: signals.shown_as.clone(),
+        rate,
+        segment,
+        segments: averages,
+        resolution,
+        band,
+        left_out: inside,
+        coherence: median(&mut coherence),
+        fitted,
+        misfit_percent,
+        bins,
+        warnings: Vec::new(),
+    })
+}
+
+/// A power of two that leaves about fifteen half-overlapped segments.
+fn automatic(samples: usize) -> usize {
+    let eighth = (samples / 8).max(1);
+    (1usize << eighth.ilog2()).clamp(64, 1 << 15)
+}
+
+fn sampling_rate(signals: &Signals, findings: &mut Findings) -> Option<f64> {
+    let time = signals.column(0);
+    let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    let interval = median(&mut intervals);
+    // A time column of few digits rounds each time by up to half a digit; the grid as a whole must fit.
+    let even = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
+    let off = |k: usize| (time[k] - time[0] - k as f64 * even).abs();
+    let worst = (0..time.len()).fold(0, |w, k| if off(k) > off(w) { k } else { w });
+    if off(worst) > 0.5 * even || (even / interval - 1.0).abs() > UNIFORM {
+        let message = format!(
+            "the samples are not evenly spaced: at {} s the time is {:.2} sampling intervals off",
+            time[worst],
+            off(worst) / even
+        );
+        findings.error(
+            "E0630",
+            Some(signals.lines[worst]),
+            message,
+            "record with a fixed sampling interval, without lost samples",
+        );
+        return None;
+    }
+    Some(1.0 / even)
+}
+
+/// A limited channel shows as many samples at exactly its largest or smallest value; a dead one as a long standstill.
+fn check_limits(signals: &Signals, findings: &mut Findings) {
+    for (column, name) in [(1, "drive_V"), (2, "displacement_um")] {
+        let values = signals.column(column);
+        let (low, high) = extent(values);
+        if low >= high {
+            let message = format!(
+                "`{name}` is {low} in every sample, from {} to {}",
+                signals.place(0),
+                signals.place(values.len() - 1)
+            );
+            findings.error("E0512", None, message, "is the channel connected?");
+            return;
+        }
+        for (limit, word) in [(low, "lower"), (high, "upper")] {
+            // Two neighbours at the limit: a peak touches it once, a clipped one stays.
+            let stays = values.windows(2).filter(|w| w[0] == limit && w[1] == limit).count();
+            // A drive of two levels (a random binary signal) is at its limits by intent.
+            if column == 2 && stays > 10 && stays as f64 > AT_LIMIT * values.len() as f64 {
+                let first = values.windows(2).position(|w| w[0] == limit && w[1] == limit).unwrap_or(0);
+                let message = format!(
+                    "from {} on `{name}` is again and again exactly at its {word} limit {limit} ({stays} samples)",
+                    signals.place(first)
+                );
+                findings.error(
+                    "E0513",
+                    Some(signals.lines[first]),
+                    message,
+                    "the gauge or its converter is at the end of its range: drive less, or shift the range",
+                );
+                return;
+            }
+        }
+    }
+    let (drive, values) = (signals.column(1), signals.column(2));
+    let (low, high) = extent(drive);
+    let longest = (values.len() / 50).max(20);
+    let mut first = 0;
+    while first < values.len() {
+        let run = values[first..].iter().take_while(|v| **v == values[first]).count();
+        let (a, b) = extent(&drive[first..first + run]);
+        if run >= longest && b - a > 0.05 * (high - low) {
+            let message = format!(
+                "from {} to {} the displacement is stuck at {} um for {run} samples while the drive goes through {a} V to {b} V",
+                signals.place(first),
+                signals.place(first + run - 1),
+                values[first]
+            );
+            findings.error(
+                "E0513",
+                Some(signals.lines[first]),
+                message,
+                "check the connection of the gauge and record again",
+            );
+        }
+        first += run;
+    }
+}
+
+/// Runs of bins that are not usable, at least [`NARROW`] wide.
+fn left_out(bins: &[Bin], usable: &dyn Fn(&Bin) -> bool, excited: &dyn Fn(&Bin) -> bool) -> Vec<Band> {
+    let mut bands = Vec::new();
+    let mut first = 1;
+    while first < bins.len() {
+        if usable(&bins[first]) {
+            first += 1;
+            continue;
+        }
+        let run = bins[first..].iter().take_while(|b| !usable(b)).count();
+        let part = &bins[first..first + run];
+        if run >= NARROW {
+            bands.push(Band {
+                low: part[0].frequency,
+                high: part[run - 1].frequency,
+                coherence: part.iter().fold(0.0, |sum, b| sum + b.coherence) / run as f64,
+                excited: 2 * part.iter().filter(|b| excited(b)).count() > run,
+            });
+        }
+        first += run;
+    }
+    bands
+}
+
+fn named(bands: &[Band]) -> String {
+    let mut sorted: Vec<&Band> = bands.iter().collect();
+    sorted.sort_by(|a, b| (b.high - b.low).total_cmp(&(a.high - a.low)));
+    let each: Vec<String> = sorted
+        .iter()
+        .take(4)
+        .map(|b| {
+            let why = if b.excited { format!("coherence {:.2}", b.coherence) } else { "not excited".to_owned() };
+            format!("{:.4} to {:.4} Hz ({why})", b.low, b.high)
+        })
+        .collect();
+    let more = if sorted.len() > 4 { format!(" and {} narrower bands", sorted.len() - 4) } else { String::new() };
+    format!("{}{more}", each.join(", "))
+}
+
+/// Refuses a resonance that the record does not show: outside the band, or where the coherence is too low.
+fn check_resonance(
+    fitted: &Fitted,
+    band: [f64; 2],
+    bins: &[Bin],
+    usable: &dyn Fn(&Bin) -> bool,
+    bands: &[Band],
+    findings: &mut Findings,
+) -> Option<()> {
+    let f0 = fitted.resonance.value;
+    let around: Vec<&Bin> = bins.iter().filter(|b| b.frequency >= 0.7 * f0 && b.frequency <= 1.3 * f0).collect();
+    let seen = around.iter().filter(|b| usable(b)).count();
+    if f0 > band[1] || f0 < band[0] || around.is_empty() || (seen as f64) < AROUND * around.len() as f64 {
+        let near: Vec<Band> = bands.iter().copied().filter(|b| b.high >= 0.7 * f0 && b.low <= 1.3 * f0).collect();
+        let gap = if near.is_empty() { String::new() } else { format!("; too low: {}", named(&near)) };
+        let message = format!(
+            "the record does not show the resonance: the fit puts it at {f0:.1} Hz, coherent are {:.1} to {:.1} Hz{gap}",
+            band[0], band[1]
+        );
+        findings.error(
+            "E0631",
+            None,
+            message,
+            "excite the actuator through its resonance, and record long enough for coherence there",
+        );
+        return None;
+    }
+    Some(())
+}

@@ -1,0 +1,208 @@
+//! Is a record plausible as a measurement, whatever it was meant for?
+
+use super::columns::{DISPLACEMENT, DRIVE, TIME};
+use super::findings::Findings;
+use super::limits;
+
+/// Fewer samples are no record.
+pub const MIN_SAMPLES: usize = 100;
+/// A sampling interval this many times the median one is a gap: a reversal may hide in it.
+const GAP: f64 = 10.0;
+/// The displacement may stay exactly equal while the drive travels this share of its range; longer is a stuck or limited sensor.
+const STUCK_TRAVEL: f64 = 0.05;
+/// White noise of a command, as a share of its range, is below this (rounding to five digits); of a gauge it is above.
+const COMMANDED_NOISE: f64 = 3e-6;
+/// A displacement range outside these bounds (m) is unusual for a piezo actuator and suggests another unit.
+pub(crate) const PLAUSIBLE_RANGE: [f64; 2] = [50e-9, 2e-3];
+
+/// Checks columns of finite numbers in s, V, m; `lines[k]` is where sample k stands in the file.
+pub(crate) fn check(lines: &[usize], columns: &[Vec<f64>; 3], findings: &mut Findings) {
+    let [time, drive, displacement] = columns;
+    if time.len() < MIN_SAMPLES {
+        let until = time.last().map_or_else(String::new, |t| format!(" and ends at {t} s"));
+        let message = format!("has {} samples{until}; at least {MIN_SAMPLES} are needed", time.len());
+        findings.error("E0509", None, message, "record more samples per reversal curve");
+        return;
+    }
+    check_time(lines, time, findings);
+    let moving = [(drive, "drive_V", DRIVE), (displacement, "displacement_um", DISPLACEMENT)]
+        .into_iter()
+        .all(|(column, name, which)| check_not_constant(time, column, name, which, findings));
+    if moving {
+        check_stuck(lines, time, drive, displacement, findings);
+        check_sign(time, drive, displacement, findings);
+        check_displacement_unit(time, displacement, findings);
+    }
+    if !findings.any_error() {
+        limits::check(lines, time, drive, displacement, findings);
+    }
+}
+
+pub(crate) fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings) {
+    let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    let mut increasing = true;
+    for (k, dt) in intervals.iter().enumerate().filter(|(_, dt)| **dt <= 0.0) {
+        increasing = false;
+        let message = format!("time goes from {} s to {} s ({dt:e} s); it must increase", time[k], time[k + 1]);
+        let help = if *dt == 0.0 {
+            "delete the repeated sample, or write the time with more digits"
+        } else {
+            "sort or re-record; is the time column the right one?"
+        };
+        findings.error("E0510", Some(lines[k + 1]), message, help);
+    }
+    if !increasing {
+        return;
+    }
+    let gap = GAP * median(&mut intervals);
+    for (k, w) in time.windows(2).enumerate().filter(|(_, w)| w[1] - w[0] > gap) {
+        let message = format!(
+            "nothing was recorded between {} s and {} s ({:.0} sampling intervals)",
+            w[0],
+            w[1],
+            GAP * (w[1] - w[0]) / gap
+        );
+        findings.error(
+            "E0511",
+            Some(lines[k + 1]),
+            message,
+            "record without gaps: a reversal of the drive may be missing",
+        );
+    }
+}
+
+fn check_not_constant(time: &[f64], column: &[f64], name: &str, which: usize, findings: &mut Findings) -> bool {
+    let (low, high) = extent(column);
+    if low < high {
+        return true;
+    }
+    let shown = if which == DISPLACEMENT { low * 1e6 } else { low };
+    let message = format!("`{name}` is {shown} in every sample, from {} s to {} s", time[0], time[time.len() - 1]);
+    findings.error("E0512", None, message, "record while the drive runs through its range; is the channel connected?");
+    false
+}
+
+fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
+    let (low, high) = extent(drive);
+    let (bottom, top) = extent(displacement);
+    let swapped = is_commanded(displacement) && !is_commanded(drive);
+    let mut first = 0;
+    while first < drive.len() {
+        let value = displacement[first];
+        let run = displacement[first..].iter().take_while(|y| **y == value).count();
+        let (run_low, run_high) = extent(&drive[first..first + run]);
+        if run_high - run_low > STUCK_TRAVEL * (high - low) {
+            let um = value * 1e6;
+            if swapped {
+                let message = format!(
+                    "from {} s to {} s `displacement_um` stands at {um:.4} while `drive_V` goes through {run_low} to {run_high} with noise on it",
+                    time[first],
+                    time[first + run - 1]
+                );
+                let help = "the columns `drive_V` and `displacement_um` seem to be swapped";
+                findings.error("E0604", Some(lines[first]), message, help);
+                return;
+            }
+            let what = if value == bottom || value == top { "is limited at" } else { "is stuck at" };
+            let message = format!(
+                "from {} s to {} s the displacement {what} {um} um for {run} samples while the drive goes through {run_low} V to {run_high} V",
+                time[first],
+                time[first + run - 1]
+            );
+            findings.error(
+                "E0513",
+                Some(lines[first]),
+                message,
+                "check the range and the connection of the displacement sensor",
+            );
+        }
+        first += run;
+    }
+}
+
+/// Whether a column has the look of a command, not of a measurement: next to no noise. From fourth differences, which see
+/// nothing of a ramp and next to nothing of a sine.
+fn is_commanded(column: &[f64]) -> bool {
+    let (low, high) = extent(column);
+    let mut fourth: Vec<f64> =
+        column.windows(5).map(|w| (w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4]).abs()).collect();
+    // The median of |N(0, s)| is 0.6745 s; fourth differences of white noise have the variance 70 σ².
+    median(&mut fourth) / (0.674_489_75 * 70f64.sqrt()) < COMMANDED_NOISE * (high - low)
+}
+
+/// Displacement must grow with the drive: a Preisach model with non-negative weights cannot do otherwise.
+fn check_sign(time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
+    let count = drive.len() as f64;
+    let mean = |x: &[f64]| x.iter().fold(0.0, |sum, v| sum + v) / count;
+    let (mean_u, mean_y) = (mean(drive), mean(displacement));
+    let (mut uu, mut yy, mut uy) = (0.0, 0.0, 0.0);
+    for (u, y) in drive.iter().zip(displacement) {
+        uu += (u - mean_u) * (u - mean_u);
+        yy += (y - mean_y) * (y - mean_y);
+        uy += (u - mean_u) * (y - mean_y);
+    }
+    let correlation = uy / (uu * yy).sqrt();
+    if correlation < 0.5 {
+        relation(time, drive, displacement, correlation, findings);
+    }
+}
+
+/// Reports a relation that no actuator has, with the stretch of the record that shows it best.
+fn relation(time: &[f64], drive: &[f64], displacement: &[f64], correlation: f64, findings: &mut Findings) {
+    let at = |value: f64| drive.iter().position(|u| *u == value).unwrap_or(0);
+    let (low, high) = extent(drive);
+    let (a, b) = (at(low).min(at(high)), at(low).max(at(high)));
+    let shown = format!(
+        "between {} s and {} s the drive goes from {} V to {} V and the displacement from {:.4} um to {:.4} um",
+        time[a],
+        time[b],
+        drive[a],
+        drive[b],
+        displacement[a] * 1e6,
+        displacement[b] * 1e6
+    );
+    if correlation < -0.5 {
+        let message = format!("the displacement falls when the drive rises (correlation {correlation:.2}): {shown}");
+        findings.error("E0514", None, message, "change the sign of one of the two columns");
+    } else {
+        let message = format!(
+            "the displacement hardly follows the drive (correlation {correlation:.2}; a piezo actuator shows more than 0.9): {shown}"
+        );
+        findings.error("E0514", None, message, "check that `drive_V` and `displacement_um` hold what their names say");
+    }
+}
+
+fn check_displacement_unit(time: &[f64], displacement: &[f64], findings: &mut Findings) {
+    let (low, high) = extent(displacement);
+    let range = high - low;
+    let um = range * 1e6;
+    let at = |value: f64| displacement.iter().position(|y| *y == value).map_or(0.0, |k| time[k]);
+    let times = format!("least at {} s, most at {} s", at(low), at(high));
+    if range > PLAUSIBLE_RANGE[1] {
+        let message =
+            format!("the displacement covers {um:.0} um ({times}), too much for a piezo actuator: is it in nm?");
+        findings.warning("W0515", None, message, "convert the column to micrometres");
+    } else if range < PLAUSIBLE_RANGE[0] {
+        let message = format!("the displacement covers only {um:.2e} um ({times}): is it in mm or m?");
+        findings.warning("W0515", None, message, "convert the column to micrometres");
+    }
+}
+
+/// Smallest and largest value of finite numbers; (+inf, -inf) if there are none.
+pub fn extent(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| {
+        (if x < low { x } else { low }, if x > high { x } else { high })
+    })
+}
+
+/// Middle value (upper middle of an even count); 0 for an empty slice. Reorders the slice.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Which columns exist, for readers of this module: the order of [`TIME`], [`DRIVE`], [`DISPLACEMENT`].
+const _: () = assert!(TIME == 0 && DRIVE == 1 && DISPLACEMENT == 2);

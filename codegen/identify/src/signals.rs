@@ -1,0 +1,182 @@
+//! Reads records of other kinds than reversal curves: named columns, some of which may be left out.
+
+use std::path::Path;
+
+use super::findings::Findings;
+use super::record::{number, read_file};
+use super::sanity;
+use specgen_language::diagnostic::Diagnostic;
+
+/// A column that a record may have.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wanted {
+    /// Name with unit, such as `force_N`.
+    pub(crate) name: &'static str,
+    /// Whether the record is refused without it.
+    pub(crate) required: bool,
+}
+
+/// Columns of equal length, in the order wanted, in the units of their names.
+#[derive(Debug, Clone)]
+pub(crate) struct Signals {
+    /// Name of the file as its user knows it.
+    pub(crate) shown_as: String,
+    /// Line of each sample.
+    pub(crate) lines: Vec<usize>,
+    /// Values; none for a column that the file does not have.
+    pub(crate) columns: Vec<Option<Vec<f64>>>,
+}
+
+/// Fewer samples are no record.
+const MIN_SAMPLES: usize = 8;
+
+/// Reads the `wanted` columns. Time, if wanted, is the first one; it must rise.
+pub(crate) fn read(path: &Path, shown_as: &str, wanted: &[Wanted]) -> Result<Signals, Vec<Diagnostic>> {
+    parse(&read_file(path, shown_as)?, shown_as, wanted)
+}
+
+/// The same from the text of a file.
+pub(crate) fn parse(text: &str, shown_as: &str, wanted: &[Wanted]) -> Result<Signals, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    let parsed = parse_into(text, shown_as, wanted, &mut findings);
+    match parsed {
+        Some(signals) if !findings.any_error() => Ok(signals),
+        _ => Err(findings.into_diagnostics()),
+    }
+}
+
+fn parse_into(text: &str, shown_as: &str, wanted: &[Wanted], findings: &mut Findings) -> Option<Signals> {
+    let mut reader =
+        csv::ReaderBuilder::new().flexible(true).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+    let header = match reader.headers() {
+        Ok(header) => header.clone(),
+        Err(e) => {
+            findings.error("E0504", Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
+            return None;
+        }
+    };
+    let header_line = header.position().map_or(1, |p| p.line() as usize);
+    let places: Vec<Option<usize>> =
+        wanted.iter().map(|w| locate(&header, *w, wanted, header_line, findings)).collect();
+    if findings.any_error() {
+        return None;
+    }
+    let mut lines = Vec::new();
+    let mut columns: Vec<Option<Vec<f64>>> = places.iter().map(|p| p.map(|_| Vec::new())).collect();
+    for row in reader.records() {
+        match row {
+            Ok(row) => {
+                let line = row.position().map_or(0, |p| p.line() as usize);
+                lines.push(line);
+                for ((column, place), w) in columns.iter_mut().zip(&places).zip(wanted) {
+                    if let (Some(values), Some(at)) = (column, place) {
+                        values.push(number(row.get(*at), line, w.name, findings));
+                    }
+                }
+            }
+            Err(e) => {
+                let line = e.position().map(|p| p.line() as usize);
+                findings.error("E0506", line, format!("cannot be read as CSV: {e}"), "write plain CSV");
+            }
+        }
+    }
+    if lines.len() < MIN_SAMPLES {
+        let message = format!("has {} samples; at least {MIN_SAMPLES} are needed", lines.len());
+        findings.error("E0509", None, message, "record more samples");
+    } else if let (Some(Some(time)), true, false) = (columns.first(), wanted[0].name == "time_s", findings.any_error())
+    {
+        sanity::check_time(&lines, time, findings);
+    }
+    Some(Signals { shown_as: shown_as.to_owned(), lines, columns })
+}
+
+fn locate(
+    header: &csv::StringRecord,
+    wanted: Wanted,
+    all: &[Wanted],
+    line: usize,
+    findings: &mut Findings,
+) -> Option<usize> {
+    let matching: Vec<usize> =
+        (0..header.len()).filter(|&i| header[i].trim().eq_ignore_ascii_case(wanted.name)).collect();
+    match matching[..] {
+        [only] => return Some(only),
+        [first, second, ..] => {
+            let message =
+                format!("column `{}` appears twice, as columns {} and {}", wanted.name, first + 1, second + 1);
+            findings.error("E0505", Some(line), message, "keep one of them");
+            return None;
+        }
+        [] => {}
+    }
+    if wanted.required {
+        let present: Vec<String> = header.iter().map(|h| format!("`{}`", h.trim())).collect();
+        let message = format!("column `{}` is missing; the header has {}", wanted.name, present.join(", "));
+        let names: Vec<&str> = all.iter().map(|w| w.name).collect();
+        let help = format!("name the columns with their units: {}", names.join(","));
+        findings.error("E0504", Some(line), message, &help);
+    }
+    None
+}
+
+impl Signals {
+    /// A column that was required; empty if it was not.
+    pub(crate) fn column(&self, k: usize) -> &[f64] {
+        self.columns.get(k).and_then(Option::as_deref).unwrap_or(&[])
+    }
+
+    /// Where a sample is, for messages: its time if column 0 holds times, else its line.
+    pub(crate) fn place(&self, k: usize) -> String {
+        match self.columns.first().and_then(Option::as_ref).and_then(|t| t.get(k)) {
+            Some(t) => format!("{t} s"),
+            None => format!("line {}", self.lines.get(k).copied().unwrap_or(0)),
+        }
+    }
+
+    /// Refuses a column that never changes, or that stands exactly still while `input` travels 5 % of its range.
+    pub(crate) fn check_moves(&self, input: usize, output: usize, names: [&str; 2], findings: &mut Findings) {
+        for (which, name) in [input, output].into_iter().zip(names) {
+            let (low, high) = sanity::extent(self.column(which));
+            if low >= high {
+                let message = format!(
+                    "`{name}` is {low} in every sample, from {} to {}",
+                    self.place(0),
+                    self.place(self.lines.len() - 1)
+                );
+                findings.error(
+                    "E0512",
+                    None,
+                    message,
+                    "record while it runs through its range; is the channel connected?",
+                );
+                return;
+            }
+        }
+        let (x, y) = (self.column(input), self.column(output));
+        let (low, high) = sanity::extent(x);
+        let (bottom, top) = sanity::extent(y);
+        let mut first = 0;
+        while first < y.len() {
+            let run = y[first..].iter().take_while(|v| **v == y[first]).count();
+            let (a, b) = sanity::extent(&x[first..first + run]);
+            if run > 2 && b - a > 0.05 * (high - low) {
+                let what = if y[first] == bottom || y[first] == top { "is limited at" } else { "is stuck at" };
+                let message = format!(
+                    "from {} to {} `{}` {what} {} for {run} samples while `{}` goes through {a} to {b}",
+                    self.place(first),
+                    self.place(first + run - 1),
+                    names[1],
+                    y[first],
+                    names[0]
+                );
+                findings.error(
+                    "E0513",
+                    Some(self.lines[first]),
+                    message,
+                    "check the range and the connection of that channel; record again within its range",
+                );
+            }
+            first += run;
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! Reads a table of poses: a CSV file whose columns name axis and unit, such as `x_um` and `theta_z_urad`.
+//!
+//! Rows stand at the fixed period that the spec gives. A column `time_s` (or `time_ms`, `time_us`) may be there; it is then
+//! checked against that period, so that a table played at the wrong speed is found. Axes without a column stay at 0.
+//! Every problem of the file is reported in one run.
+
+use std::path::Path;
+
+use crate::findings::Findings;
+use specgen_language::diagnostic::{Diagnostic, codes};
+
+/// More rows are refused: a table lies in the flash of a microcontroller.
+pub const MAX_ROWS: usize = 65_536;
+
+/// Names of the axes in column names.
+const AXES: [&str; 6] = ["x", "y", "z", "theta_x", "theta_y", "theta_z"];
+const LENGTHS: [(&str, f64); 4] = [("nm", 1e-9), ("um", 1e-6), ("mm", 1e-3), ("m", 1.0)];
+const ANGLES: [(&str, f64); 4] = [("nrad", 1e-9), ("urad", 1e-6), ("mrad", 1e-3), ("rad", 1.0)];
+const TIMES: [(&str, f64); 3] = [("us", 1e-6), ("ms", 1e-3), ("s", 1.0)];
+/// What a time column may deviate from the period, of the period: times are written with few digits.
+const TIME_SLACK: f64 = 1e-3;
+
+/// A table of poses, each finite, at least two.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Waveform {
+    /// Name of the file as its user knows it.
+    pub shown_as: String,
+    /// Line of each row.
+    pub lines: Vec<usize>,
+    /// x, y, z (m), θx, θy, θz (rad) of each row.
+    pub rows: Vec<[f64; 6]>,
+}
+
+/// The text of a waveform file.
+///
+/// # Errors
+/// A finding if it is no regular file, cannot be read, is too large or not UTF-8.
+pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>> {
+    crate::read_file(path, shown_as)
+}
+
+/// A waveform from the text of its file, whose rows are `period` (s) apart.
+///
+/// # Errors
+/// All findings of the file.
+pub fn parse(text: &str, shown_as: &str, period: f64) -> Result<Waveform, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    match parse_rows(text, shown_as, period, &mut findings) {
+        Some(waveform) if !findings.any_error() => Ok(waveform),
+        _ => Err(findings.into_diagnostics()),
+    }
+}
+
+/// What a column holds, and the size of its unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Column {
+    Time(f64),
+    Axis(usize, f64),
+}
+
+fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) -> Option<Waveform> {
+    let mut reader =
+        csv::ReaderBuilder::new().flexible(true).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+    let header = match reader.headers() {
+        Ok(header) if header.iter().any(|name| !name.is_empty()) => header.clone(),
+        Ok(_) => {
+            findings.error(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
+            return None;
+        }
+        Err(error) => {
+            let message = format!("the header cannot be read: {error}");
+            findings.error(codes::WAVEFORM_HEADER, Some(1), message, "write plain CSV");
+            return None;
+        }
+    };
+    let columns = columns(&header, findings)?;
+    let mut waveform = Waveform { shown_as: shown_as.to_owned(), lines: Vec::new(), rows: Vec::new() };
+    let mut times = Vec::new();
+    for record in reader.records() {
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                let line = error.position().map(|p| p.line() as usize);
+                let message = format!("cannot be read as CSV: {error}");
+                findings.error(codes::WAVEFORM_VALUE, line, message, "write plain CSV");
+                continue;
+            }
+        };
+        let line = record.position().map_or(0, |p| p.line() as usize);
+        let mut row = [0.0; 6];
+        for (place, column) in columns.iter().enumerate() {
+            let Some(value) = number(record.get(place), line, header.get(place).unwrap_or_default(), findings) else {
+                continue;
+            };
+            match *column {
+                Column::Time(unit) => times.push((line, value * unit)),
+                Column::Axis(axis, unit) => row[axis] = value * unit,
+            }
+        }
+        if record.len() > columns.len() {
+            let message = format!("has {} values, expected {}", record.len(), columns.len());
+            findings.error(
+                codes::WAVEFORM_VALUE,
+                Some(line),
+                message,
+                "one value to each column, a point as decimal sign",
+            );
+        }
+        waveform.lines.push(line);
+        waveform.rows.push(row);
+    }
+    check_times(&times, period, findings);
+    let count = waveform.rows.len();
+    if !(2..=MAX_ROWS).contains(&count) {
+        let message = format!("has {count} rows, expected 2 to {MAX_ROWS}");
+        findings.error(codes::WAVEFORM_LENGTH, None, message, "sample more coarsely: rows are joined by cubic splines");
+    }
+    Some(waveform)
+}
+
+const EXPECTED: &str = "name the columns by axis and unit in the first line, such as `x_um,y_um,z_um,theta_x_urad`";
+
+/// What each column holds, or `None` after every problem of the header was reported.
+fn columns(header: &csv::StringRecord, findings: &mut Findings) -> Option<Vec<Column>> {
+    let line = Some(header.position().map_or(1, |p| p.line() as usize));
+    let mut found: Vec<Column> = Vec::new();
+    for (place, name) in header.iter().enumerate() {
+        match column(name) {
+            Ok(column) => {
+                let same = |other: &Column| match (other, &column) {
+                    (Column::Time(_), Column::Time(_)) => true,
+                    (Column::Axis(a, _), Column::Axis(b, _)) => a == b,
+                    _ => false,
+                };
+                if let Some(first) = found.iter().position(same) {
+                    let message =
+                        format!("columns {} and {} (`{name}`) hold the same coordinate", first + 1, place + 1);
+                    findings.error(codes::WAVEFORM_HEADER, line, message, "keep one of them");
+                }
+                found.push(column);
+            }
+            Err(help) => {
+                let message = format!("`{name}` is no column of a table of poses");
+                findings.error(codes::WAVEFORM_HEADER, line, message, &help);
+            }
+        }
+    }
+    if findings.any_error() {
+        return None;
+    }
+    if found.iter().all(|column| matches!(column, Column::Time(_))) {
+        findings.error(codes::WAVEFORM_HEADER, line, "has no coordinate".to_owned(), EXPECTED);
+        return None;
+    }
+    Some(found)
+}
+
+/// A column by its name, or how to mend the name.
+fn column(name: &str) -> Result<Column, String> {
+    let lower = name.to_ascii_lowercase();
+    let (quantity, unit) = lower.rsplit_once('_').unwrap_or((lower.as_str(), ""));
+    let size = |units: &[(&str, f64)]| units.iter().find(|(name, _)| *name == unit).map(|(_, size)| *size);
+    let names = |units: &[(&str, f64)]| {
+        let all: Vec<String> = units.iter().map(|(unit, _)| format!("`{quantity}_{unit}`")).collect();
+        format!("the unit is part of the name: {}", all.join(", "))
+    };
+    // `theta_x` alone is an axis without its unit, not a quantity `theta` in a unit x.
+    if let Some(axis) = AXES.iter().position(|axis| *axis == lower) {
+        return Err(format!("the unit is part of the name: `{name}_{}`", if axis < 3 { "um" } else { "urad" }));
+    }
+    if quantity == "time" || quantity == "t" {
+        return size(&TIMES).map(Column::Time).ok_or_else(|| names(&TIMES));
+    }
+    if let Some(axis) = AXES.iter().position(|axis| *axis == quantity) {
+        let units = if axis < 3 { &LENGTHS } else { &ANGLES };
+        return size(units).map(|unit| Column::Axis(axis, unit)).ok_or_else(|| names(units));
+    }
+    Err(EXPECTED.to_owned())
+}
+
+/// The number in a field, or `None` after the problem was reported.
+fn number(field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> Option<f64> {
+    let Some(field) = field else {
+        let message = format!("`{name}` is missing: the line is too short");
+        findings.error(codes::WAVEFORM_VALUE, Some(line), message, "complete or delete the line");
+        return None;
+    };
+    match field.parse::<f64>() {
+        Ok(value) if value.is_finite() => Some(value),
+        Ok(_) => {
+            let message = format!("`{name}` is `{field}`, not a finite number");
+            findings.error(codes::WAVEFORM_VALUE, Some(line), message, "give every row a value");
+            None
+        }
+        Err(_) => {
+            let shown: String = field.chars().take(40).collect();
+            let message = format!("`{name}` is `{shown}`, which is not a number");
+            let help = "write a plain number with a decimal point, such as -12.5e-3";
+            findings.error(codes::WAVEFORM_VALUE, Some(line), message, help);
+            None
+        }
+    }
+}
+
+/// Times rise by the period from row to row.
+fn check_times(times: &[(usize, f64)], period: f64, findings: &mut Findings) {
+    for pair in times.windows(2) {
+        let (line, step) = (pair[1].0, pair[1].1 - pair[0].1);
+        if step <= 0.0 {
+            let message = format!("the time does not rise: it changes by {:.6} ms", step * 1e3);
+            findings.error(codes::WAVEFORM_TIME, Some(line), message, "order the rows by time, each once");
+        } else if (step - period).abs() > TIME_SLACK * period {
+            let message =
+                format!("the time rises by {:.6} ms, the spec's period is {:.6} ms", step * 1e3, period * 1e3);
+            let help = "sample at a fixed period and give that as trajectory.period";
+            findings.error(codes::WAVEFORM_TIME, Some(line), message, help);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(text: &str) -> Vec<String> {
+        let found = parse(text, "w.csv", 1e-3).unwrap_err();
+        found.into_iter().map(|d| format!("{} {:?} {} / {}", d.code, d.place, d.message, d.help)).collect()
+    }
+
+    #[test]
+    fn columns_may_come_in_any_order_and_unit_and_missing_axes_rest() {
+        let text = "\u{feff}".to_owned() + "# a table\ntime_ms, THETA_Z_mrad ,x_um\n0,0.5,-1\n1,0,2.5e1\n";
+        let waveform = parse(text.trim_start_matches('\u{feff}'), "w.csv", 1e-3).unwrap();
+        assert_eq!(waveform.lines, [3, 4]);
+        assert_eq!(waveform.rows, [[-1e-6, 0.0, 0.0, 0.0, 0.0, 0.5e-3], [25.0 * 1e-6, 0.0, 0.0, 0.0, 0.0, 0.0]]);
+    }
+
+    #[test]
+    fn a_bad_header_is_told_how_to_be_mended() {
+        assert!(refused("")[0].contains("is empty"));
+        assert!(refused("x_um,x_nm\n1,2\n")[0].contains("hold the same coordinate"));
+        assert!(refused("x_um,theta_x_deg\n")[0].contains("`theta_x_rad`"));
+        assert!(refused("x_um,z_V\n")[0].contains("`z_um`"));
+        assert!(refused("theta_x\n")[0].contains("`theta_x_urad`"));
+        assert!(refused("pitch\n")[0].contains("no column of a table"));
+        assert!(refused("1.0,2.0\n1,2\n")[0].contains("first line"));
+        assert!(refused("time_s\n1\n2\n")[0].contains("no coordinate"));
+    }
+
+    #[test]
+    fn bad_values_are_named_by_line() {
+        let found = refused("x_um,y_um\n1,2\nNaN,2\n1\n1,2,3\n1,a\n1,inf\n");
+        let lines: Vec<bool> = (3..=7).map(|line| found.iter().any(|f| f.contains(&format!("Some({line})")))).collect();
+        assert_eq!(lines, [true; 5], "{found:#?}");
+        assert!(refused("x_um\n1\n")[0].contains("has 1 rows"));
+    }
+
+    #[test]
+    fn a_time_column_must_rise_by_the_period() {
+        assert!(parse("time_ms,x_um\n0,1\n1,2\n2.0005,3\n", "w.csv", 1e-3).is_ok());
+        assert!(refused("time_ms,x_um\n0,1\n1,2\n1,3\n")[0].contains("does not rise"));
+        assert!(refused("time_s,x_um\n0,1\n1,2\n")[0].contains("the spec's period is 1.000000 ms"));
+    }
+}

@@ -1,0 +1,94 @@
+//! What the compiler tells its user about the spec file or a record.
+
+pub mod codes;
+mod json;
+mod position;
+mod render;
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::ops::Range;
+
+pub use json::to_json;
+pub use render::render;
+
+/// How bad a finding is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Worth knowing; nothing is refused.
+    Note,
+    /// Probably wrong; nothing is refused.
+    Warning,
+    /// Refused: nothing is generated.
+    Error,
+}
+
+/// Where a finding is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// Byte range in the spec file.
+    Spec(Range<usize>),
+    /// A line (counted from 1) of a data file named in the spec, or the whole file.
+    File {
+        /// Path as the spec names it.
+        path: String,
+        /// Line, counted from 1, if one line is to blame.
+        line: Option<usize>,
+    },
+    /// The run as a whole (a missing file, an output folder).
+    Whole,
+}
+
+/// One finding: what is wrong, where, and how to mend it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// How bad.
+    pub severity: Severity,
+    /// Stable code such as `E0102`, documented in `docs/diagnostics.md`.
+    pub code: &'static str,
+    /// Key path such as `actuator.voltage[1]`, empty if no key is to blame.
+    pub key: String,
+    /// Where.
+    pub place: Place,
+    /// What is wrong, with the value found and what was expected.
+    pub message: String,
+    /// How to mend it.
+    pub help: String,
+}
+
+impl Diagnostic {
+    /// A finding at the first of `keys` that stands in the spec, by its `spans`; at none of them, about the whole spec
+    /// and under the first.
+    #[must_use]
+    pub fn at(
+        spans: &BTreeMap<String, Range<usize>>,
+        keys: &[&str],
+        (severity, code): (Severity, &'static str),
+        message: String,
+        help: String,
+    ) -> Self {
+        let found = keys.iter().find_map(|key| spans.get(*key).map(|span| (*key, Place::Spec(span.clone()))));
+        let (key, place) = found.unwrap_or_else(|| (keys.first().copied().unwrap_or_default(), Place::Whole));
+        Self { severity, code, key: key.to_owned(), place, message, help }
+    }
+}
+
+const MARKDOWN_HEAD: &str = "\
+<!-- Generated from the registry in codegen/language/src/diagnostic/codes.rs; do not edit. -->
+
+# Findings
+
+Every finding has a code that keeps its meaning. E: refused, nothing is written. W: pointed out, nothing is refused. N: worth
+knowing.
+";
+
+/// The registry of codes as Markdown; `docs/diagnostics.md` is this text.
+#[must_use]
+pub fn reference_markdown() -> String {
+    let mut text = MARKDOWN_HEAD.to_owned();
+    for code in codes::REGISTRY {
+        // Writing to a String cannot fail.
+        let _ = write!(text, "\n## {}: {}\n\n{}\n", code.id, code.title, code.explanation);
+    }
+    text
+}

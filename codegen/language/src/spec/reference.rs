@@ -1,0 +1,100 @@
+//! The reference of the spec language, printed from the key table; `docs/spec-reference.md` is this text.
+
+use std::fmt::Write as _;
+
+use super::keys::{Key, Kind, Presence, SECTIONS, Shape};
+use super::messages::range_of;
+
+const HEAD: &str = "\
+<!-- Generated from the key table in codegen/language/src/spec/keys/table.rs; do not edit. -->
+
+# Spec reference
+
+A spec is one TOML file. A value with a dimension is a text with number and unit: `\"1.195 kg\"`, `\"3.26e7 g mm^2\"`,
+`\"0.012 pi rad\"`, `\"40 V/ms\"`, `\"12 N m/rad\"`. Units are m, g, s, min, V, N, Hz, rad, deg, arcmin, arcsec, Pa, J, W, A, F and B
+with the prefixes f p n u (also µ) m c d k M G T; bytes take k M G T and Ki Mi Gi. A space, `*` or `·` multiplies,
+`/` divides by the one unit that follows (group several: `N/(m s)`), `^` raises to a power.
+Radians count as a unit: a rotational stiffness is in N m/rad, a bandwidth in rad/s and not in Hz.
+A conversion to SI rounds once, so that `\"150 mm\"` is the double nearest to 0.15.
+
+The column *example* shows the form of a value with its unit; any other unit of the same dimension will do. Ranges are those of a single
+value; `docs/diagnostics.md` lists what is checked across values, and a finding names the keys that it is about.
+File names are relative to the spec and use forward slashes.
+";
+
+/// The reference as Markdown.
+#[must_use]
+pub fn reference_markdown() -> String {
+    let mut text = HEAD.to_owned();
+    for section in SECTIONS {
+        let title = if section.name.is_empty() { "Before the first section".to_owned() } else { section.header() };
+        let optional = if section.kind == Kind::Optional {
+            " Optional; if it is there, it has every key without a default."
+        } else {
+            ""
+        };
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "\n## {title}\n\n{}{optional}\n\n| key | example | range | if left out | meaning |\n| --- | --- | --- | --- | --- |\n",
+            section.doc
+        );
+        for key in section.keys {
+            let _ = writeln!(
+                text,
+                "| `{}` | {} | {} | {} | {}{} |",
+                key.name,
+                form(key),
+                range(key),
+                absence(key),
+                symbol(key),
+                key.doc
+            );
+        }
+    }
+    text
+}
+
+fn form(key: &Key) -> String {
+    match key.shape {
+        Shape::One(_) | Shape::Records => format!("`{}`", key.example),
+        Shape::List(items) if items.len() > 3 => {
+            format!("{} values, `{}`", items.len(), key.example)
+        }
+        Shape::List(_) | Shape::Leading(..) => format!("`{}`", key.example),
+        Shape::Rows(count, items) => format!("{count} rows of {} values, `{}`", items.len(), key.example),
+    }
+}
+
+fn range(key: &Key) -> String {
+    match key.shape {
+        Shape::One(item) => range_of(item),
+        Shape::List(items) | Shape::Rows(_, items) => {
+            let mut ranges: Vec<String> = items.iter().map(|item| range_of(*item)).collect();
+            ranges.dedup();
+            format!("each {}", ranges.join(", then "))
+        }
+        Shape::Leading(least, items) => {
+            let mut ranges: Vec<String> = items.iter().map(|item| range_of(*item)).collect();
+            ranges.dedup();
+            let each = if ranges.len() == 1 { "each " } else { "" };
+            format!("{least} to {} values: {each}{}", items.len(), ranges.join(", then "))
+        }
+        Shape::Records => "1 or 6 files".to_owned(),
+    }
+}
+
+fn absence(key: &Key) -> String {
+    match key.presence {
+        Presence::Required => "error".to_owned(),
+        Presence::Default(literal) => format!("`{literal}`"),
+        Presence::Optional => "no check".to_owned(),
+        Presence::InsteadOf(other) => format!("see `{other}`"),
+        Presence::Form(form) => format!("error, unless in another form than {form}"),
+        Presence::Rule(rule) => rule.to_owned(),
+    }
+}
+
+fn symbol(key: &Key) -> String {
+    if key.symbol.is_empty() { String::new() } else { format!("{}: ", key.symbol) }
+}

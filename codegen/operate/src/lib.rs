@@ -1,0 +1,19 @@
+//! A host that operates a machine over the link: commands in, requests out, and the link kept alive in between.
+//!
+//! ```text
+//! line ─► Order ─► Session ─ link ─► device (a board at a serial port, a program at a socket)
+//!                     └─ status, every 20 ms: after 0.1 s of silence a device holds
+//! ```
+
+pub mod doctor;
+mod order;
+pub mod pil;
+pub mod served;
+mod session;
+mod socket;
+mod wave;
+
+pub use order::{Order, Until};
+pub use session::{ALIVE, Session};
+pub use socket::SocketLine;
+pub use wave::{read_wave, refused_wave};

@@ -1,0 +1,299 @@
+//! A figure for each kind of identification.
+
+use crate::plot::{BLUE, GREY, Mark, ORANGE, PURPLE, Panel, Patch, Scale, figure};
+use specgen_identify::gauge::GaugeReport;
+use specgen_identify::linear::LinearReport;
+use specgen_identify::response::ResponseReport;
+use specgen_identify::stiffness::StiffnessReport;
+use specgen_identify::{GridChoice, Identified, Record, Trace, Validation};
+
+/// Colours of several records.
+const COLORS: [&str; 4] = [BLUE, ORANGE, PURPLE, GREY];
+
+fn micrometres(trace: &Trace, model: bool) -> Vec<[f64; 2]> {
+    let value = |k: usize| if model { trace.measured[k] - trace.residual[k] } else { trace.measured[k] };
+    (0..trace.time.len()).map(|k| [trace.drive[k], value(k) * 1e6]).collect()
+}
+
+fn residual(title: &str, trace: &Trace) -> Panel {
+    let points = trace.time.iter().zip(&trace.residual).map(|(t, r)| [*t, r * 1e9]).collect();
+    Panel::new(title, "time (s)", "measured − model (nm)").with("", PURPLE, Mark::Line(0.8), points)
+}
+
+/// Loops against the model, residual, Preisach plane with what was not excited hatched, and the choice of the grid or the
+/// validation if there is one.
+#[must_use]
+pub fn everett(identified: &Identified, choice: Option<&GridChoice>, validation: Option<&Validation>) -> String {
+    let (report, trace) = (&identified.report, &identified.trace);
+    let loops = Panel::new("Loops", "drive (V)", "displacement (µm)")
+        .with("measured", BLUE, Mark::Line(2.2), micrometres(trace, false))
+        .with("model", ORANGE, Mark::Line(0.9), micrometres(trace, true));
+    let mut panels = vec![
+        loops,
+        residual(
+            &format!("Residual of the fit: {:.2} nm rms, mainly {}", report.fit_rms * 1e9, report.cause.main.name()),
+            trace,
+        ),
+        plane(identified),
+    ];
+    if let Some(choice) = choice {
+        panels.push(curve(choice));
+    }
+    if let Some(validation) = validation {
+        panels.push(residual(
+            &format!("Residual of {}: {:.3} % rms", shortened(&validation.record), validation.best.rms_percent),
+            &validation.trace,
+        ));
+    }
+    let subtitle = format!(
+        "N = {}; fit {:.3} % of {:.2} µm; noise {:.2} nm; drift {:.3} nm/s; dead time {:.3} ms; {:.1} % of the plane excited",
+        report.grid,
+        report.fit_rms_percent,
+        report.displacement_range * 1e6,
+        report.noise_floor * 1e9,
+        report.drift * 1e9,
+        report.dead_time * 1e3,
+        report.excited_share * 100.0
+    );
+    figure(&format!("Everett table of {}", shortened(&report.record)), &subtitle, &panels, 2)
+}
+
+/// The end of a long path.
+fn shortened(name: &str) -> &str {
+    name.rsplit(['/', '\\']).next().unwrap_or(name)
+}
+
+fn plane(identified: &Identified) -> Panel {
+    let table = &identified.table;
+    let mut panel = Panel::new("Preisach plane: weight of the cells", "down_threshold (V)", "up_threshold (V)");
+    let mut largest = 0.0;
+    for up in 2..=table.grid {
+        for down in 0..up - 1 {
+            let weight = table.weight(up, down);
+            largest = if weight > largest { weight } else { largest };
+        }
+    }
+    let cell = |up: usize, down: usize, shade: Option<f64>| Patch {
+        x: [table.threshold(down), table.threshold(down + 1)],
+        y: [table.threshold(up - 1), table.threshold(up)],
+        shade,
+    };
+    for up in 1..=table.grid {
+        for down in 0..up {
+            // The diagonal holds the reversible part, many times heavier.
+            let share = if down + 1 == up || largest <= 0.0 { 1.0 } else { table.weight(up, down) / largest };
+            // A weight of zero may come out of the nodes a rounding below it.
+            panel.patches.push(cell(up, down, Some(if share > 0.0 { share.sqrt() } else { 0.0 })));
+        }
+    }
+    for (up, down) in identified.report.unexcited.iter().flat_map(|r| &r.members) {
+        panel.patches.push(cell(*up, *down, None));
+    }
+    let share = 100.0 * (1.0 - identified.report.excited_share);
+    panel.hatched = Some(if share > 0.0 {
+        format!("not excited: {share:.1} % of the cells")
+    } else {
+        "not excited: none".to_owned()
+    });
+    let ends = [[table.drive_min; 2], [table.drive_max; 2]];
+    panel.with("up = down", GREY, Mark::Line(1.0), ends.to_vec())
+}
+
+fn curve(choice: &GridChoice) -> Panel {
+    let points: Vec<[f64; 2]> = choice.scores.iter().map(|s| [s.grid as f64, s.held_out_rms * 1e9]).collect();
+    let chosen = points.iter().copied().filter(|p| p[0] == choice.chosen as f64).collect();
+    let mut bars = Vec::new();
+    for s in &choice.scores {
+        let x = s.grid as f64;
+        bars.push([x, (s.held_out_rms - s.standard_error) * 1e9]);
+        bars.push([x, (s.held_out_rms + s.standard_error) * 1e9]);
+        bars.push([f64::NAN; 2]);
+    }
+    Panel::new(&format!("Curves held out: N = {} chosen", choice.chosen), "grid N", "held-out error (nm rms)")
+        .with("standard error to the best", GREY, Mark::Line(1.0), bars)
+        .with("error", BLUE, Mark::Line(1.5), points)
+        .with("chosen", ORANGE, Mark::Dots(5.0), chosen)
+}
+
+/// Loops with their lines, and gain over frequency. `records` in the order in which they were named.
+#[must_use]
+pub fn linear(report: &LinearReport, records: &[Record]) -> String {
+    let mut loops = Panel::new("Y = ρX + δ", "drive (V)", "displacement (µm)");
+    let mut rest = Panel::new("Distance from the line", "drive (V)", "Y − ρX − δ (nm)");
+    for (k, relation) in report.relations.iter().enumerate() {
+        let Some(record) = records.iter().find(|r| r.shown_as == relation.record) else { continue };
+        let inside: Vec<usize> = (0..record.time.len())
+            .filter(|&i| record.time[i] >= relation.span[0] && record.time[i] <= relation.span[1])
+            .collect();
+        let color = COLORS[k % COLORS.len()];
+        let name = format!("{:.4} Hz", relation.frequency);
+        let points = inside.iter().map(|&i| [record.drive[i], record.displacement[i] * 1e6]).collect();
+        loops = loops.with(&name, color, Mark::Line(1.2), points);
+        let off = |i: usize| record.displacement[i] - relation.gain * record.drive[i] - relation.offset;
+        rest =
+            rest.with(&name, color, Mark::Line(1.0), inside.iter().map(|&i| [record.drive[i], off(i) * 1e9]).collect());
+        let (low, high) = specgen_identify::extent(&inside.iter().map(|&i| record.drive[i]).collect::<Vec<_>>());
+        let at = |u: f64| [u, (relation.gain * u + relation.offset) * 1e6];
+        loops = loops.with("", color, Mark::Dashed(1.0), vec![at(low), at(high)]);
+    }
+    let gains: Vec<[f64; 2]> = report.relations.iter().map(|r| [r.frequency, r.gain * 1e6]).collect();
+    let mut bars = Vec::new();
+    for r in &report.relations {
+        bars.push([r.frequency, (r.gain - 2.0 * r.gain_error) * 1e6]);
+        bars.push([r.frequency, (r.gain + 2.0 * r.gain_error) * 1e6]);
+        bars.push([f64::NAN; 2]);
+    }
+    let reference = vec![[report.reference_frequency, report.reference_gain * 1e6]];
+    let mut gain = Panel::new("Gain over frequency", "frequency (Hz)", "ρ (µm/V)")
+        .with("± 2 standard errors", GREY, Mark::Line(1.5), bars)
+        .with("ρ", BLUE, Mark::Dots(3.5), gains)
+        .with("reference ρ̂", ORANGE, Mark::Dots(5.0), reference);
+    gain.x_scale = Scale::Log;
+    let widths: Vec<[f64; 2]> = report.relations.iter().map(|r| [r.frequency, r.loop_percent]).collect();
+    let mut width =
+        Panel::new("Loop width", "frequency (Hz)", "width (% of range)").with("", BLUE, Mark::Dots(3.5), widths);
+    width.x_scale = Scale::Log;
+    let subtitle = format!(
+        "reference gain {:.5} µm/V at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4}",
+        report.reference_gain * 1e6,
+        report.reference_frequency,
+        report.gain_ratio[0],
+        report.gain_ratio[1]
+    );
+    figure("Linear relation of displacement and drive", &subtitle, &[loops, rest, gain, width], 2)
+}
+
+/// Magnitude, phase and coherence, with the fitted model.
+#[must_use]
+pub fn response(report: &ResponseReport) -> String {
+    let shown: Vec<_> = report
+        .bins
+        .iter()
+        .filter(|b| b.frequency > 0.0 && b.frequency >= 0.5 * report.band[0] && b.frequency <= 1.1 * report.band[1])
+        .collect();
+    let inside = |f: f64| f >= report.band[0] && f <= report.band[1];
+    let modelled: Vec<(f64, f64, f64)> = shown
+        .iter()
+        .filter(|b| inside(b.frequency))
+        .map(|b| {
+            let (size, phase) = specgen_identify::response::response(&report.fitted, b.frequency);
+            (b.frequency, size, phase)
+        })
+        .collect();
+    let hatched: Vec<[f64; 2]> = report.left_out.iter().map(|b| [b.low, b.high]).collect();
+    let logarithmic = |mut panel: Panel, range: [f64; 2]| {
+        panel.x_scale = Scale::Log;
+        panel.patches = hatched.iter().map(|x| Patch { x: *x, y: range, shade: None }).collect();
+        panel.hatched = (!hatched.is_empty()).then(|| "left out".to_owned());
+        panel
+    };
+    let size = |h: [f64; 2]| libm::hypot(h[0], h[1]) * 1e6;
+    let sizes: Vec<f64> =
+        shown.iter().filter(|b| inside(b.frequency)).map(|b| size(b.h)).filter(|s| *s > 0.0).collect();
+    let range = specgen_identify::extent(&sizes);
+    let mut magnitude = logarithmic(Panel::new("Magnitude", "frequency (Hz)", "|H| (µm/V)"), [range.0, range.1])
+        .with(
+            "measured H1",
+            BLUE,
+            Mark::Dots(1.6),
+            shown.iter().filter(|b| inside(b.frequency)).map(|b| [b.frequency, size(b.h)]).collect(),
+        )
+        .with("model", ORANGE, Mark::Line(1.6), modelled.iter().map(|m| [m.0, m.1 * 1e6]).collect());
+    magnitude.y_scale = Scale::Log;
+    // The measured phase is shown on the sheet nearest to the model's, which does not jump.
+    let turn = |b: &&specgen_identify::response::Bin| {
+        let (_, phase) = specgen_identify::response::response(&report.fitted, b.frequency);
+        let off = libm::atan2(b.h[1], b.h[0]) - phase;
+        let off = off - std::f64::consts::TAU * libm::rint(off / std::f64::consts::TAU);
+        [b.frequency, (phase + off).to_degrees()]
+    };
+    let lowest = modelled.iter().fold(0.0, |m, p| if p.2 < m { p.2 } else { m }).to_degrees();
+    let phase = logarithmic(Panel::new("Phase", "frequency (Hz)", "phase (°)"), [lowest, 0.0])
+        .with("measured H1", BLUE, Mark::Dots(1.6), shown.iter().filter(|b| inside(b.frequency)).map(turn).collect())
+        .with("model", ORANGE, Mark::Line(1.6), modelled.iter().map(|m| [m.0, m.2.to_degrees()]).collect());
+    let mut coherence = logarithmic(Panel::new("Coherence", "frequency (Hz)", "γ²"), [0.0, 1.05]).with(
+        "",
+        PURPLE,
+        Mark::Line(1.0),
+        shown.iter().map(|b| [b.frequency, b.coherence]).collect(),
+    );
+    coherence.y_limits = Some([0.0, 1.05]);
+    let f = &report.fitted;
+    let subtitle = format!(
+        "resonance {:.2} ± {:.1e} Hz; ζ {:.4} ± {:.1e}; lag {:.4} ± {:.1e} ms; dead time {:.4} ± {:.1e} ms; gain {:.5} µm/V; {} segments of {}",
+        f.resonance.value,
+        f.resonance.error,
+        f.damping_ratio.value,
+        f.damping_ratio.error,
+        f.lag.value * 1e3,
+        f.lag.error * 1e3,
+        f.dead_time.value * 1e3,
+        f.dead_time.error * 1e3,
+        f.gain.value * 1e6,
+        report.segments,
+        report.segment
+    );
+    figure(
+        &format!("Frequency response of {}", shortened(&report.record)),
+        &subtitle,
+        &[magnitude, phase, coherence],
+        2,
+    )
+}
+
+/// Calibration and its residual.
+#[must_use]
+pub fn gauge(report: &GaugeReport) -> String {
+    let value = |v: f64| report.coefficients.iter().rev().fold(0.0, |sum, c| sum * v + c);
+    let [low, high] = report.volts;
+    let line = (0..=200).map(|k| low + (high - low) * f64::from(k) / 200.0).map(|v| [v, value(v) * 1e6]).collect();
+    let measured: Vec<[f64; 2]> = report.points.iter().map(|p| [p[0], (value(p[0]) + p[1]) * 1e6]).collect();
+    let calibration = Panel::new("Calibration", "gauge (V)", "reference (µm)")
+        .with("measured", BLUE, Mark::Dots(2.0), measured)
+        .with(&format!("polynomial of degree {}", report.degree), ORANGE, Mark::Line(1.4), line);
+    let rest = Panel::new("Residual", "gauge (V)", "reference − calibration (nm)").with(
+        "",
+        PURPLE,
+        Mark::Dots(2.0),
+        report.points.iter().map(|p| [p[0], p[1] * 1e9]).collect(),
+    );
+    let errors: Vec<[f64; 2]> =
+        report.held_out_rms.iter().enumerate().map(|(k, e)| [(k + 1) as f64, e * 1e9]).collect();
+    let chosen = errors.iter().copied().filter(|p| p[0] == report.degree as f64).collect();
+    let mut degrees = Panel::new("Points held out", "degree", "held-out error (nm rms)")
+        .with("error", BLUE, Mark::Line(1.5), errors)
+        .with("chosen", ORANGE, Mark::Dots(5.0), chosen);
+    degrees.y_scale = Scale::Log;
+    let subtitle = format!(
+        "degree {}; residual {:.2} nm rms, {:.2} nm at most; hysteresis {}; least slope {:.1} % of the mean",
+        report.degree,
+        report.residual_rms * 1e9,
+        report.residual_max * 1e9,
+        report.hysteresis.map_or_else(|| "not seen (it never turns back)".to_owned(), |h| format!("{:.2} nm", h * 1e9)),
+        report.least_slope_percent
+    );
+    figure(&format!("Gauge calibration of {}", shortened(&report.record)), &subtitle, &[calibration, rest, degrees], 2)
+}
+
+/// Force against displacement without creep, and the residual.
+#[must_use]
+pub fn stiffness(report: &StiffnessReport) -> String {
+    let measured = report.points.iter().map(|p| [p[0], p[1] * 1e9]).collect();
+    let [low, high] = report.force;
+    let line = vec![[low, low / report.stiffness * 1e9], [high, high / report.stiffness * 1e9]];
+    let law = Panel::new("Displacement without offset, drift and creep", "force (N)", "displacement (nm)")
+        .with("measured", BLUE, Mark::Dots(1.6), measured)
+        .with("force / k", ORANGE, Mark::Line(1.4), line);
+    let points = report.time.iter().zip(&report.points).map(|(t, p)| [*t, p[2] * 1e9]).collect();
+    let rest = Panel::new("Residual", "time (s)", "measured − model (nm)").with("", PURPLE, Mark::Line(0.9), points);
+    let subtitle = format!(
+        "k = {:.4} ± {:.4} N/µm; {}",
+        report.stiffness * 1e-6,
+        report.error * 1e-6,
+        report.creep_time.map_or_else(
+            || "no creep found".to_owned(),
+            |t| format!("creep {:.1} % with {t:.3} s taken out", report.creep_percent)
+        )
+    );
+    figure(&format!("Stiffness from {}", shortened(&report.record)), &subtitle, &[law, rest], 2)
+}

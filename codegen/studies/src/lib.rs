@@ -1,0 +1,8 @@
+//! Many runs of a compiled controller against simulated machines and images.
+
+pub mod machine;
+pub mod paper;
+pub mod reproduce;
+pub mod robust;
+pub mod tuning;
+pub mod verify;

@@ -1,0 +1,143 @@
+//! The machine that a spec describes, for the simulator: everything that the spec says of it, nothing of the controller.
+//!
+//! What a spec does not say is the reference plant's: the hysteresis of a leg, its creep and asymmetry, scaled to the
+//! declared leg gain and voltages; the force sensor. A machine is not its data sheet: its legs are out of tolerance.
+
+use core::array::from_fn;
+
+use host_sim::closed_loop::LEGS;
+use host_sim::plant::{LegParameters, NoiseParameters};
+use host_sim::platform::rig::{Noise, PlatformRig, RunOptions};
+use host_sim::platform::{GaugeSignal, Joints, PlatformParameters, PlatformScenario, Probe, Specimen, UserFrames};
+use host_sim::scenario::LegScenario;
+
+use specgen_language::model::{Model, TaskSpace};
+
+/// Gain of the reference leg's controller, 5 × 0.1262 µm/V: what its measured gain is relative to, m/V.
+const REFERENCE_GAIN: f64 = 0.631e-6;
+/// Integration steps in a period of the fastest mode, at least.
+const STEPS_PER_PERIOD: f64 = 60.0;
+/// Longest and shortest integration step, s.
+const STEPS: [f64; 2] = [1e-7, 2e-5];
+/// Rest at the bias pose before a run, s.
+const SETTLE: f64 = 0.2;
+
+/// Six legs of these parameters under the voltages of the spec, prepared.
+#[must_use]
+pub fn legs(
+    model: &Model,
+    parameters: &[LegParameters; LEGS],
+    noise: &NoiseParameters,
+    seed: u64,
+    samples_per_period: u32,
+) -> LegScenario {
+    let voltages = [model.actuator.voltage[0], model.rest_voltage()];
+    LegScenario::resting(parameters, noise, seed, samples_per_period, voltages)
+}
+
+/// A machine of the spec with tolerances of `seed` (legs ± 10 %, stiffness ± 5 %), or as its data sheet with none. `leg`
+/// gives the shape of the hysteresis.
+#[must_use]
+pub fn specimen(model: &Model, task: &TaskSpace, leg: &LegParameters, seed: Option<u64>) -> Specimen {
+    let leg = scaled(model, leg);
+    let mut nominal = nominal(model, task);
+    // A stiff light platform has modes that the usual step is too long for.
+    let fastest = Specimen::ideal(&nominal, &leg).structure().modes().0[5] / core::f64::consts::TAU;
+    let needed = 1.0 / (STEPS_PER_PERIOD * fastest);
+    nominal.step_s = if needed < STEPS[0] {
+        STEPS[0]
+    } else if needed < STEPS[1] {
+        needed
+    } else {
+        STEPS[1]
+    };
+    match seed {
+        Some(seed) => Specimen::within_tolerances(&nominal, &leg, seed),
+        None => Specimen::ideal(&nominal, &leg),
+    }
+}
+
+/// That machine, prepared, with the gauges of the spec; `noise` as [`Noise::of`] it or [`Noise::NONE`].
+#[must_use]
+pub fn scenario(model: &Model, task: &TaskSpace, specimen: &Specimen, noise: &Noise, seed: u64) -> PlatformScenario {
+    let mut options = RunOptions::new(model.timing.period, bias(task));
+    options.settle = SETTLE;
+    options.frames =
+        Some(UserFrames::new(&[task.frames.work[3], task.frames.work[4], task.frames.work[5]], task.frames.tool));
+    let mut scenario = PlatformScenario::new(specimen, noise, seed, options);
+    if let Some(calibration) = &task.calibration {
+        let rig: PlatformRig = scenario.rig().clone().with_signal(GaugeSignal::Volts(calibration.clone()));
+        *scenario.rig_mut() = rig;
+    }
+    scenario
+}
+
+/// Pose of the user's zero: the bias, and the offset of the work frame.
+fn bias(task: &TaskSpace) -> [f64; 6] {
+    let mut bias = task.setpoint.bias;
+    for (value, offset) in bias.iter_mut().zip(&task.frames.work[..3]) {
+        *value += offset;
+    }
+    bias
+}
+
+/// The reference leg with the displacement, the voltages, the lag and the noise of the spec.
+fn scaled(model: &Model, leg: &LegParameters) -> LegParameters {
+    let [low, high] = model.actuator.voltage;
+    let stretch = (high - low) / leg.u_max;
+    let volts = |values: &[f64]| values.iter().map(|v| v * stretch).collect();
+    let steps = libm::exp2(f64::from(model.sensor.bits));
+    LegParameters {
+        name: model.name.clone(),
+        u_max: high - low,
+        gain_um_per_v: leg.gain_um_per_v * model.actuator.leg_gain() / REFERENCE_GAIN,
+        v0_v_per_s: leg.v0_v_per_s * stretch,
+        play_thresholds_v: volts(&leg.play_thresholds_v),
+        creep_thresholds_v: volts(&leg.creep_thresholds_v),
+        forc_rate_v_per_s: leg.forc_rate_v_per_s * stretch,
+        tau_amp_s: model.amplifier.lag,
+        fn_hz: model.actuator.resonance,
+        zeta: model.actuator.damping_ratio,
+        noise: NoiseParameters {
+            sensor_nm_rms: model.sensor.noise * 1e9,
+            adc_lsb_nm: (model.sensor.range[1] - model.sensor.range[0]) / steps * 1e9,
+            amplifier_mv_rms: model.amplifier.noise * 1e3,
+            ..leg.noise
+        },
+        ..leg.clone()
+    }
+}
+
+fn nominal(model: &Model, task: &TaskSpace) -> PlatformParameters {
+    let reference = PlatformParameters::reference();
+    let (body, leg) = (&model.platform, &model.leg);
+    let ([ixx, iyy, izz], [ixy, ixz, iyz]) = (body.inertia, body.products);
+    PlatformParameters {
+        name: model.name.clone(),
+        joints: Some(Joints { base: model.geometry.base_joints, platform: model.geometry.platform_joints }),
+        height_m: model.geometry.height,
+        platform_mass_kg: body.mass,
+        platform_inertia_kg_m2: [[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]],
+        platform_center_m: body.center_of_mass,
+        fixed_mass_kg: leg.fixed_mass,
+        extensible_mass_kg: leg.extensible_mass,
+        fixed_inertia_kg_m2: leg.fixed_inertia,
+        extensible_inertia_kg_m2: leg.extensible_inertia,
+        fixed_center_m: leg.fixed_center,
+        extensible_center_m: leg.extensible_center,
+        axial_stiffness_n_per_m: model.actuator.axial_stiffness,
+        modal_damping: task.modal_damping,
+        // The amplifier is as fast as the spec says, no faster.
+        amplifier_current_a: model.actuator.slew_rate * reference.stack_capacitance_f,
+        lowest_voltage_v: model.actuator.voltage[0],
+        rest_voltage_v: model.rest_voltage(),
+        probes: from_fn(|k| Probe {
+            point: task.probes[k].point,
+            direction: task.probes[k].direction,
+            plane_point: task.probes[k].plane_point,
+            plane_normal: task.probes[k].plane_normal,
+        }),
+        gauge_range_m: model.sensor.range,
+        ..reference
+    }
+}

@@ -1,0 +1,114 @@
+//! The genetic algorithm with the settings of Table 3 on the emitted controller: how the cost (9) falls.
+
+use std::num::NonZero;
+use std::sync::atomic::AtomicBool;
+
+use host_sim::closed_loop::RunError;
+use host_sim::controller::Controller;
+use host_sim::plant::LegParameters;
+use serde::Serialize;
+
+use crate::tuning::feasible::{Feasibility, Required};
+use crate::tuning::genetic::{Genetic, Settings};
+use crate::tuning::search::{Generation, Progress};
+use crate::tuning::{Candidate, Case, Conditions, Search, SearchOptions, Setting, Space, TrajectoryChoice, What};
+use specgen_compiler::compile::Compiled;
+
+/// As `specgen tune` has it: margins, and the multisine's highest frequency (Hz) and length (s).
+const REQUIRED: Required = Required { gain: 2.0, delay: 0.5 };
+const MULTISINE: [f64; 2] = [10.0, 2.0];
+/// Factor on the spec's own numbers until they hold the margins, and how often.
+const SHRINK: f64 = 0.85;
+const SHRINKS: usize = 40;
+
+/// What the search did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Convergence {
+    /// Seed of strings, machine, noise and multisine.
+    pub seed: u64,
+    /// Numbers that are tuned.
+    pub dimension: usize,
+    /// By generation.
+    pub history: Vec<Generation>,
+    /// The best.
+    pub best: Option<Candidate>,
+}
+
+/// Why there is no search.
+#[derive(Debug)]
+pub enum ConvergenceError {
+    /// The spec's mode uses nothing that is tuned.
+    NothingToTune(String),
+    /// A run failed.
+    Run(RunError),
+}
+
+impl std::fmt::Display for ConvergenceError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NothingToTune(why) => f.write_str(why),
+            Self::Run(error) => error.fmt(f),
+        }
+    }
+}
+
+/// Runs `generations` of 100 strings from the numbers of the spec, made smaller until they hold the margins. The bytes do
+/// not depend on the number of threads.
+///
+/// # Errors
+/// If nothing is tuned, or a run fails.
+pub fn run(
+    compiled: &Compiled,
+    controller: &Controller,
+    leg: &LegParameters,
+    seed: u64,
+    generations: usize,
+    progress: &dyn Fn(&Progress),
+) -> Result<Convergence, ConvergenceError> {
+    let space = Space::of(compiled, What::All, &[]).map_err(|found| {
+        let why = found.into_iter().map(|finding| finding.message).collect::<Vec<_>>().join("; ");
+        ConvergenceError::NothingToTune(why)
+    })?;
+    let feasibility = Feasibility::of(compiled, REQUIRED);
+    let own = Setting::of(compiled);
+    let [frequency, seconds] = MULTISINE;
+    let conditions = Conditions {
+        trajectory: TrajectoryChoice::Multisine { frequency, seconds, seed, corners: false },
+        noise: Some(seed),
+        machine: Some(seed),
+        latency: 0,
+        whole_ticks: true,
+    };
+    let case = Case::new(compiled, controller, leg, &own, &conditions).map_err(ConvergenceError::Run)?;
+    let starts: Vec<Vec<f64>> = start(&space, &feasibility, own).into_iter().collect();
+    let mut genetic = Genetic::new(Settings::PAPER, space.dimension(), &starts, seed);
+    let stop = AtomicBool::new(false);
+    let options = SearchOptions {
+        evaluations: generations * Settings::PAPER.population,
+        threads: std::thread::available_parallelism().map_or(1, NonZero::get),
+        stop: &stop,
+        progress,
+    };
+    let search = Search::run(&mut genetic, &space, &feasibility, &case, &options).map_err(ConvergenceError::Run)?;
+    Ok(Convergence { seed, dimension: space.dimension(), best: search.best().copied(), history: search.history })
+}
+
+/// Genes of the spec's own numbers, smaller where they do not hold the margins; none if no size does.
+fn start(space: &Space, feasibility: &Feasibility, own: Setting) -> Option<Vec<f64>> {
+    let mut setting = own;
+    for _ in 0..=SHRINKS {
+        setting = space.setting(&space.genes(&setting));
+        if feasibility.holds(&setting) {
+            return Some(space.genes(&setting));
+        }
+        setting = match setting {
+            Setting::Legs { level, drift } => Setting::Legs { level: level * SHRINK, drift: drift * SHRINK },
+            Setting::Platform { combined, position, period } => Setting::Platform {
+                combined: combined.scaled(SHRINK, SHRINK),
+                position: position.scaled(SHRINK, SHRINK),
+                period,
+            },
+        };
+    }
+    None
+}

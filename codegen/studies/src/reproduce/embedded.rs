@@ -1,0 +1,43 @@
+//! The specs of the paper's experiments, in the binary: they are found without the repository too.
+
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use specgen_language::spec::SpecSource;
+
+/// Six legs with their own gauges, section 3 of the paper.
+pub const LEGS: &str = include_str!("../../../../specs/legs.toml");
+/// The platform, section 4.
+pub const PLATFORM: &str = include_str!("../../../../specs/reference.toml");
+/// The record that both name.
+const RECORD: (&str, &str) =
+    ("records/reference-forc.csv", include_str!("../../../../specs/records/reference-forc.csv"));
+
+/// `text` as a spec in `folder`, into which its record is written.
+///
+/// # Errors
+/// If the record cannot be written.
+pub fn source(name: &str, text: &str, folder: &Path) -> io::Result<SpecSource> {
+    let record = folder.join(RECORD.0);
+    if let Some(parent) = record.parent() {
+        fs::create_dir_all(parent)?;
+    }
+    fs::write(record, RECORD.1)?;
+    Ok(SpecSource { display_name: format!("specs/{name}.toml"), text: text.to_owned(), dir: folder.to_owned() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use specgen_compiler::compile;
+
+    #[test]
+    fn the_embedded_specs_compile_away_from_the_repository() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text, platform) in [("legs", LEGS, false), ("reference", PLATFORM, true)] {
+            let compiled = compile::compile_source(source(name, text, folder.path()).unwrap()).unwrap();
+            assert_eq!((compiled.ir.name.as_str(), compiled.design.is_some()), (name, platform));
+        }
+    }
+}

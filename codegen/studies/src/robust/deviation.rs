@@ -1,0 +1,135 @@
+//! One machine of many: by how much it differs from its data sheet.
+
+use host_sim::closed_loop::LEGS;
+use host_sim::plant::LegParameters;
+use host_sim::platform::Specimen;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use serde::Serialize;
+
+use super::factors::{Factor, Factors};
+use crate::machine;
+use crate::tuning::genetic::unit;
+use specgen_language::model::{Model, TaskSpace};
+
+/// Apart from the streams of noise and tolerances.
+const STREAM: u64 = 21;
+/// A structure with more damping than this rings no more, and the leg plant takes no ratio of 1.
+const MOST_DAMPING: f64 = 0.99;
+
+/// Factors of one leg.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LegDeviation {
+    /// On its axial stiffness.
+    pub stiffness: f64,
+    /// On its gain.
+    pub gain: f64,
+    /// On the thresholds of its plays.
+    pub hysteresis: f64,
+    /// On its creep.
+    pub creep: f64,
+    /// On the lag of its amplifier.
+    pub lag: f64,
+}
+
+/// Factors of one machine.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Deviation {
+    /// On mass and inertia.
+    pub mass: f64,
+    /// On the damping ratio.
+    pub damping: f64,
+    /// On all noise.
+    pub noise: f64,
+    /// Control intervals by which voltages come late.
+    pub delay_ticks: u32,
+    /// Of the legs.
+    pub legs: [LegDeviation; LEGS],
+}
+
+impl Deviation {
+    /// Six equal legs with the value that `of` gives for each factor.
+    #[must_use]
+    pub fn common(of: impl Fn(Factor) -> f64) -> Self {
+        let leg = LegDeviation {
+            stiffness: of(Factor::Stiffness),
+            gain: of(Factor::Gain),
+            hysteresis: of(Factor::Hysteresis),
+            creep: of(Factor::Creep),
+            lag: of(Factor::Lag),
+        };
+        Self {
+            mass: of(Factor::Mass),
+            damping: of(Factor::Damping),
+            noise: of(Factor::Noise),
+            // A whole number from 0 to 100 by the checks of its range.
+            delay_ticks: of(Factor::DelayTicks) as u32,
+            legs: [leg; LEGS],
+        }
+    }
+
+    /// Uniform within the ranges, from `seed` alone; every leg on its own.
+    #[must_use]
+    pub fn drawn(factors: &Factors, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(STREAM);
+        let mut within = |factor: Factor| {
+            let [low, high] = factors.range(factor);
+            low + (high - low) * unit(&mut rng)
+        };
+        let (mass, damping, noise) = (within(Factor::Mass), within(Factor::Damping), within(Factor::Noise));
+        let legs = std::array::from_fn(|_| LegDeviation {
+            stiffness: within(Factor::Stiffness),
+            gain: within(Factor::Gain),
+            hysteresis: within(Factor::Hysteresis),
+            creep: within(Factor::Creep),
+            lag: within(Factor::Lag),
+        });
+        let [low, high] = factors.range(Factor::DelayTicks);
+        let delay_ticks = (low + libm::floor(unit(&mut rng) * (high - low + 1.0))) as u32;
+        Self { mass, damping, noise, delay_ticks, legs }
+    }
+
+    /// Six legs with their own gauges. Mass and stiffness act by their resonance.
+    #[must_use]
+    pub fn legs_of(&self, leg: &LegParameters) -> [LegParameters; LEGS] {
+        self.legs.map(|deviation| {
+            let mut own = self.leg_of(leg, &deviation);
+            own.fn_hz *= libm::sqrt(deviation.stiffness / self.mass);
+            own.zeta = damped(own.zeta, self.damping);
+            own
+        })
+    }
+
+    /// The platform that a spec describes, so far off; `leg` gives the shape of the hysteresis.
+    #[must_use]
+    pub fn specimen(&self, model: &Model, task: &TaskSpace, leg: &LegParameters) -> Specimen {
+        let mut specimen = machine::specimen(model, task, leg, None);
+        for ((leg, stiffness), deviation) in specimen.legs.iter_mut().zip(&mut specimen.stiffness).zip(&self.legs) {
+            *leg = self.leg_of(leg, deviation);
+            *stiffness *= deviation.stiffness;
+        }
+        let nominal = &mut specimen.nominal;
+        nominal.platform_mass_kg *= self.mass;
+        nominal.platform_inertia_kg_m2.as_flattened_mut().iter_mut().for_each(|moment| *moment *= self.mass);
+        nominal.modal_damping = damped(nominal.modal_damping, self.damping);
+        nominal.force_noise.iter_mut().for_each(|noise| *noise *= self.noise);
+        specimen
+    }
+
+    fn leg_of(&self, leg: &LegParameters, deviation: &LegDeviation) -> LegParameters {
+        let mut own = leg.clone();
+        own.gain_um_per_v *= deviation.gain;
+        own.play_thresholds_v.iter_mut().for_each(|threshold| *threshold *= deviation.hysteresis);
+        own.creep_weights.iter_mut().for_each(|weight| *weight *= deviation.creep);
+        own.tau_amp_s *= deviation.lag;
+        own.noise.sensor_nm_rms *= self.noise;
+        own.noise.amplifier_mv_rms *= self.noise;
+        own
+    }
+}
+
+fn damped(ratio: f64, factor: f64) -> f64 {
+    let ratio = ratio * factor;
+    if ratio < MOST_DAMPING { ratio } else { MOST_DAMPING }
+}

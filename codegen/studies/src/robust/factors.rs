@@ -1,0 +1,266 @@
+//! What varies, from where to where, and who said so.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use specgen_language::model::Model;
+
+/// Something that a machine has more or less of than its spec says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Factor {
+    /// On mass and inertia of the platform; of legs with their own gauges on the moved mass, by their resonance.
+    Mass,
+    /// On the axial stiffness of a leg.
+    Stiffness,
+    /// On the damping ratio.
+    Damping,
+    /// λ, on the gain of a leg.
+    Gain,
+    /// On the thresholds of a leg's plays: the width of its loop.
+    Hysteresis,
+    /// On its creep.
+    Creep,
+    /// On the lag of an amplifier.
+    Lag,
+    /// On the noise of gauges, amplifiers and force sensor.
+    Noise,
+    /// Control intervals by which voltages come late: no factor but a whole number.
+    DelayTicks,
+}
+
+impl Factor {
+    /// All, in the order of reports.
+    pub const ALL: [Self; 9] = [
+        Self::Mass,
+        Self::Stiffness,
+        Self::Damping,
+        Self::Gain,
+        Self::Hysteresis,
+        Self::Creep,
+        Self::Lag,
+        Self::Noise,
+        Self::DelayTicks,
+    ];
+
+    /// As options, corners and `[robust]` call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mass => "mass",
+            Self::Stiffness => "stiffness",
+            Self::Damping => "damping",
+            Self::Gain => "gain",
+            Self::Hysteresis => "hysteresis",
+            Self::Creep => "creep",
+            Self::Lag => "lag",
+            Self::Noise => "noise",
+            Self::DelayTicks => "delay_ticks",
+        }
+    }
+
+    /// Whether each leg has its own value in a draw.
+    #[must_use]
+    pub fn of_each_leg(self) -> bool {
+        matches!(self, Self::Stiffness | Self::Gain | Self::Hysteresis | Self::Creep | Self::Lag)
+    }
+
+    /// The value of a machine as its data sheet.
+    #[must_use]
+    pub fn nominal(self) -> f64 {
+        if self == Self::DelayTicks { 0.0 } else { 1.0 }
+    }
+}
+
+impl fmt::Display for Factor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Who said how much a factor varies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// Nobody.
+    Default,
+    /// `[robust]`, or `adaptation.gain_ratio`.
+    Spec,
+    /// An option of the command.
+    Option,
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Default => "default",
+            Self::Spec => "spec",
+            Self::Option => "option",
+        })
+    }
+}
+
+/// Range of one factor.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Varied {
+    /// Which.
+    pub factor: Factor,
+    /// Smallest and largest value.
+    pub range: [f64; 2],
+    /// Who said so.
+    pub origin: Origin,
+}
+
+/// A range that a user gives: `mass=5 %`, `gain=0.9:1.1`, `delay_ticks=2`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Given {
+    /// Which.
+    pub factor: Factor,
+    /// Smallest and largest value.
+    pub range: [f64; 2],
+}
+
+/// Largest factor, as in the key table.
+const LARGEST: f64 = 10.0;
+/// Most ticks of delay, as in the key table.
+const MOST_TICKS: f64 = 100.0;
+
+impl Given {
+    /// Reads `NAME=RANGE`.
+    ///
+    /// # Errors
+    /// In words: what is wrong and how it is written.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let how = "write NAME=PART such as mass=5%, NAME=LOW:HIGH such as gain=0.9:1.1, or delay_ticks=1";
+        let Some((name, value)) = text.split_once('=') else { return Err(format!("found `{text}`; {how}")) };
+        let name = name.trim();
+        let Some(factor) = Factor::ALL.into_iter().find(|factor| factor.name() == name) else {
+            let known: Vec<&str> = Factor::ALL.iter().map(|factor| factor.name()).collect();
+            return Err(format!("nothing is called `{name}`; expected one of {}", known.join(", ")));
+        };
+        let number = |part: &str| -> Result<f64, String> {
+            let found = part.trim().parse().ok().filter(|value: &f64| value.is_finite());
+            found.ok_or_else(|| format!("`{}` in `{text}` is no number; {how}", part.trim()))
+        };
+        let value = value.trim();
+        let range = match (value.split_once(':'), value.strip_suffix('%')) {
+            (Some((low, high)), _) => [number(low)?, number(high)?],
+            (None, Some(percent)) if factor != Factor::DelayTicks => {
+                let part = number(percent)? / 100.0;
+                [1.0 - part, 1.0 + part]
+            }
+            (None, None) if factor == Factor::DelayTicks => [0.0, number(value)?],
+            _ => return Err(format!("found `{text}`; {how}")),
+        };
+        check(factor, range)?;
+        Ok(Self { factor, range })
+    }
+}
+
+/// Whether a machine can be so.
+fn check(factor: Factor, [low, high]: [f64; 2]) -> Result<(), String> {
+    if low > high {
+        return Err(format!("{factor} from {low} to {high} holds nothing; give the smaller value first"));
+    }
+    if factor == Factor::DelayTicks {
+        let whole = low.fract() == 0.0 && high.fract() == 0.0;
+        return if whole && low >= 0.0 && high <= MOST_TICKS {
+            Ok(())
+        } else {
+            Err(format!("{factor} from {low} to {high}: expected whole control intervals from 0 to {MOST_TICKS}"))
+        };
+    }
+    if low > 0.0 && high <= LARGEST {
+        return Ok(());
+    }
+    Err(format!(
+        "{factor} from {low} to {high} times what the spec says: expected factors above 0, up to {LARGEST}; a part such as 5% \
+         must be below 100%"
+    ))
+}
+
+/// Every factor with its range.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Factors(Vec<Varied>);
+
+impl Factors {
+    /// Of the options, else of the spec, else by default.
+    #[must_use]
+    pub fn of(model: &Model, given: &[Given]) -> Self {
+        let declared = &model.robust;
+        let about = |part: f64| [1.0 - part, 1.0 + part];
+        let one = |factor: Factor| {
+            let (spec, default) = match factor {
+                Factor::Mass => (declared.mass, about(0.05)),
+                Factor::Stiffness => (declared.stiffness, about(0.05)),
+                Factor::Damping => (declared.damping, about(0.3)),
+                Factor::Gain => (declared.gain.or(Some(model.adaptation.gain_ratio)), about(0.1)),
+                Factor::Hysteresis => (declared.hysteresis, about(0.1)),
+                Factor::Creep => (declared.creep, about(0.1)),
+                Factor::Lag => (declared.lag, about(0.2)),
+                Factor::Noise => (declared.noise, about(0.5)),
+                Factor::DelayTicks => (declared.delay_ticks.map(|ticks| [0.0, f64::from(ticks)]), [0.0, 1.0]),
+            };
+            // The last of several options counts, as everywhere.
+            let option = given.iter().rev().find(|given| given.factor == factor).map(|given| given.range);
+            let (range, origin) = match (option, spec) {
+                (Some(range), _) => (range, Origin::Option),
+                (None, Some(range)) => (range, Origin::Spec),
+                (None, None) => (default, Origin::Default),
+            };
+            Varied { factor, range, origin }
+        };
+        Self(Factor::ALL.into_iter().map(one).collect())
+    }
+
+    /// In the order of [`Factor::ALL`].
+    pub fn iter(&self) -> impl Iterator<Item = &Varied> {
+        self.0.iter()
+    }
+
+    /// Range of one.
+    #[must_use]
+    pub fn range(&self, factor: Factor) -> [f64; 2] {
+        // Every factor has its row; a machine as its data sheet otherwise.
+        self.0.iter().find(|one| one.factor == factor).map_or([factor.nominal(); 2], |one| one.range)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_read_in_three_ways() {
+        let range = |text: &str| Given::parse(text).map(|given| (given.factor, given.range));
+        let (factor, [low, high]) = range("mass=5 %").unwrap();
+        assert!(factor == Factor::Mass && (low - 0.95).abs() < 1e-12 && (high - 1.05).abs() < 1e-12);
+        assert_eq!(range("gain = 0.9 : 1.1"), Ok((Factor::Gain, [0.9, 1.1])));
+        assert_eq!(range("delay_ticks=2"), Ok((Factor::DelayTicks, [0.0, 2.0])));
+        assert_eq!(range("delay_ticks=1:2"), Ok((Factor::DelayTicks, [1.0, 2.0])));
+        assert_eq!(range("lag=1:1"), Ok((Factor::Lag, [1.0, 1.0])));
+    }
+
+    #[test]
+    fn what_no_machine_can_have_is_refused_with_a_mend() {
+        for (text, mend) in [
+            ("mass", "write NAME=PART"),
+            ("weight=5%", "expected one of mass"),
+            ("mass=5", "such as mass=5%"),
+            ("mass=x%", "is no number"),
+            ("mass=nan:1", "is no number"),
+            ("mass=-0.5:1", "expected factors above 0"),
+            ("mass=150%", "must be below 100%"),
+            ("mass=-5%", "the smaller value first"),
+            ("mass=1.1:0.9", "the smaller value first"),
+            ("noise=1:11", "up to 10"),
+            ("delay_ticks=0.5", "whole control intervals"),
+            ("delay_ticks=101", "from 0 to 100"),
+            ("delay_ticks=10%", "delay_ticks=1"),
+        ] {
+            let error = Given::parse(text).unwrap_err();
+            assert!(error.contains(mend), "{text}: {error}");
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Which machines are tried: the nominal one, corners, random draws.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::Serialize;
+
+use super::deviation::Deviation;
+use super::factors::{Factor, Factors};
+
+/// With so many factors or fewer, every combination of their ends is a corner.
+const FACTORIAL: usize = 4;
+/// Apart from the streams of noise, tolerances and deviations.
+const STREAM: u64 = 22;
+
+/// One machine of a plan.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Member {
+    /// `nominal`, of a corner such as `mass-low`, or the seed of a draw.
+    pub name: String,
+    /// Seed of the noise; of a draw of everything.
+    pub seed: u64,
+    /// Whether it was drawn.
+    pub drawn: bool,
+    /// What it is.
+    pub deviation: Deviation,
+}
+
+/// All of them, in the order in which they are reported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The nominal machine first, then corners, then draws.
+    pub members: Vec<Member>,
+}
+
+impl Plan {
+    /// The nominal machine, corners with the noise of `seed`, and `samples` draws whose seeds come from `seed`.
+    #[must_use]
+    pub fn new(factors: &Factors, samples: u32, seed: u64) -> Self {
+        let mut members = corners(factors, seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(STREAM);
+        // 53 bits, which every reader of JSON keeps.
+        members.extend((0..samples).map(|_| draw(factors, rng.next_u64() >> 11)));
+        Self { members }
+    }
+
+    /// One member alone: a draw by its seed, or the nominal machine or a corner by its name.
+    ///
+    /// # Errors
+    /// If nothing is called so: what there is.
+    pub fn alone(factors: &Factors, name: &str, seed: u64) -> Result<Self, String> {
+        if let Ok(seed) = name.parse() {
+            return Ok(Self { members: vec![draw(factors, seed)] });
+        }
+        let corners = corners(factors, seed);
+        match corners.iter().find(|corner| corner.name == name) {
+            Some(corner) => Ok(Self { members: vec![corner.clone()] }),
+            None => {
+                let names: Vec<&str> = corners.iter().map(|corner| corner.name.as_str()).collect();
+                Err(format!("no machine is called `{name}`; name the seed of a draw, or one of {}", names.join(", ")))
+            }
+        }
+    }
+}
+
+fn draw(factors: &Factors, seed: u64) -> Member {
+    Member { name: seed.to_string(), seed, drawn: true, deviation: Deviation::drawn(factors, seed) }
+}
+
+/// The end of a factor's range that brings the loop nearer to its edge: more gain, more delay, less damping. Mass and
+/// stiffness move the modes, for which both directions are tried.
+fn bad_end(factor: Factor, stiff: bool) -> usize {
+    match factor {
+        Factor::Damping => 0,
+        Factor::Mass => usize::from(!stiff),
+        Factor::Stiffness => usize::from(stiff),
+        _ => 1,
+    }
+}
+
+fn corners(factors: &Factors, seed: u64) -> Vec<Member> {
+    let mut members: Vec<Member> = Vec::new();
+    let mut add = |name: String, deviation: Deviation| {
+        // An end that is nominal, or a combination that is one end alone, is not tried twice.
+        if members.iter().all(|other| other.deviation != deviation) {
+            members.push(Member { name, seed, drawn: false, deviation });
+        }
+    };
+    add("nominal".to_owned(), Deviation::common(Factor::nominal));
+    let mut varied = Vec::new();
+    for one in factors.iter() {
+        let [low, high] = one.range;
+        let alone =
+            |value: f64| Deviation::common(|factor| if factor == one.factor { value } else { factor.nominal() });
+        if high > low {
+            varied.push(one.factor);
+            add(format!("{}-low", one.factor), alone(low));
+            add(format!("{}-high", one.factor), alone(high));
+        } else {
+            add(one.factor.to_string(), alone(low));
+        }
+    }
+    // What is known and differs from 1 is so in every combination.
+    if varied.len() <= FACTORIAL {
+        for combination in 0..1_usize << varied.len() {
+            let end = |factor: Factor| {
+                let place = varied.iter().position(|other| *other == factor);
+                place.map_or(0, |place| combination >> place & 1)
+            };
+            let parts: Vec<String> = varied
+                .iter()
+                .map(|factor| format!("{factor}-{}", if end(*factor) == 1 { "high" } else { "low" }))
+                .collect();
+            let name = if parts.is_empty() { "all".to_owned() } else { parts.join("+") };
+            add(name, Deviation::common(|factor| factors.range(factor)[end(factor)]));
+        }
+    } else {
+        for (name, stiff) in [("all-soft", false), ("all-stiff", true)] {
+            add(name.to_owned(), Deviation::common(|factor| factors.range(factor)[bad_end(factor, stiff)]));
+        }
+    }
+    members
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::robust::factors::Given;
+    use specgen_compiler::compile::compile;
+
+    /// Of the spec of six legs, with `given` in place of what it says.
+    fn factors(given: &[&str]) -> Factors {
+        let spec = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/legs.toml");
+        let given: Vec<Given> = given.iter().map(|text| Given::parse(text).unwrap()).collect();
+        Factors::of(&compile(&spec).unwrap().model, &given)
+    }
+
+    fn names(plan: &Plan) -> Vec<&str> {
+        plan.members.iter().filter(|member| !member.drawn).map(|member| member.name.as_str()).collect()
+    }
+
+    #[test]
+    fn draws_fill_their_ranges_leg_by_leg_and_are_drawn_alone_as_in_a_plan() {
+        let factors = factors(&["delay_ticks=2"]);
+        let plan = Plan::new(&factors, 300, 7);
+        let draws: Vec<&Member> = plan.members.iter().filter(|member| member.drawn).collect();
+        assert_eq!(draws.len(), 300);
+        let fills = |factor: Factor, of: &dyn Fn(&Deviation) -> f64| {
+            let [low, high] = factors.range(factor);
+            let values: Vec<f64> = draws.iter().map(|member| of(&member.deviation)).collect();
+            assert!(values.iter().all(|value| *value >= low && *value <= high), "{factor}");
+            let within = |part: f64| low + part * (high - low);
+            assert!(values.iter().any(|v| *v < within(0.03)) && values.iter().any(|v| *v > within(0.97)), "{factor}");
+            let mean = values.iter().sum::<f64>() / 300.0;
+            // Five deviations of the mean of 300 uniform numbers; a whole number of 0, 1, 2 spreads a little more.
+            assert!((mean - within(0.5)).abs() < 5.0 * 0.41 / 300_f64.sqrt() * (high - low), "{factor} {mean}");
+        };
+        fills(Factor::Mass, &|d| d.mass);
+        fills(Factor::Damping, &|d| d.damping);
+        fills(Factor::Noise, &|d| d.noise);
+        fills(Factor::DelayTicks, &|d| f64::from(d.delay_ticks));
+        for leg in 0..6 {
+            fills(Factor::Stiffness, &|d| d.legs[leg].stiffness);
+            fills(Factor::Gain, &|d| d.legs[leg].gain);
+            fills(Factor::Hysteresis, &|d| d.legs[leg].hysteresis);
+            fills(Factor::Creep, &|d| d.legs[leg].creep);
+            fills(Factor::Lag, &|d| d.legs[leg].lag);
+        }
+        for (index, member) in draws.iter().enumerate() {
+            assert!(draws[..index].iter().all(|other| other.seed != member.seed));
+            assert!(member.deviation.legs.windows(2).all(|pair| pair[0] != pair[1]));
+            assert_eq!(Plan::alone(&factors, &member.name, 99).unwrap().members, [(*member).clone()]);
+        }
+        assert_ne!(plan, Plan::new(&factors, 300, 8));
+    }
+
+    #[test]
+    fn corners_are_the_ends_of_each_factor_and_the_two_at_the_edge() {
+        let plan = Plan::new(&factors(&["delay_ticks=0", "creep=1:1", "lag=1.5:1.5"]), 1, 1);
+        let names = names(&plan);
+        assert_eq!(names[..3], ["nominal", "mass-low", "mass-high"]);
+        assert_eq!(names[names.len() - 3..], ["noise-high", "all-soft", "all-stiff"]);
+        // What is nominal anyway has no corner, what is known and differs has one.
+        assert!(names.contains(&"lag") && !names.iter().any(|name| name.contains("delay") || name.contains("creep")));
+        let soft = &plan.members.iter().find(|member| member.name == "all-soft").unwrap().deviation;
+        assert_eq!((soft.mass, soft.damping, soft.legs[3].stiffness, soft.legs[3].lag), (1.05, 0.7, 0.95, 1.5));
+        assert_eq!(soft.legs[0].gain, 1.1);
+    }
+
+    #[test]
+    fn of_few_factors_every_combination_is_a_corner_once() {
+        let fixed = ["mass=1:1", "stiffness=1:1", "damping=1:1", "creep=1:1", "lag=1:1", "noise=1:1", "delay_ticks=0"];
+        let plan = Plan::new(&factors(&fixed), 1, 1);
+        let expected = [
+            "nominal",
+            "gain-low",
+            "gain-high",
+            "hysteresis-low",
+            "hysteresis-high",
+            "gain-low+hysteresis-low",
+            "gain-high+hysteresis-low",
+            "gain-low+hysteresis-high",
+            "gain-high+hysteresis-high",
+        ];
+        assert_eq!(names(&plan), expected);
+        let error = Plan::alone(&factors(&fixed), "gain", 1).unwrap_err();
+        assert!(error.contains("one of nominal, gain-low"), "{error}");
+    }
+}

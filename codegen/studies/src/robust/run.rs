@@ -1,0 +1,193 @@
+//! Runs of a plan, in threads, in the order of the plan.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc;
+
+use host_sim::closed_loop::RunError;
+use host_sim::controller::Controller;
+use host_sim::plant::LegParameters;
+use serde::Serialize;
+
+use super::plan::{Member, Plan};
+use crate::tuning::{Case, Conditions, Setting, TrajectoryChoice};
+use specgen_compiler::compile::Compiled;
+
+/// Status bits of legs at a limit of voltage or slew.
+const LIMITS: u32 = 0x3f;
+/// Status bits of gauges or forces that are not believed, and of set-points that are refused or stale.
+const FAULTS: u32 = 0x3f00 | 0x1_0000 | 0x2_0000 | 0x8_0000;
+
+/// What a run that kept its bound did.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Figures {
+    /// Root mean square of the translation's error as a norm, nm; of legs over time and legs.
+    pub error_nm: f64,
+    /// Largest such error, nm; of legs the largest of one leg.
+    pub peak_nm: f64,
+    /// Root mean square of the angles' error as a norm, nrad; 0 for legs.
+    pub orientation_nrad: f64,
+    /// Largest such error, nrad.
+    pub orientation_peak_nrad: f64,
+    /// Part of the ticks with a leg at a limit, %.
+    pub limited_percent: f64,
+    /// Ticks with a bad gauge or force, a set-point refused or stale.
+    pub fault_ticks: u64,
+    /// Their status bits.
+    pub fault_bits: u32,
+}
+
+/// What became of a member.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// It kept the bound.
+    Ran(Figures),
+    /// It did not, or never came to its bias pose.
+    Diverged {
+        /// Since the start of the trajectory, s; none before it.
+        time: Option<f64>,
+        /// In words.
+        reason: String,
+        /// Part of the ticks before with a leg at a limit, %: a leg short of stroke or voltage leaves the bound as well.
+        limited_percent: f64,
+    },
+}
+
+impl Outcome {
+    /// Of a run that kept the bound.
+    #[must_use]
+    pub fn figures(&self) -> Option<&Figures> {
+        match self {
+            Self::Ran(figures) => Some(figures),
+            Self::Diverged { .. } => None,
+        }
+    }
+}
+
+/// What every member is run with.
+pub struct Study<'a> {
+    /// The spec.
+    pub compiled: &'a Compiled,
+    /// Its host library.
+    pub controller: &'a Controller,
+    /// Shape of the hysteresis.
+    pub leg: &'a LegParameters,
+    /// What is followed.
+    pub trajectory: TrajectoryChoice,
+    /// Whether there is noise.
+    pub noise: bool,
+    /// Error beyond which a run counts as diverged, m; angles count with the radius of the platform joints.
+    pub bound: f64,
+}
+
+impl Study<'_> {
+    /// Runs one member; the same bits whoever runs it.
+    ///
+    /// # Errors
+    /// If the run cannot be laid out or the controller refuses its own settings.
+    pub fn run(&self, member: &Member) -> Result<Outcome, RunError> {
+        match self.simulate(member) {
+            Err(error @ (RunError::NotReady { .. } | RunError::NotFinite { .. })) => {
+                Ok(Outcome::Diverged { time: None, reason: error.to_string(), limited_percent: 0.0 })
+            }
+            other => other,
+        }
+    }
+
+    fn simulate(&self, member: &Member) -> Result<Outcome, RunError> {
+        let Self { compiled, controller, leg, .. } = *self;
+        let model = &compiled.model;
+        let setting = Setting::of(compiled);
+        let conditions = Conditions {
+            trajectory: self.trajectory,
+            noise: self.noise.then_some(member.seed),
+            machine: None,
+            latency: member.deviation.delay_ticks as usize,
+            whole_ticks: true,
+        };
+        let case = match &model.task_space {
+            None => Case::of_legs(model, controller, &member.deviation.legs_of(leg), &conditions)?,
+            Some(task) => {
+                let specimen = member.deviation.specimen(model, task, leg);
+                Case::of_machine(compiled, task, controller, &specimen, &setting, &conditions)?
+            }
+        };
+        let radius = model.geometry.joint_radius();
+        let (mut ticks, mut limited) = (0_u64, 0_u64);
+        let (mut square, mut turned) = (0.0, 0.0);
+        let mut figures = Figures::default();
+        let mut lost = None;
+        case.observe(&mut case.worker(), &setting, |seen| {
+            // A NaN keeps no bound.
+            let kept = seen.largest <= self.bound && seen.orientation * radius <= self.bound;
+            ticks += 1;
+            limited += u64::from(seen.status & LIMITS != 0);
+            if !kept {
+                lost = Some(seen.time);
+                return ControlFlow::Break(());
+            }
+            square += seen.translation * seen.translation;
+            turned += seen.orientation * seen.orientation;
+            let raise = |peak: &mut f64, value: f64| {
+                if value > *peak {
+                    *peak = value;
+                }
+            };
+            raise(&mut figures.peak_nm, seen.largest * 1e9);
+            raise(&mut figures.orientation_peak_nrad, seen.orientation * 1e9);
+            figures.fault_ticks += u64::from(seen.status & FAULTS != 0);
+            figures.fault_bits |= seen.status & FAULTS;
+            ControlFlow::Continue(())
+        })?;
+        figures.limited_percent = 100.0 * limited as f64 / ticks.max(1) as f64;
+        if let Some(time) = lost {
+            let reason = format!("error beyond {:.0} nm", self.bound * 1e9);
+            let limited_percent = figures.limited_percent;
+            return Ok(Outcome::Diverged { time: Some(time), reason, limited_percent });
+        }
+        let rms = |sum: f64| libm::sqrt(sum / ticks.max(1) as f64) * 1e9;
+        figures.error_nm = rms(square);
+        figures.orientation_nrad = rms(turned);
+        Ok(Outcome::Ran(figures))
+    }
+
+    /// Runs a plan in `threads` threads, until `stop` is set: what was done then, in the order of the plan. `progress` is
+    /// told how many are done.
+    ///
+    /// # Errors
+    /// As [`Study::run`], the first in the order of the plan.
+    pub fn run_all(
+        &self,
+        plan: &Plan,
+        threads: usize,
+        stop: &AtomicBool,
+        mut progress: impl FnMut(usize),
+    ) -> Result<Vec<(Member, Outcome)>, RunError> {
+        let members = &plan.members;
+        let mut outcomes: Vec<Option<Result<Outcome, RunError>>> = members.iter().map(|_| None).collect();
+        let next = AtomicUsize::new(0);
+        let (sender, receiver) = mpsc::channel();
+        std::thread::scope(|scope| {
+            for _ in 0..threads.clamp(1, members.len().max(1)) {
+                let sender = sender.clone();
+                let next = &next;
+                scope.spawn(move || {
+                    while !stop.load(Ordering::Relaxed) {
+                        let index = next.fetch_add(1, Ordering::Relaxed);
+                        let Some(member) = members.get(index) else { return };
+                        // The receiver lives until every sender is gone.
+                        let _ = sender.send((index, self.run(member)));
+                    }
+                });
+            }
+            drop(sender);
+            for (done, (index, outcome)) in receiver.iter().enumerate() {
+                outcomes[index] = Some(outcome);
+                progress(done + 1);
+            }
+        });
+        let done = members.iter().zip(outcomes);
+        done.filter_map(|(member, outcome)| Some(outcome?.map(|outcome| (member.clone(), outcome)))).collect()
+    }
+}

@@ -1,0 +1,148 @@
+//! Whether a setting is stable with the margins that are asked for: what is not is never simulated.
+
+use specgen_compiler::compile::Compiled;
+use specgen_compiler::lower::platform;
+use specgen_compiler::stability::platform::{
+    Adapting, ClosedLoop, Conditions, LARGEST_RADIUS, Law, RestDynamics, Tuning, closed_loop_of,
+};
+use specgen_compiler::stability::{LegDynamics, ewma_limit, pcc_limit, spectral_radius};
+use specgen_language::model::{Adaptation, AdaptationMode, ControlMode};
+
+use super::Setting;
+
+/// Values of λ that a candidate is tried at: the ends of the interval, where it is worst. The compiler looks at more when
+/// the result is written.
+const ENDS: usize = 2;
+
+/// Margins that a candidate must have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Required {
+    /// Factor on all gains and bandwidths, or weights, at which it is still stable; at least 1.
+    pub gain: f64,
+    /// Further delay at which it is still stable, ticks. For a platform.
+    pub delay: f64,
+}
+
+/// Decides for settings of one spec.
+#[derive(Debug, Clone)]
+pub enum Feasibility {
+    /// Six legs with their own gauges.
+    Legs {
+        /// One of them.
+        dynamics: LegDynamics,
+        /// Of the spec.
+        adaptation: Adaptation,
+        /// What is asked for.
+        required: Required,
+    },
+    /// A platform.
+    Platform {
+        /// Its loop up to the tuning.
+        closed_loop: Box<ClosedLoop>,
+        /// Control modes that the tuned numbers work in.
+        laws: Vec<Law>,
+        /// λ.
+        ratios: [f64; 2],
+        /// What is asked for.
+        required: Required,
+    },
+}
+
+impl Feasibility {
+    /// For a compiled spec.
+    #[must_use]
+    pub fn of(compiled: &Compiled, required: Required) -> Self {
+        let model = &compiled.model;
+        let legs = || Self::Legs { dynamics: LegDynamics::of(model), adaptation: model.adaptation.clone(), required };
+        let Some(task) = &model.task_space else { return legs() };
+        // Compiling found both: neither can be missing here.
+        let rest = platform(model).map(|platform| RestDynamics::of(&platform));
+        let Some(closed_loop) = rest.ok().and_then(|rest| closed_loop_of(model, task, &rest)) else { return legs() };
+        // A running controller may be switched to any of them; the one of the spec is asked first.
+        let adapting = match model.adaptation.mode {
+            AdaptationMode::Invhys => Adapting::Invhys,
+            AdaptationMode::Ewma => Adapting::Ewma,
+            AdaptationMode::Pcc => Adapting::Pcc,
+        };
+        let mut laws = match task.mode {
+            ControlMode::P => vec![Law::Position],
+            ControlMode::F => vec![Law::Feedforward(adapting)],
+            ControlMode::PF => vec![Law::Combined(adapting)],
+        };
+        if task.mode != ControlMode::P {
+            for law in Law::ALL {
+                let used = law != Law::Position && law != Law::Feedforward(Adapting::Invhys);
+                if used && !laws.contains(&law) {
+                    laws.push(law);
+                }
+            }
+        }
+        Self::Platform { closed_loop: Box::new(closed_loop), laws, ratios: model.adaptation.gain_ratio, required }
+    }
+
+    /// Whether `setting` is stable with the margins.
+    #[must_use]
+    pub fn holds(&self, setting: &Setting) -> bool {
+        match (self, setting) {
+            (Self::Legs { dynamics, adaptation, required }, Setting::Legs { level, drift }) => {
+                leg_holds(dynamics, adaptation, required, *level, *drift)
+            }
+            (
+                Self::Platform { closed_loop, laws, ratios, required },
+                Setting::Platform { combined, position, period },
+            ) => laws.iter().all(|law| {
+                let tuning = if *law == Law::Position { position } else { combined };
+                platform_holds(closed_loop, *law, tuning, *ratios, required, *period)
+            }),
+            _ => false,
+        }
+    }
+}
+
+fn leg_holds(dynamics: &LegDynamics, adaptation: &Adaptation, required: &Required, level: f64, drift: f64) -> bool {
+    let with_drift = adaptation.mode == AdaptationMode::Pcc;
+    let [low, high] = adaptation.gain_ratio;
+    // Scaling the weights is what scales a loop's gain here.
+    let stable = |scale: f64, ratio: f64| {
+        let (level, drift) = (level * scale, drift * scale);
+        if level > 1.0 || drift > 1.0 {
+            return scale > 1.0;
+        }
+        let inside = ratio < ewma_limit(level) && (!with_drift || ratio < pcc_limit(level, drift));
+        inside
+            && spectral_radius(dynamics, level, with_drift.then_some(drift), ratio) <= LARGEST_RADIUS
+            // The law may be switched to EWMA, whose weight is the same.
+            && spectral_radius(dynamics, level, None, ratio) <= LARGEST_RADIUS
+    };
+    level > 0.0
+        && (0..ENDS).all(|end| stable(1.0, if end == 0 { high } else { low }))
+        && stable(1.0, 0.5 * (low + high))
+        && stable(required.gain, high)
+}
+
+fn platform_holds(
+    closed_loop: &ClosedLoop,
+    law: Law,
+    tuning: &Tuning,
+    [low, high]: [f64; 2],
+    required: &Required,
+    period: f64,
+) -> bool {
+    let most =
+        if tuning.level_bandwidth > tuning.drift_bandwidth { tuning.level_bandwidth } else { tuning.drift_bandwidth };
+    if most * period > 1.0 {
+        return false;
+    }
+    let contacts: &[bool] = if closed_loop.environment == [0.0; 6] { &[false] } else { &[false, true] };
+    let scaled = tuning.scaled(required.gain, required.gain);
+    contacts.iter().all(|&touching| {
+        let at = |tuning: &Tuning, conditions: Conditions| {
+            closed_loop.spectral_radius(law, tuning, &Conditions { touching, ..conditions }) <= LARGEST_RADIUS
+        };
+        // The margins first: they turn most candidates away.
+        at(&scaled, Conditions::NOMINAL)
+            && at(tuning, Conditions { delay: required.delay, ..Conditions::NOMINAL })
+            && at(tuning, Conditions { gain_ratio: high, ..Conditions::NOMINAL })
+            && at(tuning, Conditions { gain_ratio: low, ..Conditions::NOMINAL })
+    })
+}

@@ -1,0 +1,216 @@
+//! Relay feedback test (Åström and Hägglund): ultimate gain and period of each axis, and from them the PI gains of Ziegler
+//! and Nichols.
+//!
+//! One axis at a time, at the bias pose. The relay stands where k_p would: behind the modal notch, and its force ± d asks the
+//! legs for K⁻¹ d. The emitted controller turns that motion into voltages in mode F with the inverse model alone, so that
+//! the hysteresis is compensated as it will be; its lead, which works on set-points and not on feedback, is undone. On the bare loop the test finds the first resonance; with the notch in it
+//! finds where the lag of amplifier, notch and tick turn the phase.
+
+use core::f64::consts::PI;
+
+use host_sim::closed_loop::RunError;
+use host_sim::controller::{Controller, TickController};
+use host_sim::platform::PlatformScenario;
+use host_sim::platform::rig::{Bench, Request};
+use host_sim::trajectory::PoseTarget;
+use serde::Serialize;
+
+use specgen_compiler::stability::platform::{Biquad, ClosedLoop};
+use specgen_numerics::Matrix6;
+
+/// Word of the mode F with the inverse model alone.
+const OPEN: f64 = 1.0;
+/// Motion that the relay asks for, m at the joints: a hundred times the noise of a gauge.
+const AMPLITUDE: f64 = 0.1e-6;
+/// Switches that are left out at first, and those that are measured.
+const SETTLED: usize = 20;
+const MEASURED: usize = 40;
+/// Ticks after which a relay that does not oscillate is given up.
+const PATIENCE: usize = 20_000;
+
+/// What the relay found on an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Ultimate {
+    /// K_u over the stiffness of the axis.
+    pub gain: f64,
+    /// T_u, s.
+    pub period: f64,
+}
+
+impl Ultimate {
+    /// k_p and k_I of Ziegler and Nichols for PI, over the stiffness of the axis: 0.45 K_u and k_p/(T_u/1.2), the latter
+    /// in 1/s.
+    #[must_use]
+    pub fn ziegler_nichols(&self) -> [f64; 2] {
+        let proportional = 0.45 * self.gain;
+        [proportional, proportional / (self.period / 1.2)]
+    }
+}
+
+/// The test on each axis; none where no oscillation came up. `radius` of the platform joints (m), `lead` of the set-point
+/// (ticks).
+///
+/// # Errors
+/// If the machine does not come to its bias pose.
+pub fn test(
+    scenario: &PlatformScenario,
+    controller: &Controller,
+    closed_loop: &ClosedLoop,
+    [radius, lead]: [f64; 2],
+) -> Result<[Option<Ultimate>; 6], RunError> {
+    let mut out = [None; 6];
+    for (axis, found) in out.iter_mut().enumerate() {
+        let mut controller = controller.fork();
+        let mut words = controller.default_config();
+        controller.description().set_config(&mut words, "mode", OPEN)?;
+        controller.configure(&words)?;
+        let unit = if axis < 3 { 1.0 } else { 1.0 / radius };
+        *found = one_axis(scenario, &mut controller, closed_loop, axis, [unit, lead])?;
+    }
+    Ok(out)
+}
+
+/// `unit` turns metres at the joints into the unit of the axis.
+fn one_axis(
+    scenario: &PlatformScenario,
+    controller: &mut Controller,
+    closed_loop: &ClosedLoop,
+    axis: usize,
+    [unit, lead]: [f64; 2],
+) -> Result<Option<Ultimate>, RunError> {
+    let options = &scenario.options;
+    let mut rig = scenario.rig().clone();
+    rig.machine_mut().step_whole_ticks(options.interval);
+    let mut bench = Bench::new(&mut rig, controller, options.interval, options.latency)?;
+    bench.arm(options.arming)?;
+    for _ in 0..(options.settle / options.interval) as usize {
+        bench.tick(&Request::default())?;
+    }
+    let basis = &closed_loop.basis;
+    // K⁻¹ d of the axis as a pose, for d = K_ii · amplitude.
+    let modal = basis.compliance(axis);
+    let amplitude = AMPLITUDE * unit;
+    let force = basis.axis_stiffness[axis] * amplitude;
+    let motion: [f64; 6] =
+        std::array::from_fn(|k| force * (0..6).map(|i| basis.from_modal[k][i] * modal[i]).sum::<f64>());
+    let mut notch = ModalNotch::of(closed_loop);
+    let center = bench.rig().machine().pose();
+    let mut relay = Relay::default();
+    let mut asked = 0.0;
+    for tick in 0..PATIENCE {
+        let pose = bench.rig().machine().pose();
+        let error = notch.filter(&std::array::from_fn(|k| center[k] - pose[k]))[axis];
+        let output = relay.switch(tick, error / amplitude);
+        if let Some((gain, period)) = relay.found {
+            return Ok(Some(Ultimate { gain, period: period * options.interval }));
+        }
+        // The controller asks for r + lead (r − r_last): this r makes it the relay's output.
+        asked = (output + lead * asked) / (1.0 + lead);
+        bench.tick(&Request::stream(PoseTarget { pose: motion.map(|x| x * asked), ..PoseTarget::default() }))?;
+    }
+    Ok(None)
+}
+
+/// Switches on the sign of its input and measures what comes of it.
+#[derive(Debug, Clone, Default)]
+struct Relay {
+    high: bool,
+    last: f64,
+    /// Times of switching up, ticks, by straight line between samples.
+    rises: Vec<f64>,
+    /// Sums of input times cosine and sine cannot be kept before the period is known: the input itself.
+    inputs: Vec<(f64, f64)>,
+    found: Option<(f64, f64)>,
+}
+
+impl Relay {
+    fn switch(&mut self, tick: usize, input: f64) -> f64 {
+        let time = tick as f64;
+        if self.rises.len() > SETTLED {
+            self.inputs.push((time, input));
+        }
+        if tick > 0 && self.last < 0.0 && input >= 0.0 {
+            self.rises.push(time - input / (input - self.last));
+            if self.rises.len() == SETTLED + MEASURED + 1 {
+                self.measure();
+            }
+        }
+        // A relay at rest begins upward.
+        self.high = if input == 0.0 { tick == 0 || self.high } else { input > 0.0 };
+        self.last = input;
+        if self.high { 1.0 } else { -1.0 }
+    }
+
+    /// Describing function: K_u = 4 d / (π a), a the first harmonic of the input, d = 1.
+    fn measure(&mut self) {
+        let (first, last) = (self.rises[SETTLED], self.rises[SETTLED + MEASURED]);
+        let period = (last - first) / MEASURED as f64;
+        let (mut cosine, mut sine, mut count) = (0.0, 0.0, 0.0);
+        for (time, input) in self.inputs.iter().filter(|(time, _)| *time < last) {
+            let (s, c) = libm::sincos(2.0 * PI * (time - first) / period);
+            cosine += input * c;
+            sine += input * s;
+            count += 1.0;
+        }
+        let amplitude = 2.0 * libm::hypot(cosine, sine) / count;
+        if period > 0.0 && amplitude > 0.0 {
+            self.found = Some((4.0 / (PI * amplitude), period));
+        }
+    }
+}
+
+/// The notch of the controller, in the simulator's own text.
+struct ModalNotch {
+    to_modal: Matrix6,
+    from_modal: Matrix6,
+    sections: [Biquad; 6],
+    states: [[f64; 2]; 6],
+}
+
+impl ModalNotch {
+    fn of(closed_loop: &ClosedLoop) -> Self {
+        let basis = &closed_loop.basis;
+        let sections = closed_loop.notch.as_ref().map_or([Biquad::IDENTITY; 6], |notch| notch.sections);
+        Self { to_modal: basis.to_modal, from_modal: basis.from_modal, sections, states: [[0.0; 2]; 6] }
+    }
+
+    fn filter(&mut self, pose: &[f64; 6]) -> [f64; 6] {
+        let apply = |m: &Matrix6, x: &[f64; 6]| -> [f64; 6] {
+            std::array::from_fn(|row| (0..6).map(|k| m[row][k] * x[k]).sum::<f64>())
+        };
+        let mut modal = apply(&self.to_modal, pose);
+        for ((value, section), state) in modal.iter_mut().zip(&self.sections).zip(&mut self.states) {
+            let input = *value;
+            let output = section.b[0] * input + state[0];
+            state[0] = section.b[1] * input - section.a[0] * output + state[1];
+            state[1] = section.b[2] * input - section.a[1] * output;
+            *value = output;
+        }
+        apply(&self.from_modal, &modal)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_relay_on_an_integrator_with_delay_finds_what_theory_says() {
+        // ẏ = u late by L: K_u = π/(2 L), T_u = 4 L, by the describing function; sampled finely.
+        let delay = 50;
+        let mut relay = Relay::default();
+        let (mut y, mut line) = (0.0, std::collections::VecDeque::from(vec![0.0; delay]));
+        for tick in 0..PATIENCE {
+            line.push_back(relay.switch(tick, -y));
+            y += line.pop_front().unwrap();
+            if relay.found.is_some() {
+                break;
+            }
+        }
+        let (gain, period) = relay.found.unwrap();
+        // The sample-and-hold adds half a tick twice over: 4 (L + 1) at most.
+        assert!((period / 4.0 / delay as f64 - 1.0).abs() < 0.03, "{period}");
+        // The wave is a triangle of height L, whose first harmonic is 8 L/π²; K_u is then π/(2 L).
+        assert!((gain * 2.0 * delay as f64 / PI - 1.0).abs() < 0.03, "{gain}");
+    }
+}

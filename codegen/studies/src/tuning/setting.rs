@@ -1,0 +1,97 @@
+//! One set of numbers that tuning may change, as the controller and the analysis take it.
+
+use host_sim::controller::{Controller, TickController};
+use serde::Serialize;
+
+use specgen_compiler::compile::Compiled;
+use specgen_compiler::stability::platform::Tuning;
+use specgen_language::model::AdaptationMode;
+
+/// Value of the `setpoint_kind` word for leg displacements.
+const LEG_SETPOINTS: f64 = 1.0;
+
+/// Numbers of a controller of either kind.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[allow(clippy::large_enum_variant)] // A box would cost it `Copy`, and there are no more of them than candidates.
+pub enum Setting {
+    /// Six legs with their own gauges: weights per run.
+    Legs {
+        /// ω or ω1.
+        level: f64,
+        /// ω2.
+        drift: f64,
+    },
+    /// A platform: gains and bandwidths of P/F (F uses its bandwidths), gains of P alone.
+    Platform {
+        /// Of P/F and F.
+        combined: Tuning,
+        /// Of P alone.
+        position: Tuning,
+        /// s.
+        period: f64,
+    },
+}
+
+impl Setting {
+    /// What the spec gives, or the compiler chose.
+    #[must_use]
+    pub fn of(compiled: &Compiled) -> Self {
+        let model = &compiled.model;
+        match &compiled.design {
+            Some(design) => {
+                Self::Platform { combined: design.combined, position: design.position, period: model.timing.period }
+            }
+            None => Self::Legs {
+                level: model.adaptation.level_weight,
+                drift: if model.adaptation.mode == AdaptationMode::Pcc { model.adaptation.drift_weight } else { 0.0 },
+            },
+        }
+    }
+
+    /// Words of `controller` with these numbers and otherwise the spec's.
+    ///
+    /// Every name is one that each emitted controller of its kind has; a word that is not there would be left as it is.
+    #[must_use]
+    pub fn words(&self, controller: &Controller) -> Vec<u64> {
+        let mut words = controller.default_config();
+        let description = controller.description();
+        let mut set = |name: &str, value: f64| {
+            let _ = description.set_config(&mut words, name, value);
+        };
+        match self {
+            Self::Legs { level, drift } => {
+                set("level_weight", *level);
+                set("drift_weight", *drift);
+                set("setpoint_kind", LEG_SETPOINTS);
+            }
+            Self::Platform { combined, position, period } => {
+                set("level_weight", combined.level_bandwidth * period);
+                set("drift_weight", combined.drift_bandwidth * period);
+                for (prefix, tuning) in [("", combined), ("position_", position)] {
+                    let groups = [("kp", &tuning.proportional), ("ki", &tuning.integral), ("kv", &tuning.derivative)];
+                    for (stem, gains) in groups {
+                        for (axis, gain) in gains.iter().enumerate() {
+                            set(&format!("{prefix}{stem}[{axis}]"), *gain);
+                        }
+                    }
+                }
+            }
+        }
+        words
+    }
+
+    /// Gains in force: of P `alone` or of the others. Legs have none.
+    #[must_use]
+    pub fn tuning(&self, alone: bool) -> Tuning {
+        match self {
+            Self::Legs { .. } => Tuning::NONE,
+            Self::Platform { combined, position, .. } => {
+                if alone {
+                    *position
+                } else {
+                    *combined
+                }
+            }
+        }
+    }
+}

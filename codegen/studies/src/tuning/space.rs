@@ -1,0 +1,293 @@
+//! What may change, within which bounds: numbers in [0, 1] on a logarithmic scale, to settings and back.
+//!
+//! Gains count against the stiffness of their axis, K_ii = (Jᵀ k_a J)_ii: `kp` and `kv`·rad/s as ratios, `ki` in 1/s. A
+//! setting is rounded to four digits here already, so that what is scored is what is written into the spec.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::Setting;
+use specgen_compiler::compile::Compiled;
+use specgen_compiler::lower::platform;
+use specgen_compiler::stability::platform::RestDynamics;
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::model::{AdaptationMode, ControlMode, Model};
+
+/// Which numbers are tuned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum What {
+    /// Gains of the feedback.
+    Gains,
+    /// Weights or bandwidths of the adaptation.
+    Weights,
+    /// Both, as far as the spec's mode uses them.
+    All,
+}
+
+impl What {
+    /// As `--what` has it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Gains => "gains",
+            Self::Weights => "weights",
+            Self::All => "all",
+        }
+    }
+}
+
+/// What a parameter is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Role {
+    /// k_p of an axis.
+    Proportional(usize),
+    /// k_I of an axis.
+    Integral(usize),
+    /// k_v of an axis.
+    Derivative(usize),
+    /// ω1 or Ω1.
+    Level,
+    /// ω2 or Ω2.
+    Drift,
+}
+
+impl Role {
+    fn group(self) -> &'static str {
+        match self {
+            Self::Proportional(_) => "kp",
+            Self::Integral(_) => "ki",
+            Self::Derivative(_) => "kv",
+            Self::Level => "level",
+            Self::Drift => "drift",
+        }
+    }
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Proportional(axis) | Self::Integral(axis) | Self::Derivative(axis) => {
+                write!(f, "{}[{axis}]", self.group())
+            }
+            Self::Level | Self::Drift => f.write_str(self.group()),
+        }
+    }
+}
+
+/// One number.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Parameter {
+    /// What it is.
+    pub role: Role,
+    /// Smallest and largest value.
+    pub bounds: [f64; 2],
+}
+
+/// Bounds that a user gives for a group of parameters: `kp`, `ki`, `kv`, `level`, `drift`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GivenBounds {
+    /// The group.
+    pub group: String,
+    /// Smallest and largest value.
+    pub bounds: [f64; 2],
+}
+
+/// Every number that is tuned, and the setting that the others stay at.
+#[derive(Debug, Clone)]
+pub struct Space {
+    /// The numbers.
+    pub parameters: Vec<Parameter>,
+    /// K_ii; ones for legs.
+    stiffness: [f64; 6],
+    /// Whether the gains are those of P alone.
+    pub alone: bool,
+    base: Setting,
+}
+
+const PROPORTIONAL: [f64; 2] = [2e-3, 4.0];
+const INTEGRAL: [f64; 2] = [5.0, 5000.0];
+const DERIVATIVE: [f64; 2] = [1e-6, 1e-3];
+const WEIGHTS: [[f64; 2]; 2] = [[1e-3, 1.0], [1e-4, 1.0]];
+
+impl Space {
+    /// What `what` means for a compiled spec, within the usual bounds or those given.
+    ///
+    /// # Errors
+    /// If the spec's mode uses nothing of it, or bounds are empty or for nothing that is tuned.
+    pub fn of(compiled: &Compiled, what: What, given: &[GivenBounds]) -> Result<Self, Vec<Diagnostic>> {
+        let model = &compiled.model;
+        let mode = model.task_space.as_ref().map(|task| task.mode);
+        let base = Setting::of(compiled);
+        let mut parameters = Vec::new();
+        let mut add = |role: Role, bounds: [f64; 2]| parameters.push(Parameter { role, bounds });
+        let mut stiffness = [1.0; 6];
+        let alone = mode == Some(ControlMode::P);
+        if let Some(design) = &compiled.design {
+            stiffness = axis_stiffness(model);
+            if what != What::Weights && mode != Some(ControlMode::F) {
+                let damped = if alone { design.position } else { design.combined }.derivative != [0.0; 6];
+                (0..6).for_each(|axis| add(Role::Proportional(axis), PROPORTIONAL));
+                (0..6).for_each(|axis| add(Role::Integral(axis), INTEGRAL));
+                if damped {
+                    (0..6).for_each(|axis| add(Role::Derivative(axis), DERIVATIVE));
+                }
+            }
+        }
+        if what != What::Gains && !alone {
+            let bandwidths = compiled.design.as_ref().map(|design| {
+                let most = design.bandwidth_limit;
+                [[0.01 * most, most], [1e-4 * most, 0.5 * most]]
+            });
+            let [level, drift] = bandwidths.unwrap_or(WEIGHTS);
+            if model.adaptation.mode != AdaptationMode::Invhys {
+                add(Role::Level, level);
+            }
+            if model.adaptation.mode == AdaptationMode::Pcc {
+                add(Role::Drift, drift);
+            }
+        }
+        let refuse = |code, message: String, help: &str| {
+            let keys = ["adaptation.mode", "control.mode", "control"];
+            vec![Diagnostic::at(&model.spans, &keys, (Severity::Error, code), message, help.to_owned())]
+        };
+        if parameters.is_empty() {
+            let kind =
+                if mode.is_some() { "this mode of the platform controller" } else { "this spec without [control]" };
+            return Err(refuse(
+                codes::TUNE_NOTHING,
+                format!("{kind} uses none of the numbers that are asked for (--what {})", what.name()),
+                "weights need adaptation.mode = \"ewma\" or \"pcc\" and control.mode other than \"p\"; gains need [control] \
+                 with mode = \"p\" or \"p/f\"; or tune what there is, with --what all",
+            ));
+        }
+        for GivenBounds { group, bounds } in given {
+            let [low, high] = *bounds;
+            if !(low > 0.0 && high > low && high.is_finite()) {
+                return Err(refuse(
+                    codes::TUNE_BOUNDS,
+                    format!("the bounds of {group}, {low} to {high}, hold nothing: expected 0 < low < high"),
+                    "give the smaller one first: --bounds ki=10:1000",
+                ));
+            }
+            let found = parameters.iter_mut().filter(|p| p.role.group() == group);
+            if found.map(|p| p.bounds = *bounds).count() == 0 {
+                return Err(refuse(
+                    codes::TUNE_BOUNDS,
+                    format!("there are bounds for {group}, which is not tuned here"),
+                    "bounds are for kp, ki, kv, level and drift, as far as --what and the spec's mode have them",
+                ));
+            }
+        }
+        Ok(Self { parameters, stiffness, alone, base })
+    }
+
+    /// Number of parameters.
+    #[must_use]
+    pub fn dimension(&self) -> usize {
+        self.parameters.len()
+    }
+
+    /// The setting of numbers in [0, 1]; what is outside counts as the end.
+    #[must_use]
+    pub fn setting(&self, genes: &[f64]) -> Setting {
+        let mut setting = self.base;
+        for (parameter, gene) in self.parameters.iter().zip(genes) {
+            let [low, high] = parameter.bounds;
+            let gene = if *gene > 1.0 {
+                1.0
+            } else if *gene > 0.0 {
+                *gene
+            } else {
+                0.0
+            };
+            let value = low * libm::exp(gene * libm::log(high / low));
+            self.put(&mut setting, parameter.role, value);
+        }
+        setting
+    }
+
+    /// The numbers in [0, 1] that give a setting, or the nearest within bounds.
+    #[must_use]
+    pub fn genes(&self, setting: &Setting) -> Vec<f64> {
+        self.parameters
+            .iter()
+            .map(|parameter| {
+                let [low, high] = parameter.bounds;
+                let value = self.value(setting, parameter.role);
+                let gene = if value > 0.0 { libm::log(value / low) / libm::log(high / low) } else { 0.0 };
+                if gene > 1.0 {
+                    1.0
+                } else if gene > 0.0 {
+                    gene
+                } else {
+                    0.0
+                }
+            })
+            .collect()
+    }
+
+    /// What gains count against.
+    #[must_use]
+    pub fn stiffness(&self) -> &[f64; 6] {
+        &self.stiffness
+    }
+
+    fn put(&self, setting: &mut Setting, role: Role, value: f64) {
+        match setting {
+            Setting::Legs { level, drift } => match role {
+                Role::Level => *level = rounded(value),
+                Role::Drift => *drift = rounded(value),
+                _ => {}
+            },
+            Setting::Platform { combined, position, .. } => {
+                let gains = if self.alone { position } else { &mut *combined };
+                match role {
+                    Role::Proportional(axis) => gains.proportional[axis] = rounded(value * self.stiffness[axis]),
+                    Role::Integral(axis) => gains.integral[axis] = rounded(value * self.stiffness[axis]),
+                    Role::Derivative(axis) => gains.derivative[axis] = rounded(value * self.stiffness[axis]),
+                    Role::Level => combined.level_bandwidth = rounded(value),
+                    Role::Drift => combined.drift_bandwidth = rounded(value),
+                }
+            }
+        }
+    }
+
+    /// A number of `setting`: gains over the stiffness of their axis.
+    #[must_use]
+    pub fn value(&self, setting: &Setting, role: Role) -> f64 {
+        match setting {
+            Setting::Legs { level, drift } => match role {
+                Role::Level => *level,
+                Role::Drift => *drift,
+                _ => 0.0,
+            },
+            Setting::Platform { combined, position, .. } => {
+                let gains = if self.alone { position } else { combined };
+                match role {
+                    Role::Proportional(axis) => gains.proportional[axis] / self.stiffness[axis],
+                    Role::Integral(axis) => gains.integral[axis] / self.stiffness[axis],
+                    Role::Derivative(axis) => gains.derivative[axis] / self.stiffness[axis],
+                    Role::Level => combined.level_bandwidth,
+                    Role::Drift => combined.drift_bandwidth,
+                }
+            }
+        }
+    }
+}
+
+/// K_ii = (Jᵀ k_a J)_ii at rest of a model that compiled, N/m and N m/rad.
+#[must_use]
+pub fn axis_stiffness(model: &Model) -> [f64; 6] {
+    // Compiling found it: ones are never seen.
+    let Ok(platform) = platform(model) else { return [1.0; 6] };
+    let jacobian = RestDynamics::of(&platform).jacobian;
+    std::array::from_fn(|axis| {
+        jacobian.iter().map(|row| row[axis] * row[axis]).sum::<f64>() * model.actuator.axial_stiffness
+    })
+}
+
+/// To four significant digits, by way of the decimal text that the spec will show: the double nearest to that text.
+#[must_use]
+pub fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}

@@ -1,0 +1,237 @@
+//! Exercises a built controller: the same input record on the host and on the emulated microcontroller, compared bit for
+//! bit, with what a tick costs there.
+
+mod legs;
+mod platform;
+
+use std::time::Duration;
+
+use host_sim::closed_loop::RunError;
+use host_sim::controller::TickController;
+use host_sim::trace::{Trace, first_difference};
+use serde::Serialize;
+
+use specgen_compiler::ir::Ir;
+use specgen_language::model::Model;
+use specgen_toolchain::budget::Used;
+use specgen_toolchain::checks::{self, Checked, Rules};
+use specgen_toolchain::{self as target, Image, TargetError, image, size, stack};
+
+/// Seed of the noise in the exercise.
+const SEED: u64 = 1;
+/// The stage that is the whole tick.
+const WHOLE: &str = "step";
+/// Longest time the emulator may take, s.
+const LIMIT: Duration = Duration::from_secs(600);
+
+/// A controller, reset and configured as it is, at work: six legs on what their own gauges say, a platform in closed loop
+/// with a simulated machine.
+///
+/// # Errors
+/// It lacks a word, or a voltage is not finite.
+pub fn exercise(controller: &mut dyn TickController, model: &Model, ir: &Ir, ticks: u32) -> Result<Trace, RunError> {
+    match &model.task_space {
+        Some(task) => platform::exercise(controller, model, task, ticks),
+        None => Ok(legs::exercise(controller, model, ir, ticks)?),
+    }
+}
+
+/// What the image costs and whether it computes the same bits.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Measurement {
+    /// Emulated machine.
+    pub machine: String,
+    /// `rustc --version` of the cross compiler.
+    pub compiler: String,
+    /// Bytes of flash, replay harness included.
+    pub flash: u64,
+    /// Of these, code.
+    pub code: u64,
+    /// Of these, constants (tables).
+    pub constants: u64,
+    /// Bytes of RAM taken statically, plus Config and State.
+    pub ram: u64,
+    /// Bytes of State.
+    pub state: u64,
+    /// Bytes of code that a tick can reach.
+    pub tick_code: u64,
+    /// Static bound of a tick's stack, bytes; none if the call graph cannot be bounded.
+    pub stack_bound: Option<u64>,
+    /// Stack that ticks were seen to use, bytes.
+    pub stack_painted: u64,
+    /// Panic or allocator symbols in the image.
+    pub forbidden_symbols: Vec<String>,
+    /// Instructions per stage.
+    pub stages: Vec<Stage>,
+    /// Ticks compared with the host.
+    pub ticks: u64,
+    /// First word that differs from the host's, in words.
+    pub first_difference: Option<String>,
+    /// What the tick must not do, looked for in the image.
+    pub checks: Checked,
+    /// What a budget is held against.
+    pub used: Used,
+}
+
+/// What an image shows without being run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Inspection {
+    /// Emulated machine that it is for.
+    pub machine: String,
+    /// `rustc --version` of the cross compiler.
+    pub compiler: String,
+    /// Bytes of flash, replay harness included.
+    pub flash: u64,
+    /// Of these, code.
+    pub code: u64,
+    /// Of these, constants (tables).
+    pub constants: u64,
+    /// Bytes of RAM taken statically. Config and State are not in it: only a run tells their size.
+    pub ram: u64,
+    /// Bytes of code that a tick can reach.
+    pub tick_code: u64,
+    /// Static bound of a tick's stack, bytes; none if the call graph cannot be bounded.
+    pub stack_bound: Option<u64>,
+    /// Panic or allocator symbols in the image.
+    pub forbidden_symbols: Vec<String>,
+    /// What the tick must not do, looked for in the image.
+    pub checks: Checked,
+    /// What a budget is held against.
+    pub used: Used,
+}
+
+/// Instructions of one stage.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stage {
+    /// `step` is the whole tick.
+    pub name: String,
+    /// Calls measured.
+    pub calls: u64,
+    /// Fewest instructions.
+    pub min: u64,
+    /// Mean.
+    pub mean: f64,
+    /// Most instructions.
+    pub max: u64,
+}
+
+impl Measurement {
+    /// Instructions of a stage.
+    #[must_use]
+    pub fn stage(&self, name: &str) -> Option<&Stage> {
+        self.stages.iter().find(|stage| stage.name == name)
+    }
+}
+
+/// Looks at an image without running it.
+///
+/// # Errors
+/// The image is not one of specgen's.
+pub fn inspect(image: &Image) -> Result<Inspection, TargetError> {
+    let footprint = image::footprint(&image.elf)?;
+    let bound = stack::bound(&image.elf, stack::STEP_SYMBOL)?;
+    let rules = Rules { single: !image.mcu.part().double, whole_image: true };
+    let checks = checks::check(&image.elf, Some(stack::STEP_SYMBOL), rules)?;
+    Ok(Inspection {
+        machine: image.mcu.part().machine.to_owned(),
+        compiler: image.compiler.clone(),
+        flash: footprint.flash,
+        code: footprint.code,
+        constants: footprint.constants,
+        ram: footprint.ram,
+        tick_code: bound.code_bytes,
+        stack_bound: bound.is_complete().then_some(bound.bytes),
+        forbidden_symbols: footprint.panic_symbols.into_iter().chain(footprint.allocator_symbols).collect(),
+        used: used(image, None, &checks)?,
+        checks,
+    })
+}
+
+/// Replays `host`'s inputs under the configuration `config` on the emulated machine and measures it.
+///
+/// # Errors
+/// The emulator is missing or fails, or the image is not one of specgen's.
+pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measurement, TargetError> {
+    let seen = inspect(image)?;
+    let mut checks = seen.checks;
+    let (replayed, stats) = replay(image, config, host)?;
+    checks.hold_against_painted(stats.painted_stack);
+    let used = used(image, Some(&stats), &checks)?;
+    let stages = stats.stages.iter().filter(|stage| stage.calls > 0).map(|stage| Stage {
+        name: stage.name.clone(),
+        calls: stage.calls,
+        min: stage.smallest,
+        mean: stage.mean(),
+        max: stage.largest,
+    });
+    Ok(Measurement {
+        machine: seen.machine,
+        compiler: seen.compiler,
+        flash: seen.flash,
+        code: seen.code,
+        constants: seen.constants,
+        ram: seen.ram + stats.state_bytes + stats.config_bytes,
+        state: stats.state_bytes,
+        tick_code: seen.tick_code,
+        stack_bound: seen.stack_bound,
+        stack_painted: stats.painted_stack,
+        forbidden_symbols: seen.forbidden_symbols,
+        stages: stages.collect(),
+        ticks: stats.ticks,
+        first_difference: first_difference(host, &replayed).map(|difference| difference.to_string()),
+        checks,
+        used,
+    })
+}
+
+/// What the replay image uses, and who of it; without a run, neither Config and State nor instructions.
+fn used(image: &Image, stats: Option<&target::replay::ReplayStats>, checks: &Checked) -> Result<Used, TargetError> {
+    let size = size::size(&image.elf)?;
+    let stack = checks.stack.unwrap_or(0);
+    let words = stats.map_or(Vec::new(), |stats| {
+        vec![("State".to_owned(), stats.state_bytes), ("Config".to_owned(), stats.config_bytes)]
+    });
+    let ram_by: Vec<(String, u64)> = words
+        .iter()
+        .cloned()
+        .chain([("stack of a tick".to_owned(), stack)])
+        .chain(size.variables.iter().cloned())
+        .collect();
+    Ok(Used {
+        flash: size.flash(),
+        flash_by: size.owners.iter().map(|owner| (owner.name.clone(), owner.flash())).collect(),
+        ram: size.ram() + words.iter().map(|(_, bytes)| bytes).sum::<u64>() + stack,
+        ram_by,
+        stack: checks.stack,
+        stack_by: checks.path.clone(),
+        instructions: stats.and_then(|stats| stats.stage(WHOLE)).map(|step| step.mean().ceil() as u64),
+        instructions_by: stats.map(per_tick).unwrap_or_default(),
+    })
+}
+
+/// Instructions of the stages over a whole tick: those of a leg count six times. Stages are measured on some ticks only, one
+/// that happens once a tick as often as any.
+fn per_tick(stats: &target::replay::ReplayStats) -> Vec<(String, u64)> {
+    let stages = || stats.stages.iter().filter(|stage| stage.name != WHOLE && stage.calls > 0);
+    let ticks = stages().map(|stage| stage.calls).min().unwrap_or(1);
+    stages().map(|stage| (stage.name.clone(), (stage.sum as f64 / ticks as f64).round() as u64)).collect()
+}
+
+/// The record's inputs on the emulated machine: its trace, and what was measured.
+///
+/// # Errors
+/// As [`target::replay()`].
+pub fn replay(
+    image: &Image,
+    config: &[u64],
+    host: &Trace,
+) -> Result<(Trace, target::replay::ReplayStats), TargetError> {
+    let inputs_per_row = host.description().input_names.len();
+    let inputs: Vec<Vec<u64>> = host.rows().map(|row| row[..inputs_per_row].to_vec()).collect();
+    let result = target::replay(image, config, &inputs, LIMIT)?;
+    let mut trace = Trace::new(host.description().clone());
+    for ((input, output), digest) in inputs.iter().zip(&result.outputs).zip(&result.digests) {
+        trace.push(input, output, *digest);
+    }
+    Ok((trace, result.stats))
+}

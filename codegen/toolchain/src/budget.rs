@@ -1,0 +1,146 @@
+//! What a controller uses against what the spec allows and the part has; over it, who uses most and by how much to shrink.
+
+use serde::Serialize;
+
+use specgen_language::model::Target;
+
+/// As many users as a refusal names.
+const NAMED: usize = 3;
+
+/// Figures of a built image.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Used {
+    /// Bytes of flash.
+    pub flash: u64,
+    /// Who takes them: name, bytes.
+    pub flash_by: Vec<(String, u64)>,
+    /// Bytes of RAM, the stack of a tick included.
+    pub ram: u64,
+    /// Who takes them: name, bytes.
+    pub ram_by: Vec<(String, u64)>,
+    /// Bytes of the stack of a tick at most; none without a bound.
+    pub stack: Option<u64>,
+    /// Frames of the deepest path: function, bytes.
+    pub stack_by: Vec<(String, u64)>,
+    /// Mean instructions of a tick, rounded up; none if not counted.
+    pub instructions: Option<u64>,
+    /// Its stages, by what they take of a tick.
+    pub instructions_by: Vec<(String, u64)>,
+}
+
+/// What is over budget, in words; nothing if all is within.
+#[must_use]
+pub fn over(target: &Target, used: &Used) -> Vec<String> {
+    let part = target.mcu.part();
+    let limit = |budget: Option<u64>, key: &str, has: u64| match budget {
+        Some(bytes) => (bytes, format!("target.budget.{key} allows {}", group(bytes))),
+        None => (has, format!("{} has {}", part.name, group(has))),
+    };
+    let mut over = Vec::new();
+    let mut check = |what: &str, unit: &str, used: u64, (most, words): (u64, String), by: &[(String, u64)]| {
+        if used > most {
+            let shrink = group(used - most);
+            over.push(format!(
+                "{what} takes {} {unit}, {words}: shrink it by {shrink}{}",
+                group(used),
+                users(by, used)
+            ));
+        }
+    };
+    check("flash", "bytes", used.flash, limit(target.flash, "flash", part.flash), &used.flash_by);
+    check("ram", "bytes", used.ram, limit(target.ram, "ram", part.ram), &used.ram_by);
+    if let Some(stack) = used.stack {
+        check("stack", "bytes", stack, limit(target.stack, "stack", part.ram), &used.stack_by);
+    }
+    if let (Some(instructions), Some(most)) = (used.instructions, target.instructions) {
+        let words = format!("target.budget.instructions allows {}", group(most));
+        check("instructions", "per tick", instructions, (most, words), &used.instructions_by);
+    }
+    if target.stack.is_some() && used.stack.is_none() {
+        over.push("the stack of a tick cannot be bounded".to_owned());
+    }
+    over
+}
+
+/// `; most of it: load 1,761 (43 %), learn 437 (11 %)`.
+fn users(by: &[(String, u64)], whole: u64) -> String {
+    let mut sorted: Vec<&(String, u64)> = by.iter().filter(|(_, amount)| *amount > 0).collect();
+    sorted.sort_by(|a, b| (b.1, &a.0).cmp(&(a.1, &b.0)));
+    let share = |amount: u64| (100 * amount + whole / 2) / whole.max(1);
+    let named: Vec<String> = sorted
+        .iter()
+        .take(NAMED)
+        .map(|(name, amount)| format!("{name} {} ({} %)", group(*amount), share(*amount)))
+        .collect();
+    if named.is_empty() { String::new() } else { format!("; most of it: {}", named.join(", ")) }
+}
+
+/// A count with thousands separated.
+#[must_use]
+pub fn group(value: u64) -> String {
+    let digits = value.to_string();
+    let mut out = String::new();
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use specgen_language::model::Mcu;
+
+    fn used() -> Used {
+        let list = |parts: &[(&str, u64)]| parts.iter().map(|(name, amount)| ((*name).to_owned(), *amount)).collect();
+        Used {
+            flash: 60_000,
+            flash_by: list(&[("core", 5000), ("controller", 40_000), ("runtime", 15_000)]),
+            ram: 9000,
+            ram_by: list(&[("State", 8000)]),
+            stack: Some(1672),
+            stack_by: list(&[("step", 1600), ("memcpy", 72)]),
+            instructions: Some(4107),
+            instructions_by: list(&[("learn", 437), ("load", 1761)]),
+        }
+    }
+
+    #[test]
+    fn what_is_over_is_named_with_who_takes_most_and_by_how_much_to_shrink() {
+        let mut target = Target { mcu: Mcu::Mps2An500, flash: None, ram: None, stack: None, instructions: None };
+        assert_eq!(over(&target, &used()), Vec::<String>::new());
+        (target.flash, target.ram, target.stack, target.instructions) =
+            (Some(60_000), Some(9000), Some(1672), Some(4107));
+        assert_eq!(over(&target, &used()), Vec::<String>::new());
+        target.instructions = Some(4000);
+        assert_eq!(
+            over(&target, &used()),
+            [
+                "instructions takes 4,107 per tick, target.budget.instructions allows 4,000: shrink it by 107; most of it: \
+                 load 1,761 (43 %), learn 437 (11 %)"
+            ]
+        );
+        target.flash = Some(59_999);
+        let words = over(&target, &used()).join("\n");
+        assert!(words.contains("shrink it by 1; most of it: controller 40,000 (67 %), runtime"), "{words}");
+        (target.ram, target.stack) = (Some(1), Some(1));
+        assert_eq!(over(&target, &used()).len(), 4);
+        assert!(over(&target, &Used { stack: None, ..used() }).iter().any(|words| words.contains("cannot be bounded")));
+    }
+
+    #[test]
+    fn without_a_budget_the_part_is_the_limit() {
+        let target = Target { mcu: Mcu::Stm32F446Re, flash: None, ram: None, stack: None, instructions: None };
+        assert_eq!(over(&target, &used()), Vec::<String>::new());
+        let words = over(&target, &Used { flash: 600_000, ..used() }).join("\n");
+        assert!(words.contains("stm32f446re has 524,288") && words.contains("shrink it by 75,712"), "{words}");
+    }
+
+    #[test]
+    fn thousands_are_separated() {
+        assert_eq!([0, 999, 1000, 1_234_567].map(group), ["0", "999", "1,000", "1,234,567"]);
+    }
+}

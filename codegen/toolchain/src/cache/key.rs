@@ -1,0 +1,259 @@
+//! What decides about the bytes of a build: its sources, its command with all flags, and who carries it out.
+
+use crate::TRIPLE;
+use crate::process::{clean_command, decides_on_link, find_in_path, printed};
+use sha2::{Digest, Sha256};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+use std::process::Command;
+use std::time::UNIX_EPOCH;
+use toml::{Table, Value};
+
+/// Changes with the meaning of a key.
+const VERSION: &str = "2";
+/// Tables of cargo's configuration that say where things come from and how they look, not what is built.
+const WITHOUT_EFFECT: [&str; 11] = [
+    "alias",
+    "cache",
+    "cargo-new",
+    "credential-alias",
+    "future-incompat-report",
+    "http",
+    "install",
+    "net",
+    "registries",
+    "registry",
+    "term",
+];
+/// Keys of cargo's configuration that bring in what a key does not see: other sources, files, or another compiler.
+const BEYOND: [&[&str]; 4] = [&["paths"], &["patch"], &["include"], &["build", "rustc"]];
+
+/// What was found before a build.
+pub(super) struct Recipe {
+    package: PathBuf,
+    /// Of everything but the sources.
+    context: Digester,
+    /// Of every source.
+    sources: [u8; 32],
+}
+
+impl Recipe {
+    /// None if something may decide that cannot be read.
+    pub fn of(command: &Command, package: &Path, rustc_args: &[&str]) -> Option<Self> {
+        let mut context = Digester::default();
+        context.add(VERSION);
+        context.add(std::env::consts::ARCH);
+        context.add(command.get_program().as_encoded_bytes());
+        command.get_args().for_each(|argument| context.add(argument.as_encoded_bytes()));
+        let set: BTreeMap<_, _> = command.get_envs().filter_map(|(name, value)| Some((name, value?))).collect();
+        for (name, value) in &set {
+            context.add(name.as_encoded_bytes());
+            context.add(value.as_encoded_bytes());
+        }
+        for (name, value) in std::env::vars_os().filter(|(name, _)| decides_on_link(name)) {
+            context.add(name.as_encoded_bytes());
+            context.add(value.as_encoded_bytes());
+        }
+        rustc_args.iter().for_each(|argument| context.add(argument));
+        let package = plain(&std::path::absolute(package).ok()?);
+        configuration(&package, &mut context)?;
+        tools(command, &package, &mut context)?;
+        let sources = sources(&package)?;
+        Some(Self { package, context, sources })
+    }
+
+    /// The name of the build.
+    pub fn key(&self) -> String {
+        let mut key = self.context.clone();
+        key.add(self.sources);
+        key.digest().iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Whether the sources are those that this was made of.
+    pub fn is_current(&self) -> bool {
+        sources(&self.package) == Some(self.sources)
+    }
+}
+
+#[derive(Clone, Default)]
+struct Digester(Sha256);
+
+impl Digester {
+    fn add(&mut self, bytes: impl AsRef<[u8]>) {
+        // The length keeps neighbours apart.
+        self.0.update((bytes.as_ref().len() as u64).to_le_bytes());
+        self.0.update(bytes.as_ref());
+    }
+
+    /// A file by its place, size and time: for those that only an installation changes.
+    fn stamp(&mut self, path: &Path) -> Option<()> {
+        let path = fs::canonicalize(path).ok()?;
+        let metadata = fs::metadata(&path).ok()?;
+        let time = metadata.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
+        self.add(path.as_os_str().as_encoded_bytes());
+        self.add(metadata.len().to_le_bytes());
+        self.add(time.as_nanos().to_le_bytes());
+        Some(())
+    }
+
+    /// Every file below a folder, if it is there.
+    fn stamp_below(&mut self, folder: &Path, only: impl Fn(&str) -> bool + Copy) -> Option<()> {
+        let Ok(entries) = fs::read_dir(folder) else { return Some(()) };
+        let mut paths: Vec<PathBuf> = entries.map(|entry| Some(entry.ok()?.path())).collect::<Option<_>>()?;
+        paths.sort();
+        for path in paths.iter().filter(|path| path.file_name().is_some_and(|name| only(&name.to_string_lossy()))) {
+            if path.is_dir() { self.stamp_below(path, only) } else { self.stamp(path) }?;
+        }
+        Some(())
+    }
+
+    fn digest(self) -> [u8; 32] {
+        self.0.finalize().into()
+    }
+}
+
+/// Cargo, compiler, libraries that come with it, linkers.
+fn tools(command: &Command, package: &Path, context: &mut Digester) -> Option<()> {
+    // Cargo runs where the package is, and may be a proxy that picks the compiler by that.
+    let ask = |program: &Path, arguments: &[&str]| printed(clean_command(program).current_dir(package).args(arguments));
+    let variable = |name: &str| command.get_envs().find(|(set, _)| *set == name).and_then(|(_, value)| value);
+    let compiler = variable("RUSTC").map_or_else(|| PathBuf::from("rustc"), PathBuf::from);
+    context.add(ask(Path::new(command.get_program()), &["-vV"])?);
+    let version = ask(&compiler, &["-vV"])?;
+    context.add(&version);
+    let sysroot = ask(&compiler, &["--print", "sysroot"])?;
+    let sysroot = Path::new(sysroot.trim_end());
+    // A compiler of one's own is built again without a new version.
+    context.stamp_below(&sysroot.join("bin"), |name| name == "rustc")?;
+    context.stamp_below(&sysroot.join("lib"), |name| name.starts_with("librustc_driver"))?;
+    let rustlib = sysroot.join("lib/rustlib");
+    for target in version.lines().filter_map(|line| line.strip_prefix("host: ")).chain([TRIPLE]) {
+        context.stamp_below(&rustlib.join(target), |_| true)?;
+    }
+    if command.get_args().any(|argument| argument.as_encoded_bytes().starts_with(b"-Zbuild-std")) {
+        context.stamp_below(&rustlib.join("src/rust/library"), |name| name != "tests" && name != "benches")?;
+    }
+    let flags = variable("CARGO_ENCODED_RUSTFLAGS").map(|flags| flags.to_string_lossy().into_owned());
+    let given = flags.iter().flat_map(|flags| flags.split('\u{1f}')).filter_map(|flag| flag.strip_prefix("-Clinker="));
+    let on_path = ["cc", "ld"].into_iter().filter_map(find_in_path);
+    given.map(PathBuf::from).chain(on_path).try_for_each(|linker| context.stamp(&linker))
+}
+
+/// What cargo's own configuration files say, from the package's folder upwards and in cargo's home.
+fn configuration(package: &Path, context: &mut Digester) -> Option<()> {
+    let home = std::env::var_os("CARGO_HOME").filter(|home| !home.is_empty()).map(PathBuf::from);
+    let home = home.or_else(|| Some(std::env::home_dir()?.join(".cargo")));
+    let folders: Vec<PathBuf> = package.ancestors().map(|folder| folder.join(".cargo")).chain(home).collect();
+    for folder in folders {
+        for name in ["config.toml", "config"] {
+            let path = folder.join(name);
+            if !path.is_file() {
+                continue;
+            }
+            let mut table: Table = fs::read_to_string(&path).ok()?.parse().ok()?;
+            table.retain(|name, _| WITHOUT_EFFECT.iter().all(|without| *without != name));
+            let table = Value::Table(table);
+            if BEYOND.iter().any(|keys| keys.iter().try_fold(&table, |value, key| value.get(key)).is_some()) {
+                return None;
+            }
+            if table.as_table().is_some_and(|table| !table.is_empty()) {
+                // Paths in it are meant from where it is.
+                context.add(path.as_os_str().as_encoded_bytes());
+                context.add(format!("{table:?}"));
+            }
+        }
+    }
+    Some(())
+}
+
+/// Digest of every file that a build of the package can see: the package, what its manifest names by a path, what theirs do,
+/// and manifest and lock file of the workspace. None if something cannot be read.
+fn sources(package: &Path) -> Option<[u8; 32]> {
+    let root = package.parent().unwrap_or(package);
+    let mut files = BTreeMap::new();
+    let mut open = vec![package.to_owned()];
+    let manifest = root.join("Cargo.toml");
+    if manifest.is_file() {
+        collect(&manifest, &mut files)?;
+        open.extend(named(root, &files[&manifest]));
+    }
+    // Cargo makes one if there is none; it says nothing where nothing comes from elsewhere. A package that is a workspace of
+    // its own has its own.
+    let lock = root.join("Cargo.lock");
+    let says = |text: &str| text.lines().any(|line| line.starts_with("source = "));
+    if lock.is_file() && !package.join("Cargo.lock").is_file() && says(&fs::read_to_string(&lock).ok()?) {
+        collect(&lock, &mut files)?;
+    }
+    let mut seen = BTreeSet::new();
+    while let Some(path) = open.pop() {
+        if !seen.insert(path.clone()) {
+            continue;
+        }
+        collect(&path, &mut files)?;
+        if let Some(manifest) = files.get(&path.join("Cargo.toml")) {
+            open.extend(named(&path, manifest));
+        }
+    }
+    let mut digest = Digester::default();
+    for (path, content) in files {
+        // The same workspace in another folder is the same.
+        digest.add(path.strip_prefix(root).unwrap_or(&path).as_os_str().as_encoded_bytes());
+        digest.add(content);
+    }
+    Some(digest.digest())
+}
+
+/// All that a manifest in `folder` names by a key `path`.
+fn named(folder: &Path, manifest: &[u8]) -> Vec<PathBuf> {
+    fn walk(value: &Value, found: &mut Vec<String>) {
+        match value {
+            Value::Table(table) => {
+                for (key, value) in table {
+                    match value {
+                        Value::String(path) if key == "path" => found.push(path.clone()),
+                        value => walk(value, found),
+                    }
+                }
+            }
+            Value::Array(list) => list.iter().for_each(|value| walk(value, found)),
+            _ => {}
+        }
+    }
+    let mut found = Vec::new();
+    // Cargo has the words for a manifest that is none.
+    if let Ok(table) = String::from_utf8_lossy(manifest).parse::<Table>() {
+        walk(&Value::Table(table), &mut found);
+    }
+    found.iter().map(|path| plain(&folder.join(path))).collect()
+}
+
+/// A path without `..` and `.` in its middle, so that one folder has one name.
+fn plain(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for part in path.components() {
+        let goes_up =
+            part == Component::ParentDir && matches!(plain.components().next_back(), Some(Component::Normal(_)));
+        if goes_up {
+            plain.pop();
+        } else if part != Component::CurDir {
+            plain.push(part);
+        }
+    }
+    plain
+}
+
+/// A file, or all below a folder but what cargo made.
+fn collect(path: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) -> Option<()> {
+    if path.is_file() {
+        files.insert(path.to_owned(), fs::read(path).ok()?);
+    } else if path.is_dir() {
+        for entry in fs::read_dir(path).ok()? {
+            let entry = entry.ok()?;
+            if entry.file_name() != "target" {
+                collect(&entry.path(), files)?;
+            }
+        }
+    }
+    Some(())
+}

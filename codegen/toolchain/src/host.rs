@@ -1,0 +1,100 @@
+//! Builds DIR/host of an emitted workspace into a shared library for this machine.
+
+use super::build::{BuildRequest, cargo_artifact};
+use super::cache;
+use super::error::TargetError;
+use super::process::{clean_command, find_in_path};
+use crate::sha256;
+use std::path::{Path, PathBuf};
+
+/// A shared library may leave symbols undefined unless told otherwise, and then the proof that nothing can
+/// panic would never fail. libc is for `memcpy` and `memset`, which the compiler calls by itself.
+const LINK: [&str; 2] = ["-Clink-arg=-Wl,-z,defs", "-Clink-arg=-lc"];
+
+/// Builds `dir/host` (a `cdylib` that links only if nothing in it can panic) and returns the library's path.
+///
+/// `target_dir` keeps what can be used again. The library is copied to a name that holds a digest of its
+/// content, so that a later build into the same folder cannot change what the path means.
+///
+/// # Errors
+/// [`TargetError::MissingTool`] without cargo, [`TargetError::PanicPath`] if the controller can panic,
+/// [`TargetError::BuildFailed`] for everything else that cargo says.
+pub fn build_library(dir: &Path, target_dir: &Path) -> Result<PathBuf, TargetError> {
+    let cargo = cargo()?;
+    let package = dir.join("host");
+    let target_dir = target_dir.join("host");
+    let mut command = clean_command(cargo);
+    // `cargo rustc`, so that the link flags below reach this crate alone.
+    command.args(["rustc", "--release", "--lib"]);
+    let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &LINK, locked: false };
+    let library = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
+        let is_library = message["target"]["kind"].as_array()?.iter().any(|kind| kind == "cdylib");
+        let file = message["filenames"].as_array()?.first()?.as_str()?;
+        is_library.then(|| PathBuf::from(file))
+    })?;
+    keep(&library.path, &library.bytes)
+}
+
+/// Builds the program in `dir/folder` for this machine and returns its path. Its dependencies are those of its lock file.
+///
+/// # Errors
+/// [`TargetError::MissingTool`] without cargo, [`TargetError::BuildFailed`] for everything that cargo says.
+pub fn build_program(dir: &Path, folder: &str, target_dir: &Path) -> Result<PathBuf, TargetError> {
+    let package = dir.join(folder);
+    let target_dir = target_dir.join(folder);
+    let mut command = clean_command(cargo()?);
+    command.args(["build", "--release"]);
+    let request = BuildRequest { package: &package, target_dir: &target_dir, rustc_args: &[], locked: true };
+    let program = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
+        message["executable"].as_str().map(PathBuf::from)
+    })?;
+    Ok(program.path)
+}
+
+/// The cargo of this machine.
+fn cargo() -> Result<PathBuf, TargetError> {
+    find_in_path("cargo").ok_or_else(|| TargetError::MissingTool {
+        tool: "cargo".into(),
+        looked: "cargo on PATH".into(),
+        command: "the commands at rustup.rs   (or, on Debian: apt-get install cargo-web)".into(),
+    })
+}
+
+/// Copies the library to a name that only this content has. A file that has the name already is replaced unless it has the
+/// content, too: it may have been cut off or damaged since.
+fn keep(built: &Path, bytes: &[u8]) -> Result<PathBuf, TargetError> {
+    let name = format!("specgen-{}{}", &sha256(bytes)[..16], std::env::consts::DLL_SUFFIX);
+    let kept = built.with_file_name(name);
+    cache::put(&kept, bytes)?;
+    Ok(kept)
+}
+
+/// Writes a file beside its place and renames it, so that nobody finds half of it.
+///
+/// # Errors
+/// [`TargetError::Io`]; nothing is left then.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), TargetError> {
+    cache::replace(path, bytes, false).map_err(|error| TargetError::io("writing", path, error))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_kept_library_is_never_believed_by_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let built = folder.path().join("libcontroller_host.so");
+        let content = b"a library".to_vec();
+        let kept = keep(&built, &content).unwrap();
+        for damaged in [&b"a libr"[..], b"b library", b""] {
+            fs::write(&kept, damaged).unwrap();
+            let mapped = fs::File::open(&kept).unwrap();
+            assert_eq!(keep(&built, &content).unwrap(), kept);
+            assert_eq!(fs::read(&kept).unwrap(), content);
+            // Another file of that name, so that a process that has mapped the old one does not see its end move.
+            assert_eq!(mapped.metadata().unwrap().len(), damaged.len() as u64);
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Brings what building and running for a microcontroller needs, by the first way that leads there.
+//!
+//! 1. What is there already, if it works.
+//! 2. The compiler by `rustup target add`.
+//! 3. Debian's packages, installed as root or with a sudo that asks for no password.
+//! 4. The same packages, [unpacked] into a folder of the user's cache.
+//!
+//! Nothing that is installed is removed, no configuration is edited, nobody is asked for a password.
+
+use super::apt::{Apt, Refusal};
+use super::emulator::{self, Emulator};
+use super::error::TargetError;
+use super::places::Places;
+use super::process::{self, clean_command};
+use super::toolchain::{self, Toolchain};
+use super::{TRIPLE, Tools, unpacked};
+use specgen_language::interrupt::Scratch;
+use std::time::Duration;
+
+/// Longest time for rustup: it downloads some megabytes.
+const RUSTUP_LIMIT: Duration = Duration::from_secs(600);
+
+/// Brings what is missing and returns what is there then. `say` is told every step before it is taken.
+///
+/// # Errors
+/// [`TargetError::SetUpFailed`] for what cannot be had, with what was tried and what is left to do by hand.
+pub fn provision(say: &mut dyn FnMut(&str)) -> Result<Tools, TargetError> {
+    provision_in(&Places::here(), say)
+}
+
+/// [`provision`] in given places.
+fn provision_in(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Tools, TargetError> {
+    let toolchain = compiler(places, say);
+    // Of use without a compiler too: `pil --elf`.
+    let emulator = emulator(places, say);
+    if let (Err(_), Err(second)) = (&toolchain, &emulator) {
+        // The first is returned.
+        say(&second.to_string());
+    }
+    let tools = Tools { toolchain: toolchain?, emulator: emulator? };
+    say(&format!("cross compiler: {} ({})", tools.toolchain.version, tools.toolchain.rustc.display()));
+    say(&format!("emulator: {} ({})", tools.emulator.version, tools.emulator.program.display()));
+    Ok(tools)
+}
+
+fn compiler(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Toolchain, TargetError> {
+    let find = || toolchain::find_in(places);
+    let mut search = Search { places, say, tried: Vec::new() };
+    if let Some(found) = search.already(&find) {
+        return Ok(found);
+    }
+    if let Some(found) = search.way("rustup target add", &find, rustup) {
+        return Ok(found);
+    }
+    let mut packages = toolchain::PACKAGES.to_vec();
+    if !toolchain::has_linker(places) {
+        packages.push(toolchain::LINKER_PACKAGE);
+    }
+    search.debian(&packages, &find).ok_or_else(|| search.failed("a Rust compiler", toolchain::install_command()))
+}
+
+fn emulator(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Emulator, TargetError> {
+    let find = || Emulator::find_in(places);
+    let mut search = Search { places, say, tried: Vec::new() };
+    if let Some(found) = search.already(&find) {
+        return Ok(found);
+    }
+    let found = search.debian(&[emulator::PROGRAM], &find);
+    found.ok_or_else(|| search.failed("QEMU for ARM", emulator::install_command()))
+}
+
+/// What looks for a tool; it alone judges whether a way has led there.
+type Find<'a, T> = &'a dyn Fn() -> Result<T, TargetError>;
+
+/// The search for one tool.
+struct Search<'a> {
+    places: &'a Places,
+    say: &'a mut dyn FnMut(&str),
+    /// Each way, and where it ended.
+    tried: Vec<String>,
+}
+
+impl Search<'_> {
+    /// What is there; else what is missing is said.
+    fn already<T>(&mut self, find: Find<'_, T>) -> Option<T> {
+        find().map_err(|missing| (self.say)(&missing.to_string())).ok()
+    }
+
+    /// Debian's packages, in both ways.
+    fn debian<T>(&mut self, packages: &[&str], find: Find<'_, T>) -> Option<T> {
+        let mut offline = false;
+        let installed = self.way("apt-get install", find, |places, say| {
+            let apt = Apt::of_the_system(places)?;
+            say(&format!("running: {}", apt.shown(packages)));
+            let done = apt.install(packages);
+            offline = done == Err(Refusal::NoNetwork);
+            done
+        });
+        if installed.is_some() || offline {
+            return installed;
+        }
+        self.way("unpacked packages", find, |places, say| {
+            unpacked::fetch(packages[0], packages, places, &|| find().is_ok(), say)
+        })
+    }
+
+    /// Goes one way; none, with a note of why, if the tool is not there at its end.
+    fn way<T>(
+        &mut self,
+        name: &str,
+        find: Find<'_, T>,
+        go: impl FnOnce(&Places, &mut dyn FnMut(&str)) -> Result<(), Refusal>,
+    ) -> Option<T> {
+        let why = match go(self.places, &mut *self.say) {
+            Ok(()) => match find() {
+                Ok(found) => return Some(found),
+                Err(_) => "done, but what it brought does not work".to_owned(),
+            },
+            Err(refusal) => refusal.to_string(),
+        };
+        (self.say)(&format!("{name}: {why}"));
+        self.tried.push(format!("{name}: {why}"));
+        None
+    }
+
+    fn failed(&self, tool: &str, command: String) -> TargetError {
+        TargetError::SetUpFailed { tool: tool.to_owned(), tried: self.tried.clone(), command }
+    }
+}
+
+fn rustup(places: &Places, say: &mut dyn FnMut(&str)) -> Result<(), Refusal> {
+    let rustup = places.program("rustup").ok_or_else(|| Refusal::other("there is no rustup"))?;
+    say(&format!("running: rustup target add {TRIPLE}"));
+    let failed = |error: std::io::Error| Refusal::other(format!("rustup cannot be run: {error}"));
+    let scratch = Scratch::new().map_err(failed)?;
+    let mut command = clean_command(rustup);
+    let done = process::run(command.args(["target", "add", TRIPLE]), scratch.path(), RUSTUP_LIMIT).map_err(failed)?;
+    if done.success() {
+        return Ok(());
+    }
+    let why = done.stderr.lines().find_map(|line| line.strip_prefix("error: ")).unwrap_or("it does not say why");
+    // What follows are addresses and causes of causes.
+    Err(Refusal::other(why.split(": ").next().unwrap_or(why)))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,278 @@
+//! Who takes the memory of an image: by section, and by the source that the bytes come from.
+//!
+//! Code is told apart by line information, byte by byte, so that what was inlined counts for whom it was written by;
+//! constants and variables by their symbols.
+
+use super::checks;
+use super::error::TargetError;
+use super::image::RECORDER;
+use super::panics::{self, DebugInfo};
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, SymbolKind};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What the line in every image begins with that says where its controller comes from.
+pub const IDENTITY_MARK: &str = "specgen-identity: ";
+/// Longest identity that is believed, bytes.
+const LONGEST_IDENTITY: usize = 512;
+/// Code without line information: assembly, and libraries that came compiled.
+const NO_LINES: &str = "without line information";
+/// Constants without a symbol: literals of the compiler, and those that it merged.
+const UNNAMED: &str = "unnamed constants";
+
+/// Sections that take memory of the microcontroller, and who takes it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Size {
+    /// Compiler, platform and spec, as the image says; none if it was made by something else.
+    pub identity: Option<String>,
+    /// In the order of the image.
+    pub sections: Vec<Section>,
+    /// By bytes of flash, the most first.
+    pub owners: Vec<Owner>,
+    /// Variables by their names, the largest first: bytes.
+    pub variables: Vec<(String, u64)>,
+}
+
+/// A section.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Section {
+    /// Its name.
+    pub name: String,
+    /// First address.
+    pub address: u64,
+    /// Bytes.
+    pub bytes: u64,
+    /// Whether it takes flash: all that has content.
+    pub flash: bool,
+    /// Whether it takes RAM: all that can be written.
+    pub ram: bool,
+}
+
+/// What comes from one source.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Owner {
+    /// `controller`, `runtime`, a crate, `core`.
+    pub name: String,
+    /// Bytes of code.
+    pub code: u64,
+    /// Bytes of constants.
+    pub constants: u64,
+}
+
+impl Owner {
+    /// Bytes of flash.
+    #[must_use]
+    pub fn flash(&self) -> u64 {
+        self.code + self.constants
+    }
+}
+
+impl Size {
+    /// Bytes of flash.
+    #[must_use]
+    pub fn flash(&self) -> u64 {
+        self.sections.iter().filter(|section| section.flash).map(|section| section.bytes).sum()
+    }
+
+    /// Bytes of RAM that are taken statically, the memory of a recorder left out.
+    #[must_use]
+    pub fn ram(&self) -> u64 {
+        self.sections
+            .iter()
+            .filter(|section| section.ram && section.name != RECORDER)
+            .map(|section| section.bytes)
+            .sum()
+    }
+
+    /// Bytes of the memory of a recorder.
+    #[must_use]
+    pub fn recorder(&self) -> u64 {
+        self.sections.iter().filter(|section| section.name == RECORDER).map(|section| section.bytes).sum()
+    }
+}
+
+/// Measures an image.
+///
+/// # Errors
+/// [`TargetError::MalformedImage`] if it is no ELF file or its tables are damaged.
+pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
+    let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
+    let file = object::File::parse(elf).map_err(malformed)?;
+    let debug = panics::debug_info(elf)?;
+    let mut sections = Vec::new();
+    let mut owners: BTreeMap<String, Owner> = BTreeMap::new();
+    let mut variables: BTreeMap<String, u64> = BTreeMap::new();
+    let mut identity = None;
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags, .. } = section.flags() else { continue };
+        if sh_flags.0 & object::elf::SHF_ALLOC.0 == 0 || section.size() == 0 {
+            continue;
+        }
+        let ram = sh_flags.0 & object::elf::SHF_WRITE.0 != 0;
+        let flash = section.kind() != SectionKind::UninitializedData;
+        let name = section.name().map_err(malformed)?.to_owned();
+        sections.push(Section { name, address: section.address(), bytes: section.size(), flash, ram });
+        if !flash {
+            continue;
+        }
+        let end = section.address() + section.size();
+        if section.kind() == SectionKind::Text {
+            code(&debug, section.address(), end, &mut owners)?;
+            continue;
+        }
+        identity = identity.or(find_identity(section.data().map_err(malformed)?));
+        constants(&file, section.address(), end, &mut owners);
+    }
+    for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Data && symbol.size() > 0) {
+        let held = |section: &&Section| (section.address..section.address + section.bytes).contains(&symbol.address());
+        if sections.iter().find(held).is_some_and(|section| section.ram) {
+            let name = demangled(symbol.name().map_err(malformed)?);
+            variables.insert(name, symbol.size());
+        }
+    }
+    let mut owners: Vec<Owner> = owners.into_values().filter(|owner| owner.flash() > 0).collect();
+    owners.sort_by(|a, b| (b.flash(), &a.name).cmp(&(a.flash(), &b.name)));
+    let mut variables: Vec<(String, u64)> = variables.into_iter().collect();
+    variables.sort_by(|a, b| (b.1, &a.0).cmp(&(a.1, &b.0)));
+    Ok(Size { identity, sections, owners, variables })
+}
+
+/// The tick of an image, if it has one that can be told: see [`checks::check`].
+#[must_use]
+pub fn has_tick(elf: &[u8]) -> bool {
+    let Ok(file) = object::File::parse(elf) else { return false };
+    file.symbols().any(|symbol| symbol.name().is_ok_and(|name| checks::TICKS.contains(&name)))
+}
+
+fn demangled(name: &str) -> String {
+    format!("{:#}", rustc_demangle::demangle(name))
+}
+
+fn owner<'a>(owners: &'a mut BTreeMap<String, Owner>, name: &str) -> &'a mut Owner {
+    owners.entry(name.to_owned()).or_insert_with(|| Owner { name: name.to_owned(), ..Owner::default() })
+}
+
+/// Code between two addresses by the file of its lines; a line reaches to the next, literals after it included.
+fn code(debug: &DebugInfo<'_>, start: u64, end: u64, owners: &mut BTreeMap<String, Owner>) -> Result<(), TargetError> {
+    let malformed = |error: addr2line::gimli::Error| TargetError::MalformedImage { text: error.to_string() };
+    let mut known = start;
+    for (address, bytes, location) in debug.find_location_range(start, end).map_err(malformed)? {
+        // Rows come in the order of their addresses; one that reaches back counts from where the last one ended.
+        let (from, to) = (address.max(known), (address + bytes).min(end));
+        if to <= from {
+            continue;
+        }
+        owner(owners, NO_LINES).code += from - known;
+        owner(owners, &location.file.map_or_else(|| NO_LINES.to_owned(), crate_of_file)).code += to - from;
+        known = to;
+    }
+    owner(owners, NO_LINES).code += end - known;
+    Ok(())
+}
+
+/// Constants between two addresses by the crate of their symbols.
+fn constants(file: &object::File<'_>, start: u64, end: u64, owners: &mut BTreeMap<String, Owner>) {
+    let mut symbols: Vec<(u64, u64, String)> = file
+        .symbols()
+        .filter(|symbol| symbol.kind() == SymbolKind::Data && (start..end).contains(&symbol.address()))
+        .filter_map(|symbol| Some((symbol.address(), symbol.size(), demangled(symbol.name().ok()?))))
+        .collect();
+    symbols.sort();
+    let mut known = start;
+    for (address, bytes, name) in symbols {
+        let (from, to) = (address.max(known), (address + bytes).min(end));
+        if to <= from {
+            continue;
+        }
+        owner(owners, UNNAMED).constants += from - known;
+        owner(owners, crate_of_symbol(&name)).constants += to - from;
+        known = to;
+    }
+    owner(owners, UNNAMED).constants += end - known;
+}
+
+/// `controller` of `controller::hysteresis::EVERETT_0`, also where it stands for an implementation: `<controller::…`.
+fn crate_of_symbol(name: &str) -> &str {
+    let name = name.trim_start_matches(['<', '&']);
+    match name.split_once("::") {
+        Some(("specgen_runtime", _)) => "runtime",
+        Some((krate, _)) if !krate.is_empty() && !krate.contains(' ') => krate,
+        _ => UNNAMED,
+    }
+}
+
+/// The crate that a source file belongs to: by the registry's `name-version`, the library of the compiler, else the folder
+/// that holds `src`. Never a path of the machine.
+fn crate_of_file(path: &str) -> String {
+    let path = path.replace('\\', "/");
+    let parts: Vec<&str> = path.split('/').collect();
+    let after = |mark: &[&str]| parts.windows(mark.len()).position(|window| window == mark).map(|at| at + mark.len());
+    if let Some(at) = after(&["registry", "src"])
+        && let Some(package) = parts.get(at + 1)
+    {
+        return without_version(package).to_owned();
+    }
+    if let Some(library) = after(&["library"]).and_then(|at| parts.get(at)) {
+        return (*library).to_owned();
+    }
+    let source = parts.iter().rposition(|part| *part == "src").and_then(|at| at.checked_sub(1));
+    match source.and_then(|at| parts.get(at)).copied() {
+        Some(folder) if !folder.is_empty() && folder != "." => folder.to_owned(),
+        // Paths of the package that is built itself start with `src`.
+        _ if parts.first() == Some(&"src") => "firmware".to_owned(),
+        _ => NO_LINES.to_owned(),
+    }
+}
+
+/// `cortex-m-rt` of `cortex-m-rt-0.7.7`.
+fn without_version(package: &str) -> &str {
+    let mut end = package.len();
+    for (at, _) in package.match_indices('-') {
+        if package[at + 1..].starts_with(|c: char| c.is_ascii_digit()) {
+            end = at;
+            break;
+        }
+    }
+    &package[..end]
+}
+
+/// The identity line in the bytes of a section.
+fn find_identity(bytes: &[u8]) -> Option<String> {
+    let mark = IDENTITY_MARK.as_bytes();
+    let start = bytes.windows(mark.len()).position(|window| window == mark)? + mark.len();
+    let line = bytes.get(start..)?.iter().take(LONGEST_IDENTITY).take_while(|byte| **byte != b'\n');
+    let line: Vec<u8> = line.copied().collect();
+    String::from_utf8(line).ok().filter(|text| text.starts_with("specgen "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_and_symbols_are_told_by_their_crate() {
+        for (path, expected) in [
+            ("/home/me/out/controller/src/step.rs", "controller"),
+            ("controller/src/setpoint/x.rs", "controller"),
+            ("/x/registry/src/index-0123/cortex-m-rt-0.7.7/src/lib.rs", "cortex-m-rt"),
+            ("/x/registry/src/index-0123/embassy-stm32-0.6.0/src/spi/mod.rs", "embassy-stm32"),
+            ("/usr/src/rustc-1.96/library/core/src/num/f64.rs", "core"),
+            ("src/main.rs", "firmware"),
+            ("qemu/src/main.rs", "qemu"),
+            ("asm.S", NO_LINES),
+        ] {
+            assert_eq!(crate_of_file(path), expected, "{path}");
+        }
+        assert_eq!(crate_of_symbol("controller::hysteresis::EVERETT_0"), "controller");
+        assert_eq!(crate_of_symbol("<specgen_runtime::crc::Crc32 as x>::TABLE"), "runtime");
+        assert_eq!(crate_of_symbol(".Lanon.1"), UNNAMED);
+    }
+
+    #[test]
+    fn an_identity_is_found_where_it_lies_and_nowhere_else() {
+        let line = format!("\0\0{IDENTITY_MARK}specgen 0.1.0, platform x, f64, spec 00\nrest");
+        assert_eq!(find_identity(line.as_bytes()).as_deref(), Some("specgen 0.1.0, platform x, f64, spec 00"));
+        assert_eq!(find_identity(b"specgen-identity"), None);
+        assert_eq!(find_identity(IDENTITY_MARK.as_bytes()), None);
+    }
+}

@@ -1,0 +1,78 @@
+//! What a workspace can be built for, by the names that `--target` takes.
+
+use specgen_language::model::Mcu;
+
+/// How a target is built.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A shared library for this machine.
+    Host,
+    /// An image for the emulated machine of the spec's core.
+    Emulated,
+    /// An image for a board with this part.
+    Board(Mcu),
+    /// A program for this machine.
+    Program,
+}
+
+/// A target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Target {
+    /// As `--target` names it.
+    pub name: &'static str,
+    /// Its folder in the workspace.
+    pub folder: &'static str,
+    /// How it is built.
+    pub kind: Kind,
+}
+
+/// Every target.
+pub const TARGETS: [Target; 5] = [
+    Target { name: "host", folder: "host", kind: Kind::Host },
+    Target { name: "qemu", folder: "qemu", kind: Kind::Emulated },
+    Target { name: "stm32h743", folder: "stm32h743", kind: Kind::Board(Mcu::Stm32H743Zi) },
+    Target { name: "stm32f4", folder: "stm32f4", kind: Kind::Board(Mcu::Stm32F446Re) },
+    Target { name: "rt-pc", folder: "rt-pc", kind: Kind::Program },
+];
+
+/// Their names.
+pub const NAMES: [&str; TARGETS.len()] = {
+    let mut names = [""; TARGETS.len()];
+    let mut k = 0;
+    while k < names.len() {
+        names[k] = TARGETS[k].name;
+        k += 1;
+    }
+    names
+};
+
+impl Target {
+    /// The target called `name`.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        TARGETS.into_iter().find(|target| target.name == name)
+    }
+
+    /// The board of a part; the emulated machine if it has none.
+    #[must_use]
+    pub fn of(mcu: Mcu) -> Self {
+        let board = TARGETS.into_iter().find(|target| target.kind == Kind::Board(mcu));
+        board.unwrap_or(TARGETS[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_part_has_a_target_and_every_name_one() {
+        for target in TARGETS {
+            assert_eq!(Target::named(target.name), Some(target));
+        }
+        assert_eq!(Target::of(Mcu::Stm32H743Zi).name, "stm32h743");
+        assert_eq!(Target::of(Mcu::Stm32F446Re).name, "stm32f4");
+        assert_eq!(Target::of(Mcu::Mps2An386).name, "qemu");
+        assert_eq!(Target::named("esp32"), None);
+    }
+}
