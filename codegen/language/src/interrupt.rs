@@ -190,15 +190,29 @@ impl Claimed {
         let mut claimed = Self(Vec::new());
         for path in missing {
             let _whole = whole();
-            match fs::create_dir(path) {
-                Ok(()) => claimed.0.push(Guard::of(Passing::EmptyFolder(path.to_owned()))),
-                // Somebody else was faster.
-                Err(_) if path.is_dir() => {}
-                Err(error) => return Err(error),
+            if make_folder(path)? {
+                claimed.0.push(Guard::of(Passing::EmptyFolder(path.to_owned())));
             }
         }
-        // What is there and is no folder is told by trying to use it as one.
-        if folder.is_dir() { Ok(claimed) } else { fs::create_dir(folder).map(|()| claimed) }
+        // Another run may have removed it meanwhile; what is there and is no folder is told by trying.
+        let _whole = whole();
+        if !folder.is_dir() && make_folder(folder)? {
+            claimed.0.push(Guard::of(Passing::EmptyFolder(folder.to_owned())));
+        }
+        Ok(claimed)
+    }
+}
+
+/// Makes a folder; false if there is one by now.
+fn make_folder(path: &Path) -> io::Result<bool> {
+    loop {
+        match fs::create_dir(path) {
+            Ok(()) => return Ok(true),
+            Err(_) if path.is_dir() => return Ok(false),
+            // It was there, and has just been removed by whoever had made it.
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists && fs::symlink_metadata(path).is_err() => {}
+            Err(error) => return Err(error),
+        }
     }
 }
 
@@ -229,6 +243,26 @@ mod tests {
         assert_eq!((passing(&path), path.is_dir()), (1, true));
         drop(scratch);
         assert_eq!((passing(&path), path.exists()), (0, false));
+    }
+
+    /// As another run of specgen does it: in one process the second waits for the first to be done.
+    #[test]
+    fn a_folder_that_goes_while_it_is_made_is_made_again() {
+        let scratch = Scratch::new().unwrap();
+        let folder = scratch.path().join("work");
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..1000 {
+                        make_folder(&folder).unwrap();
+                        let _ = fs::remove_dir(&folder);
+                    }
+                });
+            }
+        });
+        // What stands in the way for good is an error, and no reason to wait.
+        std::os::unix::fs::symlink("nowhere", &folder).unwrap();
+        assert_eq!(make_folder(&folder).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
     }
 
     #[test]
