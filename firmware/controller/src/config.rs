@@ -3,9 +3,9 @@
 
 //! What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build.
 
+use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
 use crate::words::{CONFIG_CODES, CONFIG_WORDS};
 use crate::{Real, limits, permitted};
-use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
 
 /// ρ̂ of a leg, m/V; from `actuator`. Mode P takes the leg as linear: u = q/ρ̂.
 pub const LEG_GAIN: Real = 6.31e-7;
@@ -53,39 +53,23 @@ impl Config {
     pub const fn new() -> Self {
         let gains = Gains {
             proportional: [
-                506773.52336956555,
-                506773.52336956526,
-                1986452.9532608693,
-                9932.264766304346,
-                9932.264766304348,
-                9886.35923843263,
+                506773.52336956555, 506773.52336956526, 1986452.9532608693, 9932.264766304346,
+                9932.264766304348, 9886.35923843263,
             ],
             integral: [
-                1836209458.057596,
-                1836209458.0575948,
-                7197581429.494045,
-                35987907.14747023,
-                35987907.147470236,
-                35821576.11285991,
+                1836209458.057596, 1836209458.0575948, 7197581429.494045, 35987907.14747023,
+                35987907.147470236, 35821576.11285991,
             ],
             derivative: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         };
         let position_gains = Gains {
             proportional: [
-                366143.87063451105,
-                366143.8706345109,
-                1435212.2587309778,
-                7176.06129365489,
-                7176.0612936548905,
-                7142.894549767574,
+                366143.87063451105, 366143.8706345109, 1435212.2587309778, 7176.06129365489,
+                7176.0612936548905, 7142.894549767574,
             ],
             integral: [
-                7959968000.679677,
-                7959968000.679673,
-                31201515496.85669,
-                156007577.48428345,
-                156007577.48428345,
-                155286532.44924772,
+                7959968000.679677, 7959968000.679673, 31201515496.85669, 156007577.48428345,
+                156007577.48428345, 155286532.44924772,
             ],
             derivative: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         };
@@ -94,7 +78,11 @@ impl Config {
             interaction: Interaction::Neglected,
             level_weight: 0.04831111264715217,
             drift_weight: 0.002125688956474695,
-            code_limits: CodeLimits { min: limits::CODES[0], max: limits::CODES[1], max_step: 1747 },
+            code_limits: CodeLimits {
+                min: limits::CODES[0],
+                max: limits::CODES[1],
+                max_step: 1747,
+            },
             gains,
             position_gains,
             environment: Environment {
@@ -199,8 +187,17 @@ impl Config {
     /// # Errors
     /// A weight outside its range in [`permitted::SETTINGS`]. That they are stable on the platform is for the
     /// compiler to check, not for this function.
-    pub fn with_weights(self, level_weight: Real, drift_weight: Real) -> Result<Self, ConfigError> {
-        Self { level_weight, drift_weight, ..self }.checked()
+    pub fn with_weights(
+        self,
+        level_weight: Real,
+        drift_weight: Real,
+    ) -> Result<Self, ConfigError> {
+        Self {
+            level_weight,
+            drift_weight,
+            ..self
+        }
+            .checked()
     }
 
     /// The same with other gains for P/F and for P alone.
@@ -208,16 +205,29 @@ impl Config {
     /// # Errors
     /// A gain outside its range in [`permitted::SETTINGS`]. That they are stable on the platform is for the compiler
     /// to check, not for this function.
-    pub fn with_gains(self, gains: Gains<Real>, position_gains: Gains<Real>) -> Result<Self, ConfigError> {
+    pub fn with_gains(
+        self,
+        gains: Gains<Real>,
+        position_gains: Gains<Real>,
+    ) -> Result<Self, ConfigError> {
         let damps = [damps(&gains), damps(&position_gains)];
-        Self { gains, position_gains, damps, ..self }.checked()
+        Self {
+            gains,
+            position_gains,
+            damps,
+            ..self
+        }
+            .checked()
     }
 
     /// The same with another environment.
     ///
     /// # Errors
     /// A stiffness or a pose outside its range.
-    pub fn with_environment(self, environment: Environment) -> Result<Self, ConfigError> {
+    pub fn with_environment(
+        self,
+        environment: Environment,
+    ) -> Result<Self, ConfigError> {
         Self { environment, ..self }.checked()
     }
 
@@ -246,7 +256,9 @@ impl Config {
             }
         }
         if words[CONFIG_CODES + 2] < words[CONFIG_CODES + 1] {
-            return Err(ConfigError { word: CONFIG_CODES + 2 });
+            return Err(ConfigError {
+                word: CONFIG_CODES + 2,
+            });
         }
         Ok(())
     }

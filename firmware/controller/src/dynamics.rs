@@ -9,8 +9,8 @@
 use specgen_runtime::dynamics::Leg;
 use specgen_runtime::{Platform, Real as _};
 
-use crate::Real;
 pub use specgen_runtime::{Load, Motion};
+use crate::Real;
 
 /// Constants of the platform; from `geometry`, `platform` and `leg`.
 ///
@@ -145,10 +145,26 @@ pub const ANALYSIS_WORDS: usize = 96;
 #[must_use]
 pub fn analysis(words: &[u64; MOTION_WORDS]) -> [u64; ANALYSIS_WORDS] {
     let number = |k: usize| Real::from_word(words[k]);
-    let six = |k: usize| [number(k), number(k + 1), number(k + 2), number(k + 3), number(k + 4), number(k + 5)];
-    let motion = Motion { pose: six(0), rate: six(6), acceleration: six(12) };
+    let six = |k: usize| [
+        number(k),
+        number(k + 1),
+        number(k + 2),
+        number(k + 3),
+        number(k + 4),
+        number(k + 5),
+    ];
+    let motion = Motion {
+        pose: six(0),
+        rate: six(6),
+        acceleration: six(12),
+    };
     let load = load(&motion, None);
-    let rows = [coriolis(&motion.pose, &motion.rate), gravity(&motion.pose), leg_forces(&motion), load.displacement];
+    let rows = [
+        coriolis(&motion.pose, &motion.rate),
+        gravity(&motion.pose),
+        leg_forces(&motion),
+        load.displacement,
+    ];
     let (jacobian, mass) = (jacobian(&motion.pose), mass_matrix(&motion.pose));
     let mut out = [0; ANALYSIS_WORDS];
     let values = jacobian.iter().chain(&mass).chain(&rows).flatten();

@@ -53,12 +53,13 @@ pub use specgen_runtime::setpoint::{Command, CommandKind, Target};
 pub use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
 pub use state::{LegState, State};
 pub use step::{
-    GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE, TickInput, TickOutput, WRENCH_FAULT,
-    actuate, step,
+    GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE, TickInput,
+    TickOutput, WRENCH_FAULT, actuate, step,
 };
 
 pub use words::{
-    CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words,
+    CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES,
+    OUTPUT_WORDS, output_words,
 };
 
 /// Floating-point type of this controller; from `controller.scalar`.

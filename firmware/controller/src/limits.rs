@@ -3,8 +3,8 @@
 
 //! What may go out and what is believed of what comes in.
 
-use crate::Real;
 use specgen_runtime::Dac;
+use crate::Real;
 
 /// Converter codes in volts and in cells of the Everett grid; from `dac` and `actuator.voltage`.
 pub const DAC: Dac<Real> = Dac {

@@ -128,12 +128,17 @@ impl MachineInput {
 
 /// Words in the order of [`MACHINE_OUTPUT_NAMES`], of a tick and of the machine that it left.
 #[must_use]
-pub fn machine_output_words(output: &MachineOutput, machine: &Machine) -> [u64; MACHINE_OUTPUT_WORDS] {
+pub fn machine_output_words(
+    output: &MachineOutput,
+    machine: &Machine,
+) -> [u64; MACHINE_OUTPUT_WORDS] {
     let mut words = [0; MACHINE_OUTPUT_WORDS];
-    for (slot, word) in words.iter_mut().zip(output_words(&output.tick, &machine.state)) {
+    for (slot, word) in words.iter_mut().zip(output_words(&output.tick, &machine.state))
+    {
         *slot = word;
     }
-    words[OUTPUT_WORDS] = output.phase.word() | output.cause.word() << 8 | (output.amplifier_on as u64) << 16;
+    words[OUTPUT_WORDS] = output.phase.word() | output.cause.word() << 8
+        | (output.amplifier_on as u64) << 16;
     words[OUTPUT_WORDS + 1] = machine.supervisor.conditions as u64;
     words
 }

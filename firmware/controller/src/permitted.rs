@@ -3,9 +3,9 @@
 
 //! What settings may be, and how large the numbers of a state may become: nothing beyond the limits of the spec.
 
-use crate::Real;
 use specgen_runtime::Permitted;
 use specgen_runtime::snapshot::Sizes;
+use crate::Real;
 
 /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
 /// most `code_max`.
@@ -21,7 +21,11 @@ pub const SETTINGS: [(Permitted<Real>, usize); 8] = [
 ];
 
 /// Largest numbers of a state, under any of these settings.
-pub const STATE: Sizes = Sizes { request: 1.4479036934480133e28, reading: 5.5e-5, stiffness: 1000000000000000.0 };
+pub const STATE: Sizes = Sizes {
+    request: 1.4479036934480133e28,
+    reading: 5.5e-5,
+    stiffness: 1000000000000000.0,
+};
 
 /// Range of a word of the settings; none beyond the last.
 #[must_use]

@@ -10,20 +10,28 @@ use specgen_runtime::record::Layout;
 pub use specgen_runtime::recorder;
 use specgen_runtime::recorder::{Recorder, Row};
 
-use crate::hysteresis::{GRID, Memory};
-use crate::supervised::{MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, Supervisor, supervise};
-use crate::{CONFIG_WORDS, Config, LEGS, LegState, Real, State, limits, permitted};
-use specgen_runtime::setpoint::{CommandKind, Generator};
 pub use specgen_runtime::snapshot::Invalid;
-use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
 use specgen_runtime::snapshot::{Reader, Snapshot, Writer};
-use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, NotchState, Rate, Transfer};
+use specgen_runtime::setpoint::{CommandKind, Generator};
+use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
+use specgen_runtime::{
+    ControlMode, Estimate, Integral, Interaction, NotchState, Rate, Transfer,
+};
+use crate::hysteresis::{GRID, Memory};
+use crate::supervised::{
+    MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, Supervisor, supervise,
+};
+use crate::{CONFIG_WORDS, Config, LEGS, LegState, Real, State, limits, permitted};
 
 /// Words of a [`Machine`].
-pub const MACHINE_STATE_WORDS: usize = <State as Snapshot>::WORDS + <Supervisor as Snapshot>::WORDS;
+pub const MACHINE_STATE_WORDS: usize = <State as Snapshot>::WORDS
+    + <Supervisor as Snapshot>::WORDS;
 /// Words of this controller's records.
-pub const RECORD_LAYOUT: Layout =
-    Layout { config: CONFIG_WORDS, input: MACHINE_INPUT_WORDS, state: MACHINE_STATE_WORDS };
+pub const RECORD_LAYOUT: Layout = Layout {
+    config: CONFIG_WORDS,
+    input: MACHINE_INPUT_WORDS,
+    state: MACHINE_STATE_WORDS,
+};
 
 impl Machine {
     /// Everything that later ticks depend on, as words.
@@ -58,13 +66,16 @@ impl MachineInput {
         let mut all = [0; MACHINE_INPUT_WORDS];
         let mut words = Writer::new(&mut all);
         let input = self;
-        words.word(match input.tick.command.kind {
-            CommandKind::Hold => 0,
-            CommandKind::Stream => 1,
-            CommandKind::Move => 2,
-            CommandKind::Trajectory => 3,
-            CommandKind::Unknown => 4,
-        });
+        words
+            .word(
+                match input.tick.command.kind {
+                    CommandKind::Hold => 0,
+                    CommandKind::Stream => 1,
+                    CommandKind::Move => 2,
+                    CommandKind::Trajectory => 3,
+                    CommandKind::Unknown => 4,
+                },
+            );
         words.word(input.tick.command.selector as u64);
         words.word(input.tick.command.sequence as u64);
         words.reals(&input.tick.command.target.pose);
@@ -95,17 +106,28 @@ pub fn supervise_recorded(
 #[inline]
 pub fn record_before(config: &Config, machine: &Machine, recorder: &mut Recorder<'_>) {
     if recorder.opens() {
-        recorder.open_with(&config.to_words(), || machine.digest(), |words| machine.save_into(words));
+        recorder
+            .open_with(
+                &config.to_words(),
+                || machine.digest(),
+                |words| machine.save_into(words),
+            );
     }
 }
 
 /// What it keeps after the tick.
 #[inline]
-pub fn record_after(machine: &Machine, input: &MachineInput, output: &MachineOutput, recorder: &mut Recorder<'_>) {
+pub fn record_after(
+    machine: &Machine,
+    input: &MachineInput,
+    output: &MachineOutput,
+    recorder: &mut Recorder<'_>,
+) {
     let row = Row {
         codes: output.tick.dac_code,
         status: output.tick.status,
-        supervisor: output.phase.word() as u32 | (output.cause.word() as u32) << 8 | (output.amplifier_on as u32) << 16,
+        supervisor: output.phase.word() as u32 | (output.cause.word() as u32) << 8
+            | (output.amplifier_on as u32) << 16,
     };
     recorder.push(&input.to_words(), &row, || machine.digest());
 }
@@ -135,14 +157,10 @@ impl Snapshot for LegState {
 
 impl Snapshot for State {
     const WORDS: usize = LEGS * <LegState as Snapshot>::WORDS
-        + 6 * <Estimate<Real> as Snapshot>::WORDS
-        + 8 * 6
-        + <Rate<Real> as Snapshot>::WORDS
-        + <Generator<Real> as Snapshot>::WORDS
-        + 2 * <NotchState<Real> as Snapshot>::WORDS
-        + <Integral<Real> as Snapshot>::WORDS
-        + <Transfer<Real> as Snapshot>::WORDS
-        + 3;
+        + 6 * <Estimate<Real> as Snapshot>::WORDS + 8 * 6
+        + <Rate<Real> as Snapshot>::WORDS + <Generator<Real> as Snapshot>::WORDS
+        + 2 * <NotchState<Real> as Snapshot>::WORDS + <Integral<Real> as Snapshot>::WORDS
+        + <Transfer<Real> as Snapshot>::WORDS + 3;
     fn save(&self, words: &mut Writer<'_>) {
         for leg in &self.legs {
             leg.save(words);
@@ -169,10 +187,13 @@ impl Snapshot for State {
         self.integral.save(words);
         self.transfer.save(words);
         words.flag(self.limited);
-        words.word(match self.mode {
-            None => 0,
-            Some(mode) => 1 + mode.word(),
-        });
+        words
+            .word(
+                match self.mode {
+                    None => 0,
+                    Some(mode) => 1 + mode.word(),
+                },
+            );
         words.word(self.interaction.word());
     }
 
@@ -200,10 +221,12 @@ impl Snapshot for State {
         self.limited = words.flag()?;
         self.mode = match words.word(u64::MAX)? {
             0 => None,
-            word => match ControlMode::from_word(word - 1) {
-                Some(mode) => Some(mode),
-                None => return Err(words.refused()),
-            },
+            word => {
+                match ControlMode::from_word(word - 1) {
+                    Some(mode) => Some(mode),
+                    None => return Err(words.refused()),
+                }
+            }
         };
         let Some(interaction) = Interaction::from_word(words.word(u64::MAX)?) else {
             return Err(words.refused());

@@ -3,11 +3,13 @@
 
 //! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
 
+use specgen_runtime::setpoint::Generator;
+use specgen_runtime::{
+    ControlMode, Digest, Estimate, Integral, Interaction, NotchState, Rate, Transfer,
+};
 use crate::config::Environment;
 use crate::hysteresis::Memory;
 use crate::{LEGS, Real, limits};
-use specgen_runtime::setpoint::Generator;
-use specgen_runtime::{ControlMode, Digest, Estimate, Integral, Interaction, NotchState, Rate, Transfer};
 
 /// State of one leg.
 #[derive(Debug, Clone, Copy)]
@@ -73,7 +75,12 @@ impl State {
     /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there, no correction.
     #[must_use]
     pub const fn new() -> Self {
-        let leg = LegState { memory: Memory::new(), requested: 0.0, excess: 0.0, code: limits::CODES[0] };
+        let leg = LegState {
+            memory: Memory::new(),
+            requested: 0.0,
+            excess: 0.0,
+            code: limits::CODES[0],
+        };
         Self {
             legs: [leg; LEGS],
             pose: [0.0; 6],
@@ -92,7 +99,10 @@ impl State {
             transfer: Transfer::new(),
             mode: None,
             interaction: Interaction::Neglected,
-            environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
+            environment: Environment {
+                stiffness: [0.0; 6],
+                rest: [0.0; 6],
+            },
         }
     }
 
@@ -110,8 +120,16 @@ impl State {
             estimate.digest(&mut digest);
         }
         let Environment { stiffness, rest } = &self.environment;
-        let vectors =
-            [&self.pose, &self.error, &self.deflection, &self.demand, &self.load, &self.wrench, stiffness, rest];
+        let vectors = [
+            &self.pose,
+            &self.error,
+            &self.deflection,
+            &self.demand,
+            &self.load,
+            &self.wrench,
+            stiffness,
+            rest,
+        ];
         for vector in vectors {
             for value in vector {
                 digest.real(*value);
@@ -124,10 +142,13 @@ impl State {
         self.integral.digest(&mut digest);
         self.transfer.digest(&mut digest);
         digest.word(self.limited as u64);
-        digest.word(match self.mode {
-            None => 0,
-            Some(mode) => 1 + mode.word(),
-        });
+        digest
+            .word(
+                match self.mode {
+                    None => 0,
+                    Some(mode) => 1 + mode.word(),
+                },
+            );
         digest.word(self.interaction.word());
         digest.finish()
     }

@@ -26,20 +26,20 @@
 //! δ̂ and φ̂ are kept in modal coordinates, where N works: with the same weights on every leg the law commutes with the map
 //! between them, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
 
+use specgen_runtime::feedback::{force_of, winds_up};
+use specgen_runtime::linear::{difference, each, transform};
+use specgen_runtime::setpoint::{Command, CommandKind};
+use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState};
 use crate::dynamics::Load;
 use crate::hysteresis::{TABLES, Table};
 use crate::limits::DAC;
 use crate::setpoint::PLAN;
 use crate::task_space::{
-    COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP,
-    TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS, linear_displacement, linear_drive, modal_error, notch_error,
-    notch_innovation,
+    COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, MODES_TO_LEGS,
+    PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
+    linear_displacement, linear_drive, modal_error, notch_error, notch_innovation,
 };
 use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
-use specgen_runtime::feedback::{force_of, winds_up};
-use specgen_runtime::linear::{difference, each, transform};
-use specgen_runtime::setpoint::{Command, CommandKind};
-use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState};
 
 /// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
 pub const LEG_LIMITED: u32 = 0x3f;
@@ -88,7 +88,12 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
 }
 
 /// The work of a tick, with `kind` in place of that of the command; returns its status.
-pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, input: &TickInput) -> u32 {
+pub(crate) fn advance(
+    config: &Config,
+    state: &mut State,
+    kind: CommandKind,
+    input: &TickInput,
+) -> u32 {
     let entered = enter_mode(config, state);
     let gauge_faults = sense(config, state, &input.gauge);
     if gauge_faults == 0 {
@@ -99,7 +104,10 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
     let setpoint_status = state.generator.tick_as(&PLAN, kind, &input.command);
     let Load { displacement: demand, force } = known_load(config, state);
     let correction = correction(config, state);
-    state.load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE + (demand[leg] - state.demand[leg]) * LEAD);
+    state.load = each(|leg| {
+        (force[leg] - REST_FORCE[leg]) * COMPLIANCE
+            + (demand[leg] - state.demand[leg]) * LEAD
+    });
     state.demand = demand;
     if let Some(damping) = &damping {
         state.load = each(|leg| state.load[leg] + damping[leg]);
@@ -121,14 +129,19 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
         limited |= (held_back as u32) << index;
     }
     state.limited = limited != 0;
-    limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT }
+    limited | gauge_faults << 8 | setpoint_status
+        | if wrench_good { 0 } else { WRENCH_FAULT }
 }
 
 /// What goes out, of the state that the tick left.
 #[inline]
 pub(crate) fn outputs(state: &State, status: u32) -> TickOutput {
     let legs = &state.legs;
-    TickOutput { voltage: each(|leg| DAC.voltage(legs[leg].code)), dac_code: each(|leg| legs[leg].code), status }
+    TickOutput {
+        voltage: each(|leg| DAC.voltage(legs[leg].code)),
+        dac_code: each(|leg| legs[leg].code),
+        status,
+    }
 }
 
 /// Whether this tick is the first of its mode, or of its source of the interaction force. If so, what the mode does not
@@ -137,7 +150,8 @@ pub(crate) fn outputs(state: &State, status: u32) -> TickOutput {
 fn enter_mode(config: &Config, state: &mut State) -> bool {
     let (mode, interaction) = (config.mode(), config.interaction());
     let same_force = state.interaction == interaction
-        && (interaction != Interaction::Modelled || state.environment == *config.environment());
+        && (interaction != Interaction::Modelled
+            || state.environment == *config.environment());
     if state.mode == Some(mode) && same_force {
         return false;
     }
@@ -184,10 +198,16 @@ fn hand_over(config: &Config, state: &mut State, request: &[Real; LEGS]) {
     let mode = config.mode();
     let mut offset = [0.0; LEGS];
     if mode.law() != Law::Invhys {
-        for (estimate, held) in state.estimates.iter_mut().zip(transform(&LEGS_TO_MODES, &held)) {
+        for (estimate, held) in state
+            .estimates
+            .iter_mut()
+            .zip(transform(&LEGS_TO_MODES, &held))
+        {
             estimate.level -= held;
         }
-    } else if mode.feeds_back() && config.active_gains().integral.iter().all(|gain| *gain > 0.0) {
+    } else if mode.feeds_back()
+        && config.active_gains().integral.iter().all(|gain| *gain > 0.0)
+    {
         state.integral.grow(&transform(&LEGS_TO_WRENCH, &held));
     } else {
         offset = held;
@@ -219,7 +239,11 @@ pub(crate) fn learn(config: &Config, state: &mut State) {
     let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
     if mode.feeds_back() {
         state.error = notch_error(&mut state.error_notch, &error);
-        let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
+        let growth = Integral::growth(
+            &config.active_gains().integral,
+            PERIOD,
+            &state.error,
+        );
         if !(state.limited && would_wind_up(&state.legs, &growth)) {
             state.integral.grow(&growth);
         }
@@ -252,7 +276,10 @@ fn take_wrench(config: &Config, state: &mut State, wrench: &[Real; 6]) -> bool {
     if config.interaction() != Interaction::Measured {
         return true;
     }
-    let good = wrench.iter().zip(&WRENCH_LIMIT).all(|(value, limit)| (-*limit..=*limit).contains(value));
+    let good = wrench
+        .iter()
+        .zip(&WRENCH_LIMIT)
+        .all(|(value, limit)| (-*limit..=*limit).contains(value));
     if good {
         state.wrench = *wrench;
     }
@@ -266,7 +293,9 @@ fn damping(config: &Config, state: &State) -> Option<[Real; LEGS]> {
         return None;
     }
     let error = difference(&state.generator.target().rate, state.rate.value());
-    Some(transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error)))
+    Some(
+        transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error)),
+    )
 }
 
 /// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
@@ -293,14 +322,21 @@ pub(crate) fn correction(config: &Config, state: &mut State) -> [Real; LEGS] {
         let force = each(|axis| proportional[axis] + integral[axis]);
         state.deflection = transform(&FORCE_TO_MODES, &force);
     }
-    let wanted = each(|mode| state.deflection[mode] - state.estimates[mode].correction());
+    let wanted = each(|mode| {
+        state.deflection[mode] - state.estimates[mode].correction()
+    });
     transform(&MODES_TO_LEGS, &wanted)
 }
 
 /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,
 /// voltage or slew rate held the leg back.
 #[inline]
-pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
+pub fn actuate(
+    config: &Config,
+    leg: &mut LegState,
+    table: &Table,
+    request: Real,
+) -> bool {
     let LegState { memory, code, .. } = leg;
     let mut limited = false;
     let mut permitted = |drive: Real| {
@@ -326,5 +362,9 @@ pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real
 /// What the code that is held means in the leg model of a mode, m.
 #[inline]
 fn requested(mode: ControlMode, leg: &LegState) -> Real {
-    if mode.inverts() { leg.memory.displacement() } else { linear_displacement(DAC.drive(leg.code)) }
+    if mode.inverts() {
+        leg.memory.displacement()
+    } else {
+        linear_displacement(DAC.drive(leg.code))
+    }
 }

@@ -3,24 +3,27 @@
 
 //! The control law under its supervisor: what every target calls.
 
-use crate::hysteresis::TABLES;
-use crate::limits::DAC;
-pub use specgen_runtime::supervisor::{CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STOP};
+pub use specgen_runtime::supervisor::{
+    CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, Request, STOP,
+};
 use specgen_runtime::supervisor::{Sample, toward};
 use specgen_runtime::{Digest, supervisor};
+use crate::hysteresis::TABLES;
+use crate::limits::DAC;
 
 pub use crate::machine_words::{
-    MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS, machine_output_words,
+    MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS,
+    machine_output_words,
 };
-use crate::setpoint::PLAN as SETPOINTS;
-use crate::step::sense;
 use crate::step::{GAUGE_FAULT, LEG_LIMITED, advance, outputs};
 use crate::supervision::PLAN;
-use crate::supervision::READINGS_PER_LEG;
-use crate::{Config, LEGS, Real, State, TickInput, TickOutput};
-use crate::{kinematics, sensing};
 use specgen_runtime::setpoint::{CommandKind, Generator};
 use specgen_runtime::{Estimate, Integral, NotchState, Real as _, Transfer};
+use crate::setpoint::PLAN as SETPOINTS;
+use crate::step::sense;
+use crate::supervision::READINGS_PER_LEG;
+use crate::{kinematics, sensing};
+use crate::{Config, LEGS, Real, State, TickInput, TickOutput};
 
 /// State of the supervisor in this controller's arithmetic.
 pub type Supervisor = supervisor::Supervisor<Real>;
@@ -44,7 +47,10 @@ impl Machine {
     /// Reset: disarmed, and [`State::new`].
     #[must_use]
     pub const fn new() -> Self {
-        Self { state: State::new(), supervisor: Supervisor::new() }
+        Self {
+            state: State::new(),
+            supervisor: Supervisor::new(),
+        }
     }
 
     /// Fingerprint of everything that later ticks depend on.
@@ -85,9 +91,14 @@ pub struct MachineOutput {
 ///
 /// What events and request say acts in this tick; what the readings show acts in the next one, after the law has seen
 /// them.
-pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
+pub fn supervise(
+    config: &Config,
+    machine: &mut Machine,
+    input: &MachineInput,
+) -> MachineOutput {
     let Machine { state, supervisor } = machine;
-    let at_rest = supervisor.phase != Phase::Running && state.legs.iter().all(|leg| leg.code == PLAN.rest);
+    let at_rest = supervisor.phase != Phase::Running
+        && state.legs.iter().all(|leg| leg.code == PLAN.rest);
     let begins = supervisor.decide(&PLAN, input.request, input.events, at_rest);
     if begins {
         begin(config, state, supervisor, &input.tick);
@@ -97,12 +108,19 @@ pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -
     let (phase, cause) = (supervisor.phase, supervisor.cause);
     let status = if phase == Phase::Running {
         run(config, state, supervisor, &input.tick, channel, [expected, target])
-    } else if matches!(phase, Phase::Holding | Phase::RampingDown) && state.generator.can_stop() {
+    } else if matches!(phase, Phase::Holding | Phase::RampingDown)
+        && state.generator.can_stop()
+    {
         come_to_rest(config, state, supervisor, &input.tick)
     } else {
         stand(config, state, supervisor, &input.tick, channel, expected)
     };
-    MachineOutput { tick: outputs(state, status), phase, cause, amplifier_on: phase.is_powered() }
+    MachineOutput {
+        tick: outputs(state, status),
+        phase,
+        cause,
+        amplifier_on: phase.is_powered(),
+    }
 }
 
 /// The law at work; returns its status. Of the channel: what is `expected`, and its `target`.
@@ -113,7 +131,9 @@ fn run(
     supervisor: &mut Supervisor,
     input: &TickInput,
     channel: usize,
-    [expected, target]: [Real; 2],
+    [expected,
+    target,
+    ]: [Real; 2],
 ) -> u32 {
     let before = codes(state);
     let status = advance(config, state, input.command.kind, input);
@@ -125,7 +145,8 @@ fn run(
     } else {
         let (faults, limited) = ((status & GAUGE_FAULT) >> 8, status & LEG_LIMITED);
         let moved = moved(state, &before);
-        supervisor.see(faults, limited, &input.gauge, &moved, config.code_limits().max_step);
+        supervisor
+            .see(faults, limited, &input.gauge, &moved, config.code_limits().max_step);
     }
     status
 }
@@ -136,7 +157,12 @@ fn run(
 /// estimates stay, and only what feeds back begins anew.
 #[cold]
 #[inline(never)]
-fn begin(_config: &Config, state: &mut State, supervisor: &mut Supervisor, _input: &TickInput) {
+fn begin(
+    _config: &Config,
+    state: &mut State,
+    supervisor: &mut Supervisor,
+    _input: &TickInput,
+) {
     if supervisor.fresh {
         state.generator = Generator::starting_at(&SETPOINTS, &state.pose);
         state.demand = kinematics::leg_displacements(&state.generator.target().pose);
@@ -161,7 +187,14 @@ fn begin(_config: &Config, state: &mut State, supervisor: &mut Supervisor, _inpu
 
 /// The channel whose turn it is, after the law has seen the readings.
 #[inline]
-fn look(state: &State, supervisor: &mut Supervisor, input: &TickInput, channel: usize, expected: Real, target: Real) {
+fn look(
+    state: &State,
+    supervisor: &mut Supervisor,
+    input: &TickInput,
+    channel: usize,
+    expected: Real,
+    target: Real,
+) {
     let error = Some(target - component(&state.pose, channel));
     supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
 }
@@ -170,7 +203,12 @@ fn look(state: &State, supervisor: &mut Supervisor, input: &TickInput, channel: 
 /// the status.
 #[cold]
 #[inline(never)]
-fn come_to_rest(config: &Config, state: &mut State, supervisor: &mut Supervisor, input: &TickInput) -> u32 {
+fn come_to_rest(
+    config: &Config,
+    state: &mut State,
+    supervisor: &mut Supervisor,
+    input: &TickInput,
+) -> u32 {
     let faults = advance(config, state, CommandKind::Hold, input) & GAUGE_FAULT;
     supervisor.see(faults >> 8, 0, &input.gauge, &[0; LEGS], 1);
     faults
@@ -206,7 +244,9 @@ fn stand(
 /// of the axis of that number, m or rad.
 #[inline]
 fn expectation(state: &State, channel: usize) -> (Real, Real) {
-    let Some([a, b, c, d, e, f]) = READINGS_PER_LEG.get(channel) else { return (0.0, 0.0) };
+    let Some([a, b, c, d, e, f]) = READINGS_PER_LEG.get(channel) else {
+        return (0.0, 0.0)
+    };
     let legs = &state.legs;
     let load = &state.load;
     let displaced = |leg: usize| legs[leg].memory.displacement() - load[leg];
@@ -216,8 +256,18 @@ fn expectation(state: &State, channel: usize) -> (Real, Real) {
 }
 
 #[inline]
-fn sample(gauge: &[Real; 6], channel: usize, expected: Real, error: Option<Real>) -> Sample<Real> {
-    Sample { word: component(gauge, channel), reading: component(&sensing::readings(gauge), channel), expected, error }
+fn sample(
+    gauge: &[Real; 6],
+    channel: usize,
+    expected: Real,
+    error: Option<Real>,
+) -> Sample<Real> {
+    Sample {
+        word: component(gauge, channel),
+        reading: component(&sensing::readings(gauge), channel),
+        expected,
+        error,
+    }
 }
 
 #[inline]

@@ -4,12 +4,12 @@
 //! Inputs, outputs and settings as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target
 //! reads and writes these, so that two of them can be compared bit for bit.
 
-use crate::config::{Environment, damps};
-use crate::task_space::MODES_TO_LEGS;
-use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput};
 use specgen_runtime::linear::{each, transform};
 use specgen_runtime::setpoint::{Command, CommandKind, Target};
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Real as _};
+use crate::config::{Environment, damps};
+use crate::task_space::MODES_TO_LEGS;
+use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput};
 
 /// Words of a tick's input.
 pub const INPUT_WORDS: usize = 33;
@@ -196,7 +196,11 @@ impl TickInput {
                 kind: CommandKind::from_word(words[0]),
                 selector: saturated(words[1]),
                 sequence: saturated(words[2]),
-                target: Target { pose: six(words, 3), rate: six(words, 9), acceleration: six(words, 15) },
+                target: Target {
+                    pose: six(words, 3),
+                    rate: six(words, 9),
+                    acceleration: six(words, 15),
+                },
             },
             gauge: six(words, INPUT_MEASURED),
             wrench: six(words, INPUT_MEASURED + 6),
@@ -259,7 +263,10 @@ impl Config {
             damps: [damps(&gains), damps(&position_gains)],
             gains,
             position_gains,
-            environment: Environment { stiffness: six(words, CONFIG_GAINS + 36), rest: six(words, CONFIG_GAINS + 42) },
+            environment: Environment {
+                stiffness: six(words, CONFIG_GAINS + 36),
+                rest: six(words, CONFIG_GAINS + 42),
+            },
         })
     }
 

@@ -145,7 +145,7 @@ impl Pair {
 
 /// How many.
 pub fn plants() -> u32 {
-    length(3, 12)
+    length(2, 12)
 }
 
 fn of(what: &str, number: u32, edits: &[(&str, &str)]) -> Bench {

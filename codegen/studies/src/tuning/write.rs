@@ -1,6 +1,6 @@
 //! The tuned numbers as an edit of the spec's text: comments, order and layout of everything else stay.
 
-use similar::TextDiff;
+use diffy::DiffOptions;
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
 
 use super::Setting;
@@ -108,7 +108,9 @@ fn set(table: &mut Table, key: &str, mut value: Value) {
 /// The change as a patch that `patch -p0` and `git apply -p0` take.
 #[must_use]
 pub fn patch(name: &str, old: &str, new: &str) -> String {
-    TextDiff::from_lines(old, new).unified_diff().context_radius(3).header(name, name).to_string()
+    let mut options = DiffOptions::new();
+    options.set_original_filename(name.to_owned()).set_modified_filename(name.to_owned());
+    options.create_patch(old, new).to_string()
 }
 
 #[cfg(test)]
