@@ -1,4 +1,4 @@
-//! Every way in which a record can be wrong gives a message that names the place and the mend, and nothing panics.
+//! Every way in which a record can be wrong gives a message that names the place and the fix, and nothing panics.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
 

@@ -108,12 +108,12 @@ fn blocks(bytes: &[u8]) -> Vec<(usize, usize)> {
     found
 }
 
-/// The file with one bit of a word of a block flipped, and with the checksum that fits it if it is to be `mended`.
-fn flipped(bytes: &[u8], block: (usize, usize), word: usize, bit: u32, mended: bool) -> Vec<u8> {
+/// The file with one bit of a word of a block flipped, and with the checksum that fits it if it is to be `fixed`.
+fn flipped(bytes: &[u8], block: (usize, usize), word: usize, bit: u32, fixed: bool) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let (start, count) = block;
     bytes[start + word * 8 + bit as usize / 8] ^= 1 << (bit % 8);
-    if mended {
+    if fixed {
         let words: Vec<u64> =
             bytes[start..start + count * 8].as_chunks().0.iter().map(|chunk| u64::from_le_bytes(*chunk)).collect();
         let sum = checksum(&words).to_le_bytes();

@@ -1,4 +1,4 @@
-//! What the spec asks of converter and microcontroller: refused with a mend, and the mend put into the spec is accepted.
+//! What the spec asks of converter and microcontroller: refused with a fix, and the fix put into the spec is accepted.
 
 use std::fs;
 
@@ -103,7 +103,7 @@ fn microcontrollers_that_do_not_fit_are_refused_with_a_mend_that_is_accepted() {
         let one = finding(&findings, codes::SCALAR_WITHOUT_FPU);
         let Place::Spec(span) = &one.place else { panic!("{one:?}") };
         assert_eq!(&text[span.clone()], format!("\"{part}\""));
-        // Both mends.
+        // Both fixes.
         let scalar = format!("scalar   = \"{}\"", quoted(&one.help, "scalar = "));
         let (_, first) = verdict("legs.toml", &[(mcu, &single), ("scalar   = \"f64\"", &scalar)]);
         assert!(first.is_ok(), "{first:?}");

@@ -14,7 +14,7 @@ use specgen::waveform::{self, Waveform};
 use specgen_runtime::Real;
 use specgen_runtime::setpoint as runtime;
 use specgen_runtime::setpoint::{
-    BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Plan, StopLimits, Target,
+    BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Setpoints, StopLimits, Target,
 };
 use specgen_tests::{Emitted, compile_edited, repository};
 
@@ -47,7 +47,7 @@ fn paper(path: model::PaperPath, as_printed: bool, frequency: f64) -> Trajectory
 }
 
 /// The plan that the emitter prints, as a value.
-fn plan<T: Real>(model: &Model, setpoints: &ir::Setpoints) -> Plan<T, Parallel> {
+fn plan<T: Real>(model: &Model, setpoints: &ir::Setpoints) -> Setpoints<T, Parallel> {
     let n = |value: f64| T::from_f64(value);
     let six = |values: [f64; 6]| values.map(T::from_f64);
     let trajectory = |trajectory: &ir::Trajectory| match &trajectory.path {
@@ -92,7 +92,7 @@ fn plan<T: Real>(model: &Model, setpoints: &ir::Setpoints) -> Plan<T, Parallel> 
     let trajectories: Vec<runtime::Trajectory<T>> = setpoints.trajectories.iter().map(trajectory).collect();
     let [tx, ty, tz] = model.workspace.translation;
     let [rx, ry, rz] = model.workspace.rotation;
-    Plan {
+    Setpoints {
         period: n(setpoints.period),
         rate: n(setpoints.rate),
         square_rate: n(setpoints.square_rate),
@@ -119,7 +119,7 @@ fn plan<T: Real>(model: &Model, setpoints: &ir::Setpoints) -> Plan<T, Parallel> 
 }
 
 /// Every set-point of trajectory `selector` from its first tick to its last, without the bias.
-fn play<T: Real + Into<f64>>(model: &Model, plan: &Plan<T, Parallel>, selector: u32) -> Vec<Target<f64>> {
+fn play<T: Real + Into<f64>>(model: &Model, plan: &Setpoints<T, Parallel>, selector: u32) -> Vec<Target<f64>> {
     let mut generator = Generator::new();
     let mut command = Command { kind: CommandKind::Hold, selector, sequence: 0, target: Target::at([T::ZERO; 6]) };
     while generator.next(plan, &command).1 != 0 {}

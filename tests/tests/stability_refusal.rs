@@ -88,10 +88,10 @@ fn weights_beyond_jury_are_refused_as_such() {
     let (code, help) = verdict(&edits).unwrap_err();
     assert_eq!(code, "E0401");
     let (level, drift) = suggestion(&help, "level_weight");
-    let mended = [
+    let fixed = [
         edits[0].clone(),
         (LEVEL, format!("level_weight = {level}")),
         (DRIFT, format!("drift_weight = {}", drift.expect("PCC"))),
     ];
-    verdict(&mended).unwrap();
+    verdict(&fixed).unwrap();
 }

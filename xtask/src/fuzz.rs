@@ -87,11 +87,11 @@ fn run(root: &Path, target: &str, seconds: u32) -> Outcome {
     fuzzer.args([&format!("-max_total_time={seconds}"), "-print_final_stats=1", "-verbosity=0", "-timeout=10"]);
     fuzzer.arg(format!("-max_len={LONGEST}")).arg(format!("-artifact_prefix={}", failed.display()));
     fuzzer.arg(found).arg(&kept);
-    let mend = format!(
+    let fix = format!(
         "an input that fails is named above; move it to {CORPUS}/{target}, where the tests repeat it: \
          cargo test --release -p specgen-tests fuzz_corpus"
     );
-    expect_success(fuzzer, &mend)
+    expect_success(fuzzer, &fix)
 }
 
 /// Makes the smallest set of inputs that reaches every edge that any of them reaches the kept one.

@@ -1,6 +1,7 @@
 //! Developer commands: see [`USAGE`].
 
 mod binaries;
+mod changelog;
 mod fresh;
 mod fuzz;
 mod generated;
@@ -25,6 +26,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   mutants code changed one operator at a time, to see whether a test notices; a sample, `K/N` for another, `all` for all
   fuzz    SECONDS [TARGET]: what comes from outside, under a fuzzer guided by coverage; `fuzz keep` keeps what it found
   bless   writes the generated files that are committed anew
+  changelog VERSION: puts the fragments in changelog/ into CHANGELOG.md, as a release
   fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
 
 With SPECGEN_ALLOW_MISSING=1, what needs a tool that cannot be installed is skipped, and said so.";
@@ -39,6 +41,13 @@ fn main() -> ExitCode {
         ["mutants"] => steps::mutants(&root(), None),
         ["mutants", sample] => steps::mutants(&root(), Some(sample)),
         ["bless"] => steps::bless(&root()),
+        ["changelog", version] => match changelog::release(&root(), version) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(text) => {
+                eprintln!("{text}");
+                ExitCode::FAILURE
+            }
+        },
         ["fresh", "--help" | "-h"] => {
             println!("{}", fresh::usage());
             ExitCode::SUCCESS

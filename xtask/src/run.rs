@@ -10,7 +10,7 @@ pub enum Outcome {
     Passed,
     /// It could not be run, which was allowed; why.
     Skipped(String),
-    /// What went wrong and how to mend it.
+    /// What went wrong and how to fix it.
     Failed(String),
 }
 
@@ -69,11 +69,11 @@ pub fn cargo(root: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs it in view; `mend` says what to do if it fails.
-pub fn expect_success(mut command: Command, mend: &str) -> Outcome {
+/// Runs it in view; `fix` says what to do if it fails.
+pub fn expect_success(mut command: Command, fix: &str) -> Outcome {
     match command.status() {
         Ok(status) if status.success() => Outcome::Passed,
-        Ok(status) => Outcome::Failed(format!("{status}; {mend}")),
+        Ok(status) => Outcome::Failed(format!("{status}; {fix}")),
         Err(error) => Outcome::Failed(format!("{}: {error}", command.get_program().display())),
     }
 }

@@ -172,8 +172,8 @@ fn formatting(root: &Path) -> Outcome {
         [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, LOOM].into_iter().chain(BOARDS);
     let excluded = excluded.map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
-        let mend = format!("run: cargo fmt {}", scope.join(" "));
-        let outcome = expect_success(cargo(root, &[&["fmt", "--check"], &scope[..]].concat()), &mend);
+        let fix = format!("run: cargo fmt {}", scope.join(" "));
+        let outcome = expect_success(cargo(root, &[&["fmt", "--check"], &scope[..]].concat()), &fix);
         if !matches!(outcome, Outcome::Passed) {
             return outcome;
         }
@@ -192,7 +192,7 @@ fn lints(root: &Path) -> Outcome {
     let alone = ["--manifest-path", REAL_TIME, "--all-targets", "--locked", "--target-dir", "target"];
     for scope in [own, &alone] {
         let clippy = [&["clippy", "--release", "--quiet"], scope, &["--", "-D", "warnings"]].concat();
-        let outcome = expect_success(cargo(root, &clippy), "mend what is reported above");
+        let outcome = expect_success(cargo(root, &clippy), "fix what is reported above");
         if !matches!(outcome, Outcome::Passed) {
             return outcome;
         }

@@ -234,7 +234,7 @@ fn a_spec_that_is_no_spec_is_refused_with_its_name_and_a_mend() {
     folder.write("marked.toml", mark.flat_map(u16::to_le_bytes).collect::<Vec<_>>());
     fs::create_dir(folder.path("folder.toml")).unwrap();
     let before = folder.listing();
-    for (spec, code, line, mend) in [
+    for (spec, code, line, fix) in [
         ("nothing.toml", "E0101", None, "path"),
         ("folder.toml", "E0101", None, "name the .toml file in it"),
         ("empty.toml", "E0105", Some(1), "specs/minimal.toml"),
@@ -251,7 +251,7 @@ fn a_spec_that_is_no_spec_is_refused_with_its_name_and_a_mend() {
             assert_eq!(document.error(), format!("{spec} is refused; nothing was written"));
             let finding = document.finding(code);
             assert_eq!(finding["file"], spec);
-            assert!(finding["help"].as_str().unwrap().contains(mend), "{finding:#}");
+            assert!(finding["help"].as_str().unwrap().contains(fix), "{finding:#}");
             if let Some(line) = line {
                 assert_eq!(finding["line"], line, "{spec}");
             }
@@ -397,7 +397,7 @@ fn a_computer_is_judged_by_the_period_of_a_spec() {
     assert!(count("planned") >= 2_000 && count("p50_ns") <= count("max_ns"));
     for finding in result["findings"].as_array().unwrap() {
         let good = finding["grade"] == "good";
-        assert_eq!(finding["mend"].is_null(), good, "{finding}");
+        assert_eq!(finding["fix"].is_null(), good, "{finding}");
     }
 
     // With a spec the verdict is the exit code, and the figures come all the same.

@@ -7,9 +7,10 @@ use std::fs;
 
 use crate::support::{Folder, repository};
 
-const DOCUMENTS: [&str; 16] = [
+const DOCUMENTS: [&str; 17] = [
     "README.md",
     "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
     "docs/bring-up.md",
     "docs/control-law.md",
     "docs/guide.md",
@@ -73,6 +74,25 @@ fn files_and_folders_that_are_named_exist() {
         }
     }
     assert!(found > 20, "{found} paths");
+}
+
+/// A typical change is made in few places, and they are there.
+#[test]
+fn a_typical_change_touches_at_most_three_files() {
+    let text = read("ARCHITECTURE.md");
+    let (_, below) = text.split_once("## Where would I change …").unwrap();
+    let rows: Vec<&str> = below
+        .lines()
+        .skip_while(|line| !line.starts_with("|---"))
+        .skip(1)
+        .take_while(|line| line.starts_with('|'))
+        .collect();
+    assert!(rows.len() >= 10, "{} changes", rows.len());
+    for row in rows {
+        let places = quoted(row);
+        assert!((1..=3).contains(&places.len()), "{row}");
+        places.iter().for_each(|place| assert!(repository().join(place).exists(), "{row}"));
+    }
 }
 
 /// Modules of tests that figures come from: the word before `--`, or the last, of a call of `cargo test`.

@@ -21,7 +21,7 @@ use serde_json::Value;
 use specgen::model::Mcu;
 use specgen::pil::{Lockstep, Pipes, Stop};
 use specgen::target::{self, Image, emulator::Emulator};
-use specgen_link::client::Patience;
+use specgen_link::client::Timeout;
 
 /// One workspace for all, so that dependencies are built once; one run at a time writes it.
 static ONE: Mutex<()> = Mutex::new(());
@@ -178,8 +178,8 @@ fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
     for (signal, word) in [(Signal::KILL, "the emulator ended"), (Signal::STOP, "no answer within")] {
         let pipes = Pipes::start(&emulator, &image).unwrap();
         let process = pipes.process();
-        let patience = Patience { limit: Duration::from_secs(2), attempts: 1 };
-        let mut lockstep = Lockstep::open(supervised(&folder), pipes, patience, &NEVER).unwrap();
+        let timeout = Timeout { limit: Duration::from_secs(2), attempts: 1 };
+        let mut lockstep = Lockstep::open(supervised(&folder), pipes, timeout, &NEVER).unwrap();
         lockstep.reset();
         let description = lockstep.description().clone();
         let mut output = vec![0; description.output_names.len()];
@@ -200,8 +200,8 @@ fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
     }
     let nonsense = Image { elf: b"no image".to_vec(), ..image };
     let pipes = Pipes::start(&emulator, &nonsense).unwrap();
-    let patience = Patience { limit: Duration::from_secs(20), attempts: 1 };
-    let error = Lockstep::open(supervised(&folder), pipes, patience, &NEVER).err().unwrap().to_string();
+    let timeout = Timeout { limit: Duration::from_secs(20), attempts: 1 };
+    let error = Lockstep::open(supervised(&folder), pipes, timeout, &NEVER).err().unwrap().to_string();
     assert!(error.contains("the emulator ended: "), "{error}");
 }
 

@@ -6,7 +6,7 @@ use std::fs;
 
 use crate::support::{Folder, repository};
 
-/// The folder, with `name` beside the records; its paths to them are mended.
+/// The folder, with `name` beside the records; its paths to them are fixed.
 fn folder(name: &str) -> (Folder, String) {
     let folder = Folder::new();
     let text = fs::read_to_string(repository().join("specs").join(name)).unwrap();
@@ -69,12 +69,12 @@ fn gains_that_are_too_high_are_refused_in_their_line_and_the_offer_is_accepted()
         let line = 1 + bad[..bad.find("1e13").unwrap()].matches('\n').count();
         folder.run(&["check", "bad.toml"]).says(1, &[&format!("--> bad.toml:{line}:"), "E0421", "spectral radius"]);
         let help = finding["help"].as_str().unwrap();
-        let mut mended = bad;
+        let mut fixed = bad;
         for key in ["proportional", "integral"] {
-            mended = with_numbers(&mended, section, key, &offered(help, key));
+            fixed = with_numbers(&fixed, section, key, &offered(help, key));
         }
-        folder.write("mended.toml", &mended);
-        let run = folder.run(&["check", "mended.toml"]);
+        folder.write("fixed.toml", &fixed);
+        let run = folder.run(&["check", "fixed.toml"]);
         assert_eq!(run.code, 0, "{}", run.stderr);
     }
 }
@@ -89,9 +89,9 @@ fn a_bandwidth_that_is_too_high_is_refused_and_the_offer_is_accepted() {
     assert_eq!(finding["key"], "adaptation.level_bandwidth");
     let help = finding["help"].as_str().unwrap();
     let value = |name: &str| help.split_once(&format!("{name} = ")).unwrap().1.split('"').nth(1).unwrap().to_owned();
-    let mended = bad.replace("5000 rad/s", &value("level_bandwidth")).replace("19.6 rad/s", &value("drift_bandwidth"));
-    folder.write("mended.toml", &mended);
-    let found = folder.json(&["check", "mended.toml"]);
+    let fixed = bad.replace("5000 rad/s", &value("level_bandwidth")).replace("19.6 rad/s", &value("drift_bandwidth"));
+    folder.write("fixed.toml", &fixed);
+    let found = folder.json(&["check", "fixed.toml"]);
     // The gains of this spec were chosen beside a slower estimate: they may be refused in their turn, the bandwidth not.
     let keys: Vec<&str> = found.findings().iter().map(|one| one["key"].as_str().unwrap()).collect();
     assert!(!keys.contains(&"adaptation.level_bandwidth") || found.code == 0, "{keys:?}");

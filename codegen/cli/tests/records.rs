@@ -1,4 +1,4 @@
-//! A record that is no use is refused with the line or time, what was expected, and a mend; nothing is written. Each is made
+//! A record that is no use is refused with the line or time, what was expected, and a fix; nothing is written. Each is made
 //! from a good one, and met both ways: named in a spec, and given to `identify`.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
@@ -46,7 +46,7 @@ fn met(folder: &Folder) -> [Document; 2] {
     ]
 }
 
-/// What a refusal must say: line if one is to blame, code, words of the message, words of the mend.
+/// What a refusal must say: line if one is to blame, code, words of the message, words of the fix.
 struct Expected {
     line: Option<usize>,
     code: &'static str,

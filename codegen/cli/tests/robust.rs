@@ -163,8 +163,8 @@ fn what_cannot_be_run_is_refused_with_a_mend_and_nothing_is_written() {
         ("reference.toml", &["--trajectory", "leg"], "name one of case-1, case-2, machining, multisine"),
         ("legs.toml", &["--replay", "mass"], "one of nominal, mass-low"),
     ];
-    for (spec, more, mend) in cases {
-        folder.run(&[&["robust", spec, "-o", "out"], *more].concat()).says(2, &[mend]);
+    for (spec, more, fix) in cases {
+        folder.run(&[&["robust", spec, "-o", "out"], *more].concat()).says(2, &[fix]);
     }
     assert_eq!(folder.listing(), before);
     let text = folder.read("legs.toml");

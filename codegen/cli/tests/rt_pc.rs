@@ -245,7 +245,7 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
 fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     let [socket, link] = ["socket", "link"].map(|name| bench.path(name));
     let mut command = bench.command("b.rec");
-    command.args(["--elastic", "--patience", "5000", "--link-silence", "1000", "--socket"]).arg(&socket);
+    command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "1000", "--socket"]).arg(&socket);
     command.arg("--link").arg(&link).arg("--capture").arg(bench.path("capture.rec"));
     let running = Running::new(&mut command);
     wait_for("the link", || link.exists());
@@ -377,7 +377,7 @@ fn a_record_that_finds_no_room_brings_the_machine_down(bench: &Bench) {
     let script = "ulimit -f 800; trap '' XFSZ; exec \"$@\"";
     let mut command = Command::new("sh");
     command.args(["-c", script, "sh"]).arg(&bench.binary).args(["--sim", &bench.name, "--allow-no-rt", "--json"]);
-    command.args(["--elastic", "--patience", "5000", "--set", "command=3", "--record"]).arg(bench.path("cut.rec"));
+    command.args(["--elastic", "--sim-timeout", "5000", "--set", "command=3", "--record"]).arg(bench.path("cut.rec"));
     let output = command.output().unwrap();
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
     let failure = summary["failure"].as_str().unwrap();
@@ -454,7 +454,7 @@ fn legs_are_moved_by_lines_and_a_machine_that_is_killed_is_a_converter_that_does
     let mut bench = Bench::new("legs.toml");
     let socket = bench.path("socket");
     let mut command = bench.command("legs.rec");
-    command.args(["--elastic", "--patience", "1000", "--socket"]).arg(&socket);
+    command.args(["--elastic", "--sim-timeout", "1000", "--socket"]).arg(&socket);
     let running = Running::new(&mut command);
     wait_for("the socket", || socket.exists());
     let mut lines = Lines::new(&socket);

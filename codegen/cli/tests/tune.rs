@@ -182,13 +182,13 @@ fn what_cannot_be_tuned_is_refused_with_a_mend() {
         ("legs.toml", &["--frequency", "400", "--seconds", "0.1"], "E0705", "lower --frequency"),
     ];
     let before = folder.listing();
-    for (spec, more, code, mend) in cases {
+    for (spec, more, code, fix) in cases {
         let mut arguments = vec!["tune", spec, "--evaluations", "8"];
         arguments.extend(*more);
         let document = folder.json(&arguments);
         assert_eq!(document.code, 1, "{arguments:?}: {:#}", document.value);
         let help = document.finding(code)["help"].as_str().unwrap();
-        assert!(help.contains(mend), "{arguments:?}: {help}");
+        assert!(help.contains(fix), "{arguments:?}: {help}");
     }
     assert_eq!(folder.listing(), before, "nothing is written");
 }

@@ -329,7 +329,7 @@ fn wrong_scale(model: &Model, name: &str, table: &EverettTable) -> Option<Diagno
             model.actuator.stack_gain,
             expected * 1e6
         ),
-        help: "check that the displacement is in µm, or mend actuator.stacks and actuator.stack_gain".to_owned(),
+        help: "check that the displacement is in µm, or fix actuator.stacks and actuator.stack_gain".to_owned(),
     })
 }
 

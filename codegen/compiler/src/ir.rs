@@ -337,7 +337,7 @@ pub struct GaugeConverter {
     pub beyond: [f64; 2],
 }
 
-/// The supervisor; the constants of [`specgen_runtime::supervisor::Plan`], where each is explained.
+/// The supervisor; the constants of [`specgen_runtime::supervisor::Supervision`], where each is explained.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Supervision {
     /// Ticks.
@@ -355,7 +355,7 @@ pub struct Supervision {
     pub host_ticks: u32,
     /// Counts at which a condition is a cause: gauge not finite, gauge range, voltage, slew, missed tick, converter, host gone,
     /// converter silent.
-    pub patience: [u32; TIMERS],
+    pub timeout: [u32; TIMERS],
     /// What a tick with the condition counts.
     pub weight: [u32; TIMERS],
     /// m.

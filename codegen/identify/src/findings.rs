@@ -66,7 +66,7 @@ impl Findings {
                 key: String::new(),
                 place: Place::File { path: path.clone(), line: None },
                 message: format!("and {} more lines like this ({code})", n - SHOWN_PER_CODE),
-                help: "mend the ones shown and run again".to_owned(),
+                help: "fix the ones shown and run again".to_owned(),
             });
         }
         found
@@ -81,7 +81,7 @@ mod tests {
     fn repeated_findings_are_counted_instead_of_listed() {
         let mut findings = Findings::new("a.csv");
         for line in 2..44 {
-            findings.error("E0506", Some(line), format!("line {line}"), "mend it");
+            findings.error("E0506", Some(line), format!("line {line}"), "fix it");
         }
         let all = findings.into_diagnostics();
         assert_eq!(all.len(), SHOWN_PER_CODE + 1);

@@ -1,4 +1,4 @@
-//! Rate dependence from records at several rates: what a static table misses, and which of three options mends it.
+//! Rate dependence from records at several rates: what a static table misses, and which of three options fixes it.
 //!
 //! ```text
 //! static           y = Γ₀[u]

@@ -155,7 +155,7 @@ fn columns(header: &csv::StringRecord, findings: &mut Findings) -> Option<Vec<Co
     Some(found)
 }
 
-/// A column by its name, or how to mend the name.
+/// A column by its name, or how to fix the name.
 fn column(name: &str) -> Result<Column, String> {
     let lower = name.to_ascii_lowercase();
     let (quantity, unit) = lower.rsplit_once('_').unwrap_or((lower.as_str(), ""));

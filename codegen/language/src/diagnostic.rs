@@ -39,7 +39,7 @@ pub enum Place {
     Whole,
 }
 
-/// One finding: what is wrong, where, and how to mend it.
+/// One finding: what is wrong, where, and how to fix it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
     /// How bad.
@@ -52,7 +52,7 @@ pub struct Diagnostic {
     pub place: Place,
     /// What is wrong, with the value found and what was expected.
     pub message: String,
-    /// How to mend it.
+    /// How to fix it.
     pub help: String,
 }
 

@@ -49,13 +49,13 @@ pub fn solve_from(gram: &DMatrix<f64>, rhs: &[f64], near: &[f64]) -> Result<Solu
     solve_with(gram, rhs, free, usize::MAX, PATIENCE)
 }
 
-/// `fewest` is the number of wrong signs that counts as the best so far: 0 leaves only the backup rule once `patience` is used up.
+/// `fewest` is the number of wrong signs that counts as the best so far: 0 leaves only the backup rule once `trials` is used up.
 fn solve_with(
     gram: &DMatrix<f64>,
     rhs: &[f64],
     mut free: Vec<bool>,
     mut fewest: usize,
-    patience: usize,
+    trials: usize,
 ) -> Result<Solution, Failure> {
     let n = rhs.len();
     let mut scale = Vec::with_capacity(n);
@@ -70,7 +70,7 @@ fn solve_with(
     let largest = target.iter().fold(0.0, |m: f64, b| if b.abs() > m { b.abs() } else { m });
     let limit = 5 * n + 50;
 
-    let mut left = patience;
+    let mut left = trials;
     for iteration in 1..=limit {
         let weights = restricted(gram, &scale, &target, &free)?;
         let wrong = wrong_signs(gram, &scale, &target, &free, &weights, largest);
@@ -81,7 +81,7 @@ fn solve_with(
         let progress = wrong.len() < fewest;
         if progress {
             fewest = wrong.len();
-            left = patience;
+            left = trials;
         }
         if progress || left > 0 {
             left = if progress { left } else { left - 1 };

@@ -34,16 +34,16 @@ pub struct Finding {
     /// What was found.
     pub found: String,
     /// What to change; none where nothing is to be.
-    pub mend: Option<String>,
+    pub fix: Option<String>,
 }
 
 impl Finding {
     fn good(subject: &'static str, found: impl Into<String>) -> Self {
-        Self { subject, grade: Grade::Good, found: found.into(), mend: None }
+        Self { subject, grade: Grade::Good, found: found.into(), fix: None }
     }
 
-    fn of(subject: &'static str, grade: Grade, found: impl Into<String>, mend: impl Into<String>) -> Self {
-        Self { subject, grade, found: found.into(), mend: Some(mend.into()) }
+    fn of(subject: &'static str, grade: Grade, found: impl Into<String>, fix: impl Into<String>) -> Self {
+        Self { subject, grade, found: found.into(), fix: Some(fix.into()) }
     }
 }
 

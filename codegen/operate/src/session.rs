@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use host_sim::description::Description;
-use specgen_link::client::{Client, ClientError, Patience, Port};
+use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{Identity, RecorderAction, RecorderStatus, Reply, Request, Status, WORDS, WaveAction, put_words};
 use specgen_runtime::supervisor;
 
@@ -29,8 +29,8 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     /// No answer, or another controller.
-    pub fn open(port: P, patience: Patience, digest: Option<&str>) -> Result<Self, OpenError> {
-        let Opened { client, identity, text, description } = pil::open(port, patience)?;
+    pub fn open(port: P, timeout: Timeout, digest: Option<&str>) -> Result<Self, OpenError> {
+        let Opened { client, identity, text, description } = pil::open(port, timeout)?;
         if digest.is_some_and(|digest| digest != description.digest) {
             return Err(OpenError::Other(format!(
                 "the device runs the controller `{}` of spec digest {}; the spec gives {}: name the spec that it was built from, \

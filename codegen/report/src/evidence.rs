@@ -36,7 +36,7 @@ pub fn findings(compiled: &Compiled, command: &str) -> Section {
     if compiled.findings.is_empty() {
         return section.text("None: no error, no warning, no note.");
     }
-    let mut table = Grid::new("Findings", &["", "code", "line", "column", "key", "what", "mend"]);
+    let mut table = Grid::new("Findings", &["", "code", "line", "column", "key", "what", "fix"]);
     for finding in to_json(&compiled.findings, &compiled.source).as_array().into_iter().flatten() {
         let text = |key: &str| match &finding[key] {
             serde_json::Value::Null => String::new(),

@@ -51,7 +51,7 @@ pub fn build_image_with(toolchain: &Toolchain, dir: &Path, mcu: Mcu, target_dir:
     build_program(toolchain, dir, EMULATED, mcu, target_dir, &["--bin", "replay"])
 }
 
-/// Builds the image of `dir/qemu` that [`pil`](specgen_operate::pil) talks to, as [`build_image`] does that of the replay.
+/// Builds the image of `dir/qemu` that `specgen_operate::pil` talks to, as [`build_image`] does that of the replay.
 ///
 /// # Errors
 /// As [`build_image`].

@@ -276,7 +276,7 @@ fn refusal(refused: wave::Refused) -> Refusal {
 
 impl Device for Visit<'_, '_> {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
-        (self.with)(&mut |exchange, _| exchange.hear());
+        (self.with)(&mut |exchange, _| exchange.host_alive());
         match *request {
             Request::Hello => Reply::Identity(self.identity()),
             Request::Describe { offset } => piece(DESCRIPTION.as_bytes(), offset),

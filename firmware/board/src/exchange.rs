@@ -123,7 +123,7 @@ impl Exchange {
     }
 
     /// A request of the host was carried out or refused.
-    pub fn hear(&mut self) {
+    pub fn host_alive(&mut self) {
         self.silence.heard();
         if let Some(silence) = &mut self.lockstep {
             silence.heard();

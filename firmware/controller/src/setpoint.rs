@@ -5,13 +5,13 @@
 #![allow(clippy::approx_constant)]
 
 use specgen_runtime::setpoint::{
-    Axis, MoveLimits, Parallel, Plan, Segment, StopLimits, Trajectory,
+    Axis, MoveLimits, Parallel, Segment, Setpoints, StopLimits, Trajectory,
 };
 use crate::Real;
 
 /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
 /// and `trajectory`.
-pub const PLAN: Plan<Real, Parallel> = Plan {
+pub const SETPOINTS: Setpoints<Real, Parallel> = Setpoints {
     period: 0.0001,
     rate: 10000.0,
     square_rate: 100000000.0,

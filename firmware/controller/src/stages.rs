@@ -8,7 +8,7 @@ use specgen_runtime::linear::difference;
 use crate::dynamics::leg_forces;
 use crate::hysteresis::TABLES;
 use crate::limits::DAC;
-use crate::setpoint::PLAN;
+use crate::setpoint::SETPOINTS;
 use crate::step::{actuate, correction, known_load, learn};
 use crate::task_space::{modal_error, notch_error};
 use crate::{Config, LEGS, Real, State, TickInput};
@@ -79,7 +79,7 @@ pub const STAGES: [Stage; STAGE_COUNT] = [
 /// Brings a copy of the state to where the stages find it, with each leg's request in place of its excess; not measured.
 pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
     crate::step::sense(config, state, &input.gauge);
-    state.generator.tick(&PLAN, &input.command);
+    state.generator.tick(&SETPOINTS, &input.command);
     let load = known_load(config, state);
     let correction = correction(config, state);
     for (index, leg) in state.legs.iter_mut().enumerate() {
@@ -120,7 +120,7 @@ extern "C" fn setpoint(
     input: &TickInput,
     _leg: usize,
 ) {
-    state.generator.tick(&PLAN, &input.command);
+    state.generator.tick(&SETPOINTS, &input.command);
 }
 
 /// h, ḣ, ḧ to six leg forces.

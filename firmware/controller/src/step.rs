@@ -33,7 +33,7 @@ use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchSt
 use crate::dynamics::Load;
 use crate::hysteresis::{TABLES, Table};
 use crate::limits::DAC;
-use crate::setpoint::PLAN;
+use crate::setpoint::SETPOINTS;
 use crate::task_space::{
     COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, MODES_TO_LEGS,
     PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
@@ -101,7 +101,7 @@ pub(crate) fn advance(
     }
     let wrench_good = take_wrench(config, state, &input.wrench);
     let damping = damping(config, state);
-    let setpoint_status = state.generator.tick_as(&PLAN, kind, &input.command);
+    let setpoint_status = state.generator.tick_as(&SETPOINTS, kind, &input.command);
     let Load { displacement: demand, force } = known_load(config, state);
     let correction = correction(config, state);
     state.load = each(|leg| {

@@ -16,10 +16,10 @@ pub use crate::machine_words::{
     machine_output_words,
 };
 use crate::step::{GAUGE_FAULT, LEG_LIMITED, advance, outputs};
-use crate::supervision::PLAN;
+use crate::supervision::SUPERVISION;
 use specgen_runtime::setpoint::{CommandKind, Generator};
 use specgen_runtime::{Estimate, Integral, NotchState, Real as _, Transfer};
-use crate::setpoint::PLAN as SETPOINTS;
+use crate::setpoint::SETPOINTS;
 use crate::step::sense;
 use crate::supervision::READINGS_PER_LEG;
 use crate::{kinematics, sensing};
@@ -98,8 +98,8 @@ pub fn supervise(
 ) -> MachineOutput {
     let Machine { state, supervisor } = machine;
     let at_rest = supervisor.phase != Phase::Running
-        && state.legs.iter().all(|leg| leg.code == PLAN.rest);
-    let begins = supervisor.decide(&PLAN, input.request, input.events, at_rest);
+        && state.legs.iter().all(|leg| leg.code == SUPERVISION.rest);
+    let begins = supervisor.decide(&SUPERVISION, input.request, input.events, at_rest);
     if begins {
         begin(config, state, supervisor, &input.tick);
     }
@@ -196,7 +196,8 @@ fn look(
     target: Real,
 ) {
     let error = Some(target - component(&state.pose, channel));
-    supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
+    supervisor
+        .look(&SUPERVISION, channel, &sample(&input.gauge, channel, expected, error));
 }
 
 /// A motion that was under way when the law was to be suspended, brought to rest by it within the limits of stops. Returns
@@ -231,7 +232,8 @@ fn stand(
     }
     let faults = sense(config, state, &input.gauge);
     if faults == 0 && compares(supervisor.phase) {
-        supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, None));
+        supervisor
+            .look(&SUPERVISION, channel, &sample(&input.gauge, channel, expected, None));
     }
     if !supervisor.phase.is_powered() {
         state.load = [0.0; LEGS];
@@ -280,9 +282,9 @@ fn component(vector: &[Real; 6], index: usize) -> Real {
 
 /// Codes held, or on their way to rest; the memories follow what is really sent.
 fn move_codes(config: &Config, state: &mut State, supervisor: &mut Supervisor) {
-    let step = supervisor.step_to_rest(&PLAN, config.code_limits().max_step);
+    let step = supervisor.step_to_rest(&SUPERVISION, config.code_limits().max_step);
     for (leg, table) in state.legs.iter_mut().zip(&TABLES) {
-        leg.code = toward(leg.code, PLAN.rest, step);
+        leg.code = toward(leg.code, SUPERVISION.rest, step);
         leg.memory.apply(table, DAC.drive(leg.code));
     }
 }

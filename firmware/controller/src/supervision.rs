@@ -3,16 +3,16 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
-use specgen_runtime::supervisor::Plan;
+use specgen_runtime::supervisor::Supervision;
 use crate::Real;
 
 /// Bounds and times, these in ticks, or in samples of six ticks.
-pub const PLAN: Plan<Real> = Plan {
+pub const SUPERVISION: Supervision<Real> = Supervision {
     arm_ticks: 1000,
     rest: 0,
     ramp_step: 4,
     ramp_every: 1,
-    patience: [100, 100, 5000, 500, 20001, 100, 99001, 100000],
+    timeout: [100, 100, 5000, 500, 20001, 100, 99001, 100000],
     weight: [1, 1, 1, 1, 10000, 1, 1, 1],
     stuck_motion: 2.2e-8,
     stuck_samples: 84,

@@ -6,7 +6,7 @@
 use specgen_runtime::wave::Limits;
 use specgen_runtime::{Motion, Real as _, wave};
 use specgen_runtime::setpoint::CommandKind;
-use crate::setpoint::PLAN;
+use crate::setpoint::SETPOINTS;
 use crate::{Config, GENERATOR_BUSY, Real};
 
 /// Word of the command to stream.
@@ -15,7 +15,7 @@ const STREAM: u64 = 1;
 /// Those of streams; from `control.setpoint` and `workspace`.
 #[must_use]
 pub fn limits(_config: &Config) -> Limits<Real> {
-    Limits::of(&PLAN)
+    Limits::of(&SETPOINTS)
 }
 
 /// A wave may begin with the next tick: the platform is at its bias pose and plays nothing. `status` is that of the last

@@ -37,14 +37,14 @@ impl<P: Port + ?Sized> Port for std::boxed::Box<P> {
 
 /// How long a client waits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Patience {
+pub struct Timeout {
     /// For an answer.
     pub limit: Duration,
     /// How often a request is sent, at most.
     pub attempts: u32,
 }
 
-impl Patience {
+impl Timeout {
     /// For a serial line: an answer comes within milliseconds, and noise may eat a frame.
     pub const SERIAL: Self = Self { limit: Duration::from_millis(250), attempts: 8 };
     /// For a pipe, which loses nothing: an answer comes, or the other side hangs.
@@ -130,7 +130,7 @@ fn words(refusal: Refusal) -> String {
 /// Asks a device, one request at a time.
 pub struct Client<P> {
     port: P,
-    patience: Patience,
+    timeout: Timeout,
     receiver: Receiver,
     session: u16,
     sequence: u16,
@@ -145,10 +145,10 @@ impl<P: Port> Client<P> {
     ///
     /// # Errors
     /// As [`Client::ask`].
-    pub fn open(port: P, session: u16, patience: Patience) -> Result<(Self, Identity), ClientError> {
+    pub fn open(port: P, session: u16, timeout: Timeout) -> Result<(Self, Identity), ClientError> {
         let mut client = Self {
             port,
-            patience,
+            timeout,
             receiver: Receiver::new(),
             session,
             sequence: 0,
@@ -189,7 +189,7 @@ impl<P: Port> Client<P> {
         let start = Instant::now();
         let before = self.damaged;
         let mut came = false;
-        for _ in 0..self.patience.attempts {
+        for _ in 0..self.timeout.attempts {
             self.port.send(self.request.bytes()).map_err(ClientError::Port)?;
             if self.wait(&header)? {
                 came = true;
@@ -197,7 +197,7 @@ impl<P: Port> Client<P> {
             }
         }
         if !came {
-            let (attempts, damaged) = (self.patience.attempts, self.damaged - before);
+            let (attempts, damaged) = (self.timeout.attempts, self.damaged - before);
             return Err(ClientError::Silent { waited: start.elapsed(), attempts, damaged });
         }
         match frame::message::<Reply<'_>>(&self.answer).ok_or(ClientError::Unexpected)? {
@@ -221,7 +221,7 @@ impl<P: Port> Client<P> {
         let start = Instant::now();
         let mut buffer = [0; 4096];
         loop {
-            let left = self.patience.limit.saturating_sub(start.elapsed());
+            let left = self.timeout.limit.saturating_sub(start.elapsed());
             let count = self.port.receive(&mut buffer, left).map_err(ClientError::Port)?;
             // What follows an answer is of no request that is still open.
             for byte in &buffer[..count] {
@@ -284,8 +284,8 @@ impl<P: Port> Client<P> {
     }
 
     /// Waits differently from here on.
-    pub fn set_patience(&mut self, patience: Patience) {
-        self.patience = patience;
+    pub fn set_timeout(&mut self, timeout: Timeout) {
+        self.timeout = timeout;
     }
 
     /// The line.

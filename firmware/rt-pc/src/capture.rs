@@ -85,7 +85,7 @@ impl Capture {
     }
 
     /// The loop said how its recorder stands.
-    pub fn hear(&mut self, recorded: Option<u64>, triggered: bool) {
+    pub fn update(&mut self, recorded: Option<u64>, triggered: bool) {
         if let Some(ticks) = recorded
             && self.here.is_none()
         {

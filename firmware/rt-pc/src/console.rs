@@ -61,10 +61,10 @@ impl Console {
     }
 
     /// Hears of a tick.
-    pub fn hear(&mut self, row: &Row, said: Said) {
+    pub fn update(&mut self, row: &Row, said: Said) {
         self.said = Some(said);
         self.events |= self.places.events(&row.input);
-        self.capture.hear(row.recorded, row.triggered);
+        self.capture.update(row.recorded, row.triggered);
         if !said.waving && self.wave.is_some_and(|number| said.orders.wrapping_sub(number).cast_signed() >= 0) {
             self.wave = None;
         }

@@ -40,7 +40,7 @@ use control::{Loop, Timing};
 use devices::Device;
 use devices::simulated::Simulated;
 use handover::Shared;
-use operator::{Operator, Patience};
+use operator::{Operator, Timeout};
 use options::{Asked, Options};
 use service::{Link, Service, Socket};
 use summary::Summary;
@@ -84,7 +84,7 @@ fn open(options: &Options) -> Result<(), Failure> {
     match &options.machine {
         options::Machine::Simulated(name) => {
             let path = exchange::path_of(name).map_err(|text| Failure::Usage(format!("--sim: {text}")))?;
-            let device = Simulated::open(&path, options.patience);
+            let device = Simulated::open(&path, options.sim_timeout);
             run(options, &mut device.map_err(Failure::Environment)?)
         }
         #[cfg(feature = "comedi")]
@@ -121,8 +121,8 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     let places = Places::find().map_err(|error| environment(error.to_string()))?;
     // Somebody or something is there to end it.
     let attended = options.socket.is_some() || options.link.is_some() || options.duration.is_some();
-    let patience = Patience { silence: timing.silence * period, idle: options.link_idle };
-    let mut operator = Operator::new(places.clone(), attended, patience);
+    let timeout = Timeout { silence: timing.silence * period, idle: options.link_idle };
+    let mut operator = Operator::new(places.clone(), attended, timeout);
     if options.arm {
         operator.plan(&options.set, clock::now()).map_err(|error| usage(format!("--set: {error}")))?;
     }
@@ -162,7 +162,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         shared: &shared,
         timing,
     };
-    let (ready, hear) = mpsc::channel();
+    let (ready, readiness) = mpsc::channel();
     let (go, wait) = mpsc::channel();
     let (cpu, priority) = (options.cpu, options.priority);
     let book = &mut *account;
@@ -176,7 +176,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
             }
         });
         spawned.map_err(|error| environment(format!("no thread for the loop: {error}")))?;
-        missing.extend(hear.recv().unwrap_or_default());
+        missing.extend(readiness.recv().unwrap_or_default());
         for refused in &missing {
             eprintln!("{}: {refused}", if options.allow_no_rt { "warning" } else { "error" });
         }

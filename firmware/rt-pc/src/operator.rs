@@ -50,7 +50,7 @@ pub enum Denied {
 
 /// For how long a host over a link has the orders, ns.
 #[derive(Debug, Clone, Copy)]
-pub struct Patience {
+pub struct Timeout {
     /// It may be silent for so long.
     pub silence: u64,
     /// It may be there without ordering anything for so long.
@@ -99,55 +99,55 @@ pub struct Operator {
     step: Step,
     since: u64,
     /// Input words to set once it runs, by place.
-    play: Vec<(usize, u64)>,
+    assignments: Vec<(usize, u64)>,
     /// Why the plan could not be carried out.
-    pub complaint: Option<String>,
+    pub failure: Option<String>,
     changed: bool,
     owner: Owner,
     /// Requests over the link.
     requests: u64,
     /// The host from which the orders were taken last.
     evicted: Option<HostId>,
-    patience: Patience,
-    /// After a fault the loop goes on, for somebody will look at it or end it.
+    timeout: Timeout,
+    /// An operator is present: after a fault the loop goes on instead of ending.
     attended: bool,
 }
 
 impl Operator {
     /// An operator without a plan. If the plan fails the loop goes on where it is `attended`, else it ends.
     #[must_use]
-    pub fn new(places: Places, attended: bool, patience: Patience) -> Self {
+    pub fn new(places: Places, attended: bool, timeout: Timeout) -> Self {
         Self {
             places,
             words: [0; MACHINE_INPUT_WORDS],
             request: Request::None,
             step: Step::Free,
             since: 0,
-            play: Vec::new(),
-            complaint: None,
+            assignments: Vec::new(),
+            failure: None,
             changed: true,
             owner: Owner::Here,
             requests: 0,
             evicted: None,
-            patience,
+            timeout,
             attended,
         }
     }
 
-    /// Plans: arm, run, then set `play` (assignments such as `command=3`).
+    /// Plans: arm, run, then set `assignments` (such as `command=3`).
     ///
     /// # Errors
     /// An assignment that makes no sense.
-    pub fn plan(&mut self, play: &[String], now: u64) -> Result<(), String> {
-        for assignment in play {
-            self.play.push(self.assignment(assignment)?);
+    pub fn plan(&mut self, assignments: &[String], now: u64) -> Result<(), String> {
+        for assignment in assignments {
+            self.assignments.push(self.assignment(assignment)?);
         }
         self.go(Step::Arming, Request::Arm, now);
         Ok(())
     }
 
     /// Asks to ramp down; then the loop may end.
-    pub fn go_down(&mut self, now: u64) {
+    pub fn ramp_down(&mut self, now: u64) {
         if !self.is_ending() {
             self.go(Step::GoingDown, Request::RampDown, now);
         }
@@ -160,14 +160,14 @@ impl Operator {
     }
 
     /// Hears what the supervisor said and goes on with the plan.
-    pub fn hear(&mut self, said: &Said, now: u64) {
+    pub fn update(&mut self, said: &Said, now: u64) {
         let waited = now.saturating_sub(self.since);
         match (self.step, said.phase) {
             (Step::Arming | Step::Starting | Step::Playing, Phase::Faulted) => {
                 self.give_up(format!("the machine faulted: {}", said.cause.name()), now);
             }
             (Step::Arming, Phase::Running) | (Step::Starting, Phase::Running) => {
-                for (place, word) in std::mem::take(&mut self.play) {
+                for (place, word) in std::mem::take(&mut self.assignments) {
                     self.words[place] = word;
                 }
                 self.go(Step::Playing, Request::None, now);
@@ -186,7 +186,7 @@ impl Operator {
                     DOWN_LIMIT / SECOND,
                     said.phase.name()
                 );
-                self.complaint.get_or_insert(text);
+                self.failure.get_or_insert(text);
                 self.go(Step::Over, Request::None, now);
             }
             _ => {}
@@ -218,7 +218,7 @@ impl Operator {
                 return Ok("ok".to_owned());
             }
             "stop" => {
-                self.go_down(now);
+                self.ramp_down(now);
                 return Ok("ok".to_owned());
             }
             _ => {
@@ -282,7 +282,7 @@ impl Operator {
         match self.owner {
             Owner::Here => false,
             Owner::Host { heard, ordered, left, .. } => {
-                let Patience { silence, idle } = self.patience;
+                let Timeout { silence, idle } = self.timeout;
                 !left && now.saturating_sub(heard) <= silence && now.saturating_sub(ordered) <= idle
             }
         }
@@ -323,7 +323,7 @@ impl Operator {
     }
 
     /// A host comes anew: what one that is not there any more asked for is not asked for on its behalf.
-    pub fn greeted(&mut self, host: HostId, now: u64) {
+    pub fn connected(&mut self, host: HostId, now: u64) {
         if self.is_links() && self.may_order(host, now) && !self.is_ending() {
             self.ask(Request::None);
         }
@@ -411,7 +411,7 @@ impl Operator {
 
     /// Why it cannot go on: ramp down, and end where nobody attends.
     pub fn give_up(&mut self, text: String, now: u64) {
-        self.complaint.get_or_insert(text);
+        self.failure.get_or_insert(text);
         if self.attended {
             self.go(Step::Free, Request::RampDown, now);
         } else {
@@ -449,7 +449,7 @@ mod tests {
     }
 
     fn operator() -> Operator {
-        Operator::new(Places::find().unwrap(), false, Patience { silence: PATIENCE, idle: IDLE })
+        Operator::new(Places::find().unwrap(), false, Timeout { silence: PATIENCE, idle: IDLE })
     }
 
     #[test]
@@ -457,45 +457,45 @@ mod tests {
         let mut operator = operator();
         operator.plan(&["setpoint[0]=1e-6".to_owned()], 0).unwrap();
         assert_eq!(operator.wish().unwrap().request, Request::Arm.word());
-        operator.hear(&said(Phase::Disarmed, false), 1);
+        operator.update(&said(Phase::Disarmed, false), 1);
         assert!(operator.wish().is_none());
-        operator.hear(&said(Phase::Arming, true), 1);
+        operator.update(&said(Phase::Arming, true), 1);
         assert_eq!(operator.wish().unwrap().request, Request::Run.word());
-        operator.hear(&said(Phase::Arming, true), 1);
+        operator.update(&said(Phase::Arming, true), 1);
         assert!(operator.wish().is_none());
-        operator.hear(&said(Phase::Running, true), 2);
+        operator.update(&said(Phase::Running, true), 2);
         let wish = operator.wish().unwrap();
         let index = place("setpoint[0]").unwrap();
         assert_eq!((wish.request, wish.words[index]), (Request::None.word(), word_of(index, 1e-6).unwrap()));
-        operator.go_down(3);
+        operator.ramp_down(3);
         assert_eq!(operator.wish().unwrap().request, Request::RampDown.word());
-        operator.hear(&said(Phase::RampingDown, true), 4);
+        operator.update(&said(Phase::RampingDown, true), 4);
         assert!(!operator.is_over());
-        operator.hear(&said(Phase::Disarmed, false), 5);
-        assert!(operator.is_over() && operator.complaint.is_none());
+        operator.update(&said(Phase::Disarmed, false), 5);
+        assert!(operator.is_over() && operator.failure.is_none());
     }
 
     #[test]
     fn a_fault_ends_the_plan_and_a_machine_that_does_not_come_down_is_not_waited_for_for_ever() {
         let mut operator = operator();
         operator.plan(&[], 0).unwrap();
-        operator.hear(&said(Phase::Faulted, true), 1);
-        assert!(operator.complaint.as_ref().unwrap().contains("faulted: "));
-        operator.hear(&said(Phase::Holding, true), 2);
+        operator.update(&said(Phase::Faulted, true), 1);
+        assert!(operator.failure.as_ref().unwrap().contains("faulted: "));
+        operator.update(&said(Phase::Holding, true), 2);
         assert!(!operator.is_over());
-        operator.hear(&said(Phase::Holding, true), 2 + DOWN_LIMIT);
+        operator.update(&said(Phase::Holding, true), 2 + DOWN_LIMIT);
         assert!(operator.is_over());
     }
 
     #[test]
     fn where_somebody_looks_a_fault_does_not_end_the_loop() {
-        let mut operator = Operator::new(Places::find().unwrap(), true, Patience { silence: PATIENCE, idle: IDLE });
+        let mut operator = Operator::new(Places::find().unwrap(), true, Timeout { silence: PATIENCE, idle: IDLE });
         operator.plan(&[], 0).unwrap();
-        operator.hear(&said(Phase::Faulted, false), 1);
-        operator.hear(&said(Phase::Faulted, false), 2);
-        assert!(operator.complaint.is_some() && !operator.is_over());
-        operator.go_down(3);
-        operator.hear(&said(Phase::Faulted, false), 4);
+        operator.update(&said(Phase::Faulted, false), 1);
+        operator.update(&said(Phase::Faulted, false), 2);
+        assert!(operator.failure.is_some() && !operator.is_over());
+        operator.ramp_down(3);
+        operator.update(&said(Phase::Faulted, false), 4);
         assert!(operator.is_over());
     }
 
@@ -554,7 +554,7 @@ mod tests {
         operator.take_for_host(A, 600).unwrap();
         operator.left(A, Some(&said(Phase::Disarmed, false)));
         assert_eq!(operator.link_number(), 0);
-        operator.go_down(700);
+        operator.ramp_down(700);
         assert!(
             operator.take_for_host(A, 701) == Err(Denied::Ending)
                 && operator.obey("run", 701).is_err()

@@ -18,7 +18,7 @@ Machine
   --comedi-range LOW:HIGH       voltages that the range of a gauge's input must hold (default -10:10)
   --comedi-out-range LOW:HIGH   voltages that the range of an amplifier's output must hold (default -10:10)
   --comedi-library FILE         another libcomedi than the system's
-  --patience MS        how long a reading of the simulated machine may take before it counts as broken (default 20)
+  --sim-timeout MS     how long a reading of the simulated machine may take before it counts as broken (default 20)
 
 Time
   --seconds S          ramp down and end after S seconds (default: at a signal)
@@ -68,7 +68,7 @@ pub struct Options {
     /// The library's file.
     pub comedi_library: Option<PathBuf>,
     /// ns.
-    pub patience: u64,
+    pub sim_timeout: u64,
     /// ns.
     pub duration: Option<u64>,
     /// Share of the period.
@@ -126,7 +126,7 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
         comedi_outputs: Vec::new(),
         comedi_ranges: [[-10.0, 10.0]; 2],
         comedi_library: None,
-        patience: 20_000_000,
+        sim_timeout: 20_000_000,
         duration: None,
         late_after: 0.5,
         elastic: false,
@@ -159,7 +159,7 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             Long("comedi-range") => options.comedi_ranges[0] = range(&mut parser, "--comedi-range")?,
             Long("comedi-out-range") => options.comedi_ranges[1] = range(&mut parser, "--comedi-out-range")?,
             Long("comedi-library") => options.comedi_library = Some(parser.value()?.into()),
-            Long("patience") => options.patience = (number(&mut parser, "--patience", 0.1, 10_000.0)? * 1e6) as u64,
+            Long("sim-timeout") => options.sim_timeout = (number(&mut parser, "--sim-timeout", 0.1, 10_000.0)? * 1e6) as u64,
             Long("seconds") => {
                 options.duration = Some((number(&mut parser, "--seconds", 0.01, 1e7)? * SECOND as f64) as u64);
             }

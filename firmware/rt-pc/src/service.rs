@@ -75,7 +75,7 @@ pub struct Outcome {
     /// Rows seen.
     pub rows: u64,
     /// Why the plan was given up.
-    pub complaint: Option<String>,
+    pub failure: Option<String>,
 }
 
 impl Service<'_> {
@@ -92,12 +92,12 @@ impl Service<'_> {
                 break;
             }
             if let Some(said) = self.console.said {
-                self.console.operator.hear(&said, now);
+                self.console.operator.update(&said, now);
             }
             self.serve(now);
             self.signals += u32::from(self.signal.swap(false, Ordering::Relaxed));
             if self.signals > 0 || self.until.is_some_and(|until| now >= until) {
-                self.console.operator.go_down(now);
+                self.console.operator.ramp_down(now);
             }
             if self.console.operator.is_over() || self.signals > 1 {
                 self.shared.stop.store(true, Ordering::Relaxed);
@@ -109,7 +109,7 @@ impl Service<'_> {
             outcome.record = Some((path, writer.finish()));
         }
         outcome.last = self.console.said;
-        outcome.complaint = self.console.operator.complaint.take();
+        outcome.failure = self.console.operator.failure.take();
         outcome.capture = self.console.capture.written.take();
         outcome.link = self.link.map(|link| link.traffic());
         outcome
@@ -163,7 +163,7 @@ impl Service<'_> {
             if faulted || held {
                 outcome.incidents.push(Incident { tick: said.tick, phase: said.phase, cause: said.cause });
             }
-            self.console.hear(&row, said);
+            self.console.update(&row, said);
             if let Some((path, mut writer)) = self.record.take() {
                 match writer.add(&row, &mut self.rings.snapshots) {
                     Ok(()) => self.record = Some((path, writer)),

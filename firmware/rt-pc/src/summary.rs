@@ -53,8 +53,8 @@ impl Summary<'_> {
                 "the record lacks {lost} ticks: the disk was slower than the loop; write it to a faster one"
             ));
         }
-        if let Some(complaint) = &outcome.complaint {
-            return Some(complaint.clone());
+        if let Some(failure) = &outcome.failure {
+            return Some(failure.clone());
         }
         if let Some((path, Err(error))) = &outcome.capture {
             return Some(format!("{}: what the recorder kept could not be written: {error}", path.display()));

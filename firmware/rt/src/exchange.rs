@@ -207,10 +207,10 @@ impl Server {
     }
 
     /// The latest actuation and what the controller waits for (session, tick), once the counter of either has moved on from
-    /// `seen`; none after `patience` (ns). It looks for `look` (ns) before it sleeps.
+    /// `seen`; none after `timeout` (ns). It looks for `look` (ns) before it sleeps.
     #[must_use]
-    pub fn wait(&self, seen: &mut u32, look: u64, patience: u64) -> Option<(Actuation, [u64; 2])> {
-        self.mapping.words().wait(seen, look, patience)
+    pub fn wait(&self, seen: &mut u32, look: u64, timeout: u64) -> Option<(Actuation, [u64; 2])> {
+        self.mapping.words().wait(seen, look, timeout)
     }
 
     /// Gives a reading out.
@@ -247,10 +247,10 @@ impl Client {
         Ok(Self { mapping, session })
     }
 
-    /// The reading at the beginning of `tick`; none if the machine does not give it within `patience` (ns).
+    /// The reading at the beginning of `tick`; none if the machine does not give it within `timeout` (ns).
     #[must_use]
-    pub fn sense(&self, tick: u64, patience: u64) -> Option<Sensing> {
-        self.mapping.words().sense(self.session, tick, patience)
+    pub fn sense(&self, tick: u64, timeout: u64) -> Option<Sensing> {
+        self.mapping.words().sense(self.session, tick, timeout)
     }
 
     /// Gives codes out for the interval that begins with `tick`.

@@ -17,12 +17,12 @@ pub struct Refused {
     /// The system's answer.
     pub cause: io::Error,
     /// How to get it.
-    pub mend: &'static str,
+    pub fix: &'static str,
 }
 
 impl fmt::Display for Refused {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}; {}", self.what, self.cause, self.mend)
+        write!(f, "{}: {}; {}", self.what, self.cause, self.fix)
     }
 }
 
@@ -71,10 +71,10 @@ pub fn unlock_memory() {
 /// # Errors
 /// If there is no such processor, or it is not among those of this process.
 pub fn pin(processor: usize) -> Result<(), Refused> {
-    let mend = "choose one that `taskset -p $$` allows; `nproc --all` counts them from 0";
+    let fix = "choose one that `taskset -p $$` allows; `nproc --all` counts them from 0";
     if processor >= libc::CPU_SETSIZE as usize {
         let cause = io::Error::from(io::ErrorKind::InvalidInput);
-        return Err(Refused { what: format!("processor {processor}"), cause, mend });
+        return Err(Refused { what: format!("processor {processor}"), cause, fix });
     }
     // SAFETY: an all-zero set is the empty one; `processor` is within it; the call reads it.
     let answer = unsafe {
@@ -82,7 +82,7 @@ pub fn pin(processor: usize) -> Result<(), Refused> {
         libc::CPU_SET(processor, &mut set);
         libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &raw const set)
     };
-    refused(answer, || format!("processor {processor}"), mend)
+    refused(answer, || format!("processor {processor}"), fix)
 }
 
 /// Processors that this process may run on, in ascending order.
@@ -153,17 +153,17 @@ impl AwakeProcessors {
         ask().map_err(|cause| Refused {
             what: format!("keeping processors awake ({})", path.display()),
             cause,
-            mend: "let group `realtime` write it by a udev rule: KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"",
+            fix: "let group `realtime` write it by a udev rule: KERNEL==\"cpu_dma_latency\", GROUP=\"realtime\", MODE=\"0660\"",
         })
     }
 }
 
-fn refused(answer: libc::c_int, what: impl FnOnce() -> String, mend: &'static str) -> Result<(), Refused> {
+fn refused(answer: libc::c_int, what: impl FnOnce() -> String, fix: &'static str) -> Result<(), Refused> {
     if answer == 0 {
         return Ok(());
     }
     let cause = io::Error::last_os_error();
-    Err(Refused { what: what(), cause, mend })
+    Err(Refused { what: what(), cause, fix })
 }
 
 #[cfg(test)]

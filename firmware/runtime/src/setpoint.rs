@@ -72,7 +72,7 @@ pub struct Command<T> {
 
 /// What the spec fixes about set-points.
 #[derive(Debug, Clone, Copy)]
-pub struct Plan<T: Real, F> {
+pub struct Setpoints<T: Real, F> {
     /// T_s, s.
     pub period: T,
     /// 1/T_s, 1/s.
@@ -103,7 +103,7 @@ pub struct Plan<T: Real, F> {
     pub trajectories: &'static [Trajectory<T>],
 }
 
-impl<T: Real, F: Frames<T>> Plan<T, F> {
+impl<T: Real, F: Frames<T>> Setpoints<T, F> {
     /// Puts the user's set-point as one of the platform into `target`, if it is finite and within the workspace.
     #[inline]
     pub fn admit(&self, user: &Target<T>, target: &mut Target<T>) -> bool {

@@ -15,7 +15,7 @@
 //! | module | what |
 //! |---|---|
 //! | `kinds` | phases, requests, causes, event bits |
-//! | `plan` | what the spec fixes |
+//! | `supervision` | what the spec fixes |
 //! | `debounce` | for how long a condition must last before it is a cause |
 //! | `watch` | what the gauges show against what was sent: stuck, disagreeing, astray |
 //! | `phases` | the state machine |
@@ -25,8 +25,8 @@ mod approach;
 mod debounce;
 mod kinds;
 mod phases;
-mod plan;
 mod snapshot;
+mod supervision;
 mod watch;
 
 pub use approach::Approach;
@@ -35,7 +35,7 @@ pub use kinds::{
     CONVERTER, Cause, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, RAMPS_DOWN, Request, STOP, SWITCHES_OFF,
 };
 pub use phases::Supervisor;
-pub use plan::Plan;
+pub use supervision::Supervision;
 pub use watch::{Channel, Sample, Watch};
 
 /// `code` moved towards `goal` by at most `step` (≥ 0) codes.

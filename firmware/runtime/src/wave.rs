@@ -18,7 +18,7 @@ pub use words::WORDS;
 
 use crate::motion::Motion;
 use crate::real::Real;
-use crate::setpoint::{Frames, Plan};
+use crate::setpoint::{Frames, Setpoints};
 use shape::{Cursor, Sample};
 
 /// What a wave has to keep to.
@@ -40,17 +40,17 @@ impl<T: Real> Limits<T> {
     /// Those of the streams of a platform. In frames that turn the user's coordinates the range is that of the platform's; the
     /// controller refuses what is beyond it.
     #[must_use]
-    pub fn of<F: Frames<T>>(plan: &Plan<T, F>) -> Self {
+    pub fn of<F: Frames<T>>(setpoints: &Setpoints<T, F>) -> Self {
         let mut limits = Self {
-            low: plan.bound,
-            high: plan.bound,
-            rate: plan.stream_rate,
-            acceleration: plan.stream_acceleration,
-            ticks_per_second: plan.rate,
+            low: setpoints.bound,
+            high: setpoints.bound,
+            rate: setpoints.stream_rate,
+            acceleration: setpoints.stream_acceleration,
+            ticks_per_second: setpoints.rate,
         };
-        for (axis, bias) in plan.bias.iter().enumerate() {
-            limits.low[axis] = -(plan.bound[axis] + *bias);
-            limits.high[axis] = plan.bound[axis] - *bias;
+        for (axis, bias) in setpoints.bias.iter().enumerate() {
+            limits.low[axis] = -(setpoints.bound[axis] + *bias);
+            limits.high[axis] = setpoints.bound[axis] - *bias;
         }
         limits
     }

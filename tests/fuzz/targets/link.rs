@@ -13,7 +13,7 @@ use controller::{Config, LEGS, LegState};
 use specgen::operate::Session;
 use specgen_board::{Board, Desk, Exchange, Noticed, Stopwatch, Visit, recorder};
 use specgen_hal::{Amplifiers, Fault, Gauges};
-use specgen_link::client::{Patience, Port};
+use specgen_link::client::{Port, Timeout};
 use specgen_link::{Endpoint, Kind, Receiver, RecorderAction, VERSION};
 use specgen_runtime::supervisor::Request;
 
@@ -231,8 +231,8 @@ impl Port for Answers<'_> {
 /// A host gets through, or says why not.
 fn host(script: &[u8]) {
     let port = Answers { script, asked: Receiver::new(), session: 0, sequence: 0, coming: Vec::new() };
-    let patience = Patience { limit: Duration::from_secs(1000), attempts: 1 };
-    let mut session = match Session::open(port, patience, None) {
+    let timeout = Timeout { limit: Duration::from_secs(1000), attempts: 1 };
+    let mut session = match Session::open(port, timeout, None) {
         Ok(session) => session,
         Err(why) => return assert!(!why.to_string().is_empty()),
     };

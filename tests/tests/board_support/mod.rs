@@ -19,7 +19,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen_board::{Board, Desk, Exchange, Noticed, Stopwatch, Visit, recorder};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::Endpoint;
-use specgen_link::client::{Client, ClientError, Patience, Port};
+use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{Refusal, Reply, Request};
 use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
@@ -108,8 +108,8 @@ impl Line {
 
     /// A host that asks again as often as it takes.
     pub fn client(&self, session: u16) -> Client<Self> {
-        let patience = Patience { limit: Duration::from_micros(1), attempts: 1000 };
-        Client::open(self.clone(), session, patience).unwrap().0
+        let timeout = Timeout { limit: Duration::from_micros(1), attempts: 1000 };
+        Client::open(self.clone(), session, timeout).unwrap().0
     }
 
     pub fn tick(&self, count: u32) {

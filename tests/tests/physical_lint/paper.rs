@@ -31,15 +31,15 @@ fn the_paper_as_printed_is_refused_with_every_erratum_and_the_corrected_one_pass
         assert!(!matches!(found.place, specgen::diagnostic::Place::Whole), "{what}: {found:?}");
         assert!(!found.help.is_empty(), "{what}");
     }
-    // Each is there for its own reason: mended, its finding is gone.
-    let mends = [
+    // Each is there for its own reason: fixed, its finding is gone.
+    let fixes = [
         ("\"1.195 g\"", "\"1.195 kg\"", "E0311"),
         ("stacks          = 1", "stacks          = 5", "E0801"),
         ("\"2.2 um\"", "\"2.2 nm\"", "W0303"),
     ];
-    for (printed, mended, code) in mends {
+    for (printed, fixed, code) in fixes {
         assert!(text.contains(printed), "{printed}");
-        let (_, findings) = verdict(&text.replace(printed, mended), &dir);
+        let (_, findings) = verdict(&text.replace(printed, fixed), &dir);
         assert!(findings.iter().all(|one| one.code != code), "{code} stays");
     }
     let (accepted, findings) = verdict(&spec("reference.toml"), &dir);

@@ -1,5 +1,5 @@
 //! Platforms that no controller may be made for: each is refused before anything is written, at its place in the file, with
-//! what was expected, and with a mend that is itself accepted when it is put into the spec.
+//! what was expected, and with a fix that is itself accepted when it is put into the spec.
 
 mod stops;
 mod support;
@@ -158,8 +158,8 @@ fn converters_that_do_not_see_their_gauge() {
             &[(NOISE, "noise = \"2.2 nm\"\ncalibration = [\"-55 um\", \"10 um/V\"]\ninput_range = [\"0 V\", \"2 V\"]")],
             ("E0474", "[\"0 V\", \"2 V\"]", "does not see the reading zero"),
             |help, bad, _| {
-                let (_, range) = help.split_once("write input_range = ").expect("a mend");
-                let (range, _) = range.split_once(" or wider").expect("a mend");
+                let (_, range) = help.split_once("write input_range = ").expect("a fix");
+                let (range, _) = range.split_once(" or wider").expect("a fix");
                 put(bad, "[\"0 V\", \"2 V\"]", range)
             },
         ),

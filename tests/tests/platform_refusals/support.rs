@@ -1,4 +1,4 @@
-//! A spec that is wrong, its verdict, and the mend that the verdict's help gives.
+//! A spec that is wrong, its verdict, and the fix that the verdict's help gives.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use specgen::compile::{Refused, compile};
 use specgen::diagnostic::{Diagnostic, Place, Severity, codes, render};
 use specgen_tests::repository;
 
-/// A spec that is wrong, and how what the finding says mends it.
+/// A spec that is wrong, and how what the finding says fixes it.
 pub struct Case {
     pub what: &'static str,
     /// Old and new text; the first place of the old text is replaced.
@@ -19,8 +19,8 @@ pub struct Case {
     pub at: Option<&'static str>,
     /// Part of the message.
     pub says: &'static str,
-    /// From the help and the wrong spec and table to the mended ones.
-    pub mend: fn(&str, &str, &str) -> (String, String),
+    /// From the help and the wrong spec and table to the fixed ones.
+    pub fix: fn(&str, &str, &str) -> (String, String),
 }
 
 pub fn reference() -> String {
@@ -101,11 +101,11 @@ pub fn hold(cases: Vec<Case>) {
                 assert!(shown.contains("--> table.csv"), "{what}:\n{shown}");
             }
         }
-        let (mended, table) = (case.mend)(&found.help, &bad, case.table.as_deref().unwrap_or_default());
-        assert!(mended != bad || Some(&table) != case.table.as_ref(), "{what}: nothing mended");
-        if let Err(refused) = verdict(folder.path(), &mended, case.table.is_some().then_some(&table)) {
+        let (fixed, table) = (case.fix)(&found.help, &bad, case.table.as_deref().unwrap_or_default());
+        assert!(fixed != bad || Some(&table) != case.table.as_ref(), "{what}: nothing fixed");
+        if let Err(refused) = verdict(folder.path(), &fixed, case.table.is_some().then_some(&table)) {
             panic!(
-                "{what}: the mend `{}` is refused in its turn:\n{}",
+                "{what}: the fix `{}` is refused in its turn:\n{}",
                 found.help,
                 render(&refused.findings, &source, false)
             );
@@ -120,10 +120,10 @@ pub fn case(
     what: &'static str,
     edits: &[(&'static str, &str)],
     (code, at, says): (&'static str, &'static str, &'static str),
-    mend: fn(&str, &str, &str) -> (String, String),
+    fix: fn(&str, &str, &str) -> (String, String),
 ) -> Case {
     let edits = edits.iter().map(|(old, new)| (*old, (*new).to_owned())).collect();
-    Case { what, edits, table: None, code, at: Some(at), says, mend }
+    Case { what, edits, table: None, code, at: Some(at), says, fix }
 }
 
 /// The spec with `old` replaced by `new`, the table unchanged.
@@ -138,8 +138,8 @@ pub fn with_table(
     table: String,
     code: &'static str,
     says: &'static str,
-    mend: fn(&str, &str, &str) -> (String, String),
+    fix: fn(&str, &str, &str) -> (String, String),
 ) -> Case {
     let spec = "kind   = \"waveform\"\nfile   = \"table.csv\"\nperiod = \"1 ms\"";
-    Case { what, edits: vec![(CASE_1, spec.to_owned())], table: Some(table), code, at: None, says, mend }
+    Case { what, edits: vec![(CASE_1, spec.to_owned())], table: Some(table), code, at: None, says, fix }
 }

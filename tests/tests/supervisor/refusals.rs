@@ -1,4 +1,4 @@
-//! What cannot work in `[supervisor]` is refused with its line, and the mend is accepted.
+//! What cannot work in `[supervisor]` is refused with its line, and the fix is accepted.
 
 use specgen::compile::compile;
 use specgen::diagnostic::Place;
@@ -49,14 +49,14 @@ fn what_cannot_work_is_refused_with_a_mend_that_works() {
         let (found, help) = verdict(spec, line).expect_err(line);
         assert_eq!(found, code, "{line}: {help}");
         // "write key = value or more; …"
-        let mend = help.strip_prefix("write ").expect("a mend");
+        let fix = help.strip_prefix("write ").expect("a fix");
         let end = [" or more", " or less", " or a voltage"]
             .iter()
-            .filter_map(|word| mend.find(word))
+            .filter_map(|word| fix.find(word))
             .min()
             .expect("an amount");
         println!("{line}: {help}");
-        assert_eq!(verdict(spec, &mend[..end]), Ok(()), "{line}: mended by {}", &mend[..end]);
+        assert_eq!(verdict(spec, &fix[..end]), Ok(()), "{line}: fixed by {}", &fix[..end]);
     }
 }
 

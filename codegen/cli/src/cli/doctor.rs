@@ -58,8 +58,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     for finding in &findings {
         // Writing to a String cannot fail, here and below.
         let _ = writeln!(text, "{} {:<17} {}", mark(finding.grade), finding.subject, finding.found);
-        if let Some(mend) = &finding.mend {
-            let _ = writeln!(text, "{:27}→ {mend}", "");
+        if let Some(fix) = &finding.fix {
+            let _ = writeln!(text, "{:27}→ {fix}", "");
         }
     }
     let _ = writeln!(text, "wake-ups, from the planned time to running");
@@ -95,13 +95,13 @@ fn management(measured: &Measured) -> Finding {
             subject,
             grade: Grade::Good,
             found: "no system management interrupts meanwhile".to_owned(),
-            mend: None,
+            fix: None,
         },
         Some(count) => Finding {
             subject,
             grade: Grade::Warning,
             found: format!("{count} system management interrupts meanwhile"),
-            mend: Some(
+            fix: Some(
                 "switch USB legacy support, sensors and power management off in the firmware's set-up".to_owned(),
             ),
         },
@@ -109,7 +109,7 @@ fn management(measured: &Measured) -> Finding {
             subject,
             grade: Grade::Unknown,
             found: "system management interrupts are not counted here".to_owned(),
-            mend: Some(
+            fix: Some(
                 "`modprobe msr` as root on an Intel processor, then again; `hwlatdetect` finds what is left".to_owned(),
             ),
         },

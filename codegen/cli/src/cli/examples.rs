@@ -21,7 +21,7 @@ Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment, 13
 
 pub const CHECK: &str = "\
 Examples:
-  specgen check platform.toml              # every finding with line, column and mend
+  specgen check platform.toml              # every finding with line, column and fix
   specgen check platform.toml --json       # the same, with margins, reach and precision, for programs";
 
 pub const BUILD: &str = "\

@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 
 use clap::{ArgGroup, Args};
 use serde_json::{Value, json};
-use specgen_link::client::{Patience, Port};
+use specgen_link::client::{Port, Timeout};
 
 use super::ui::{Failure, Ui};
 use machine::{Ended, Machine};
@@ -77,11 +77,11 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     match (&arguments.port, &arguments.socket) {
         (Some(path), _) => {
             let line = SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?;
-            operate(line, Patience::SERIAL, &path.display().to_string(), digest, source, ui)
+            operate(line, Timeout::SERIAL, &path.display().to_string(), digest, source, ui)
         }
         (None, Some(path)) => {
             let line = SocketLine::open(path).map_err(Failure::Environment)?;
-            operate(line, Patience::SERIAL, &path.display().to_string(), digest, source, ui)
+            operate(line, Timeout::SERIAL, &path.display().to_string(), digest, source, ui)
         }
         // One of the two is required.
         (None, None) => Err(Failure::Usage("name the device with --port or --socket".to_owned())),
@@ -114,13 +114,13 @@ fn source(arguments: &Arguments, commands: &[String]) -> Result<Source, Failure>
 
 fn operate(
     line: impl Port,
-    patience: Patience,
+    timeout: Timeout,
     name: &str,
     digest: Option<&str>,
     source: Source,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
-    let session = Session::open(line, patience, digest).map_err(|error| match error {
+    let session = Session::open(line, timeout, digest).map_err(|error| match error {
         OpenError::Other(text) => Failure::Gate(format!("{name}: {text}")),
         OpenError::Link(_) => Failure::Environment(format!("{name}: {error}")),
     })?;
@@ -222,7 +222,7 @@ fn finish(ended: Result<(), Ended>, machine: &mut Machine<impl Port>, name: &str
         Err(Ended::Link(error)) => Err(Failure::Environment(format!(
             "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
         ))),
-        Err(Ended::Interrupted) => match machine.go_down(ui) {
+        Err(Ended::Interrupted) => match machine.ramp_down(ui) {
             Ok(text) => Err(Failure::Interrupted { message: format!("interrupted; {text}"), result: result(machine) }),
             Err(error) => Err(Failure::Environment(format!("{name}: interrupted, and then: {error}"))),
         },

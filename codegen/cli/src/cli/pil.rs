@@ -12,7 +12,7 @@ use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, Supervised};
 use serde_json::json;
 use specgen_link::Counted;
-use specgen_link::client::{Patience, Port};
+use specgen_link::client::{Port, Timeout};
 
 use super::sim::{PlantArguments, environment, frequency};
 use super::ui::{Failure, Ui};
@@ -99,7 +99,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             let name = arguments.port.as_deref().unwrap_or_else(|| Path::new("")).display().to_string();
             let report = Report::new(&compiled, name, None);
             drop(hold);
-            in_the_loop(host, line, Patience::SERIAL, report, &plan, &compiled, arguments, ui)
+            in_the_loop(host, line, Timeout::SERIAL, report, &plan, &compiled, arguments, ui)
         }
         (None, Some(emulator)) => {
             let image = given.map_or_else(|| built(&compiled, &output, &target_dir, ui), Ok)?;
@@ -109,7 +109,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             let name = format!("{} ({}) in {}", image.mcu.part().machine, image.mcu.part().core, emulator.version);
             let report = Report::new(&compiled, name, bound);
             let pipes = Pipes::start(&emulator, &image)?;
-            in_the_loop(host, pipes, Patience::PIPE, report, &plan, &compiled, arguments, ui)
+            in_the_loop(host, pipes, Timeout::PIPE, report, &plan, &compiled, arguments, ui)
         }
         // One of the two is there.
         (None, None) => Ok(()),
@@ -136,7 +136,7 @@ fn built(compiled: &Compiled, output: &Path, target_dir: &Path, ui: &Ui) -> Resu
 fn in_the_loop<P: Port>(
     host: Supervised,
     port: P,
-    patience: Patience,
+    timeout: Timeout,
     mut report: Report,
     plan: &scenario::Plan,
     compiled: &Compiled,
@@ -144,7 +144,7 @@ fn in_the_loop<P: Port>(
     ui: &mut Ui,
 ) -> Result<(), Failure> {
     // From the first tick on there is something to report.
-    let mut lockstep = Lockstep::open(host, port, patience, interrupt::heed()).map_err(|error| match error {
+    let mut lockstep = Lockstep::open(host, port, timeout, interrupt::heed()).map_err(|error| match error {
         OpenError::Other(text) => Failure::Gate(text),
         OpenError::Link(_) => Failure::Environment(format!("{}: {error}", report.device)),
     })?;

@@ -75,7 +75,7 @@ impl Site {
 pub fn nobody_keeps_others_from_ramping_down(bench: &Bench) {
     let site = Site { socket: bench.path("clients.socket"), link: bench.path("clients.link") };
     let mut command = bench.command("clients.rec");
-    command.args(["--elastic", "--patience", "5000", "--link-silence", "500", "--link-idle", "1"]);
+    command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "500", "--link-idle", "1"]);
     command.arg("--socket").arg(&site.socket).arg("--link").arg(&site.link);
     let running = Running::new(&mut command);
     wait_for("the link", || site.link.exists() && site.socket.exists());

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use host_sim::controller::Supervised;
 use host_sim::record::{Piece, Reader, Replay, Row, replay};
-use specgen_link::client::{Client, ClientError, Patience, Port};
+use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Status};
 use specgen_runtime::record::checksum;
 
@@ -38,7 +38,7 @@ pub struct Host {
 impl Host {
     pub fn open(path: &Path, session: u16) -> Result<Self, ClientError> {
         let port = Socket(UnixStream::connect(path).map_err(ClientError::Port)?);
-        let (client, identity) = Client::open(port, session, Patience::PIPE)?;
+        let (client, identity) = Client::open(port, session, Timeout::PIPE)?;
         Ok(Self { client, identity })
     }
 

@@ -1,5 +1,5 @@
 //! `src/setpoint.rs`: limits, user frames and trajectories. Reads [`ir::Setpoints`](crate::ir::Setpoints) and the pose bounds;
-//! exports `PLAN` and `TRAJECTORY_NAMES`. Only for controllers that see the platform.
+//! exports `SETPOINTS` and `TRAJECTORY_NAMES`. Only for controllers that see the platform.
 
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
@@ -28,7 +28,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
         .enumerate()
         .map(|(index, trajectory)| path(scalar, index, &trajectory.name, &trajectory.path))
         .unzip();
-    let mut imports: Vec<&str> = vec!["MoveLimits", "Plan"];
+    let mut imports: Vec<&str> = vec!["MoveLimits", "Setpoints"];
     imports.push(match s.frames {
         Frames::Parallel => "Parallel",
         Frames::Tool { .. } => "Tool",
@@ -54,7 +54,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
 
         /// What the generator of set-points needs to know; from `control.setpoint`, `control.frames`, `workspace`, `timing.period`
         /// and `trajectory`.
-        pub const PLAN: Plan<Real, #frames_type> = Plan {
+        pub const SETPOINTS: Setpoints<Real, #frames_type> = Setpoints {
             period: #period,
             rate: #rate,
             square_rate: #square_rate,

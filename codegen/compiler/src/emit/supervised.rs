@@ -31,7 +31,7 @@ pub fn emit(Parts { imports, functions, stops, law, gauges }: &Parts) -> TokenSt
             MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_NAMES, MACHINE_OUTPUT_WORDS, machine_output_words,
         };
         use crate::step::{GAUGE_FAULT, LEG_LIMITED, advance, outputs};
-        use crate::supervision::PLAN;
+        use crate::supervision::SUPERVISION;
         #imports
         use crate::{Config, LEGS, Real, State, TickInput, TickOutput};
 
@@ -100,8 +100,8 @@ pub fn emit(Parts { imports, functions, stops, law, gauges }: &Parts) -> TokenSt
         /// them.
         pub fn supervise(config: &Config, machine: &mut Machine, input: &MachineInput) -> MachineOutput {
             let Machine { state, supervisor } = machine;
-            let at_rest = supervisor.phase != Phase::Running && state.legs.iter().all(|leg| leg.code == PLAN.rest);
-            let begins = supervisor.decide(&PLAN, input.request, input.events, at_rest);
+            let at_rest = supervisor.phase != Phase::Running && state.legs.iter().all(|leg| leg.code == SUPERVISION.rest);
+            let begins = supervisor.decide(&SUPERVISION, input.request, input.events, at_rest);
             if begins {
                 begin(config, state, supervisor, &input.tick);
             }
@@ -146,9 +146,9 @@ pub fn emit(Parts { imports, functions, stops, law, gauges }: &Parts) -> TokenSt
 
         /// Codes held, or on their way to rest; the memories follow what is really sent.
         fn move_codes(config: &Config, state: &mut State, supervisor: &mut Supervisor) {
-            let step = supervisor.step_to_rest(&PLAN, config.code_limits().max_step);
+            let step = supervisor.step_to_rest(&SUPERVISION, config.code_limits().max_step);
             for (leg, table) in state.legs.iter_mut().zip(&TABLES) {
-                leg.code = toward(leg.code, PLAN.rest, step);
+                leg.code = toward(leg.code, SUPERVISION.rest, step);
                 leg.memory.apply(table, DAC.drive(leg.code));
             }
         }

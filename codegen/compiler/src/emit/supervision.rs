@@ -17,7 +17,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let (arm_ticks, rest) = (count(s.arm_ticks), literal::integer(s.rest));
     let (ramp_step, ramp_every) = (literal::integer(s.ramp_step), count(s.ramp_every));
     let host_ticks = count(s.host_ticks);
-    let (patience, weight) = (counts(&s.patience), counts(&s.weight));
+    let (timeout, weight) = (counts(&s.timeout), counts(&s.weight));
     let (stuck_motion, stuck_samples) = (real(s.stuck_motion), count(s.stuck_samples));
     let (disagreement, disagreement_samples) = (real(s.disagreement), count(s.disagreement_samples));
     let (tracking, tracking_samples) = (literal::reals(ir.scalar, &s.tracking), count(s.tracking_samples));
@@ -42,17 +42,17 @@ pub fn emit(ir: &Ir) -> TokenStream {
     quote! {
         #![doc = " What the supervisor takes for a fault; from `supervisor`."]
 
-        use specgen_runtime::supervisor::Plan;
+        use specgen_runtime::supervisor::Supervision;
 
         use crate::Real;
 
         /// Bounds and times, these in ticks, or in samples of six ticks.
-        pub const PLAN: Plan<Real> = Plan {
+        pub const SUPERVISION: Supervision<Real> = Supervision {
             arm_ticks: #arm_ticks,
             rest: #rest,
             ramp_step: #ramp_step,
             ramp_every: #ramp_every,
-            patience: #patience,
+            timeout: #timeout,
             weight: #weight,
             stuck_motion: #stuck_motion,
             stuck_samples: #stuck_samples,

@@ -23,7 +23,7 @@ fn platform() -> TokenStream {
     quote! {
         use specgen_runtime::setpoint::CommandKind;
 
-        use crate::setpoint::PLAN;
+        use crate::setpoint::SETPOINTS;
         use crate::{Config, GENERATOR_BUSY, Real};
 
         /// Word of the command to stream.
@@ -32,7 +32,7 @@ fn platform() -> TokenStream {
         /// Those of streams; from `control.setpoint` and `workspace`.
         #[must_use]
         pub fn limits(_config: &Config) -> Limits<Real> {
-            Limits::of(&PLAN)
+            Limits::of(&SETPOINTS)
         }
 
         /// A wave may begin with the next tick: the platform is at its bias pose and plays nothing. `status` is that of the last

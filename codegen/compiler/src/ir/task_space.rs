@@ -165,7 +165,7 @@ pub struct Sensing {
     pub rate_gain: f64,
 }
 
-/// Constants of `specgen_runtime::setpoint::Plan`; the workspace is in [`super::Bounds`].
+/// Constants of `specgen_runtime::setpoint::Setpoints`; the workspace is in [`super::Bounds`].
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Setpoints {
     /// T_s, s.

@@ -93,10 +93,10 @@ pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
             probes[gauge] = change.probe.clone();
             let then = PATTERNS.map(|(pattern, _)| pattern(&probes, gauge));
             let breaks = (0..PATTERNS.len()).any(|k| now[k] == Some(true) && then[k] != Some(true));
-            let mended: Vec<usize> =
+            let fixed: Vec<usize> =
                 (0..PATTERNS.len()).filter(|k| now[*k] == Some(false) && then[*k] == Some(true)).collect();
-            if let (false, Some(first)) = (breaks, mended.first()) {
-                restoring.push((mended.len(), PATTERNS[*first].1, change));
+            if let (false, Some(first)) = (breaks, fixed.first()) {
+                restoring.push((fixed.len(), PATTERNS[*first].1, change));
             }
         }
     }

@@ -21,7 +21,7 @@ const ROUNDING: f64 = 1e-6;
 /// Lines within this angle of each other are parallel, as a cosine.
 const PARALLEL: f64 = 0.99;
 /// Farthest target from P_C, in joint radii.
-const OUT_OF_TOUCH: f64 = 3.0;
+const DETACHED: f64 = 3.0;
 
 fn step(facts: &Facts) -> f64 {
     let sensor = &facts.model.sensor;
@@ -52,7 +52,7 @@ pub(super) fn range_centred(facts: &Facts, found: &mut Found) {
     let [low, high] = facts.model.sensor.range;
     let stroke = facts.model.actuator.stroke;
     let below = -low;
-    let (lopsided, item) = if facts.model.task_space.is_some() {
+    let (asymmetric, item) = if facts.model.task_space.is_some() {
         // Seen from rest, a platform moves both ways.
         let seen = FARTHEST * farthest_seen(facts);
         let beyond = |far: f64, near: f64| far > LOPSIDED * near || (far > UNEVEN * near && far > seen);
@@ -60,7 +60,7 @@ pub(super) fn range_centred(facts: &Facts, found: &mut Found) {
     } else {
         (below > FARTHEST * stroke || high > FARTHEST * stroke, usize::from(high > below))
     };
-    if !lopsided {
+    if !asymmetric {
         return;
     }
     found.warning(
@@ -201,7 +201,7 @@ pub(super) fn size_of_layout(facts: &Facts, found: &mut Found) {
         let way: f64 = (0..3).fold(0.0, |sum, k| sum + m[k] * (probe.plane_point[k] - start[k])) / across;
         let pierced: [f64; 3] = core::array::from_fn(|k| start[k] + way * n[k]);
         let far = libm::sqrt(pierced.iter().fold(0.0, |sum, part| sum + part * part));
-        if far.is_nan() || far <= OUT_OF_TOUCH * radius {
+        if far.is_nan() || far <= DETACHED * radius {
             if let Some(axis) = aside(&pierced, &n, radius) {
                 found.warning(
                     codes::GAUGE_FAR,

@@ -75,7 +75,7 @@ pub(super) fn lower(
         ramp_step,
         ramp_every,
         host_ticks,
-        patience: [gauge, gauge, voltage, slew, missed, gauge, host_gone, converter_silent],
+        timeout: [gauge, gauge, voltage, slew, missed, gauge, host_gone, converter_silent],
         weight: [1, 1, 1, 1, window, 1, 1, 1],
         stuck_motion: round(stuck_motion),
         stuck_samples,
@@ -267,7 +267,7 @@ fn ramp(model: &Model, actuation: &Actuation, max_step: i32, findings: &mut Vec<
     }
 }
 
-/// A little above, for a mend that is itself accepted when printed.
+/// A little above, for a fix that is itself accepted when printed.
 fn above(value: f64) -> f64 {
     value * 1.001 + 1e-4
 }

@@ -77,7 +77,7 @@ impl std::fmt::Display for WriteError {
             Self::HalfWritten { dir, action, source } => write!(
                 f,
                 "could not {action}: {source}, nor put back what was there before: `{}` holds files of two versions. \
-                 Run again when that is mended, or name another folder with -o",
+                 Run again when that is fixed, or name another folder with -o",
                 dir.display()
             ),
         }

@@ -11,7 +11,7 @@ pub struct Code {
     pub id: &'static str,
     /// A few words.
     pub title: &'static str,
-    /// Why it is refused or pointed out, and how to mend it.
+    /// Why it is refused or pointed out, and how to fix it.
     pub explanation: &'static str,
 }
 
@@ -477,11 +477,11 @@ codes! {
     BUDGET_SWAPPED = "W0873", "more RAM than flash",
         "Parts have more flash than RAM, and controllers need more of it.";
     PRECISION_POOR = "W0880", "arithmetic too coarse for the gauges",
-        "The rounding errors of the chosen scalar may exceed the noise of the gauges. f64, or a smaller workspace, mends it.";
+        "The rounding errors of the chosen scalar may exceed the noise of the gauges. f64, or a smaller workspace, fixes it.";
     ESTIMATED = "N0872", "memory and time are measured by a build",
         "`check` knows what tables and memories take; code, stack and instructions are known once it is built.";
     TRUNCATED = "W0001", "further findings left out",
-        "Only the first findings are shown; mend them and run again.";
+        "Only the first findings are shown; fix them and run again.";
 }
 
 /// The entry of `id`.

@@ -1,4 +1,4 @@
-//! Findings for people: file, line, column, the line itself with a mark below it, and how to mend it.
+//! Findings for people: file, line, column, the line itself with a mark below it, and how to fix it.
 
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 

@@ -83,7 +83,7 @@ impl Findings {
                 "",
                 Place::Whole,
                 format!("{} further findings are not shown", total - shown),
-                "mend the ones shown and run again".to_owned(),
+                "fix the ones shown and run again".to_owned(),
             );
         }
         self.list

@@ -186,9 +186,9 @@ impl ValueReader<'_> {
         if good && found.len() <= MAX_NAME {
             return Some(found.to_string());
         }
-        let mended: String = found.chars().map(|c| if allowed(c) { c } else { '-' }).take(MAX_NAME).collect();
-        let mended = mended.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
-        let such_as = if mended.is_empty() { "my-platform" } else { mended };
+        let fixed: String = found.chars().map(|c| if allowed(c) { c } else { '-' }).take(MAX_NAME).collect();
+        let fixed = fixed.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
+        let such_as = if fixed.is_empty() { "my-platform" } else { fixed };
         self.findings.error(
             codes::BAD_NAME,
             path,
@@ -243,9 +243,9 @@ impl ValueReader<'_> {
         path: &str,
         value: &Spanned<DeValue<'_>>,
         expected: &str,
-        mend: Option<String>,
+        fix: Option<String>,
     ) -> Option<T> {
-        let help = mend.unwrap_or_else(|| format!("write {} = {}", self.key.name, self.key.example));
+        let help = fix.unwrap_or_else(|| format!("write {} = {}", self.key.name, self.key.example));
         self.findings.error(
             codes::WRONG_TYPE,
             path,

@@ -42,8 +42,8 @@ fn device(files: &Files, beginning: &str, subject: &'static str, missing: &str, 
     let closed: Vec<&str> =
         names.iter().filter(|name| !may_use(&files.path(&format!("/dev/{name}")))).map(String::as_str).collect();
     if names.is_empty() {
-        let (found, mend) = missing.split_once(": ").unwrap_or((missing, missing));
-        Finding::of(subject, Warning, found, mend)
+        let (found, fix) = missing.split_once(": ").unwrap_or((missing, missing));
+        Finding::of(subject, Warning, found, fix)
     } else if closed.is_empty() {
         Finding::good(subject, names.join(", "))
     } else {
@@ -59,9 +59,9 @@ fn may_use(path: &Path) -> bool {
 /// Tools, each with the command that installs it.
 #[must_use]
 pub fn tools() -> Vec<Finding> {
-    let tool = |subject, program: &str, mend: &str| match target::find_program(program) {
+    let tool = |subject, program: &str, fix: &str| match target::find_program(program) {
         Some(path) => Finding::good(subject, path.display().to_string()),
-        None => Finding::of(subject, Warning, format!("no {program} on PATH"), mend),
+        None => Finding::of(subject, Warning, format!("no {program} on PATH"), fix),
     };
     let compiler = match target::available() {
         Ok(_) => Finding::good("cross compiler", "and emulator are there"),
@@ -88,8 +88,8 @@ mod tests {
         fs::create_dir(root.path().join("dev")).unwrap();
         let files = Files::below(root.path());
         let found = devices(&files);
-        assert!(found.iter().all(|finding| finding.grade == Warning && finding.mend.is_some()));
-        assert!(found[0].mend.as_deref().unwrap().contains("ni_pcimio"), "{:?}", found[0]);
+        assert!(found.iter().all(|finding| finding.grade == Warning && finding.fix.is_some()));
+        assert!(found[0].fix.as_deref().unwrap().contains("ni_pcimio"), "{:?}", found[0]);
         fs::write(root.path().join("dev/comedi0"), "").unwrap();
         assert_eq!(devices(&files)[0], Finding::good("acquisition card", "comedi0"));
         // Root may open anything: closed is then tried with what cannot be opened for writing at all.
@@ -97,7 +97,7 @@ mod tests {
         fs::create_dir(&line).unwrap();
         fs::set_permissions(&line, fs::Permissions::from_mode(0o500)).unwrap();
         let closed = &devices(&files)[1];
-        assert!(closed.found.contains("ttyACM0") && closed.mend.as_deref().unwrap().contains("dialout"), "{closed:?}");
-        assert!(tools().iter().all(|finding| (finding.grade == Good) == finding.mend.is_none()));
+        assert!(closed.found.contains("ttyACM0") && closed.fix.as_deref().unwrap().contains("dialout"), "{closed:?}");
+        assert!(tools().iter().all(|finding| (finding.grade == Good) == finding.fix.is_none()));
     }
 }

@@ -26,9 +26,9 @@ pub fn findings(files: &Files) -> Vec<Finding> {
 /// What the system answered when it was asked for priority and for locked memory.
 #[must_use]
 pub fn rights(priority: Result<(), &Refused>, memory: Result<(), &Refused>) -> Vec<Finding> {
-    let of = |subject, answer: Result<(), &Refused>, granted: &str, mend: &str| match answer {
+    let of = |subject, answer: Result<(), &Refused>, granted: &str, fix: &str| match answer {
         Ok(()) => Finding::good(subject, granted),
-        Err(refused) => Finding::of(subject, Bad, format!("{}: {}", refused.what, refused.cause), mend),
+        Err(refused) => Finding::of(subject, Bad, format!("{}: {}", refused.what, refused.cause), fix),
     };
     vec![
         of("priority", priority, "SCHED_FIFO is granted", MEND_PRIORITY),
@@ -209,7 +209,7 @@ mod tests {
     #[test]
     fn a_container_without_sys_and_proc_is_unknown_in_everything() {
         let found = of(&[]);
-        assert!(found.iter().all(|finding| finding.grade == Unknown && finding.mend.is_some()), "{found:?}");
+        assert!(found.iter().all(|finding| finding.grade == Unknown && finding.fix.is_some()), "{found:?}");
     }
 
     #[test]
@@ -232,7 +232,7 @@ mod tests {
             ("proc/loadavg", "0.10 0.2 0.3 1/100 7\n"),
         ]);
         assert_eq!(grades(&found), [Good; 8], "{found:?}");
-        assert!(found.iter().all(|finding| finding.mend.is_none()));
+        assert!(found.iter().all(|finding| finding.fix.is_none()));
     }
 
     #[test]
@@ -262,10 +262,10 @@ mod tests {
             ("950000", ""),
             ("3.5 threads want 2 processors", "other work"),
         ];
-        for (finding, (text, mend)) in found.iter().zip(words) {
+        for (finding, (text, fix)) in found.iter().zip(words) {
             assert!(finding.found.contains(text), "{finding:?}");
-            assert_eq!(finding.grade == Warning, !mend.is_empty(), "{finding:?}");
-            assert!(finding.mend.as_deref().unwrap_or_default().contains(mend), "{finding:?}");
+            assert_eq!(finding.grade == Warning, !fix.is_empty(), "{finding:?}");
+            assert!(finding.fix.as_deref().unwrap_or_default().contains(fix), "{finding:?}");
         }
         assert_eq!(found.len(), words.len());
     }

@@ -8,7 +8,7 @@ use host_sim::closed_loop::LEGS;
 use host_sim::controller::{ControllerError, MachineWord, Supervised, TickController};
 use host_sim::description::Description;
 use serde::Serialize;
-use specgen_link::client::{Client, ClientError, Patience, Port};
+use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{Counted, Identity, Reply, Request, WORDS, put_words};
 
 use super::difference::Difference;
@@ -108,10 +108,10 @@ impl<P: Port> Lockstep<P> {
     pub fn open(
         host: Supervised,
         port: P,
-        patience: Patience,
+        timeout: Timeout,
         interrupted: &'static AtomicBool,
     ) -> Result<Self, OpenError> {
-        let Opened { client, identity, description: theirs, .. } = session::open(port, patience)?;
+        let Opened { client, identity, description: theirs, .. } = session::open(port, timeout)?;
         let ours = host.controller().description();
         if &theirs != ours {
             return Err(OpenError::Other(format!(

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use host_sim::description::Description;
-use specgen_link::client::{Client, ClientError, Patience, Port};
+use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{Identity, Request};
 
 /// Why there is no session.
@@ -46,8 +46,8 @@ pub struct Opened<P> {
 ///
 /// # Errors
 /// No answer, or a description that cannot be read.
-pub fn open<P: Port>(port: P, patience: Patience) -> Result<Opened<P>, OpenError> {
-    let (mut client, identity) = Client::open(port, session_number(), patience)?;
+pub fn open<P: Port>(port: P, timeout: Timeout) -> Result<Opened<P>, OpenError> {
+    let (mut client, identity) = Client::open(port, session_number(), timeout)?;
     let text = client.fetch(|offset| Request::Describe { offset })?;
     let text = String::from_utf8_lossy(&text).into_owned();
     let description = Description::parse(&text).map_err(|error| OpenError::Other(error.to_string()))?;

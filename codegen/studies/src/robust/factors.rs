@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn what_no_machine_can_have_is_refused_with_a_mend() {
-        for (text, mend) in [
+        for (text, fix) in [
             ("mass", "write NAME=PART"),
             ("weight=5%", "expected one of mass"),
             ("mass=5", "such as mass=5%"),
@@ -260,7 +260,7 @@ mod tests {
             ("delay_ticks=10%", "delay_ticks=1"),
         ] {
             let error = Given::parse(text).unwrap_err();
-            assert!(error.contains(mend), "{text}: {error}");
+            assert!(error.contains(fix), "{text}: {error}");
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::support;
 use crate::support::{Notebook, leaked, session};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_link::client::{Client, Patience, Port};
+use specgen_link::client::{Client, Port, Timeout};
 use specgen_link::{Counters, Device, Endpoint, FRAME, Reply, Request};
 use std::io;
 use std::time::Duration;
@@ -257,8 +257,8 @@ fn over_a_noisy_line_every_request_is_carried_out_exactly_once() {
         rate: 60,
     };
     // No waiting: what does not come at once does not come.
-    let patience = Patience { limit: Duration::ZERO, attempts: 200 };
-    let (mut client, _) = Client::open(port, 7, patience).unwrap();
+    let timeout = Timeout { limit: Duration::ZERO, attempts: 200 };
+    let (mut client, _) = Client::open(port, 7, timeout).unwrap();
     let mut total = 0_u64;
     for k in 0..20_000_u64 {
         total = total.wrapping_mul(3).wrapping_add(k);

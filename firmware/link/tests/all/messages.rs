@@ -4,7 +4,7 @@ use crate::support;
 use std::time::Duration;
 
 use crate::support::{IDENTITY, Tap, leaked};
-use specgen_link::client::{Client, ClientError, Patience};
+use specgen_link::client::{Client, ClientError, Timeout};
 use specgen_link::{
     Bytes, Counters, Device, Endpoint, FRAME, MESSAGE, RecorderAction, RecorderStatus, Refusal, Reply, Request, Stage,
     Status, WORDS, WaveAction,
@@ -91,7 +91,7 @@ fn converse(requests: &[Request<'_>], answers: Vec<Reply<'static>>) -> (Vec<Stri
             }
             out
         };
-        let (mut client, _) = Client::open(Tap(&mut sent, &mut answer, Vec::new()), 9, Patience::PIPE).unwrap();
+        let (mut client, _) = Client::open(Tap(&mut sent, &mut answer, Vec::new()), 9, Timeout::PIPE).unwrap();
         for request in requests {
             seen.push(match client.ask(request) {
                 Ok(reply) => format!("{reply:?}"),
@@ -129,7 +129,7 @@ fn what_does_not_fit_is_refused_on_both_sides() {
     let long = Bytes(&[1; MESSAGE]);
     let (mut sent, mut nobody) = (Vec::new(), |_: &[u8]| Vec::new());
     let refused =
-        Client::open(Tap(&mut sent, &mut nobody, Vec::new()), 9, Patience { limit: Duration::ZERO, attempts: 3 });
+        Client::open(Tap(&mut sent, &mut nobody, Vec::new()), 9, Timeout { limit: Duration::ZERO, attempts: 3 });
     // Nobody answers.
     let Err(ClientError::Silent { attempts: 3, .. }) = refused else { panic!("not silent") };
     assert_eq!(sent.len(), 1 + 3, "a zero, then three times the same frame");
@@ -153,7 +153,7 @@ fn telemetry_is_kept_and_is_no_answer() {
         out
     };
     let mut sent = Vec::new();
-    let (mut client, identity) = Client::open(Tap(&mut sent, &mut answer, Vec::new()), 1, Patience::PIPE).unwrap();
+    let (mut client, identity) = Client::open(Tap(&mut sent, &mut answer, Vec::new()), 1, Timeout::PIPE).unwrap();
     assert_eq!(identity, IDENTITY);
     assert_eq!(client.telemetry(), Some(&STATUS));
     assert_eq!(client.ask(&Request::ReadConfig).unwrap(), Reply::Done);

@@ -18,7 +18,7 @@ pub struct Simulated {
     path: String,
     tick: u64,
     /// How long a reading may take, ns. While the machine is silent it is not waited for.
-    patience: u64,
+    timeout: u64,
     silent: bool,
     wrench: [f64; CHANNELS],
     codes: [i32; CHANNELS],
@@ -26,11 +26,11 @@ pub struct Simulated {
 }
 
 impl Simulated {
-    /// Opens it and waits until it gives its first reading. Later ones may take `patience`, ns.
+    /// Opens it and waits until it gives its first reading. Later ones may take `timeout`, ns.
     ///
     /// # Errors
     /// In words: if there is no such machine, it is of another spec, or it does not answer.
-    pub fn open(path: &Path, patience: u64) -> Result<Self, String> {
+    pub fn open(path: &Path, timeout: u64) -> Result<Self, String> {
         let client = Client::open(path, controller::SPEC_DIGEST).map_err(|error| error.to_string())?;
         let start = clock::now();
         while client.sense(0, FIRST / 100).is_none() {
@@ -49,7 +49,7 @@ impl Simulated {
             client,
             path: path.display().to_string(),
             tick: 0,
-            patience,
+            timeout,
             silent: false,
             wrench: [0.0; CHANNELS],
             codes: [0; CHANNELS],
@@ -63,8 +63,8 @@ impl Gauges for Simulated {
     const BITS: u32 = u32::BITS - CONVERTER.highest.leading_zeros();
 
     fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {
-        let patience = if self.silent { 0 } else { self.patience };
-        match self.client.sense(self.tick, patience) {
+        let timeout = if self.silent { 0 } else { self.timeout };
+        match self.client.sense(self.tick, timeout) {
             Some(sensing) => {
                 self.silent = false;
                 self.wrench = sensing.wrench.map(f64::from_bits);

@@ -161,7 +161,7 @@ impl Device for Desk<'_> {
         self.console.operator.heard(self.host, self.now);
         match *request {
             Request::Hello => {
-                self.console.operator.greeted(self.host, self.now);
+                self.console.operator.connected(self.host, self.now);
                 Reply::Identity(Identity {
                     config_words: CONFIG_WORDS as u16,
                     input_words: MACHINE_INPUT_WORDS as u16,

@@ -126,10 +126,10 @@ pub(super) fn wake(bell: &AtomicU32) {
     unsafe { libc::syscall(libc::SYS_futex, bell.as_ptr(), libc::FUTEX_WAKE, i32::MAX) };
 }
 
-/// Sleeps until [`wake`], at most `patience` (ns); not at all if `bell` is no more `seen`. May end early.
-pub(super) fn sleep(bell: &AtomicU32, seen: u32, patience: u64) {
+/// Sleeps until [`wake`], at most `timeout` (ns); not at all if `bell` is no more `seen`. May end early.
+pub(super) fn sleep(bell: &AtomicU32, seen: u32, timeout: u64) {
     let time =
-        libc::timespec { tv_sec: (patience / SECOND) as libc::time_t, tv_nsec: (patience % SECOND) as libc::c_long };
+        libc::timespec { tv_sec: (timeout / SECOND) as libc::time_t, tv_nsec: (timeout % SECOND) as libc::c_long };
     // SAFETY: the address is that of a live word, the time that of a live local.
     unsafe { libc::syscall(libc::SYS_futex, bell.as_ptr(), libc::FUTEX_WAIT, seen, &raw const time) };
 }

@@ -62,9 +62,9 @@ struct Bell {
 
 impl Words {
     /// For the machine: the latest actuation and what the controller waits for (session, tick), once the counter of either has
-    /// moved on from `seen`; none after `patience` (ns). It looks for `look` (ns) before it sleeps.
-    pub(super) fn wait(&self, seen: &mut u32, look: u64, patience: u64) -> Option<(Actuation, [u64; 2])> {
-        *seen = wait_for(&self.bells[0], *seen, look, patience)?;
+    /// moved on from `seen`; none after `timeout` (ns). It looks for `look` (ns) before it sleeps.
+    pub(super) fn wait(&self, seen: &mut u32, look: u64, timeout: u64) -> Option<(Actuation, [u64; 2])> {
+        *seen = wait_for(&self.bells[0], *seen, look, timeout)?;
         let mut block = [0; 3 + CHANNELS];
         read_block(&self.actuation_count, &self.actuation, &mut block)?;
         let [session, tick, enable, codes @ ..] = block;
@@ -84,9 +84,9 @@ impl Words {
         ring(&self.bells[1]);
     }
 
-    /// For the controller: the reading at the beginning of `tick`; none if the machine does not give it within `patience` (ns).
-    pub(super) fn sense(&self, session: u64, tick: u64, patience: u64) -> Option<Sensing> {
-        let deadline = clock::now().saturating_add(patience);
+    /// For the controller: the reading at the beginning of `tick`; none if the machine does not give it within `timeout` (ns).
+    pub(super) fn sense(&self, session: u64, tick: u64, timeout: u64) -> Option<Sensing> {
+        let deadline = clock::now().saturating_add(timeout);
         let mut asked = false;
         loop {
             let bell = self.bells[1].count.load(Ordering::Acquire);
@@ -167,8 +167,8 @@ fn ring(bell: &Bell) {
     }
 }
 
-/// The bell's count once it is no more `seen`; none after `patience` (ns). Sleeps after `look` (ns).
-fn wait_for(bell: &Bell, seen: u32, look: u64, patience: u64) -> Option<u32> {
+/// The bell's count once it is no more `seen`; none after `timeout` (ns). Sleeps after `look` (ns).
+fn wait_for(bell: &Bell, seen: u32, look: u64, timeout: u64) -> Option<u32> {
     let start = clock::now();
     loop {
         let count = bell.count.load(Ordering::Acquire);
@@ -176,14 +176,14 @@ fn wait_for(bell: &Bell, seen: u32, look: u64, patience: u64) -> Option<u32> {
             return Some(count);
         }
         let waited = clock::now().saturating_sub(start);
-        if waited >= patience {
+        if waited >= timeout {
             return None;
         }
         if waited < look {
             hint::spin_loop();
         } else {
             bell.sleepers.fetch_add(1, Ordering::SeqCst);
-            mapping::sleep(&bell.count, seen, patience - waited);
+            mapping::sleep(&bell.count, seen, timeout - waited);
             bell.sleepers.fetch_sub(1, Ordering::SeqCst);
         }
     }

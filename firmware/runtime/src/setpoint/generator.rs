@@ -24,7 +24,7 @@
 use super::profile::Profile;
 use super::stop::Stop;
 use super::trajectory::Cursor;
-use super::{Command, CommandKind, Frames, Plan, Target};
+use super::{Command, CommandKind, Frames, Setpoints, Target};
 use crate::digest::Digest;
 use crate::real::{Real, saturate};
 
@@ -103,9 +103,9 @@ impl<T: Real> Generator<T> {
 
     /// At rest at a pose of the platform (finite, brought within the workspace); the bias is approached from there.
     #[must_use]
-    pub fn starting_at<F>(plan: &Plan<T, F>, pose: &[T; 6]) -> Self {
+    pub fn starting_at<F>(setpoints: &Setpoints<T, F>, pose: &[T; 6]) -> Self {
         let mut generator = Self::new();
-        for ((slot, value), bound) in generator.target.pose.iter_mut().zip(pose).zip(plan.bound) {
+        for ((slot, value), bound) in generator.target.pose.iter_mut().zip(pose).zip(setpoints.bound) {
             *slot = saturate(*value, -bound, bound);
         }
         generator
@@ -141,38 +141,43 @@ impl<T: Real> Generator<T> {
 
     /// As [`Generator::tick`], with a copy of the set-point.
     #[inline]
-    pub fn next<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>) -> (Target<T>, u32) {
-        let status = self.tick(plan, command);
+    pub fn next<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, command: &Command<T>) -> (Target<T>, u32) {
+        let status = self.tick(setpoints, command);
         (self.target, status)
     }
 
     /// Brings [`Generator::target`] to the end of the coming interval; returns [`REFUSED`], [`STALE`], [`BUSY`].
     #[inline]
-    pub fn tick<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>) -> u32 {
-        self.tick_as(plan, command.kind, command)
+    pub fn tick<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, command: &Command<T>) -> u32 {
+        self.tick_as(setpoints, command.kind, command)
     }
 
     /// As [`Generator::tick`], with `kind` in place of that of the command, which need not be copied for it.
     #[inline]
-    pub fn tick_as<F: Frames<T>>(&mut self, plan: &Plan<T, F>, kind: CommandKind, command: &Command<T>) -> u32 {
+    pub fn tick_as<F: Frames<T>>(
+        &mut self,
+        setpoints: &Setpoints<T, F>,
+        kind: CommandKind,
+        command: &Command<T>,
+    ) -> u32 {
         let fresh = command.sequence != self.sequence;
         self.sequence = command.sequence;
         let streams = kind == CommandKind::Stream;
         if streams && matches!(self.phase, Phase::Stream | Phase::Hold | Phase::Stop) {
-            return self.stream(plan, command, fresh);
+            return self.stream(setpoints, command, fresh);
         }
         self.age = 0;
-        let status = self.obey(plan, kind, command);
-        self.advance(plan, status)
+        let status = self.obey(setpoints, kind, command);
+        self.advance(setpoints, status)
     }
 
     /// One tick under the command to stream.
     #[inline]
-    fn stream<F: Frames<T>>(&mut self, plan: &Plan<T, F>, command: &Command<T>, fresh: bool) -> u32 {
+    fn stream<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, command: &Command<T>, fresh: bool) -> u32 {
         self.finished = None;
         let mut status = 0;
         if fresh {
-            if self.is_believed(plan, &command.target) && plan.admit(&command.target, &mut self.target) {
+            if self.is_believed(setpoints, &command.target) && setpoints.admit(&command.target, &mut self.target) {
                 self.phase = Phase::Stream;
                 self.age = 0;
                 self.place = command.target.pose;
@@ -182,30 +187,30 @@ impl<T: Real> Generator<T> {
             status = REFUSED;
         }
         self.age = self.age.saturating_add(1);
-        let stale = self.age >= plan.stale_ticks;
+        let stale = self.age >= setpoints.stale_ticks;
         if stale {
             status |= STALE;
         }
         if self.phase == Phase::Stream && (fresh || stale) {
-            self.begin_stop(plan);
+            self.begin_stop(setpoints);
         }
-        self.advance(plan, status)
+        self.advance(setpoints, status)
     }
 
     /// Whether a streamed set-point is no jump from where the platform is and states no impossible motion.
     #[inline]
-    fn is_believed<F>(&self, plan: &Plan<T, F>, user: &Target<T>) -> bool {
+    fn is_believed<F>(&self, setpoints: &Setpoints<T, F>, user: &Target<T>) -> bool {
         // A NaN fails every comparison.
         (0..6).all(|axis| {
-            (user.pose[axis] - self.place[axis]).abs() <= plan.stream_step[axis]
-                && user.rate[axis].abs() <= plan.stream_rate[axis]
-                && user.acceleration[axis].abs() <= plan.stream_acceleration[axis]
+            (user.pose[axis] - self.place[axis]).abs() <= setpoints.stream_step[axis]
+                && user.rate[axis].abs() <= setpoints.stream_rate[axis]
+                && user.acceleration[axis].abs() <= setpoints.stream_acceleration[axis]
         })
     }
 
     /// Begins and ends motions as the command wants; returns the status of a refusal.
     #[inline]
-    fn obey<F: Frames<T>>(&mut self, plan: &Plan<T, F>, kind: CommandKind, command: &Command<T>) -> u32 {
+    fn obey<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, kind: CommandKind, command: &Command<T>) -> u32 {
         let played = match kind {
             CommandKind::Trajectory => Some(command.selector),
             _ => None,
@@ -215,22 +220,24 @@ impl<T: Real> Generator<T> {
         }
         match self.phase {
             Phase::Reset => {
-                if !self.begin_bias(plan) {
+                if !self.begin_bias(setpoints) {
                     return REFUSED;
                 }
             }
             Phase::Bias | Phase::Stop => {}
-            Phase::Stream => self.begin_stop(plan),
+            Phase::Stream => self.begin_stop(setpoints),
             Phase::Move if kind == CommandKind::Move => {}
             Phase::Approach(index) | Phase::Play(index) if played == Some(index) => {}
-            Phase::Move | Phase::Approach(_) | Phase::Play(_) => self.begin_stop(plan),
+            Phase::Move | Phase::Approach(_) | Phase::Play(_) => self.begin_stop(setpoints),
             Phase::Hold => {}
         }
         let accepted = match kind {
             CommandKind::Hold | CommandKind::Stream => true,
             CommandKind::Unknown => false,
-            CommandKind::Move => self.phase != Phase::Hold || self.begin_move(plan, &command.target.pose, Phase::Move),
-            CommandKind::Trajectory => self.phase != Phase::Hold || self.begin_trajectory(plan, command.selector),
+            CommandKind::Move => {
+                self.phase != Phase::Hold || self.begin_move(setpoints, &command.target.pose, Phase::Move)
+            }
+            CommandKind::Trajectory => self.phase != Phase::Hold || self.begin_trajectory(setpoints, command.selector),
         };
         if accepted { 0 } else { REFUSED }
     }
@@ -238,12 +245,12 @@ impl<T: Real> Generator<T> {
     /// The bias is a move of the platform itself, for the user's frames may bend the way. Without it nothing moves. It begins
     /// where the platform stands: at rest after reset.
     #[inline(never)]
-    fn begin_bias<F: Frames<T>>(&mut self, plan: &Plan<T, F>) -> bool {
-        self.place = plan.home;
-        match plan.admitted(&plan.home) {
+    fn begin_bias<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>) -> bool {
+        self.place = setpoints.home;
+        match setpoints.admitted(&setpoints.home) {
             Some(goal) => {
                 let from = self.target.pose;
-                self.begin_straight(plan, &from, &goal, Phase::Bias)
+                self.begin_straight(setpoints, &from, &goal, Phase::Bias)
             }
             None => false,
         }
@@ -251,21 +258,27 @@ impl<T: Real> Generator<T> {
 
     /// Whether the goal is one; begins no motion if it is reached.
     #[inline(never)]
-    fn begin_move<F: Frames<T>>(&mut self, plan: &Plan<T, F>, goal: &[T; 6], phase: Phase) -> bool {
+    fn begin_move<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, goal: &[T; 6], phase: Phase) -> bool {
         if *goal == self.place {
             return true;
         }
         let from = self.place;
-        plan.admitted(goal).is_some() && self.begin_straight(plan, &from, goal, phase)
+        setpoints.admitted(goal).is_some() && self.begin_straight(setpoints, &from, goal, phase)
     }
 
-    fn begin_straight<F: Frames<T>>(&mut self, plan: &Plan<T, F>, from: &[T; 6], to: &[T; 6], phase: Phase) -> bool {
+    fn begin_straight<F: Frames<T>>(
+        &mut self,
+        setpoints: &Setpoints<T, F>,
+        from: &[T; 6],
+        to: &[T; 6],
+        phase: Phase,
+    ) -> bool {
         self.start = *from;
         self.goal = *to;
         for axis in 0..6 {
             self.way[axis] = to[axis] - from[axis];
         }
-        match Profile::plan(&self.way, &plan.limits) {
+        match Profile::plan(&self.way, &setpoints.limits) {
             Some(profile) => {
                 self.profile = profile;
                 self.tick = 0;
@@ -277,11 +290,11 @@ impl<T: Real> Generator<T> {
     }
 
     /// Whether the platform is at, or can go to, the start of a trajectory.
-    fn begin_trajectory<F: Frames<T>>(&mut self, plan: &Plan<T, F>, selector: u32) -> bool {
+    fn begin_trajectory<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, selector: u32) -> bool {
         if self.finished == Some(selector) {
             return true;
         }
-        let Some(trajectory) = plan.trajectories.get(selector as usize) else {
+        let Some(trajectory) = setpoints.trajectories.get(selector as usize) else {
             return false;
         };
         let start = trajectory.start();
@@ -290,14 +303,14 @@ impl<T: Real> Generator<T> {
             self.cursor = Cursor::new();
             return true;
         }
-        self.begin_move(plan, &start, Phase::Approach(selector))
+        self.begin_move(setpoints, &start, Phase::Approach(selector))
     }
 
-    fn begin_stop<F: Frames<T>>(&mut self, plan: &Plan<T, F>) {
+    fn begin_stop<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>) {
         if self.rate == [T::ZERO; 6] {
             self.rest();
         } else {
-            self.stop = Stop::plan(plan, &self.place, &self.rate);
+            self.stop = Stop::plan(setpoints, &self.place, &self.rate);
             self.phase = Phase::Stop;
         }
     }
@@ -311,12 +324,12 @@ impl<T: Real> Generator<T> {
 
     /// One tick of the motion under way.
     #[inline]
-    fn advance<F: Frames<T>>(&mut self, plan: &Plan<T, F>, status: u32) -> u32 {
+    fn advance<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, status: u32) -> u32 {
         let busy = status | BUSY;
         match self.phase {
             Phase::Hold | Phase::Reset => status,
             Phase::Bias => {
-                let (target, ended) = self.straight(plan);
+                let (target, ended) = self.straight(setpoints);
                 self.target = target;
                 self.arrive(ended);
                 if ended { status } else { busy }
@@ -324,38 +337,38 @@ impl<T: Real> Generator<T> {
             Phase::Stream => {
                 let mut user = Target { rate: self.rate, ..Target::at(self.place) };
                 for (value, rate) in user.pose.iter_mut().zip(&user.rate) {
-                    *value = *value + *rate * plan.period;
+                    *value = *value + *rate * setpoints.period;
                 }
-                self.commit(plan, &user, false, status, status)
+                self.commit(setpoints, &user, false, status, status)
             }
             Phase::Move | Phase::Approach(_) => {
-                let (user, ended) = self.straight(plan);
-                self.commit(plan, &user, ended, busy, status)
+                let (user, ended) = self.straight(setpoints);
+                self.commit(setpoints, &user, ended, busy, status)
             }
             Phase::Stop => {
-                let (user, ended) = self.stop.next(plan);
-                self.commit(plan, &user, ended, busy, status)
+                let (user, ended) = self.stop.next(setpoints);
+                self.commit(setpoints, &user, ended, busy, status)
             }
             Phase::Play(index) => {
-                let (user, ended) = match plan.trajectories.get(index as usize) {
+                let (user, ended) = match setpoints.trajectories.get(index as usize) {
                     Some(trajectory) => trajectory.next(&mut self.cursor),
                     None => (Target::at(self.place), true),
                 };
                 if ended {
                     self.finished = Some(index);
                 }
-                self.commit(plan, &user, ended, busy, status)
+                self.commit(setpoints, &user, ended, busy, status)
             }
         }
     }
 
     /// The straight motion one tick on, and whether it has arrived.
     #[inline]
-    fn straight<F>(&mut self, plan: &Plan<T, F>) -> (Target<T>, bool) {
+    fn straight<F>(&mut self, setpoints: &Setpoints<T, F>) -> (Target<T>, bool) {
         self.tick += 1;
         let ended = self.tick >= self.profile.ticks();
         let progress = self.profile.at(self.tick);
-        let (rate, acceleration) = (progress.rate * plan.rate, progress.acceleration * plan.square_rate);
+        let (rate, acceleration) = (progress.rate * setpoints.rate, progress.acceleration * setpoints.square_rate);
         if ended {
             // Exactly: start + way may miss it by a rounding.
             return (Target::at(self.goal), true);
@@ -374,13 +387,13 @@ impl<T: Real> Generator<T> {
     #[inline]
     fn commit<F: Frames<T>>(
         &mut self,
-        plan: &Plan<T, F>,
+        setpoints: &Setpoints<T, F>,
         user: &Target<T>,
         ended: bool,
         moving: u32,
         standing: u32,
     ) -> u32 {
-        if !plan.admit(user, &mut self.target) {
+        if !setpoints.admit(user, &mut self.target) {
             self.rest();
             return standing | REFUSED;
         }

@@ -6,7 +6,7 @@
 //! dropped at once.
 
 use super::profile::{LONGEST, largest, least};
-use super::{Frames, Plan, Target};
+use super::{Frames, Setpoints, Target};
 use crate::digest::Digest;
 use crate::real::Real;
 use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
@@ -67,14 +67,14 @@ impl<T: Real> Stop<T> {
 
     /// The stop from `pose` (m, rad) at `rate` (per s), in the user's frames.
     #[must_use]
-    pub fn plan<F: Frames<T>>(plan: &Plan<T, F>, pose: &[T; 6], rate: &[T; 6]) -> Self {
+    pub fn plan<F: Frames<T>>(setpoints: &Setpoints<T, F>, pose: &[T; 6], rate: &[T; 6]) -> Self {
         let mut stop = Self { start: *pose, rate: *rate, ticks: 1, tick: 0 };
         for rate in &mut stop.rate {
-            *rate = *rate * plan.period;
+            *rate = *rate * setpoints.period;
         }
-        stop.ticks = plan.stop.ticks(&stop.rate);
+        stop.ticks = setpoints.stop.ticks(&stop.rate);
         for _ in 0..HALVINGS {
-            if stop.ticks == 1 || plan.admitted(&stop.end()).is_some() {
+            if stop.ticks == 1 || setpoints.admitted(&stop.end()).is_some() {
                 break;
             }
             stop.ticks = (stop.ticks + 1) / 2;
@@ -94,7 +94,7 @@ impl<T: Real> Stop<T> {
 
     /// Set-point one tick on, and whether that is standstill.
     #[inline]
-    pub(super) fn next<F>(&mut self, plan: &Plan<T, F>) -> (Target<T>, bool) {
+    pub(super) fn next<F>(&mut self, setpoints: &Setpoints<T, F>) -> (Target<T>, bool) {
         self.tick += 1;
         if self.tick >= self.ticks {
             return (Target::at(self.end()), true);
@@ -104,8 +104,8 @@ impl<T: Real> Stop<T> {
         let (two, three) = (T::from_f64(2.0), T::from_f64(3.0));
         let square = s * s;
         let way = d * s * (T::ONE - square + square * s * T::HALF);
-        let rate = (T::ONE - square * (three - two * s)) * plan.rate;
-        let acceleration = -(two * three) * s * (T::ONE - s) / d * plan.square_rate;
+        let rate = (T::ONE - square * (three - two * s)) * setpoints.rate;
+        let acceleration = -(two * three) * s * (T::ONE - s) / d * setpoints.square_rate;
         let mut target = Target::at(self.start);
         for axis in 0..6 {
             let v = self.rate[axis];

@@ -1,10 +1,10 @@
 //! For how long a condition must last before it is a cause.
 
 use super::kinds::Cause;
-use super::plan::Plan;
+use super::supervision::Supervision;
 use crate::digest::Digest;
 
-/// Causes that are timed tick by tick, in the order of [`Plan::patience`]. Those of the watch are counted in samples there; all
+/// Causes that are timed tick by tick, in the order of [`Supervision::timeout`]. Those of the watch are counted in samples there; all
 /// others act at once.
 pub const TIMED: [Cause; TIMERS] = [
     Cause::GaugeNotFinite,
@@ -55,27 +55,27 @@ impl Debounce {
     ///
     /// Mostly nothing is, and nothing was: `busy` is what the last call left there, any count above zero.
     #[inline]
-    pub fn count<T>(&mut self, plan: &Plan<T>, present: u32, busy: &mut bool) -> u32 {
+    pub fn count<T>(&mut self, supervision: &Supervision<T>, present: u32, busy: &mut bool) -> u32 {
         if present == 0 && !*busy {
             return 0;
         }
-        self.count_slowly(plan, present, busy)
+        self.count_slowly(supervision, present, busy)
     }
 
     #[cold]
     #[inline(never)]
-    fn count_slowly<T>(&mut self, plan: &Plan<T>, present: u32, busy: &mut bool) -> u32 {
+    fn count_slowly<T>(&mut self, supervision: &Supervision<T>, present: u32, busy: &mut bool) -> u32 {
         let mut lasted = present & AT_ONCE;
         let mut any = 0;
         for (index, (cause, count)) in TIMED.iter().zip(&mut self.counts).enumerate() {
-            let patience = plan.patience[index];
+            let timeout = supervision.timeout[index];
             if present & condition(*cause) == 0 {
                 *count = count.saturating_sub(1);
             } else {
-                // Held at the patience, so that it is forgotten as fast as it was learned.
-                let sum = count.saturating_add(plan.weight[index]);
-                *count = if sum > patience { patience } else { sum };
-                if *count >= patience {
+                // Held at the timeout, so that it is forgotten as fast as it was learned.
+                let sum = count.saturating_add(supervision.weight[index]);
+                *count = if sum > timeout { timeout } else { sum };
+                if *count >= timeout {
                     lasted |= cause.bit();
                 }
             }

@@ -3,7 +3,7 @@
 use super::approach::Approach;
 use super::debounce::Debounce;
 use super::kinds::{Cause, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF};
-use super::plan::Plan;
+use super::supervision::Supervision;
 use super::watch::{Sample, Watch};
 use crate::digest::Digest;
 use crate::real::Real;
@@ -74,30 +74,30 @@ impl<T: Real> Supervisor<T> {
     /// `events` are what the target noticed since the last tick, `at_rest` whether every code is at rest (not asked while
     /// running).
     #[inline]
-    pub fn decide(&mut self, plan: &Plan<T>, request: Request, events: u32, at_rest: bool) -> bool {
+    pub fn decide(&mut self, supervision: &Supervision<T>, request: Request, events: u32, at_rest: bool) -> bool {
         let begun = request != self.request;
         self.request = request;
         let present = (self.seen & CAUSES) | self.watch.present | (events & EVENTS) << FIRST_EVENT;
         self.conditions = self.seen | present | self.watch.suspected() << FIRST_CHANNEL;
-        let lasted = self.debounce.count(plan, present, &mut self.busy) | self.watch.lasted;
+        let lasted = self.debounce.count(supervision, present, &mut self.busy) | self.watch.lasted;
         self.watch.lasted = 0;
         if self.phase == Phase::Running && lasted == 0 && !matches!(request, Request::Hold | Request::RampDown) {
             return false;
         }
-        self.change(plan, begun, present, lasted, at_rest)
+        self.change(supervision, begun, present, lasted, at_rest)
     }
 
     /// Everything but running on.
     #[cold]
     #[inline(never)]
-    fn change(&mut self, plan: &Plan<T>, begun: bool, present: u32, lasted: u32, at_rest: bool) -> bool {
+    fn change(&mut self, supervision: &Supervision<T>, begun: bool, present: u32, lasted: u32, at_rest: bool) -> bool {
         if lasted & SWITCHES_OFF != 0 && self.phase != Phase::Faulted {
             self.enter(Phase::Faulted, first(lasted & SWITCHES_OFF));
             return false;
         }
         match self.phase {
             Phase::Disarmed => self.disarmed(begun, present, at_rest),
-            Phase::Arming => return self.arming(plan, present, lasted),
+            Phase::Arming => return self.arming(supervision, present, lasted),
             Phase::Running => self.running(lasted),
             Phase::Holding => return self.holding(begun, present, lasted),
             Phase::RampingDown => self.ramping_down(lasted, at_rest),
@@ -120,7 +120,7 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    fn arming(&mut self, plan: &Plan<T>, present: u32, lasted: u32) -> bool {
+    fn arming(&mut self, supervision: &Supervision<T>, present: u32, lasted: u32) -> bool {
         if lasted & (RAMPS_DOWN | HOLDS) != 0 {
             self.enter(Phase::RampingDown, first(lasted));
         } else if self.request == Request::RampDown {
@@ -129,7 +129,7 @@ impl<T: Real> Supervisor<T> {
             self.ticks = 0;
         } else {
             self.ticks = self.ticks.saturating_add(1);
-            if self.ticks >= plan.arm_ticks {
+            if self.ticks >= supervision.arm_ticks {
                 let runs = self.request == Request::Run;
                 self.enter(if runs { Phase::Running } else { Phase::Holding }, Cause::None);
                 return runs;
@@ -194,17 +194,17 @@ impl<T: Real> Supervisor<T> {
 
     /// Codes by which every leg goes towards rest in this tick, when the law does not run; never above `max_step`.
     #[inline]
-    pub fn step_to_rest(&mut self, plan: &Plan<T>, max_step: i32) -> i32 {
+    pub fn step_to_rest(&mut self, supervision: &Supervision<T>, max_step: i32) -> i32 {
         match self.phase {
             Phase::Arming | Phase::Holding | Phase::Running => 0,
             Phase::Disarmed | Phase::Faulted => max_step,
             Phase::RampingDown => {
                 self.ticks = self.ticks.saturating_add(1);
-                if self.ticks < plan.ramp_every {
+                if self.ticks < supervision.ramp_every {
                     return 0;
                 }
                 self.ticks = 0;
-                if plan.ramp_step < max_step { plan.ramp_step } else { max_step }
+                if supervision.ramp_step < max_step { supervision.ramp_step } else { max_step }
             }
         }
     }
@@ -217,8 +217,8 @@ impl<T: Real> Supervisor<T> {
 
     /// Takes a sample of the channel whose turn it was.
     #[inline]
-    pub fn look(&mut self, plan: &Plan<T>, channel: usize, sample: &Sample<T>) {
-        self.watch.look(plan, channel, sample);
+    pub fn look(&mut self, supervision: &Supervision<T>, channel: usize, sample: &Sample<T>) {
+        self.watch.look(supervision, channel, sample);
     }
 
     /// Adds the state to a digest.

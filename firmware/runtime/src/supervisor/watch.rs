@@ -2,7 +2,7 @@
 //! sixth of the work is a sixth of the time.
 
 use super::kinds::Cause;
-use super::plan::Plan;
+use super::supervision::Supervision;
 use crate::digest::Digest;
 use crate::real::Real;
 
@@ -90,7 +90,7 @@ impl<T: Real> Watch<T> {
 
     /// Looks at a channel (0 to 5). Every number of the sample is finite.
     #[inline]
-    pub fn look(&mut self, plan: &Plan<T>, index: usize, sample: &Sample<T>) {
+    pub fn look(&mut self, supervision: &Supervision<T>, index: usize, sample: &Sample<T>) {
         let index = if index < 6 { index } else { 0 };
         let channel = &mut self.channels[index];
         let [low, high] = &mut channel.expected;
@@ -102,34 +102,34 @@ impl<T: Real> Watch<T> {
             if sample.expected > *high {
                 *high = sample.expected;
             }
-            moved = *high - *low > plan.stuck_motion;
+            moved = *high - *low > supervision.stuck_motion;
         } else {
             channel.word = sample.word;
             channel.known = true;
             channel.expected = [sample.expected; 2];
         }
-        let disagrees = (sample.reading - sample.expected).abs() > plan.disagreement;
+        let disagrees = (sample.reading - sample.expected).abs() > supervision.disagreement;
         let astray = match sample.error {
-            Some(error) => error.abs() > plan.tracking[index],
+            Some(error) => error.abs() > supervision.tracking[index],
             None => false,
         };
         let counted = channel.stuck | channel.disagreed | channel.astray;
         if moved | disagrees | astray || counted != 0 {
-            self.count(plan, index, [moved, disagrees, astray]);
+            self.count(supervision, index, [moved, disagrees, astray]);
         }
     }
 
     /// The counts of a channel that something is, or was, wrong with.
     #[cold]
     #[inline(never)]
-    fn count(&mut self, plan: &Plan<T>, index: usize, [moved, disagrees, astray]: [bool; 3]) {
+    fn count(&mut self, supervision: &Supervision<T>, index: usize, [moved, disagrees, astray]: [bool; 3]) {
         let index = if index < 6 { index } else { 0 };
         let channel = &mut self.channels[index];
         let lasting = [
             // One word that changes shows that the gauge lives: nothing is left of the count.
-            count(&mut channel.stuck, moved, plan.stuck_samples, u32::MAX),
-            count(&mut channel.disagreed, disagrees, plan.disagreement_samples, 1),
-            count(&mut channel.astray, astray, plan.tracking_samples, 1),
+            count(&mut channel.stuck, moved, supervision.stuck_samples, u32::MAX),
+            count(&mut channel.disagreed, disagrees, supervision.disagreement_samples, 1),
+            count(&mut channel.astray, astray, supervision.tracking_samples, 1),
         ];
         let causes = [Cause::GaugeStuck, Cause::GaugeDisagreement, Cause::TrackingError];
         self.present = 0;
@@ -174,14 +174,14 @@ impl<T: Real> Watch<T> {
 
 /// Counts a sample in which something was seen, takes `off` for one in which it was not; whether it has lasted.
 #[inline]
-fn count(count: &mut u32, seen: bool, patience: u32, off: u32) -> bool {
+fn count(count: &mut u32, seen: bool, timeout: u32, off: u32) -> bool {
     if !seen {
         *count = count.saturating_sub(off);
         return false;
     }
-    // Held at the patience, so that it is forgotten as fast as it was learned.
-    if *count < patience {
+    // Held at the timeout, so that it is forgotten as fast as it was learned.
+    if *count < timeout {
         *count += 1;
     }
-    *count >= patience
+    *count >= timeout
 }

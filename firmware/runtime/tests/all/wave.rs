@@ -1,7 +1,7 @@
 //! Waves: their shapes against textbook formulas, their derivatives against differences, their limits, and their ends.
 
 use specgen_runtime::Motion;
-use specgen_runtime::setpoint::{MoveLimits, Parallel, Plan, StopLimits};
+use specgen_runtime::setpoint::{MoveLimits, Parallel, Setpoints, StopLimits};
 use specgen_runtime::wave::{AxisWave, Limits, Refused, Settings, Shape, Stage, TONES, Tone, WORDS, Wave, step_of};
 
 const PERIOD: f64 = 1e-4;
@@ -338,7 +338,7 @@ fn every_word_of_a_shape_has_its_bounds() {
 /// Those of the streams: the bound less the bias, on either side.
 #[test]
 fn limits_are_those_of_the_streams_about_the_bias() {
-    let plan = Plan::<f64, Parallel> {
+    let plan = Setpoints::<f64, Parallel> {
         period: PERIOD,
         rate: 1.0 / PERIOD,
         square_rate: 1.0 / (PERIOD * PERIOD),

@@ -3,16 +3,16 @@
 
 //! What the supervisor takes for a fault; from `supervisor`.
 
-use specgen_runtime::supervisor::Plan;
+use specgen_runtime::supervisor::Supervision;
 use crate::Real;
 
 /// Bounds and times, these in ticks, or in samples of six ticks.
-pub const PLAN: Plan<Real> = Plan {
+pub const SUPERVISION: Supervision<Real> = Supervision {
     arm_ticks: 500,
     rest: 0,
     ramp_step: 8,
     ramp_every: 1,
-    patience: [50, 50, 2500, 250, 10001, 50, 49501, 50000],
+    timeout: [50, 50, 2500, 250, 10001, 50, 49501, 50000],
     weight: [1, 1, 1, 1, 5000, 1, 1, 1],
     stuck_motion: 7.629395e-9,
     stuck_samples: 42,

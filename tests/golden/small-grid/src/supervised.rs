@@ -16,7 +16,7 @@ pub use crate::machine_words::{
     machine_output_words,
 };
 use crate::step::{GAUGE_FAULT, LEG_LIMITED, advance, outputs};
-use crate::supervision::PLAN;
+use crate::supervision::SUPERVISION;
 use specgen_runtime::{Estimate, Law, Real as _};
 use crate::limits::{gauge_is_accepted, leg_setpoint_is_accepted};
 use crate::supervision::{APPROACH_KEEP, APPROACH_NEGLIGIBLE};
@@ -96,8 +96,8 @@ pub fn supervise(
 ) -> MachineOutput {
     let Machine { state, supervisor } = machine;
     let at_rest = supervisor.phase != Phase::Running
-        && state.legs.iter().all(|leg| leg.code == PLAN.rest);
-    let begins = supervisor.decide(&PLAN, input.request, input.events, at_rest);
+        && state.legs.iter().all(|leg| leg.code == SUPERVISION.rest);
+    let begins = supervisor.decide(&SUPERVISION, input.request, input.events, at_rest);
     if begins {
         begin(config, state, supervisor, &input.tick);
     }
@@ -230,7 +230,7 @@ fn look(
     let error = Some(target - reading);
     supervisor
         .look(
-            &PLAN,
+            &SUPERVISION,
             channel,
             &Sample {
                 word: reading,
@@ -261,7 +261,7 @@ fn stand(
         let reading = component(&input.displacement, channel);
         supervisor
             .look(
-                &PLAN,
+                &SUPERVISION,
                 channel,
                 &Sample {
                     word: reading,
@@ -294,9 +294,9 @@ fn component(vector: &[Real; 6], index: usize) -> Real {
 
 /// Codes held, or on their way to rest; the memories follow what is really sent.
 fn move_codes(config: &Config, state: &mut State, supervisor: &mut Supervisor) {
-    let step = supervisor.step_to_rest(&PLAN, config.code_limits().max_step);
+    let step = supervisor.step_to_rest(&SUPERVISION, config.code_limits().max_step);
     for (leg, table) in state.legs.iter_mut().zip(&TABLES) {
-        leg.code = toward(leg.code, PLAN.rest, step);
+        leg.code = toward(leg.code, SUPERVISION.rest, step);
         leg.memory.apply(table, DAC.drive(leg.code));
     }
 }

@@ -299,7 +299,7 @@ impl<P: Port> Machine<P> {
     }
 
     /// Ramps down and waits until the amplifiers are off; what came of it.
-    pub fn go_down(&mut self, ui: &Ui) -> Result<String, ClientError> {
+    pub fn ramp_down(&mut self, ui: &Ui) -> Result<String, ClientError> {
         ui.progress("interrupted: ramping down");
         self.session.supervise(Request::RampDown)?;
         let start = Instant::now();

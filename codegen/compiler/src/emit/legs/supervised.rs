@@ -70,7 +70,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         ) {
             let reading = component(&input.displacement, channel);
             let error = Some(target - reading);
-            supervisor.look(&PLAN, channel, &Sample { word: reading, reading, expected, error });
+            supervisor.look(&SUPERVISION, channel, &Sample { word: reading, reading, expected, error });
         }
 
         /// Codes held or on their way to rest, the law suspended. Returns the status.
@@ -92,7 +92,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
             #no_leads
             if faults == 0 && compares(supervisor.phase) {
                 let reading = component(&input.displacement, channel);
-                supervisor.look(&PLAN, channel, &Sample { word: reading, reading, expected, error: None });
+                supervisor.look(&SUPERVISION, channel, &Sample { word: reading, reading, expected, error: None });
             }
             supervisor.see(faults, 0, &input.displacement, &[0; LEGS], 1);
             faults << 8

@@ -16,7 +16,7 @@ pub fn emit() -> TokenStream {
         use crate::dynamics::leg_forces;
         use crate::hysteresis::TABLES;
         use crate::limits::DAC;
-        use crate::setpoint::PLAN;
+        use crate::setpoint::SETPOINTS;
         use crate::step::{actuate, correction, known_load, learn};
         use crate::task_space::{modal_error, notch_error};
         use crate::{Config, LEGS, Real, State, TickInput};
@@ -39,7 +39,7 @@ pub fn emit() -> TokenStream {
         /// Brings a copy of the state to where the stages find it, with each leg's request in place of its excess; not measured.
         pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
             crate::step::sense(config, state, &input.gauge);
-            state.generator.tick(&PLAN, &input.command);
+            state.generator.tick(&SETPOINTS, &input.command);
             let load = known_load(config, state);
             let correction = correction(config, state);
             for (index, leg) in state.legs.iter_mut().enumerate() {
@@ -65,7 +65,7 @@ pub fn emit() -> TokenStream {
 
         /// The generator of set-points.
         extern "C" fn setpoint(_config: &Config, state: &mut State, input: &TickInput, _leg: usize) {
-            state.generator.tick(&PLAN, &input.command);
+            state.generator.tick(&SETPOINTS, &input.command);
         }
 
         /// h, ḣ, ḧ to six leg forces.

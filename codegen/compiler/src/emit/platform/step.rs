@@ -74,7 +74,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use crate::dynamics::Load;
         use crate::hysteresis::{TABLES, Table};
         use crate::limits::DAC;
-        use crate::setpoint::PLAN;
+        use crate::setpoint::SETPOINTS;
         use crate::task_space::{
             COMPLIANCE, FORCE_TO_MODES, #lead_import LEGS_TO_MODES, LEGS_TO_WRENCH, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP,
             TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS, linear_displacement, linear_drive, modal_error, notch_error,
@@ -133,7 +133,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
             }
             let wrench_good = take_wrench(config, state, &input.wrench);
             let damping = damping(config, state);
-            let setpoint_status = state.generator.tick_as(&PLAN, kind, &input.command);
+            let setpoint_status = state.generator.tick_as(&SETPOINTS, kind, &input.command);
             let Load { displacement: demand, force } = known_load(config, state);
             let correction = correction(config, state);
             state.load = each(|leg| (force[leg] - REST_FORCE[leg]) * COMPLIANCE #lead);

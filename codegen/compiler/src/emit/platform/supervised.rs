@@ -10,7 +10,7 @@ pub fn emit() -> TokenStream {
         use specgen_runtime::setpoint::{CommandKind, Generator};
         use specgen_runtime::{Estimate, Integral, NotchState, Real as _, Transfer};
 
-        use crate::setpoint::PLAN as SETPOINTS;
+        use crate::setpoint::SETPOINTS;
         use crate::step::sense;
         use crate::supervision::READINGS_PER_LEG;
         use crate::{kinematics, sensing};
@@ -56,7 +56,7 @@ pub fn emit() -> TokenStream {
             target: Real,
         ) {
             let error = Some(target - component(&state.pose, channel));
-            supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, error));
+            supervisor.look(&SUPERVISION, channel, &sample(&input.gauge, channel, expected, error));
         }
 
         /// A motion that was under way when the law was to be suspended, brought to rest by it within the limits of stops. Returns
@@ -86,7 +86,7 @@ pub fn emit() -> TokenStream {
             }
             let faults = sense(config, state, &input.gauge);
             if faults == 0 && compares(supervisor.phase) {
-                supervisor.look(&PLAN, channel, &sample(&input.gauge, channel, expected, None));
+                supervisor.look(&SUPERVISION, channel, &sample(&input.gauge, channel, expected, None));
             }
             if !supervisor.phase.is_powered() {
                 // What it knew of a load ends with the run: arming begins without.

@@ -37,7 +37,7 @@ impl Excesses {
         }
     }
 
-    /// How the place can be mended: numbers that are themselves accepted, as far as the workspace is concerned.
+    /// How the place can be fixed: numbers that are themselves accepted, as far as the workspace is concerned.
     pub fn mend_place(&self, user: &User) -> Option<String> {
         let Worst { axis, value, .. } = self.place?;
         let bound = user.bound[axis];

@@ -115,7 +115,7 @@ pub(super) fn is_stable(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, con
 /// The first tuning on the way down that holds; the last one tried if none does, which the check then refuses.
 ///
 /// A condition that a `fixed` law does not hold under, whose numbers are the spec's, is not asked of the others: the rule
-/// cannot mend it.
+/// cannot fix it.
 fn shrink(
     closed_loop: &ClosedLoop,
     laws: &[Law],

@@ -48,13 +48,13 @@ pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
 /// Weights per run, runs of several ticks and leg set-points are the leg feed-forward's.
 pub(super) fn no_leg_keys(f: &Fields, findings: &mut Findings) -> Option<()> {
     there(f)?;
-    let mut refuse = |path: &str, why: &str, mend: &str| {
+    let mut refuse = |path: &str, why: &str, fix: &str| {
         findings.error(
             codes::LEG_KEY_WITH_CONTROL,
             path,
             f.span(path),
             format!("`{path}` stands beside [control]: {why}"),
-            mend.to_owned(),
+            fix.to_owned(),
         );
     };
     for which in ["level", "drift"] {

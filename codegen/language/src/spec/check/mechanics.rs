@@ -60,7 +60,7 @@ pub(super) fn mass_centers_inside_leg(f: &Fields, findings: &mut Findings) -> Op
                     number(center * 1e3),
                     number(length * 1e3)
                 ),
-                format!("give less than {} mm, or mend [geometry]", number(length * 1e3)),
+                format!("give less than {} mm, or fix [geometry]", number(length * 1e3)),
             );
         }
     }

@@ -83,8 +83,8 @@ impl ValueReader<'_> {
             }
             DeValue::String(found) => {
                 let is_number = found.trim().parse::<f64>().is_ok_and(f64::is_finite);
-                let mend = is_number.then(|| format!("write {} without quotes", found.trim()));
-                return self.wrong_type(path, value, "a number", mend);
+                let fix = is_number.then(|| format!("write {} without quotes", found.trim()));
+                return self.wrong_type(path, value, "a number", fix);
             }
             _ => return self.wrong_type(path, value, "a number", None),
         };
@@ -133,12 +133,12 @@ impl ValueReader<'_> {
                     self.plain_number(path, value);
                     return None;
                 }
-                let mend = (number.fract() == 0.0).then(|| format!("write {number} without the decimal point"));
-                self.wrong_type(path, value, expected, mend)
+                let fix = (number.fract() == 0.0).then(|| format!("write {number} without the decimal point"));
+                self.wrong_type(path, value, expected, fix)
             }
             DeValue::String(found) => {
-                let mend = found.trim().parse::<i64>().ok().map(|number| format!("write {number} without quotes"));
-                self.wrong_type(path, value, expected, mend)
+                let fix = found.trim().parse::<i64>().ok().map(|number| format!("write {number} without quotes"));
+                self.wrong_type(path, value, expected, fix)
             }
             _ => self.wrong_type(path, value, expected, None),
         }

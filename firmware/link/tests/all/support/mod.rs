@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // Each test uses its part.
 
-use specgen_link::client::{Client, Patience, Port};
+use specgen_link::client::{Client, Port, Timeout};
 use specgen_link::{Bytes, Counted, Device, Identity, Reply, Request};
 use std::io;
 use std::time::Duration;
@@ -73,7 +73,7 @@ pub fn session(requests: &[Request<'_>]) -> Vec<Vec<u8>> {
         }
         out
     };
-    let (mut client, identity) = Client::open(Tap(&mut sent, &mut answer, Vec::new()), 0x4711, Patience::PIPE).unwrap();
+    let (mut client, identity) = Client::open(Tap(&mut sent, &mut answer, Vec::new()), 0x4711, Timeout::PIPE).unwrap();
     assert_eq!(identity, IDENTITY);
     for request in requests {
         assert_eq!(client.ask(request).unwrap(), Reply::Done);

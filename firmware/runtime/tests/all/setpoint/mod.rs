@@ -9,13 +9,13 @@ mod support;
 
 use crate::common::Random;
 use specgen_runtime::setpoint::{
-    BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Plan, Profile, REFUSED, STALE, StopLimits, Target,
+    BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Profile, REFUSED, STALE, Setpoints, StopLimits, Target,
 };
 use support::*;
 
-type Plan64 = Plan<f64, Parallel>;
+type Setpoints64 = Setpoints<f64, Parallel>;
 
-fn plan64() -> Plan64 {
+fn plan64() -> Setpoints64 {
     plan(Parallel, vec![spiral(), ring(false), ring(true)])
 }
 
@@ -24,7 +24,7 @@ fn biased(pose: [f64; 6]) -> [f64; 6] {
 }
 
 /// Steps with one command until it is no longer busy; every set-point on the way.
-fn run(generator: &mut Generator<f64>, plan: &Plan64, command: &Command<f64>) -> Vec<Target<f64>> {
+fn run(generator: &mut Generator<f64>, plan: &Setpoints64, command: &Command<f64>) -> Vec<Target<f64>> {
     let mut targets = Vec::new();
     for _ in 0..200_000 {
         let (target, status) = generator.next(plan, command);

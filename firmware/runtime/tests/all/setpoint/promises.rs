@@ -2,7 +2,7 @@
 
 use specgen_runtime::Real;
 use specgen_runtime::setpoint::{
-    BUSY, Command, CommandKind, Frames, Generator, Parallel, Plan, REFUSED, STALE, Target, Tool, Work,
+    BUSY, Command, CommandKind, Frames, Generator, Parallel, REFUSED, STALE, Setpoints, Target, Tool, Work,
 };
 
 use super::plan64;
@@ -46,7 +46,7 @@ fn random_command<T: Real>(random: &mut Random, last: &Target<T>, previous: &Com
 
 /// Ticks under random commands; what is broken first, and how often each status bit was seen.
 fn hammer<T: Real + Into<f64> + std::fmt::Debug, F: Frames<T>>(
-    plan: &Plan<T, F>,
+    plan: &Setpoints<T, F>,
     step: [f64; 6],
     rate: [f64; 6],
     ticks: u32,

@@ -6,10 +6,10 @@ use specgen_runtime::setpoint::{
 use specgen_runtime::snapshot::{Reader, Snapshot, Writer};
 
 use super::support::*;
-use super::{Plan64, biased, plan64};
+use super::{Setpoints64, biased, plan64};
 
 /// Ticks of one command.
-fn go(generator: &mut Generator<f64>, plan: &Plan64, order: &Command<f64>, ticks: u32) -> (Target<f64>, u32) {
+fn go(generator: &mut Generator<f64>, plan: &Setpoints64, order: &Command<f64>, ticks: u32) -> (Target<f64>, u32) {
     let mut last = (*generator.target(), 0);
     for _ in 0..ticks {
         last = generator.next(plan, order);
@@ -25,7 +25,7 @@ fn streamed(sequence: u32, x: f64, rate: f64) -> Command<f64> {
 }
 
 /// A generator in each of its phases, whether it has to stop, and whether the bias is behind it.
-fn phases(plan: &Plan64) -> Vec<(&'static str, Generator<f64>, bool, bool)> {
+fn phases(plan: &Setpoints64) -> Vec<(&'static str, Generator<f64>, bool, bool)> {
     let reset = Generator::new();
     let mut bias = reset;
     go(&mut bias, plan, &hold(), 50);

@@ -1,7 +1,9 @@
 //! Stops: their limits are kept in every tick, they end when and where they are said to, and no sooner stop would keep them.
 
 use specgen_runtime::Real;
-use specgen_runtime::setpoint::{BUSY, Command, CommandKind, Generator, Parallel, Plan, STALE, StopLimits, Target};
+use specgen_runtime::setpoint::{
+    BUSY, Command, CommandKind, Generator, Parallel, STALE, Setpoints, StopLimits, Target,
+};
 
 use super::support::*;
 use crate::common::Random;
@@ -12,7 +14,7 @@ fn limits(random: &mut Random) -> [[f64; 6]; 2] {
     [log(1e-2, 1e3), log(1e2, 1e7)]
 }
 
-fn with<T: Real>([acceleration, jerk]: &[[f64; 6]; 2], shortest: i32) -> Plan<T, Parallel> {
+fn with<T: Real>([acceleration, jerk]: &[[f64; 6]; 2], shortest: i32) -> Setpoints<T, Parallel> {
     let mut plan = plan::<T, _>(Parallel, vec![]);
     plan.stop = StopLimits {
         acceleration: six(acceleration.map(|a| 1.0 / (a * PERIOD * PERIOD))),
@@ -25,7 +27,7 @@ fn with<T: Real>([acceleration, jerk]: &[[f64; 6]; 2], shortest: i32) -> Plan<T,
 }
 
 /// A generator at rest that has taken one set-point of a stream at `rate`, and what it gave out.
-fn streaming<T: Real>(plan: &Plan<T, Parallel>, rate: &[f64; 6]) -> (Generator<T>, Command<T>, Target<T>) {
+fn streaming<T: Real>(plan: &Setpoints<T, Parallel>, rate: &[f64; 6]) -> (Generator<T>, Command<T>, Target<T>) {
     let mut generator = ready(plan);
     let mut target = Target::at(six(rate.map(|v| v * PERIOD)));
     target.rate = six(*rate);
@@ -104,7 +106,7 @@ fn a_stop_keeps_its_limits_in_every_tick_and_ends_when_and_where_it_is_said_to()
 #[test]
 fn moves_do_not_know_the_limits_of_stops_nor_stops_those_of_moves() {
     let order = command(CommandKind::Move, [20e-6, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    let run = |plan: &Plan<f64, Parallel>, interrupted: usize| {
+    let run = |plan: &Setpoints<f64, Parallel>, interrupted: usize| {
         let mut generator = ready(plan);
         let moved: Vec<Target<f64>> = (0..interrupted).map(|_| generator.next(plan, &order).0).collect();
         let stop: Vec<Target<f64>> = (0..4000).map(|_| generator.next(plan, &hold()).0).collect();

@@ -3,7 +3,7 @@
 
 use specgen_runtime::Real;
 use specgen_runtime::setpoint::{
-    Axis, Command, CommandKind, Frames, Generator, MoveLimits, Plan, Row, Segment, StopLimits, Table, Target,
+    Axis, Command, CommandKind, Frames, Generator, MoveLimits, Row, Segment, Setpoints, StopLimits, Table, Target,
     Trajectory,
 };
 
@@ -23,9 +23,9 @@ pub fn six<T: Real>(values: [f64; 6]) -> [T; 6] {
     values.map(T::from_f64)
 }
 
-pub fn plan<T: Real, F: Frames<T>>(frames: F, trajectories: Vec<Trajectory<T>>) -> Plan<T, F> {
+pub fn plan<T: Real, F: Frames<T>>(frames: F, trajectories: Vec<Trajectory<T>>) -> Setpoints<T, F> {
     let scaled = |values: [f64; 6], factor: f64| six(values.map(|v| 1.0 / (v * factor)));
-    Plan {
+    Setpoints {
         period: T::from_f64(PERIOD),
         rate: T::from_f64(1.0 / PERIOD),
         square_rate: T::from_f64(1.0 / (PERIOD * PERIOD)),
@@ -128,7 +128,7 @@ pub fn doubles<T: Real + Into<f64>>(values: [T; 6]) -> [f64; 6] {
 }
 
 /// A generator that stands at the bias pose.
-pub fn ready<T: Real, F: Frames<T>>(plan: &Plan<T, F>) -> Generator<T> {
+pub fn ready<T: Real, F: Frames<T>>(plan: &Setpoints<T, F>) -> Generator<T> {
     let mut generator = Generator::new();
     for _ in 0..100_000 {
         let (_, status) = generator.next(plan, &hold());

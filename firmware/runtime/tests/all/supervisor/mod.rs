@@ -5,14 +5,14 @@ mod oracle;
 mod sequences;
 
 use specgen_runtime::GaugeConverter;
-use specgen_runtime::supervisor::{Approach, Cause, Debounce, Plan, TIMED, toward};
+use specgen_runtime::supervisor::{Approach, Cause, Debounce, Supervision, TIMED, toward};
 
-const PLAN: Plan<f64> = Plan {
+const SUPERVISION: Supervision<f64> = Supervision {
     arm_ticks: 10,
     rest: 0,
     ramp_step: 5,
     ramp_every: 1,
-    patience: [5, 5, 10, 5, 201, 3, 40, 50],
+    timeout: [5, 5, 10, 5, 201, 3, 40, 50],
     weight: [1, 1, 1, 1, 100, 1, 1, 1],
     stuck_motion: 1e-8,
     stuck_samples: 3,
@@ -64,16 +64,16 @@ fn lasts(cause: Cause, shows: impl Fn(u32) -> bool) -> Option<u32> {
             own => own,
         };
         let present = if shows(*tick) { shown.bit() } else { 0 };
-        debounce.count(&PLAN, present, &mut busy) & cause.bit() != 0
+        debounce.count(&SUPERVISION, present, &mut busy) & cause.bit() != 0
     })
 }
 
 #[test]
 fn conditions_become_causes_when_they_have_lasted() {
-    for (cause, patience) in TIMED.into_iter().zip(PLAN.patience) {
+    for (cause, timeout) in TIMED.into_iter().zip(SUPERVISION.timeout) {
         if cause != Cause::MissedTick {
-            assert_eq!(lasts(cause, |_| true), Some(patience - 1), "{cause:?}");
-            assert_eq!(lasts(cause, |tick| tick % 2 == 0), if patience == 1 { Some(0) } else { None }, "{cause:?}");
+            assert_eq!(lasts(cause, |_| true), Some(timeout - 1), "{cause:?}");
+            assert_eq!(lasts(cause, |tick| tick % 2 == 0), if timeout == 1 { Some(0) } else { None }, "{cause:?}");
             // Two ticks of three: slower, but as sure.
             assert!(lasts(cause, |tick| tick % 3 != 2).is_some(), "{cause:?}");
         }
@@ -90,7 +90,7 @@ fn conditions_become_causes_when_they_have_lasted() {
 #[test]
 fn a_count_is_forgotten_as_fast_as_its_patience_lasts() {
     let (mut debounce, mut busy) = (Debounce::new(), false);
-    let mut tick = |present: u32| debounce.count(&PLAN, present, &mut busy) & Cause::MissedTick.bit() != 0;
+    let mut tick = |present: u32| debounce.count(&SUPERVISION, present, &mut busy) & Cause::MissedTick.bit() != 0;
     assert_eq!([1, 1, 1, 1].map(|_| tick(Cause::MissedTick.bit())), [false, false, true, true]);
     for _ in 0..201 {
         assert!(!tick(0));

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use specgen_runtime::supervisor::{Phase, Plan, Request, Sample, Supervisor, toward};
+use specgen_runtime::supervisor::{Phase, Request, Sample, Supervision, Supervisor, toward};
 
 use super::oracle::*;
 use crate::common::Random;
@@ -18,18 +18,18 @@ fn platform_bounds() -> Bounds {
     Bounds::platform([50e-6, 50e-6, 60e-6, 0.3e-3, 0.3e-3, 0.4e-3], GAUGE_RANGE)
 }
 
-fn plan(bounds: &Bounds) -> Plan<f64> {
+fn plan(bounds: &Bounds) -> Supervision<f64> {
     let second = bounds.ticks_per_second as u32;
     let [gauge, voltage, slew] =
         [bounds.gauge_ticks, bounds.voltage_ticks, bounds.slew_ticks].map(|ticks| ticks as u32);
     let [host, converter] = bounds.gone_ticks.map(|ticks| ticks as u32);
     let samples = bounds.samples as u32;
-    Plan {
+    Supervision {
         arm_ticks: bounds.arm_ticks,
         rest: REST,
         ramp_step: 40,
         ramp_every: 2,
-        patience: [gauge, gauge, voltage, slew, second + 1, gauge, host, converter],
+        timeout: [gauge, gauge, voltage, slew, second + 1, gauge, host, converter],
         weight: [1, 1, 1, 1, second, 1, 1, 1],
         stuck_motion: STUCK_MOTION,
         stuck_samples: samples,
@@ -67,7 +67,7 @@ enum Wrong {
 /// A supervisor on a machine of six codes.
 struct Bench {
     supervisor: Supervisor<f64>,
-    plan: Plan<f64>,
+    plan: Supervision<f64>,
     codes: [i32; 6],
 }
 
@@ -289,7 +289,7 @@ fn an_oracle_of_any_other_time_or_bound_is_told_apart() {
 fn codes_are_held_or_go_to_rest_as_the_phase_says() {
     for (ramp_step, max_step, expected) in [(40, 100, 40), (100, 100, 100), (101, 100, 100), (40, 3, 3)] {
         for ramp_every in [1, 2, 5] {
-            let plan = Plan { ramp_step, ramp_every, ..plan(&Bounds::legs()) };
+            let plan = Supervision { ramp_step, ramp_every, ..plan(&Bounds::legs()) };
             let mut supervisor = Supervisor::<f64>::new();
             for phase in [Phase::Arming, Phase::Running, Phase::Holding] {
                 supervisor.phase = phase;

@@ -73,7 +73,7 @@ fn harder(model: &Model, stop: &Stopping, room: &[f64; 6], limits: &stop::Limits
 
 /// A stop on the way of trajectory `index`.
 pub(super) fn leaves(model: &Model, index: usize, name: &str, kind: &TrajectoryKind, leaves: &Leaves) -> Diagnostic {
-    let (key, mend) = match kind {
+    let (key, fix) = match kind {
         TrajectoryKind::Paper { frequency, .. } => {
             ("frequency", format!("at most {} Hz stops within", down(frequency * leaves.share)))
         }
@@ -83,7 +83,7 @@ pub(super) fn leaves(model: &Model, index: usize, name: &str, kind: &TrajectoryK
     };
     let message =
         format!("trajectory \"{name}\": another command on the way would bring it to rest with {}", leaves.end);
-    let help = format!("{mend}; or raise control.setpoint.stop_acceleration and stop_jerk");
+    let help = format!("{fix}; or raise control.setpoint.stop_acceleration and stop_jerk");
     finding(model, Severity::Error, codes::STOP_LEAVES, &format!("trajectory[{index}].{key}"), message, help)
 }
 

@@ -5,17 +5,17 @@ use super::debounce::TIMERS;
 /// Constants of the supervisor; from `supervisor`. Six gauges are looked at in turn, so what they show is counted in samples, one
 /// in six ticks.
 #[derive(Debug, Clone, Copy)]
-pub struct Plan<T> {
+pub struct Supervision<T> {
     /// Ticks without any condition that arming takes, ≥ 1.
     pub arm_ticks: u32,
     /// Code at rest.
     pub rest: i32,
     /// Codes by which a ramp moves, ≥ 1, every so many ticks, ≥ 1.
     pub ramp_step: i32,
-    /// See [`Plan::ramp_step`].
+    /// See [`Supervision::ramp_step`].
     pub ramp_every: u32,
     /// For each of [`super::TIMED`], the count at which the condition is a cause, ≥ 1.
-    pub patience: [u32; TIMERS],
+    pub timeout: [u32; TIMERS],
     /// For each of them, what a tick with the condition counts; one without it takes 1 off.
     pub weight: [u32; TIMERS],
     /// Motion along a gauge that the codes sent must have caused before an unchanged word means that the gauge is stuck, m.
