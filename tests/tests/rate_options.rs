@@ -1,5 +1,5 @@
 //! Rate-dependent options of the emitted controller: equal bits on host and microcontroller, and what they are worth on the
-//! reference plant. `cargo test --release -p specgen-tests rate_options -- --nocapture` prints the table of
+//! reference plant. `SPECGEN_SOAK=1 cargo test --release -p specgen-tests rate_options -- --nocapture` prints the table of
 //! `docs/hysteresis.md`, and what a tick costs with each.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]

@@ -1,7 +1,7 @@
 //! What each command does, in order.
 
 use std::path::Path;
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 use std::time::Instant;
 
 use crate::binaries::{self, Binary, Mode, Ran};
@@ -178,7 +178,27 @@ fn formatting(root: &Path) -> Outcome {
             return outcome;
         }
     }
-    Outcome::Passed
+    // Carried over into every controller, and a member of no package where they lie.
+    match law_files(&root.join("firmware/controller/law")) {
+        Ok(files) => {
+            let fix = format!("run: rustfmt --edition 2024 {}", files.join(" "));
+            let mut rustfmt = Command::new("rustfmt");
+            rustfmt.current_dir(root).args(["--edition", "2024", "--check"]).args(&files);
+            expect_success(rustfmt, &fix)
+        }
+        Err(error) => Outcome::Failed(format!("firmware/controller/law: {error}")),
+    }
+}
+
+fn law_files(law: &Path) -> std::io::Result<Vec<String>> {
+    let mut files = Vec::new();
+    for folder in std::fs::read_dir(law)? {
+        for file in std::fs::read_dir(folder?.path())? {
+            files.push(file?.path().display().to_string());
+        }
+    }
+    files.sort();
+    Ok(files)
 }
 
 fn lints(root: &Path) -> Outcome {

@@ -38,7 +38,10 @@ pub mod permitted;
 pub mod sensing;
 pub mod setpoint;
 pub mod snapshot;
+mod stage;
+
 pub mod stages;
+mod standing;
 mod state;
 mod step;
 
@@ -53,8 +56,8 @@ pub use specgen_runtime::setpoint::{Command, CommandKind, Target};
 pub use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
 pub use state::{LegState, State};
 pub use step::{
-    GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE, TickInput,
-    TickOutput, WRENCH_FAULT, actuate, step,
+    GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE,
+    STATIC_INVERSE, TickInput, TickOutput, WRENCH_FAULT, actuate, step,
 };
 
 pub use words::{

@@ -4,7 +4,8 @@
 //! What the supervisor takes for a fault; from `supervisor`.
 
 use specgen_runtime::supervisor::Supervision;
-use crate::Real;
+use crate::hysteresis::Memory;
+use crate::{Real, limits};
 
 /// Bounds and times, these in ticks, or in samples of six ticks.
 pub const SUPERVISION: Supervision<Real> = Supervision {
@@ -52,3 +53,21 @@ pub const READINGS_PER_LEG: [[Real; 6]; 6] = [
         -0.27598478107822527, -0.22131909259459276,
     ],
 ];
+
+/// All legs stand alike at reset.
+pub(crate) const ALIKE_AT_REST: bool = true;
+
+/// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.
+pub(crate) const fn memory_at_rest(_leg: usize) -> Memory {
+    Memory::new()
+}
+
+/// Displacement that the model gives a leg at reset, m.
+pub(crate) const fn displacement_at_rest(_leg: usize) -> Real {
+    0.0
+}
+
+/// Converter code of every leg at reset.
+pub(crate) const fn code_at_rest() -> i32 {
+    limits::CODES[0]
+}

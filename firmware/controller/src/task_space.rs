@@ -144,7 +144,7 @@ pub const REST_FORCE: [Real; LEGS] = [
 /// Largest |component| of the measured wrench that is believed, N and N m; from `control.interaction`.
 pub const WRENCH_LIMIT: [Real; 6] = [3600.0, 3600.0, 3600.0, 360.0, 360.0, 360.0];
 
-/// Lead of the leg displacements, in periods; from `control.lead`.
+/// Lead of the leg displacements, in periods; from `control.lead`. Zero: none.
 pub const LEAD: Real = 1.0;
 
 /// Part of the offset of a change of mode that is left after a tick; from `control.transfer_time`.

@@ -159,7 +159,9 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             Long("comedi-range") => options.comedi_ranges[0] = range(&mut parser, "--comedi-range")?,
             Long("comedi-out-range") => options.comedi_ranges[1] = range(&mut parser, "--comedi-out-range")?,
             Long("comedi-library") => options.comedi_library = Some(parser.value()?.into()),
-            Long("sim-timeout") => options.sim_timeout = (number(&mut parser, "--sim-timeout", 0.1, 10_000.0)? * 1e6) as u64,
+            Long("sim-timeout") => {
+                options.sim_timeout = (number(&mut parser, "--sim-timeout", 0.1, 10_000.0)? * 1e6) as u64
+            }
             Long("seconds") => {
                 options.duration = Some((number(&mut parser, "--seconds", 0.01, 1e7)? * SECOND as f64) as u64);
             }

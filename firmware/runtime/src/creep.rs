@@ -134,6 +134,27 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
         still >= T::ZERO && still <= table.still.full_displacement()
     }
 
+    /// Whether another inverse was used than the one asked for: never, there is only one.
+    #[inline]
+    #[must_use]
+    pub const fn fell_back(&self) -> bool {
+        false
+    }
+
+    /// One tick that ends as near to `displacement` (m, finite) as `permitted` lets its drive; returns whether it is out of reach.
+    #[inline]
+    pub fn follow_within<const N: usize, const NODES: usize>(
+        &mut self,
+        table: &CreepEverett<T, N, NODES, K>,
+        displacement: T,
+        permitted: impl FnOnce(T) -> T,
+    ) -> bool {
+        let within = self.reaches(table, displacement);
+        let drive = permitted(self.solve(table, displacement));
+        self.apply(table, drive);
+        !within
+    }
+
     /// f: what the static model must give for `displacement` at the end of the next tick, m; not limited.
     #[inline]
     fn still_part<const N: usize, const NODES: usize>(

@@ -165,6 +165,20 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         found.unwrap_or(still)
     }
 
+    /// One tick that ends as near to `displacement` (m, finite) as `permitted` lets its drive; returns whether it is out of reach.
+    #[inline]
+    pub fn follow_within<const N: usize, const NODES: usize>(
+        &mut self,
+        table: &DynamicEverett<T, N, NODES>,
+        displacement: T,
+        permitted: impl FnOnce(T) -> T,
+    ) -> bool {
+        let within = self.reaches(table, displacement);
+        let drive = permitted(self.solve(table, displacement));
+        self.apply(table, drive);
+        !within
+    }
+
     /// The drive at which h exceeds Γ₀ at the last drive by `wanted` (m); `still` is that of the static model.
     fn invert<const N: usize, const NODES: usize>(
         &self,

@@ -168,6 +168,33 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         }
     }
 
+    /// Whether the table reaches `displacement` (m).
+    #[inline]
+    #[must_use]
+    pub fn reaches<const N: usize, const NODES: usize>(&self, table: &Everett<T, N, NODES>, displacement: T) -> bool {
+        displacement >= T::ZERO && displacement <= table.full_displacement()
+    }
+
+    /// Whether another inverse than the static one was asked for and not used: never, there is no other.
+    #[inline]
+    #[must_use]
+    pub const fn fell_back(&self) -> bool {
+        false
+    }
+
+    /// [`ReversalMemory::follow`] for a displacement (m, finite) that the table may not reach; returns whether it did not.
+    #[inline]
+    pub fn follow_within<const N: usize, const NODES: usize>(
+        &mut self,
+        table: &Everett<T, N, NODES>,
+        displacement: T,
+        permitted: impl FnOnce(T) -> T,
+    ) -> bool {
+        let within = table.within_reach(displacement);
+        self.follow(table, within, permitted);
+        within != displacement
+    }
+
     /// Γ⁻¹ and Γ in one: solves for `displacement`, which must be within the reach of the table, and applies the drive that
     /// `permitted` makes of the solution (finite). `permitted` is called once.
     ///

@@ -17,8 +17,8 @@ const REFERENCE_CURVES: u32 = 32;
 const LEG_CURVES: u32 = 8;
 /// Gains of the six legs against the reference leg's.
 const LEG_GAINS: [f64; 6] = [0.95, 1.03, 0.98, 1.05, 1.0, 0.97];
-/// Emitted files that differ between specs only in their header and in what the controller says of itself.
-const SAME_FOR_EVERY_SPEC: [&str; 3] = ["src/state.rs", "src/step.rs", "src/words.rs"];
+/// Differs between specs only in its header and in what the controller says of itself.
+const WORDS: &str = "src/words.rs";
 /// Specs whose emitted crate is kept as a golden: small ones, one per scalar.
 const GOLDENS: [&str; 2] = ["small-grid", "six-records"];
 
@@ -67,14 +67,14 @@ pub fn reference_controller(root: &Path) -> Result<Files, String> {
     Ok(emit::emit(&compiled(&root.join("specs/reference.toml"))?.ir))
 }
 
-/// IR and emitted crate of small specs; what is the same for every spec stands in `firmware/controller` already.
+/// IR and emitted crate of small specs, without what is carried over from `firmware/controller/law`.
 pub fn goldens(root: &Path) -> Result<Files, String> {
     let mut files = Files::new();
     for name in GOLDENS {
         let compiled = compiled(&root.join(format!("specs/features/{name}.toml")))?;
         files.insert(format!("{name}/ir.json"), workspace::ir_text(&compiled.ir));
         for (path, text) in emit::emit(&compiled.ir) {
-            if SAME_FOR_EVERY_SPEC.contains(&path.as_str()) {
+            if path == WORDS || emit::is_carried_over(&path) {
                 continue;
             }
             // Cargo would take a manifest here for a package of this repository.

@@ -14,9 +14,13 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let (tables, of_leg) = statics(ir.scalar, &h.tables, &h.table_of_leg, "EVERETT", doc);
     let rate = rate(ir, &of_leg);
     let (imports, types, constants) = (rate.imports, rate.types, rate.constants);
-    let lead = h.lead.as_ref().map(|lead| {
-        let (ticks, limit) = (literal::real(ir.scalar, lead.ticks), literal::real(ir.scalar, lead.limit));
+    // A platform leads its load, see `task_space.rs`.
+    let lead = ir.task_space.is_none().then(|| {
+        let (ticks, limit) = h.lead.as_ref().map_or((0.0, 0.0), |lead| (lead.ticks, lead.limit));
+        let (ticks, limit, led) = (literal::real(ir.scalar, ticks), literal::real(ir.scalar, limit), h.lead.is_some());
         quote! {
+            /// Whether legs are asked to be ahead, for their dead time.
+            pub const LED: bool = #led;
             /// Lead of the leg displacements asked for, ticks; from `hysteresis.dead_time`.
             pub const LEAD: Real = #ticks;
             /// Most that it adds to a demand, m; from `actuator.slew_rate`.
@@ -172,12 +176,4 @@ pub fn rate_doc(ir: &Ir) -> Vec<&'static str> {
         lines.insert(0, "");
     }
     lines
-}
-
-/// Name of the status bits that a model with an inverse of its own has, and a comma.
-pub fn status_name(ir: &Ir) -> TokenStream {
-    match &ir.hysteresis.rate {
-        Some(RateModel::DynamicPreisach { .. }) => quote! { STATIC_INVERSE, },
-        _ => quote! {},
-    }
 }

@@ -3,9 +3,4 @@
 pub mod config;
 pub mod crate_root;
 pub mod sensing;
-pub mod snapshot;
-pub mod stages;
-pub mod state;
-pub mod step;
-pub mod supervised;
 pub mod words;

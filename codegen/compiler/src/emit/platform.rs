@@ -2,10 +2,5 @@
 
 pub mod config;
 pub mod crate_root;
-pub mod snapshot;
-pub mod stages;
-pub mod state;
-pub mod step;
-pub mod supervised;
 pub mod task_space;
 pub mod words;

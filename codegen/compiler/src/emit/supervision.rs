@@ -4,7 +4,7 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 use super::literal;
-use crate::ir::Ir;
+use crate::ir::{Ir, RateModel};
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let s = &ir.supervision;
@@ -39,12 +39,15 @@ pub fn emit(ir: &Ir) -> TokenStream {
             }
         }
     };
+    let at_rest = at_rest(ir);
+    let limits = s.risen.is_none().then(|| quote! { , limits });
     quote! {
         #![doc = " What the supervisor takes for a fault; from `supervisor`."]
 
         use specgen_runtime::supervisor::Supervision;
 
-        use crate::Real;
+        use crate::hysteresis::Memory;
+        use crate::{Real #limits};
 
         /// Bounds and times, these in ticks, or in samples of six ticks.
         pub const SUPERVISION: Supervision<Real> = Supervision {
@@ -64,5 +67,59 @@ pub fn emit(ir: &Ir) -> TokenStream {
         /// Ticks without a request over a link after which its host is lost; from `supervisor.host_lost`.
         pub const HOST_TICKS: u32 = #host_ticks;
         #of_kind
+        #at_rest
+    }
+}
+
+/// How legs stand at reset, which is at rest. One for all where they rest at the lowest voltage, at which every history is
+/// forgotten.
+fn at_rest(ir: &Ir) -> TokenStream {
+    let real = |value| literal::real(ir.scalar, value);
+    let (memory, displacement, code) = match &ir.supervision.risen {
+        None => (quote! { Memory::new() }, quote! { 0.0 }, quote! { limits::CODES[0] }),
+        Some(rest) => {
+            let drive = real(rest.drive);
+            let memories = (0..6).map(|leg| {
+                let displacement = real(rest.displacement[leg]);
+                let rate = matches!(ir.hysteresis.rate, Some(RateModel::DynamicPreisach { .. })).then(|| {
+                    let rate = real(rest.rate[leg]);
+                    quote! { , #rate }
+                });
+                quote! { Memory::risen(#drive, #displacement #rate) }
+            });
+            let displacements = rest.displacement.map(real);
+            let code = literal::integer(ir.supervision.rest);
+            (quote! { [#(#memories),*][leg] }, quote! { [#(#displacements),*][leg] }, code)
+        }
+    };
+    let alike = ir.supervision.risen.is_none();
+    let (doc, leg) = if alike {
+        (" Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.", quote! { _leg })
+    } else {
+        (
+            " Reset: at `supervisor.rest_voltage`, risen to it from the lowest voltage after a sweep to the highest and back, gauges zeroed at the lowest.",
+            quote! { leg },
+        )
+    };
+    let of_platform = ir.task_space.is_some().then(|| {
+        quote! {
+            /// Displacement that the model gives a leg at reset, m.
+            pub(crate) const fn displacement_at_rest(#leg: usize) -> Real {
+                #displacement
+            }
+        }
+    });
+    quote! {
+        /// All legs stand alike at reset.
+        pub(crate) const ALIKE_AT_REST: bool = #alike;
+        #[doc = #doc]
+        pub(crate) const fn memory_at_rest(#leg: usize) -> Memory {
+            #memory
+        }
+        #of_platform
+        /// Converter code of every leg at reset.
+        pub(crate) const fn code_at_rest() -> i32 {
+            #code
+        }
     }
 }

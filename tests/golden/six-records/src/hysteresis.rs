@@ -21,6 +21,15 @@ pub type Table = Everett<Real, GRID, NODES>;
 /// Reversal memory of one leg.
 pub type Memory = ReversalMemory<Real, MEMORY>;
 
+/// Whether legs are asked to be ahead, for their dead time.
+pub const LED: bool = false;
+
+/// Lead of the leg displacements asked for, ticks; from `hysteresis.dead_time`.
+pub const LEAD: Real = 0.0;
+
+/// Most that it adds to a demand, m; from `actuator.slew_rate`.
+pub const LEAD_LIMIT: Real = 0.0;
+
 /// Tables of the six legs.
 pub static TABLES: [Table; LEGS] = [
     Everett { nodes: &EVERETT_0 },

@@ -34,7 +34,10 @@ mod machine_words;
 pub mod permitted;
 pub mod sensing;
 pub mod snapshot;
+mod stage;
+
 pub mod stages;
+mod standing;
 mod state;
 mod step;
 
@@ -47,7 +50,8 @@ pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};
 pub use specgen_runtime::{CodeLimits, Law};
 pub use state::{LegState, State};
 pub use step::{
-    GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, TickInput, TickOutput, actuate, step,
+    GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, STATIC_INVERSE, TickInput, TickOutput,
+    actuate, step,
 };
 
 pub use words::{

@@ -4,7 +4,8 @@
 //! What the supervisor takes for a fault; from `supervisor`.
 
 use specgen_runtime::supervisor::Supervision;
-use crate::Real;
+use crate::hysteresis::Memory;
+use crate::{Real, limits};
 
 /// Bounds and times, these in ticks, or in samples of six ticks.
 pub const SUPERVISION: Supervision<Real> = Supervision {
@@ -30,3 +31,16 @@ pub const APPROACH_KEEP: Real = 0.998002;
 
 /// A way this short, m and rad, is none.
 pub const APPROACH_NEGLIGIBLE: Real = 1e-13;
+
+/// All legs stand alike at reset.
+pub(crate) const ALIKE_AT_REST: bool = true;
+
+/// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.
+pub(crate) const fn memory_at_rest(_leg: usize) -> Memory {
+    Memory::new()
+}
+
+/// Converter code of every leg at reset.
+pub(crate) const fn code_at_rest() -> i32 {
+    limits::CODES[0]
+}

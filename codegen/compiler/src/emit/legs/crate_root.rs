@@ -7,7 +7,7 @@ use crate::emit::{hysteresis, identity};
 use crate::ir::Ir;
 
 pub fn emit(ir: &Ir) -> TokenStream {
-    let (rate_doc, static_inverse) = (hysteresis::rate_doc(ir), hysteresis::status_name(ir));
+    let rate_doc = hysteresis::rate_doc(ir);
     let title = identity::title(ir);
     let identity = identity::emit(ir);
     quote! {
@@ -43,7 +43,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod permitted;
         pub mod sensing;
         pub mod snapshot;
+        mod stage;
         pub mod stages;
+        mod standing;
         mod state;
         mod step;
         pub mod supervised;
@@ -54,7 +56,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};
         pub use specgen_runtime::{CodeLimits, Law};
         pub use state::{LegState, State};
-        pub use step::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, #static_inverse TickInput, TickOutput, actuate, step};
+        pub use step::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, STATIC_INVERSE, TickInput, TickOutput, actuate, step};
         pub use words::{
             CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words,
         };

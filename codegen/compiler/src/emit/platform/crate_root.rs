@@ -9,7 +9,7 @@ use crate::ir::Ir;
 pub fn emit(ir: &Ir) -> TokenStream {
     let title = identity::title(ir);
     let identity = identity::emit(ir);
-    let (rate_doc, static_inverse) = (hysteresis::rate_doc(ir), hysteresis::status_name(ir));
+    let rate_doc = hysteresis::rate_doc(ir);
     quote! {
         #![doc = #title]
         #![doc = ""]
@@ -47,7 +47,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod sensing;
         pub mod setpoint;
         pub mod snapshot;
+        mod stage;
         pub mod stages;
+        mod standing;
         mod state;
         mod step;
         pub mod supervised;
@@ -61,7 +63,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
         pub use state::{LegState, State};
         pub use step::{
-            GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE, #static_inverse TickInput, TickOutput, WRENCH_FAULT,
+            GAUGE_FAULT, GENERATOR_BUSY, LEG_LIMITED, SETPOINT_FAULT, SETPOINT_STALE, STATIC_INVERSE, TickInput, TickOutput, WRENCH_FAULT,
             actuate, step,
         };
         pub use words::{

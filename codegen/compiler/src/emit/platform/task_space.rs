@@ -21,13 +21,11 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let (rest_force, wrench_limit) = (six(&law.rest_force), six(&law.wrench_limit));
     let (keep, negligible) = (real(law.transfer_keep), real(law.transfer_negligible));
     let (cells_per_metre, metres_per_cell) = (real(law.cells_per_metre), real(law.metres_per_cell));
-    let lead = (law.lead != 0.0).then(|| {
-        let lead = real(law.lead);
-        quote! {
-            /// Lead of the leg displacements, in periods; from `control.lead`.
-            pub const LEAD: Real = #lead;
-        }
-    });
+    let lead = real(law.lead);
+    let lead = quote! {
+        /// Lead of the leg displacements, in periods; from `control.lead`. Zero: none.
+        pub const LEAD: Real = #lead;
+    };
     let notch = match &law.notch {
         None => without_notch(),
         Some(notch) => with_notch(ir, notch, &matrix),

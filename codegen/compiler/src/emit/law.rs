@@ -1,0 +1,36 @@
+//! What is the same for every spec of a kind: ordinary files below `firmware/controller/law`, carried over as they stand. What
+//! they need to know of the spec they take from the emitted constants.
+
+use crate::ir::Ir;
+
+/// Path in the emitted crate, text.
+type File = (&'static str, &'static str);
+
+macro_rules! files {
+    ($($folder:literal: $($name:literal),+;)+) => {
+        &[$($((
+            concat!("src/", $name, ".rs"),
+            include_str!(concat!("../../../../firmware/controller/law/", $folder, "/", $name, ".rs")),
+        ),)+)+]
+    };
+}
+
+/// Of six legs with their own gauges.
+pub const LEGS: &[File] = files! {
+    "common": "machine_words", "snapshot", "stage", "supervised";
+    "legs": "stages", "standing", "state", "step", "waves";
+};
+
+/// Of a platform.
+pub const PLATFORM: &[File] = files! {
+    "common": "machine_words", "snapshot", "stage", "supervised";
+    "platform": "stages", "standing", "state", "step", "waves";
+};
+
+/// The text of one in the emitted crate.
+pub fn carried_over(ir: &Ir, text: &str) -> String {
+    format!(
+        "// Carried over by specgen {}: the same for every spec. Its constants are in the generated files beside it.\n\n{text}",
+        ir.specgen_version
+    )
+}

@@ -1,0 +1,337 @@
+//! One control tick.
+//!
+//! At time t_n the interval that the voltages u_n were held over has just ended and the gauges are read; the set-point is
+//! that of the END of the interval that begins now, t_{n+1}, and the voltages that come out are held over it.
+//!
+//! ```text
+//! sense      gauges → h                                                      pose from rest
+//! learn      e = N(h_d(t_n) − h) ;  s ← s + T k_I e                          (7), held where it would wind up
+//!            ν = N(Y − (q̂ − p) − δ̂ − φ̂) ;  δ̂, φ̂ ← ν                        (AII.3), (AII.5), (AII.6), in modal coordinates
+//! setpoint   h_d, ḣ_d, ḧ_d at t_{n+1}
+//! load       p = (J⁻ᵀ(M ḧ_d + C ḣ_d + G + K_e (h_d − h_e)) − f_rest)/k_a      known deflection of the legs, (7)
+//!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T                  damping, lead
+//! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is what was really requested
+//! ```
+//! N is the modal notch. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback
+//! is none and does not.
+//!
+//! Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
+//! offset b of a change of mode) and w = q − q̂ withheld by limits, the innovation is then w − b − f − J e: no large numbers
+//! are subtracted, and f is small in modal coordinates, too. What is left out is the error times the change of J over the
+//! workspace, a thousandth of it, and the rounding of the converter on a leg that is free.
+//!
+//! δ̂ and φ̂ are kept in modal coordinates, where N works: with the same weights on every leg the law commutes with the map
+//! between them, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
+
+use crate::dynamics::Load;
+use crate::hysteresis::{TABLES, Table};
+use crate::limits::DAC;
+use crate::setpoint::SETPOINTS;
+use crate::task_space::{
+    COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP,
+    TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS, linear_displacement, linear_drive, modal_error, notch_error,
+    notch_innovation,
+};
+use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
+use specgen_runtime::feedback::{force_of, winds_up};
+use specgen_runtime::linear::{difference, each, transform};
+use specgen_runtime::setpoint::{Command, CommandKind};
+use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState};
+
+/// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
+pub const LEG_LIMITED: u32 = 0x3f;
+
+/// Bits 8 to 13: gauge not finite or out of range. The pose, the integral and the estimates were held.
+pub const GAUGE_FAULT: u32 = 0x3f00;
+
+/// Bit 16: set-point not finite, out of the workspace or a jump; the last one was held.
+pub const SETPOINT_FAULT: u32 = 0x1_0000;
+
+/// Bit 17: the stream of set-points is stale; brought to rest.
+pub const SETPOINT_STALE: u32 = 0x2_0000;
+
+/// Bit 18: bias, move or trajectory under way.
+pub const GENERATOR_BUSY: u32 = 0x4_0000;
+
+/// Bit 19: measured wrench not finite or out of range; the last one believed was kept.
+pub const WRENCH_FAULT: u32 = 0x8_0000;
+
+/// Bits 24 to 29: the rate-dependent inverse of the leg was not safe to use; the static one stood in for it. Never set by models
+/// with one inverse.
+pub const STATIC_INVERSE: u32 = 0x3f00_0000;
+
+/// What a tick reads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TickInput {
+    /// What the platform is to do.
+    pub command: Command<Real>,
+    /// Reading of each gauge: V if the spec gives a calibration, else m from rest.
+    pub gauge: [Real; 6],
+    /// Measured force (N) and torque (N m) of the work piece ON the platform, about P_C, base axes.
+    pub wrench: [Real; 6],
+}
+
+/// What a tick yields. Every number is finite. What else there is to know stands in the [`State`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TickOutput {
+    /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
+    pub voltage: [Real; LEGS],
+    /// Converter code of each leg.
+    pub dac_code: [i32; LEGS],
+    /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`], [`SETPOINT_STALE`], [`GENERATOR_BUSY`], [`WRENCH_FAULT`].
+    pub status: u32,
+}
+
+/// One control tick. See the module for the timing.
+pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
+    let status = advance(config, state, input.command.kind, input);
+    outputs(state, status)
+}
+
+/// The work of a tick, with `kind` in place of that of the command; returns its status.
+pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, input: &TickInput) -> u32 {
+    let entered = enter_mode(config, state);
+    let gauge_faults = sense(config, state, &input.gauge);
+    if gauge_faults == 0 {
+        learn(config, state);
+    }
+    let wrench_good = take_wrench(config, state, &input.wrench);
+    let damping = damping(config, state);
+    let setpoint_status = state.generator.tick_as(&SETPOINTS, kind, &input.command);
+    let Load { displacement: demand, force } = known_load(config, state);
+    let correction = correction(config, state);
+    state.load = each(|leg| {
+        let load = (force[leg] - REST_FORCE[leg]) * COMPLIANCE;
+        if LEAD == 0.0 { load } else { load + (demand[leg] - state.demand[leg]) * LEAD }
+    });
+    state.demand = demand;
+    if let Some(damping) = &damping {
+        state.load = each(|leg| state.load[leg] + damping[leg]);
+    }
+    let mut request = each(|leg| demand[leg] + state.load[leg] + correction[leg]);
+    if entered {
+        hand_over(config, state, &request);
+        request = each(|leg| state.legs[leg].requested);
+    } else {
+        state.transfer.fade(TRANSFER_KEEP, TRANSFER_NEGLIGIBLE);
+        if state.transfer.is_active() {
+            let offset = state.transfer.offset();
+            request = each(|leg| request[leg] + offset[leg]);
+        }
+    }
+    let mut limited = 0;
+    for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
+        let held_back = actuate(config, leg, table, request[index]);
+        limited |= (held_back as u32) << index;
+    }
+    state.limited = limited != 0;
+    let mut static_inverse = 0;
+    for (index, leg) in state.legs.iter().enumerate() {
+        static_inverse |= ((config.mode().inverts() && leg.memory.fell_back()) as u32) << (24 + index);
+    }
+    static_inverse | limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT }
+}
+
+/// What goes out, of the state that the tick left.
+#[inline]
+pub(crate) fn outputs(state: &State, status: u32) -> TickOutput {
+    let legs = &state.legs;
+    TickOutput { voltage: each(|leg| DAC.voltage(legs[leg].code)), dac_code: each(|leg| legs[leg].code), status }
+}
+
+/// Whether this tick is the first of its mode, or of its source of the interaction force. If so, what the mode does not
+/// use is put at rest; the first request then defines what keeps the voltages where they are.
+#[inline]
+fn enter_mode(config: &Config, state: &mut State) -> bool {
+    let (mode, interaction) = (config.mode(), config.interaction());
+    let same_force = state.interaction == interaction
+        && (interaction != Interaction::Modelled || state.environment == *config.environment());
+    if state.mode == Some(mode) && same_force {
+        return false;
+    }
+    let adapted = match state.mode {
+        Some(before) => before.law() != Law::Invhys,
+        None => false,
+    };
+    if mode.law() != Law::Invhys && !adapted {
+        state.integral = Integral::new();
+        state.deflection = [0.0; 6];
+    }
+    state.mode = Some(mode);
+    state.interaction = interaction;
+    state.environment = *config.environment();
+    for estimate in &mut state.estimates {
+        match mode.law() {
+            Law::Invhys => *estimate = Estimate::new(),
+            Law::Ewma => estimate.drift = 0.0,
+            Law::Pcc => {}
+        }
+    }
+    for leg in &mut state.legs {
+        leg.requested = requested(mode, leg);
+        leg.excess = 0.0;
+    }
+    state.limited = false;
+    if mode.law() == Law::Invhys {
+        state.innovation_notch = NotchState::new();
+    }
+    if !mode.feeds_back() {
+        state.integral = Integral::new();
+        state.error_notch = NotchState::new();
+        state.error = [0.0; 6];
+        state.deflection = [0.0; 6];
+    }
+    true
+}
+
+/// Gives what the first `request` of a mode (m of each leg) lacks to where the legs stand to what the mode would itself
+/// come to hold it with: the estimates, else the integral if every axis has one. Else it becomes an offset that fades.
+#[cold]
+fn hand_over(config: &Config, state: &mut State, request: &[Real; LEGS]) {
+    let held = each(|leg| state.legs[leg].requested - request[leg]);
+    let mode = config.mode();
+    let mut offset = [0.0; LEGS];
+    if mode.law() != Law::Invhys {
+        for (estimate, held) in state.estimates.iter_mut().zip(transform(&LEGS_TO_MODES, &held)) {
+            estimate.level -= held;
+        }
+    } else if mode.feeds_back() && config.active_gains().integral.iter().all(|gain| *gain > 0.0) {
+        state.integral.grow(&transform(&LEGS_TO_WRENCH, &held));
+    } else {
+        offset = held;
+    }
+    state.transfer.begin(offset);
+}
+
+/// h and ḣ from the gauges; returns the gauges that are not believed, bit by bit. With any such the last pose is held.
+#[inline]
+pub(crate) fn sense(config: &Config, state: &mut State, gauge: &[Real; 6]) -> u32 {
+    let faults = sensing::faults(gauge);
+    if faults == 0 {
+        state.pose = sensing::pose(gauge);
+    }
+    if !config.damps() {
+        state.rate.rest();
+    } else if faults == 0 {
+        state.rate.update(&sensing::RATE, &state.pose);
+    } else {
+        state.rate.coast(&sensing::RATE);
+    }
+    faults
+}
+
+/// What the readings teach: the integral of (7) and the run-to-run estimates.
+#[inline]
+pub(crate) fn learn(config: &Config, state: &mut State) {
+    let mode = config.mode();
+    let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
+    if mode.feeds_back() {
+        state.error = notch_error(&mut state.error_notch, &error);
+        let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
+        if !(state.limited && would_wind_up(&state.legs, &growth)) {
+            state.integral.grow(&growth);
+        }
+    }
+    if mode.law() != Law::Invhys {
+        let disturbed = state.limited || state.transfer.is_active();
+        let mut innovation = each(|mode| -error[mode] - state.deflection[mode]);
+        if disturbed {
+            let offset = state.transfer.offset();
+            let withheld = each(|leg| state.legs[leg].excess - offset[leg]);
+            let withheld = transform(&LEGS_TO_MODES, &withheld);
+            innovation = each(|mode| innovation[mode] + withheld[mode]);
+        }
+        let innovation = notch_innovation(&mut state.innovation_notch, &innovation);
+        let (level, drift) = (config.level_weight(), config.drift_weight());
+        Estimate::correct(&mut state.estimates, mode.law(), level, drift, &innovation);
+    }
+}
+
+/// Whether the integral's growth would push a leg further beyond the limit that holds it back.
+#[inline]
+fn would_wind_up(legs: &[LegState; LEGS], growth: &[Real; 6]) -> bool {
+    let excess = each(|leg| legs[leg].excess);
+    winds_up(&excess, &transform(&WRENCH_TO_LEGS, growth))
+}
+
+/// Takes the measured wrench if it is to be believed; one that nobody asks for is not looked at.
+#[inline]
+fn take_wrench(config: &Config, state: &mut State, wrench: &[Real; 6]) -> bool {
+    if config.interaction() != Interaction::Measured {
+        return true;
+    }
+    let good = wrench.iter().zip(&WRENCH_LIMIT).all(|(value, limit)| (-*limit..=*limit).contains(value));
+    if good {
+        state.wrench = *wrench;
+    }
+    good
+}
+
+/// J⁻ᵀ k_v ė/k_a with ė = ḣ_d(t_n) − ḣ: m of each leg; none without k_v.
+#[inline]
+fn damping(config: &Config, state: &State) -> Option<[Real; LEGS]> {
+    if !config.damps() {
+        return None;
+    }
+    let error = difference(&state.generator.target().rate, state.rate.value());
+    Some(transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error)))
+}
+
+/// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
+#[inline]
+pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
+    let target = state.generator.target();
+    match config.interaction() {
+        Interaction::Neglected => dynamics::load(target, None),
+        Interaction::Measured => dynamics::load(target, Some(&state.wrench)),
+        Interaction::Modelled => {
+            let environment = config.environment();
+            let compressed = difference(&environment.rest, &target.pose);
+            dynamics::load(target, Some(&force_of(&environment.stiffness, &compressed)))
+        }
+    }
+}
+
+/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂: m of each leg.
+#[inline]
+pub(crate) fn correction(config: &Config, state: &mut State) -> [Real; LEGS] {
+    if config.mode().feeds_back() {
+        let proportional = force_of(&config.active_gains().proportional, &state.error);
+        let integral = &state.integral.force;
+        let force = each(|axis| proportional[axis] + integral[axis]);
+        state.deflection = transform(&FORCE_TO_MODES, &force);
+    }
+    let wanted = each(|mode| state.deflection[mode] - state.estimates[mode].correction());
+    transform(&MODES_TO_LEGS, &wanted)
+}
+
+/// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,
+/// voltage or slew rate held the leg back.
+#[inline]
+pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
+    let LegState { memory, code, .. } = leg;
+    let mut limited = false;
+    let mut permitted = |drive: Real| {
+        let (permitted, held_back) = DAC.code(drive, *code, config.code_limits());
+        *code = permitted;
+        limited |= held_back;
+        DAC.drive(permitted)
+    };
+    if config.mode().inverts() {
+        let out_of_reach = memory.follow_within(table, request, &mut permitted);
+        limited |= out_of_reach;
+        leg.requested = leg.memory.displacement();
+    } else {
+        let drive = permitted(linear_drive(request));
+        memory.apply(table, drive);
+        leg.requested = linear_displacement(drive);
+    }
+    leg.excess = if limited { request - leg.requested } else { 0.0 };
+    limited
+}
+
+/// What the code that is held means in the leg model of a mode, m.
+#[inline]
+fn requested(mode: ControlMode, leg: &LegState) -> Real {
+    if mode.inverts() { leg.memory.displacement() } else { linear_displacement(DAC.drive(leg.code)) }
+}

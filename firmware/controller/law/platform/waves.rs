@@ -1,0 +1,39 @@
+//! A wave in place of the host's set-points: what it has to keep to, and the input words that it writes.
+
+use crate::setpoint::SETPOINTS;
+use crate::{Config, GENERATOR_BUSY, Real};
+use specgen_runtime::setpoint::CommandKind;
+use specgen_runtime::wave::Limits;
+use specgen_runtime::{Motion, Real as _, wave};
+
+/// Word of the command to stream.
+const STREAM: u64 = 1;
+
+/// Those of streams; from `control.setpoint` and `workspace`.
+#[must_use]
+pub fn limits(_config: &Config) -> Limits<Real> {
+    Limits::of(&SETPOINTS)
+}
+
+/// A wave may begin with the next tick: the platform is at its bias pose and plays nothing. `status` is that of the last
+/// tick, `words` is the command that it ran under. That the wave begins where the platform stands is for the generator to
+/// say, which believes no jump.
+///
+/// # Errors
+/// It may not; the axis in the way, 0 for all of them.
+pub fn may_begin(status: u32, words: &[u64], _center: &[Real; 6], _limits: &Limits<Real>) -> Result<(), usize> {
+    let plays = words.first().is_some_and(|word| CommandKind::from_word(*word) == CommandKind::Trajectory);
+    if status & GENERATOR_BUSY == 0 && !plays { Ok(()) } else { Err(0) }
+}
+
+/// Writes the set-point into the command's words, as the `sequence`-th of a stream.
+pub fn write(motion: &Motion<Real>, sequence: u32, words: &mut [u64]) {
+    let numbers = motion.pose.iter().chain(&motion.rate).chain(&motion.acceleration);
+    let all = [STREAM, 0, sequence as u64].into_iter().chain(numbers.map(|number| number.to_word()));
+    for (slot, word) in words.iter_mut().zip(all) {
+        *slot = word;
+    }
+}
+
+/// The wave generator of this controller.
+pub type Wave = wave::Wave<Real>;
