@@ -7,12 +7,13 @@ use std::fs;
 
 use crate::support::{Folder, repository};
 
-const DOCUMENTS: [&str; 17] = [
+const DOCUMENTS: [&str; 18] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "docs/bring-up.md",
     "docs/control-law.md",
+    "docs/errata.md",
     "docs/guide.md",
     "docs/hysteresis.md",
     "docs/identification.md",

@@ -1,7 +1,7 @@
 //! Mass matrix and weight of platform and legs, from the motion of every body: M(h) = Σ Jᵀ m J + Jωᵀ I Jω.
 //!
 //! A leg is two bodies on one line: the fixed part turns about the base joint, the extensible part slides along it. Legs
-//! do not spin about their own line (`paper/errata.md`, consistent form of Appendix I).
+//! do not spin about their own line (`docs/errata.md`, consistent form of Appendix I).
 
 use super::geometry::{Geometry, angles, point_jacobian, rate_matrix, rotation};
 use super::linear::{Matrix3, Matrix6, Six, Three, add_congruent, apply, dot, product, transposed};
