@@ -170,8 +170,8 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
         ("dynamics", ir.dynamics.mass, &["load"]),
         ("setpoint", task.setpoints.square_rate, &["load"]),
         ("setpoint", task.setpoints.bias[2], &["target"]),
-        ("config", task.defaults.gains.integral[0], legs),
-        ("config", task.defaults.level_weight, legs),
+        ("defaults", task.defaults.gains.integral[0], legs),
+        ("defaults", task.defaults.level_weight, legs),
     ];
     let bad = Emitted::new("platform-ulp-bad", "reference.toml", &[]);
     let mut files = BTreeSet::new();

@@ -6,7 +6,7 @@
 //! The law itself is carried over as it stands (`law`); emitted are constants, tables, types and words. What differs between six legs with their own gauges and a platform in
 //! task space lies in `legs` and `platform`.
 
-mod config;
+mod defaults;
 mod description;
 mod dynamics;
 mod format;
@@ -39,6 +39,8 @@ pub type EmittedCrate = BTreeMap<String, String>;
 #[must_use]
 pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
+        ("src/defaults.rs", defaults::emit(ir)),
+        ("src/description.rs", description::emit(ir)),
         ("src/dynamics.rs", dynamics::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
         ("src/integrity.rs", integrity::emit(ir)),
@@ -72,21 +74,14 @@ pub fn is_carried_over(path: &str) -> bool {
 }
 
 fn legs_sources(ir: &Ir) -> Vec<(&'static str, TokenStream)> {
-    vec![
-        ("src/config.rs", legs::config::emit(ir)),
-        ("src/lib.rs", legs::crate_root::emit(ir)),
-        ("src/sensing.rs", legs::sensing::emit(ir)),
-        ("src/words.rs", legs::words::emit(ir)),
-    ]
+    vec![("src/lib.rs", legs::crate_root::emit(ir)), ("src/sensing.rs", legs::sensing::emit(ir))]
 }
 
 fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream)> {
     vec![
-        ("src/config.rs", platform::config::emit(ir, &task.defaults)),
         ("src/lib.rs", platform::crate_root::emit(ir)),
         ("src/sensing.rs", sensing::emit(ir, &task.sensing)),
         ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),
-        ("src/words.rs", platform::words::emit(ir, task)),
     ]
 }

@@ -26,6 +26,8 @@
 #![deny(missing_docs)]
 
 mod config;
+mod defaults;
+mod description;
 
 pub mod dynamics;
 pub mod hysteresis;
@@ -51,7 +53,9 @@ pub mod task_space;
 pub mod waves;
 mod words;
 
-pub use config::{Config, ConfigError, Environment, LEG_GAIN};
+pub use defaults::LEG_GAIN;
+pub use description::DESCRIPTION;
+pub use config::{Config, ConfigError, Environment};
 pub use specgen_runtime::setpoint::{Command, CommandKind, Target};
 pub use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
 pub use state::{LegState, State};
@@ -61,8 +65,8 @@ pub use step::{
 };
 
 pub use words::{
-    CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES,
-    OUTPUT_WORDS, output_words,
+    CONFIG_NAMES, CONFIG_WORDS, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS,
+    output_words,
 };
 
 /// Floating-point type of this controller; from `controller.scalar`.

@@ -18,13 +18,13 @@ macro_rules! files {
 /// Of six legs with their own gauges.
 pub const LEGS: &[File] = files! {
     "common": "machine_words", "snapshot", "stage", "supervised";
-    "legs": "stages", "standing", "state", "step", "waves";
+    "legs": "config", "stages", "standing", "state", "step", "waves", "words";
 };
 
 /// Of a platform.
 pub const PLATFORM: &[File] = files! {
     "common": "machine_words", "snapshot", "stage", "supervised";
-    "platform": "stages", "standing", "state", "step", "waves";
+    "platform": "config", "stages", "standing", "state", "step", "waves", "words";
 };
 
 /// The text of one in the emitted crate.

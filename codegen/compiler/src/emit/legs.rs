@@ -1,6 +1,4 @@
 //! The controller of six legs with their own gauges: hysteresis feed-forward alone.
 
-pub mod config;
 pub mod crate_root;
 pub mod sensing;
-pub mod words;

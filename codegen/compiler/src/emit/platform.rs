@@ -1,6 +1,4 @@
 //! The controller of the platform in task space: P, F and P/F.
 
-pub mod config;
 pub mod crate_root;
 pub mod task_space;
-pub mod words;

@@ -23,6 +23,8 @@
 #![deny(missing_docs)]
 
 mod config;
+mod defaults;
+mod description;
 
 pub mod dynamics;
 pub mod hysteresis;
@@ -46,7 +48,9 @@ pub mod supervision;
 pub mod waves;
 mod words;
 
-pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};
+pub use defaults::LEG_GAIN;
+pub use description::DESCRIPTION;
+pub use config::{Config, ConfigError, SetpointKind};
 pub use specgen_runtime::{CodeLimits, Law};
 pub use state::{LegState, State};
 pub use step::{
@@ -55,8 +59,8 @@ pub use step::{
 };
 
 pub use words::{
-    CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES,
-    OUTPUT_WORDS, output_words,
+    CONFIG_NAMES, CONFIG_WORDS, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS,
+    output_words,
 };
 
 /// Floating-point type of this controller; from `controller.scalar`.

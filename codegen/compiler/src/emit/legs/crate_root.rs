@@ -34,6 +34,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![deny(missing_docs)]
 
         mod config;
+        mod defaults;
+        mod description;
         pub mod dynamics;
         pub mod hysteresis;
         pub mod integrity;
@@ -53,12 +55,14 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod waves;
         mod words;
 
-        pub use config::{Config, ConfigError, LEG_GAIN, SetpointKind};
+        pub use defaults::LEG_GAIN;
+        pub use description::DESCRIPTION;
+        pub use config::{Config, ConfigError, SetpointKind};
         pub use specgen_runtime::{CodeLimits, Law};
         pub use state::{LegState, State};
         pub use step::{GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, STATIC_INVERSE, TickInput, TickOutput, actuate, step};
         pub use words::{
-            CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words,
+            CONFIG_NAMES, CONFIG_WORDS, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words,
         };
 
         #identity

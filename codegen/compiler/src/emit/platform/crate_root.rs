@@ -37,6 +37,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
         #![deny(missing_docs)]
 
         mod config;
+        mod defaults;
+        mod description;
         pub mod dynamics;
         pub mod hysteresis;
         pub mod integrity;
@@ -58,7 +60,9 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub mod waves;
         mod words;
 
-        pub use config::{Config, ConfigError, Environment, LEG_GAIN};
+        pub use defaults::LEG_GAIN;
+        pub use description::DESCRIPTION;
+        pub use config::{Config, ConfigError, Environment};
         pub use specgen_runtime::setpoint::{Command, CommandKind, Target};
         pub use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Law};
         pub use state::{LegState, State};
@@ -67,7 +71,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
             actuate, step,
         };
         pub use words::{
-            CONFIG_NAMES, CONFIG_WORDS, DESCRIPTION, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words,
+            CONFIG_NAMES, CONFIG_WORDS, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words,
         };
 
         #identity
