@@ -1,10 +1,9 @@
 //! IR to the text of the `controller` crate.
 //!
 //! One emitter per emitted file. Emitters are infallible and do no arithmetic: whatever can fail failed in lowering.
-
 //!
-//! The law itself is carried over as it stands (`law`); emitted are constants, tables, types and words. What differs between six legs with their own gauges and a platform in
-//! task space lies in `legs` and `platform`.
+//! The law itself is carried over as it stands (`law`); emitted are constants, tables, types and words. What differs between six legs
+//! with their own gauges and a platform in task space lies in `legs` and `platform`.
 
 mod defaults;
 mod description;

@@ -9,7 +9,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Full exchanges without progress before the backup rule.
-const PATIENCE: usize = 3;
+const TRIALS: usize = 3;
 /// Relative tolerance of the sign tests, on a problem scaled to unit diagonal.
 const TOLERANCE: f64 = 1e-11;
 
@@ -36,7 +36,7 @@ pub enum Failure {
 /// # Errors
 /// [`Failure::Singular`] if a principal submatrix of `gram` is not positive definite, else see [`Failure`].
 pub fn solve(gram: &DMatrix<f64>, rhs: &[f64]) -> Result<Solution, Failure> {
-    solve_with(gram, rhs, vec![true; rhs.len()], usize::MAX, PATIENCE)
+    solve_with(gram, rhs, vec![true; rhs.len()], usize::MAX, TRIALS)
 }
 
 /// [`solve`], started with the weights that are zero in `near`, the solution of a similar problem, held at zero. The
@@ -46,7 +46,7 @@ pub fn solve(gram: &DMatrix<f64>, rhs: &[f64]) -> Result<Solution, Failure> {
 /// As [`solve`].
 pub fn solve_from(gram: &DMatrix<f64>, rhs: &[f64], near: &[f64]) -> Result<Solution, Failure> {
     let free = (0..rhs.len()).map(|k| near.get(k).is_none_or(|w| *w > 0.0)).collect();
-    solve_with(gram, rhs, free, usize::MAX, PATIENCE)
+    solve_with(gram, rhs, free, usize::MAX, TRIALS)
 }
 
 /// `fewest` is the number of wrong signs that counts as the best so far: 0 leaves only the backup rule once `trials` is used up.

@@ -7,7 +7,7 @@ use specgen_link::RecorderAction;
 use specgen_runtime::supervisor::{Phase, Request};
 
 /// How long something is waited for if nothing else is said.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 /// Longest time that can be asked for, s.
 const LONGEST: f64 = 86_400.0;
 /// Rows after a trigger, if nothing else is said.
@@ -103,7 +103,7 @@ impl Order {
             Some(phase) => Until::Phase(phase),
             None => Until::Passed(seconds(until)?),
         };
-        Ok(Self::Wait { until, limit: limit.unwrap_or(PATIENCE) })
+        Ok(Self::Wait { until, limit: limit.unwrap_or(TIMEOUT) })
     }
 }
 
@@ -133,9 +133,9 @@ mod tests {
             ("", None),
             ("  # nothing", None),
             ("arm # now", Some(Order::Ask(Request::Arm))),
-            ("wait running", Some(Order::Wait { until: Until::Phase(Phase::Running), limit: PATIENCE })),
+            ("wait running", Some(Order::Wait { until: Until::Phase(Phase::Running), limit: TIMEOUT })),
             ("wait ramping-down 3", Some(Order::Wait { until: Until::Phase(Phase::RampingDown), limit: time(3.0) })),
-            ("wait 0.5", Some(Order::Wait { until: Until::Passed(time(0.5)), limit: PATIENCE })),
+            ("wait 0.5", Some(Order::Wait { until: Until::Passed(time(0.5)), limit: TIMEOUT })),
             ("set a=1 b[2]=-2e-6", Some(Order::Set(vec![("a".into(), "1".into()), ("b[2]".into(), "-2e-6".into())]))),
             ("record arm 7", Some(Order::Record(RecorderAction::Arm { after: 7 }))),
             ("record download run.rec", Some(Order::Download("run.rec".into()))),

@@ -28,7 +28,7 @@ const LEAD: u64 = 20_000_000;
 /// A machine that slept this long was suspended, ns.
 const SLEPT: u64 = 1_000_000;
 /// Without a sign of life of the service for so long the operator's link is lost, ns. The service gives one every few ms.
-const SERVICE_PATIENCE: u64 = 2_000_000_000;
+const SERVICE_TIMEOUT: u64 = 2_000_000_000;
 
 /// Where and how fast the loop runs.
 #[derive(Debug, Clone, Copy)]
@@ -96,7 +96,7 @@ impl<D: Device> Loop<'_, D> {
                 events |= MISSED_TICK;
             }
             let silence = woken.saturating_sub(self.shared.service_alive.load(Ordering::Relaxed));
-            if silence > SERVICE_PATIENCE || link.is_lost(self.shared.link.load(Ordering::Relaxed), tick) {
+            if silence > SERVICE_TIMEOUT || link.is_lost(self.shared.link.load(Ordering::Relaxed), tick) {
                 events |= LINK_LOST;
             }
 

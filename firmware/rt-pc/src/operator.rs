@@ -439,7 +439,7 @@ impl Operator {
 mod tests {
     use super::*;
 
-    const PATIENCE: u64 = 100;
+    const SILENCE: u64 = 100;
     const IDLE: u64 = 1000;
     const A: HostId = HostId(1);
     const B: HostId = HostId(2);
@@ -449,7 +449,7 @@ mod tests {
     }
 
     fn operator() -> Operator {
-        Operator::new(Places::find().unwrap(), false, Timeout { silence: PATIENCE, idle: IDLE })
+        Operator::new(Places::find().unwrap(), false, Timeout { silence: SILENCE, idle: IDLE })
     }
 
     #[test]
@@ -489,7 +489,7 @@ mod tests {
 
     #[test]
     fn where_somebody_looks_a_fault_does_not_end_the_loop() {
-        let mut operator = Operator::new(Places::find().unwrap(), true, Timeout { silence: PATIENCE, idle: IDLE });
+        let mut operator = Operator::new(Places::find().unwrap(), true, Timeout { silence: SILENCE, idle: IDLE });
         operator.plan(&[], 0).unwrap();
         operator.update(&said(Phase::Faulted, false), 1);
         operator.update(&said(Phase::Faulted, false), 2);
@@ -535,16 +535,16 @@ mod tests {
         operator.ask_by_link(Request::Run);
         assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run.word());
         for line in ["arm", "run", "none", "acknowledge", "set setpoint[0]=0"] {
-            assert!(operator.obey(line, 10 + PATIENCE).unwrap_err().contains("a host over the link has the orders"));
+            assert!(operator.obey(line, 10 + SILENCE).unwrap_err().contains("a host over the link has the orders"));
         }
-        assert_eq!(operator.take_for_host(B, 10 + PATIENCE), Err(Denied::Others));
+        assert_eq!(operator.take_for_host(B, 10 + SILENCE), Err(Denied::Others));
         assert!(operator.obey("hold", 20).is_ok() && operator.linked(20) && !operator.is_evicted(A));
         operator.heard(A, 200);
         let number = operator.link_number();
         operator.heard(B, 250);
         assert_eq!(operator.link_number(), number, "another host is not the one that is missed");
         // Silent while something moves: it is missed until somebody takes over.
-        assert!(operator.linked(200 + PATIENCE) && !operator.linked(201 + PATIENCE) && operator.link_number() > 0);
+        assert!(operator.linked(200 + SILENCE) && !operator.linked(201 + SILENCE) && operator.link_number() > 0);
         assert!(operator.obey("ramp-down", 500).is_ok() && operator.is_evicted(A) && operator.link_number() == 0);
         // Gone while something moves: missed, and everybody may take over at once.
         operator.take_for_host(B, 600).unwrap();

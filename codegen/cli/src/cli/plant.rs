@@ -19,7 +19,7 @@ use specgen_operate::served::{Machine, Served};
 use specgen_studies::machine;
 
 /// How long it waits for a controller before it looks whether it is to end, ns.
-const PATIENCE: u64 = SECOND / 10;
+const TIMEOUT: u64 = SECOND / 10;
 /// Samples per period of the paper's trajectory, which is not run here.
 const NO_TRAJECTORY: u32 = 1;
 
@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let end = arguments.seconds.map(|seconds| clock::now() + (seconds * SECOND as f64) as u64);
     let mut seen = 0;
     while !stop.load(Ordering::Relaxed) && end.is_none_or(|end| clock::now() < end) {
-        if let Some((actuation, wanted)) = server.wait(&mut seen, look, PATIENCE) {
+        if let Some((actuation, wanted)) = server.wait(&mut seen, look, TIMEOUT) {
             let start = clock::now();
             let sensing = served.answer(&actuation, wanted);
             server.publish(&sensing);

@@ -1,5 +1,5 @@
-//! `src/defaults.rs`: the spec's settings, which [`Config`](crate::settings) begins with. Reads [`ir::Defaults`](crate::ir::Defaults) and,
-//! of a platform, [`ir::PlatformDefaults`](crate::ir::PlatformDefaults).
+//! `src/defaults.rs`: the spec's settings, which `Config::new` of the law begins with. Reads [`ir::Defaults`](crate::ir::Defaults)
+//! and, of a platform, [`ir::PlatformDefaults`](crate::ir::PlatformDefaults).
 
 use proc_macro2::TokenStream;
 use quote::quote;

@@ -26,7 +26,7 @@ const AMPLITUDE: f64 = 0.1e-6;
 const SETTLED: usize = 20;
 const MEASURED: usize = 40;
 /// Ticks after which a relay that does not oscillate is given up.
-const PATIENCE: usize = 20_000;
+const MOST_TICKS: usize = 20_000;
 
 /// What the relay found on an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -97,7 +97,7 @@ fn one_axis(
     let center = bench.rig().machine().pose();
     let mut relay = Relay::default();
     let mut asked = 0.0;
-    for tick in 0..PATIENCE {
+    for tick in 0..MOST_TICKS {
         let pose = bench.rig().machine().pose();
         let error = notch.filter(&std::array::from_fn(|k| center[k] - pose[k]))[axis];
         let output = relay.switch(tick, error / amplitude);
@@ -200,7 +200,7 @@ mod tests {
         let delay = 50;
         let mut relay = Relay::default();
         let (mut y, mut line) = (0.0, std::collections::VecDeque::from(vec![0.0; delay]));
-        for tick in 0..PATIENCE {
+        for tick in 0..MOST_TICKS {
             line.push_back(relay.switch(tick, -y));
             y += line.pop_front().unwrap();
             if relay.found.is_some() {

@@ -85,7 +85,7 @@ impl Default for State {
 }
 
 impl State {
-    /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there, no correction.
+    /// Reset: at rest, as `memory_at_rest` of `supervision.rs` says, no correction.
     #[must_use]
     pub const fn new() -> Self {
         Self {
