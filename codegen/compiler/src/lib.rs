@@ -1,11 +1,13 @@
 //! The checked model to an emitted controller.
 //!
 //! ```text
-//! model → reach, stability, lint, requirements (findings) → lower → ir (every constant) → emit (text) → workspace (folder)
+//! model → lint, stability, requirements, demand (findings) → lower → ir (every constant) → emit (text) → workspace (folder)
 //! ```
 
 pub mod compile;
+pub mod demand;
 pub mod emit;
+mod figure;
 pub mod ir;
 pub mod lint;
 pub mod lower;

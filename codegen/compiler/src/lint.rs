@@ -27,6 +27,7 @@ pub use budget::{estimated, least};
 
 use specgen_runtime::Platform;
 
+use crate::figure::{AXES, figure};
 use crate::stability::platform::{ModalBasis, RestDynamics};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::model::Model;
@@ -182,43 +183,7 @@ impl<'a> Found<'a> {
     }
 }
 
-const AXES: [&str; 6] = ["x", "y", "z", "theta_x", "theta_y", "theta_z"];
-
-/// A number for a message: four digits.
-fn figure(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
-    }
-    let size = value.abs();
-    if (1e-3..1e6).contains(&size) {
-        let decimals = (3.0 - libm::floor(libm::log10(size))).max(0.0) as usize;
-        let text = format!("{value:.decimals$}");
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-    } else {
-        format!("{value:.3e}")
-    }
-}
-
 /// A length or an angle of an axis, with its unit.
 fn amount(axis: usize, value: f64) -> String {
     format!("{} {}", figure(value * 1e6), if axis < 3 { "um" } else { "urad" })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::figure;
-
-    #[test]
-    fn figures_have_four_digits_and_no_more() {
-        for (value, text) in [
-            (0.0, "0"),
-            (150.0, "150"),
-            (0.08, "0.08"),
-            (-1.23456, "-1.235"),
-            (2.5e-9, "2.500e-9"),
-            (123_456.7, "123457"),
-        ] {
-            assert_eq!(figure(value), text);
-        }
-    }
 }

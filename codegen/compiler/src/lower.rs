@@ -16,6 +16,7 @@ mod supervision;
 mod task_space;
 
 pub use dynamics::{GRAVITY, platform};
+pub(crate) use integrity::digest;
 pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
 pub use sensing::{PoseNoise, pose_noise};
 

@@ -29,9 +29,11 @@ pub fn steps(model: &Model) -> Steps {
 }
 
 /// Refuses a converter too coarse for `requirements.precision`.
-#[must_use]
-pub fn check(model: &Model) -> Vec<Diagnostic> {
-    let Some(precision) = model.precision else { return Vec::new() };
+///
+/// # Errors
+/// One finding at that key, with the number of bits that would do.
+pub fn check(model: &Model) -> Result<(), Vec<Diagnostic>> {
+    let Some(precision) = model.precision else { return Ok(()) };
     let steps = steps(model);
     let (mut largest, mut what) = (steps.leg, "one code moves a leg".to_owned());
     for (axis, step) in AXES.iter().zip(steps.platform) {
@@ -40,7 +42,7 @@ pub fn check(model: &Model) -> Vec<Diagnostic> {
         }
     }
     if largest <= precision {
-        return Vec::new();
+        return Ok(());
     }
     // A step is the range over 2^b − 1.
     let codes_needed = (libm::ldexp(1.0, model.dac.bits as i32) - 1.0) * largest / precision;
@@ -48,7 +50,7 @@ pub fn check(model: &Model) -> Vec<Diagnostic> {
     let [low, high] = model.dac.range;
     let range = (high - low) * precision / largest;
     let nanometres = |metres: f64| format!("{:.3} nm", metres * 1e9);
-    vec![Diagnostic::at(
+    Err(vec![Diagnostic::at(
         &model.spans,
         &["requirements.precision"],
         (Severity::Error, codes::TOO_FEW_BITS),
@@ -69,7 +71,7 @@ pub fn check(model: &Model) -> Vec<Diagnostic> {
                 up(largest)
             ),
         },
-    )]
+    )])
 }
 
 /// As a value for the spec, rounded up to what is printed.

@@ -14,6 +14,7 @@ mod cause;
 mod columns;
 mod coverage;
 mod dead_time;
+pub mod declared;
 mod distrust;
 pub mod everett;
 mod export;

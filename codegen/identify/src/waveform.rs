@@ -31,12 +31,13 @@ pub struct Waveform {
     pub rows: Vec<[f64; 6]>,
 }
 
-/// The text of a waveform file.
+/// The waveform in the file at `path`, whose rows are `period` (s) apart, and the text of the file.
 ///
 /// # Errors
-/// A finding if it is no regular file, cannot be read, is too large or not UTF-8.
-pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>> {
-    crate::read_file(path, shown_as)
+/// One finding if it is no regular file, cannot be read, is too large or not UTF-8; else as [`parse`].
+pub fn read(path: &Path, shown_as: &str, period: f64) -> Result<(Waveform, String), Vec<Diagnostic>> {
+    let text = crate::read_file(path, shown_as)?;
+    Ok((parse(&text, shown_as, period)?, text))
 }
 
 /// A waveform from the text of its file, whose rows are `period` (s) apart.
@@ -236,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_header_is_told_how_to_be_mended() {
+    fn a_bad_header_comes_with_its_fix() {
         assert!(refused("")[0].contains("is empty"));
         assert!(refused("x_um,x_nm\n1,2\n")[0].contains("hold the same coordinate"));
         assert!(refused("x_um,theta_x_deg\n")[0].contains("`theta_x_rad`"));

@@ -10,4 +10,7 @@ pub mod diagnostic;
 pub mod interrupt;
 pub mod lock;
 pub mod model;
+mod source;
 pub mod spec;
+
+pub use source::SpecSource;

@@ -29,9 +29,10 @@ use findings::Findings;
 use crate::diagnostic::{Diagnostic, Severity, codes};
 use crate::model::Model;
 
+pub use crate::SpecSource;
 pub use reference::reference_markdown;
 pub use schema::json_schema;
-pub use source::{MAX_BYTES, SpecSource};
+pub use source::MAX_BYTES;
 
 /// Errors that leave every value that the model needs as it stands in the file. A gain without a unit counts: gains may be
 /// left out.

@@ -8,7 +8,6 @@ use specgen_runtime::Platform;
 
 use super::{Found, Legs, figure};
 use crate::lower::setpoint::Stretch;
-use specgen_identify::waveform::Waveform;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
 
@@ -18,10 +17,6 @@ const GAIN_SLACK: f64 = 1.3;
 const LARGEST_DEFLECTION: f64 = 0.1;
 /// A sinusoid faster than this share of the lowest mode excites it.
 const FASTEST: f64 = 0.2;
-/// A step between two rows that is this many times its neighbours' is a jump.
-const STANDS_OUT: f64 = 4.0;
-/// A step that is none, m and rad.
-const NO_STEP: [f64; 6] = [5e-9, 5e-9, 5e-9, 50e-9, 50e-9, 50e-9];
 
 /// What a trajectory asks of the legs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -198,36 +193,4 @@ fn excitation(key: &str, name: &str, frequency: f64, mode: f64, found: &mut Foun
         format!("`{name}` at {} Hz excites the lowest mode of {} Hz", figure(frequency), figure(mode)),
         "a tenth of the lowest mode is usual: check the unit of the frequency, and `actuator.axial_stiffness`, which makes the mode",
     );
-}
-
-/// Steps of a table that stand out from those around them: a jump that no speed limit sees.
-#[must_use]
-pub fn steps(waveform: &Waveform) -> Option<Diagnostic> {
-    let rows = &waveform.rows;
-    for axis in 0..6 {
-        let steps: Vec<f64> = rows.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs()).collect();
-        let at = (2..steps.len().saturating_sub(2)).find(|k| {
-            let around = [steps[k - 2], steps[k - 1], steps[k + 1], steps[k + 2]];
-            let largest = around.into_iter().fold(0.0, |a: f64, b| if b > a { b } else { a });
-            // From rest every step is larger than the ones before.
-            largest > 0.0 && steps[*k] > STANDS_OUT * largest && steps[*k] > NO_STEP[axis]
-        });
-        let Some(at) = at else { continue };
-        let scale = 1e6;
-        return Some(Diagnostic {
-            severity: specgen_language::diagnostic::Severity::Warning,
-            code: codes::WAVEFORM_STEP,
-            key: "trajectory".to_owned(),
-            place: specgen_language::diagnostic::Place::File { path: waveform.shown_as.clone(), line: waveform.lines.get(at + 1).copied() },
-            message: format!(
-                "{} steps by {} {} here, by at most {} in the rows around",
-                super::AXES[axis],
-                figure(steps[at] * scale),
-                if axis < 3 { "um" } else { "urad" },
-                figure([steps[at - 2], steps[at - 1], steps[at + 1], steps[at + 2]].into_iter().fold(0.0, f64::max) * scale)
-            ),
-            help: "a jump between two pieces? The platform rings behind it: join the pieces, or spread the step over some rows".to_owned(),
-        });
-    }
-    None
 }

@@ -1,12 +1,25 @@
 //! Checksum of tables and settings, as the controller computes it again when it starts.
 
 use specgen_runtime::Crc32;
-use specgen_toolchain::IDENTITY_MARK;
+use specgen_toolchain::{IDENTITY_MARK, sha256};
 
 use crate::ir::{
     Actuation, Defaults, Gains, Hysteresis, Integrity, Interaction, Law, Mode, Path, PlatformDefaults, RateModel,
     Scalar, Segment, Setpoint, TaskSpace,
 };
+
+/// Digest of what the controller depends on: the text of the spec (line ends as `\n`) and the files that it names, by name and
+/// text. Not the folder it lies in.
+pub(crate) fn digest<'a>(spec: &str, files: impl Iterator<Item = &'a (String, String)>) -> String {
+    let mut all = spec.replace("\r\n", "\n").into_bytes();
+    for (name, text) in files {
+        all.push(0);
+        all.extend(name.as_bytes());
+        all.push(0);
+        all.extend(sha256(text.as_bytes()).as_bytes());
+    }
+    sha256(&all)
+}
 
 /// One line about where a controller comes from.
 pub(super) fn identity(name: &str, digest: &str, scalar: Scalar) -> String {

@@ -2,6 +2,7 @@
 //! workspace and the limits that the spec declares.
 
 mod check;
+mod declared;
 mod paper;
 mod poses;
 mod segments;
@@ -10,11 +11,13 @@ mod stop;
 mod stopping;
 mod table;
 
+pub use declared::{Declared, declared};
 pub use poses::{Stretch, stretches};
 pub use stopping::{Stopping, check as check_stops, describe as describe_stops};
 
 use specgen_runtime::setpoint::{Frames as _, MoveLimits, Profile, Target, Tool, Work};
 
+use crate::figure::AXES;
 use crate::ir::{Frames, Scalar, Setpoints, Trajectory};
 use specgen_identify::waveform::Waveform;
 use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
@@ -267,9 +270,6 @@ fn too_slow(model: &Model, user: &User, limits: &MoveLimits<f64>) -> Option<Diag
         "raise control.setpoint.speed, acceleration or jerk".to_owned(),
     ))
 }
-
-/// Names of the coordinates.
-const AXES: [&str; 6] = ["x", "y", "z", "theta_x", "theta_y", "theta_z"];
 
 /// A length in µm or an angle in µrad.
 fn amount(axis: usize, value: f64) -> String {

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::position::Lines;
 use super::{Diagnostic, Place, Severity};
-use crate::spec::SpecSource;
+use crate::SpecSource;
 
 /// An array with one object for each finding: `code`, `severity` ("error", "warning", "note"), `key`, `file`, `line`,
 /// `column`, `message`, `help`. Line and column count from 1, columns in characters; what does not apply is null.

@@ -4,7 +4,7 @@ use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet}
 
 use super::position::{self, Lines};
 use super::{Diagnostic, Place, Severity};
-use crate::spec::SpecSource;
+use crate::SpecSource;
 
 /// Longest piece of a line that is shown, characters. Far below what would make a message unreadable.
 const MAX_SHOWN: usize = 160;

@@ -128,12 +128,6 @@ pub(super) fn weight(f: &Fields, which: &str) -> Option<f64> {
     Some(f.number(&format!("adaptation.{which}_bandwidth"))? * f.number("timing.period")? * f64::from(run))
 }
 
-/// `vector` with length 1; `None` if it has none worth speaking of.
-pub(super) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
-    let length = libm::sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
-    (length > 1e-9).then(|| vector.map(|component| component / length))
-}
-
 fn supervisor(f: &Fields) -> Option<Supervisor> {
     let number = |key: &str| f.number(&format!("supervisor.{key}"));
     Some(Supervisor {

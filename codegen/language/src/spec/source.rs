@@ -1,27 +1,17 @@
-//! The spec file as text.
+//! Reads the spec file as text.
 
 // A finding is larger than clippy likes in a Result; there is one per run, and its type is shared by every phase.
 #![expect(clippy::result_large_err)]
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use crate::SpecSource;
 use crate::diagnostic::{Diagnostic, Place, Severity, codes};
 
 /// Largest spec file, bytes.
 pub const MAX_BYTES: usize = 1 << 20;
-
-/// Text of a spec, and where it came from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SpecSource {
-    /// Path as messages show it.
-    pub display_name: String,
-    /// The whole text, without byte-order mark. Spans count its bytes.
-    pub text: String,
-    /// Folder that file names in the spec are relative to.
-    pub dir: PathBuf,
-}
 
 impl SpecSource {
     /// Reads the file at `path`.

@@ -2,7 +2,6 @@
 
 use std::f64::consts::PI;
 
-use super::build::unit;
 use super::fields::Fields;
 use crate::model::{
     ControlMode, Environment, Frames, Gains, Interaction, PaperPath, Probe, SetpointRules, TaskSpace, Trajectory,
@@ -80,6 +79,12 @@ fn probe(f: &Fields, gauge: usize) -> Option<Probe> {
         plane_point: f.list(&key("target_point")).unwrap_or(facing),
         plane_normal: normal.map_or(Some(direction), unit)?,
     })
+}
+
+/// `vector` with length 1; `None` if it has none worth speaking of.
+pub(super) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
+    let length = libm::sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+    (length > 1e-9).then(|| vector.map(|component| component / length))
 }
 
 /// Each gauge's own, or that of all; `None` if the gauge words are metres.

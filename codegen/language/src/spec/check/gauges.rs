@@ -2,9 +2,9 @@
 
 use super::control;
 use crate::diagnostic::codes;
-use crate::spec::build;
 use crate::spec::fields::Fields;
 use crate::spec::findings::Findings;
+use crate::spec::task_space;
 use crate::spec::text::number;
 
 /// Least |cos| between the measuring line and the normal of its target.
@@ -38,7 +38,7 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
             let Some(vector) = f.list::<3>(path) else {
                 continue;
             };
-            *unit = build::unit(vector);
+            *unit = task_space::unit(vector);
             if unit.is_none() {
                 findings.error(
                     codes::BAD_DIRECTION,

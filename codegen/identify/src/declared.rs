@@ -1,0 +1,164 @@
+//! The records that a spec names: each is identified, or taken as the table that it is, and held against what the spec says.
+
+use std::path::Path;
+
+use crate::everett::EverettTable;
+use crate::{Options, Report, identify, is_table_csv, parse_record, rate, read_file, read_table_csv};
+use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::model::{Model, RateDependence};
+
+/// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
+/// factor, a wrong unit is 1000.
+const LARGEST_SCALE: f64 = 5.0;
+
+/// What the records of a spec yield.
+#[derive(Debug, Default)]
+pub struct Declared {
+    /// The table of each record, in the order of `hysteresis.records`.
+    pub tables: Vec<EverettTable>,
+    /// The tables of the second weight of (6), m s/V, in the order of `hysteresis.rate_tables`.
+    pub rate_tables: Vec<EverettTable>,
+    /// How each record was identified; none for one that is a table already.
+    pub reports: Vec<Option<Report>>,
+    /// Warnings, none of which refuses anything.
+    pub warnings: Vec<Diagnostic>,
+    /// Name and text of each file that was read.
+    pub texts: Vec<(String, String)>,
+}
+
+/// Reads and identifies every record that `model` names; file names are relative to `dir`.
+///
+/// # Errors
+/// All findings, if a record cannot be read or identified, or contradicts the spec's grid, voltages or stack gain.
+pub fn records(model: &Model, dir: &Path) -> Result<Declared, Vec<Diagnostic>> {
+    let mut all = Declared::default();
+    let mut errors = Vec::new();
+    for name in &model.hysteresis.records {
+        let added = read_file(&dir.join(name), name).and_then(|text| all.add_record(model, name, text));
+        errors.extend(added.err().unwrap_or_default());
+    }
+    if let RateDependence::DynamicPreisach(files) = &model.hysteresis.rate {
+        for name in files {
+            let added = read_file(&dir.join(name), name).and_then(|text| all.add_rate_table(model, name, text));
+            errors.extend(added.err().unwrap_or_default());
+        }
+        all.warnings.push(rate_not_in_stability(model));
+    }
+    if errors.is_empty() {
+        return Ok(all);
+    }
+    errors.extend(all.warnings);
+    Err(errors)
+}
+
+impl Declared {
+    fn add_record(&mut self, model: &Model, name: &str, text: String) -> Result<(), Vec<Diagnostic>> {
+        let table = if is_table_csv(&text) {
+            let table = read_table_csv(&text, name)?;
+            fits_spec(model, name, &table, codes::TABLE_MISMATCH, "hysteresis.records")?;
+            self.reports.push(None);
+            table
+        } else {
+            let options = Options::new(model.hysteresis.grid, model.actuator.voltage);
+            let identified = identify(&parse_record(&text, name)?, &options)?;
+            if matches!(model.hysteresis.rate, RateDependence::Creep(_)) {
+                self.warnings.push(static_table_with_creep(model, name));
+            }
+            self.warnings.extend(identified.warnings);
+            self.reports.push(Some(identified.report));
+            identified.table
+        };
+        let scale = of_right_scale(model, name, &table);
+        self.tables.push(table);
+        self.texts.push((name.to_owned(), text));
+        scale
+    }
+
+    fn add_rate_table(&mut self, model: &Model, name: &str, text: String) -> Result<(), Vec<Diagnostic>> {
+        let table = rate::read_rate_csv(&text, name)?;
+        fits_spec(model, name, &table, codes::RATE_TABLE_MISMATCH, "hysteresis.rate_tables")?;
+        self.rate_tables.push(table);
+        self.texts.push((name.to_owned(), text));
+        Ok(())
+    }
+}
+
+/// A displacement that stack gain and voltage do not explain is one in another unit, and the controller would be off by it.
+fn of_right_scale(model: &Model, name: &str, table: &EverettTable) -> Result<(), Vec<Diagnostic>> {
+    let [min, max] = model.actuator.voltage;
+    let expected = model.actuator.leg_gain() * (max - min);
+    let found = table.node(table.grid, 0);
+    if (expected / LARGEST_SCALE..=expected * LARGEST_SCALE).contains(&found) {
+        return Ok(());
+    }
+    Err(vec![about_file(
+        name,
+        codes::RECORD_SCALE,
+        "hysteresis.records",
+        format!(
+            "the record moves by {:.4} µm over {min} V to {max} V; {} stacks of {} m/V give {:.4} µm",
+            found * 1e6,
+            model.actuator.stacks,
+            model.actuator.stack_gain,
+            expected * 1e6
+        ),
+        "check that the displacement is in µm, or fix actuator.stacks and actuator.stack_gain".to_owned(),
+    )])
+}
+
+/// Refuses a table of another grid or range than the spec's.
+fn fits_spec(
+    model: &Model,
+    name: &str,
+    table: &EverettTable,
+    code: &'static str,
+    key: &str,
+) -> Result<(), Vec<Diagnostic>> {
+    let [min, max] = model.actuator.voltage;
+    let slack = 1e-9 * (max - min);
+    let fits = (table.drive_min - min).abs() <= slack && (table.drive_max - max).abs() <= slack;
+    if table.grid == model.hysteresis.grid && fits {
+        return Ok(());
+    }
+    Err(vec![about_file(
+        name,
+        code,
+        key,
+        format!(
+            "the table has {} cells over {} V to {} V; the spec declares {} cells (hysteresis.grid) over {min} V to {max} V (actuator.voltage)",
+            table.grid, table.drive_min, table.drive_max, model.hysteresis.grid
+        ),
+        format!("identify the record again with --grid {} --drive {min}:{max}", model.hysteresis.grid),
+    )])
+}
+
+fn about_file(name: &str, code: &'static str, key: &str, message: String, help: String) -> Diagnostic {
+    let place = Place::File { path: name.to_owned(), line: None };
+    Diagnostic { severity: Severity::Error, code, key: key.to_owned(), place, message, help }
+}
+
+/// The check of the adaptation knows the static inverse only.
+fn rate_not_in_stability(model: &Model) -> Diagnostic {
+    Diagnostic::at(
+        &model.spans,
+        &["hysteresis.rate"],
+        (Severity::Warning, codes::RATE_NOT_IN_STABILITY),
+        "the stability of the adaptation was checked without the rate term of (6)".to_owned(),
+        format!(
+            "its inverse at most doubles the gain of fast corrections: let gain_ratio reach twice its upper end ({}), or simulate",
+            2.0 * model.adaptation.gain_ratio[1]
+        ),
+    )
+}
+
+fn static_table_with_creep(model: &Model, record: &str) -> Diagnostic {
+    Diagnostic::at(
+        &model.spans,
+        &["hysteresis.records"],
+        (Severity::Warning, codes::STATIC_TABLE_WITH_CREEP),
+        format!(
+            "the table of `{record}` is fitted without creep, and the creep that is in it is compensated once more"
+        ),
+        "name the table that `specgen identify rate SLOW.csv FAST.csv -o NAME` writes to NAME-creep.csv".to_owned(),
+    )
+}
