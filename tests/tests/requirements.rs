@@ -3,7 +3,7 @@
 use std::fs;
 
 use specgen::compile::{Refused, compile};
-use specgen::diagnostic::{Diagnostic, Place, codes};
+use specgen::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen::lower::leg_jacobian;
 use specgen::requirements::{Steps, steps};
 use specgen_tests::repository;
@@ -25,8 +25,8 @@ fn verdict(spec: &str, edits: &[(&str, &str)]) -> (String, Result<Steps, Vec<Dia
     (text, found)
 }
 
-fn finding<'a>(findings: &'a [Diagnostic], code: &str) -> &'a Diagnostic {
-    findings.iter().find(|finding| finding.code == code).unwrap_or_else(|| panic!("no {code} in {findings:#?}"))
+fn finding(findings: &[Diagnostic], code: Code) -> &Diagnostic {
+    findings.iter().find(|finding| finding.code == code).unwrap_or_else(|| panic!("no {} in {findings:#?}", code.id))
 }
 
 /// The first text between quotes after `marker`.

@@ -47,7 +47,7 @@ fn json_names_file_line_and_column() {
     let (_, findings) = spec::load(&source);
     let json = to_json(&findings, &source);
     let line = 1 + text.lines().position(|l| l.starts_with("height")).expect("there");
-    assert_eq!(json[0]["code"], codes::WRONG_DIMENSION);
+    assert_eq!(json[0]["code"], codes::WRONG_DIMENSION.id);
     assert_eq!(json[0]["severity"], "error");
     assert_eq!(json[0]["key"], "geometry.height");
     assert_eq!(json[0]["file"], "my.toml");
@@ -250,7 +250,7 @@ mod files {
             let (_, findings) = spec::load(&source(&text, "spec.toml", &folder));
             let errors = errors(&findings);
             assert_eq!(errors.len(), 1, "{record}: {findings:#?}");
-            assert_eq!((errors[0].code, errors[0].key.as_str()), (code, "hysteresis.records[0]"));
+            assert_eq!((errors[0].code, errors[0].key.as_str()), (code.id, "hysteresis.records[0]"));
         }
     }
 }

@@ -6,7 +6,7 @@
 use crate::support::specs::{
     Choice, LEGS, PLATFORM, errors, every_key, folder_with_records, line_of, source, spec_files,
 };
-use specgen::diagnostic::{Diagnostic, codes, render};
+use specgen::diagnostic::{Code, Diagnostic, codes, render};
 use specgen::spec::keys::{Item, Key, Kind, Presence, SECTIONS, Section, Shape};
 use specgen::spec::{self, SpecSource};
 use specgen::stability;
@@ -28,7 +28,7 @@ struct Case<'a> {
     path: &'a str,
     /// What stands in the place of the key's line.
     lines: String,
-    code: &'static str,
+    code: Code,
     /// Key path of the finding.
     about: String,
     what: &'a str,
@@ -93,7 +93,7 @@ impl Bench {
         let findings = self.findings(&text);
         let hint = format!("{} {}: {:?} gave {findings:#?}", case.path, case.what, case.lines);
         let found = errors(&findings).into_iter().find(|d| d.code == case.code && d.key == case.about);
-        let found = found.unwrap_or_else(|| panic!("no {} about {}: {hint}", case.code, case.about));
+        let found = found.unwrap_or_else(|| panic!("no {} about {}: {hint}", case.code.id, case.about));
         assert_eq!(line_of(found, &text), line + line_offset, "{hint}");
         for d in errors(&findings) {
             assert_eq!(line_of(d, &text), line + line_offset, "a follow-up: {hint}");
@@ -155,7 +155,7 @@ fn line_with(key: &Key, index: usize, literal: &str) -> String {
 }
 
 /// Bad literals for an item: what is wrong, the text, the code.
-fn bad_literals(item: Item) -> Vec<(&'static str, String, &'static str)> {
+fn bad_literals(item: Item) -> Vec<(&'static str, String, Code)> {
     let mut bad = vec![("table", "{ a = 1 }".to_owned(), codes::WRONG_TYPE)];
     if !matches!(item, Item::Flag) {
         bad.push(("wrong type", "true".to_owned(), codes::WRONG_TYPE));
@@ -301,7 +301,7 @@ fn every_key_may_be_missing_only_if_it_has_a_default() {
             match key.presence {
                 Presence::Required | Presence::Form(_) => {
                     assert_eq!(errors.len(), 1, "{path}: {findings:#?}");
-                    assert_eq!((errors[0].code, errors[0].key.as_str()), (codes::MISSING_KEY, path.as_str()));
+                    assert_eq!((errors[0].code, errors[0].key.as_str()), (codes::MISSING_KEY.id, path.as_str()));
                     assert!(errors[0].help.contains(key.name), "{path}: {}", errors[0].help);
                     let header = section.header();
                     let line = 1 + text[..text.find(&header).expect("header")].matches('\n').count();
@@ -318,7 +318,7 @@ fn every_key_may_be_missing_only_if_it_has_a_default() {
                 }
                 Presence::Rule(rule) => {
                     let found: Vec<_> = errors.iter().map(|d| (d.code, d.key.as_str())).collect();
-                    let expected = [(codes::MISSING_KEY, path.as_str())];
+                    let expected = [(codes::MISSING_KEY.id, path.as_str())];
                     assert_eq!(found, if rule.contains("error") { &expected[..] } else { &[] }, "{path}: {rule}");
                 }
             }
@@ -341,7 +341,7 @@ fn every_section_may_be_missing_only_if_nothing_in_it_is_required() {
         if section.is_required() {
             let required = section.keys.iter().find(|key| key.presence == Presence::Required);
             assert_eq!(errors.len(), 1, "{}: {findings:#?}", section.name);
-            assert_eq!((errors[0].code, errors[0].key.as_str()), (codes::MISSING_SECTION, section.name));
+            assert_eq!((errors[0].code, errors[0].key.as_str()), (codes::MISSING_SECTION.id, section.name));
             assert!(errors[0].help.contains(required.expect("one").name));
         } else {
             assert!(errors.is_empty(), "{}: {findings:#?}", section.name);
@@ -377,7 +377,7 @@ fn all_findings_of_a_file_come_in_one_run() {
         codes::UNKNOWN_CHOICE,
         codes::UNKNOWN_SECTION,
     ] {
-        assert_eq!(found.iter().filter(|c| **c == code).count(), 1, "{code} in {found:?}");
+        assert_eq!(found.iter().filter(|c| **c == code).count(), 1, "{} in {found:?}", code.id);
     }
     assert_eq!(found.len(), 8, "{findings:#?}");
 }

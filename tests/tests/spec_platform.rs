@@ -261,13 +261,13 @@ fn too_many_of_anything_are_refused() {
     let many: String = (0..29).map(path).collect();
     let enough: String = (0..200).map(path).collect();
     for (more, expected) in [
-        (gauge.to_owned(), vec![(codes::GAUGE_COUNT, "gauge[6]")]),
-        (gauge.repeat(100), vec![(codes::GAUGE_COUNT, "gauge[6]")]),
+        (gauge.to_owned(), vec![(codes::GAUGE_COUNT.id, "gauge[6]")]),
+        (gauge.repeat(100), vec![(codes::GAUGE_COUNT.id, "gauge[6]")]),
         (many, Vec::new()),
-        (enough, vec![(codes::TOO_MANY_TRAJECTORIES, "trajectory")]),
+        (enough, vec![(codes::TOO_MANY_TRAJECTORIES.id, "trajectory")]),
         (
             "[[trajectory]]\n".to_owned(),
-            vec![(codes::MISSING_KEY, "trajectory[3].name"), (codes::MISSING_KEY, "trajectory[3].kind")],
+            vec![(codes::MISSING_KEY.id, "trajectory[3].name"), (codes::MISSING_KEY.id, "trajectory[3].kind")],
         ),
     ] {
         let (_, findings) = spec::load(&source(&format!("{text}\n{more}"), "spec.toml", &folder));

@@ -29,7 +29,7 @@ use specgen_runtime::Platform;
 
 use crate::figure::{AXES, figure};
 use crate::stability::platform::{ModalBasis, RestDynamics};
-use specgen_language::diagnostic::{Diagnostic, Severity};
+use specgen_language::diagnostic::{Code, Diagnostic};
 use specgen_language::model::Model;
 
 /// A rule looks at the platform and reports what it finds.
@@ -163,20 +163,12 @@ impl<'a> Found<'a> {
         self.list
     }
 
-    fn error(&mut self, code: &'static str, key: &str, message: String, help: &str) {
-        self.push(Severity::Error, code, key, message, help);
-    }
-
-    fn warning(&mut self, code: &'static str, key: &str, message: String, help: &str) {
-        self.push(Severity::Warning, code, key, message, help);
-    }
-
     /// At `key`; where only its list or its section stands in the spec, there.
-    fn push(&mut self, severity: Severity, code: &'static str, key: &str, message: String, help: &str) {
+    fn add(&mut self, code: Code, key: &str, message: String, help: &str) {
         let list = key.rsplit_once('[').filter(|_| key.ends_with(']')).map_or(key, |(list, _)| list);
         let section = key.rsplit_once('.').map_or(key, |(section, _)| section);
         let keys = [key, list, section];
-        let mut finding = Diagnostic::at(&self.model.spans, &keys, (severity, code), message, help.to_owned());
+        let mut finding = Diagnostic::at(&self.model.spans, &keys, code, message, help);
         // The key that is suspected, even where only its section has a place.
         key.clone_into(&mut finding.key);
         self.list.push(finding);

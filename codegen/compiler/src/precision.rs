@@ -17,7 +17,7 @@ use serde::Serialize;
 
 use crate::ir::{Ir, Scalar};
 use crate::lower::PoseNoise;
-use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
 pub use table::{Row, describe, rows};
@@ -136,7 +136,7 @@ pub fn findings(model: &Model, precision: &Precision, noise: Option<&PoseNoise>)
     vec![Diagnostic::at(
         &model.spans,
         &["controller.scalar", "controller"],
-        (Severity::Warning, codes::PRECISION_POOR),
+        codes::PRECISION_POOR,
         format!(
             "rounding may put {} off by {:.3} {unit}, more than the noise of the gauges of {:.3} {unit} rms",
             ["x", "y", "z", "theta_x", "theta_y", "theta_z"][worst],

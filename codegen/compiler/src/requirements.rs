@@ -1,7 +1,7 @@
 //! What the platform is for, against what its converters can do.
 
 use crate::lower::inverse_jacobian;
-use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
 /// Most bits that `dac.bits` takes.
@@ -53,7 +53,7 @@ pub fn check(model: &Model) -> Result<(), Vec<Diagnostic>> {
     Err(vec![Diagnostic::at(
         &model.spans,
         &["requirements.precision"],
-        (Severity::Error, codes::TOO_FEW_BITS),
+        codes::TOO_FEW_BITS,
         format!(
             "{what} by {}, more than the {} of requirements.precision (dac.bits = {} over {} V, {} per code at a leg)",
             nanometres(largest),

@@ -12,7 +12,7 @@ mod phase;
 pub mod platform;
 mod sampled;
 
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::{Adaptation, Model};
 
 pub use phase::phase_margin;
@@ -173,7 +173,7 @@ fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Ad
 }
 
 /// `largest` is rounded down to what the message shows, so that the number shown is itself accepted.
-fn refusal(model: &Model, code: &'static str, message: String, largest: f64) -> Diagnostic {
+fn refusal(model: &Model, code: Code, message: String, largest: f64) -> Diagnostic {
     let bandwidth = model.spans.contains_key("adaptation.level_bandwidth");
     let key = if bandwidth { "adaptation.level_bandwidth" } else { "adaptation.level_weight" };
     let run = model.timing.period * f64::from(model.adaptation.run_interval);
@@ -198,12 +198,5 @@ fn refusal(model: &Model, code: &'static str, message: String, largest: f64) -> 
             "the largest stable {name} is {level}{unit}{drift}; or lengthen the run, or narrow `adaptation.gain_ratio`, or check `amplifier.lag`, `actuator.resonance` and `timing.period`, which make the loop"
         )
     };
-    Diagnostic {
-        severity: Severity::Error,
-        code,
-        key: key.to_owned(),
-        place: model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec),
-        message,
-        help,
-    }
+    Diagnostic::at(&model.spans, &[key], code, message, help)
 }

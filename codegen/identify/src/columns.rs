@@ -1,6 +1,7 @@
 //! Finds the three columns of a record by their header names.
 
 use super::findings::Findings;
+use specgen_language::diagnostic::codes;
 
 /// Time of the sample, s.
 pub(crate) const TIME: usize = 0;
@@ -31,13 +32,13 @@ fn find(header: &csv::StringRecord, name: &str, line: usize, findings: &mut Find
         [] => {}
         [first, second, ..] => {
             let message = format!("column `{name}` appears twice, as columns {} and {}", first + 1, second + 1);
-            findings.error("E0505", Some(line), message, "keep one of them");
+            findings.add(codes::RECORD_COLUMN_TWICE, Some(line), message, "keep one of them");
             return None;
         }
     }
     let present: Vec<String> = header.iter().map(|h| format!("`{}`", h.trim())).collect();
     let message = format!("column `{name}` is missing; the header has {}", present.join(", "));
-    findings.error("E0504", Some(line), message, &missing_column_help(header, name));
+    findings.add(codes::RECORD_HEADER, Some(line), message, &missing_column_help(header, name));
     None
 }
 

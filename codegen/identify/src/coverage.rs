@@ -10,6 +10,7 @@ use super::record::Record;
 use super::regressor::Plane;
 use super::sanity::{PLAUSIBLE_RANGE, extent};
 use crate::everett::EverettTable;
+use specgen_language::diagnostic::codes;
 use specgen_language::model::MAX_GRID;
 
 /// The record may exceed the declared range by this share of it (amplifier overshoot, ADC noise).
@@ -26,11 +27,11 @@ pub(crate) fn plane(options: &Options, findings: &mut Findings) -> Option<Plane>
     let [low, high] = options.drive;
     if !(2..=MAX_GRID).contains(&options.grid) {
         let message = format!("a grid of {} cannot be identified", options.grid);
-        findings.error("E0601", None, message, "choose a grid from 2 to 64; 32 is usual");
+        findings.add(codes::GRID_NOT_IDENTIFIABLE, None, message, "choose a grid from 2 to 64; 32 is usual");
     }
     if !(low.is_finite() && high.is_finite() && low < high) {
         let message = format!("the declared drive range {low} V to {high} V is empty or not finite");
-        findings.error("E0602", None, message, "declare the lowest voltage first, then the highest");
+        findings.add(codes::DRIVE_RANGE_EMPTY, None, message, "declare the lowest voltage first, then the highest");
     }
     if findings.any_error() { None } else { Some(Plane { grid: options.grid, range: [low, high] }) }
 }
@@ -49,8 +50,8 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     let um = record.displacement_range() * 1e6;
     if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
         let unit = if ratio > 1.0 { "mV" } else { "kV" };
-        findings.error(
-            "E0603",
+        findings.add(
+            codes::DRIVE_UNIT,
             None,
             format!("{found}: is the column in {unit}?"),
             "write the drive in volts at the stack",
@@ -59,22 +60,32 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
     }
     if (ratio - 1.0).abs() > 0.2 && (um / span - 1.0).abs() < 0.02 {
         let message = format!("{found}, and the displacement covers {um:.3}, the span of the drive");
-        findings.error("E0604", None, message, "the columns `drive_V` and `displacement_um` seem to be swapped");
+        findings.add(
+            codes::COLUMNS_SWAPPED,
+            None,
+            message,
+            "the columns `drive_V` and `displacement_um` seem to be swapped",
+        );
         return;
     }
     if bottom < low - BEYOND * span || top > high + BEYOND * span {
         let help = "declare the range in which the record was taken, or record again within the declared one";
         let left = time_of(record, |u| u < low - BEYOND * span || u > high + BEYOND * span);
-        findings.error("E0605", None, format!("{found}; it leaves that range at {left} s"), help);
+        findings.add(codes::DRIVE_RANGE, None, format!("{found}; it leaves that range at {left} s"), help);
     }
     let interval = plane.interval();
     if bottom > low + interval {
         let message = format!("{found}: no cell with a down_threshold below {bottom} V was ever excited");
-        findings.error("E0606", None, message, "let the drive fall to the lower end of its range between the curves");
+        findings.add(
+            codes::NOT_EXCITED,
+            None,
+            message,
+            "let the drive fall to the lower end of its range between the curves",
+        );
     }
     if top < high - interval {
         let message = format!("{found}: no cell with an up_threshold above {top} V was ever excited");
-        findings.error("E0606", None, message, "let the last curves rise to the upper end of the drive range");
+        findings.add(codes::NOT_EXCITED, None, message, "let the last curves rise to the upper end of the drive range");
     }
 }
 
@@ -99,7 +110,7 @@ fn check_displacement_unit(record: &Record, findings: &mut Findings) {
         high * 1e6,
         at(high)
     );
-    findings.error("E0623", None, message, "convert the column to micrometres");
+    findings.add(codes::DISPLACEMENT_UNIT, None, message, "convert the column to micrometres");
 }
 
 /// Number of reversal curves: falls from a reversal. Refuses a record with too few of them for the grid.
@@ -112,11 +123,11 @@ pub(crate) fn check_curves(branches: &[Branch], plane: &Plane, findings: &mut Fi
             plane.grid,
             MIN_CURVES.max(plane.grid / 4)
         );
-        findings.error("E0607", None, message, help);
+        findings.add(codes::TOO_FEW_CURVES, None, message, help);
     } else if curves < plane.grid / 2 {
         let message =
             format!("has {curves} reversal curves for a grid of {}: weights between them are interpolated", plane.grid);
-        findings.warning("W0608", None, message, help);
+        findings.add(codes::FEW_CURVES, None, message, help);
     }
     curves
 }
@@ -205,7 +216,12 @@ pub(crate) fn check_excited(plane: &Plane, excited: &[bool], findings: &mut Find
         100.0 * missing as f64 / excited.len() as f64,
         places.join("; "),
     );
-    findings.warning("W0609", None, message, "add reversal curves that turn back in that part of the range");
+    findings.add(
+        codes::CELLS_INTERPOLATED,
+        None,
+        message,
+        "add reversal curves that turn back in that part of the range",
+    );
     regions
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::everett::EverettTable;
 use crate::{Options, Report, identify, is_table_csv, parse_record, rate, read_file, read_table_csv};
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, RateDependence};
 
 /// Displacement of a record against that of stack gain and voltage: creep and a rough data sheet explain less than this
@@ -107,13 +107,7 @@ fn of_right_scale(model: &Model, name: &str, table: &EverettTable) -> Result<(),
 }
 
 /// Refuses a table of another grid or range than the spec's.
-fn fits_spec(
-    model: &Model,
-    name: &str,
-    table: &EverettTable,
-    code: &'static str,
-    key: &str,
-) -> Result<(), Vec<Diagnostic>> {
+fn fits_spec(model: &Model, name: &str, table: &EverettTable, code: Code, key: &str) -> Result<(), Vec<Diagnostic>> {
     let [min, max] = model.actuator.voltage;
     let slack = 1e-9 * (max - min);
     let fits = (table.drive_min - min).abs() <= slack && (table.drive_max - max).abs() <= slack;
@@ -132,9 +126,9 @@ fn fits_spec(
     )])
 }
 
-fn about_file(name: &str, code: &'static str, key: &str, message: String, help: String) -> Diagnostic {
+fn about_file(name: &str, code: Code, key: &str, message: String, help: String) -> Diagnostic {
     let place = Place::File { path: name.to_owned(), line: None };
-    Diagnostic { severity: Severity::Error, code, key: key.to_owned(), place, message, help }
+    Diagnostic::new(code, key, place, message, help)
 }
 
 /// The check of the adaptation knows the static inverse only.
@@ -142,8 +136,8 @@ fn rate_not_in_stability(model: &Model) -> Diagnostic {
     Diagnostic::at(
         &model.spans,
         &["hysteresis.rate"],
-        (Severity::Warning, codes::RATE_NOT_IN_STABILITY),
-        "the stability of the adaptation was checked without the rate term of (6)".to_owned(),
+        codes::RATE_NOT_IN_STABILITY,
+        "the stability of the adaptation was checked without the rate term of (6)",
         format!(
             "its inverse at most doubles the gain of fast corrections: let gain_ratio reach twice its upper end ({}), or simulate",
             2.0 * model.adaptation.gain_ratio[1]
@@ -155,10 +149,10 @@ fn static_table_with_creep(model: &Model, record: &str) -> Diagnostic {
     Diagnostic::at(
         &model.spans,
         &["hysteresis.records"],
-        (Severity::Warning, codes::STATIC_TABLE_WITH_CREEP),
+        codes::STATIC_TABLE_WITH_CREEP,
         format!(
             "the table of `{record}` is fitted without creep, and the creep that is in it is compensated once more"
         ),
-        "name the table that `specgen identify rate SLOW.csv FAST.csv -o NAME` writes to NAME-creep.csv".to_owned(),
+        "name the table that `specgen identify rate SLOW.csv FAST.csv -o NAME` writes to NAME-creep.csv",
     )
 }

@@ -3,6 +3,7 @@
 use super::findings::Findings;
 use super::sanity::{extent, median};
 use super::trend::noise_floor;
+use specgen_language::diagnostic::codes;
 
 /// A sample that differs from the median of its neighbourhood by this share of the displacement range is a glitch, if
 /// that is also far above noise and above what the drive moves in a sample.
@@ -67,7 +68,12 @@ fn glitches(
             time[k],
             off * 1e6
         );
-        findings.warning("W0517", Some(lines[k]), message, "look for interference or a loose contact, or record again");
+        findings.add(
+            codes::RECORD_GLITCH,
+            Some(lines[k]),
+            message,
+            "look for interference or a loose contact, or record again",
+        );
     }
 }
 
@@ -88,8 +94,8 @@ fn jumps(lines: &[usize], time: &[f64], drive: &[f64], weightless: &mut [bool], 
             drive[k],
             end - k
         );
-        findings.warning(
-            "W0518",
+        findings.add(
+            codes::RECORD_JUMP,
             Some(lines[k]),
             message,
             "drive by ramps or sines: a jump excites the resonance, which hides the hysteresis",

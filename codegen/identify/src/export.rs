@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::findings::Findings;
 use crate::everett::EverettTable;
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 
 const HEADER: &str = "up_V,down_V,everett_um";
 
@@ -37,7 +37,7 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
     let help = "write the file with `specgen identify`";
     let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim()));
     if lines.next().is_none_or(|(_, header)| header != HEADER) {
-        findings.error("E0613", Some(1), format!("the header must be `{HEADER}`"), help);
+        findings.add(codes::TABLE_FILE, Some(1), format!("the header must be `{HEADER}`"), help);
         return Err(findings.into_diagnostics());
     }
     let mut values = Vec::new();
@@ -46,7 +46,7 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
             text.split(',').filter_map(|f| f.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();
         match fields[..] {
             [up, down, um] => values.push([up, down, um]),
-            _ => findings.error("E0613", Some(line), "is not three finite numbers".to_owned(), help),
+            _ => findings.add(codes::TABLE_FILE, Some(line), "is not three finite numbers".to_owned(), help),
         }
     }
     let grid = (1..=256).find(|n| n * (n + 1) / 2 == values.len());
@@ -59,7 +59,7 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
         },
         _ => {
             let message = format!("{} nodes do not make a triangle of rising thresholds", values.len());
-            findings.error("E0613", None, message, help);
+            findings.add(codes::TABLE_FILE, None, message, help);
             return Err(findings.into_diagnostics());
         }
     };
@@ -73,7 +73,7 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
                     "thresholds {} V, {} V; expected {} V, {} V",
                     values[at][0], values[at][1], wanted[0], wanted[1]
                 );
-                findings.error("E0613", Some(at + 2), message, help);
+                findings.add(codes::TABLE_FILE, Some(at + 2), message, help);
             }
         }
     }
@@ -94,7 +94,12 @@ fn check_weights(table: &EverettTable, findings: &mut Findings) {
                     table.threshold(down),
                     weight * 1e6
                 );
-                findings.error("E0613", Some(EverettTable::index(up, down) + 2), message, "identify the record again");
+                findings.add(
+                    codes::TABLE_FILE,
+                    Some(EverettTable::index(up, down) + 2),
+                    message,
+                    "identify the record again",
+                );
             }
         }
     }

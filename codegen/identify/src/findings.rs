@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use specgen_language::diagnostic::{Diagnostic, Place, Severity};
+use specgen_language::diagnostic::{Code, Diagnostic, Severity};
 
 /// Findings of one kind that are shown one by one; the rest is counted.
 const SHOWN_PER_CODE: usize = 5;
@@ -12,7 +12,7 @@ const SHOWN_PER_CODE: usize = 5;
 pub(crate) struct Findings {
     path: String,
     found: Vec<Diagnostic>,
-    count: BTreeMap<&'static str, usize>,
+    count: BTreeMap<&'static str, (Code, usize)>,
 }
 
 impl Findings {
@@ -21,22 +21,12 @@ impl Findings {
         Self { path: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
     }
 
-    /// Adds an error about `line`, or about the whole file.
-    pub(crate) fn error(&mut self, code: &'static str, line: Option<usize>, message: String, help: &str) {
-        self.add(Severity::Error, code, line, message, help);
-    }
-
-    /// Adds a warning about `line`, or about the whole file.
-    pub(crate) fn warning(&mut self, code: &'static str, line: Option<usize>, message: String, help: &str) {
-        self.add(Severity::Warning, code, line, message, help);
-    }
-
-    fn add(&mut self, severity: Severity, code: &'static str, line: Option<usize>, message: String, help: &str) {
-        let count = self.count.entry(code).or_insert(0);
+    /// Adds a finding about `line`, or about the whole file, as bad as its code.
+    pub(crate) fn add(&mut self, code: Code, line: Option<usize>, message: String, help: &str) {
+        let (_, count) = self.count.entry(code.id).or_insert((code, 0));
         *count += 1;
         if *count <= SHOWN_PER_CODE {
-            let place = Place::File { path: self.path.clone(), line };
-            self.found.push(Diagnostic { severity, code, key: String::new(), place, message, help: help.to_owned() });
+            self.found.push(Diagnostic::in_file(&self.path, line, code, message, help));
         }
     }
 
@@ -58,16 +48,9 @@ impl Findings {
     /// All findings in the order found, followed by one line for each kind that was cut short.
     pub(crate) fn into_diagnostics(self) -> Vec<Diagnostic> {
         let Self { path, mut found, count } = self;
-        for (code, n) in count.into_iter().filter(|(_, n)| *n > SHOWN_PER_CODE) {
-            let severity = found.iter().find(|d| d.code == code).map_or(Severity::Error, |d| d.severity);
-            found.push(Diagnostic {
-                severity,
-                code,
-                key: String::new(),
-                place: Place::File { path: path.clone(), line: None },
-                message: format!("and {} more lines like this ({code})", n - SHOWN_PER_CODE),
-                help: "fix the ones shown and run again".to_owned(),
-            });
+        for (code, n) in count.into_values().filter(|(_, n)| *n > SHOWN_PER_CODE) {
+            let message = format!("and {} more lines like this ({})", n - SHOWN_PER_CODE, code.id);
+            found.push(Diagnostic::in_file(&path, None, code, message, "fix the ones shown and run again"));
         }
         found
     }
@@ -76,12 +59,13 @@ impl Findings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use specgen_language::diagnostic::codes;
 
     #[test]
     fn repeated_findings_are_counted_instead_of_listed() {
         let mut findings = Findings::new("a.csv");
         for line in 2..44 {
-            findings.error("E0506", Some(line), format!("line {line}"), "fix it");
+            findings.add(codes::RECORD_VALUE, Some(line), format!("line {line}"), "fix it");
         }
         let all = findings.into_diagnostics();
         assert_eq!(all.len(), SHOWN_PER_CODE + 1);

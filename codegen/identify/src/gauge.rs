@@ -7,7 +7,7 @@ use super::findings::Findings;
 use super::least_squares::{Fit, fit, mean_square};
 use super::sanity::{extent, median};
 use super::signals::{self, Signals, Wanted};
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A calibration and how well it is founded. Lengths in m, voltages in V.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -102,7 +102,7 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
     let (volts, micrometres) = (signals.column(1), signals.column(2));
     if volts.len() < PER_COEFFICIENT * 2 * FOLDS {
         let message = format!("has {} samples; at least {} are needed", volts.len(), PER_COEFFICIENT * 2 * FOLDS);
-        findings.error("E0636", None, message, "record more positions of the reference");
+        findings.add(codes::GAUGE_RECORD, None, message, "record more positions of the reference");
         return None;
     }
     signals.check_moves(2, 1, ["reference_um", "gauge_V"], findings);
@@ -117,8 +117,8 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
     let scaled: Vec<f64> = volts.iter().map(|v| (2.0 * v - low - high) / (high - low)).collect();
     let held_out = held_out(&scaled, &reference);
     if held_out.is_empty() {
-        findings.error(
-            "E0636",
+        findings.add(
+            codes::GAUGE_RECORD,
             None,
             "the voltages are too few to hold some out".to_owned(),
             "record more positions of the reference",
@@ -130,8 +130,8 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
         None => choose(&held_out),
     };
     let Some(found) = polynomial(&scaled, &reference, degree) else {
-        findings.error(
-            "E0636",
+        findings.add(
+            codes::GAUGE_RECORD,
             None,
             format!("a polynomial of degree {degree} is not determined"),
             "record more positions of the reference",
@@ -158,8 +158,8 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
             least.1,
             signals.place(near)
         );
-        findings.error(
-            "E0635",
+        findings.add(
+            codes::GAUGE_NOT_MONOTONE,
             Some(signals.lines[near]),
             message,
             "use the gauge where its voltage rises or falls all the way, or look for a fault there",
@@ -170,8 +170,8 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
     let hysteresis = hysteresis(&reference, &scaled, &found.residual);
     if let Some(width) = hysteresis.filter(|width| *width > HYSTERESIS * residual_rms.max(noise_of(&found.residual))) {
         let message = format!("the gauge reads up to {:.2} nm differently on the way back", width * 1e9);
-        findings.warning(
-            "W0637",
+        findings.add(
+            codes::GAUGE_HYSTERESIS,
             None,
             message,
             "no calibration removes that: look for play or friction in the mount, or a delay between the columns",
@@ -209,12 +209,17 @@ fn check_units(signals: &Signals, volts: [f64; 2], reference: [f64; 2], findings
             range * 1e6,
             at(2, signals.column(2).iter().fold(f64::NEG_INFINITY, |m, v| if *v > m { *v } else { m }))
         );
-        findings.error("E0636", None, message, "write the reference in micrometres");
+        findings.add(codes::GAUGE_RECORD, None, message, "write the reference in micrometres");
     }
     let largest = if volts[1].abs() > volts[0].abs() { volts[1] } else { volts[0] };
     if largest.abs() > 100.0 {
         let message = format!("the gauge shows {largest} V (at {}): is it in mV?", at(1, largest));
-        findings.error("E0636", None, message, "write the gauge's voltage in volts; are the columns swapped?");
+        findings.add(
+            codes::GAUGE_RECORD,
+            None,
+            message,
+            "write the gauge's voltage in volts; are the columns swapped?",
+        );
     }
 }
 
@@ -399,8 +404,8 @@ fn glitches(signals: &Signals, residual: &[f64], findings: &mut Findings) {
             r * 1e9,
             (r / usual).abs()
         );
-        findings.warning(
-            "W0638",
+        findings.add(
+            codes::GAUGE_GLITCH,
             Some(signals.lines[k]),
             message,
             "delete the point if the reading was disturbed, or record again",

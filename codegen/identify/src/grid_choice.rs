@@ -16,7 +16,7 @@ use super::normal::{Normal, Weighting, accumulate};
 use super::record::Record;
 use super::regressor::Plane;
 use super::{DeadTime, Options, coverage, dead_time, prior, selection};
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_numerics::nnls;
 
 /// Grids that are tried.
@@ -112,8 +112,8 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
             "the curves turn back at {levels} different voltages; cross-validation of the grid needs at least {}",
             FEWEST_FOLDS + 1
         );
-        findings.error(
-            "E0622",
+        findings.add(
+            codes::GRID_NOT_CHOSEN,
             None,
             message,
             "give the grid with --grid, or record curves that turn back at more voltages",
@@ -158,8 +158,8 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
         }
     }
     if errors.is_empty() {
-        findings.error(
-            "E0610",
+        findings.add(
+            codes::NOT_DETERMINED,
             None,
             "no grid could be fitted with curves held out".to_owned(),
             "give the grid with --grid, or record more reversal curves",

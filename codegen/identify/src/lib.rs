@@ -48,7 +48,7 @@ use findings::Findings;
 use normal::Normal;
 use regressor::Plane;
 use residual::Residual;
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_numerics::nnls;
 
 pub use cause::{Cause, Source};
@@ -203,8 +203,8 @@ fn identify_checked(
     sweep::check(&plane, record, &used, &report, findings);
     if report.fit_rms_percent > POOR_FIT_PERCENT {
         let message = format!("the fitted table misses the record by {:.2} % rms of its range", report.fit_rms_percent);
-        findings.warning(
-            "W0611",
+        findings.add(
+            codes::POOR_FIT,
             None,
             message,
             "is the record one actuator at one load, without steps or lost samples?",
@@ -220,7 +220,7 @@ fn solve(normal: &Normal, findings: &mut Findings) -> Option<nnls::Solution> {
         .map_err(|failure| {
             let message = format!("the weights cannot be determined ({failure:?})");
             let help = "choose a smaller grid, or record more reversal curves";
-            findings.error("E0610", None, message, help);
+            findings.add(codes::NOT_DETERMINED, None, message, help);
         })
         .ok()
 }

@@ -4,6 +4,7 @@
 use super::findings::Findings;
 use super::sanity::{extent, median};
 use super::trend::noise_floor;
+use specgen_language::diagnostic::codes;
 
 /// Travel of the drive over which it is judged, as a share of its range, and least number of samples in it.
 const TRAVEL: f64 = 0.1;
@@ -63,8 +64,8 @@ pub(crate) fn check(lines: &[usize], time: &[f64], drive: &[f64], displacement: 
                 drive[from],
                 drive[to]
             );
-            findings.error(
-                "E0516",
+            findings.add(
+                codes::RECORD_LIMITED,
                 Some(lines[from]),
                 message,
                 "check the range of the gauge, the limit of the amplifier and the preload; record again within them",

@@ -7,7 +7,7 @@ use super::findings::Findings;
 use super::least_squares::fit;
 use super::record::Record;
 use super::sanity::extent;
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_numerics::{ewma_limit, pcc_limit};
 
 /// The relation in one record.
@@ -90,8 +90,8 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
                 record.time[record.time.len() - 1],
                 starts.len()
             );
-            findings.error(
-                "E0625",
+            findings.add(
+                codes::NO_CYCLE,
                 None,
                 message,
                 "record two cycles or more, or give --frequency for a record of exactly one cycle",
@@ -110,7 +110,12 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
             crossings[k + 1],
             crossings[k + 1] - crossings[k]
         );
-        findings.error("E0626", None, message, "record each frequency by itself: sines or triangles of one amplitude");
+        findings.add(
+            codes::FREQUENCY_UNCLEAR,
+            None,
+            message,
+            "record each frequency by itself: sines or triangles of one amplitude",
+        );
         return None;
     }
     let found = (crossings.len() - 1) as f64 / (crossings[crossings.len() - 1] - crossings[0]);
@@ -119,8 +124,8 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
             "the drive has {found:.4} Hz (cycle from {} s to {} s), but {given} Hz was given",
             crossings[0], crossings[1]
         );
-        findings.error(
-            "E0626",
+        findings.add(
+            codes::FREQUENCY_UNCLEAR,
             None,
             message,
             "give the frequencies in the order of the records, or leave --frequency out",
@@ -167,7 +172,7 @@ fn line(
     };
     let Some((found, x, y)) = straight(first, end) else {
         let message = format!("from {} s to {} s the drive hardly moves", record.time[first], record.time[end]);
-        findings.error("E0625", None, message, "record whole cycles of the drive");
+        findings.add(codes::NO_CYCLE, None, message, "record whole cycles of the drive");
         return None;
     };
     let count = x.len() as f64;
@@ -249,7 +254,7 @@ pub fn together(mut relations: Vec<Relation>, reference: Option<f64>) -> Result<
     if let Some(bad) = relations.iter().find(|r| r.gain.is_nan() || r.gain <= 0.0) {
         let mut findings = Findings::new(&bad.record);
         let message = format!("from {} s to {} s the gain is {:e} um/V", bad.span[0], bad.span[1], bad.gain * 1e6);
-        findings.error("E0625", None, message, "the displacement must rise with the drive");
+        findings.add(codes::NO_CYCLE, None, message, "the displacement must rise with the drive");
         return Err(findings.into_diagnostics());
     }
     let (reference_gain, reference_frequency) = (chosen.gain, chosen.frequency);

@@ -10,7 +10,7 @@ use super::columns::{self, DISPLACEMENT, DRIVE, NAMES, TIME};
 use super::distrust;
 use super::findings::Findings;
 use super::sanity;
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// Larger files are refused before they are read.
 pub const MAX_FILE_BYTES: u64 = 256 << 20;
@@ -50,7 +50,7 @@ impl Record {
         let n = time.len();
         if drive.len() != n || displacement.len() != n {
             let message = format!("columns of {n}, {} and {} samples", drive.len(), displacement.len());
-            findings.error("E0507", None, message, "give columns of equal length");
+            findings.add(codes::RECORD_LENGTHS, None, message, "give columns of equal length");
             return Err(findings.into_diagnostics());
         }
         for (column, name) in [(&time, NAMES[TIME]), (&drive, NAMES[DRIVE]), (&displacement, NAMES[DISPLACEMENT])] {
@@ -127,13 +127,13 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
         Ok(bytes) => bytes,
         Err(e) => {
             let (message, help) = unreadable(e);
-            findings.error("E0501", None, message, help);
+            findings.add(codes::RECORD_IO, None, message, help);
             return None;
         }
     };
     if bytes.len() as u64 > MAX_FILE_BYTES {
         let message = format!("is larger than {} MiB", MAX_FILE_BYTES >> 20);
-        findings.error("E0502", None, message, "record at a lower rate, or keep every n-th sample");
+        findings.add(codes::RECORD_TOO_LARGE, None, message, "record at a lower rate, or keep every n-th sample");
         return None;
     }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
@@ -142,7 +142,7 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
     if let Some(at) = end_of_text.or(bad) {
         let line = 1 + bytes[..at].iter().filter(|&&b| b == b'\n').count();
         let message = format!("is not a text file in UTF-8: byte {at} is 0x{:02x}", bytes[at]);
-        findings.error("E0503", Some(line), message, "export the record as CSV text in UTF-8");
+        findings.add(codes::RECORD_NOT_TEXT, Some(line), message, "export the record as CSV text in UTF-8");
         return None;
     }
     Some(String::from_utf8_lossy(bytes).into_owned())
@@ -163,7 +163,7 @@ fn read_limited(path: &Path) -> std::io::Result<Vec<u8>> {
 fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 3])> {
     if text.trim().is_empty() {
         let help = format!("the first line must be the header `{}`", NAMES.join(","));
-        findings.error("E0504", None, "is empty".to_owned(), &help);
+        findings.add(codes::RECORD_HEADER, None, "is empty".to_owned(), &help);
         return None;
     }
     let mut reader =
@@ -171,7 +171,7 @@ fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 
     let header = match reader.headers() {
         Ok(header) => header.clone(),
         Err(e) => {
-            findings.error("E0504", Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
+            findings.add(codes::RECORD_HEADER, Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
             return None;
         }
     };
@@ -190,7 +190,7 @@ fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 
             }
             Err(e) => {
                 let line = e.position().map(|p| p.line() as usize);
-                findings.error("E0506", line, format!("cannot be read as CSV: {e}"), "write plain CSV");
+                findings.add(codes::RECORD_VALUE, line, format!("cannot be read as CSV: {e}"), "write plain CSV");
             }
         }
     }
@@ -200,8 +200,8 @@ fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 
 /// The number in a field, or NaN after the problem was reported.
 pub(crate) fn number(field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> f64 {
     let Some(field) = field else {
-        findings.error(
-            "E0506",
+        findings.add(
+            codes::RECORD_VALUE,
             Some(line),
             format!("`{name}` is missing: the line is too short"),
             "complete or delete the line",
@@ -217,15 +217,20 @@ pub(crate) fn number(field: Option<&str>, line: usize, name: &str, findings: &mu
         Err(_) => {
             let shown: String = field.chars().take(40).collect();
             let message = format!("`{name}` is `{shown}`, which is not a number");
-            findings.error("E0506", Some(line), message, "write a plain number with a decimal point, such as -12.5e-3");
+            findings.add(
+                codes::RECORD_VALUE,
+                Some(line),
+                message,
+                "write a plain number with a decimal point, such as -12.5e-3",
+            );
             f64::NAN
         }
     }
 }
 
 fn report_not_finite(findings: &mut Findings, line: usize, name: &str, shown: &str) {
-    findings.error(
-        "E0508",
+    findings.add(
+        codes::RECORD_NOT_FINITE,
         Some(line),
         format!("`{name}` is `{shown}`, not a finite number"),
         "delete the sample, or record again",

@@ -16,7 +16,7 @@ use serde::Serialize;
 use super::findings::Findings;
 use super::sanity::{extent, median};
 use super::signals::{self, Signals, Wanted};
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 
 pub use fit::response;
 pub use fit::{Estimate, Fitted};
@@ -130,7 +130,12 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
             signals.place(0),
             signals.place(n - 1)
         );
-        findings.error("E0630", None, message, "record longer, or choose a shorter --segment (32 or more)");
+        findings.add(
+            codes::RESPONSE_SAMPLES,
+            None,
+            message,
+            "record longer, or choose a shorter --segment (32 or more)",
+        );
         return None;
     }
     let micrometres = signals.column(2);
@@ -143,11 +148,11 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
     let bands = left_out(&bins, &usable, &excited);
     if used.len() < BINS {
         let message = format!("the coherence is below {COHERENT} nearly everywhere: {}", named(&bands));
-        findings.error("E0631", None, message, "drive harder within the linear range, record longer, and check both channels; coherence is lost to noise, to hysteresis at large amplitude and to a wrong channel");
+        findings.add(codes::RESPONSE_COHERENCE, None, message, "drive harder within the linear range, record longer, and check both channels; coherence is lost to noise, to hysteresis at large amplitude and to a wrong channel");
         return None;
     }
     let fitted = fit::fit(&used, averages).map_err(|why| {
-        findings.error("E0632", None, why, "does the record hold the response from well below to above the resonance, displacement rising with the drive?");
+        findings.add(codes::RESPONSE_FIT, None, why, "does the record hold the response from well below to above the resonance, displacement rising with the drive?");
     });
     let fitted = fitted.ok()?;
     let band = [used[0].frequency, used[used.len() - 1].frequency];
@@ -158,18 +163,18 @@ fn responded(signals: &Signals, segment: Option<usize>, findings: &mut Findings)
             "the resonance is {:.2} Hz wide, a bin {resolution:.2} Hz: the damping ratio comes out too large",
             2.0 * fitted.damping_ratio.value * fitted.resonance.value
         );
-        findings.warning("W0633", None, message, "record longer and choose a longer --segment");
+        findings.add(codes::RESPONSE_BAND, None, message, "record longer and choose a longer --segment");
     }
     let inside: Vec<Band> = bands.into_iter().filter(|b| b.high > band[0] && b.low < band[1]).collect();
     if !inside.is_empty() {
         let message = format!("left out of the fit: {}", named(&inside));
-        findings.warning("W0633", None, message, "drive harder there or record longer if the band matters");
+        findings.add(codes::RESPONSE_BAND, None, message, "drive harder there or record longer if the band matters");
     }
     let misfit_percent = 100.0 * fit::misfit(&fitted, &used, averages);
     if misfit_percent > POOR {
         let message = format!("the fitted model misses the response by {misfit_percent:.0} % rms");
-        findings.warning(
-            "W0634",
+        findings.add(
+            codes::RESPONSE_POOR,
             None,
             message,
             "is there more than one resonance in the band? Limit the sweep to the first one",
@@ -212,8 +217,8 @@ fn sampling_rate(signals: &Signals, findings: &mut Findings) -> Option<f64> {
             time[worst],
             off(worst) / even
         );
-        findings.error(
-            "E0630",
+        findings.add(
+            codes::RESPONSE_SAMPLES,
             Some(signals.lines[worst]),
             message,
             "record with a fixed sampling interval, without lost samples",
@@ -234,7 +239,7 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
                 signals.place(0),
                 signals.place(values.len() - 1)
             );
-            findings.error("E0512", None, message, "is the channel connected?");
+            findings.add(codes::RECORD_CONSTANT, None, message, "is the channel connected?");
             return;
         }
         for (limit, word) in [(low, "lower"), (high, "upper")] {
@@ -247,8 +252,8 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
                     "from {} on `{name}` is again and again exactly at its {word} limit {limit} ({stays} samples)",
                     signals.place(first)
                 );
-                findings.error(
-                    "E0513",
+                findings.add(
+                    codes::RECORD_STUCK,
                     Some(signals.lines[first]),
                     message,
                     "the gauge or its converter is at the end of its range: drive less, or shift the range",
@@ -271,8 +276,8 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
                 signals.place(first + run - 1),
                 values[first]
             );
-            findings.error(
-                "E0513",
+            findings.add(
+                codes::RECORD_STUCK,
                 Some(signals.lines[first]),
                 message,
                 "check the connection of the gauge and record again",
@@ -340,8 +345,8 @@ fn check_resonance(
             "the record does not show the resonance: the fit puts it at {f0:.1} Hz, coherent are {:.1} to {:.1} Hz{gap}",
             band[0], band[1]
         );
-        findings.error(
-            "E0631",
+        findings.add(
+            codes::RESPONSE_COHERENCE,
             None,
             message,
             "excite the actuator through its resonance, and record long enough for coherence there",

@@ -3,6 +3,7 @@
 use super::columns::{DISPLACEMENT, DRIVE, TIME};
 use super::findings::Findings;
 use super::limits;
+use specgen_language::diagnostic::codes;
 
 /// Fewer samples are no record.
 pub const MIN_SAMPLES: usize = 100;
@@ -21,7 +22,7 @@ pub(crate) fn check(lines: &[usize], columns: &[Vec<f64>; 3], findings: &mut Fin
     if time.len() < MIN_SAMPLES {
         let until = time.last().map_or_else(String::new, |t| format!(" and ends at {t} s"));
         let message = format!("has {} samples{until}; at least {MIN_SAMPLES} are needed", time.len());
-        findings.error("E0509", None, message, "record more samples per reversal curve");
+        findings.add(codes::RECORD_TOO_SHORT, None, message, "record more samples per reversal curve");
         return;
     }
     check_time(lines, time, findings);
@@ -49,7 +50,7 @@ pub(crate) fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings)
         } else {
             "sort or re-record; is the time column the right one?"
         };
-        findings.error("E0510", Some(lines[k + 1]), message, help);
+        findings.add(codes::RECORD_TIME, Some(lines[k + 1]), message, help);
     }
     if !increasing {
         return;
@@ -62,8 +63,8 @@ pub(crate) fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings)
             w[1],
             GAP * (w[1] - w[0]) / gap
         );
-        findings.error(
-            "E0511",
+        findings.add(
+            codes::RECORD_GAP,
             Some(lines[k + 1]),
             message,
             "record without gaps: a reversal of the drive may be missing",
@@ -78,7 +79,12 @@ fn check_not_constant(time: &[f64], column: &[f64], name: &str, which: usize, fi
     }
     let shown = if which == DISPLACEMENT { low * 1e6 } else { low };
     let message = format!("`{name}` is {shown} in every sample, from {} s to {} s", time[0], time[time.len() - 1]);
-    findings.error("E0512", None, message, "record while the drive runs through its range; is the channel connected?");
+    findings.add(
+        codes::RECORD_CONSTANT,
+        None,
+        message,
+        "record while the drive runs through its range; is the channel connected?",
+    );
     false
 }
 
@@ -100,7 +106,7 @@ fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64
                     time[first + run - 1]
                 );
                 let help = "the columns `drive_V` and `displacement_um` seem to be swapped";
-                findings.error("E0604", Some(lines[first]), message, help);
+                findings.add(codes::COLUMNS_SWAPPED, Some(lines[first]), message, help);
                 return;
             }
             let what = if value == bottom || value == top { "is limited at" } else { "is stuck at" };
@@ -109,8 +115,8 @@ fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64
                 time[first],
                 time[first + run - 1]
             );
-            findings.error(
-                "E0513",
+            findings.add(
+                codes::RECORD_STUCK,
                 Some(lines[first]),
                 message,
                 "check the range and the connection of the displacement sensor",
@@ -163,12 +169,17 @@ fn relation(time: &[f64], drive: &[f64], displacement: &[f64], correlation: f64,
     );
     if correlation < -0.5 {
         let message = format!("the displacement falls when the drive rises (correlation {correlation:.2}): {shown}");
-        findings.error("E0514", None, message, "change the sign of one of the two columns");
+        findings.add(codes::RECORD_RELATION, None, message, "change the sign of one of the two columns");
     } else {
         let message = format!(
             "the displacement hardly follows the drive (correlation {correlation:.2}; a piezo actuator shows more than 0.9): {shown}"
         );
-        findings.error("E0514", None, message, "check that `drive_V` and `displacement_um` hold what their names say");
+        findings.add(
+            codes::RECORD_RELATION,
+            None,
+            message,
+            "check that `drive_V` and `displacement_um` hold what their names say",
+        );
     }
 }
 
@@ -181,10 +192,10 @@ fn check_displacement_unit(time: &[f64], displacement: &[f64], findings: &mut Fi
     if range > PLAUSIBLE_RANGE[1] {
         let message =
             format!("the displacement covers {um:.0} um ({times}), too much for a piezo actuator: is it in nm?");
-        findings.warning("W0515", None, message, "convert the column to micrometres");
+        findings.add(codes::RECORD_UNIT, None, message, "convert the column to micrometres");
     } else if range < PLAUSIBLE_RANGE[0] {
         let message = format!("the displacement covers only {um:.2e} um ({times}): is it in mm or m?");
-        findings.warning("W0515", None, message, "convert the column to micrometres");
+        findings.add(codes::RECORD_UNIT, None, message, "convert the column to micrometres");
     }
 }
 

@@ -8,6 +8,7 @@ use super::record::Record;
 use super::regressor::Plane;
 use super::report::Branches;
 use super::{sanity, trend};
+use specgen_language::diagnostic::codes;
 
 /// Share of the drive range within which the drive counts as being at its minimum.
 const AT_MINIMUM: f64 = 0.002;
@@ -35,7 +36,12 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
     let tolerance = AT_MINIMUM * (plane.range[1] - plane.range[0]);
     let Some(first) = branches::first_usable(record, tolerance) else {
         let message = "the drive never rises from its minimum".to_owned();
-        findings.error("E0607", None, message, "start at the lowest drive, then rise to each reversal and fall back");
+        findings.add(
+            codes::TOO_FEW_CURVES,
+            None,
+            message,
+            "start at the lowest drive, then rise to each reversal and fall back",
+        );
         return None;
     };
     let branches = branches::branches(&record.drive, first, REVERSAL * plane.interval());

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::findings::Findings;
 use super::record::{number, read_file};
 use super::sanity;
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A column that a record may have.
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +51,7 @@ fn parse_into(text: &str, shown_as: &str, wanted: &[Wanted], findings: &mut Find
     let header = match reader.headers() {
         Ok(header) => header.clone(),
         Err(e) => {
-            findings.error("E0504", Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
+            findings.add(codes::RECORD_HEADER, Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
             return None;
         }
     };
@@ -76,13 +76,13 @@ fn parse_into(text: &str, shown_as: &str, wanted: &[Wanted], findings: &mut Find
             }
             Err(e) => {
                 let line = e.position().map(|p| p.line() as usize);
-                findings.error("E0506", line, format!("cannot be read as CSV: {e}"), "write plain CSV");
+                findings.add(codes::RECORD_VALUE, line, format!("cannot be read as CSV: {e}"), "write plain CSV");
             }
         }
     }
     if lines.len() < MIN_SAMPLES {
         let message = format!("has {} samples; at least {MIN_SAMPLES} are needed", lines.len());
-        findings.error("E0509", None, message, "record more samples");
+        findings.add(codes::RECORD_TOO_SHORT, None, message, "record more samples");
     } else if let (Some(Some(time)), true, false) = (columns.first(), wanted[0].name == "time_s", findings.any_error())
     {
         sanity::check_time(&lines, time, findings);
@@ -104,7 +104,7 @@ fn locate(
         [first, second, ..] => {
             let message =
                 format!("column `{}` appears twice, as columns {} and {}", wanted.name, first + 1, second + 1);
-            findings.error("E0505", Some(line), message, "keep one of them");
+            findings.add(codes::RECORD_COLUMN_TWICE, Some(line), message, "keep one of them");
             return None;
         }
         [] => {}
@@ -114,7 +114,7 @@ fn locate(
         let message = format!("column `{}` is missing; the header has {}", wanted.name, present.join(", "));
         let names: Vec<&str> = all.iter().map(|w| w.name).collect();
         let help = format!("name the columns with their units: {}", names.join(","));
-        findings.error("E0504", Some(line), message, &help);
+        findings.add(codes::RECORD_HEADER, Some(line), message, &help);
     }
     None
 }
@@ -143,8 +143,8 @@ impl Signals {
                     self.place(0),
                     self.place(self.lines.len() - 1)
                 );
-                findings.error(
-                    "E0512",
+                findings.add(
+                    codes::RECORD_CONSTANT,
                     None,
                     message,
                     "record while it runs through its range; is the channel connected?",
@@ -169,8 +169,8 @@ impl Signals {
                     y[first],
                     names[0]
                 );
-                findings.error(
-                    "E0513",
+                findings.add(
+                    codes::RECORD_STUCK,
                     Some(self.lines[first]),
                     message,
                     "check the range and the connection of that channel; record again within its range",

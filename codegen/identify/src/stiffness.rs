@@ -12,7 +12,7 @@ use super::findings::Findings;
 use super::least_squares::{Fit, fit, independent_samples, mean_square};
 use super::sanity::extent;
 use super::signals::{self, Signals, Wanted};
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A stiffness and how well it is founded.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -105,8 +105,8 @@ fn of_signals(signals: &Signals) -> Result<StiffnessReport, Vec<Diagnostic>> {
 fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessReport> {
     let (time, force) = (signals.column(0), signals.column(1));
     if time.len() < 30 {
-        findings.error(
-            "E0509",
+        findings.add(
+            codes::RECORD_TOO_SHORT,
             None,
             format!(
                 "has {} samples and ends at {} s; at least 30 are needed",
@@ -134,7 +134,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
             signals.place(0),
             signals.place(time.len() - 1)
         );
-        findings.error("E0646", None, message, "raise and lower the force at least once");
+        findings.add(codes::STIFFNESS_RECORD, None, message, "raise and lower the force at least once");
         return None;
     };
     let base = mean_square(&straight.residual);
@@ -191,8 +191,8 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
             "a stiffness of {stiffness:.3e} N/m is none of a piezo actuator (force {low} to {high} N, highest at {})",
             signals.place(at)
         );
-        findings.error(
-            "E0646",
+        findings.add(
+            codes::STIFFNESS_RECORD,
             None,
             message,
             "write the force in newtons and the displacement in micrometres; are the columns swapped?",
@@ -201,7 +201,7 @@ fn measured(signals: &Signals, findings: &mut Findings) -> Option<StiffnessRepor
     let error = compliance_error * stiffness * stiffness;
     if error > 0.01 * UNCERTAIN * stiffness {
         let message = format!("the stiffness is uncertain by {:.0} %", 100.0 * error / stiffness);
-        findings.warning("W0647", None, message, "use more force, or average several rises and falls");
+        findings.add(codes::STIFFNESS_UNCERTAIN, None, message, "use more force, or average several rises and falls");
     }
     let points = (0..y.len())
         .map(|k| {
@@ -235,7 +235,12 @@ fn check_drive(signals: &Signals, findings: &mut Findings) {
     let start = drive[0];
     if let Some(k) = drive.iter().position(|u| (u - start).abs() > CONSTANT) {
         let message = format!("at {} the drive is {} V, while it began with {start} V", signals.place(k), drive[k]);
-        findings.error("E0645", Some(signals.lines[k]), message, "hold the drive constant while the force changes");
+        findings.add(
+            codes::STIFFNESS_DRIVE,
+            Some(signals.lines[k]),
+            message,
+            "hold the drive constant while the force changes",
+        );
     }
 }
 
@@ -245,7 +250,7 @@ fn check_sign(signals: &Signals, force: &[f64], compliance: f64, error: f64, fin
     if compliance.abs() <= 2.0 * error {
         let message =
             format!("the displacement does not follow the force (lowest at {}, highest at {})", at(low), at(high));
-        findings.error("E0646", None, message, "use more force, or a gauge of less noise");
+        findings.add(codes::STIFFNESS_RECORD, None, message, "use more force, or a gauge of less noise");
         return None;
     }
     if compliance < 0.0 {
@@ -255,8 +260,8 @@ fn check_sign(signals: &Signals, force: &[f64], compliance: f64, error: f64, fin
             at(high),
             1.0 / compliance
         );
-        findings.error(
-            "E0644",
+        findings.add(
+            codes::STIFFNESS_SIGN,
             None,
             message,
             "count force positive where it pushes the displacement up: change the sign of one column",

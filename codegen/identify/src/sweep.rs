@@ -6,6 +6,7 @@ use super::regressor::Plane;
 use super::report::Report;
 use super::sanity::median;
 use super::selection::Used;
+use specgen_language::diagnostic::codes;
 
 /// A lag that widens the loop by this share of the range is worth a warning.
 const WIDENING: f64 = 0.01;
@@ -45,7 +46,12 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
             rate * interval,
             plane.interval()
         );
-        findings.warning("W0620", None, message, "sweep more slowly, sample faster, or choose a coarser grid");
+        findings.add(
+            codes::SWEEP_TOO_FAST,
+            None,
+            message,
+            "sweep more slowly, sample faster, or choose a coarser grid",
+        );
     } else if unknown && rate * lag > WIDENING * span {
         let message = format!(
             "from {} s on the drive runs at {rate:.0} V/s, where a dead time of {:.3} ms alone widens the loop by {:.1} nm; all of the dead time that there may be is counted as hysteresis (dead time {})",
@@ -54,8 +60,8 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
             2.0 * rate * lag * gain * 1e9,
             report.dead_time_basis
         );
-        findings.warning(
-            "W0620",
+        findings.add(
+            codes::SWEEP_TOO_FAST,
             None,
             message,
             "sweep more slowly, or record branches of at least two rates so that the dead time can be told",
@@ -71,8 +77,8 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
             between * gain * 1e9,
             report.noise_floor * 1e9
         );
-        findings.warning(
-            "W0621",
+        findings.add(
+            codes::CURVES_IN_NOISE,
             None,
             message,
             "record fewer curves with more samples each, or average several sweeps",

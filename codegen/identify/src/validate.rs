@@ -14,7 +14,7 @@ use super::trace::Trace;
 use super::trend::{Line, noise_floor, rms_and_max};
 use super::{dead_time, sanity};
 use crate::everett::EverettTable;
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// What the drive did before a record whose start is unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -102,13 +102,13 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
             "the drive goes from {low} V to {high} V, outside the table's {} V to {} V",
             plane.range[0], plane.range[1]
         );
-        findings.error("E0605", None, message, "validate with a record inside the range of the table");
+        findings.add(codes::DRIVE_RANGE, None, message, "validate with a record inside the range of the table");
     }
     let first = branches(&record.drive, 0, 0.5 * plane.interval()).first().map(|b| b.first);
     let Some(first) = first.filter(|_| !findings.any_error()) else {
         if !findings.any_error() {
-            findings.error(
-                "E0612",
+            findings.add(
+                codes::VALIDATION_IDLE,
                 None,
                 "the drive moves by less than half a grid interval".to_owned(),
                 "validate with a record that moves the drive",

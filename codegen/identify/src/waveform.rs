@@ -65,12 +65,12 @@ fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) 
     let header = match reader.headers() {
         Ok(header) if header.iter().any(|name| !name.is_empty()) => header.clone(),
         Ok(_) => {
-            findings.error(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
+            findings.add(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
             return None;
         }
         Err(error) => {
             let message = format!("the header cannot be read: {error}");
-            findings.error(codes::WAVEFORM_HEADER, Some(1), message, "write plain CSV");
+            findings.add(codes::WAVEFORM_HEADER, Some(1), message, "write plain CSV");
             return None;
         }
     };
@@ -83,7 +83,7 @@ fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) 
             Err(error) => {
                 let line = error.position().map(|p| p.line() as usize);
                 let message = format!("cannot be read as CSV: {error}");
-                findings.error(codes::WAVEFORM_VALUE, line, message, "write plain CSV");
+                findings.add(codes::WAVEFORM_VALUE, line, message, "write plain CSV");
                 continue;
             }
         };
@@ -100,7 +100,7 @@ fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) 
         }
         if record.len() > columns.len() {
             let message = format!("has {} values, expected {}", record.len(), columns.len());
-            findings.error(
+            findings.add(
                 codes::WAVEFORM_VALUE,
                 Some(line),
                 message,
@@ -114,7 +114,7 @@ fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) 
     let count = waveform.rows.len();
     if !(2..=MAX_ROWS).contains(&count) {
         let message = format!("has {count} rows, expected 2 to {MAX_ROWS}");
-        findings.error(codes::WAVEFORM_LENGTH, None, message, "sample more coarsely: rows are joined by cubic splines");
+        findings.add(codes::WAVEFORM_LENGTH, None, message, "sample more coarsely: rows are joined by cubic splines");
     }
     Some(waveform)
 }
@@ -136,13 +136,13 @@ fn columns(header: &csv::StringRecord, findings: &mut Findings) -> Option<Vec<Co
                 if let Some(first) = found.iter().position(same) {
                     let message =
                         format!("columns {} and {} (`{name}`) hold the same coordinate", first + 1, place + 1);
-                    findings.error(codes::WAVEFORM_HEADER, line, message, "keep one of them");
+                    findings.add(codes::WAVEFORM_HEADER, line, message, "keep one of them");
                 }
                 found.push(column);
             }
             Err(help) => {
                 let message = format!("`{name}` is no column of a table of poses");
-                findings.error(codes::WAVEFORM_HEADER, line, message, &help);
+                findings.add(codes::WAVEFORM_HEADER, line, message, &help);
             }
         }
     }
@@ -150,7 +150,7 @@ fn columns(header: &csv::StringRecord, findings: &mut Findings) -> Option<Vec<Co
         return None;
     }
     if found.iter().all(|column| matches!(column, Column::Time(_))) {
-        findings.error(codes::WAVEFORM_HEADER, line, "has no coordinate".to_owned(), EXPECTED);
+        findings.add(codes::WAVEFORM_HEADER, line, "has no coordinate".to_owned(), EXPECTED);
         return None;
     }
     Some(found)
@@ -183,21 +183,21 @@ fn column(name: &str) -> Result<Column, String> {
 fn number(field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> Option<f64> {
     let Some(field) = field else {
         let message = format!("`{name}` is missing: the line is too short");
-        findings.error(codes::WAVEFORM_VALUE, Some(line), message, "complete or delete the line");
+        findings.add(codes::WAVEFORM_VALUE, Some(line), message, "complete or delete the line");
         return None;
     };
     match field.parse::<f64>() {
         Ok(value) if value.is_finite() => Some(value),
         Ok(_) => {
             let message = format!("`{name}` is `{field}`, not a finite number");
-            findings.error(codes::WAVEFORM_VALUE, Some(line), message, "give every row a value");
+            findings.add(codes::WAVEFORM_VALUE, Some(line), message, "give every row a value");
             None
         }
         Err(_) => {
             let shown: String = field.chars().take(40).collect();
             let message = format!("`{name}` is `{shown}`, which is not a number");
             let help = "write a plain number with a decimal point, such as -12.5e-3";
-            findings.error(codes::WAVEFORM_VALUE, Some(line), message, help);
+            findings.add(codes::WAVEFORM_VALUE, Some(line), message, help);
             None
         }
     }
@@ -209,12 +209,12 @@ fn check_times(times: &[(usize, f64)], period: f64, findings: &mut Findings) {
         let (line, step) = (pair[1].0, pair[1].1 - pair[0].1);
         if step <= 0.0 {
             let message = format!("the time does not rise: it changes by {:.6} ms", step * 1e3);
-            findings.error(codes::WAVEFORM_TIME, Some(line), message, "order the rows by time, each once");
+            findings.add(codes::WAVEFORM_TIME, Some(line), message, "order the rows by time, each once");
         } else if (step - period).abs() > TIME_SLACK * period {
             let message =
                 format!("the time rises by {:.6} ms, the spec's period is {:.6} ms", step * 1e3, period * 1e3);
             let help = "sample at a fixed period and give that as trajectory.period";
-            findings.error(codes::WAVEFORM_TIME, Some(line), message, help);
+            findings.add(codes::WAVEFORM_TIME, Some(line), message, help);
         }
     }
 }

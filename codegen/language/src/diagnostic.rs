@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;
 
+pub use codes::Code;
 pub use json::to_json;
 pub use render::render;
 
@@ -39,8 +40,9 @@ pub enum Place {
     Whole,
 }
 
-/// One finding: what is wrong, where, and how to fix it.
+/// One finding: what is wrong, where, and how to fix it. Only the functions below make one, each from a [`Code`] of the table.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Diagnostic {
     /// How bad.
     pub severity: Severity,
@@ -57,19 +59,38 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
+    /// A finding as bad as its `code`, about `key` (empty: about no key), at `place`.
+    #[must_use]
+    pub fn new(code: Code, key: &str, place: Place, message: impl Into<String>, help: impl Into<String>) -> Self {
+        let (message, help) = (message.into(), help.into());
+        Self { severity: code.severity(), code: code.id, key: key.to_owned(), place, message, help }
+    }
+
     /// A finding at the first of `keys` that stands in the spec, by its `spans`; at none of them, about the whole spec
     /// and under the first.
     #[must_use]
     pub fn at(
         spans: &BTreeMap<String, Range<usize>>,
         keys: &[&str],
-        (severity, code): (Severity, &'static str),
-        message: String,
-        help: String,
+        code: Code,
+        message: impl Into<String>,
+        help: impl Into<String>,
     ) -> Self {
         let found = keys.iter().find_map(|key| spans.get(*key).map(|span| (*key, Place::Spec(span.clone()))));
         let (key, place) = found.unwrap_or_else(|| (keys.first().copied().unwrap_or_default(), Place::Whole));
-        Self { severity, code, key: key.to_owned(), place, message, help }
+        Self::new(code, key, place, message, help)
+    }
+
+    /// A finding about no key, in the data file `path` as its user knows it: at `line`, counted from 1, or about the whole.
+    #[must_use]
+    pub fn in_file(
+        path: &str,
+        line: Option<usize>,
+        code: Code,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Self {
+        Self::new(code, "", Place::File { path: path.to_owned(), line }, message, help)
     }
 }
 

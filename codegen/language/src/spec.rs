@@ -26,7 +26,7 @@ mod value;
 
 use findings::Findings;
 
-use crate::diagnostic::{Diagnostic, Severity, codes};
+use crate::diagnostic::{Code, Diagnostic, Severity, codes};
 use crate::model::Model;
 
 pub use crate::SpecSource;
@@ -36,7 +36,7 @@ pub use source::MAX_BYTES;
 
 /// Errors that leave every value that the model needs as it stands in the file. A gain without a unit counts: gains may be
 /// left out.
-const UNPHYSICAL: [&str; 6] = [
+const UNPHYSICAL: [Code; 6] = [
     codes::GYRATION,
     codes::INERTIA_UNPHYSICAL,
     codes::CENTER_OUTSIDE_LEG,
@@ -63,7 +63,7 @@ pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     let mut findings = Findings::default();
     let text = source.text.as_str();
     if text.len() > MAX_BYTES {
-        findings.error(
+        findings.add(
             codes::TOO_LARGE,
             "",
             0..0,
@@ -74,7 +74,7 @@ pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     }
     let parsed = syntax::parse(text, &mut findings);
     if parsed.root.is_empty() && !findings.has_errors() {
-        findings.error(
+        findings.add(
             codes::EMPTY,
             "",
             0..0,
@@ -89,7 +89,9 @@ pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     let fields = read::read(text, &parsed.root, &mut findings);
     check::all(&fields, &source.dir, &mut findings);
     drop_wrong_advice(&mut findings);
-    let whole = |finding: &Diagnostic| finding.severity < Severity::Error || UNPHYSICAL.contains(&finding.code);
+    let whole = |finding: &Diagnostic| {
+        finding.severity < Severity::Error || UNPHYSICAL.iter().any(|code| finding.code == *code)
+    };
     let model = if findings.all().iter().all(whole) { build::model(&fields) } else { None };
     (model, findings.finish())
 }

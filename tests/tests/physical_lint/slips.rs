@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use specgen::diagnostic::{Diagnostic, Severity};
+use specgen::diagnostic::{Diagnostic, Place, Severity, codes};
 
 use specgen_tests::length;
 
@@ -115,14 +115,7 @@ fn every_reason_is_of_a_slip() {
 
 #[test]
 fn the_comparison_knows_a_wrong_key() {
-    let finding = |key: &str, message: &str| Diagnostic {
-        severity: Severity::Error,
-        code: "E0301",
-        key: key.to_owned(),
-        place: specgen::diagnostic::Place::Whole,
-        message: message.to_owned(),
-        help: String::new(),
-    };
+    let finding = |key: &str, message: &str| Diagnostic::new(codes::OUT_OF_RANGE, key, Place::Whole, message, "");
     assert!(is_about(&finding("gauge[2].point[1]", ""), "gauge[2].point[0]"));
     assert!(!is_about(&finding("gauge[1].point", ""), "gauge[2].point"));
     assert!(is_about(&finding("timing.period", "check `actuator.stroke`"), "actuator.stroke"));

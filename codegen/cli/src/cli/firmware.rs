@@ -17,7 +17,7 @@ use super::build::TICKS;
 use super::ui::{Failure, Ui};
 use crate::{emit, workspace};
 use specgen_compiler::compile::{self, Compiled, Refused};
-use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Mcu;
 use specgen_studies::verify::{self, Measurement};
 use specgen_toolchain::budget::{self, Used};
@@ -182,7 +182,7 @@ fn wrong_part(compiled: &Compiled, mcu: Mcu, target: Target) -> Option<Diagnosti
     Some(Diagnostic::at(
         &compiled.model.spans,
         &["target.mcu", "target"],
-        (Severity::Error, codes::WRONG_PART),
+        codes::WRONG_PART,
         format!(
             "the spec is for {} ({}), but target {} is the {} with {} ({})",
             declared.name, declared.core, target.name, part.board, part.name, part.core

@@ -365,14 +365,13 @@ impl Job<'_> {
         let why: Vec<String> = errors.map(|finding| format!("{}: {}", finding.code, finding.message)).collect();
         refused(
             &self.compiled,
-            vec![Diagnostic {
-                severity: Severity::Error,
-                code: codes::TUNE_REFUSED,
-                key: String::new(),
-                place: Place::Whole,
-                message: format!("the spec with the tuned numbers is refused: {}", why.join("; ")),
-                help: "ask for larger margins (--gain-margin, --delay-margin); the spec is as it was".to_owned(),
-            }],
+            vec![Diagnostic::new(
+                codes::TUNE_REFUSED,
+                "",
+                Place::Whole,
+                format!("the spec with the tuned numbers is refused: {}", why.join("; ")),
+                "ask for larger margins (--gain-margin, --delay-margin); the spec is as it was",
+            )],
         )
     }
 

@@ -30,7 +30,7 @@ pub(super) fn strain(facts: &Facts, found: &mut Found) {
     if (SMALLEST_STRAIN..=LARGEST_STRAIN).contains(&(stroke / length)) {
         return;
     }
-    found.warning(
+    found.add(
         codes::STRAIN_ODD,
         "actuator.stroke",
         format!(
@@ -60,7 +60,7 @@ pub(super) fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
         figure(own * 1e3),
         figure(loaded)
     );
-    found.warning(
+    found.add(
         codes::RESONANCE_ODD,
         "actuator.resonance",
         format!("{sizes}; the spec says {} Hz", figure(resonance)),
@@ -76,7 +76,7 @@ pub(super) fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
     if time * actuator.resonance >= FASTEST {
         return;
     }
-    found.warning(
+    found.add(
         codes::SLEW_TOO_FAST,
         "actuator.slew_rate",
         format!(
@@ -101,7 +101,7 @@ pub(super) fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
     if time <= SLOWEST {
         return;
     }
-    found.warning(
+    found.add(
         codes::SLEW_TOO_SLOW,
         "actuator.slew_rate",
         format!(
@@ -120,7 +120,7 @@ pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
     if actuator.damping_ratio >= LEAST_DAMPED {
         return;
     }
-    found.warning(
+    found.add(
         codes::DAMPING_ODD,
         "actuator.damping_ratio",
         format!(
@@ -140,7 +140,7 @@ pub(super) fn grid_shows_the_loop(facts: &Facts, found: &mut Found) {
         return;
     }
     let [low, high] = facts.model.actuator.voltage;
-    found.warning(
+    found.add(
         codes::GRID_COARSE,
         "hysteresis.grid",
         format!(

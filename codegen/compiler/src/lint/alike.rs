@@ -36,7 +36,7 @@ pub(super) fn calibrations(facts: &Facts, found: &mut Found) {
             if !far && !turned {
                 continue;
             }
-            found.warning(
+            found.add(
                 codes::CALIBRATION_ODD,
                 &format!("gauge[{gauge}].calibration[{power}]"),
                 format!(
@@ -67,7 +67,7 @@ pub(super) fn calibrations_straight(facts: &Facts, found: &mut Found) {
             }
             let own = format!("gauge[{gauge}].calibration");
             let key = if found.model.spans.contains_key(&own) { own } else { "sensor.calibration".to_owned() };
-            found.warning(
+            found.add(
                 codes::CALIBRATION_BENT,
                 &format!("{key}[{power}]"),
                 format!(
@@ -100,7 +100,7 @@ pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
                 if ratio == 0.0 || usual == 0.0 || (1.0 / GAIN_SPREAD..=GAIN_SPREAD).contains(&(ratio / usual)) {
                     continue;
                 }
-                found.warning(
+                found.add(
                     codes::GAIN_UNEVEN,
                     &format!("{section}.{name}[{axis}]"),
                     format!(
@@ -138,7 +138,7 @@ pub(super) fn gains_in_order(facts: &Facts, found: &mut Found) {
                 if now <= libm::log(EXCHANGED_NOW) || exchanged >= libm::log(EXCHANGED_THEN) {
                     continue;
                 }
-                found.warning(
+                found.add(
                     codes::GAINS_EXCHANGED,
                     &format!("{section}.{name}[{a}]"),
                     format!(

@@ -41,7 +41,7 @@ pub(super) fn leg_parts_have_size(facts: &Facts, found: &mut Found) {
         if radius >= THINNEST * length {
             continue;
         }
-        found.warning(
+        found.add(
             codes::LEG_PART_SMALL,
             &format!("leg.{part}_inertia"),
             format!(
@@ -64,7 +64,7 @@ pub(super) fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
         if *center == 0.0 || *center >= NEAREST_CENTRE * radius {
             continue;
         }
-        found.warning(
+        found.add(
             codes::CENTRE_AT_JOINT,
             &format!("leg.{part}_center"),
             format!(
@@ -87,7 +87,7 @@ pub(super) fn parts_are_bodies(facts: &Facts, found: &mut Found) {
         if *center == 0.0 || SOUND_PART.contains(&(radius / center)) || found.list.iter().any(said) {
             continue;
         }
-        found.warning(
+        found.add(
             codes::LEG_PART_SHAPE,
             &key,
             format!(
@@ -112,7 +112,7 @@ pub(super) fn centre_over_joints(facts: &Facts, found: &mut Found) {
         if libm::fabs(value) <= FARTHEST_CENTRE[axis] * size {
             continue;
         }
-        found.warning(
+        found.add(
             codes::CENTRE_FAR,
             &format!("platform.center_of_mass[{axis}]"),
             format!(
@@ -135,7 +135,7 @@ pub(super) fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
         if sound.contains(&(radius / size)) {
             continue;
         }
-        found.warning(
+        found.add(
             codes::MOMENT_ODD,
             &format!("platform.inertia[{axis}]"),
             format!(
@@ -167,7 +167,7 @@ pub(super) fn moments_fit_symmetry(facts: &Facts, found: &mut Found) {
     }
     // The odd one of the three is suspected: the one whose fellow is on the third axis.
     let odd = usize::from(from_yy > from_xx);
-    found.warning(
+    found.add(
         codes::MOMENTS_UNEVEN,
         &format!("platform.inertia[{odd}]"),
         format!(
@@ -187,7 +187,7 @@ pub(super) fn leg_parts_against_platform(facts: &Facts, found: &mut Found) {
         if SOUND_SHARE.contains(&(mass / platform)) {
             continue;
         }
-        found.warning(
+        found.add(
             codes::LEG_MASS_ODD,
             &format!("leg.{part}_mass"),
             format!("the {part} part of a leg weighs {} kg, the platform {} kg", figure(*mass), figure(platform)),

@@ -1,7 +1,7 @@
 //! Memory that the constants take whatever the code does.
 
 use super::{Facts, Found, figure};
-use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Model, Scalar};
 
 /// Least stack of a tick, bytes: six legs and a pose in flight.
@@ -35,7 +35,7 @@ pub fn estimated(model: &Model) -> Option<Diagnostic> {
     Some(Diagnostic::at(
         &model.spans,
         &["target.budget"],
-        (Severity::Note, codes::ESTIMATED),
+        codes::ESTIMATED,
         format!(
             "tables take {tables} B of flash, reversal memories {memory} B of RAM; the rest of the budget is not checked here"
         ),
@@ -56,14 +56,14 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
         let Some(declared) = declared else { continue };
         let key = format!("target.budget.{name}");
         if declared < least {
-            found.error(
+            found.add(
                 codes::BUDGET_IMPOSSIBLE,
                 &key,
                 format!("`{key}` is {declared} B, but {what} {least} B"),
                 "check the unit (B or KiB); `specgen build` measures what it really takes",
             );
         } else if declared > LOOSE * least.max(if name == "stack" { 1024 } else { 4096 }) {
-            found.warning(
+            found.add(
                 codes::BUDGET_LOOSE,
                 &key,
                 format!(
@@ -78,7 +78,7 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
     if let (Some(flash), Some(ram)) = (target.flash, target.ram)
         && ram > flash
     {
-        found.warning(
+        found.add(
             codes::BUDGET_SWAPPED,
             "target.budget.ram",
             format!("a budget of {ram} B of RAM and {flash} B of flash"),
@@ -88,7 +88,7 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
     if let Some(declared) = target.instructions
         && declared < LEAST_INSTRUCTIONS
     {
-        found.error(
+        found.add(
             codes::BUDGET_IMPOSSIBLE,
             "target.budget.instructions",
             format!("`target.budget.instructions` is {declared}, but the kinematics of six legs alone takes more than {LEAST_INSTRUCTIONS}"),

@@ -17,7 +17,7 @@ pub(super) fn work_piece(facts: &Facts, found: &mut Found) {
         if value == 0.0 || SOUND_WORK_PIECE.contains(&ratio) {
             continue;
         }
-        found.warning(
+        found.add(
             codes::WORK_PIECE_ODD,
             &format!("control.environment.stiffness[{axis}]"),
             format!(
@@ -46,7 +46,7 @@ pub(super) fn lever_of_contact(facts: &Facts, found: &mut Found) {
         if lever <= LONGEST_LEVER * radius {
             continue;
         }
-        found.warning(
+        found.add(
             codes::CONTACT_LEVER,
             &format!("control.environment.stiffness[{axis}]"),
             format!(
@@ -74,7 +74,7 @@ pub(super) fn contact_near_bias(facts: &Facts, found: &mut Found) {
         if gives <= reach {
             continue;
         }
-        found.warning(
+        found.add(
             codes::CONTACT_FAR,
             &format!("control.environment.rest[{axis}]"),
             format!(

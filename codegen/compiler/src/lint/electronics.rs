@@ -21,7 +21,7 @@ pub(super) fn lag_fits_slew(facts: &Facts, found: &mut Found) {
     if amplifier.lag * actuator.slew_rate <= LAG_SLACK * (high - low) {
         return;
     }
-    found.warning(
+    found.add(
         codes::LAG_AGAINST_SLEW,
         "amplifier.lag",
         format!(
@@ -43,7 +43,7 @@ pub(super) fn current_fits_slew(facts: &Facts, found: &mut Found) {
     if needed <= current {
         return;
     }
-    found.warning(
+    found.add(
         codes::CURRENT_AGAINST_SLEW,
         "amplifier.current",
         format!(
@@ -69,7 +69,7 @@ pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
         return;
     }
     let how = if share > 1e-3 { "more than a hundredth of its range" } else { "quieter than any amplifier" };
-    found.warning(
+    found.add(
         codes::AMPLIFIER_NOISE,
         "amplifier.noise",
         format!(
@@ -91,7 +91,7 @@ pub(super) fn converter_step(facts: &Facts, found: &mut Found) {
     if step <= COARSEST_STEP * actuator.stroke {
         return;
     }
-    found.warning(
+    found.add(
         codes::CONVERTER_COARSE,
         "dac.bits",
         format!(
@@ -112,7 +112,7 @@ pub(super) fn converter_range(facts: &Facts, found: &mut Found) {
         return;
     }
     let item = usize::from(high - to >= from - low);
-    found.warning(
+    found.add(
         codes::CONVERTER_WIDE,
         &format!("dac.range[{item}]"),
         format!(
@@ -133,7 +133,7 @@ pub(super) fn rest_without_power(facts: &Facts, found: &mut Found) {
     if rest == off {
         return;
     }
-    found.warning(
+    found.add(
         codes::REST_NOT_ZERO,
         "supervisor.rest_voltage",
         format!(

@@ -117,7 +117,7 @@ pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
     } else {
         "do not see every motion".to_owned()
     };
-    found.warning(
+    found.add(
         codes::GAUGE_SLIP,
         &first.key,
         format!("the gauges {seen}; with {} in `{}` changed it were {} times", first.what, first.key, figure(*best)),

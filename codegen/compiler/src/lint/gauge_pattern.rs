@@ -108,7 +108,7 @@ pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
             keys.push(&change.key);
         }
     }
-    found.warning(
+    found.add(
         codes::GAUGE_PATTERN,
         &first.key,
         format!("with {} in `{}` changed, the gauge {pattern}; as it is written it does not", first.what, first.key),

@@ -34,7 +34,7 @@ pub(super) fn noise_of_a_step(facts: &Facts, found: &mut Found) {
     if noise == 0.0 || noise >= QUIETEST * step {
         return;
     }
-    found.warning(
+    found.add(
         codes::GAUGE_QUIET,
         "sensor.noise",
         format!(
@@ -63,7 +63,7 @@ pub(super) fn range_centred(facts: &Facts, found: &mut Found) {
     if !asymmetric {
         return;
     }
-    found.warning(
+    found.add(
         codes::GAUGE_LOPSIDED,
         &format!("sensor.range[{item}]"),
         format!(
@@ -86,7 +86,7 @@ pub(super) fn range_beyond_zero(facts: &Facts, found: &mut Found) {
             if end == 0.0 || libm::fabs(end) >= END_AT_ZERO * (range[1] - range[0]) {
                 continue;
             }
-            found.warning(
+            found.add(
                 codes::RANGE_AT_ZERO,
                 &format!("{name}[{item}]"),
                 format!(
@@ -119,7 +119,7 @@ pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
     if step <= COARSEST_STEP * stroke {
         return;
     }
-    found.warning(
+    found.add(
         codes::GAUGE_COARSE,
         "sensor.bits",
         format!(
@@ -145,7 +145,7 @@ pub(super) fn odd_coordinates(facts: &Facts, found: &mut Found) {
             if value.abs() < ROUNDING || value.abs() >= NEARLY_ZERO * radius {
                 continue;
             }
-            found.warning(
+            found.add(
                 codes::COORDINATE_ODD,
                 &format!("{key}[{axis}]"),
                 format!(
@@ -179,7 +179,7 @@ pub(super) fn opposite_directions(facts: &Facts, found: &mut Found) {
         if count < with + 1 || (count == with + 1 && gauge < other) {
             continue;
         }
-        found.warning(
+        found.add(
             codes::GAUGE_REVERSED,
             &format!("gauge[{gauge}].direction"),
             format!("gauge {gauge} counts against gauge {other}, which looks along the same line the other way"),
@@ -203,7 +203,7 @@ pub(super) fn size_of_layout(facts: &Facts, found: &mut Found) {
         let far = libm::sqrt(pierced.iter().fold(0.0, |sum, part| sum + part * part));
         if far.is_nan() || far <= DETACHED * radius {
             if let Some(axis) = aside(&pierced, &n, radius) {
-                found.warning(
+                found.add(
                     codes::GAUGE_FAR,
                     &format!("gauge[{gauge}].point[{axis}]"),
                     format!(
@@ -217,7 +217,7 @@ pub(super) fn size_of_layout(facts: &Facts, found: &mut Found) {
             }
             continue;
         }
-        found.warning(
+        found.add(
             codes::GAUGE_FAR,
             &format!("gauge[{gauge}].point"),
             format!(

@@ -35,7 +35,7 @@ pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
         } else {
             format!("geometry.{body}_angle")
         };
-        found.warning(
+        found.add(
             codes::JOINTS_TOUCH,
             &key,
             format!(
@@ -59,7 +59,7 @@ pub(super) fn joints_turn(facts: &Facts, found: &mut Found) {
     if angle <= most {
         return;
     }
-    found.error(
+    found.add(
         codes::JOINT_ANGLE,
         "leg.joint_angle",
         format!(
@@ -87,7 +87,7 @@ pub(super) fn base_is_wider(facts: &Facts, found: &mut Found) {
     } else {
         ["geometry.base_joints", "geometry.platform_joints"]
     };
-    found.warning(
+    found.add(
         codes::PLATFORM_WIDER,
         key,
         format!(
@@ -123,7 +123,7 @@ pub(super) fn proportions(facts: &Facts, found: &mut Found) {
     if !apart[odd].is_finite() || apart[odd] <= libm::log(OUT_OF_PROPORTION) {
         return;
     }
-    found.warning(
+    found.add(
         codes::OUT_OF_PROPORTION,
         keys[odd],
         format!(
@@ -151,7 +151,7 @@ pub(super) fn legs_cross(facts: &Facts, found: &mut Found) {
         if exchanged >= now * (1.0 - CROSSED) {
             continue;
         }
-        found.warning(
+        found.add(
             codes::LEGS_CROSS,
             &format!("geometry.platform_joints[{i}]"),
             format!(

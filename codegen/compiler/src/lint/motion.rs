@@ -32,7 +32,7 @@ pub(super) fn moves_within_slew(facts: &Facts, found: &mut Found) {
         if slew <= actuator.slew_rate {
             continue;
         }
-        found.warning(
+        found.add(
             codes::MOVE_BEYOND_SLEW,
             &format!("control.setpoint.speed[{axis}]"),
             format!(
@@ -58,7 +58,7 @@ pub(super) fn moves_end(facts: &Facts, found: &mut Found) {
         if time <= LONGEST_MOVE {
             continue;
         }
-        found.warning(
+        found.add(
             codes::MOVE_SLOW,
             &format!("control.setpoint.speed[{axis}]"),
             format!(
@@ -81,7 +81,7 @@ pub(super) fn limits_bind(facts: &Facts, found: &mut Found) {
         let (speed, acceleration, jerk) = (rules.speed[axis], rules.acceleration[axis], rules.jerk[axis]);
         let shown = |value: f64, per: &str| format!("{}/{per}", amount(axis, value));
         let mut say = |name: &str, value: String, what: String| {
-            found.warning(
+            found.add(
                 codes::LIMIT_WITHOUT_EFFECT,
                 &format!("control.setpoint.{name}[{axis}]"),
                 format!("a limit of {value} on {} {what}", AXES[axis]),
@@ -129,7 +129,7 @@ pub(super) fn stream_limit_binds(facts: &Facts, found: &mut Found) {
         if step <= way(facts, axis) {
             continue;
         }
-        found.warning(
+        found.add(
             codes::STREAM_UNCHECKED,
             &format!("control.setpoint.stream_speed[{axis}]"),
             format!(
@@ -161,7 +161,7 @@ pub(super) fn workspace_is_used(facts: &Facts, found: &mut Found) {
         } else {
             format!("workspace.rotation[{}]", axis - 3)
         };
-        found.warning(
+        found.add(
             codes::WORKSPACE_TINY,
             &key,
             format!(

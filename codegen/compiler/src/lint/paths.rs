@@ -136,9 +136,9 @@ fn slew(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
     );
     // Beyond doubt only where the mean gain and a quarter more do not do.
     if demand.slew > limit * GAIN_SLACK {
-        found.error(codes::PATH_BEYOND_SLEW, key, message, &help);
+        found.add(codes::PATH_BEYOND_SLEW, key, message, &help);
     } else {
-        found.warning(codes::PATH_NEAR_SLEW, key, message, &help);
+        found.add(codes::PATH_NEAR_SLEW, key, message, &help);
     }
 }
 
@@ -147,7 +147,7 @@ fn current(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) {
     if needed <= limit / GAIN_SLACK {
         return;
     }
-    found.error(
+    found.add(
         codes::PATH_BEYOND_CURRENT,
         key,
         format!(
@@ -169,7 +169,7 @@ fn deflection(model: &Model, key: &str, demand: &PathDemand, found: &mut Found) 
     if demand.deflection <= LARGEST_DEFLECTION * stroke {
         return;
     }
-    found.warning(
+    found.add(
         codes::PATH_INERTIA,
         key,
         format!(
@@ -187,7 +187,7 @@ fn excitation(key: &str, name: &str, frequency: f64, mode: f64, found: &mut Foun
     if frequency <= FASTEST * mode {
         return;
     }
-    found.warning(
+    found.add(
         codes::PATH_EXCITES,
         key,
         format!("`{name}` at {} Hz excites the lowest mode of {} Hz", figure(frequency), figure(mode)),

@@ -28,7 +28,7 @@ pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
         if time == 0.0 || time >= NOTHING * tick {
             continue;
         }
-        found.warning(
+        found.add(
             codes::TIME_WITHOUT_EFFECT,
             key,
             format!(
@@ -50,7 +50,7 @@ pub(super) fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
     if task.lead <= LARGEST_LEAD * lag {
         return;
     }
-    found.warning(
+    found.add(
         codes::LEAD_TOO_LONG,
         "control.lead",
         format!(
@@ -74,7 +74,7 @@ pub(super) fn transfer(facts: &Facts, found: &mut Found) {
     } else {
         "so long that a mode takes a minute to be what it says"
     };
-    found.warning(
+    found.add(
         codes::TRANSFER_ODD,
         "control.transfer_time",
         format!("a transfer time of {} ms is {how}", figure(time * 1e3)),
@@ -91,7 +91,7 @@ pub(super) fn velocity_filter(facts: &Facts, found: &mut Found) {
     if cutoff >= SLOWEST_FILTER * modes[0] {
         return;
     }
-    found.warning(
+    found.add(
         codes::VELOCITY_FILTER_SLOW,
         "control.velocity_cutoff",
         format!(
@@ -111,7 +111,7 @@ pub(super) fn ticks_against_modes(facts: &Facts, found: &mut Found) {
     if (FEWEST_TICKS..=MOST_TICKS).contains(&ticks) {
         return;
     }
-    found.warning(
+    found.add(
         codes::TICKS_AGAINST_MODES,
         "timing.period",
         format!(

@@ -18,7 +18,7 @@ pub(super) fn ratio_of_gains(facts: &Facts, found: &mut Found) {
         if SOUND_RATIO.contains(&ratio) {
             continue;
         }
-        found.warning(
+        found.add(
             codes::GAIN_RATIO_ODD,
             &format!("adaptation.gain_ratio[{end}]"),
             format!("the loop is to be stable for stacks whose gain is {} times what was identified", figure(ratio)),
@@ -50,7 +50,7 @@ pub(super) fn adapts_in_time(facts: &Facts, found: &mut Found) {
     if level == 0.0 || level >= SLOWEST {
         return;
     }
-    found.warning(
+    found.add(
         codes::ADAPTATION_SLOW,
         &key,
         format!("the level estimate follows at {} rad/s: it takes {} s", figure(level), figure(1.0 / level)),
@@ -69,7 +69,7 @@ pub(super) fn drift_behind_level(facts: &Facts, found: &mut Found) {
         return;
     }
     let how = if drift > level { "is to follow faster than" } else { "is next to nothing beside" };
-    found.warning(
+    found.add(
         codes::DRIFT_ODD,
         &key,
         format!("the drift estimate, at {} rad/s, {how} the level estimate, at {} rad/s", figure(drift), figure(level)),

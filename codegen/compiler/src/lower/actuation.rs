@@ -1,7 +1,7 @@
 //! Voltage limits and slew rate as converter codes, and the codes on the Everett grid.
 
 use crate::ir::{Actuation, Scalar};
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
 /// Returns the converter constants and the slew limit in codes per tick.
@@ -25,10 +25,7 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<(Actuation, i32), V
     }
     let mut findings = Vec::new();
     if code_max - code_min < 2 * model.hysteresis.grid as i32 {
-        findings.push(finding(
-            model,
-            codes::TOO_FEW_CODES,
-            "dac.bits",
+        findings.push(Diagnostic::at(&model.spans, &["dac.bits"], codes::TOO_FEW_CODES,
             format!(
                 "the converter has only {} codes between {volts_min} V and {volts_max} V, fewer than two per cell of the {}-cell Preisach grid",
                 code_max - code_min + 1,
@@ -55,11 +52,6 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<(Actuation, i32), V
         voltage: [volts_min, volts_max],
     };
     Ok((actuation, max_step))
-}
-
-fn finding(model: &Model, code: &'static str, key: &str, message: String, help: String) -> Diagnostic {
-    let place = model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec);
-    Diagnostic { severity: Severity::Error, code, key: key.to_owned(), place, message, help }
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use specgen_runtime::Platform;
 
 use super::kinematics::joint_positions;
 use crate::ir::{Dynamics, DynamicsLeg, LEGS, Scalar};
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
 
 /// Standard gravity of the project's reference data, m/s², along −z of {B}.
@@ -227,20 +227,18 @@ fn ill_conditioned(model: &Model, ratio: f64) -> Diagnostic {
     let equations = equations_at_rest(model, 0, reach);
     let singular = nalgebra::Matrix6::from_fn(|i, j| equations[i][j]).singular_values();
     let key = if model.spans.contains_key("geometry.height") { "geometry.height" } else { "geometry.base_joints" };
-    Diagnostic {
-        severity: Severity::Error,
-        code: codes::ILL_CONDITIONED,
-        key: key.to_owned(),
-        place: model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec),
-        message: format!(
+    Diagnostic::at(
+        &model.spans,
+        &[key],
+        codes::ILL_CONDITIONED,
+        format!(
             "somewhere in the declared workspace the six legs hardly hold the platform: the smallest pivot of the equations for the leg \
              forces is {ratio:.2e} of the largest, expected {SMALLEST_PIVOT_RATIO:.0e} or more (condition number at rest {:.3e})",
             singular.max() / singular.min()
         ),
-        help: "spread the leg directions: make the height comparable to the radii, bring the joints of base and platform closer in \
-               different pairs (small base_angle and platform_angle), or reduce workspace.rotation"
-            .to_owned(),
-    }
+        "spread the leg directions: make the height comparable to the radii, bring the joints of base and platform closer in \
+               different pairs (small base_angle and platform_angle), or reduce workspace.rotation",
+    )
 }
 
 fn dot(a: Vector, b: Vector) -> f64 {

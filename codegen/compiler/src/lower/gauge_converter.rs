@@ -1,7 +1,7 @@
 //! Codes of the gauges' converters.
 
 use crate::ir::{GaugeConverter, Scalar, Sensing};
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, Place, codes};
 use specgen_language::model::Model;
 
 /// What converters of gauges with a calibration take in without `sensor.input_range`, V.
@@ -39,16 +39,9 @@ pub(super) fn unseen(model: &Model, sensing: Option<&Sensing>) -> Vec<Diagnostic
         from >= to || reading(from) * reading(to) > 0.0
     });
     unseen
-        .map(|(gauge, (_, [first, last]))| Diagnostic {
-            severity: Severity::Error,
-            code: codes::GAUGE_INPUT,
-            key: key.to_owned(),
-            place: place.cloned().map_or(Place::Whole, Place::Spec),
-            message: format!(
+        .map(|(gauge, (_, [first, last]))| { let message = format!(
                 "gauge {gauge} gives {first:.4} V to {last:.4} V over `sensor.range`, but its converter takes in {low} V to {high} V: \
                  it does not see the reading zero"
-            ),
-            help: format!("write input_range = [\"{:.3} V\", \"{:.3} V\"] or wider, or check the calibration", first - 1e-3, last + 1e-3),
-        })
+            ); let help = format!("write input_range = [\"{:.3} V\", \"{:.3} V\"] or wider, or check the calibration", first - 1e-3, last + 1e-3); Diagnostic::new(codes::GAUGE_INPUT, key, place.cloned().map_or(Place::Whole, Place::Spec), message, help) })
         .collect()
 }

@@ -4,7 +4,7 @@ use specgen_runtime::{Legs, Series};
 
 use super::linear::{self, Matrix, cross, norm};
 use crate::ir::{Kinematics, LEGS, Scalar};
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Geometry, Model};
 
 /// Largest |Δl| / l₀ for which the Newton steps are known to converge as counted.
@@ -122,32 +122,28 @@ fn corrections(legs: &Legs<f64>, inverse: &Matrix, bounds: [f64; 6], scalar: Sca
 
 fn degenerate(model: &Model) -> Diagnostic {
     let key = "geometry.base_joints";
-    Diagnostic {
-        severity: Severity::Error,
-        code: codes::DEGENERATE_GEOMETRY,
-        key: key.to_owned(),
-        place: model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec),
-        message: "the six legs leave a motion of the platform free at rest".to_owned(),
-        help: "move the joints of base and platform apart: pairs of legs must meet in different places".to_owned(),
-    }
+    Diagnostic::at(
+        &model.spans,
+        &[key],
+        codes::DEGENERATE_GEOMETRY,
+        "the six legs leave a motion of the platform free at rest",
+        "move the joints of base and platform apart: pairs of legs must meet in different places",
+    )
 }
 
 fn too_large(model: &Model, displacement: f64, length: f64) -> Diagnostic {
     let key = "workspace.translation";
-    Diagnostic {
-        severity: Severity::Error,
-        code: codes::WORKSPACE_TOO_LARGE,
-        key: key.to_owned(),
-        place: model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec),
-        message: format!(
+    Diagnostic::at(
+        &model.spans,
+        &[key],
+        codes::WORKSPACE_TOO_LARGE,
+        format!(
             "the declared workspace may change a leg by {:.3} mm, more than a quarter of its length of {:.3} mm",
             displacement * 1e3,
             length * 1e3
         ),
-        help:
-            "the difference-form kinematics is for small motions: reduce workspace.translation and workspace.rotation"
-                .to_owned(),
-    }
+        "the difference-form kinematics is for small motions: reduce workspace.translation and workspace.rotation",
+    )
 }
 
 /// Coefficients of sin x / x after the leading 1 (−1/3!, 1/5!, …) and of (1 − cos x) / x² (1/2!, −1/4!, …), in x²: as many as

@@ -12,7 +12,7 @@ use super::kinematics::{bounds, leg_jacobian, series_of, tolerance};
 use super::linear::{grid, norm};
 use crate::ir::{Scalar, Sensing};
 use layout::Layout;
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, TaskSpace};
 
 /// More passes than this mean that the pose does not converge.
@@ -206,10 +206,10 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
     )]
 }
 
-fn finding(model: &Model, code: &'static str, key: &str, message: String, help: String) -> Diagnostic {
+fn finding(model: &Model, code: Code, key: &str, message: String, help: String) -> Diagnostic {
     // A key of a gauge that takes its default has no place of its own; its table may have one.
     let table = key.split('.').next().unwrap_or(key);
     let span = model.spans.get(key).or_else(|| model.spans.get(table));
     let place = span.cloned().map_or(Place::Whole, Place::Spec);
-    Diagnostic { severity: Severity::Error, code, key: key.to_owned(), place, message, help }
+    Diagnostic::new(code, key, place, message, help)
 }

@@ -20,7 +20,7 @@ use specgen_runtime::setpoint::{Frames as _, MoveLimits, Profile, Target, Tool, 
 use crate::figure::AXES;
 use crate::ir::{Frames, Scalar, Setpoints, Trajectory};
 use specgen_identify::waveform::Waveform;
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
 
 /// Ticks of the longest trajectory: counted exactly in f32, and 7 min at 10 kHz.
@@ -211,7 +211,7 @@ impl User {
                     amount(axis, value),
                     amount(axis, self.bound[axis])
                 );
-                findings.push(finding(model, Severity::Error, codes::ZERO_OUTSIDE, key, message, help.to_owned()));
+                findings.push(Diagnostic::at(&model.spans, &[key], codes::ZERO_OUTSIDE, message, help));
             }
         }
         findings
@@ -229,11 +229,10 @@ fn rotation([x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
 }
 
 fn too_wide(model: &Model, found: f64, largest: f64) -> Diagnostic {
-    finding(
-        model,
-        Severity::Error,
+    Diagnostic::at(
+        &model.spans,
+        &["control.frames"],
         codes::FRAMES_TOO_WIDE,
-        "control.frames",
         format!("the workspace turns by up to {:.1} mrad; user frames are for {:.1} mrad", found * 1e3, largest * 1e3),
         "reduce workspace.rotation, or leave control.frames out".to_owned(),
     )
@@ -258,11 +257,10 @@ fn too_slow(model: &Model, user: &User, limits: &MoveLimits<f64>) -> Option<Diag
     if Profile::plan(&way, limits).is_some() {
         return None;
     }
-    Some(finding(
-        model,
-        Severity::Error,
+    Some(Diagnostic::at(
+        &model.spans,
+        &["control.setpoint.speed"],
         codes::MOVES_TOO_SLOW,
-        "control.setpoint.speed",
         format!(
             "at these limits a move across the workspace takes more than {:.0} s",
             f64::from(specgen_runtime::setpoint::LONGEST) * model.timing.period
@@ -275,16 +273,4 @@ fn too_slow(model: &Model, user: &User, limits: &MoveLimits<f64>) -> Option<Diag
 fn amount(axis: usize, value: f64) -> String {
     let digits = if (value * 1e6).abs() < 0.1 { 5 } else { 3 };
     format!("{:.digits$} {}", value * 1e6, if axis < 3 { "um" } else { "urad" })
-}
-
-fn finding(
-    model: &Model,
-    severity: Severity,
-    code: &'static str,
-    key: &str,
-    message: String,
-    help: String,
-) -> Diagnostic {
-    let place = model.spans.get(key).cloned().map_or(Place::Whole, Place::Spec);
-    Diagnostic { severity, code, key: key.to_owned(), place, message, help }
 }

@@ -5,7 +5,7 @@ mod rest;
 use super::kinematics::inverse_jacobian;
 use super::sensing::{PoseNoise, pose_noise, readings_per_pose};
 use crate::ir::{Actuation, Hysteresis, Scalar, Supervision};
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::Model;
 use specgen_numerics::multiply6;
 
@@ -278,8 +278,6 @@ fn whole(value: f64) -> u32 {
     value as u32
 }
 
-fn finding(model: &Model, code: &'static str, key: &str, message: String, help: String) -> Diagnostic {
-    let path = format!("supervisor.{key}");
-    let place = model.spans.get(&path).cloned().map_or(Place::Whole, Place::Spec);
-    Diagnostic { severity: Severity::Error, code, key: path, place, message, help }
+fn finding(model: &Model, code: Code, key: &str, message: String, help: String) -> Diagnostic {
+    Diagnostic::at(&model.spans, &[&format!("supervisor.{key}")], code, message, help)
 }

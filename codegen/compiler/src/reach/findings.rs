@@ -52,11 +52,10 @@ fn of_furthest_axis(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     let (table, item) = if worst < 3 { ("workspace.translation", worst) } else { ("workspace.rotation", worst - 3) };
     let (unit, scale) = unit(worst);
     let [low, high] = reach.axes[worst].from_middle;
-    Some(finding(
-        model,
-        Severity::Note,
-        codes::LEGS_CUT_SHORT,
+    Some(Diagnostic::at(
+        &model.spans,
         &[&format!("{table}[{item}]"), table, "workspace"],
+        codes::LEGS_CUT_SHORT,
         format!(
             "no pose reaches |{}| = {:.2} {unit}: from the middle of the strokes, at z = {:.1} um, this axis alone goes from {:.2} to {:.2} {unit}",
             AXES[worst],
@@ -84,16 +83,8 @@ fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     let item = usize::from(low <= 0.0);
     let seen = if high < reach.stroke { high } else { reach.stroke } - if low > 0.0 { low } else { 0.0 };
     // The paper's gauge sees four fifths; one that sees little is in another unit.
-    let grade = if seen < LEAST_SEEN * reach.stroke {
-        (Severity::Warning, codes::SENSOR_RANGE)
-    } else {
-        (Severity::Note, codes::GAUGE_SHORT_OF_STROKE)
-    };
-    Some(finding(
-        model,
-        grade.0,
-        grade.1,
-        &[&format!("sensor.range[{item}]"), "sensor.range", "sensor"],
+    let code = if seen < LEAST_SEEN * reach.stroke { codes::SENSOR_RANGE } else { codes::GAUGE_SHORT_OF_STROKE };
+    Some(Diagnostic::at(&model.spans, &[&format!("sensor.range[{item}]"), "sensor.range", "sensor"], code,
         format!(
             "the gauge of a leg reads {:.3} um to {:.3} um, but the leg moves from 0 to {:.3} um",
             low * 1e6,
@@ -112,11 +103,7 @@ fn of_condition(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     if conditioning.worst_bound <= POOREST {
         return None;
     }
-    Some(finding(
-        model,
-        Severity::Warning,
-        codes::CONDITION_POOR,
-        &["geometry.height", "geometry"],
+    Some(Diagnostic::at(&model.spans, &["geometry.height", "geometry"], codes::CONDITION_POOR,
         format!(
             "the condition number of the legs is {:.1} at rest and may come to {:.1} in the workspace",
             conditioning.at_rest, conditioning.worst_bound
@@ -136,7 +123,7 @@ fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic>
             high * 1e6,
             reach.stroke * 1e6
         );
-        return Some(finding(model, Severity::Error, codes::BIAS_UNREACHABLE, &KEYS, message, help));
+        return Some(Diagnostic::at(&model.spans, &KEYS, codes::BIAS_UNREACHABLE, message, help));
     }
     let room = ROOM * reach.stroke;
     if low >= room && high <= reach.stroke - room {
@@ -149,7 +136,7 @@ fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic>
     );
     let middle = 0.5 * (reach.axes[2].from_middle[0] + reach.axes[2].from_middle[1]);
     let help = format!("move the bias towards the middle of the strokes, where z is {:.1} um", middle * 1e6);
-    Some(finding(model, Severity::Warning, codes::NO_ROOM, &KEYS, message, help))
+    Some(Diagnostic::at(&model.spans, &KEYS, codes::NO_ROOM, message, help))
 }
 
 fn of_axis(model: &Model, reach: &Reach, axis: usize) -> Option<Diagnostic> {
@@ -164,11 +151,10 @@ fn of_axis(model: &Model, reach: &Reach, axis: usize) -> Option<Diagnostic> {
     let (unit, scale) = unit(axis);
     // Rounded down, so that the number shown is itself accepted.
     let shown = libm::floor(furthest * scale * 100.0) / 100.0;
-    Some(finding(
-        model,
-        Severity::Error,
-        codes::AXIS_UNREACHABLE,
+    Some(Diagnostic::at(
+        &model.spans,
         &[&key, table, "workspace"],
+        codes::AXIS_UNREACHABLE,
         format!(
             "no pose reaches |{}| = {:.2} {unit}: from the middle of the strokes, this axis alone goes from {:.2} to {:.2} {unit}",
             AXES[axis],
@@ -192,11 +178,10 @@ pub(super) fn of_path(model: &Model, stroke: f64, [key, name]: [&str; 2], path: 
         stroke * 1e6
     );
     let section = key.split('.').next().unwrap_or(key);
-    Some(finding(
-        model,
-        Severity::Error,
-        codes::TRAJECTORY_UNREACHABLE,
+    Some(Diagnostic::at(
+        &model.spans,
         &[key, section],
+        codes::TRAJECTORY_UNREACHABLE,
         message,
         advice(path, "control.setpoint.bias"),
     ))
@@ -278,15 +263,4 @@ pub fn describe(reach: &Reach, biased: bool) -> String {
         half(&reach.boxes.without_rotation[..3])
     );
     text
-}
-
-fn finding(
-    model: &Model,
-    severity: Severity,
-    code: &'static str,
-    keys: &[&str],
-    message: String,
-    help: String,
-) -> Diagnostic {
-    Diagnostic::at(&model.spans, keys, (severity, code), message, help)
 }

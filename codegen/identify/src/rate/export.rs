@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::{RateModel, RateOption};
 use crate::everett::EverettTable;
 use crate::findings::Findings;
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 
 const HEADER: &str = "up_V,down_V,rate_um_s_per_V";
 /// Largest value that is believed, m s/V: a metre at 1 V/s.
@@ -39,7 +39,7 @@ pub fn read_rate_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Dia
     let mut findings = Findings::new(shown_as);
     let help = "write the file with `specgen identify rate … -o NAME`: it is the one that ends in -mu1.csv";
     if !is_rate_csv(text) {
-        findings.error("E0641", Some(1), format!("the header must be `{HEADER}`"), help);
+        findings.add(codes::RATE_TABLE_FILE, Some(1), format!("the header must be `{HEADER}`"), help);
         return Err(findings.into_diagnostics());
     }
     let mut values = Vec::new();
@@ -49,7 +49,7 @@ pub fn read_rate_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Dia
             [up, down, value] if [up, down].iter().all(|x| x.is_finite()) && (value * 1e-6).abs() <= LARGEST => {
                 values.push([up, down, value * 1e-6]);
             }
-            _ => findings.error("E0641", Some(k + 1), "is not three numbers in range".to_owned(), help),
+            _ => findings.add(codes::RATE_TABLE_FILE, Some(k + 1), "is not three numbers in range".to_owned(), help),
         }
     }
     if findings.any_error() {
@@ -58,7 +58,7 @@ pub fn read_rate_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Dia
     let grid = (1..=256).find(|n| n * (n + 1) / 2 == values.len());
     let (Some(grid), Some(first), Some(last)) = (grid, values.first(), values.last()) else {
         let message = format!("{} nodes do not make a triangle of thresholds", values.len());
-        findings.error("E0641", None, message, help);
+        findings.add(codes::RATE_TABLE_FILE, None, message, help);
         return Err(findings.into_diagnostics());
     };
     let nodes = values.iter().map(|v| v[2]).collect();
@@ -73,7 +73,7 @@ pub fn read_rate_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Dia
                     "thresholds {} V, {} V; expected {} V, {} V, rising",
                     values[at][0], values[at][1], wanted[0], wanted[1]
                 );
-                findings.error("E0641", Some(at + 2), message, help);
+                findings.add(codes::RATE_TABLE_FILE, Some(at + 2), message, help);
             }
         }
     }

@@ -9,6 +9,7 @@ use crate::findings::Findings;
 use crate::normal::weights_to_nodes;
 use crate::prior;
 use crate::regressor::Plane;
+use specgen_language::diagnostic::codes;
 use specgen_numerics::nnls::{self, Failure};
 
 /// Longest dead time tried, sampling intervals of the fastest sampled record.
@@ -37,7 +38,7 @@ pub(super) fn all(
     fitted()
         .map_err(|failure| {
             let message = format!("the weights cannot be determined ({failure:?})");
-            findings.error("E0610", None, message, "choose a smaller grid, or record more reversal curves");
+            findings.add(codes::NOT_DETERMINED, None, message, "choose a smaller grid, or record more reversal curves");
         })
         .ok()
 }

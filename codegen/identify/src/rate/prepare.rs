@@ -5,6 +5,7 @@ use crate::findings::Findings;
 use crate::record::Record;
 use crate::regressor::Plane;
 use crate::{coverage, dead_time, sanity, selection};
+use specgen_language::diagnostic::codes;
 
 /// Records whose rates differ by less than this factor tell nothing about rate dependence.
 const RATE_RATIO: f64 = 1.2;
@@ -84,9 +85,9 @@ pub(super) fn check_rates(prepared: &[Prepared], findings: &mut Findings) {
     };
     if prepared.len() < 2 {
         let message = format!("is the only record, at {slow:.1} V/s: rate dependence shows between two rates");
-        findings.error("E0640", None, message, help);
+        findings.add(codes::ONE_RATE, None, message, help);
     } else if *fast < RATE_RATIO * slow {
         let message = format!("and the other records all have one rate ({slow:.1} to {fast:.1} V/s, median)");
-        findings.error("E0640", None, message, help);
+        findings.add(codes::ONE_RATE, None, message, help);
     }
 }

@@ -10,7 +10,7 @@ use crate::regressor::Plane;
 use crate::staircase::Staircase;
 use crate::trend::{Line, rms_and_max};
 use crate::{dead_time, sanity};
-use specgen_language::diagnostic::Diagnostic;
+use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A step between two samples by this share of the drive range is a jump, after which the actuator rings.
 const JUMP: f64 = 0.1;
@@ -50,12 +50,12 @@ impl<'a> Unknown<'a> {
                 "the drive goes from {low} V to {high} V, outside the table's {} V to {} V",
                 plane.range[0], plane.range[1]
             );
-            findings.error("E0605", None, message, "hold out a record inside the range of the table");
+            findings.add(codes::DRIVE_RANGE, None, message, "hold out a record inside the range of the table");
             return Err(findings.into_diagnostics());
         }
         let Some(first) = branches(&record.drive, 0, 0.5 * plane.interval()).first().map(|b| b.first) else {
             let message = "the drive moves by less than half a grid interval".to_owned();
-            findings.error("E0612", None, message, "hold out a record that moves the drive");
+            findings.add(codes::VALIDATION_IDLE, None, message, "hold out a record that moves the drive");
             return Err(findings.into_diagnostics());
         };
         let mut settled = first;

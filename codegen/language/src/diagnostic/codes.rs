@@ -4,8 +4,11 @@
 //! values, E03: ranges and consistency, E04: stability and lowering, E05: records, E06: identification, E07: tuning,
 //! E08: values that do not fit together (the physical lint).
 
-/// What a code stands for.
-#[derive(Debug, Clone, Copy)]
+use super::Severity;
+
+/// A code and what it stands for. The constants below are all there are: a finding with another code does not compile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Code {
     /// Such as `E0102`: E for an error, W for a warning, N for a note.
     pub id: &'static str,
@@ -15,11 +18,31 @@ pub struct Code {
     pub explanation: &'static str,
 }
 
+impl Code {
+    /// How bad every finding with this code is: its letter says so.
+    #[must_use]
+    pub const fn severity(self) -> Severity {
+        match self.id.as_bytes() {
+            [b'E', ..] => Severity::Error,
+            [b'W', ..] => Severity::Warning,
+            _ => Severity::Note,
+        }
+    }
+}
+
+/// A [`Diagnostic::code`](super::Diagnostic::code) beside the constant.
+impl PartialEq<Code> for &str {
+    fn eq(&self, other: &Code) -> bool {
+        *self == other.id
+    }
+}
+
 macro_rules! codes {
     ($($name:ident = $id:literal, $title:literal, $explanation:literal;)*) => {
-        $(#[doc = concat!($id, ": `", $title, "`.")] pub const $name: &str = $id;)*
+        $(#[doc = concat!($id, ": `", $title, "`.")]
+        pub const $name: Code = Code { id: $id, title: $title, explanation: $explanation };)*
         /// Every code, in order.
-        pub const REGISTRY: &[Code] = &[$(Code { id: $id, title: $title, explanation: $explanation }),*];
+        pub const REGISTRY: &[Code] = &[$($name),*];
     };
 }
 

@@ -91,20 +91,15 @@ fn without_c1(line: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnostic::codes;
 
     #[test]
     fn no_control_character_of_a_spec_reaches_the_terminal() {
         let text =
             format!("a = {}\n", ('\u{1}'..='\u{9f}').filter(|c| c.is_control() && *c != '\n').collect::<String>());
         let source = SpecSource { display_name: "x\u{9b}.toml".to_owned(), text, dir: ".".into() };
-        let finding = Diagnostic {
-            severity: Severity::Error,
-            code: "E0104",
-            key: String::new(),
-            place: Place::Spec(4..source.text.len() - 1),
-            message: "m\u{85}".to_owned(),
-            help: "h".to_owned(),
-        };
+        let place = Place::Spec(4..source.text.len() - 1);
+        let finding = Diagnostic::new(codes::SYNTAX, "", place, "m\u{85}", "h");
         let shown = render(&[finding], &source, false);
         assert!(!shown.contains(|c: char| c.is_control() && c != '\n'), "{shown:?}");
     }

@@ -82,7 +82,7 @@ fn in_order(fields: &Fields, findings: &mut Findings, path: &str, equal_allowed:
     let message = format!("`{path}` ends where it starts or before: the first value must be the smaller one");
     let key = path.rsplit('.').next().unwrap_or(path);
     let example = super::keys::key(path).map_or("", |key| key.example);
-    findings.error(
+    findings.add(
         codes::WRONG_ORDER,
         path,
         fields.span(path),

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::diagnostic::{Diagnostic, Place, Severity, codes};
+use crate::diagnostic::{Code, Diagnostic, Place, Severity, codes};
 
 /// More findings than this are cut: a file with so many is not a spec with mistakes.
 pub(super) const MAX_FINDINGS: usize = 100;
@@ -18,20 +18,13 @@ pub(super) struct Findings {
 }
 
 impl Findings {
-    pub(super) fn error(&mut self, code: &'static str, key: &str, span: Range<usize>, message: String, help: String) {
-        self.push(Severity::Error, code, key, Place::Spec(span), message, help);
-    }
-
-    pub(super) fn warning(&mut self, code: &'static str, key: &str, span: Range<usize>, message: String, help: String) {
-        self.push(Severity::Warning, code, key, Place::Spec(span), message, help);
-    }
-
-    fn push(&mut self, severity: Severity, code: &'static str, key: &str, place: Place, message: String, help: String) {
+    /// Adds a finding about `key`, as bad as its code.
+    pub(super) fn add(&mut self, code: Code, key: &str, span: Range<usize>, message: String, help: String) {
         if self.list.len() >= MAX_KEPT {
             self.left_out += 1;
             return;
         }
-        self.list.push(Diagnostic { severity, code, key: key.to_owned(), place, message, help });
+        self.list.push(Diagnostic::new(code, key, Place::Spec(span), message, help));
     }
 
     /// Counts findings that were not even made.
@@ -77,14 +70,9 @@ impl Findings {
         self.list.sort_by_key(start);
         if total > self.list.len() {
             let shown = self.list.len();
-            self.push(
-                Severity::Warning,
-                codes::TRUNCATED,
-                "",
-                Place::Whole,
-                format!("{} further findings are not shown", total - shown),
-                "fix the ones shown and run again".to_owned(),
-            );
+            let message = format!("{} further findings are not shown", total - shown);
+            let help = "fix the ones shown and run again";
+            self.list.push(Diagnostic::new(codes::TRUNCATED, "", Place::Whole, message, help));
         }
         self.list
     }

@@ -5,7 +5,7 @@ use toml::de::DeValue;
 use super::keys::{Item, Key, Range, Shape};
 use super::quantity::{self, Dimension, Problem};
 use super::text;
-use crate::diagnostic::codes;
+use crate::diagnostic::{Code, codes};
 
 /// "a number", "a text" and so on, with article.
 pub(super) fn kind_of(value: &DeValue<'_>) -> &'static str {
@@ -97,7 +97,7 @@ pub(super) fn wrong_dimension(
 }
 
 /// Code, message and help for a text that is not a quantity.
-pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem) -> (&'static str, String, String) {
+pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem) -> (Code, String, String) {
     let example = example_of(key, path);
     let such_as = format!("write a number and a unit, such as {example}");
     let is = format!("`{path}` is \"{}\"", text::shorten(found));

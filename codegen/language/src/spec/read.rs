@@ -79,7 +79,7 @@ impl Reader<'_> {
                 let keys = section.keys.iter().filter(|key| key.presence == *form).map(|key| key.name);
                 keys.collect::<Vec<_>>().join(", ")
             };
-            self.findings.error(
+            self.findings.add(
                 codes::ALTERNATIVES,
                 &keys::join(path, second.name),
                 found.get(second.name).cloned().unwrap_or(0..0),
@@ -121,7 +121,7 @@ impl Reader<'_> {
     }
 
     fn not_repeated(&mut self, section: &Section, path: &str, span: Range<usize>, value: &DeValue<'_>) {
-        self.findings.error(
+        self.findings.add(
             codes::WRONG_TYPE,
             path,
             span,
@@ -173,7 +173,7 @@ impl Reader<'_> {
             (None, None) => format!("take it out; {}", known_names(section, is_table)),
         };
         let span = text::clamp(self.source, name.span());
-        self.findings.error(code, &path, span, format!("unknown {what} {}{place}", text::quote(written)), help);
+        self.findings.add(code, &path, span, format!("unknown {what} {}{place}", text::quote(written)), help);
     }
 
     fn section(
@@ -189,7 +189,7 @@ impl Reader<'_> {
         }
         self.seen.insert(section.name);
         let is = messages::kind_of(value.get_ref());
-        self.findings.error(
+        self.findings.add(
             codes::WRONG_TYPE,
             section.name,
             span,
@@ -224,7 +224,7 @@ impl Reader<'_> {
                 } else {
                     format!("in {}", section.header())
                 };
-                self.findings.error(
+                self.findings.add(
                     codes::MISSING_KEY,
                     &path,
                     header.clone(),
@@ -256,7 +256,7 @@ impl Reader<'_> {
                 continue;
             }
             if section.is_required() {
-                self.findings.error(
+                self.findings.add(
                     codes::MISSING_SECTION,
                     section.name,
                     end..end,

@@ -8,7 +8,7 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use crate::SpecSource;
-use crate::diagnostic::{Diagnostic, Place, Severity, codes};
+use crate::diagnostic::{Diagnostic, codes};
 
 /// Largest spec file, bytes.
 pub const MAX_BYTES: usize = 1 << 20;
@@ -27,20 +27,9 @@ impl SpecSource {
     }
 }
 
-fn finding(code: &'static str, path: &str, line: Option<usize>, message: String, help: &str) -> Diagnostic {
-    Diagnostic {
-        severity: Severity::Error,
-        code,
-        key: String::new(),
-        place: Place::File { path: path.to_owned(), line },
-        message,
-        help: help.to_owned(),
-    }
-}
-
 fn read_bytes(path: &Path, shown: &str) -> Result<Vec<u8>, Diagnostic> {
     let unreadable = |reason: String, help: &str| {
-        finding(codes::UNREADABLE, shown, None, format!("the spec file cannot be read: {reason}"), help)
+        Diagnostic::in_file(shown, None, codes::UNREADABLE, format!("the spec file cannot be read: {reason}"), help)
     };
     if path.is_dir() {
         return Err(unreadable("this is a folder".to_owned(), "name the .toml file in it"));
@@ -59,11 +48,11 @@ fn read_bytes(path: &Path, shown: &str) -> Result<Vec<u8>, Diagnostic> {
         .read_to_end(&mut bytes)
         .map_err(|e| unreadable(e.to_string(), "check that it is a regular file"))?;
     if bytes.len() > MAX_BYTES {
-        return Err(finding(
-            codes::TOO_LARGE,
+        return Err(Diagnostic::in_file(
             shown,
             None,
-            "the spec file is larger than 1 MiB, expected a few kilobytes".to_owned(),
+            codes::TOO_LARGE,
+            "the spec file is larger than 1 MiB, expected a few kilobytes",
             "name the .toml spec; measurements belong in CSV files that the spec refers to",
         ));
     }
@@ -81,10 +70,10 @@ fn into_text(bytes: Vec<u8>, shown: &str) -> Result<String, Diagnostic> {
         let line = 1 + bytes[..offset].iter().filter(|b| **b == b'\n').count();
         // `valid_up_to` is before the end: the byte there is the one that failed.
         let byte = bytes.get(offset).copied().unwrap_or_default();
-        finding(
-            codes::NOT_TEXT,
+        Diagnostic::in_file(
             shown,
             Some(line),
+            codes::NOT_TEXT,
             format!("the spec file is not UTF-8 text: byte {offset} (line {line}) is 0x{byte:02x}"),
             "save the file as UTF-8; a unit may be written without special characters, such as \"um\" or \"deg\"",
         )
@@ -102,10 +91,10 @@ fn other_encoding(bytes: &[u8], shown: &str) -> Option<Diagnostic> {
     let offset = if marked { 0 } else { zero.unwrap_or_default() };
     let line = 1 + bytes[..offset].iter().filter(|b| **b == b'\n').count();
     let looks = if marked { "it begins with the mark of UTF-16".to_owned() } else { format!("byte {offset} is zero") };
-    Some(finding(
-        codes::NOT_TEXT,
+    Some(Diagnostic::in_file(
         shown,
         Some(line),
+        codes::NOT_TEXT,
         format!("the spec file is not UTF-8 text: {looks} (line {line})"),
         "save the file as UTF-8, not as UTF-16 (\"Unicode\" in some editors): iconv -f utf-16 -t utf-8 OLD > NEW",
     ))

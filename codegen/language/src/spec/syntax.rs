@@ -48,7 +48,7 @@ fn report(source: &str, span: Range<usize>, message: &str, findings: &mut Findin
         return false;
     }
     let missing_value = message.starts_with("string values must be quoted");
-    findings.error(
+    findings.add(
         codes::SYNTAX,
         "",
         span,
@@ -69,7 +69,7 @@ fn unquoted(source: &str, span: Range<usize>, findings: &mut Findings) {
         return;
     }
     let found = &source[span.clone()];
-    findings.error(
+    findings.add(
         codes::UNQUOTED,
         "",
         span,
@@ -123,7 +123,7 @@ fn duplicate(source: &str, span: Range<usize>, findings: &mut Findings) {
     };
     let before = first.map_or_else(String::new, |line| format!(", first on line {line}"));
     let what = if is_header { "section" } else { "key" };
-    findings.error(
+    findings.add(
         codes::DUPLICATE,
         &text::shorten(&key),
         span.clone(),
@@ -212,7 +212,7 @@ mod tests {
             parse(&format!("a = {word} # comment\n"), &mut findings);
             let messages: Vec<_> = findings.all().iter().map(|d| (d.code, d.message.clone())).collect();
             let expected = format!("`{word}` is a text without quotes");
-            assert_eq!(messages, [(codes::UNQUOTED, expected)], "{word}");
+            assert_eq!(messages, [(codes::UNQUOTED.id, expected)], "{word}");
         }
     }
 

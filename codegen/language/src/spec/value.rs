@@ -111,7 +111,7 @@ impl ValueReader<'_> {
     }
 
     fn wrong_count(&mut self, path: &str, value: &Spanned<DeValue<'_>>, found: usize, what: &str, wanted: &str) {
-        self.findings.error(
+        self.findings.add(
             codes::WRONG_COUNT,
             path,
             text::clamp(self.source, value.span()),
@@ -158,7 +158,7 @@ impl ValueReader<'_> {
                 if known.is_none() {
                     let meant = text::nearest(found, words.iter().copied());
                     let did_you_mean = meant.map_or_else(String::new, |word| format!("did you mean \"{word}\"? "));
-                    self.findings.error(
+                    self.findings.add(
                         codes::UNKNOWN_CHOICE,
                         path,
                         text::clamp(self.source, value.span()),
@@ -189,7 +189,7 @@ impl ValueReader<'_> {
         let fixed: String = found.chars().map(|c| if allowed(c) { c } else { '-' }).take(MAX_NAME).collect();
         let fixed = fixed.trim_start_matches(|c: char| !c.is_ascii_alphabetic());
         let such_as = if fixed.is_empty() { "my-platform" } else { fixed };
-        self.findings.error(
+        self.findings.add(
             codes::BAD_NAME,
             path,
             text::clamp(self.source, value.span()),
@@ -208,7 +208,7 @@ impl ValueReader<'_> {
         if text::is_relative_path(found) {
             return Some(found.to_string());
         }
-        self.findings.error(
+        self.findings.add(
             codes::RECORD_PATH,
             path,
             text::clamp(self.source, value.span()),
@@ -227,7 +227,7 @@ impl ValueReader<'_> {
         shown: &str,
     ) -> Option<()> {
         if !inside {
-            self.findings.error(
+            self.findings.add(
                 codes::OUT_OF_RANGE,
                 path,
                 text::clamp(self.source, value.span()),
@@ -246,7 +246,7 @@ impl ValueReader<'_> {
         fix: Option<String>,
     ) -> Option<T> {
         let help = fix.unwrap_or_else(|| format!("write {} = {}", self.key.name, self.key.example));
-        self.findings.error(
+        self.findings.add(
             codes::WRONG_TYPE,
             path,
             text::clamp(self.source, value.span()),

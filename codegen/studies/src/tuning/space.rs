@@ -11,7 +11,7 @@ use super::Setting;
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::lower::platform;
 use specgen_compiler::stability::platform::RestDynamics;
-use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{AdaptationMode, ControlMode, Model};
 
 /// Which numbers are tuned.
@@ -148,7 +148,7 @@ impl Space {
         }
         let refuse = |code, message: String, help: &str| {
             let keys = ["adaptation.mode", "control.mode", "control"];
-            vec![Diagnostic::at(&model.spans, &keys, (Severity::Error, code), message, help.to_owned())]
+            vec![Diagnostic::at(&model.spans, &keys, code, message, help)]
         };
         if parameters.is_empty() {
             let kind =

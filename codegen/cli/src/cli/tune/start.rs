@@ -6,7 +6,7 @@ use super::super::sim::environment;
 use super::super::ui::{Failure, Ui};
 use super::{Job, refused};
 use specgen_compiler::stability::platform::Tuning;
-use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_studies::machine;
 use specgen_studies::tuning::feasible::Feasibility;
 use specgen_studies::tuning::relay::{self, Ultimate};
@@ -132,7 +132,7 @@ fn no_start(job: &Job, limited: Option<(f64, u32)>) -> Failure {
         Diagnostic::at(
             spans,
             &["actuator.voltage"],
-            (Severity::Error, codes::TUNE_LIMITED),
+            codes::TUNE_LIMITED,
             format!("at {time:.4} s of the trajectory the first stable numbers meet a limit (status {status:#x})"),
             "try another --trajectory or a lower --frequency; bits 0 to 5 are legs at a limit, 8 to 13 gauges, 16 and 17 \
              set-points refused or stale"
@@ -143,7 +143,7 @@ fn no_start(job: &Job, limited: Option<(f64, u32)>) -> Failure {
         Diagnostic::at(
             spans,
             &keys,
-            (Severity::Error, codes::TUNE_NO_START),
+            codes::TUNE_NO_START,
             format!(
                 "no numbers within the bounds were found that are stable with a gain margin of {} and {} ticks of delay",
                 arguments.gain_margin, arguments.delay_margin

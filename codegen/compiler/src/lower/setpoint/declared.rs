@@ -6,7 +6,7 @@ use crate::figure::{AXES, figure};
 use crate::ir::Setpoints;
 use crate::lower::scalar;
 use specgen_identify::waveform::{self, Waveform};
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, Place, codes};
 use specgen_language::model::{Model, TrajectoryKind};
 
 /// A step between two rows that is this many times its neighbours' is a jump.
@@ -63,20 +63,15 @@ fn step(waveform: &Waveform) -> Option<Diagnostic> {
         // From rest every step is larger than the ones before.
         let stands_out = |k: usize| around(k) > 0.0 && steps[k] > STANDS_OUT * around(k) && steps[k] > NO_STEP[axis];
         let at = (2..steps.len().saturating_sub(2)).find(|k| stands_out(*k))?;
-        Some(Diagnostic {
-            severity: Severity::Warning,
-            code: codes::WAVEFORM_STEP,
-            key: "trajectory".to_owned(),
-            place: Place::File { path: waveform.shown_as.clone(), line: waveform.lines.get(at + 1).copied() },
-            message: format!(
-                "{} steps by {} {} here, by at most {} in the rows around",
-                AXES[axis],
-                figure(steps[at] * 1e6),
-                if axis < 3 { "um" } else { "urad" },
-                figure(around(at) * 1e6)
-            ),
-            help: "a jump between two pieces? The platform rings behind it: join the pieces, or spread the step over some rows"
-                .to_owned(),
-        })
+        let place = Place::File { path: waveform.shown_as.clone(), line: waveform.lines.get(at + 1).copied() };
+        let message = format!(
+            "{} steps by {} {} here, by at most {} in the rows around",
+            AXES[axis],
+            figure(steps[at] * 1e6),
+            if axis < 3 { "um" } else { "urad" },
+            figure(around(at) * 1e6)
+        );
+        let help = "a jump between two pieces? The platform rings behind it: join the pieces, or spread the step over some rows";
+        Some(Diagnostic::new(codes::WAVEFORM_STEP, "trajectory", place, message, help))
     })
 }

@@ -4,9 +4,9 @@ use core::f64::consts::TAU;
 
 use super::check::Excesses;
 use super::paper::{Coordinate, Piece};
-use super::{AXES, LONGEST, User, amount, finding};
+use super::{AXES, LONGEST, User, amount};
 use crate::ir::{Path, Segment, SegmentAxis};
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, TaskSpace};
 
 /// A step at a joint that is none: below what a gauge sees. m and rad.
@@ -27,9 +27,9 @@ pub(super) fn lower(
 ) -> Result<(Path, Vec<Diagnostic>), Vec<Diagnostic>> {
     let period = model.timing.period;
     let key = format!("trajectory[{index}].frequency");
-    let refuse = |code: &'static str, message: String, help: &str| {
+    let refuse = |code: Code, message: String, help: &str| {
         let message = format!("trajectory \"{}\": {message}", task.trajectories[index].name);
-        finding(model, Severity::Error, code, &key, message, help.to_owned())
+        Diagnostic::at(&model.spans, &[&key], code, message, help)
     };
     let firsts: Vec<f64> =
         core::iter::once(0.0).chain(pieces.iter().map(|piece| libm::ceil(piece.end / period - AT_TICK))).collect();
@@ -83,7 +83,7 @@ pub(super) fn lower(
                 amount(worst.axis, worst.rate)
             );
             let help = "the platform rings at each: expect errors there, or smooth the path as a waveform";
-            finding(model, Severity::Warning, codes::TRAJECTORY_CORNERS, &key, message, help.to_owned())
+            Diagnostic::at(&model.spans, &[&key], codes::TRAJECTORY_CORNERS, message, help)
         })
         .into_iter()
         .collect();

@@ -1,10 +1,10 @@
 //! A table of poses to a spline in ticks.
 
 use super::check::Excesses;
-use super::{AXES, LONGEST, User, amount, finding, spline};
+use super::{AXES, LONGEST, User, amount, spline};
 use crate::ir::{Path, Row};
 use specgen_identify::waveform::Waveform;
-use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::{Model, TaskSpace};
 
 /// Share of a tick that the period may be off a whole number of ticks, for it is a rounded quotient.
@@ -34,7 +34,7 @@ pub(super) fn lower(
         let help =
             format!("choose a whole number of ticks, such as \"{:.4} ms\", and some minutes at most", nearest * 1e3);
         let key = format!("trajectory[{index}].period");
-        return Err(vec![finding(model, Severity::Error, codes::TRAJECTORY_TICKS, &key, message, help)]);
+        return Err(vec![Diagnostic::at(&model.spans, &[&key], codes::TRAJECTORY_TICKS, message, help)]);
     }
     let mut rows = waveform.rows.clone();
     let mut findings = Vec::new();
@@ -161,13 +161,6 @@ pub(super) fn at(row: &Row, following: &Row, b: f64, period: f64) -> ([f64; 6], 
     (core::array::from_fn(|axis| of(axis).0), core::array::from_fn(|axis| of(axis).1))
 }
 
-fn in_file(waveform: &Waveform, row: usize, code: &'static str, message: String, help: &str) -> Diagnostic {
-    Diagnostic {
-        severity: Severity::Error,
-        code,
-        key: String::new(),
-        place: Place::File { path: waveform.shown_as.clone(), line: waveform.lines.get(row).copied() },
-        message,
-        help: help.to_owned(),
-    }
+fn in_file(waveform: &Waveform, row: usize, code: Code, message: String, help: &str) -> Diagnostic {
+    Diagnostic::in_file(&waveform.shown_as, waveform.lines.get(row).copied(), code, message, help)
 }

@@ -7,7 +7,7 @@ use super::law::{Adapting, Law, Tuning};
 use super::margins::ModeMargins;
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions, notch, worst_radius};
-use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{AdaptationMode, ControlMode, Model, TaskSpace};
 
 const ADAPTED: [Law; 2] = [Law::Feedforward(Adapting::Ewma), Law::Feedforward(Adapting::Pcc)];
@@ -23,11 +23,10 @@ const THIN_DELAY: f64 = 0.5;
 
 /// A platform that [`super::ModalBasis`] refuses.
 pub(super) fn no_modes(model: &Model) -> Diagnostic {
-    finding(
-        model,
-        Severity::Error,
-        codes::NO_MODES,
+    Diagnostic::at(
+        &model.spans,
         &["geometry"],
+        codes::NO_MODES,
         "the platform has no six modes on its legs: its mass matrix or K = Jᵀ k_a J at rest is not positive definite"
             .to_owned(),
         "check [geometry] (six legs that hold every direction), the masses and inertias, and actuator.axial_stiffness"
@@ -137,7 +136,7 @@ impl Case<'_> {
                 .to_owned(),
         };
         let keys = ["control.environment.stiffness", "control.interaction", "control.modal_damping", "control"];
-        Some(finding(self.model, Severity::Error, codes::UNSTABLE_PLATFORM, &keys, self.what(unstable), help))
+        Some(Diagnostic::at(&self.model.spans, &keys, codes::UNSTABLE_PLATFORM, self.what(unstable), help))
     }
 
     fn bandwidths(&self, task: &TaskSpace, unstable: Unstable, tuning: &Tuning, largest: Option<f64>) -> Diagnostic {
@@ -160,7 +159,7 @@ impl Case<'_> {
                 )
             },
         );
-        finding(self.model, Severity::Error, codes::UNSTABLE_PLATFORM, &keys, self.what(unstable), help)
+        Diagnostic::at(&self.model.spans, &keys, codes::UNSTABLE_PLATFORM, self.what(unstable), help)
     }
 
     fn gains(&self, table: &str, given: bool, unstable: Unstable, tuning: &Tuning, largest: Option<f64>) -> Diagnostic {
@@ -191,16 +190,15 @@ impl Case<'_> {
                 )
             },
         );
-        finding(self.model, Severity::Error, codes::UNSTABLE_PLATFORM, &keys, self.what(unstable), help)
+        Diagnostic::at(&self.model.spans, &keys, codes::UNSTABLE_PLATFORM, self.what(unstable), help)
     }
 
     fn no_tuning(&self, unstable: Unstable) -> Diagnostic {
         let message = format!("the start rule found no values that hold: {}", self.what(unstable));
-        finding(
-            self.model,
-            Severity::Error,
-            codes::NO_TUNING,
+        Diagnostic::at(
+            &self.model.spans,
             &["control", "timing.period"],
+            codes::NO_TUNING,
             message,
             self.nothing_helps(),
         )
@@ -242,7 +240,7 @@ pub(super) fn thin(
                 or(one.delay_margin_ticks, "enough")
             );
             let help = "reduce these values, or leave them out: the compiler's own hold at twice the gain".to_owned();
-            findings.push(finding(model, Severity::Warning, codes::THIN_MARGIN, keys, message, help));
+            findings.push(Diagnostic::at(&model.spans, keys, codes::THIN_MARGIN, message, help));
         }
     }
     let missed: Vec<String> = closed_loop
@@ -253,11 +251,10 @@ pub(super) fn thin(
         .map(|frequency| format!("{:.0} Hz", frequency / TAU))
         .collect();
     if task.notch_damping.is_some() && !missed.is_empty() {
-        findings.push(finding(
-            model,
-            Severity::Warning,
-            codes::MODE_NOT_NOTCHED,
+        findings.push(Diagnostic::at(
+            &model.spans,
             &["control.notch_damping", "control.notch", "timing.period"],
+            codes::MODE_NOT_NOTCHED,
             format!(
                 "the notch leaves out the modes at {}: they lie near or above half the tick rate, {:.0} Hz",
                 missed.join(", "),
@@ -292,11 +289,10 @@ pub(super) fn slower_than_position(
         )
     };
     (ratio > 1.0).then(|| {
-        finding(
-            model,
-            Severity::Warning,
-            codes::SLOWER_THAN_P,
+        Diagnostic::at(
+            &model.spans,
             &["adaptation.mode", "adaptation"],
+            codes::SLOWER_THAN_P,
             message,
             "write adaptation.mode = \"ewma\" or \"pcc\": their estimates correct what the integral of P/F leaves"
                 .to_owned(),
@@ -311,17 +307,6 @@ fn shown(value: f64) -> f64 {
     }
     let scale = libm::pow(10.0, 3.0 - libm::floor(libm::log10(value.abs())));
     libm::floor(value * scale) / scale
-}
-
-fn finding(
-    model: &Model,
-    severity: Severity,
-    code: &'static str,
-    keys: &[&str],
-    message: String,
-    help: String,
-) -> Diagnostic {
-    Diagnostic::at(&model.spans, keys, (severity, code), message, help)
 }
 
 #[cfg(test)]

@@ -22,7 +22,7 @@ pub(super) fn alternatives(f: &Fields, findings: &mut Findings) -> Option<()> {
     for which in WHICH {
         let (weight, bandwidth) = (format!("adaptation.{which}_weight"), format!("adaptation.{which}_bandwidth"));
         if f.given(&weight) && f.given(&bandwidth) {
-            findings.error(
+            findings.add(
                 codes::ALTERNATIVES,
                 &bandwidth,
                 f.span(&bandwidth),
@@ -45,7 +45,7 @@ pub(super) fn weights_for_mode(f: &Fields, findings: &mut Findings) -> Option<()
         let (weight, bandwidth) = (format!("adaptation.{which}_weight"), format!("adaptation.{which}_bandwidth"));
         let given = [&weight, &bandwidth].into_iter().find(|path| f.given(path));
         match given {
-            None if uses(mode, which) && !findings.mentions(&[&weight, &bandwidth]) => findings.error(
+            None if uses(mode, which) && !findings.mentions(&[&weight, &bandwidth]) => findings.add(
                 codes::ALTERNATIVES,
                 &weight,
                 f.span("adaptation.mode"),
@@ -56,7 +56,7 @@ pub(super) fn weights_for_mode(f: &Fields, findings: &mut Findings) -> Option<()
                 }
                 .to_owned(),
             ),
-            Some(path) if !uses(mode, which) => findings.warning(
+            Some(path) if !uses(mode, which) => findings.add(
                 codes::UNUSED_WEIGHT,
                 path,
                 f.span(path),
@@ -79,7 +79,7 @@ pub(super) fn bandwidths_fit_period(f: &Fields, findings: &mut Findings) -> Opti
             continue;
         };
         if bandwidth * interval > 1.0 {
-            findings.error(
+            findings.add(
                 codes::BANDWIDTH_TOO_HIGH,
                 &path,
                 f.span(&path),

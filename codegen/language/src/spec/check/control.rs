@@ -23,7 +23,7 @@ pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
     let calibration = f.given(key).then(|| (key, f.span(key)));
     for (path, span) in parts.chain(calibration) {
         let what = path.split('[').next().unwrap_or(path);
-        findings.error(
+        findings.add(
             codes::WITHOUT_CONTROL,
             path,
             span,
@@ -33,7 +33,7 @@ pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
     }
     for section in ["gains", "position_gains"] {
         if let Some(span) = f.table(section) {
-            findings.warning(
+            findings.add(
                 codes::GAINS_UNUSED,
                 section,
                 span,
@@ -49,7 +49,7 @@ pub(super) fn parts_need_it(f: &Fields, findings: &mut Findings) -> Option<()> {
 pub(super) fn no_leg_keys(f: &Fields, findings: &mut Findings) -> Option<()> {
     there(f)?;
     let mut refuse = |path: &str, why: &str, fix: &str| {
-        findings.error(
+        findings.add(
             codes::LEG_KEY_WITH_CONTROL,
             path,
             f.span(path),
@@ -95,7 +95,7 @@ pub(super) fn both_bandwidths(f: &Fields, findings: &mut Findings) -> Option<()>
     if findings.mentions(&[missing]) {
         return Some(());
     }
-    findings.error(
+    findings.add(
         codes::ALTERNATIVES,
         given,
         f.span(given),
@@ -111,7 +111,7 @@ pub(super) fn notch(f: &Fields, findings: &mut Findings) -> Option<()> {
     let path = "control.notch_damping";
     let damping = f.number(path)?;
     if !f.flag("control.notch")? {
-        findings.error(
+        findings.add(
             codes::ALTERNATIVES,
             path,
             f.span(path),
@@ -122,7 +122,7 @@ pub(super) fn notch(f: &Fields, findings: &mut Findings) -> Option<()> {
     }
     let own = f.number("control.modal_damping")?;
     if damping <= own {
-        findings.error(
+        findings.add(
             codes::NOTCH_DAMPING,
             path,
             f.span(path),
@@ -137,7 +137,7 @@ pub(super) fn cutoff_below_tick_rate(f: &Fields, findings: &mut Findings) -> Opt
     let path = "control.velocity_cutoff";
     let (cutoff, limit) = (f.number(path)?, PI / f.number("timing.period")?);
     if cutoff >= limit {
-        findings.error(
+        findings.add(
             codes::CUTOFF_TOO_HIGH,
             path,
             f.span(path),
@@ -155,7 +155,7 @@ pub(super) fn cutoff_below_tick_rate(f: &Fields, findings: &mut Findings) -> Opt
 pub(super) fn environment_for_model(f: &Fields, findings: &mut Findings) -> Option<()> {
     let path = "control.interaction";
     if f.choice(path)? == "modelled" && f.table("control.environment").is_none() {
-        findings.error(
+        findings.add(
             codes::MISSING_SECTION,
             "control.environment",
             f.span(path),
@@ -179,7 +179,7 @@ pub(super) fn bias_inside_workspace(f: &Fields, findings: &mut Findings) -> Opti
             continue;
         }
         let (unit, scale) = if axis < 3 { ("um", 1e6) } else { ("urad", 1e6) };
-        findings.error(
+        findings.add(
             codes::BIAS_OUTSIDE,
             &format!("{path}[{axis}]"),
             f.item_span(path, axis),

@@ -22,7 +22,7 @@ pub(super) fn voltage_inside_dac(f: &Fields, findings: &mut Findings) -> Option<
     let [low, high] = f.list::<2>("dac.range")?;
     for (i, limit) in limits.into_iter().enumerate() {
         if low < high && (limit < low || limit > high) {
-            findings.error(
+            findings.add(
                 codes::VOLTAGE_OUTSIDE_DAC,
                 &format!("actuator.voltage[{i}]"),
                 f.item_span("actuator.voltage", i),
@@ -40,7 +40,7 @@ pub(super) fn slew_moves_a_code(f: &Fields, findings: &mut Findings) -> Option<(
     let (slew, period) = (f.number("actuator.slew_rate")?, f.number("timing.period")?);
     let code = (high - low) / (libm::ldexp(1.0, bits as i32) - 1.0);
     if low < high && slew * period < code {
-        findings.error(
+        findings.add(
             codes::SLEW_BELOW_CODE,
             "actuator.slew_rate",
             f.span("actuator.slew_rate"),
@@ -76,10 +76,10 @@ pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()
     );
     let check = "check `actuator.stacks`, `actuator.stack_gain` (of one stack, not of the leg), `actuator.voltage` and `actuator.stroke`";
     if (1.0 / LARGEST_MISMATCH..=LARGEST_MISMATCH).contains(&ratio) {
-        findings.warning(codes::STROKE_MISMATCH, key, span, message, check.to_owned());
+        findings.add(codes::STROKE_MISMATCH, key, span, message, check.to_owned());
     } else {
         let how = if ratio > 1.0 { "the legs would be driven far past it" } else { "they never come near it" };
-        findings.error(codes::STROKE_IMPOSSIBLE, key, span, format!("{message}: {how}"), check.to_owned());
+        findings.add(codes::STROKE_IMPOSSIBLE, key, span, format!("{message}: {how}"), check.to_owned());
     }
     Some(())
 }
@@ -87,7 +87,7 @@ pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()
 pub(super) fn resonance_below_tick_rate(f: &Fields, findings: &mut Findings) -> Option<()> {
     let (resonance, period) = (f.number("actuator.resonance")?, f.number("timing.period")?);
     if resonance * period > 0.5 {
-        findings.warning(
+        findings.add(
             codes::RESONANCE_ALIASED,
             "actuator.resonance",
             f.span("actuator.resonance"),
@@ -110,7 +110,7 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
     }
     let path = "sensor.range";
     if low > 0.0 || high < 0.0 {
-        findings.warning(
+        findings.add(
             codes::SENSOR_RANGE,
             path,
             f.span(path),
@@ -125,7 +125,7 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
     if let Some(stroke) = f.number("actuator.stroke")
         && !(0.05..=100.0).contains(&(span / stroke))
     {
-        findings.warning(
+        findings.add(
             codes::SENSOR_RANGE,
             path,
             f.span(path),
@@ -135,7 +135,7 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
     }
     let noise = f.number("sensor.noise")?;
     if noise > 0.01 * span {
-        findings.warning(
+        findings.add(
             codes::SENSOR_NOISE,
             "sensor.noise",
             f.span("sensor.noise"),

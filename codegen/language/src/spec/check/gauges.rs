@@ -20,7 +20,7 @@ pub(super) fn six(f: &Fields, findings: &mut Findings) -> Option<()> {
     let path = if count > 6 { "gauge[6]" } else { "gauge" };
     let last = format!("gauge[{}]", count.saturating_sub(1));
     let place = if count > 6 { f.table(path) } else { f.table(&last).or_else(|| f.table("control")) };
-    findings.error(
+    findings.add(
         codes::GAUGE_COUNT,
         path,
         place.unwrap_or(0..0),
@@ -40,7 +40,7 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
             };
             *unit = task_space::unit(vector);
             if unit.is_none() {
-                findings.error(
+                findings.add(
                     codes::BAD_DIRECTION,
                     path,
                     f.span(path),
@@ -54,7 +54,7 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
         };
         let cosine = line[0] * normal[0] + line[1] * normal[1] + line[2] * normal[2];
         if cosine.abs() < STEEPEST {
-            findings.error(
+            findings.add(
                 codes::BAD_DIRECTION,
                 &paths[1],
                 f.span(&paths[1]),
@@ -79,7 +79,7 @@ pub(super) fn calibrated_alike(f: &Fields, findings: &mut Findings) -> Option<()
     let paths: Vec<String> = (0..f.count("gauge")).map(|gauge| format!("gauge[{gauge}].calibration")).collect();
     let first = paths.iter().find(|path| f.given(path))?;
     let without = paths.iter().position(|path| !f.given(path) && !findings.mentions(&[path]))?;
-    findings.error(
+    findings.add(
         codes::CALIBRATION_PARTLY,
         first,
         f.span(first),
@@ -96,7 +96,7 @@ pub(super) fn input_of_calibrated(f: &Fields, findings: &mut Findings) -> Option
     let calibrated =
         f.given("sensor.calibration") || (0..f.count("gauge")).any(|k| f.given(&format!("gauge[{k}].calibration")));
     if f.given(path) && !calibrated {
-        findings.error(
+        findings.add(
             codes::INPUT_WITHOUT_CALIBRATION,
             path,
             f.span(path),

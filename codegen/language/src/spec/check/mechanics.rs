@@ -51,7 +51,7 @@ pub(super) fn mass_centers_inside_leg(f: &Fields, findings: &mut Findings) -> Op
             continue;
         };
         if center >= length {
-            findings.error(
+            findings.add(
                 codes::CENTER_OUTSIDE_LEG,
                 path,
                 f.span(path),
@@ -77,7 +77,7 @@ pub(super) fn leg_gyration(f: &Fields, findings: &mut Findings) -> Option<()> {
         let radius = (inertia / mass).sqrt();
         // A rod as long as the leg has 0.29 of its length.
         if radius > length || radius < length * 1e-3 {
-            findings.error(
+            findings.add(
                 codes::GYRATION,
                 &path,
                 f.span(&path),
@@ -110,7 +110,7 @@ pub(super) fn platform_inertia(f: &Fields, findings: &mut Findings) -> Option<()
         return Some(());
     };
     let list = principal.map(|moment| number(moment * 1e9)).join(", ");
-    findings.error(
+    findings.add(
         codes::INERTIA_UNPHYSICAL,
         "platform.inertia",
         f.span("platform.inertia"),
@@ -143,9 +143,9 @@ pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<(
         format!("{did_you_mean}check the units of `platform.mass` (kg or g) and `platform.inertia` (mm^2 or m^2)");
     let (path, span) = ("platform.mass", f.span("platform.mass"));
     if (0.02..=10.0).contains(&ratio) {
-        findings.warning(codes::GYRATION_ODD, path, span, message, help);
+        findings.add(codes::GYRATION_ODD, path, span, message, help);
     } else {
-        findings.error(codes::GYRATION, path, span, message, help);
+        findings.add(codes::GYRATION, path, span, message, help);
     }
     Some(())
 }
@@ -155,7 +155,7 @@ pub(super) fn legs_have_length(f: &Fields, findings: &mut Findings) -> Option<()
     let lengths = legs_at_rest(&build::geometry(f)?).lengths;
     let leg = lengths.iter().position(|length| *length < SHORTEST_LEG)?;
     let path = if f.given("geometry.base_joints") { "geometry.platform_joints" } else { "geometry.height" };
-    findings.error(
+    findings.add(
         codes::DEGENERATE_GEOMETRY,
         path,
         f.item_span(path, leg),
@@ -181,7 +181,7 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
     if condition.is_finite() && condition < 1e4 {
         return Some(());
     }
-    findings.error(
+    findings.add(
         codes::DEGENERATE_GEOMETRY,
         "geometry.height",
         f.span("geometry.height"),
@@ -230,7 +230,7 @@ pub(super) fn workspace_in_reach(f: &Fields, findings: &mut Findings) -> Option<
             if bound * steepest <= stroke {
                 continue;
             }
-            findings.error(
+            findings.add(
                 codes::WORKSPACE_UNREACHABLE,
                 &format!("{path}[{axis}]"),
                 f.item_span(path, axis),

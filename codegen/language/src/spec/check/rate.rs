@@ -23,7 +23,7 @@ pub(super) fn keys_of_option(f: &Fields, findings: &mut Findings) -> Option<()> 
             let path = format!("hysteresis.{key}");
             let given = f.given(&path);
             if given && option != chosen {
-                findings.error(
+                findings.add(
                     codes::RATE_KEYS,
                     &path,
                     f.span(&path),
@@ -31,7 +31,7 @@ pub(super) fn keys_of_option(f: &Fields, findings: &mut Findings) -> Option<()> 
                     format!("write rate = \"{option}\", or take `{key}` out"),
                 );
             } else if !given && option == chosen && !findings.mentions_item(&path) {
-                findings.error(
+                findings.add(
                     codes::MISSING_KEY,
                     &path,
                     f.span("hysteresis.rate"),
@@ -48,7 +48,7 @@ pub(super) fn creep_lists(f: &Fields, findings: &mut Findings) -> Option<()> {
     let path = "hysteresis.creep_weights";
     let (times, weights) = (f.numbers("hysteresis.creep_times")?, f.numbers(path)?);
     if times.len() != weights.len() {
-        findings.error(
+        findings.add(
             codes::RATE_KEYS,
             path,
             f.span(path),
@@ -58,7 +58,7 @@ pub(super) fn creep_lists(f: &Fields, findings: &mut Findings) -> Option<()> {
     }
     let sum = weights.iter().fold(0.0, |sum, weight| sum + weight);
     if sum >= 1.0 {
-        findings.error(
+        findings.add(
             codes::RATE_KEYS,
             path,
             f.span(path),
@@ -74,7 +74,7 @@ pub(super) fn dead_time_of_legs(f: &Fields, findings: &mut Findings) -> Option<(
     let path = "hysteresis.dead_time";
     let dead_time = f.number(path)?;
     if dead_time > 0.0 {
-        findings.error(
+        findings.add(
             codes::LEG_KEY_WITH_CONTROL,
             path,
             f.span(path),

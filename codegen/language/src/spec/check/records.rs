@@ -20,7 +20,7 @@ pub(in crate::spec) fn readable(f: &Fields, dir: &Path, findings: &mut Findings)
 fn readable_of(f: &Fields, dir: &Path, findings: &mut Findings, key: &str) -> Option<()> {
     let records = f.texts(key)?;
     if !matches!(records.len(), 1 | 6) {
-        findings.error(
+        findings.add(
             codes::RECORD_COUNT,
             key,
             f.span(key),
@@ -45,7 +45,7 @@ fn readable_of(f: &Fields, dir: &Path, findings: &mut Findings, key: &str) -> Op
             ))
         };
         if let Some((code, message, help)) = finding {
-            findings.error(code, &format!("{key}[{i}]"), f.item_span(key, i), message, help);
+            findings.add(code, &format!("{key}[{i}]"), f.item_span(key, i), message, help);
         }
     }
     Some(())

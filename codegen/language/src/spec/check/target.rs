@@ -10,7 +10,7 @@ pub(super) fn scalar_fits_fpu(f: &Fields, findings: &mut Findings) -> Option<()>
     let part = Mcu::named(f.choice("target.mcu")?)?.part();
     if !part.double && f.choice("controller.scalar")? == "f64" {
         let path = if f.given("target.mcu") { "target.mcu" } else { "controller.scalar" };
-        findings.error(
+        findings.add(
             codes::SCALAR_WITHOUT_FPU,
             path,
             f.span(path),
@@ -35,7 +35,7 @@ pub(super) fn budget_in_bytes(f: &Fields, findings: &mut Findings) -> Option<()>
             continue;
         };
         if bytes.fract() != 0.0 {
-            findings.error(
+            findings.add(
                 codes::BUDGET_NOT_WHOLE,
                 path,
                 f.span(path),
@@ -59,7 +59,7 @@ pub(super) fn budget_fits_part(f: &Fields, findings: &mut Findings) -> Option<()
             continue;
         };
         if bytes > has as f64 {
-            findings.error(
+            findings.add(
                 codes::BUDGET_BEYOND_PART,
                 path,
                 f.span(path),

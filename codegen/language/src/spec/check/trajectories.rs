@@ -17,7 +17,7 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
         let is_waveform = kind == "waveform";
         let foreign: &[&str] = if is_waveform { &OF_PAPER } else { &OF_WAVEFORM };
         for path in foreign.iter().map(|key| keys::join(&table, key)).filter(|path| f.given(path)) {
-            findings.error(
+            findings.add(
                 codes::TRAJECTORY_KEY,
                 &path,
                 f.span(&path),
@@ -34,7 +34,7 @@ pub(super) fn keys_of_kind(f: &Fields, findings: &mut Findings) -> Option<()> {
                 continue;
             }
             let key = keys::key(&path)?;
-            findings.error(
+            findings.add(
                 codes::MISSING_KEY,
                 &path,
                 f.table(&table).unwrap_or(0..0),
@@ -55,7 +55,7 @@ pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
         let Some(first) = (0..index).find(|other| f.name(&format!("trajectory[{other}].name")) == Some(name)) else {
             continue;
         };
-        findings.error(
+        findings.add(
             codes::NAME_TAKEN,
             &path,
             f.span(&path),
@@ -69,7 +69,7 @@ pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
 pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
     let count = f.count("trajectory");
     if count > MAX_TABLES {
-        findings.error(
+        findings.add(
             codes::TOO_MANY_TRAJECTORIES,
             "trajectory",
             f.table("trajectory[0]").unwrap_or(0..0),

@@ -36,7 +36,7 @@ impl ValueReader<'_> {
             }
             Ok(quantity) if quantity.dimension != dimension => {
                 let (message, help) = messages::wrong_dimension(self.key, path, found, quantity.dimension, dimension);
-                self.findings.error(codes::WRONG_DIMENSION, path, span, message, help);
+                self.findings.add(codes::WRONG_DIMENSION, path, span, message, help);
                 None
             }
             Ok(quantity) => {
@@ -47,7 +47,7 @@ impl ValueReader<'_> {
             Err(error) => {
                 let place = self.inside(&span, found, &error.range);
                 let (code, message, help) = messages::bad_quantity(self.key, path, found, &error.problem);
-                self.findings.error(code, path, place, message, help);
+                self.findings.add(code, path, place, message, help);
                 None
             }
         }
@@ -65,7 +65,7 @@ impl ValueReader<'_> {
     fn unit_missing(&mut self, path: &str, span: Range<usize>, number: f64, unit: &str) {
         let form = format!("\"{} {unit}\"", text::number(number));
         let message = format!("`{path}` is a number without unit, expected a quantity such as {form}");
-        self.findings.error(
+        self.findings.add(
             codes::UNIT_MISSING,
             path,
             span,
@@ -93,7 +93,7 @@ impl ValueReader<'_> {
         match number {
             Some(number) if number.is_finite() && !vanished => Some(if number == 0.0 { 0.0 } else { number }),
             _ => {
-                self.findings.error(
+                self.findings.add(
                     codes::NOT_FINITE,
                     path,
                     text::clamp(self.source, value.span()),
@@ -114,7 +114,7 @@ impl ValueReader<'_> {
             DeValue::Integer(integer) => {
                 let parsed = i64::from_str_radix(integer.as_str(), integer.radix()).ok();
                 if parsed.is_none() {
-                    self.findings.error(
+                    self.findings.add(
                         codes::OUT_OF_RANGE,
                         path,
                         text::clamp(self.source, value.span()),

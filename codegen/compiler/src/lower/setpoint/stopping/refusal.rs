@@ -1,8 +1,8 @@
 //! What is said of a stop that leaves workspace or strokes, and what speed or limits would do.
 
-use super::super::{AXES, amount, finding, stop};
+use super::super::{AXES, amount, stop};
 use super::{Leaves, Stopping};
-use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Model, TrajectoryKind};
 
 /// A stop that its axis has no room for. An axis without any room at all is kept still, and needs none.
@@ -40,7 +40,7 @@ pub(super) fn too_long(
     }
     let keys = [format!("control.setpoint.{name}[{worst}]"), format!("control.setpoint.{name}")];
     let keys: Vec<&str> = keys.iter().map(String::as_str).chain(["control.setpoint", "control"]).collect();
-    Some(Diagnostic::at(&model.spans, &keys, (Severity::Error, codes::STOP_LEAVES), message, help))
+    Some(Diagnostic::at(&model.spans, &keys, codes::STOP_LEAVES, message, help))
 }
 
 /// The least limits with which the stop fits on every axis, as lines of a spec; nothing if what goes by before it is too long.
@@ -84,7 +84,7 @@ pub(super) fn leaves(model: &Model, index: usize, name: &str, kind: &TrajectoryK
     let message =
         format!("trajectory \"{name}\": another command on the way would bring it to rest with {}", leaves.end);
     let help = format!("{fix}; or raise control.setpoint.stop_acceleration and stop_jerk");
-    finding(model, Severity::Error, codes::STOP_LEAVES, &format!("trajectory[{index}].{key}"), message, help)
+    Diagnostic::at(&model.spans, &[&format!("trajectory[{index}].{key}")], codes::STOP_LEAVES, message, help)
 }
 
 /// Three digits, rounded down.
