@@ -1,110 +1,154 @@
-//! Finds the three columns of a record by their header names.
+//! Reads columns of numbers from CSV text: a header that names them, values between commas, comments behind `#`. How the
+//! mistakes of a kind of file are called stands in its [`Format`].
 
 use super::findings::Findings;
-use specgen_language::diagnostic::codes;
+use specgen_language::diagnostic::{Code, codes};
 
-/// Time of the sample, s.
-pub(crate) const TIME: usize = 0;
-/// Drive, V.
-pub(crate) const DRIVE: usize = 1;
-/// Displacement, µm.
-pub(crate) const DISPLACEMENT: usize = 2;
-
-/// Header names in the order of [`TIME`], [`DRIVE`], [`DISPLACEMENT`].
-pub(crate) const NAMES: [&str; 3] = ["time_s", "drive_V", "displacement_um"];
-
-/// Headers closer than this many edits to a wanted one are suggested.
-const NEAR: usize = 4;
-
-/// Positions of the three columns in a header, or `None` after every problem was reported.
-pub(crate) fn locate(header: &csv::StringRecord, line: usize, findings: &mut Findings) -> Option<[usize; 3]> {
-    let wanted = NAMES.map(|name| find(header, name, line, findings));
-    match wanted {
-        [Some(time), Some(drive), Some(displacement)] => Some([time, drive, displacement]),
-        _ => None,
-    }
+/// What a kind of file calls its mistakes.
+#[derive(Debug)]
+pub(crate) struct Format {
+    /// A header that cannot be read.
+    pub(crate) header: Code,
+    /// A line or a value that cannot be read.
+    pub(crate) value: Code,
+    /// NaN or infinity, and how to fix it.
+    pub(crate) not_finite: (Code, &'static str),
+    /// Whether a line may have more values than the header has names.
+    pub(crate) longer_lines: bool,
+    /// Message and help for any line without a finite number in every column, instead of what is wrong with each value.
+    pub(crate) whole_line: Option<[&'static str; 2]>,
 }
 
-fn find(header: &csv::StringRecord, name: &str, line: usize, findings: &mut Findings) -> Option<usize> {
-    let matching: Vec<usize> = (0..header.len()).filter(|&i| header[i].trim().eq_ignore_ascii_case(name)).collect();
-    match matching[..] {
-        [only] => return Some(only),
-        [] => {}
-        [first, second, ..] => {
-            let message = format!("column `{name}` appears twice, as columns {} and {}", first + 1, second + 1);
-            findings.add(codes::RECORD_COLUMN_TWICE, Some(line), message, "keep one of them");
-            return None;
+/// Records of the bench.
+pub(crate) const RECORD: Format = Format {
+    header: codes::RECORD_HEADER,
+    value: codes::RECORD_VALUE,
+    not_finite: (codes::RECORD_NOT_FINITE, "delete the sample, or record again"),
+    longer_lines: true,
+    whole_line: None,
+};
+
+/// The header of a file.
+#[derive(Debug)]
+pub(crate) struct Header {
+    /// Names of the columns, without white space around them.
+    pub(crate) names: Vec<String>,
+    /// Its line, counted from 1.
+    pub(crate) line: usize,
+}
+
+/// The lines behind the header.
+pub(crate) struct Lines<'a> {
+    format: &'a Format,
+    names: usize,
+    reader: csv::Reader<&'a [u8]>,
+}
+
+/// Reads the header; `None` after the problem was reported.
+pub(crate) fn open<'a>(text: &'a str, format: &'a Format, findings: &mut Findings) -> Option<(Header, Lines<'a>)> {
+    let mut reader =
+        csv::ReaderBuilder::new().flexible(true).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
+    let header = reader.headers().map(|header| Header {
+        names: header.iter().map(str::to_owned).collect(),
+        line: header.position().map_or(1, |p| p.line() as usize),
+    });
+    match header {
+        Ok(header) => {
+            let names = header.names.len();
+            Some((header, Lines { format, names, reader }))
+        }
+        Err(e) => {
+            findings.add(format.header, Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
+            None
         }
     }
-    let present: Vec<String> = header.iter().map(|h| format!("`{}`", h.trim())).collect();
-    let message = format!("column `{name}` is missing; the header has {}", present.join(", "));
-    findings.add(codes::RECORD_HEADER, Some(line), message, &missing_column_help(header, name));
-    None
 }
 
-fn missing_column_help(header: &csv::StringRecord, name: &str) -> String {
-    if header.len() == 1 && (header[0].contains(';') || header[0].contains('\t')) {
-        return "separate the columns by commas and write numbers with a decimal point".to_owned();
-    }
-    if (0..header.len()).any(|i| header[i].trim().parse::<f64>().is_ok()) {
-        return format!("the first line must be the header `{}`", NAMES.join(","));
-    }
-    let quantity = name.split('_').next().unwrap_or(name);
-    let lower = name.to_ascii_lowercase();
-    let near = header
-        .iter()
-        .map(str::trim)
-        .filter(|h| !NAMES.iter().any(|other| h.eq_ignore_ascii_case(other)))
-        .map(|h| (strsim::damerau_levenshtein(&h.to_ascii_lowercase(), &lower), h))
-        .filter(|(distance, h)| *distance < NEAR || h.to_ascii_lowercase().starts_with(quantity))
-        .min();
-    match near {
-        Some((_, h)) if other_unit(h, name) => {
-            format!("`{h}` seems to be in another unit: convert it and name the column `{name}`")
+impl Header {
+    /// The place of the column `name`, in upper or lower case; `None` after two of that name were reported. If there is none
+    /// and a help is given, it is reported, too.
+    pub(crate) fn place(&self, name: &str, help: Option<&str>, findings: &mut Findings) -> Option<usize> {
+        let same = |k: &usize| self.names[*k].eq_ignore_ascii_case(name);
+        let matching: Vec<usize> = (0..self.names.len()).filter(same).collect();
+        match (&matching[..], help) {
+            ([only], _) => return Some(*only),
+            ([first, second, ..], _) => {
+                let message = format!("column `{name}` appears twice, as columns {} and {}", first + 1, second + 1);
+                findings.add(codes::RECORD_COLUMN_TWICE, Some(self.line), message, "keep one of them");
+            }
+            ([], Some(help)) => {
+                let present: Vec<String> = self.names.iter().map(|name| format!("`{name}`")).collect();
+                let message = format!("column `{name}` is missing; the header has {}", present.join(", "));
+                findings.add(codes::RECORD_HEADER, Some(self.line), message, help);
+            }
+            ([], None) => {}
         }
-        Some((_, h)) => format!("rename `{h}` to `{name}` if that is what it holds"),
-        None => format!("name the column that holds it `{name}`; the unit is part of the name"),
+        None
     }
 }
 
-/// Whether `header` names the same quantity as `name` with another unit behind the underscore.
-fn other_unit(header: &str, name: &str) -> bool {
-    match (header.rsplit_once('_'), name.rsplit_once('_')) {
-        (Some((quantity, unit)), Some((wanted, wanted_unit))) => {
-            quantity.eq_ignore_ascii_case(wanted) && !unit.eq_ignore_ascii_case(wanted_unit)
+impl Lines<'_> {
+    /// Line numbers, and the values of the columns at `wanted`, each with its name for messages; NaN after the problem with a
+    /// value was reported.
+    pub(crate) fn read(mut self, wanted: &[(usize, &str)], findings: &mut Findings) -> (Vec<usize>, Vec<Vec<f64>>) {
+        let format = self.format;
+        let mut lines = Vec::new();
+        let mut columns = vec![Vec::new(); wanted.len()];
+        for row in self.reader.records() {
+            let row = match row {
+                Ok(row) => row,
+                Err(e) => {
+                    let line = e.position().map(|p| p.line() as usize);
+                    findings.add(format.value, line, format!("cannot be read as CSV: {e}"), "write plain CSV");
+                    continue;
+                }
+            };
+            let line = row.position().map_or(0, |p| p.line() as usize);
+            lines.push(line);
+            if let Some([message, help]) = format.whole_line {
+                let number = |field: &str| field.parse().is_ok_and(f64::is_finite);
+                if row.len() != self.names || !row.iter().all(number) {
+                    findings.add(format.value, Some(line), message.to_owned(), help);
+                    columns.iter_mut().for_each(|column| column.push(f64::NAN));
+                    continue;
+                }
+            }
+            for (column, (at, name)) in columns.iter_mut().zip(wanted) {
+                column.push(format.number(row.get(*at), line, name, findings));
+            }
+            if row.len() > self.names && !format.longer_lines {
+                let message = format!("has {} values, expected {}", row.len(), self.names);
+                findings.add(format.value, Some(line), message, "one value to each column, a point as decimal sign");
+            }
         }
-        _ => false,
+        (lines, columns)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn help(header: &[&str]) -> Vec<String> {
-        let mut findings = Findings::new("r.csv");
-        let found = locate(&csv::StringRecord::from(header.to_vec()), 1, &mut findings);
-        let all = findings.into_diagnostics();
-        assert_eq!(found.is_none(), !all.is_empty());
-        all.into_iter().map(|d| format!("{} / {}", d.message, d.help)).collect()
+impl Format {
+    /// The number in a field, or NaN after the problem was reported.
+    fn number(&self, field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> f64 {
+        let Some(field) = field else {
+            let message = format!("`{name}` is missing: the line is too short");
+            findings.add(self.value, Some(line), message, "complete or delete the line");
+            return f64::NAN;
+        };
+        match field.parse::<f64>() {
+            Ok(x) if x.is_finite() => return x,
+            Ok(_) => self.report_not_finite(line, name, field, findings),
+            Err(_) => {
+                let shown: String = field.chars().take(40).collect();
+                let message = format!("`{name}` is `{shown}`, which is not a number");
+                let help = "write a plain number with a decimal point, such as -12.5e-3";
+                findings.add(self.value, Some(line), message, help);
+            }
+        }
+        f64::NAN
     }
 
-    #[test]
-    fn order_case_and_extra_columns_do_not_matter() {
-        let header = csv::StringRecord::from(vec!["note", "Displacement_UM", " TIME_S", "drive_v"]);
-        assert_eq!(locate(&header, 1, &mut Findings::new("r.csv")), Some([2, 3, 1]));
-    }
-
-    #[test]
-    fn near_misses_units_and_wrong_separators_get_their_own_advice() {
-        assert!(help(&["tme_s", "drive_V", "displacement_um"])[0].contains("rename `tme_s` to `time_s`"));
-        assert!(
-            help(&["time_s", "drive_V", "displacement_nm"])[0]
-                .contains("`displacement_nm` seems to be in another unit")
-        );
-        assert!(help(&["time_s;drive_V;displacement_um"])[0].contains("separate the columns by commas"));
-        assert!(help(&["0.0", "1.0", "2.0"])[0].contains("first line must be the header"));
-        assert!(help(&["time_s", "time_s", "drive_V", "displacement_um"])[0].contains("appears twice"));
-        assert!(help(&["time_s", "drive_V"])[0].contains("column `displacement_um` is missing"));
+    /// Reports NaN or infinity.
+    pub(crate) fn report_not_finite(&self, line: usize, name: &str, shown: &str, findings: &mut Findings) {
+        let (code, help) = self.not_finite;
+        findings.add(code, Some(line), format!("`{name}` is `{shown}`, not a finite number"), help);
     }
 }

@@ -2,21 +2,27 @@
 
 use std::fmt::Write as _;
 
+use super::columns::{self, Format};
 use super::findings::Findings;
 use crate::everett::EverettTable;
-use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::diagnostic::{Code, Diagnostic, codes};
 
 const HEADER: &str = "up_V,down_V,everett_um";
 
 /// The table as CSV text. Numbers are shortest round-trip, so that the same table gives the same bytes.
 #[must_use]
 pub fn write_table_csv(table: &EverettTable) -> String {
-    let mut text = format!("{HEADER}\n");
+    write_nodes(table, HEADER)
+}
+
+/// Thresholds in V, nodes in µ of their unit, one line per node, below `header`.
+pub(crate) fn write_nodes(table: &EverettTable, header: &str) -> String {
+    let mut text = format!("{header}\n");
     for up in 1..=table.grid {
         for down in 0..up {
-            let um = table.node(up, down) * 1e6;
+            let value = table.node(up, down) * 1e6;
             // Writing to a String cannot fail.
-            let _ = writeln!(text, "{:?},{:?},{um:?}", table.threshold(up), table.threshold(down));
+            let _ = writeln!(text, "{:?},{:?},{value:?}", table.threshold(up), table.threshold(down));
         }
     }
     text
@@ -33,34 +39,51 @@ pub fn is_table_csv(text: &str) -> bool {
 /// # Errors
 /// A finding per line that is not as [`write_table_csv`] writes it.
 pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Diagnostic>> {
+    const LINE: [&str; 2] = ["is not three finite numbers", "write the file with `specgen identify`"];
     let mut findings = Findings::new(shown_as);
-    let help = "write the file with `specgen identify`";
-    let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim()));
-    if lines.next().is_none_or(|(_, header)| header != HEADER) {
-        findings.add(codes::TABLE_FILE, Some(1), format!("the header must be `{HEADER}`"), help);
-        return Err(findings.into_diagnostics());
+    let table = read_nodes(text, HEADER, codes::TABLE_FILE, LINE, f64::INFINITY, &mut findings);
+    if let Some((table, lines)) = &table {
+        check_weights(table, lines, &mut findings);
     }
-    let mut values = Vec::new();
-    for (line, text) in lines.filter(|(_, text)| !text.is_empty()) {
-        let fields: Vec<f64> =
-            text.split(',').filter_map(|f| f.trim().parse().ok()).filter(|x: &f64| x.is_finite()).collect();
-        match fields[..] {
-            [up, down, um] => values.push([up, down, um]),
-            _ => findings.add(codes::TABLE_FILE, Some(line), "is not three finite numbers".to_owned(), help),
+    findings.conclude(table).map(|((table, _), _)| table)
+}
+
+/// Nodes in µ of their unit behind two thresholds in V, in the order of a triangle whose thresholds rise; with the line of
+/// each node. Values beyond `largest` are refused. `None` after the problem was reported.
+pub(crate) fn read_nodes(
+    text: &str,
+    header: &str,
+    code: Code,
+    line: [&'static str; 2],
+    largest: f64,
+    findings: &mut Findings,
+) -> Option<(EverettTable, Vec<usize>)> {
+    let [message, help] = line;
+    if text.lines().next().is_none_or(|first| first.trim() != header) {
+        findings.add(code, Some(1), format!("the header must be `{header}`"), help);
+        return None;
+    }
+    let format =
+        Format { header: code, value: code, not_finite: (code, help), longer_lines: false, whole_line: Some(line) };
+    let (_, lines) = columns::open(text, &format, findings)?;
+    let (lines, values) = lines.read(&[(0, ""), (1, ""), (2, "")], findings);
+    let [ups, downs, values] = <[Vec<f64>; 3]>::try_from(values).ok()?;
+    let nodes: Vec<f64> = values.iter().map(|value| value * 1e-6).collect();
+    for (line, _) in lines.iter().zip(&nodes).filter(|(_, node)| node.abs() > largest) {
+        findings.add(code, Some(*line), message.to_owned(), help);
+    }
+    if findings.any_error() {
+        return None;
+    }
+    let grid = (1..=256).find(|n| n * (n + 1) / 2 == nodes.len());
+    let table = match (grid, downs.first(), ups.last()) {
+        (Some(grid), Some(&drive_min), Some(&drive_max)) if drive_min < drive_max => {
+            EverettTable { grid, drive_min, drive_max, nodes }
         }
-    }
-    let grid = (1..=256).find(|n| n * (n + 1) / 2 == values.len());
-    let table = match (grid, values.first(), values.last()) {
-        (Some(grid), Some(first), Some(last)) if first[1] < last[0] => EverettTable {
-            grid,
-            drive_min: first[1],
-            drive_max: last[0],
-            nodes: values.iter().map(|v| v[2] * 1e-6).collect(),
-        },
         _ => {
-            let message = format!("{} nodes do not make a triangle of rising thresholds", values.len());
-            findings.add(codes::TABLE_FILE, None, message, help);
-            return Err(findings.into_diagnostics());
+            let message = format!("{} nodes do not make a triangle of rising thresholds", nodes.len());
+            findings.add(code, None, message, help);
+            return None;
         }
     };
     let tolerance = 1e-9 * (table.drive_max - table.drive_min);
@@ -68,21 +91,18 @@ pub fn read_table_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Di
         for down in 0..up {
             let at = EverettTable::index(up, down);
             let wanted = [table.threshold(up), table.threshold(down)];
-            if (values[at][0] - wanted[0]).abs() > tolerance || (values[at][1] - wanted[1]).abs() > tolerance {
-                let message = format!(
-                    "thresholds {} V, {} V; expected {} V, {} V",
-                    values[at][0], values[at][1], wanted[0], wanted[1]
-                );
-                findings.add(codes::TABLE_FILE, Some(at + 2), message, help);
+            if (ups[at] - wanted[0]).abs() > tolerance || (downs[at] - wanted[1]).abs() > tolerance {
+                let message =
+                    format!("thresholds {} V, {} V; expected {} V, {} V", ups[at], downs[at], wanted[0], wanted[1]);
+                findings.add(code, Some(lines[at]), message, help);
             }
         }
     }
-    check_weights(&table, &mut findings);
-    if findings.any_error() { Err(findings.into_diagnostics()) } else { Ok(table) }
+    Some((table, lines))
 }
 
 /// A table with a negative weight is not monotone, so that its inverse is not unique. Rounding is let pass.
-fn check_weights(table: &EverettTable, findings: &mut Findings) {
+fn check_weights(table: &EverettTable, lines: &[usize], findings: &mut Findings) {
     let rounding = 1e-9 * table.node(table.grid, 0).abs();
     for up in 1..=table.grid {
         for down in 0..up {
@@ -96,7 +116,7 @@ fn check_weights(table: &EverettTable, findings: &mut Findings) {
                 );
                 findings.add(
                     codes::TABLE_FILE,
-                    Some(EverettTable::index(up, down) + 2),
+                    Some(lines[EverettTable::index(up, down)]),
                     message,
                     "identify the record again",
                 );

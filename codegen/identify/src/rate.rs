@@ -27,7 +27,7 @@ use super::findings::Findings;
 use super::record::Record;
 use super::{Options, coverage};
 
-pub use export::{is_rate_csv, read_rate_csv, spec_lines, write_rate_csv};
+pub use export::{read_rate_csv, spec_lines, write_rate_csv};
 pub use report::{HoldOut, Measured, OptionReport, RateReport, Verdict};
 
 /// A way to account for the rate.

@@ -6,11 +6,24 @@
 use std::io::Read;
 use std::path::Path;
 
-use super::columns::{self, DISPLACEMENT, DRIVE, NAMES, TIME};
+use super::columns::{self, Header, RECORD};
 use super::distrust;
 use super::findings::Findings;
 use super::sanity;
 use specgen_language::diagnostic::{Diagnostic, codes};
+
+/// Time of the sample, s.
+pub(crate) const TIME: usize = 0;
+/// Drive, V.
+pub(crate) const DRIVE: usize = 1;
+/// Displacement, µm.
+pub(crate) const DISPLACEMENT: usize = 2;
+
+/// Header names in the order of [`TIME`], [`DRIVE`], [`DISPLACEMENT`].
+pub(crate) const NAMES: [&str; 3] = ["time_s", "drive_V", "displacement_um"];
+
+/// Headers closer than this many edits to a wanted one are suggested.
+const NEAR: usize = 4;
 
 /// Larger files are refused before they are read.
 pub const MAX_FILE_BYTES: u64 = 256 << 20;
@@ -55,7 +68,7 @@ impl Record {
         }
         for (column, name) in [(&time, NAMES[TIME]), (&drive, NAMES[DRIVE]), (&displacement, NAMES[DISPLACEMENT])] {
             for (k, x) in column.iter().enumerate().filter(|(_, x)| !x.is_finite()) {
-                report_not_finite(&mut findings, k + 2, name, &x.to_string());
+                RECORD.report_not_finite(k + 2, name, &x.to_string(), &mut findings);
             }
         }
         let lines = (2..n + 2).collect();
@@ -166,73 +179,84 @@ fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 
         findings.add(codes::RECORD_HEADER, None, "is empty".to_owned(), &help);
         return None;
     }
-    let mut reader =
-        csv::ReaderBuilder::new().flexible(true).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
-    let header = match reader.headers() {
-        Ok(header) => header.clone(),
-        Err(e) => {
-            findings.add(codes::RECORD_HEADER, Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
-            return None;
-        }
-    };
-    let header_line = header.position().map_or(1, |p| p.line() as usize);
-    let place = columns::locate(&header, header_line, findings)?;
-    let mut lines = Vec::new();
-    let mut values = [Vec::new(), Vec::new(), Vec::new()];
-    for row in reader.records() {
-        match row {
-            Ok(row) => {
-                let line = row.position().map_or(0, |p| p.line() as usize);
-                lines.push(line);
-                for (column, (&at, name)) in values.iter_mut().zip(place.iter().zip(NAMES)) {
-                    column.push(number(row.get(at), line, name, findings));
-                }
-            }
-            Err(e) => {
-                let line = e.position().map(|p| p.line() as usize);
-                findings.add(codes::RECORD_VALUE, line, format!("cannot be read as CSV: {e}"), "write plain CSV");
-            }
-        }
-    }
-    Some((lines, values))
+    let (header, lines) = columns::open(text, &RECORD, findings)?;
+    let places = places(&header, findings)?;
+    let (lines, values) = lines.read(&[0, 1, 2].map(|k| (places[k], NAMES[k])), findings);
+    Some((lines, values.try_into().ok()?))
 }
 
-/// The number in a field, or NaN after the problem was reported.
-pub(crate) fn number(field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> f64 {
-    let Some(field) = field else {
-        findings.add(
-            codes::RECORD_VALUE,
-            Some(line),
-            format!("`{name}` is missing: the line is too short"),
-            "complete or delete the line",
+/// Places of the three columns, or `None` after every problem was reported.
+fn places(header: &Header, findings: &mut Findings) -> Option<[usize; 3]> {
+    let found = NAMES.map(|name| header.place(name, Some(&missing_column_help(&header.names, name)), findings));
+    let [Some(time), Some(drive), Some(displacement)] = found else { return None };
+    Some([time, drive, displacement])
+}
+
+fn missing_column_help(header: &[String], name: &str) -> String {
+    if header.len() == 1 && (header[0].contains(';') || header[0].contains('\t')) {
+        return "separate the columns by commas and write numbers with a decimal point".to_owned();
+    }
+    if header.iter().any(|h| h.parse::<f64>().is_ok()) {
+        return format!("the first line must be the header `{}`", NAMES.join(","));
+    }
+    let quantity = name.split('_').next().unwrap_or(name);
+    let lower = name.to_ascii_lowercase();
+    let near = header
+        .iter()
+        .filter(|h| !NAMES.iter().any(|other| h.eq_ignore_ascii_case(other)))
+        .map(|h| (strsim::damerau_levenshtein(&h.to_ascii_lowercase(), &lower), h))
+        .filter(|(distance, h)| *distance < NEAR || h.to_ascii_lowercase().starts_with(quantity))
+        .min();
+    match near {
+        Some((_, h)) if other_unit(h, name) => {
+            format!("`{h}` seems to be in another unit: convert it and name the column `{name}`")
+        }
+        Some((_, h)) => format!("rename `{h}` to `{name}` if that is what it holds"),
+        None => format!("name the column that holds it `{name}`; the unit is part of the name"),
+    }
+}
+
+/// Whether `header` names the same quantity as `name` with another unit behind the underscore.
+fn other_unit(header: &str, name: &str) -> bool {
+    match (header.rsplit_once('_'), name.rsplit_once('_')) {
+        (Some((quantity, unit)), Some((wanted, wanted_unit))) => {
+            quantity.eq_ignore_ascii_case(wanted) && !unit.eq_ignore_ascii_case(wanted_unit)
+        }
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn help(header: &[&str]) -> Vec<String> {
+        let mut findings = Findings::new("r.csv");
+        let text = header.join(",");
+        let (header, _) = columns::open(&text, &RECORD, &mut findings).unwrap();
+        let found = places(&header, &mut findings);
+        let all = findings.into_diagnostics();
+        assert_eq!(found.is_none(), !all.is_empty());
+        all.into_iter().map(|d| format!("{} / {}", d.message, d.help)).collect()
+    }
+
+    #[test]
+    fn order_case_and_extra_columns_do_not_matter() {
+        let mut findings = Findings::new("r.csv");
+        let (header, _) = columns::open("note,Displacement_UM, TIME_S,drive_v", &RECORD, &mut findings).unwrap();
+        assert_eq!(places(&header, &mut findings), Some([2, 3, 1]));
+    }
+
+    #[test]
+    fn near_misses_units_and_wrong_separators_get_their_own_advice() {
+        assert!(help(&["tme_s", "drive_V", "displacement_um"])[0].contains("rename `tme_s` to `time_s`"));
+        assert!(
+            help(&["time_s", "drive_V", "displacement_nm"])[0]
+                .contains("`displacement_nm` seems to be in another unit")
         );
-        return f64::NAN;
-    };
-    match field.parse::<f64>() {
-        Ok(x) if x.is_finite() => x,
-        Ok(_) => {
-            report_not_finite(findings, line, name, field);
-            f64::NAN
-        }
-        Err(_) => {
-            let shown: String = field.chars().take(40).collect();
-            let message = format!("`{name}` is `{shown}`, which is not a number");
-            findings.add(
-                codes::RECORD_VALUE,
-                Some(line),
-                message,
-                "write a plain number with a decimal point, such as -12.5e-3",
-            );
-            f64::NAN
-        }
+        assert!(help(&["time_s;drive_V;displacement_um"])[0].contains("separate the columns by commas"));
+        assert!(help(&["0.0", "1.0", "2.0"])[0].contains("first line must be the header"));
+        assert!(help(&["time_s", "time_s", "drive_V", "displacement_um"])[0].contains("appears twice"));
+        assert!(help(&["time_s", "drive_V"])[0].contains("column `displacement_um` is missing"));
     }
-}
-
-fn report_not_finite(findings: &mut Findings, line: usize, name: &str, shown: &str) {
-    findings.add(
-        codes::RECORD_NOT_FINITE,
-        Some(line),
-        format!("`{name}` is `{shown}`, not a finite number"),
-        "delete the sample, or record again",
-    );
 }

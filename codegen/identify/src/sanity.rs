@@ -1,8 +1,8 @@
 //! Is a record plausible as a measurement, whatever it was meant for?
 
-use super::columns::{DISPLACEMENT, DRIVE, TIME};
 use super::findings::Findings;
 use super::limits;
+use super::record::{DISPLACEMENT, DRIVE, TIME};
 use specgen_language::diagnostic::codes;
 
 /// Fewer samples are no record.

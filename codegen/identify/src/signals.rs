@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use super::columns::{self, RECORD};
 use super::findings::Findings;
-use super::record::{number, read_file};
+use super::record::read_file;
 use super::sanity;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -46,40 +47,19 @@ pub(crate) fn parse(text: &str, shown_as: &str, wanted: &[Wanted]) -> Result<Sig
 }
 
 fn parse_into(text: &str, shown_as: &str, wanted: &[Wanted], findings: &mut Findings) -> Option<Signals> {
-    let mut reader =
-        csv::ReaderBuilder::new().flexible(true).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
-    let header = match reader.headers() {
-        Ok(header) => header.clone(),
-        Err(e) => {
-            findings.add(codes::RECORD_HEADER, Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
-            return None;
-        }
-    };
-    let header_line = header.position().map_or(1, |p| p.line() as usize);
+    let (header, lines) = columns::open(text, &RECORD, findings)?;
+    let names: Vec<&str> = wanted.iter().map(|w| w.name).collect();
+    let help = format!("name the columns with their units: {}", names.join(","));
     let places: Vec<Option<usize>> =
-        wanted.iter().map(|w| locate(&header, *w, wanted, header_line, findings)).collect();
+        wanted.iter().map(|w| header.place(w.name, w.required.then_some(&help), findings)).collect();
     if findings.any_error() {
         return None;
     }
-    let mut lines = Vec::new();
-    let mut columns: Vec<Option<Vec<f64>>> = places.iter().map(|p| p.map(|_| Vec::new())).collect();
-    for row in reader.records() {
-        match row {
-            Ok(row) => {
-                let line = row.position().map_or(0, |p| p.line() as usize);
-                lines.push(line);
-                for ((column, place), w) in columns.iter_mut().zip(&places).zip(wanted) {
-                    if let (Some(values), Some(at)) = (column, place) {
-                        values.push(number(row.get(*at), line, w.name, findings));
-                    }
-                }
-            }
-            Err(e) => {
-                let line = e.position().map(|p| p.line() as usize);
-                findings.add(codes::RECORD_VALUE, line, format!("cannot be read as CSV: {e}"), "write plain CSV");
-            }
-        }
-    }
+    let there: Vec<(usize, &str)> =
+        places.iter().zip(names).filter_map(|(place, name)| Some(((*place)?, name))).collect();
+    let (lines, values) = lines.read(&there, findings);
+    let mut values = values.into_iter();
+    let columns: Vec<Option<Vec<f64>>> = places.iter().map(|place| place.and_then(|_| values.next())).collect();
     if lines.len() < MIN_SAMPLES {
         let message = format!("has {} samples; at least {MIN_SAMPLES} are needed", lines.len());
         findings.add(codes::RECORD_TOO_SHORT, None, message, "record more samples");
@@ -88,35 +68,6 @@ fn parse_into(text: &str, shown_as: &str, wanted: &[Wanted], findings: &mut Find
         sanity::check_time(&lines, time, findings);
     }
     Some(Signals { shown_as: shown_as.to_owned(), lines, columns })
-}
-
-fn locate(
-    header: &csv::StringRecord,
-    wanted: Wanted,
-    all: &[Wanted],
-    line: usize,
-    findings: &mut Findings,
-) -> Option<usize> {
-    let matching: Vec<usize> =
-        (0..header.len()).filter(|&i| header[i].trim().eq_ignore_ascii_case(wanted.name)).collect();
-    match matching[..] {
-        [only] => return Some(only),
-        [first, second, ..] => {
-            let message =
-                format!("column `{}` appears twice, as columns {} and {}", wanted.name, first + 1, second + 1);
-            findings.add(codes::RECORD_COLUMN_TWICE, Some(line), message, "keep one of them");
-            return None;
-        }
-        [] => {}
-    }
-    if wanted.required {
-        let present: Vec<String> = header.iter().map(|h| format!("`{}`", h.trim())).collect();
-        let message = format!("column `{}` is missing; the header has {}", wanted.name, present.join(", "));
-        let names: Vec<&str> = all.iter().map(|w| w.name).collect();
-        let help = format!("name the columns with their units: {}", names.join(","));
-        findings.add(codes::RECORD_HEADER, Some(line), message, &help);
-    }
-    None
 }
 
 impl Signals {

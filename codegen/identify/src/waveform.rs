@@ -6,6 +6,7 @@
 
 use std::path::Path;
 
+use crate::columns::{self, Format, Header};
 use crate::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -60,72 +61,48 @@ enum Column {
 }
 
 fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) -> Option<Waveform> {
-    let mut reader =
-        csv::ReaderBuilder::new().flexible(true).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
-    let header = match reader.headers() {
-        Ok(header) if header.iter().any(|name| !name.is_empty()) => header.clone(),
-        Ok(_) => {
-            findings.add(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
-            return None;
-        }
-        Err(error) => {
-            let message = format!("the header cannot be read: {error}");
-            findings.add(codes::WAVEFORM_HEADER, Some(1), message, "write plain CSV");
-            return None;
-        }
-    };
-    let columns = columns(&header, findings)?;
-    let mut waveform = Waveform { shown_as: shown_as.to_owned(), lines: Vec::new(), rows: Vec::new() };
-    let mut times = Vec::new();
-    for record in reader.records() {
-        let record = match record {
-            Ok(record) => record,
-            Err(error) => {
-                let line = error.position().map(|p| p.line() as usize);
-                let message = format!("cannot be read as CSV: {error}");
-                findings.add(codes::WAVEFORM_VALUE, line, message, "write plain CSV");
-                continue;
-            }
-        };
-        let line = record.position().map_or(0, |p| p.line() as usize);
-        let mut row = [0.0; 6];
-        for (place, column) in columns.iter().enumerate() {
-            let Some(value) = number(record.get(place), line, header.get(place).unwrap_or_default(), findings) else {
-                continue;
-            };
-            match *column {
-                Column::Time(unit) => times.push((line, value * unit)),
-                Column::Axis(axis, unit) => row[axis] = value * unit,
-            }
-        }
-        if record.len() > columns.len() {
-            let message = format!("has {} values, expected {}", record.len(), columns.len());
-            findings.add(
-                codes::WAVEFORM_VALUE,
-                Some(line),
-                message,
-                "one value to each column, a point as decimal sign",
-            );
-        }
-        waveform.lines.push(line);
-        waveform.rows.push(row);
+    let (header, lines) = columns::open(text, &FORMAT, findings)?;
+    if header.names.iter().all(String::is_empty) {
+        findings.add(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
+        return None;
     }
-    check_times(&times, period, findings);
-    let count = waveform.rows.len();
-    if !(2..=MAX_ROWS).contains(&count) {
-        let message = format!("has {count} rows, expected 2 to {MAX_ROWS}");
+    let columns = meanings(&header, findings)?;
+    let all: Vec<(usize, &str)> = header.names.iter().map(String::as_str).enumerate().collect();
+    let (lines, values) = lines.read(&all, findings);
+    let mut rows = vec![[0.0; 6]; lines.len()];
+    for (column, values) in columns.iter().zip(&values) {
+        match *column {
+            Column::Time(unit) => {
+                let times = lines.iter().zip(values).filter(|(_, time)| time.is_finite());
+                check_times(&times.map(|(line, time)| (*line, time * unit)).collect::<Vec<_>>(), period, findings);
+            }
+            Column::Axis(axis, unit) => {
+                rows.iter_mut().zip(values).for_each(|(row, value)| row[axis] = value * unit);
+            }
+        }
+    }
+    if !(2..=MAX_ROWS).contains(&rows.len()) {
+        let message = format!("has {} rows, expected 2 to {MAX_ROWS}", rows.len());
         findings.add(codes::WAVEFORM_LENGTH, None, message, "sample more coarsely: rows are joined by cubic splines");
     }
-    Some(waveform)
+    Some(Waveform { shown_as: shown_as.to_owned(), lines, rows })
 }
+
+const FORMAT: Format = Format {
+    header: codes::WAVEFORM_HEADER,
+    value: codes::WAVEFORM_VALUE,
+    not_finite: (codes::WAVEFORM_VALUE, "give every row a value"),
+    longer_lines: false,
+    whole_line: None,
+};
 
 const EXPECTED: &str = "name the columns by axis and unit in the first line, such as `x_um,y_um,z_um,theta_x_urad`";
 
 /// What each column holds, or `None` after every problem of the header was reported.
-fn columns(header: &csv::StringRecord, findings: &mut Findings) -> Option<Vec<Column>> {
-    let line = Some(header.position().map_or(1, |p| p.line() as usize));
+fn meanings(header: &Header, findings: &mut Findings) -> Option<Vec<Column>> {
+    let line = Some(header.line);
     let mut found: Vec<Column> = Vec::new();
-    for (place, name) in header.iter().enumerate() {
+    for (place, name) in header.names.iter().enumerate() {
         match column(name) {
             Ok(column) => {
                 let same = |other: &Column| match (other, &column) {
@@ -177,30 +154,6 @@ fn column(name: &str) -> Result<Column, String> {
         return size(units).map(|unit| Column::Axis(axis, unit)).ok_or_else(|| names(units));
     }
     Err(EXPECTED.to_owned())
-}
-
-/// The number in a field, or `None` after the problem was reported.
-fn number(field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> Option<f64> {
-    let Some(field) = field else {
-        let message = format!("`{name}` is missing: the line is too short");
-        findings.add(codes::WAVEFORM_VALUE, Some(line), message, "complete or delete the line");
-        return None;
-    };
-    match field.parse::<f64>() {
-        Ok(value) if value.is_finite() => Some(value),
-        Ok(_) => {
-            let message = format!("`{name}` is `{field}`, not a finite number");
-            findings.add(codes::WAVEFORM_VALUE, Some(line), message, "give every row a value");
-            None
-        }
-        Err(_) => {
-            let shown: String = field.chars().take(40).collect();
-            let message = format!("`{name}` is `{shown}`, which is not a number");
-            let help = "write a plain number with a decimal point, such as -12.5e-3";
-            findings.add(codes::WAVEFORM_VALUE, Some(line), message, help);
-            None
-        }
-    }
 }
 
 /// Times rise by the period from row to row.
