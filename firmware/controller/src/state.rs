@@ -41,9 +41,8 @@ impl LegState {
 
 /// State of the controller.
 #[derive(Debug, Clone, Copy)]
+#[repr(C)]
 pub struct State {
-    /// Legs 0 to 5.
-    pub legs: [LegState; LEGS],
     /// h: pose from rest, from the last gauge readings that were believed, m and rad.
     pub pose: [Real; 6],
     /// ḣ: its filtered derivative.
@@ -78,6 +77,8 @@ pub struct State {
     pub interaction: Interaction,
     /// Its model of the environment.
     pub environment: Environment,
+    /// Legs 0 to 5. They stand last, for they are large: what comes before them is within reach of one instruction of a Cortex-M.
+    pub legs: [LegState; LEGS],
 }
 
 impl Default for State {
