@@ -115,7 +115,7 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let table_value = ir.hysteresis.tables[0][grid * (grid + 1) / 2];
     let cases = [
         ("controller/src/hysteresis.rs", table_value, false, "requested"),
-        ("controller/src/kinematics.rs", ir.kinematics.rest_leg[2][0], true, "demand[2]"),
+        ("controller/src/geometry.rs", ir.kinematics.rest_leg[2][0], true, "demand[2]"),
         ("controller/src/limits.rs", ir.actuation.volts_per_code, false, "voltage"),
     ];
     for (file, value, pose, signal) in cases {

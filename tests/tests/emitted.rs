@@ -200,3 +200,29 @@ fn a_panic_path_keeps_the_host_library_from_linking() {
     let error = specgen::target::host::build_library(&emitted.dir, &emitted.dir.join("target")).unwrap_err();
     assert!(matches!(error, specgen::target::TargetError::PanicPath { .. }), "{error}");
 }
+
+/// What does not depend on the spec stands in the files of the law: in the emitters' `quote!` blocks there are at most so many lines
+/// without a splice, documentation among them.
+#[test]
+fn little_constant_text_is_emitted() {
+    const MOST: usize = 300;
+    let mut constant = 0;
+    for (path, text) in sources(&repository().join("codegen/compiler/src/emit")) {
+        let mut lines = text.lines();
+        while let Some(line) = lines.next() {
+            let Some((before, block)) = line.split_once("quote! {") else { continue };
+            let end = format!("{}}}", &before[..before.len() - before.trim_start().len()]);
+            let of_block: Vec<&str> = match block.contains('}') {
+                true => vec![block],
+                false => lines.by_ref().take_while(|line| !line.starts_with(&end)).collect(),
+            };
+            assert!(of_block.len() < 100, "{path}: {line}");
+            // `#name` and `#(…)` are splices, `#[…]` and `#![…]` are text.
+            let spliced = |line: &&str| line.replace("#[", "").replace("#![", "").contains('#');
+            let comment = |line: &&str| line.trim().starts_with("// ") || line.trim().is_empty();
+            constant += of_block.iter().filter(|line| !spliced(line) && !comment(line)).count();
+        }
+    }
+    println!("{constant} lines of constant text in the emitters, at most {MOST}");
+    assert!((50..=MOST).contains(&constant), "{constant} lines");
+}

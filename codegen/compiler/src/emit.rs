@@ -5,15 +5,16 @@
 //! The law itself is carried over as it stands (`law`); emitted are constants, tables, types and words. What differs between six legs
 //! with their own gauges and a platform in task space lies in `legs` and `platform`.
 
+mod body;
+mod checked;
+mod crate_root;
 mod defaults;
 mod description;
-mod dynamics;
 mod format;
 mod gauge_converter;
+mod geometry;
 mod hysteresis;
 mod identity;
-mod integrity;
-mod kinematics;
 mod law;
 mod legs;
 mod limits;
@@ -21,7 +22,6 @@ mod literal;
 mod manifest;
 mod permitted;
 mod platform;
-mod sensing;
 mod setpoint;
 mod supervision;
 
@@ -38,30 +38,33 @@ pub type EmittedCrate = BTreeMap<String, String>;
 #[must_use]
 pub fn emit(ir: &Ir) -> EmittedCrate {
     let mut sources = vec![
+        ("src/body.rs", body::emit(ir)),
+        ("src/checked.rs", checked::emit(ir)),
         ("src/defaults.rs", defaults::emit(ir)),
         ("src/description.rs", description::emit(ir)),
-        ("src/dynamics.rs", dynamics::emit(ir)),
+        ("src/geometry.rs", geometry::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
-        ("src/integrity.rs", integrity::emit(ir)),
-        ("src/kinematics.rs", kinematics::emit(ir)),
+        ("src/identity.rs", identity::emit(ir)),
         ("src/limits.rs", limits::emit(ir)),
         ("src/permitted.rs", permitted::emit(ir)),
         ("src/supervision.rs", supervision::emit(ir)),
     ];
-    let law = match &ir.task_space {
+    let (law, page) = match &ir.task_space {
         None => {
-            sources.extend(legs_sources(ir));
-            law::LEGS
+            sources.push(("src/gauges.rs", legs::gauges::emit(ir)));
+            (law::LEGS, law::LEGS_PAGE)
         }
         Some(task) => {
-            sources.extend(platform_sources(ir, task));
-            law::PLATFORM
+            sources.extend(of_platform(ir, task));
+            (law::PLATFORM, law::PLATFORM_PAGE)
         }
     };
     let header = format::header(ir);
     let mut files: EmittedCrate =
         sources.into_iter().map(|(path, tokens)| (path.to_owned(), format::source(&header, tokens))).collect();
     files.extend(law.iter().map(|(path, text)| ((*path).to_owned(), law::carried_over(ir, text))));
+    let root = crate_root::emit(ir, &header, page, files.keys().map(String::as_str));
+    files.insert("src/lib.rs".to_owned(), root);
     files.insert("Cargo.toml".to_owned(), manifest::emit(ir));
     files
 }
@@ -72,14 +75,9 @@ pub fn is_carried_over(path: &str) -> bool {
     [law::LEGS, law::PLATFORM].into_iter().flatten().any(|(law, _)| *law == path)
 }
 
-fn legs_sources(ir: &Ir) -> Vec<(&'static str, TokenStream)> {
-    vec![("src/lib.rs", legs::crate_root::emit(ir)), ("src/sensing.rs", legs::sensing::emit(ir))]
-}
-
-fn platform_sources(ir: &Ir, task: &TaskSpace) -> Vec<(&'static str, TokenStream)> {
-    vec![
-        ("src/lib.rs", platform::crate_root::emit(ir)),
-        ("src/sensing.rs", sensing::emit(ir, &task.sensing)),
+fn of_platform(ir: &Ir, task: &TaskSpace) -> [(&'static str, TokenStream); 3] {
+    [
+        ("src/gauges.rs", platform::gauges::emit(ir, &task.sensing)),
         ("src/setpoint.rs", setpoint::emit(ir, &task.setpoints)),
         ("src/task_space.rs", platform::task_space::emit(ir, task)),
     ]

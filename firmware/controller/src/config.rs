@@ -8,7 +8,7 @@ use crate::defaults::{
 };
 use crate::words::{CONFIG_CODES, CONFIG_WORDS};
 use crate::{Real, limits, permitted};
-use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction};
+use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Permitted};
 
 /// A value that a [`Config`] cannot hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -198,7 +198,7 @@ impl Config {
     #[inline(never)]
     pub(crate) fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
         for (word, value) in words.iter().enumerate() {
-            match permitted::of(word) {
+            match Permitted::of(&permitted::SETTINGS, word) {
                 Some(permitted) if permitted.takes(*value) => {}
                 _ => return Err(ConfigError { word }),
             }

@@ -59,7 +59,7 @@ pub const SETPOINTS: Setpoints<Real, Parallel> = Setpoints {
 pub const TRAJECTORY_NAMES: [&str; 3] = ["case-1", "case-2", "machining"];
 
 /// Trajectories by the word `selector`.
-static TRAJECTORIES: [Trajectory<Real>; 3] = [
+pub(crate) static TRAJECTORIES: [Trajectory<Real>; 3] = [
     Trajectory::Segments {
         start: [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         segments: &SEGMENTS_0,
@@ -83,7 +83,7 @@ static TRAJECTORIES: [Trajectory<Real>; 3] = [
 ];
 
 /// Pieces of trajectory `case-1`.
-pub(crate) static SEGMENTS_0: [Segment<Real>; 2] = [
+static SEGMENTS_0: [Segment<Real>; 2] = [
     Segment {
         first: 0,
         per_tick: 0.0002,
@@ -179,7 +179,7 @@ pub(crate) static SEGMENTS_0: [Segment<Real>; 2] = [
 ];
 
 /// Pieces of trajectory `case-2`.
-pub(crate) static SEGMENTS_1: [Segment<Real>; 2] = [
+static SEGMENTS_1: [Segment<Real>; 2] = [
     Segment {
         first: 0,
         per_tick: 0.0002,
@@ -275,7 +275,7 @@ pub(crate) static SEGMENTS_1: [Segment<Real>; 2] = [
 ];
 
 /// Pieces of trajectory `machining`.
-pub(crate) static SEGMENTS_2: [Segment<Real>; 3] = [
+static SEGMENTS_2: [Segment<Real>; 3] = [
     Segment {
         first: 0,
         per_tick: 0.0002,

@@ -4,7 +4,7 @@
 
 use crate::config::Environment;
 use crate::hysteresis::{GRID, Memory};
-use crate::supervision::{ALIKE_AT_REST, code_at_rest, displacement_at_rest, memory_at_rest};
+use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
 use crate::{LEGS, Real, TickInput, limits};
 use specgen_runtime::setpoint::{CommandKind, Generator};
 use specgen_runtime::snapshot::{Invalid, LARGEST, LARGEST_PLACE, Reader, Snapshot, Writer};
@@ -25,17 +25,8 @@ pub struct LegState {
 
 impl LegState {
     /// At reset.
-    const fn at_rest(leg: usize) -> Self {
+    pub(crate) const fn at_rest(leg: usize) -> Self {
         Self { memory: memory_at_rest(leg), requested: displacement_at_rest(leg), excess: 0.0, code: code_at_rest() }
-    }
-
-    /// The six legs at reset.
-    const fn all_at_rest() -> [Self; LEGS] {
-        if ALIKE_AT_REST {
-            [Self::at_rest(0); LEGS]
-        } else {
-            [Self::at_rest(0), Self::at_rest(1), Self::at_rest(2), Self::at_rest(3), Self::at_rest(4), Self::at_rest(5)]
-        }
     }
 }
 

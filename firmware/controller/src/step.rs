@@ -28,11 +28,11 @@
 use crate::dynamics::Load;
 use crate::hysteresis::{TABLES, Table};
 use crate::limits::DAC;
+use crate::notch::{modal_error, notch_error, notch_innovation};
 use crate::setpoint::SETPOINTS;
 use crate::task_space::{
-    COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP,
-    TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS, linear_displacement, linear_drive, modal_error, notch_error,
-    notch_innovation,
+    CELLS_PER_METRE, COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS,
+    PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
 };
 use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
 use specgen_runtime::feedback::{force_of, winds_up};
@@ -324,9 +324,9 @@ pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real
         limited |= out_of_reach;
         leg.requested = leg.memory.displacement();
     } else {
-        let drive = permitted(linear_drive(request));
+        let drive = permitted(request * CELLS_PER_METRE);
         memory.apply(table, drive);
-        leg.requested = linear_displacement(drive);
+        leg.requested = drive * METRES_PER_CELL;
     }
     leg.excess = if limited { request - leg.requested } else { 0.0 };
     limited
@@ -335,5 +335,5 @@ pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real
 /// What the code that is held means in the leg model of a mode, m.
 #[inline]
 fn requested(mode: ControlMode, leg: &LegState) -> Real {
-    if mode.inverts() { leg.memory.displacement() } else { linear_displacement(DAC.drive(leg.code)) }
+    if mode.inverts() { leg.memory.displacement() } else { DAC.drive(leg.code) * METRES_PER_CELL }
 }

@@ -3,8 +3,7 @@
 
 //! Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics.
 
-use specgen_runtime::linear::transform;
-use specgen_runtime::{NotchState, Section};
+use specgen_runtime::{Notch, Section};
 use crate::{LEGS, Real};
 
 /// T_s, s; from `timing.period`.
@@ -153,88 +152,54 @@ pub const TRANSFER_KEEP: Real = 0.9980019986673331;
 /// Offset of a change of mode below which it is over, m.
 pub const TRANSFER_NEGLIGIBLE: Real = 1e-11;
 
-/// u = q/ρ̂ for a displacement q (m), as drive in cells of the Everett grid.
-#[inline]
-#[must_use]
-pub fn linear_drive(displacement: Real) -> Real {
-    displacement * 507131.53724247223
-}
+/// 1/ρ̂ in cells of the Everett grid, 1/m.
+pub const CELLS_PER_METRE: Real = 507131.53724247223;
 
-/// ρ̂u for a drive u in cells of the Everett grid, m.
-#[inline]
-#[must_use]
-pub fn linear_displacement(drive: Real) -> Real {
-    drive * 1.971875e-6
-}
+/// ρ̂ in cells of the Everett grid, m.
+pub const METRES_PER_CELL: Real = 1.971875e-6;
 
-/// Notch of each mode; from `control.notch_damping`.
-pub const NOTCH: [Section<Real>; 6] = [
-    Section {
-        depth: 0.179742689732993,
-        a: [-1.591449885127875, 0.6331781842183818],
-    },
-    Section {
-        depth: 0.179742689732993,
-        a: [-1.591449885127875, 0.6331781842183818],
-    },
-    Section {
-        depth: 0.20498585658005897,
-        a: [-1.5232264391574954, 0.5800546962371057],
-    },
-    Section {
-        depth: 0.20498585658005897,
-        a: [-1.5232264391574954, 0.5800546962371057],
-    },
-    Section {
-        depth: 0.2643490383308785,
-        a: [-1.3455581563022077, 0.4526316879978491],
-    },
-    Section {
-        depth: 0.3095518602170363,
-        a: [-1.1871646506507814, 0.35233997693869806],
-    },
-];
-
-/// V⁻¹: pose to modal coordinates.
-pub const POSE_TO_MODES: [[Real; 6]; 6] = [
-    [0.0, -0.6640004857919403, 0.0, 0.15667848725573305, 0.0, 0.0],
-    [0.66400048579194, 0.0, 0.0, 0.0, 0.15667848725573302, 0.0],
-    [1.0430210635143171, 0.0, 0.0, 0.0, -0.10020515023564563, 0.0],
-    [0.0, 1.0430210635143171, 0.0, 0.10020515023564566, 0.0, 0.0],
-    [0.0, 0.0, 0.0, 0.0, 0.0, 0.11509340315056575],
-    [0.0, 0.0, 1.262079276629897, 0.0, 0.0, 0.0],
-];
-
-/// V: the modes as poses.
-pub const MODES_TO_POSE: [[Real; 6]; 6] = [
-    [0.0, 0.4357593861573382, 0.6813434366403619, 0.0, 0.0, 0.0],
-    [-0.4357593861573384, 0.0, 0.0, 0.6813434366403619, 0.0, 0.0],
-    [0.0, 0.0, 0.0, 0.0, 0.0, 0.7923432533257962],
-    [4.535757067549336, 0.0, 0.0, 2.8875206854781257, 0.0, 0.0],
-    [0.0, 4.535757067549337, -2.887520685478126, 0.0, 0.0, 0.0],
-    [0.0, 0.0, 0.0, 0.0, 8.688595285446508, 0.0],
-];
-
-/// V⁻¹ e: the pose error in modal coordinates.
-#[inline]
-#[must_use]
-pub fn modal_error(error: &[Real; 6]) -> [Real; 6] {
-    transform(&POSE_TO_MODES, error)
-}
-
-/// N(e) of a modal error, m and rad.
-#[inline]
-#[must_use]
-pub fn notch_error(notch: &mut NotchState<Real>, modal_error: &[Real; 6]) -> [Real; 6] {
-    transform(&MODES_TO_POSE, &notch.filter(&NOTCH, modal_error))
-}
-
-/// N of an innovation in modal coordinates.
-#[inline]
-#[must_use]
-pub fn notch_innovation(
-    notch: &mut NotchState<Real>,
-    innovation: &[Real; 6],
-) -> [Real; 6] {
-    notch.filter(&NOTCH, innovation)
-}
+/// Notch of each mode; from `control.notch_damping`. Without one, modal coordinates are those of the pose.
+pub const NOTCH: Option<Notch<Real>> = Some(Notch {
+    sections: [
+        Section {
+            depth: 0.179742689732993,
+            a: [-1.591449885127875, 0.6331781842183818],
+        },
+        Section {
+            depth: 0.179742689732993,
+            a: [-1.591449885127875, 0.6331781842183818],
+        },
+        Section {
+            depth: 0.20498585658005897,
+            a: [-1.5232264391574954, 0.5800546962371057],
+        },
+        Section {
+            depth: 0.20498585658005897,
+            a: [-1.5232264391574954, 0.5800546962371057],
+        },
+        Section {
+            depth: 0.2643490383308785,
+            a: [-1.3455581563022077, 0.4526316879978491],
+        },
+        Section {
+            depth: 0.3095518602170363,
+            a: [-1.1871646506507814, 0.35233997693869806],
+        },
+    ],
+    pose_to_modes: [
+        [0.0, -0.6640004857919403, 0.0, 0.15667848725573305, 0.0, 0.0],
+        [0.66400048579194, 0.0, 0.0, 0.0, 0.15667848725573302, 0.0],
+        [1.0430210635143171, 0.0, 0.0, 0.0, -0.10020515023564563, 0.0],
+        [0.0, 1.0430210635143171, 0.0, 0.10020515023564566, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.11509340315056575],
+        [0.0, 0.0, 1.262079276629897, 0.0, 0.0, 0.0],
+    ],
+    modes_to_pose: [
+        [0.0, 0.4357593861573382, 0.6813434366403619, 0.0, 0.0, 0.0],
+        [-0.4357593861573384, 0.0, 0.0, 0.6813434366403619, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.7923432533257962],
+        [4.535757067549336, 0.0, 0.0, 2.8875206854781257, 0.0, 0.0],
+        [0.0, 4.535757067549337, -2.887520685478126, 0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 8.688595285446508, 0.0],
+    ],
+});

@@ -130,7 +130,7 @@ pub fn word_of(index: usize, value: f64) -> Option<u64> {
 /// The word of `value` in the setting with this place in `CONFIG_NAMES`.
 #[must_use]
 pub fn setting(place: usize, value: f64) -> Option<u64> {
-    match permitted::of(place)? {
+    match Permitted::of(&permitted::SETTINGS, place)? {
         Permitted::Whole(..) => integer(value),
         Permitted::Number(..) => value.is_finite().then(|| word(value as Real)),
     }
@@ -139,7 +139,7 @@ pub fn setting(place: usize, value: f64) -> Option<u64> {
 /// What the setting with this place may be, in words.
 #[must_use]
 pub fn range(place: usize) -> String {
-    match permitted::of(place) {
+    match Permitted::of(&permitted::SETTINGS, place) {
         Some(Permitted::Whole(least, most)) => {
             format!("a whole number from {least} to {most}, and code_min at most code_max")
         }

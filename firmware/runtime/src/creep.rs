@@ -11,6 +11,7 @@
 //!
 //! Each state is a mean of past f with positive weights, so it stays within the reach of the table whatever is demanded.
 
+use crate::crc::Crc32;
 use crate::digest::Digest;
 use crate::everett::Everett;
 use crate::memory::ReversalMemory;
@@ -28,6 +29,16 @@ pub struct Creep<T, const K: usize> {
     pub carried: [T; K],
     /// 1 + Σ w_j g_j.
     pub direct: T,
+}
+
+impl<T: Real, const K: usize> Creep<T, K> {
+    /// Adds its numbers to a checksum.
+    pub fn checksum(&self, crc: &mut Crc32) {
+        crc.reals(&self.gains);
+        crc.reals(&self.weights);
+        crc.reals(&self.carried);
+        crc.reals(&[self.direct]);
+    }
 }
 
 /// Everett function of one leg with creep behind it.

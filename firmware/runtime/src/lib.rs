@@ -81,7 +81,7 @@ pub use kinematics::Legs;
 pub use memory::ReversalMemory;
 pub use mode::{ControlMode, Interaction};
 pub use motion::Motion;
-pub use notch::{NotchState, Section};
+pub use notch::{Notch, NotchState, Section};
 pub use permitted::Permitted;
 pub use real::Real;
 pub use recorder::Recorder;

@@ -22,6 +22,17 @@ pub struct Section<T> {
     pub a: [T; 2],
 }
 
+/// The notch of a platform.
+#[derive(Debug, Clone, Copy)]
+pub struct Notch<T> {
+    /// One for each mode.
+    pub sections: [Section<T>; 6],
+    /// V⁻¹: pose to modal coordinates.
+    pub pose_to_modes: [[T; 6]; 6],
+    /// V: the modes as poses.
+    pub modes_to_pose: [[T; 6]; 6],
+}
+
 /// What the six sections remember. Zero at reset.
 #[derive(Debug, Clone, Copy)]
 pub struct NotchState<T> {

@@ -12,6 +12,19 @@ pub enum Permitted<T> {
 }
 
 impl<T: Real> Permitted<T> {
+    /// The range of the setting with this place, in a table whose rows each hold for so many of them; none beyond the last.
+    #[must_use]
+    pub fn of(table: &[(Self, usize)], place: usize) -> Option<&Self> {
+        let mut end = 0;
+        for (permitted, settings) in table {
+            end += *settings;
+            if place < end {
+                return Some(permitted);
+            }
+        }
+        None
+    }
+
     /// Whether a setting may hold this word.
     #[inline]
     #[must_use]

@@ -12,8 +12,8 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let (grid, memory) = (literal::count(h.grid), literal::count(h.memory));
     let doc = "Everett function of leg {}, m: E(i, j) for `up` threshold i = 0..=N and, in each row, `down` threshold j = 0..=i; from `hysteresis.records`.";
     let (tables, of_leg) = statics(ir.scalar, &h.tables, &h.table_of_leg, "EVERETT", doc);
-    let rate = rate(ir, &of_leg);
-    let (imports, types, constants) = (rate.imports, rate.types, rate.constants);
+    let Rate { imports, types: [table, memory_type], entries, constants } = rate(ir, &of_leg);
+    let rate_doc = rate_doc(ir);
     // A platform leads its load, see `task_space.rs`.
     let lead = ir.task_space.is_none().then(|| {
         let (ticks, limit) = h.lead.as_ref().map_or((0.0, 0.0), |lead| (lead.ticks, lead.limit));
@@ -29,6 +29,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
     });
     quote! {
         #![doc = " Preisach tables of the legs; the model that uses them is in `specgen_runtime::memory`."]
+        #(#![doc = #rate_doc])*
 
         use specgen_runtime::#imports;
 
@@ -40,10 +41,15 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const NODES: usize = (GRID + 1) * (GRID + 2) / 2;
         /// Capacity of the reversal memory, extrema; from `hysteresis.memory`.
         pub const MEMORY: usize = #memory;
-        #types
-        #lead
-
         #constants
+        #lead
+        /// Everett function of one leg.
+        pub type Table = #table;
+        /// Reversal memory of one leg.
+        pub type Memory = #memory_type;
+
+        /// Tables of the six legs.
+        pub static TABLES: [Table; LEGS] = [#(#entries),*];
 
         #(#tables)*
     }
@@ -52,47 +58,36 @@ pub fn emit(ir: &Ir) -> TokenStream {
 /// What depends on the rate model.
 struct Rate {
     imports: TokenStream,
-    types: TokenStream,
+    /// Of a table and of a memory.
+    types: [TokenStream; 2],
+    /// The table of each leg.
+    entries: Vec<TokenStream>,
     constants: TokenStream,
 }
 
 fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
+    let still = of_leg.iter().map(|leg| quote! { Everett { nodes: &#leg } });
     match &ir.hysteresis.rate {
         None => Rate {
             imports: quote! { {Everett, ReversalMemory} },
-            types: quote! {
-                /// Everett function of one leg.
-                pub type Table = Everett<Real, GRID, NODES>;
-                /// Reversal memory of one leg.
-                pub type Memory = ReversalMemory<Real, MEMORY>;
-            },
-            constants: quote! {
-                /// Tables of the six legs.
-                pub static TABLES: [Table; LEGS] = [#(Everett { nodes: &#of_leg }),*];
-            },
+            types: [quote! { Everett<Real, GRID, NODES> }, quote! { ReversalMemory<Real, MEMORY> }],
+            entries: still.collect(),
+            constants: TokenStream::new(),
         },
         Some(RateModel::DynamicPreisach { tables, table_of_leg, tolerance }) => {
             let doc = "Second Everett function of leg {}, m per cell a tick, laid out as the first; from `hysteresis.rate_tables`.";
             let (rates, rate_of_leg) = statics(ir.scalar, tables, table_of_leg, "RATE", doc);
             let tolerance = literal::real(ir.scalar, *tolerance);
+            let entries = still.zip(rate_of_leg).map(|(still, rate)| {
+                quote! { DynamicEverett { still: #still, rate: Everett { nodes: &#rate }, tolerance: TOLERANCE } }
+            });
             Rate {
                 imports: quote! { {DynamicEverett, DynamicMemory, Everett} },
-                types: quote! {
-                    /// The two Everett functions of one leg, (6).
-                    pub type Table = DynamicEverett<Real, GRID, NODES>;
-                    /// Reversal memory of one leg, with both.
-                    pub type Memory = DynamicMemory<Real, MEMORY>;
-                },
+                types: [quote! { DynamicEverett<Real, GRID, NODES> }, quote! { DynamicMemory<Real, MEMORY> }],
+                entries: entries.collect(),
                 constants: quote! {
                     /// Miss of the demand at which the inverse is found, m: an eighth of a converter code.
                     const TOLERANCE: Real = #tolerance;
-                    /// Tables of the six legs.
-                    pub static TABLES: [Table; LEGS] = [#(DynamicEverett {
-                        still: Everett { nodes: &#of_leg },
-                        rate: Everett { nodes: &#rate_of_leg },
-                        tolerance: TOLERANCE,
-                    }),*];
-
                     #(#rates)*
                 },
             }
@@ -104,15 +99,11 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
             let direct = literal::real(ir.scalar, *direct);
             Rate {
                 imports: quote! { {Creep, CreepEverett, CreepMemory, Everett} },
-                types: quote! {
+                types: [quote! { CreepEverett<Real, GRID, NODES, CREEP> }, quote! { CreepMemory<Real, MEMORY, CREEP> }],
+                entries: still.map(|still| quote! { CreepEverett { still: #still, creep: &CREEP_OF_LEGS } }).collect(),
+                constants: quote! {
                     /// Creep operators; from `hysteresis.creep_times`.
                     pub const CREEP: usize = #count;
-                    /// Everett function of one leg, with creep behind it.
-                    pub type Table = CreepEverett<Real, GRID, NODES, CREEP>;
-                    /// Reversal memory and creep states of one leg.
-                    pub type Memory = CreepMemory<Real, MEMORY, CREEP>;
-                },
-                constants: quote! {
                     /// Creep of every leg over a tick of `timing.period`; from `hysteresis.creep_times` and `creep_weights`.
                     pub(crate) static CREEP_OF_LEGS: Creep<Real, CREEP> = Creep {
                         gains: [#gains],
@@ -120,11 +111,6 @@ fn rate(ir: &Ir, of_leg: &[Ident]) -> Rate {
                         carried: [#carried],
                         direct: #direct,
                     };
-                    /// Tables of the six legs.
-                    pub static TABLES: [Table; LEGS] = [#(CreepEverett {
-                        still: Everett { nodes: &#of_leg },
-                        creep: &CREEP_OF_LEGS,
-                    }),*];
                 },
             }
         }
@@ -156,8 +142,8 @@ fn statics(
     (statics.collect(), table_of_leg.iter().map(|k| names[*k].clone()).collect())
 }
 
-/// What the model has beyond the static one, in lines for the documentation of the crate.
-pub fn rate_doc(ir: &Ir) -> Vec<&'static str> {
+/// What the model has beyond the static one, in lines for the documentation of the module.
+fn rate_doc(ir: &Ir) -> Vec<&'static str> {
     let mut lines = Vec::new();
     match &ir.hysteresis.rate {
         None => {}

@@ -1,4 +1,4 @@
-//! What every emitted controller is called: platform, digest, scalar. The end of `src/lib.rs`.
+//! `src/identity.rs`: what every emitted controller is called: platform, digest, scalar.
 
 use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
@@ -6,18 +6,14 @@ use quote::{format_ident, quote};
 use super::literal;
 use crate::ir::{Ir, Scalar};
 
-/// First line of the crate's documentation.
-pub fn title(ir: &Ir) -> String {
-    format!(" Controller of platform `{}`.", ir.name)
-}
-
-/// Scalar type and identity.
 pub fn emit(ir: &Ir) -> TokenStream {
     let scalar = format_ident!("f{}", ir.scalar.bits().to_string());
     let bits = literal::count(ir.scalar.bits() as usize);
     let period = literal::real(Scalar::F64, ir.defaults.period);
     let (name, digest, version) = (&ir.name, &ir.digest, &ir.specgen_version);
     quote! {
+        #![doc = " What this controller is."]
+
         /// Floating-point type of this controller; from `controller.scalar`.
         pub type Real = #scalar;
         /// Width of [`Real`].

@@ -17,15 +17,21 @@ macro_rules! files {
 
 /// Of six legs with their own gauges.
 pub const LEGS: &[File] = files! {
-    "common": "machine_words", "snapshot", "stage", "supervised";
-    "legs": "config", "stages", "standing", "state", "step", "waves", "words";
+    "common": "dynamics", "integrity", "kinematics", "machine_words", "rest", "snapshot", "stage", "supervised";
+    "legs": "api", "config", "sensing", "stages", "standing", "state", "step", "waves", "words";
 };
+
+/// Documentation of their crate.
+pub const LEGS_PAGE: &str = include_str!("../../../../firmware/controller/law/legs/lib.md");
 
 /// Of a platform.
 pub const PLATFORM: &[File] = files! {
-    "common": "machine_words", "snapshot", "stage", "supervised";
-    "platform": "config", "stages", "standing", "state", "step", "waves", "words";
+    "common": "dynamics", "integrity", "kinematics", "machine_words", "rest", "snapshot", "stage", "supervised";
+    "platform": "api", "config", "notch", "sensing", "stages", "standing", "state", "step", "waves", "words";
 };
+
+/// Documentation of its crate.
+pub const PLATFORM_PAGE: &str = include_str!("../../../../firmware/controller/law/platform/lib.md");
 
 /// The text of one in the emitted crate.
 pub fn carried_over(ir: &Ir, text: &str) -> String {

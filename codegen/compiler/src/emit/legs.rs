@@ -1,4 +1,3 @@
 //! The controller of six legs with their own gauges: hysteresis feed-forward alone.
 
-pub mod crate_root;
-pub mod sensing;
+pub mod gauges;

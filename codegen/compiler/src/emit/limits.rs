@@ -1,5 +1,4 @@
-//! `src/limits.rs`: converter and bounds on inputs. Reads [`ir::Actuation`](crate::ir::Actuation) and
-//! [`ir::Bounds`](crate::ir::Bounds); exports `DAC`, the code limits and the acceptance checks.
+//! `src/limits.rs`: the converter. Reads [`ir::Actuation`](crate::ir::Actuation); exports `DAC` and the code limits.
 
 use proc_macro2::TokenStream;
 use quote::quote;
@@ -19,42 +18,12 @@ pub fn emit(ir: &Ir) -> TokenStream {
         " Lowest and highest code whose voltage lies within {} V … {} V; from `actuator.voltage` and `dac`.",
         a.voltage[0], a.voltage[1]
     );
-    let [leg_min, leg_max] = ir.bounds.leg.map(real);
-    let [gauge_min, gauge_max] = ir.bounds.sensor.map(real);
-    // A controller in task space has its own checks, in `sensing` and `setpoint`.
-    let imports = if ir.task_space.is_none() {
-        quote! { {LEGS, Real} }
-    } else {
-        quote! { Real }
-    };
-    let of_legs = ir.task_space.is_none().then(|| {
-        quote! {
-            /// Leg set-points outside this range are faults, m; from `actuator.stroke`.
-            pub const LEG_SETPOINT: [Real; 2] = [#leg_min, #leg_max];
-            /// Gauge readings outside this range are faults, m; from `sensor.range`.
-            pub const GAUGE: [Real; 2] = [#gauge_min, #gauge_max];
-
-            /// Every leg set-point is finite and within [`LEG_SETPOINT`].
-            #[inline]
-            #[must_use]
-            pub fn leg_setpoint_is_accepted(displacements: &[Real; LEGS]) -> bool {
-                displacements.iter().all(|value| (LEG_SETPOINT[0]..=LEG_SETPOINT[1]).contains(value))
-            }
-
-            /// A gauge reading is finite and within [`GAUGE`].
-            #[inline]
-            #[must_use]
-            pub fn gauge_is_accepted(displacement: Real) -> bool {
-                (GAUGE[0]..=GAUGE[1]).contains(&displacement)
-            }
-        }
-    });
     quote! {
-        #![doc = " What may go out and what is believed of what comes in."]
+        #![doc = " What may go out."]
 
         use specgen_runtime::Dac;
 
-        use crate::#imports;
+        use crate::Real;
 
         /// Converter codes in volts and in cells of the Everett grid; from `dac` and `actuator.voltage`.
         pub const DAC: Dac<Real> = Dac {
@@ -68,6 +37,5 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const DAC_BITS: u32 = #dac_bits;
         #[doc = #codes_doc]
         pub const CODES: [i32; 2] = [#code_min, #code_max];
-        #of_legs
     }
 }

@@ -33,19 +33,6 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const SETTINGS: [(Permitted<Real>, usize); #count] = [#(#rows),*];
         /// Largest numbers of a state, under any of these settings.
         pub const STATE: Sizes = Sizes { request: #request, reading: #reading, stiffness: #stiffness };
-
-        /// Range of a word of the settings; none beyond the last.
-        #[must_use]
-        pub fn of(word: usize) -> Option<&'static Permitted<Real>> {
-            let mut end = 0;
-            for (permitted, words) in &SETTINGS {
-                end += *words;
-                if word < end {
-                    return Some(permitted);
-                }
-            }
-            None
-        }
     }
 }
 

@@ -1,4 +1,4 @@
 //! The controller of the platform in task space: P, F and P/F.
 
-pub mod crate_root;
+pub mod gauges;
 pub mod task_space;

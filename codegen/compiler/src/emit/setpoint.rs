@@ -82,7 +82,7 @@ pub fn emit(ir: &Ir, s: &Setpoints) -> TokenStream {
         /// Names of the trajectories, by the word `selector`.
         pub const TRAJECTORY_NAMES: [&str; #count] = [#(#names),*];
         /// Trajectories by the word `selector`.
-        static TRAJECTORIES: [Trajectory<Real>; #count] = [#(#entries),*];
+        pub(crate) static TRAJECTORIES: [Trajectory<Real>; #count] = [#(#entries),*];
 
         #(#constants)*
     }
@@ -119,7 +119,7 @@ fn path(scalar: Scalar, index: usize, name: &str, path: &Path) -> (TokenStream, 
             (
                 quote! {
                     #[doc = #doc]
-                    pub(crate) static #constant: [Segment<Real>; #count] = [#(#segments),*];
+                    static #constant: [Segment<Real>; #count] = [#(#segments),*];
                 },
                 quote! {
                     Trajectory::Segments { start: [#start], segments: &#constant, ticks: #ticks, end: [#end] }
@@ -139,7 +139,7 @@ fn path(scalar: Scalar, index: usize, name: &str, path: &Path) -> (TokenStream, 
             (
                 quote! {
                     #[doc = #doc]
-                    pub(crate) static #constant: [Row<Real>; #count] = [#(#rows),*];
+                    static #constant: [Row<Real>; #count] = [#(#rows),*];
                 },
                 quote! {
                     Trajectory::Table(Table {

@@ -3,7 +3,7 @@
 use crate::defaults::{DRIFT_WEIGHT, LAW, LEVEL_WEIGHT, MAX_STEP, RUN_INTERVAL, SETPOINT};
 use crate::words::{CONFIG_CODES, CONFIG_WORDS};
 use crate::{Real, limits, permitted};
-use specgen_runtime::{CodeLimits, Law};
+use specgen_runtime::{CodeLimits, Law, Permitted};
 
 /// What the six set-point numbers are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,7 +142,7 @@ impl Config {
     #[inline(never)]
     pub(crate) fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
         for (word, value) in words.iter().enumerate() {
-            match permitted::of(word) {
+            match Permitted::of(&permitted::SETTINGS, word) {
                 Some(permitted) if permitted.takes(*value) => {}
                 _ => return Err(ConfigError { word }),
             }

@@ -1,7 +1,7 @@
 //! How the law begins, works and stands still under the supervisor.
 
 use crate::hysteresis::LED;
-use crate::limits::{gauge_is_accepted, leg_setpoint_is_accepted};
+use crate::sensing::{gauge_is_accepted, leg_setpoint_is_accepted};
 use crate::step::advance;
 use crate::supervised::{Supervisor, compares, component, move_codes};
 use crate::supervision::{APPROACH_KEEP, APPROACH_NEGLIGIBLE, SUPERVISION};

@@ -1,7 +1,7 @@
 //! What the controller remembers from tick to tick. No NaN or infinity is ever stored here.
 
 use crate::hysteresis::{GRID, LED, Memory};
-use crate::supervision::{ALIKE_AT_REST, code_at_rest, memory_at_rest};
+use crate::supervision::{code_at_rest, memory_at_rest};
 use crate::{LEGS, Real, TickInput, limits};
 use specgen_runtime::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
 use specgen_runtime::{Digest, Estimate};
@@ -21,17 +21,8 @@ pub struct LegState {
 
 impl LegState {
     /// At reset.
-    const fn at_rest(leg: usize) -> Self {
+    pub(crate) const fn at_rest(leg: usize) -> Self {
         Self { memory: memory_at_rest(leg), estimate: Estimate::new(), code: code_at_rest(), lead: 0.0 }
-    }
-
-    /// The six legs at reset.
-    const fn all_at_rest() -> [Self; LEGS] {
-        if ALIKE_AT_REST {
-            [Self::at_rest(0); LEGS]
-        } else {
-            [Self::at_rest(0), Self::at_rest(1), Self::at_rest(2), Self::at_rest(3), Self::at_rest(4), Self::at_rest(5)]
-        }
     }
 }
 

@@ -4,7 +4,8 @@
 //! END of the interval that begins now, T_{n+1}, and the voltages that come out are held over it.
 
 use crate::hysteresis::{LEAD, LEAD_LIMIT, LED, TABLES, Table};
-use crate::limits::{self, DAC};
+use crate::limits::DAC;
+use crate::sensing::{gauge_is_accepted, leg_setpoint_is_accepted};
 use crate::{Config, LEGS, LegState, Real, SetpointKind, State, kinematics};
 use specgen_runtime::Law;
 use specgen_runtime::linear::each;
@@ -66,7 +67,7 @@ pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> 
     let mut status = if accepted { 0 } else { SETPOINT_FAULT };
     for (index, (leg, table)) in state.legs.iter_mut().zip(&TABLES).enumerate() {
         let gauge = input.displacement[index];
-        let gauge_good = limits::gauge_is_accepted(gauge);
+        let gauge_good = gauge_is_accepted(gauge);
         if config.law() == Law::Invhys || (run_ends && gauge_good) {
             adapt(config, leg, gauge);
         }
@@ -101,7 +102,7 @@ pub(crate) fn outputs(state: &State, status: u32) -> TickOutput {
 pub(crate) fn take_setpoint(config: &Config, state: &mut State, input: &TickInput) -> bool {
     let accepted = match config.setpoint() {
         SetpointKind::Pose => kinematics::pose_is_accepted(&input.setpoint),
-        SetpointKind::Leg => limits::leg_setpoint_is_accepted(&input.setpoint),
+        SetpointKind::Leg => leg_setpoint_is_accepted(&input.setpoint),
     };
     if accepted {
         state.demand = match config.setpoint() {

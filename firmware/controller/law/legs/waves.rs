@@ -1,7 +1,8 @@
 //! A wave in place of the host's set-points: what it has to keep to, and the input words that it writes.
 
 use crate::kinematics::{POSE_BOUND, leg_displacements};
-use crate::limits::{DAC, LEG_SETPOINT};
+use crate::limits::DAC;
+use crate::sensing::LEG_SETPOINT;
 use crate::{Config, LEG_GAIN, PERIOD_SECONDS, Real, SetpointKind};
 use specgen_runtime::wave::Limits;
 use specgen_runtime::{Motion, Real as _, wave};

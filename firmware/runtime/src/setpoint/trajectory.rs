@@ -1,6 +1,7 @@
 //! Prepared motions: segments, and tables with cubic splines.
 
 use super::Target;
+use crate::crc::Crc32;
 use crate::real::Real;
 use crate::trig::sine_cosine_turns;
 
@@ -20,6 +21,31 @@ pub enum Trajectory<T: Real> {
     },
     /// Rows at a fixed time from each other.
     Table(Table<T>),
+}
+
+impl<T: Real> Trajectory<T> {
+    /// Adds its pieces or rows to a checksum.
+    pub fn checksum(&self, crc: &mut Crc32) {
+        match self {
+            Self::Segments { segments, .. } => {
+                for segment in *segments {
+                    crc.words(&[u64::from(segment.first as u32), segment.phase, segment.phase_step]);
+                    crc.reals(&[segment.per_tick, segment.per_second, segment.angular]);
+                    for axis in &segment.axes {
+                        crc.reals(&[axis.place, axis.slope]);
+                        crc.reals(&axis.sine);
+                        crc.reals(&axis.cosine);
+                    }
+                }
+            }
+            Self::Table(table) => {
+                for row in table.rows {
+                    crc.reals(&row.pose);
+                    crc.reals(&row.bend);
+                }
+            }
+        }
+    }
 }
 
 /// A piece on which each axis is a straight line and a sinusoid whose amplitude grows with time.

@@ -24,16 +24,3 @@ pub const STATE: Sizes = Sizes {
     reading: 4.8000001697801054e-5,
     stiffness: 999999986991104.0,
 };
-
-/// Range of a word of the settings; none beyond the last.
-#[must_use]
-pub fn of(word: usize) -> Option<&'static Permitted<Real>> {
-    let mut end = 0;
-    for (permitted, words) in &SETTINGS {
-        end += *words;
-        if word < end {
-            return Some(permitted);
-        }
-    }
-    None
-}

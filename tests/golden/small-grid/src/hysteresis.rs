@@ -15,12 +15,6 @@ pub const NODES: usize = (GRID + 1) * (GRID + 2) / 2;
 /// Capacity of the reversal memory, extrema; from `hysteresis.memory`.
 pub const MEMORY: usize = 16;
 
-/// Everett function of one leg.
-pub type Table = Everett<Real, GRID, NODES>;
-
-/// Reversal memory of one leg.
-pub type Memory = ReversalMemory<Real, MEMORY>;
-
 /// Whether legs are asked to be ahead, for their dead time.
 pub const LED: bool = false;
 
@@ -29,6 +23,12 @@ pub const LEAD: Real = 0.0;
 
 /// Most that it adds to a demand, m; from `actuator.slew_rate`.
 pub const LEAD_LIMIT: Real = 0.0;
+
+/// Everett function of one leg.
+pub type Table = Everett<Real, GRID, NODES>;
+
+/// Reversal memory of one leg.
+pub type Memory = ReversalMemory<Real, MEMORY>;
 
 /// Tables of the six legs.
 pub static TABLES: [Table; LEGS] = [

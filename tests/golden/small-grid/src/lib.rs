@@ -22,64 +22,33 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
+mod api;
+mod body;
+mod checked;
 mod config;
 mod defaults;
 mod description;
-
 pub mod dynamics;
+mod gauges;
+mod geometry;
 pub mod hysteresis;
+mod identity;
 pub mod integrity;
 pub mod kinematics;
 pub mod limits;
 mod machine_words;
-
 pub mod permitted;
+mod rest;
 pub mod sensing;
 pub mod snapshot;
 mod stage;
-
 pub mod stages;
 mod standing;
 mod state;
 mod step;
-
 pub mod supervised;
 pub mod supervision;
 pub mod waves;
 mod words;
 
-pub use defaults::LEG_GAIN;
-pub use description::DESCRIPTION;
-pub use config::{Config, ConfigError, SetpointKind};
-pub use specgen_runtime::{CodeLimits, Law};
-pub use state::{LegState, State};
-pub use step::{
-    GAUGE_FAULT, LEG_LIMITED, SETPOINT_FAULT, STATIC_INVERSE, TickInput, TickOutput,
-    actuate, step,
-};
-
-pub use words::{
-    CONFIG_NAMES, CONFIG_WORDS, INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS,
-    output_words,
-};
-
-/// Floating-point type of this controller; from `controller.scalar`.
-pub type Real = f64;
-
-/// Width of [`Real`].
-pub const SCALAR_BITS: u32 = 64;
-
-/// Control period, s; from `timing.period`.
-pub const PERIOD_SECONDS: f64 = 0.0002;
-
-/// Number of legs.
-pub const LEGS: usize = 6;
-
-/// Name of the platform.
-pub const SPEC_NAME: &str = "small-grid";
-
-/// SHA-256 of the spec and of the records it names.
-pub const SPEC_DIGEST: &str = "21c80547d7ab21c518d8aefbc507785a06e1dd5c2f6bfeafad62220002371213";
-
-/// Version of the compiler.
-pub const SPECGEN_VERSION: &str = "0.1.0";
+pub use api::*;

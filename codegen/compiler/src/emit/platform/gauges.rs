@@ -1,10 +1,10 @@
-//! `src/sensing.rs`: gauge words to pose and its rate. Reads [`ir::Sensing`](crate::ir::Sensing); exports `faults`, `readings`,
-//! `pose` and `RATE`. Only for controllers that see the platform.
+//! `src/gauges.rs` of a platform: constants of the gauges that see it. Reads [`ir::Sensing`](crate::ir::Sensing); the law's
+//! `sensing.rs` works with them.
 
 use proc_macro2::TokenStream;
 use quote::quote;
 
-use super::{gauge_converter, literal};
+use crate::emit::{gauge_converter, literal};
 use crate::ir::{Ir, Sensing};
 
 pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
@@ -25,28 +25,22 @@ pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
          `workspace`.",
         s.remainder[0], s.remainder[1]
     );
-    let (unit, import, calibration, convert) = match &s.calibration {
-        None => ("m", quote! {}, quote! {}, quote! { *raw }),
+    let (unit, coefficients, calibration) = match &s.calibration {
+        None => ("m", 1, quote! { None }),
         Some(of_gauge) => {
-            let count = literal::count(of_gauge[0].len());
             let rows = of_gauge.iter().map(|coefficients| literal::reals(scalar, coefficients));
-            let constant = quote! {
-                /// V to m, lowest power first; from `gauge.calibration`.
-                const CALIBRATION: Calibration<Real, #count> = Calibration { coefficients: [#([#rows]),*] };
-            };
-            ("V", quote! { use specgen_runtime::Calibration; }, constant, quote! { CALIBRATION.readings(raw) })
+            ("V", of_gauge[0].len(), quote! { Some(Calibration { coefficients: [#([#rows]),*] }) })
         }
     };
+    let coefficients = literal::count(coefficients);
     let raw_doc = format!(
         " Lowest and highest word of each gauge that is believed, {unit}: readings within `sensor.range`, where the gauge means one \
          reading by one word."
     );
-    let readings_doc = format!(" Readings of the gauges, m, from their words in {unit}.");
     quote! {
-        #![doc = " Pose from six gauges that see the platform, and the filter of its rate."]
+        #![doc = " Six gauges that see the platform: where they are, what their words mean, and the filter of the pose's rate."]
 
-        #import
-        use specgen_runtime::{GaugeConverter, Gauges, RateFilter, sensing};
+        use specgen_runtime::{Calibration, GaugeConverter, Gauges, RateFilter};
 
         use crate::Real;
 
@@ -62,33 +56,13 @@ pub fn emit(ir: &Ir, s: &Sensing) -> TokenStream {
             arc_sine: &[#arc_sine],
             arc_tangent: &[#arc_tangent],
         };
-        #calibration
+        /// Words in V to readings in m, lowest power first; from `gauge.calibration`. Without one a word is a reading.
+        pub const CALIBRATION: Option<Calibration<Real, #coefficients>> = #calibration;
         #[doc = #raw_doc]
         pub const RAW_LIMITS: [[Real; 2]; 6] = [#([#limits]),*];
         /// First-order filter of the pose's rate; from `velocity_cutoff` and `timing.period`.
         pub const RATE: RateFilter<Real> = RateFilter { keep: #keep, gain: #gain };
 
         #converter
-
-        /// Gauges whose word is not finite or out of [`RAW_LIMITS`]: bit k for gauge k.
-        #[inline]
-        #[must_use]
-        pub fn faults(raw: &[Real; 6]) -> u32 {
-            sensing::faults(raw, &RAW_LIMITS)
-        }
-
-        #[doc = #readings_doc]
-        #[inline]
-        #[must_use]
-        pub fn readings(raw: &[Real; 6]) -> [Real; 6] {
-            #convert
-        }
-
-        /// Pose [x y z θx θy θz] from rest (m, rad) of gauge words without [`faults`]; finite for these.
-        #[inline]
-        #[must_use]
-        pub fn pose(raw: &[Real; 6]) -> [Real; 6] {
-            GAUGES.pose(&readings(raw))
-        }
     }
 }

@@ -1,5 +1,5 @@
-//! `src/kinematics.rs`: pose to leg displacements and back. Reads [`ir::Kinematics`](crate::ir::Kinematics) and the pose
-//! bounds; exports `pose_is_accepted`, `leg_displacements`, `pose_from_legs` and the constants of the legs.
+//! `src/geometry.rs`: constants of the leg kinematics. Reads [`ir::Kinematics`](crate::ir::Kinematics) and the pose bounds; the law's
+//! `kinematics.rs` works with them.
 
 use proc_macro2::TokenStream;
 use quote::quote;
@@ -24,8 +24,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         k.largest_displacement
     );
     quote! {
-        #![doc = " Leg kinematics in difference form: leg displacements from rest, without the cancellation of |r| − l₀, and the pose"]
-        #![doc = " that has them."]
+        #![doc = " Legs and workspace, as the kinematics need them."]
 
         use specgen_runtime::{Legs, Series};
 
@@ -47,31 +46,6 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub(crate) const POSE_BOUND: [Real; 6] = [#pose_bound];
         /// Corrections of the forward kinematics: what they leave over the declared workspace is below 1e-13 m and rad, or
         /// the last bit.
-        const CORRECTIONS: usize = #corrections;
-
-        /// Every component is finite and within the declared workspace.
-        #[inline]
-        #[must_use]
-        pub fn pose_is_accepted(pose: &[Real; 6]) -> bool {
-            pose.iter().zip(&POSE_BOUND).all(|(value, bound)| (-*bound..=*bound).contains(value))
-        }
-
-        /// Δl_i = |P₀ + t + R P_i − B_i| − l₀ of each leg, m, positive when it gets longer.
-        ///
-        /// `pose` is [x y z θx θy θz] from rest: translation t of P_C in {B} (m) and rotation R = Rz(θz) Ry(θy) Rx(θx) about
-        /// fixed axes (AI.1) (rad), within the declared workspace.
-        #[inline]
-        #[must_use]
-        pub fn leg_displacements(pose: &[Real; 6]) -> [Real; LEGS] {
-            GEOMETRY.displacements(pose)
-        }
-
-        /// The pose at which the legs have these displacements (m): the inverse of [`leg_displacements`] within the declared
-        /// workspace.
-        #[inline]
-        #[must_use]
-        pub fn pose_from_legs(displacements: &[Real; LEGS]) -> [Real; 6] {
-            GEOMETRY.pose(&INVERSE_JACOBIAN, CORRECTIONS, displacements)
-        }
+        pub(crate) const CORRECTIONS: usize = #corrections;
     }
 }

@@ -1,0 +1,25 @@
+//! `src/gauges.rs` of six legs: what the codes of the gauges' converters mean, and what is believed.
+
+use proc_macro2::TokenStream;
+use quote::quote;
+
+use crate::emit::{gauge_converter, literal};
+use crate::ir::Ir;
+
+pub fn emit(ir: &Ir) -> TokenStream {
+    let converter = gauge_converter::emit(ir);
+    let (gauge, setpoint) = (literal::reals(ir.scalar, &ir.bounds.sensor), literal::reals(ir.scalar, &ir.bounds.leg));
+    quote! {
+        #![doc = " Readings of the legs' own gauges, and set-points of legs: what is believed."]
+
+        use specgen_runtime::GaugeConverter;
+
+        use crate::Real;
+
+        #converter
+        /// Leg set-points outside this range are faults, m; from `actuator.stroke`.
+        pub const LEG_SETPOINT: [Real; 2] = [#setpoint];
+        /// Gauge readings outside this range are faults, m; from `sensor.range`.
+        pub const GAUGE: [Real; 2] = [#gauge];
+    }
+}

@@ -1,0 +1,26 @@
+//! Readings of the legs' own gauges.
+
+pub use crate::gauges::{CONVERTER, GAUGE, LEG_SETPOINT};
+
+use crate::{LEGS, Real};
+
+/// What a gauge's converter means by a code of 0..2^bits, m; a code at either end is a gauge fault.
+#[inline]
+#[must_use]
+pub fn gauge_reading(code: i32) -> Real {
+    CONVERTER.reading(code)
+}
+
+/// A gauge reading is finite and within [`GAUGE`].
+#[inline]
+#[must_use]
+pub fn gauge_is_accepted(displacement: Real) -> bool {
+    (GAUGE[0]..=GAUGE[1]).contains(&displacement)
+}
+
+/// Every leg set-point is finite and within [`LEG_SETPOINT`].
+#[inline]
+#[must_use]
+pub fn leg_setpoint_is_accepted(displacements: &[Real; LEGS]) -> bool {
+    displacements.iter().all(|value| (LEG_SETPOINT[0]..=LEG_SETPOINT[1]).contains(value))
+}
