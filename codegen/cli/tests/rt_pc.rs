@@ -1,14 +1,13 @@
 //! The real-time target as a user runs it: the emitted workspace built, its binary in closed loop with `specgen plant`, asked over
-//! link and lines, its records replayed by the host library. Nothing here asserts times: only that every tick is accounted for,
+//! the link, its records replayed by the host library. Nothing here asserts times: only that every tick is accounted for,
 //! and bits.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 #![cfg(target_os = "linux")]
 
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
-use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, PoisonError};
@@ -28,16 +27,20 @@ use host::{Host, Record};
 /// Length of the platform's run, s, where another than that of CI is wanted.
 const SECONDS: &str = "SPECGEN_RT_SECONDS";
 
-/// Phases of the supervisor, and its cause of a silent link.
+/// Phases of the supervisor, and its causes of a silent link.
 const DISARMED: u8 = 0;
 const RUNNING: u8 = 2;
 const HOLDING: u8 = 3;
+const FAULTED: u8 = 5;
 const LINK_LOST: u8 = 9;
+const HOST_GONE: u8 = 13;
 /// Requests to it.
+const NONE: u8 = 0;
 const ARM: u8 = 1;
 const RUN: u8 = 2;
 const HOLD: u8 = 3;
 const RAMP_DOWN: u8 = 4;
+const ACKNOWLEDGE: u8 = 5;
 /// Bit of a platform's status: it goes to its bias pose, or plays.
 const BUSY: u32 = 1 << 18;
 
@@ -167,7 +170,7 @@ fn signal(process: &Child, name: Signal) {
     crate::support::send(name, process.id());
 }
 
-/// A run that goes on until it is told, or until the test fails.
+/// A run that goes on until it is asked to end, or until the test fails.
 struct Running(Option<Child>);
 
 impl Running {
@@ -177,10 +180,15 @@ impl Running {
 
     /// Sends it a signal and waits for its end.
     fn end(mut self, name: Signal) -> Output {
-        let mut running = self.0.take().unwrap();
-        assert!(running.try_wait().unwrap().is_none(), "it runs until it is told");
-        signal(&running, name);
-        running.wait_with_output().unwrap()
+        let running = self.0.as_mut().unwrap();
+        assert!(running.try_wait().unwrap().is_none(), "it runs until it is asked to end");
+        signal(running, name);
+        self.wait()
+    }
+
+    /// Waits for its end.
+    fn wait(mut self) -> Output {
+        self.0.take().unwrap().wait_with_output().unwrap()
     }
 }
 
@@ -190,24 +198,6 @@ impl Drop for Running {
             let _ = running.kill();
             let _ = running.wait();
         }
-    }
-}
-
-/// The socket of lines.
-struct Lines(BufReader<UnixStream>);
-
-impl Lines {
-    fn new(path: &Path) -> Self {
-        let stream = UnixStream::connect(path).unwrap();
-        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
-        Self(BufReader::new(stream))
-    }
-
-    fn ask(&mut self, line: &str) -> String {
-        self.0.get_mut().write_all(format!("{line}\n").as_bytes()).unwrap();
-        let mut answer = String::new();
-        self.0.read_line(&mut answer).unwrap();
-        answer.trim().to_owned()
     }
 }
 
@@ -243,17 +233,13 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
 
 /// With time that waits, so that it runs on any computer.
 fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
-    let [socket, link] = ["socket", "link"].map(|name| bench.path(name));
+    let link = bench.path("link");
     let mut command = bench.command("b.rec");
-    command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "1000", "--socket"]).arg(&socket);
-    command.arg("--link").arg(&link).arg("--capture").arg(bench.path("capture.rec"));
+    command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "1000", "--link"]).arg(&link);
+    command.arg("--capture").arg(bench.path("capture.rec"));
     let running = Running::new(&mut command);
     wait_for("the link", || link.exists());
-    for path in [&socket, &link] {
-        assert_eq!(fs::metadata(path).unwrap().permissions().mode() & 0o777, 0o600, "{}", path.display());
-    }
-    let mut lines = Lines::new(&socket);
-    many_short_lines_are_no_long_one(&socket);
+    assert_eq!(fs::metadata(&link).unwrap().permissions().mode() & 0o777, 0o600);
 
     let mut host = Host::open(&link, 1).unwrap();
     let machine = bench.machine();
@@ -275,9 +261,6 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     assert_eq!(other.refused(&Request::Supervise { request: RUN }), Refusal::Busy);
     assert_eq!(other.refused(&Request::Setpoint { words: Bytes(&command) }), Refusal::Busy);
     other.done(&Request::Supervise { request: HOLD });
-    drop(other);
-    assert!(lines.ask("run").starts_with("error: a host over the link has the orders"));
-    assert_eq!(lines.ask("hold"), "ok");
     host.done(&Request::Supervise { request: RUN });
     host.wait("at its bias pose", |status| status.phase == RUNNING && status.status & BUSY == 0);
 
@@ -310,7 +293,6 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     host.done(&request(&words));
     assert_eq!(host.refused(&request(&words)), Refusal::State, "one wave at a time");
     assert_eq!(host.refused(&Request::Setpoint { words: Bytes(&command) }), Refusal::State);
-    assert!(lines.ask("set command=0").starts_with("error: "));
     let tick = host.status().tick;
     host.wait("the wave", |status| status.tick > tick + 1000);
 
@@ -337,22 +319,27 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     host.wait("the end of the wave", |status| status.tick > tick + 6000);
     host.done(&Request::Setpoint { words: Bytes(&command) });
 
-    // What is no frame is counted; a host that is killed is missed, and then lines have the orders.
+    // What is no frame is counted, however long; a host that is killed is missed, and then another has the orders.
     host.line().write_all(&[1, 2, 3, 0, 255, 255, 0]).unwrap();
-    assert!(host.status().link.errors() >= 2);
+    host.line().write_all(&[&[7; 5000][..], &[0]].concat()).unwrap();
+    assert!(host.status().link.errors() >= 3);
     drop(host);
-    wait_for("the loss", || lines.ask("status").contains("phase=Holding cause=LinkLost"));
-    assert_eq!(lines.ask("ramp-down"), "ok");
+    other.wait("the loss", |status| (status.phase, status.cause) == (HOLDING, LINK_LOST));
+    other.done(&Request::Supervise { request: RAMP_DOWN });
     // For a cause it ends faulted, until that is acknowledged.
-    wait_for("the way down", || lines.ask("status").contains("phase=Faulted cause=LinkLost amplifiers=0"));
-    assert_eq!((lines.ask("none").as_str(), lines.ask("acknowledge").as_str()), ("ok", "ok"));
-    wait_for("the acknowledgement", || lines.ask("status").contains("phase=Disarmed"));
+    other.wait("the way down", |status| {
+        (status.phase, status.cause, status.amplifier_on) == (FAULTED, LINK_LOST, false)
+    });
+    for request in [NONE, ACKNOWLEDGE] {
+        other.done(&Request::Supervise { request });
+    }
+    other.wait("the acknowledgement", |status| status.phase == DISARMED);
     let output = running.end(Signal::TERM);
     let (summary, record) = bench.check(&output, "b.rec");
     assert_eq!((&summary["last_phase"], &summary["skipped"]), (&"Disarmed".into(), &0.into()), "{summary}");
     assert_eq!((output.status.code(), &summary["link"]["hosts"]), (Some(1), &2.into()), "{summary}");
     assert!(
-        summary["link"]["errors"].as_u64().unwrap() >= 2 && summary["failure"].as_str().unwrap().contains("link lost")
+        summary["link"]["errors"].as_u64().unwrap() >= 3 && summary["failure"].as_str().unwrap().contains("link lost")
     );
     let [setpoint, command] = ["setpoint[2]", "command"].map(|name| record.place(name));
     let waved = record.rows.iter().filter(|row| row.input[command] == 1);
@@ -360,16 +347,6 @@ fn a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(bench: &Bench) {
     assert!(waved.count() == 4000 && (highest - 1e-6).abs() < 1e-9, "{highest:e}");
     assert_eq!(record.rows.last().unwrap().supervisor >> 16, 0, "amplifiers off in the last tick");
     assert!(record.rows.iter().any(|row| row.supervisor >> 8 & 0xff == u32::from(LINK_LOST)));
-}
-
-fn many_short_lines_are_no_long_one(socket: &Path) {
-    let mut lines = Lines::new(socket);
-    lines.0.get_mut().write_all("status\n".repeat(1000).as_bytes()).unwrap();
-    let mut answers = lines.0.lines();
-    assert!((0..1000).all(|_| answers.next().is_some_and(|answer| !answer.unwrap().starts_with("error"))));
-    let mut lines = Lines::new(socket);
-    lines.0.get_mut().write_all(&[b'x'; 5000]).unwrap();
-    assert_eq!(lines.0.lines().next().unwrap().unwrap(), "error: a line has at most 4096 bytes");
 }
 
 /// What a file may be long is limited, as on a full disk.
@@ -428,7 +405,7 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
     assert!(sound && highest <= 43_690);
     assert!(line.starts_with('0') && line.ends_with('0') && line.contains('1') == was_on(&record), "{line}");
 
-    // A card that fails in the middle: counted, told to the supervisor, off at the end.
+    // A card that fails in the middle: counted, seen by the supervisor, off at the end.
     let (summary, record) = bench.check(&run(&[("FAKE_FAIL_AFTER", "600")], &two), "card.rec");
     let (events, ticks) = (record.place("events"), record.rows.len());
     let broken = record.rows.iter().filter(|row| row.input[events] & 8 != 0).count();
@@ -450,39 +427,40 @@ fn a_card_is_read_driven_and_switched_off(bench: &Bench) {
 }
 
 #[test]
-fn legs_are_moved_by_lines_and_a_machine_that_is_killed_is_a_converter_that_does_not_answer() {
+fn legs_are_moved_by_operate_and_a_machine_that_is_killed_is_a_converter_that_does_not_answer() {
     let mut bench = Bench::new("legs.toml");
-    let socket = bench.path("socket");
+    let link = bench.path("link");
     let mut command = bench.command("legs.rec");
-    command.args(["--elastic", "--sim-timeout", "1000", "--socket"]).arg(&socket);
+    command.args(["--elastic", "--sim-timeout", "1000", "--link"]).arg(&link);
     let running = Running::new(&mut command);
-    wait_for("the socket", || socket.exists());
-    let mut lines = Lines::new(&socket);
-    let mut ask = |line: &str| lines.ask(line);
-    wait_for("a tick", || ask("status").contains("phase=Disarmed"));
-    assert!(ask("set request=1").starts_with("error: `request`"));
-    assert!(ask("fly").starts_with("error: `fly` is none of"));
-    assert_eq!(ask("arm"), "ok");
-    wait_for("arming", || !ask("status").contains("phase=Disarmed"));
-    assert_eq!(ask("run"), "ok");
-    wait_for("running", || ask("status").contains("phase=Running"));
-    assert_eq!(ask("set setpoint[2]=2e-6"), "ok");
-    let tick = |status: &str| status.split(['=', ' ']).nth(1).unwrap().parse::<u64>().unwrap();
-    let start = tick(&ask("status"));
-    wait_for("half a second of its time", || tick(&ask("status")) > start + 2_500);
+    wait_for("the link", || link.exists());
+    let mut watcher = Host::open(&link, 1).unwrap();
+    watcher.wait("a tick", |status| status.tick > 0 && status.phase == DISARMED);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
+    command.arg("operate").arg("--socket").arg(&link).arg(&bench.spec).stdin(Stdio::piped());
+    let mut operate = Running::new(&mut command);
+    let mut input = operate.0.as_mut().unwrap().stdin.take().unwrap();
+    input.write_all(b"set request=1\nfly\narm\nwait arming\nrun\nwait running\nset setpoint[2]=2e-6\n").unwrap();
+    let start = watcher.wait("running", |status| status.phase == RUNNING).tick;
+    watcher.wait("half a second of its time", |status| status.tick > start + 3_000);
 
     signal(&bench.plant, Signal::KILL);
     bench.plant.wait().unwrap();
     // The first reading is waited for, the next ones are not.
     std::thread::sleep(Duration::from_millis(1_000));
-    let start = tick(&ask("status"));
-    wait_for("ticks without a machine", || tick(&ask("status")) > start + 100);
+    let start = watcher.status().tick;
+    watcher.wait("ticks without a machine", |status| status.tick > start + 100);
     let output = running.end(Signal::INT);
+    // It is found out that the program is gone.
+    let operated = operate.wait();
+    let text = String::from_utf8_lossy(&operated.stdout);
+    assert!(operated.status.code() == Some(3) && text.contains("`request` cannot be set"), "{operated:?}");
+    assert!(text.contains("`fly` is none of"), "{text}");
     let (summary, record) = bench.check(&output, "legs.rec");
     assert!(summary["device_faults"].as_u64().unwrap() > 0, "{summary}");
     assert!(output.status.code() == Some(1) && summary["failure"].as_str().unwrap().contains("converter"), "{summary}");
     let [events, setpoint, measured] = ["events", "setpoint[2]", "displacement[2]"].map(|name| record.place(name));
-    assert_ne!(record.rows.last().unwrap().input[events] & 8, 0, "the supervisor was told");
+    assert_ne!(record.rows.last().unwrap().input[events] & 8, 0, "the supervisor has seen it");
     let moved = record.rows.iter().rev().find(|row| row.input[setpoint] != 0 && row.input[events] & 8 == 0).unwrap();
     let measured = f64::from_bits(moved.input[measured]);
     assert!(measured > 1e-6, "the leg went: {measured:e}");

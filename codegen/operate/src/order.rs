@@ -14,7 +14,7 @@ const LONGEST: f64 = 86_400.0;
 const AFTER: u32 = 1000;
 /// What there is.
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, wait PHASE|SECONDS [TIMEOUT], config, \
-                        config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop";
+                        config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, stop";
 
 /// One order.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,6 +44,8 @@ pub enum Order {
     Wave(PathBuf),
     /// End the wave under way.
     StopWave,
+    /// Ramp down and end the program that serves the link.
+    Stop,
 }
 
 /// What is waited for.
@@ -91,6 +93,7 @@ impl Order {
             ["record", "download", file] => Self::Download(file.into()),
             ["wave", "stop"] => Self::StopWave,
             ["wave", file] => Self::Wave(file.into()),
+            ["stop"] => Self::Stop,
             _ => return Err(format!("`{line}` is none of: {COMMANDS}")),
         };
         Ok(Some(order))
@@ -140,6 +143,7 @@ mod tests {
             ("record arm 7", Some(Order::Record(RecorderAction::Arm { after: 7 }))),
             ("record download run.rec", Some(Order::Download("run.rec".into()))),
             ("wave stop", Some(Order::StopWave)),
+            ("stop", Some(Order::Stop)),
             ("wave w.toml", Some(Order::Wave("w.toml".into()))),
             ("config write tuned.toml", Some(Order::WriteConfig("tuned.toml".into()))),
         ];

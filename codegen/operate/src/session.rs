@@ -120,6 +120,11 @@ impl<P: Port> Session<P> {
         self.done(&Request::Supervise { request: request.word() as u8 })
     }
 
+    /// Asks the program that serves the link to ramp down and end. Until it does, it goes on answering.
+    pub fn stop(&mut self) -> Result<(), ClientError> {
+        self.done(&Request::Stop)
+    }
+
     /// Input words that are no measurements, by their names.
     pub fn free_names(&self) -> &[String] {
         self.description.input_names.get(..self.command.len()).unwrap_or_default()

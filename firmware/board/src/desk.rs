@@ -298,7 +298,7 @@ impl Device for Visit<'_, '_> {
             }
             #[cfg(not(feature = "lockstep"))]
             Request::LockstepReset { .. } | Request::LockstepStep { .. } => Reply::Refused(Refusal::Unsupported),
-            Request::LockstepStage { .. } => Reply::Refused(Refusal::Unsupported),
+            Request::LockstepStage { .. } | Request::Stop => Reply::Refused(Refusal::Unsupported),
             Request::Recorder { action } => self.recorder(action),
             Request::Download { offset } => self.download(offset),
             Request::Wave { action, words } => self.wave(action, words),

@@ -123,7 +123,7 @@ fn words(refusal: Refusal) -> String {
         Refusal::Word { index } => format!("word {index} is out of its range"),
         Refusal::State => "not in its present state".into(),
         Refusal::TooLong => "its answer does not fit into a message".into(),
-        Refusal::Busy => "another host has the orders; hold and ramp-down are taken from every host, all else once that one has ended its session".into(),
+        Refusal::Busy => "another host has the orders; hold, ramp-down and stop are taken from every host, all else once that one has ended its session".into(),
     }
 }
 

@@ -74,6 +74,9 @@ pub enum Request<'a> {
         #[serde(borrow)]
         words: Bytes<'a>,
     },
+    /// Ramp down, then end the program that serves the link. A board has no such end: [`Refusal::Unsupported`]. Answered by
+    /// [`Reply::Done`], whoever asks; the connection is closed once the amplifiers are off.
+    Stop,
 }
 
 /// What a recorder is to do.
@@ -172,7 +175,7 @@ pub enum Refusal {
     State,
     /// The answer does not fit into a message.
     TooLong,
-    /// Another host has the orders, or there are more of them than are carried out: hold and ramp-down are taken all the same.
+    /// Another host has the orders, or there are more of them than are carried out: hold, ramp-down and stop are taken all the same.
     Busy,
 }
 

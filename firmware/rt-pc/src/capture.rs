@@ -33,7 +33,7 @@ pub struct Standing {
 /// The recorder's other side.
 pub struct Capture {
     here: Option<Tape>,
-    /// What it was last told to record.
+    /// What it is to record.
     settings: Settings,
     standing: Standing,
     /// Number of the order by which it was last started anew while it was away.
@@ -119,7 +119,7 @@ impl Capture {
         }
         let triggered = self.standing.triggered || tape.activity() == Activity::Complete;
         self.standing = Standing { running: false, triggered, ticks: tape.rows() };
-        // One that was only stopped is somebody's business who looks at it.
+        // One that was only stopped is written by nobody but the host that downloads it.
         if let Some(path) = self.file.as_ref().filter(|_| triggered) {
             self.written = Some((path.clone(), write(path, &tape)));
         }

@@ -35,7 +35,7 @@ pub struct Console {
     places: Places,
     /// Settings that are in force once all orders are taken.
     config: Config,
-    /// Events since they were last told over the link.
+    /// Events that were not yet reported over the link.
     events: u32,
     orders: VecDeque<Order>,
     /// Number of the last order that was put there; the first is 1.
@@ -60,7 +60,7 @@ impl Console {
         }
     }
 
-    /// Hears of a tick.
+    /// Takes what a tick gave.
     pub fn update(&mut self, row: &Row, said: Said) {
         self.said = Some(said);
         self.events |= self.places.events(&row.input);
@@ -68,17 +68,6 @@ impl Console {
         if !said.waving && self.wave.is_some_and(|number| said.orders.wrapping_sub(number).cast_signed() >= 0) {
             self.wave = None;
         }
-    }
-
-    /// A line: its answer.
-    ///
-    /// # Errors
-    /// As [`Operator::obey`], and while a wave makes the set-points.
-    pub fn obey(&mut self, line: &str, now: u64) -> Result<String, String> {
-        if self.waving() && line.trim_start().starts_with("set ") {
-            return Err("a wave makes the set-points; it ends over the link, by itself, or by hold".to_owned());
-        }
-        self.operator.obey(line, now)
     }
 
     /// Settings in force.

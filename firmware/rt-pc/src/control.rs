@@ -1,7 +1,7 @@
 //! The real-time thread: read, control, write, hand over; no allocation, no lock, no file.
 //!
 //! No control decision is made here: what a missed tick, a silent gauge or an operator who is gone means is the supervisor's
-//! business, which is told by event bits.
+//! business, which sees it as event bits.
 
 mod keeper;
 mod setpoints;
@@ -74,7 +74,7 @@ impl<D: Device> Loop<'_, D> {
         let mut phase = Phase::Disarmed;
         let mut codes = [0; LEGS];
         let mut enabled = false;
-        let mut link = Link { number: 0, heard: 0, silence: self.timing.silence };
+        let mut link = Link { number: 0, asked: 0, silence: self.timing.silence };
         let mut count = 0;
         let Timing { period, elastic, .. } = self.timing;
         let mut planned = clock::now() + LEAD;
@@ -104,7 +104,7 @@ impl<D: Device> Loop<'_, D> {
             let mut broken = false;
             match self.device.read() {
                 Ok(fresh) => codes = fresh,
-                // The last codes stay: the supervisor is told that they are old.
+                // The last codes stay: an event says that they are old.
                 Err(_) => broken = true,
             }
             let usage = Usage::of_this_thread();
@@ -174,7 +174,7 @@ impl<D: Device> Loop<'_, D> {
             }
             tick += 1;
         }
-        // Twice: a bus that failed once may work now. There is nobody left to tell.
+        // Twice: a bus that failed once may work now. A failure here can be reported to nothing.
         let _ = self.device.enable(false).or_else(|_| self.device.enable(false));
         keeper.finish();
         allocation::leave();
@@ -184,10 +184,10 @@ impl<D: Device> Loop<'_, D> {
 
 /// Whether the host at the other end of a link is still there.
 struct Link {
-    /// Number of the last request seen; 0 where nobody's silence matters.
+    /// Number of the last request seen; 0 where no host's silence matters.
     number: u64,
     /// Tick in which it was.
-    heard: u64,
+    asked: u64,
     /// Ticks of silence that are none yet.
     silence: u64,
 }
@@ -196,9 +196,9 @@ impl Link {
     /// `number` is that of the last request, `tick` is now: skipped ticks are silence, too.
     fn is_lost(&mut self, number: u64, tick: u64) -> bool {
         if number != self.number {
-            (self.number, self.heard) = (number, tick);
+            (self.number, self.asked) = (number, tick);
         }
-        number != 0 && tick - self.heard > self.silence
+        number != 0 && tick - self.asked > self.silence
     }
 }
 

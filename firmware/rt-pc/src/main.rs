@@ -4,7 +4,7 @@
 //! real-time thread   sleep to the tick → gauges → supervise → amplifiers → hand over     control.rs, control/
 //!        │ rows, states, recorder              ▲ orders              rings, never wait    handover.rs
 //!        ▼                                     │
-//! main thread        record to a file, lines, link, plan, signals                        service.rs, console.rs, operator.rs
+//! main thread        record to a file, link, plan, signals                               service.rs, console.rs, operator.rs
 //! ```
 //! The machine outside is a data acquisition card or a simulated one (devices/). What is late is entered in a book and
 //! has a cause; the summary shows it.
@@ -42,7 +42,7 @@ use devices::simulated::Simulated;
 use handover::Shared;
 use operator::{Operator, Timeout};
 use options::{Asked, Options};
-use service::{Link, Service, Socket};
+use service::{Link, Service};
 use summary::Summary;
 use words::Places;
 
@@ -119,8 +119,8 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         elastic: options.elastic,
     };
     let places = Places::find().map_err(|error| environment(error.to_string()))?;
-    // Somebody or something is there to end it.
-    let attended = options.socket.is_some() || options.link.is_some() || options.duration.is_some();
+    // A host or a time ends it, not a fault.
+    let attended = options.link.is_some() || options.duration.is_some();
     let timeout = Timeout { silence: timing.silence * period, idle: options.link_idle };
     let mut operator = Operator::new(places.clone(), attended, timeout);
     if options.arm {
@@ -133,8 +133,6 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
             .map_err(|error| environment(format!("signal {number}: {error}")))?;
     }
     let named = |path: &std::path::Path, error: std::io::Error| environment(format!("{}: {error}", path.display()));
-    let socket = options.socket.as_deref().map(|path| Socket::listen(path).map_err(|error| named(path, error)));
-    let socket = socket.transpose()?;
     let link = options.link.as_deref().map(|path| Link::listen(path).map_err(|error| named(path, error)));
     let link = link.transpose()?;
     let record = options.record.as_deref().map(|path| {
@@ -189,8 +187,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         }
         let until = options.duration.map(|duration| clock::now() + duration);
         let _ = go.send(());
-        let service =
-            Service { rings: outer, shared: &shared, console, record, socket, link, signal, signals: 0, until };
+        let service = Service { rings: outer, shared: &shared, console, record, link, signal, signals: 0, until };
         Ok(service.run())
     })?;
 

@@ -1,7 +1,8 @@
-//! What is asked of the machine, and when: by the command line's plan, by lines on a socket, over a link, by signals.
+//! What is asked of the machine, and when: by the command line's plan, over the link, by signals.
 //!
-//! There is one state of it, whoever asks. A host that has ordered something over a link has the orders for as long as it is
-//! heard and goes on ordering; others may then only slow the machine down. An operator only asks. Whether a request is granted is the supervisor's business, and each step here waits for what it says.
+//! There is one state of it, whoever asks. A host that has ordered something has the orders for as long as it is not silent and
+//! goes on ordering; others may then only slow the machine down. An operator only asks: whether a request is granted is the
+//! supervisor's business, and each step here waits for its answer.
 
 use controller::supervised::{Cause, MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, Phase, Request};
 use specgen_rt::clock::SECOND;
@@ -35,7 +36,7 @@ pub struct Said {
     pub late: u64,
 }
 
-/// A connection over a link; no number is given twice in a run.
+/// A connection over the link; no number is given twice in a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HostId(pub u64);
 
@@ -48,7 +49,7 @@ pub enum Denied {
     Others,
 }
 
-/// For how long a host over a link has the orders, ns.
+/// For how long a host has the orders, ns.
 #[derive(Debug, Clone, Copy)]
 pub struct Timeout {
     /// It may be silent for so long.
@@ -60,13 +61,13 @@ pub struct Timeout {
 /// Who gave the last order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Owner {
-    /// The plan, or lines.
+    /// The plan, or none.
     Here,
-    /// A host over a link.
+    /// A host over the link.
     Host {
         id: HostId,
-        /// When it was last heard, and when it last ordered something, ns.
-        heard: u64,
+        /// When it last sent a request, and when it last ordered something, ns.
+        seen: u64,
         ordered: u64,
         /// Its connection has ended.
         left: bool,
@@ -76,7 +77,7 @@ enum Owner {
 /// Where the plan stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Step {
-    /// No plan: lines alone.
+    /// No plan: hosts alone.
     Free,
     /// Asked to arm, until it does.
     Arming,
@@ -159,7 +160,7 @@ impl Operator {
         self.step == Step::Over
     }
 
-    /// Hears what the supervisor said and goes on with the plan.
+    /// Goes on with the plan by what the supervisor said.
     pub fn update(&mut self, said: &Said, now: u64) {
         let waited = now.saturating_sub(self.since);
         match (self.step, said.phase) {
@@ -193,75 +194,6 @@ impl Operator {
         }
     }
 
-    /// A line from the socket: its answer.
-    ///
-    /// # Errors
-    /// In words: it is none, or it is not for lines to say now.
-    pub fn obey(&mut self, line: &str, now: u64) -> Result<String, String> {
-        let mut parts = line.split_whitespace();
-        let verb = parts.next().unwrap_or_default();
-        let rest: Vec<String> = parts.map(str::to_owned).collect();
-        let request = match verb {
-            "none" => Request::None,
-            "arm" => Request::Arm,
-            "run" => Request::Run,
-            "hold" => Request::Hold,
-            "ramp-down" => Request::RampDown,
-            "acknowledge" => Request::Acknowledge,
-            "set" if !rest.is_empty() => {
-                self.take(verb, now)?;
-                let words = rest.iter().map(|text| self.assignment(text)).collect::<Result<Vec<_>, _>>()?;
-                for (place, word) in words {
-                    self.words[place] = word;
-                }
-                self.changed = true;
-                return Ok("ok".to_owned());
-            }
-            "stop" => {
-                self.ramp_down(now);
-                return Ok("ok".to_owned());
-            }
-            _ => {
-                return Err(format!(
-                    "`{line}` is none of: status, set NAME=VALUE…, none, arm, run, hold, ramp-down, acknowledge, stop"
-                ));
-            }
-        };
-        if !rest.is_empty() {
-            return Err(format!("`{verb}` takes nothing more, found `{}`", rest.join(" ")));
-        }
-        self.take(verb, now)?;
-        self.ask(request);
-        Ok("ok".to_owned())
-    }
-
-    /// Lines get the orders for `verb`. What slows the machine down is obeyed whoever has them.
-    fn take(&mut self, verb: &str, now: u64) -> Result<(), String> {
-        if self.is_ending() && verb != "ramp-down" {
-            return Err("the program is ramping down to end".to_owned());
-        }
-        let linked = self.linked(now);
-        if linked && !matches!(verb, "hold" | "ramp-down") {
-            return Err(format!(
-                "a host over the link has the orders; `{verb}` is for it to say, hold, ramp-down and stop are for all"
-            ));
-        }
-        if !linked {
-            self.give(Owner::Here);
-        }
-        Ok(())
-    }
-
-    /// Gives the orders to somebody; a host that had them is to come anew.
-    fn give(&mut self, owner: Owner) {
-        if let Owner::Host { id, .. } = self.owner
-            && !matches!(owner, Owner::Host { id: next, .. } if next == id)
-        {
-            self.evicted = Some(id);
-        }
-        self.owner = owner;
-    }
-
     /// Asks for something by hand: a plan is over, but for the way down.
     fn ask(&mut self, request: Request) {
         if !self.is_ending() {
@@ -276,21 +208,20 @@ impl Operator {
         matches!(self.step, Step::GoingDown | Step::Over)
     }
 
-    /// Whether a host over a link has the orders: it is there, and has ordered something lately.
+    /// Whether a host has the orders: it is there, and has ordered something lately.
     #[must_use]
     pub fn linked(&self, now: u64) -> bool {
         match self.owner {
             Owner::Here => false,
-            Owner::Host { heard, ordered, left, .. } => {
+            Owner::Host { seen, ordered, left, .. } => {
                 let Timeout { silence, idle } = self.timeout;
-                !left && now.saturating_sub(heard) <= silence && now.saturating_sub(ordered) <= idle
+                !left && now.saturating_sub(seen) <= silence && now.saturating_sub(ordered) <= idle
             }
         }
     }
 
     /// Whether the silence of the link matters: a host has ordered something.
-    #[must_use]
-    pub fn is_links(&self) -> bool {
+    fn is_links(&self) -> bool {
         matches!(self.owner, Owner::Host { .. })
     }
 
@@ -306,18 +237,18 @@ impl Operator {
         self.evicted == Some(host)
     }
 
-    /// Another number with every request of the host that has the orders; 0 where nobody's silence matters.
+    /// Another number with every request of the host that has the orders; 0 where no host's silence matters.
     #[must_use]
     pub fn link_number(&self) -> u64 {
         if self.is_links() { self.requests } else { 0 }
     }
 
-    /// A host was heard.
-    pub fn heard(&mut self, host: HostId, now: u64) {
-        if let Owner::Host { id, heard, .. } = &mut self.owner
+    /// A host sent a request.
+    pub fn seen(&mut self, host: HostId, now: u64) {
+        if let Owner::Host { id, seen, .. } = &mut self.owner
             && *id == host
         {
-            *heard = now;
+            *seen = now;
             self.requests += 1;
         }
     }
@@ -360,8 +291,12 @@ impl Operator {
         }
         if !self.is_hosts(host) {
             self.requests += 1;
+            // A host that had them is to come anew.
+            if let Owner::Host { id, .. } = self.owner {
+                self.evicted = Some(id);
+            }
         }
-        self.give(Owner::Host { id: host, heard: now, ordered: now, left: false });
+        self.owner = Owner::Host { id: host, seen: now, ordered: now, left: false };
         self.step = Step::Free;
         Ok(())
     }
@@ -409,7 +344,7 @@ impl Operator {
         (self.step, self.request, self.since, self.changed) = (step, request, now, true);
     }
 
-    /// Why it cannot go on: ramp down, and end where nobody attends.
+    /// Why it cannot go on: ramp down, and end where it is not attended.
     pub fn give_up(&mut self, text: String, now: u64) {
         self.failure.get_or_insert(text);
         if self.attended {
@@ -488,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn where_somebody_looks_a_fault_does_not_end_the_loop() {
+    fn an_attended_loop_does_not_end_at_a_fault() {
         let mut operator = Operator::new(Places::find().unwrap(), true, Timeout { silence: SILENCE, idle: IDLE });
         operator.plan(&[], 0).unwrap();
         operator.update(&said(Phase::Faulted, false), 1);
@@ -500,54 +435,41 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_obeyed_or_refused_with_what_is_expected() {
-        let mut operator = operator();
-        assert_eq!(operator.obey("arm", 0), Ok("ok".to_owned()));
-        assert_eq!(operator.wish().unwrap().request, Request::Arm.word());
-        for (line, expected) in [
-            ("go", "is none of: status, set"),
-            ("arm now", "takes nothing more, found `now`"),
-            ("set", "is none of"),
-            ("set request=1", "has a request of its own"),
-            ("set setpoint[9]=1", "no input word `setpoint[9]`"),
-            ("set setpoint[0]=x", "expected a number, found `x`"),
-            ("set setpoint[0]=inf", "expected a finite number"),
-            ("set setpoint[0]", "NAME=VALUE"),
+    fn a_plan_is_read_or_refused_with_what_is_expected() {
+        for (assignment, expected) in [
+            ("request=1", "has a request of its own"),
+            ("setpoint[9]=1", "no input word `setpoint[9]`"),
+            ("setpoint[0]=x", "expected a number, found `x`"),
+            ("setpoint[0]=inf", "expected a finite number"),
+            ("setpoint[0]", "NAME=VALUE"),
         ] {
-            let error = operator.obey(line, 0).unwrap_err();
-            assert!(error.contains(expected), "{line}: {error}");
-            assert!(operator.wish().is_none(), "{line}");
+            let mut operator = operator();
+            let error = operator.plan(&[assignment.to_owned()], 0).unwrap_err();
+            assert!(error.contains(expected), "{assignment}: {error}");
+            assert_eq!(operator.wish().unwrap().request, Request::None.word(), "{assignment}: nothing is asked for");
         }
-        assert!(operator.obey("set setpoint[0]=1e-6 setpoint[1]=2e-6", 0).is_ok());
-        assert!(operator.wish().is_some());
-        // Half of a line is not obeyed.
-        assert!(operator.obey("set setpoint[0]=5e-6 setpoint[1]=x", 0).is_err());
-        assert!(operator.wish().is_none());
     }
 
     #[test]
-    fn a_host_has_the_orders_while_it_is_heard_and_lines_may_only_slow_the_machine_down() {
+    fn a_host_has_the_orders_while_it_is_not_silent() {
         let mut operator = operator();
-        operator.heard(A, 0);
+        operator.seen(A, 0);
         operator.left(A, None);
-        assert!(operator.obey("arm", 1).is_ok() && operator.link_number() == 0, "one that only looks has no orders");
+        assert!(!operator.linked(1) && operator.link_number() == 0, "one that only looks has no orders");
         operator.take_for_host(A, 10).unwrap();
         operator.ask_by_link(Request::Run);
         assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run.word());
-        for line in ["arm", "run", "none", "acknowledge", "set setpoint[0]=0"] {
-            assert!(operator.obey(line, 10 + SILENCE).unwrap_err().contains("a host over the link has the orders"));
-        }
         assert_eq!(operator.take_for_host(B, 10 + SILENCE), Err(Denied::Others));
-        assert!(operator.obey("hold", 20).is_ok() && operator.linked(20) && !operator.is_evicted(A));
-        operator.heard(A, 200);
+        assert!(operator.linked(20) && !operator.is_evicted(A));
+        operator.seen(A, 200);
         let number = operator.link_number();
-        operator.heard(B, 250);
+        operator.seen(B, 250);
         assert_eq!(operator.link_number(), number, "another host is not the one that is missed");
-        // Silent while something moves: it is missed until somebody takes over.
+        // Silent while something moves: it is missed until another host takes over.
         assert!(operator.linked(200 + SILENCE) && !operator.linked(201 + SILENCE) && operator.link_number() > 0);
-        assert!(operator.obey("ramp-down", 500).is_ok() && operator.is_evicted(A) && operator.link_number() == 0);
-        // Gone while something moves: missed, and everybody may take over at once.
-        operator.take_for_host(B, 600).unwrap();
+        operator.take_for_host(B, 500).unwrap();
+        assert!(operator.is_evicted(A) && operator.link_number() != number);
+        // Gone while something moves: missed, and every other host may take over at once.
         operator.left(B, Some(&said(Phase::Running, true)));
         assert!(operator.link_number() > 0 && !operator.linked(600));
         // Gone while nothing can move: not missed.
@@ -555,11 +477,7 @@ mod tests {
         operator.left(A, Some(&said(Phase::Disarmed, false)));
         assert_eq!(operator.link_number(), 0);
         operator.ramp_down(700);
-        assert!(
-            operator.take_for_host(A, 701) == Err(Denied::Ending)
-                && operator.obey("run", 701).is_err()
-                && operator.obey("ramp-down", 701).is_ok()
-        );
+        assert_eq!(operator.take_for_host(A, 701), Err(Denied::Ending));
     }
 
     #[test]
@@ -567,11 +485,11 @@ mod tests {
         let mut operator = operator();
         operator.take_for_host(A, 0).unwrap();
         for now in (0..=IDLE).step_by(50) {
-            operator.heard(A, now);
+            operator.seen(A, now);
         }
         assert_eq!(operator.take_for_host(B, IDLE), Err(Denied::Others));
-        operator.heard(A, IDLE + 1);
-        // It still has them while nobody asks, and its silence would be noticed.
+        operator.seen(A, IDLE + 1);
+        // It still has them while no other asks, and its silence would be noticed.
         assert!(operator.is_hosts(A) && operator.link_number() > 0);
         operator.take_for_host(B, IDLE + 1).unwrap();
         assert!(operator.is_evicted(A) && operator.is_hosts(B));

@@ -29,10 +29,9 @@ Time
   --allow-no-rt        run without the rights for real time, after saying which are missing
 
 Operation
-  --arm                arm and run at once; else wait for a line on the socket
+  --arm                arm and run at once; else wait for a host over the link
   --set NAME=VALUE     once running, set an input word, such as command=3 or setpoint[2]=1e-6; implies --arm
   --config NAME=VALUE  a setting for this run, such as mode=6
-  --socket PATH        listen for lines: status, set, arm, run, hold, ramp-down, acknowledge, stop
   --link PATH          answer the link protocol of boards, for `specgen operate --socket PATH`
   --link-silence MS    a host that ordered something over the link and is silent for so long is lost (default: host_lost of the spec)
   --link-idle S        a host that ordered nothing for so long loses the orders to the next that does (default 60)
@@ -87,8 +86,6 @@ pub struct Options {
     pub set: Vec<String>,
     /// Assignments of settings.
     pub config: Vec<String>,
-    /// Socket of the operator.
-    pub socket: Option<PathBuf>,
     /// Socket of the link.
     pub link: Option<PathBuf>,
     /// ns.
@@ -136,7 +133,6 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
         arm: false,
         set: Vec::new(),
         config: Vec::new(),
-        socket: None,
         link: None,
         link_silence: None,
         link_idle: 60_000_000_000,
@@ -176,7 +172,6 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
                 options.set.push(parser.value()?.string()?);
             }
             Long("config") => options.config.push(parser.value()?.string()?),
-            Long("socket") => options.socket = Some(parser.value()?.into()),
             Long("link") => options.link = Some(parser.value()?.into()),
             Long("link-idle") => options.link_idle = (number(&mut parser, "--link-idle", 0.1, 86_400.0)? * 1e9) as u64,
             Long("link-silence") => {
@@ -220,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn options_are_read_and_nonsense_is_told() {
+    fn options_are_read_and_nonsense_is_refused() {
         let Ok(Asked::Run(options)) = parsed("--sim a --seconds 2.5 --set command=3 --cpu 1 --record x") else {
             unreachable!("a good line")
         };

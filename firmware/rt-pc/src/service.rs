@@ -1,10 +1,9 @@
-//! The thread beside the loop, without a deadline: writes the record, hears operators, carries the plan on.
+//! The thread beside the loop, without a deadline: writes the record, serves the link, carries the plan on.
 
 mod clients;
 mod desk;
 mod link;
 mod listener;
-mod socket;
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::io;
@@ -21,9 +20,8 @@ use crate::handover::{Order, Outer, Row, Shared};
 use crate::operator::Said;
 use crate::record;
 pub use link::{Link, Traffic};
-pub use socket::Socket;
 
-/// Between two rounds, unless somebody says something: the ring holds many times what comes in it.
+/// Between two rounds, unless a host sends something: the ring holds many times what comes in it.
 const ROUND: Timespec = Timespec { tv_sec: 0, tv_nsec: 2_000_000 };
 
 /// What the service works with.
@@ -36,8 +34,6 @@ pub struct Service<'a> {
     pub console: Console,
     /// Where ticks are written, if anywhere.
     pub record: Option<(PathBuf, record::Writer)>,
-    /// Where lines come from, if anywhere.
-    pub socket: Option<Socket>,
     /// Where frames come from, if anywhere.
     pub link: Option<Link>,
     /// Set by a signal, taken back here.
@@ -115,11 +111,8 @@ impl Service<'_> {
         outcome
     }
 
-    /// Hears who wants something.
+    /// Serves the hosts, and says whose silence the loop is to watch.
     fn serve(&mut self, now: u64) {
-        if let Some(socket) = &mut self.socket {
-            socket.serve(&mut self.console, now);
-        }
         if let Some(link) = &mut self.link {
             link.serve(&mut self.console, now);
         }
@@ -138,16 +131,14 @@ impl Service<'_> {
                 writer.configured(number, config);
             }
             number = number.wrapping_add(1);
-            // There is room, and nobody else puts anything there.
+            // There is room, and nothing else puts orders there.
             let _ = self.rings.orders.push(order);
         }
     }
 
-    /// Until somebody says something, or for a round.
+    /// Until a host sends something, or for a round.
     fn wait(&self) {
-        let lines = self.socket.iter().flat_map(Socket::descriptors);
-        let links = self.link.iter().flat_map(Link::descriptors);
-        let all: Vec<BorrowedFd<'_>> = lines.chain(links).collect();
+        let all: Vec<BorrowedFd<'_>> = self.link.iter().flat_map(Link::descriptors).collect();
         let mut files: Vec<PollFd<'_>> = all.iter().map(|file| PollFd::new(file, PollFlags::IN)).collect();
         // A signal ends it early, and whatever else it says there is a next round.
         let _ = poll(&mut files, Some(&ROUND));

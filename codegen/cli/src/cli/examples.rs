@@ -85,7 +85,8 @@ Examples:
   specgen operate --socket rt.sock platform.toml --script run.txt  # (board) a real-time PC, from a file
 
 Commands: status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, wait PHASE|SECONDS [TIMEOUT], config,
-  config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop
+  config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
+  stop (ends the program at a socket)
 
 The link lives as long as this command does; without it the machine holds after 0.1 s. Ctrl-C ramps down first.";
 

@@ -1,6 +1,6 @@
 //! `specgen operate`: one session with a machine over the link, from the command line, a script, or line by line.
 
-mod machine;
+mod operator;
 
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use specgen_link::client::{Port, Timeout};
 
 use super::ui::{Failure, Ui};
-use machine::{Ended, Machine};
+use operator::{Ended, Operator};
 use specgen_compiler::compile;
 use specgen_language::interrupt;
 use specgen_operate::pil::{BAUD, OpenError, SerialLine};
@@ -46,7 +46,7 @@ pub struct Arguments {
 enum Source {
     /// All of them are known.
     List(Vec<Order>),
-    /// Lines as they come; somebody is there to see what happens.
+    /// Lines as they come, from a person or program that sees what happens.
     Lines,
 }
 
@@ -90,6 +90,16 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 
 /// Every command is read before anything is asked of the machine: a mistake in the last line stops the first.
 fn source(arguments: &Arguments, commands: &[String]) -> Result<Source, Failure> {
+    let source = read(arguments, commands)?;
+    match &source {
+        Source::List(orders) if orders.iter().rev().skip(1).any(|order| *order == Order::Stop) => {
+            Err(Failure::Usage("`stop` ends the session: nothing comes after it".to_owned()))
+        }
+        _ => Ok(source),
+    }
+}
+
+fn read(arguments: &Arguments, commands: &[String]) -> Result<Source, Failure> {
     let mut orders = Vec::new();
     for command in commands {
         orders.extend(Order::parse(command).map_err(Failure::Usage)?);
@@ -128,46 +138,46 @@ fn operate(
         let text = format!("{name}: not compared with a spec; name it to be sure that the device runs its controller");
         ui.progress(&text);
     }
-    let mut machine = Machine::new(session, interrupt::heed());
+    let mut operator = Operator::new(session, interrupt::heed());
     if let Source::List(orders) = &source {
         // A mistake in the last of them would leave the machine alone in the middle.
-        machine.check(orders)?;
+        operator.check(orders)?;
     }
     let ended = match source {
-        Source::List(orders) => list(&orders, &mut machine, ui),
-        Source::Lines => lines(&mut machine, ui),
+        Source::List(orders) => list(&orders, &mut operator, ui),
+        Source::Lines => lines(&mut operator, ui),
     };
-    finish(ended, &mut machine, name, ui)
+    finish(ended, &mut operator, name, ui)
 }
 
-fn list(orders: &[Order], machine: &mut Machine<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
+fn list(orders: &[Order], operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
     for order in orders {
-        machine.obey(order, ui)?;
+        operator.obey(order, ui)?;
     }
-    // A request that was the last one is to be seen by a tick before the link goes silent, and what it does to be told.
-    machine.look()
+    // A request that was the last one is to be seen by a tick before the link goes silent, and what it does to be shown.
+    operator.look()
 }
 
 /// Lines from standard input, the machine looked at meanwhile. What is wrong with a line ends nothing.
-fn lines(machine: &mut Machine<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
-    machine.attended = true;
+fn lines(operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
+    operator.attended = true;
     let lines = reader();
     if std::io::stdin().is_terminal() {
-        ui.progress(&format!("{}; commands, one a line; end with Ctrl-D", machine.stands()));
+        ui.progress(&format!("{}; commands, one a line; end with Ctrl-D", operator.stands()));
     }
     loop {
         let line = match lines.recv_timeout(ALIVE) {
             Ok(line) => line,
             Err(RecvTimeoutError::Timeout) => {
-                machine.look()?;
-                machine.tell(ui);
+                operator.look()?;
+                operator.show(ui);
                 continue;
             }
-            Err(RecvTimeoutError::Disconnected) => return machine.look(),
+            Err(RecvTimeoutError::Disconnected) => return operator.look(),
         };
         let done = match Order::parse(&line) {
             Ok(None) => Ok(()),
-            Ok(Some(order)) => machine.obey(&order, ui),
+            Ok(Some(order)) => operator.obey(&order, ui),
             Err(text) => Err(Ended::Refused(text)),
         };
         let text = match done {
@@ -180,7 +190,7 @@ fn lines(machine: &mut Machine<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
             }
             Err(other) => return Err(other),
         };
-        machine.note(&line, json!({ "error": text }), &format!("error: {text}"), ui);
+        operator.note(&line, json!({ "error": text }), &format!("error: {text}"), ui);
     }
 }
 
@@ -199,31 +209,39 @@ fn reader() -> Receiver<String> {
 }
 
 /// Says how it ended. Ctrl-C brings the machine down first.
-fn finish(ended: Result<(), Ended>, machine: &mut Machine<impl Port>, name: &str, ui: &mut Ui) -> Result<(), Failure> {
-    let result = |machine: &mut Machine<_>| -> Value {
-        json!({ "device": name, "answers": std::mem::take(&mut machine.answers), "status": machine.status() })
+fn finish(
+    ended: Result<(), Ended>,
+    operator: &mut Operator<impl Port>,
+    name: &str,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let result = |operator: &mut Operator<_>| -> Value {
+        json!({ "device": name, "answers": std::mem::take(&mut operator.answers), "status": operator.status() })
     };
+    let open = ended.is_ok();
     match ended {
-        Ok(()) => {
-            if machine.is_powered() {
+        Ok(()) | Err(Ended::Stopped) => {
+            if open && operator.is_powered() {
                 let text =
                     "the amplifiers are on; without its host the machine holds, then ramps down (supervisor.host_lost)";
-                ui.progress(&format!("{name}: {}: {text}", machine.stands()));
+                ui.progress(&format!("{name}: {}: {text}", operator.stands()));
             }
-            let result = result(machine);
+            let result = result(operator);
             ui.result("", result);
             Ok(())
         }
         Err(Ended::Refused(text)) => {
-            Err(Failure::Judged { message: format!("{name}: {text}"), result: result(machine) })
+            Err(Failure::Judged { message: format!("{name}: {text}"), result: result(operator) })
         }
-        Err(Ended::Fault(text)) => Err(Failure::Judged { message: format!("{name}: {text}"), result: result(machine) }),
+        Err(Ended::Fault(text)) => {
+            Err(Failure::Judged { message: format!("{name}: {text}"), result: result(operator) })
+        }
         Err(Ended::Failed(failure)) => Err(failure),
         Err(Ended::Link(error)) => Err(Failure::Environment(format!(
             "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
         ))),
-        Err(Ended::Interrupted) => match machine.ramp_down(ui) {
-            Ok(text) => Err(Failure::Interrupted { message: format!("interrupted; {text}"), result: result(machine) }),
+        Err(Ended::Interrupted) => match operator.ramp_down(ui) {
+            Ok(text) => Err(Failure::Interrupted { message: format!("interrupted; {text}"), result: result(operator) }),
             Err(error) => Err(Failure::Environment(format!("{name}: interrupted, and then: {error}"))),
         },
     }

@@ -63,6 +63,16 @@ impl Host {
         }
     }
 
+    /// Whether the supervisor is asked: a host without the orders is refused.
+    pub fn asks(&mut self, request: u8) -> bool {
+        matches!(self.client.ask(&Request::Supervise { request }), Ok(Reply::Done))
+    }
+
+    /// Whether it is answered.
+    pub fn is_answered(&mut self) -> bool {
+        self.client.ask(&Request::Status).is_ok()
+    }
+
     /// Asks for the status, which keeps the link alive, until it is as wanted.
     pub fn wait(&mut self, what: &str, wanted: impl Fn(&Status) -> bool) -> Status {
         let start = Instant::now();

@@ -68,6 +68,7 @@ fn what_is_refused_changes_nothing() {
         (Request::LockstepStage { index: 0 }, Refusal::Unsupported),
         (Request::Recorder { action: RecorderAction::Look }, Refusal::Unsupported),
         (Request::Download { offset: 0 }, Refusal::Unsupported),
+        (Request::Stop, Refusal::Unsupported),
         (Request::LockstepReset { config: Bytes(&good) }, Refusal::State),
         (Request::LockstepStep { input: Bytes(&[]) }, Refusal::State),
     ];

@@ -39,6 +39,7 @@ fn requests() -> Vec<Request<'static>> {
         Request::Download { offset: 1 << 20 },
         Request::Wave { action: WaveAction::Start, words: leaked(9, 5) },
         Request::Wave { action: WaveAction::Stop, words: Bytes(&[]) },
+        Request::Stop,
     ]
 }
 

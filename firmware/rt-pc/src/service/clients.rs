@@ -2,7 +2,7 @@
 //!
 //! A new client always gets in. Where there is no room, the client process with the most connections loses one of them, and of
 //! those the one that has been silent for longest; one that has the orders is spared. What a client may send in a round is
-//! bounded, so that one that sends without end delays nobody else.
+//! bounded, so that one that sends without end delays no other.
 
 use std::io::{self, ErrorKind, Read};
 use std::os::fd::{AsFd, BorrowedFd};
@@ -21,14 +21,14 @@ const ROUND: usize = 4096;
 
 /// One connection.
 pub struct Client<T> {
-    /// It.
+    /// The connection, which never waits.
     pub stream: UnixStream,
     /// What belongs to it.
     pub state: T,
     /// Its process, as the system says; 0 if it does not.
     process: i32,
-    /// When it last said something, ns.
-    heard: u64,
+    /// When it last sent something, ns.
+    last: u64,
 }
 
 /// All of them.
@@ -38,7 +38,7 @@ pub struct Clients<T> {
 }
 
 impl<T> Clients<T> {
-    /// Nobody yet.
+    /// Without a client.
     pub fn new(listener: Listener) -> Self {
         Self { listener, all: Vec::with_capacity(MOST) }
     }
@@ -50,7 +50,7 @@ impl<T> Clients<T> {
         for _ in 0..TAKEN {
             let Some(stream) = self.listener.accept() else { break };
             let process = socket_peercred(&stream).map_or(0, |credentials| credentials.pid.as_raw_nonzero().get());
-            self.all.push(Client { stream, state: fresh(), process, heard: now });
+            self.all.push(Client { stream, state: fresh(), process, last: now });
             if self.all.len() > MOST
                 && let Some(least) = self.least(now, &keeps)
             {
@@ -66,11 +66,11 @@ impl<T> Clients<T> {
         // The newest is not to make room for itself.
         let others = self.all.iter().enumerate().rev().skip(1).filter(|(_, client)| !keeps(&client.state));
         others
-            .max_by_key(|(_, client)| (connections(client.process), now.saturating_sub(client.heard)))
+            .max_by_key(|(_, client)| (connections(client.process), now.saturating_sub(client.last)))
             .map(|(index, _)| index)
     }
 
-    /// Lets each be served; gives back those whose service says that they are to go.
+    /// Lets each be served; gives back those whose service failed.
     pub fn serve(&mut self, mut service: impl FnMut(&mut Client<T>) -> io::Result<()>) -> Vec<T> {
         let gone = self.all.extract_if(.., |client| service(client).is_err());
         gone.map(|client| client.state).collect()
@@ -88,7 +88,7 @@ impl<T> Clients<T> {
 }
 
 impl<T> Client<T> {
-    /// What came since the last call, as much of it as one may say in a round. Never waits.
+    /// What came since the last call, as much of it as one may send in a round. Never waits.
     ///
     /// # Errors
     /// The client has gone.
@@ -97,7 +97,7 @@ impl<T> Client<T> {
             return match self.stream.read(bytes) {
                 Ok(0) => Err(ErrorKind::UnexpectedEof.into()),
                 Ok(count) => {
-                    self.heard = now;
+                    self.last = now;
                     Ok(&bytes[..count])
                 }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => Ok(&[]),
@@ -108,7 +108,7 @@ impl<T> Client<T> {
     }
 }
 
-/// Room for what a client says in a round.
+/// A buffer for what is read from a client in a round.
 pub const fn room() -> [u8; ROUND] {
     [0; ROUND]
 }

@@ -22,7 +22,7 @@ pub struct Desk<'a> {
     pub console: &'a mut Console,
     /// Who asks.
     pub host: HostId,
-    /// Events that this host has not been told.
+    /// Events that were not yet reported to this host.
     pub events: &'a mut u32,
     /// Now, ns.
     pub now: u64,
@@ -158,7 +158,7 @@ fn piece(whole: &[u8], offset: u32) -> Reply<'_> {
 
 impl Device for Desk<'_> {
     fn execute(&mut self, request: &Request<'_>) -> Reply<'_> {
-        self.console.operator.heard(self.host, self.now);
+        self.console.operator.seen(self.host, self.now);
         match *request {
             Request::Hello => {
                 self.console.operator.connected(self.host, self.now);
@@ -186,6 +186,10 @@ impl Device for Desk<'_> {
                 None => Reply::Refused(Refusal::State),
             },
             Request::Wave { action, words } => self.ordered(|desk| desk.wave(action, words)),
+            Request::Stop => {
+                self.console.operator.ramp_down(self.now);
+                Reply::Done
+            }
             // The machine of a PC is the host's own: it is tried by `specgen sim` and `specgen replay`.
             Request::LockstepReset { .. } | Request::LockstepStep { .. } | Request::LockstepStage { .. } => {
                 Reply::Refused(Refusal::Unsupported)

@@ -45,7 +45,7 @@ struct Line {
     id: HostId,
     endpoint: Box<Endpoint>,
     unsent: Vec<u8>,
-    /// Events since they were last told to this host.
+    /// Events that were not yet reported to this host.
     events: u32,
 }
 
@@ -55,7 +55,7 @@ impl Link {
     /// # Errors
     /// As [`Listener::open`].
     pub fn listen(path: &Path) -> io::Result<Self> {
-        let hosts = Clients::new(Listener::open(path, "--link")?);
+        let hosts = Clients::new(Listener::open(path)?);
         Ok(Self { hosts, traffic: Traffic::default() })
     }
 
@@ -117,7 +117,7 @@ fn serve(client: &mut Client<Line>, console: &mut Console, now: u64) -> io::Resu
             Ok(count) => {
                 client.state.unsent.drain(..count);
             }
-            // Nobody waits for a host that does not read; what it asked for last is still there for it.
+            // A host that does not read is not waited for; what it asked for last is still there for it.
             Err(error) if error.kind() == io::ErrorKind::WouldBlock => break,
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),

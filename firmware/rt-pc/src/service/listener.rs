@@ -21,14 +21,16 @@ pub struct Listener {
 
 impl Listener {
     /// Listens at `path`, for this user alone whatever the umask. What a killed run left there is replaced; what is served is
-    /// not. `option` is how to name another one.
+    /// not.
     ///
     /// # Errors
-    /// If somebody listens there, or the path cannot be used.
-    pub fn open(path: &Path, option: &str) -> io::Result<Self> {
+    /// If another program listens there, or the path cannot be used.
+    pub fn open(path: &Path) -> io::Result<Self> {
         if UnixStream::connect(path).is_ok() {
-            let text = format!("another program listens there: choose another {option}");
-            return Err(io::Error::new(io::ErrorKind::AddrInUse, text));
+            return Err(io::Error::new(
+                io::ErrorKind::AddrInUse,
+                "another program listens there: choose another --link",
+            ));
         }
         if std::fs::symlink_metadata(path)
             .is_ok_and(|meta| std::os::unix::fs::FileTypeExt::is_socket(&meta.file_type()))
@@ -41,7 +43,7 @@ impl Listener {
             net::SocketFlags::CLOEXEC | net::SocketFlags::NONBLOCK,
             None,
         )?;
-        // The name that `bind` makes has the mode of the socket: nobody else can connect before it is set there.
+        // The name that `bind` makes has the mode of the socket: no other user can connect before it is set there.
         fchmod(&socket, Mode::RUSR | Mode::WUSR)?;
         net::bind(&socket, &net::SocketAddrUnix::new(path)?)?;
         let this = Self { listener: UnixListener::from(socket), path: path.to_owned() };
@@ -51,7 +53,7 @@ impl Listener {
         Ok(this)
     }
 
-    /// Somebody who came since the last call. Never waits.
+    /// A client that came since the last call. Never waits.
     pub fn accept(&self) -> Option<UnixStream> {
         let (stream, _) = self.listener.accept().ok()?;
         stream.set_nonblocking(true).is_ok().then_some(stream)

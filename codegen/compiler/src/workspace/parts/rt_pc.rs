@@ -30,7 +30,6 @@ pub const PART: Part = Part {
         "src/service/desk.rs",
         "src/service/link.rs",
         "src/service/listener.rs",
-        "src/service/socket.rs",
         "src/summary.rs",
         "src/words.rs",
     },

@@ -1,4 +1,4 @@
-//! A machine in a session: orders carried out one after the other, faults noticed, the link kept alive.
+//! The operator of a session: carries orders out one after the other, notices faults, keeps the link alive.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -31,6 +31,8 @@ pub enum Ended {
     Link(ClientError),
     /// Ctrl-C.
     Interrupted,
+    /// The program that served the link was asked to end, and has.
+    Stopped,
 }
 
 impl From<ClientError> for Ended {
@@ -42,22 +44,22 @@ impl From<ClientError> for Ended {
     }
 }
 
-/// A machine.
-pub struct Machine<P> {
+/// One host's hands on a machine.
+pub struct Operator<P> {
     session: Session<P>,
     interrupted: &'static AtomicBool,
-    /// What was told last of phase and cause.
-    told: (u8, u8),
-    /// Somebody looks at it: a fault is told, and ends nothing.
+    /// Phase and cause that were shown last.
+    shown: (u8, u8),
+    /// A person looks at it: a fault is shown, and ends nothing.
     pub attended: bool,
-    /// For programs.
+    /// Answers to the orders so far, for the JSON document.
     pub answers: Vec<Value>,
 }
 
-impl<P: Port> Machine<P> {
+impl<P: Port> Operator<P> {
     pub fn new(session: Session<P>, interrupted: &'static AtomicBool) -> Self {
-        let told = (session.status().phase, session.status().cause);
-        Self { session, interrupted, told, attended: false, answers: Vec::new() }
+        let shown = (session.status().phase, session.status().cause);
+        Self { session, interrupted, shown, attended: false, answers: Vec::new() }
     }
 
     /// Phase and cause in words.
@@ -70,7 +72,7 @@ impl<P: Port> Machine<P> {
         self.session.status().amplifier_on
     }
 
-    /// For programs.
+    /// How the machine stands, for the JSON document.
     pub fn status(&self) -> Value {
         let status = self.session.status();
         json!({
@@ -87,7 +89,7 @@ impl<P: Port> Machine<P> {
         })
     }
 
-    /// Asks how it stands. A fault that is new ends what nobody attends to.
+    /// Asks how it stands. A fault that is new ends what is not attended.
     pub fn look(&mut self) -> Result<(), Ended> {
         if self.interrupted.load(Ordering::Relaxed) {
             return Err(Ended::Interrupted);
@@ -102,12 +104,12 @@ impl<P: Port> Machine<P> {
         Ok(())
     }
 
-    /// Tells of a phase that is new.
-    pub fn tell(&mut self, ui: &Ui) {
+    /// Shows a phase that is new.
+    pub fn show(&mut self, ui: &Ui) {
         let status = self.session.status();
         let now = (status.phase, status.cause);
-        if now != self.told {
-            self.told = now;
+        if now != self.shown {
+            self.shown = now;
             ui.progress(&format!("tick {}: {}", status.tick, self.stands()));
         }
     }
@@ -164,10 +166,15 @@ impl<P: Port> Machine<P> {
                 self.session.stop_wave()?;
                 (json!("done"), String::new())
             }
+            Order::Stop => {
+                self.session.stop().map_err(unsupported)?;
+                self.note(&format!("{order:?}"), json!("done"), "", ui);
+                return self.stopped(ui);
+            }
         };
         self.note(&format!("{order:?}"), value, &text, ui);
         self.look()?;
-        self.tell(ui);
+        self.show(ui);
         Ok(())
     }
 
@@ -209,8 +216,22 @@ impl<P: Port> Machine<P> {
             }
             std::thread::sleep(self.session.due());
             self.look()?;
-            self.tell(ui);
+            self.show(ui);
         }
+    }
+
+    /// Waits until the program that serves the link has closed it.
+    fn stopped(&mut self, ui: &Ui) -> Result<(), Ended> {
+        let start = Instant::now();
+        while start.elapsed() < DOWN {
+            match self.look() {
+                Err(Ended::Link(ClientError::Port(_))) => return Err(Ended::Stopped),
+                other => other?,
+            }
+            self.show(ui);
+            std::thread::sleep(self.session.due());
+        }
+        Err(Ended::Fault(format!("it has not ended after {} s, the machine is {}", DOWN.as_secs(), self.stands())))
     }
 
     fn config(&mut self) -> Result<(Value, String), Ended> {
@@ -305,7 +326,7 @@ impl<P: Port> Machine<P> {
         let start = Instant::now();
         while start.elapsed() < DOWN {
             self.session.poll()?;
-            self.tell(ui);
+            self.show(ui);
             let status = self.session.status();
             let off = [Phase::Disarmed, Phase::Faulted].map(|phase| phase.word() as u8).contains(&status.phase);
             if off && !status.amplifier_on {
@@ -322,6 +343,16 @@ fn waving(error: ClientError) -> Ended {
     match error {
         ClientError::Refused(Refusal::State) => {
             Ended::Refused("not while a wave is under way or a host steps the machine; `wave stop` first".to_owned())
+        }
+        other => other.into(),
+    }
+}
+
+/// Why a board cannot be stopped.
+fn unsupported(error: ClientError) -> Ended {
+    match error {
+        ClientError::Refused(Refusal::Unsupported) => {
+            Ended::Refused("a board does not end; `ramp-down` switches its amplifiers off".to_owned())
         }
         other => other.into(),
     }
