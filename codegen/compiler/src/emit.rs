@@ -9,7 +9,6 @@ mod body;
 mod checked;
 mod crate_root;
 mod defaults;
-mod description;
 mod format;
 mod gauge_converter;
 mod geometry;
@@ -41,7 +40,6 @@ pub fn emit(ir: &Ir) -> EmittedCrate {
         ("src/body.rs", body::emit(ir)),
         ("src/checked.rs", checked::emit(ir)),
         ("src/defaults.rs", defaults::emit(ir)),
-        ("src/description.rs", description::emit(ir)),
         ("src/geometry.rs", geometry::emit(ir)),
         ("src/hysteresis.rs", hysteresis::emit(ir)),
         ("src/identity.rs", identity::emit(ir)),

@@ -4,16 +4,14 @@ use controller::sensing::gauge_reading;
 use controller::snapshot::recorder::Recorder;
 use controller::snapshot::{record_after, record_before};
 use controller::supervised::{
-    CONVERTER, Cause, INTEGRITY, LINK_LOST, MACHINE_INPUT_WORDS, MISSED_TICK, Machine, MachineInput, MachineOutput,
-    Request, STOP,
+    CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Request, STOP,
 };
-use controller::{Config, INPUT_WORDS, Real};
+use controller::{Config, Real};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
 use specgen_link::Silence;
-use specgen_runtime::Real as _;
 
 use crate::exchange::{self, Exchange, Orders, Report};
-use crate::words::{COMMAND_WORDS, GAUGE_BITS, GAUGES};
+use crate::words::GAUGE_BITS;
 
 /// What the target noticed since the last tick.
 #[derive(Debug, Clone, Copy, Default)]
@@ -129,7 +127,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
                 note(report, fault);
                 events |= CONVERTER;
                 // What was not read is not believed: no number stands for it.
-                [Real::from_f64(f64::NAN); CHANNELS]
+                [Real::NAN; CHANNELS]
             }
         };
 
@@ -201,25 +199,15 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     }
 }
 
-/// Puts the command, the readings, and no number for what this board does not measure into `slot`. In a frame of its own: words
-/// are done with before the law needs the stack.
+/// What the tick is to read, in `slot`. In a frame of its own, which is done with before the law needs the stack.
 #[inline(never)]
 fn take<'a>(
     slot: &'a mut Option<MachineInput>,
     orders: &Orders,
-    readings: &[Real; GAUGES],
+    readings: &[Real; CHANNELS],
     events: u32,
 ) -> &'a MachineInput {
-    let mut words = [Real::from_f64(f64::NAN).to_word(); MACHINE_INPUT_WORDS];
-    for (slot, word) in words.iter_mut().zip(orders.command) {
-        *slot = word;
-    }
-    for (slot, reading) in words.iter_mut().skip(COMMAND_WORDS).zip(readings) {
-        *slot = reading.to_word();
-    }
-    words[INPUT_WORDS] = orders.request.word();
-    words[INPUT_WORDS + 1] = u64::from(events);
-    slot.insert(MachineInput::from_words(&words))
+    slot.insert(MachineInput::measured(&orders.command, readings, orders.request, events))
 }
 
 /// What the recorder keeps from before a tick. In a frame of its own, as [`take`].

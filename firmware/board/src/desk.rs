@@ -2,7 +2,7 @@
 
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, Phase, Request as Wanted};
 use controller::waves::{self, Wave};
-use controller::{CONFIG_WORDS, DESCRIPTION, Real};
+use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, Real};
 use specgen_link::lockstep::{Session, piece};
 use specgen_link::{
     Bytes, Counted, Counters, Device, Identity, RecorderAction, Refusal, Reply, Request, Status, WaveAction,
@@ -13,7 +13,6 @@ use crate::download::{self, Download};
 use crate::exchange::Exchange;
 use crate::recording;
 use crate::stepper::{Costs, Stepper, Stopwatch};
-use crate::words::COMMAND_WORDS;
 
 /// Words of the longest answer: settings, what a step gives, a piece of a record.
 const WORDS: usize = larger(larger(CONFIG_WORDS, MACHINE_OUTPUT_WORDS), larger(MACHINE_INPUT_WORDS, download::WORDS));

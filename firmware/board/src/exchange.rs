@@ -1,6 +1,6 @@
 //! What lies between the tick and the background.
 
-use controller::Config;
+use controller::{COMMAND_WORDS, Config};
 use controller::snapshot::recorder::Recorder;
 use controller::supervised::{Cause, Machine, MachineInput, MachineOutput, Phase, Request, supervise};
 use controller::supervision::HOST_TICKS;
@@ -8,7 +8,7 @@ use controller::waves::{self, Wave};
 use specgen_link::Silence;
 use specgen_runtime::wave::Stage;
 
-use crate::words::{COMMAND_WORDS, PERIOD_NANOSECONDS};
+use crate::words::PERIOD_NANOSECONDS;
 
 /// A lock-step is over after so long without a request, ns: 2 s, for its host also computes, and nothing moves meanwhile.
 #[cfg(feature = "lockstep")]

@@ -24,6 +24,7 @@ mod schedule;
 mod stepper;
 mod words;
 
+pub use controller::COMMAND_WORDS;
 pub use cycle::{Board, Noticed};
 pub use desk::{Access, Desk, Visit};
 pub use exchange::{Exchange, Orders, Report};
@@ -31,4 +32,4 @@ pub use health::{BACKGROUND_SILENCE, Health};
 pub use recording::recorder;
 pub use schedule::{Due, Schedule};
 pub use stepper::Stopwatch;
-pub use words::{COMMAND_WORDS, GAUGE_BITS, PERIOD_NANOSECONDS};
+pub use words::{GAUGE_BITS, PERIOD_NANOSECONDS};

@@ -23,3 +23,7 @@ pub const SPEC_DIGEST: &str = "3ce29c088171ef2c20424acc5ffd95b7ebf8f49ce8af8d876
 
 /// Version of the compiler.
 pub const SPECGEN_VERSION: &str = "0.1.0";
+
+/// Of the description what stands before the names of words, and what stands after them.
+pub(crate) const ABOUT: &str = "name=reference\ndigest=3ce29c088171ef2c20424acc5ffd95b7ebf8f49ce8af8d876d8d7c98de88fc16\nversion=0.1.0\nkind=platform\nscalar_bits=64\nleg_gain=6.31e-7\nperiod=0.0001\ngrid=32\ndrive_range=0.0,100.0\n";
+pub(crate) const BIAS: &str = "bias=0.0,0.0,1e-5,0.0,0.0,0.0\n";

@@ -2,9 +2,10 @@
 
 //! Inputs and outputs of the supervised tick as 64-bit words: those of the control law, and what the supervisor adds.
 
-use crate::TickInput;
 use crate::supervised::{Machine, MachineInput, MachineOutput, Request};
 use crate::words::{INPUT_NAMES, INPUT_WORDS, OUTPUT_NAMES, OUTPUT_WORDS, output_words};
+use crate::{COMMAND_WORDS, Real, TickInput};
+use specgen_runtime::Real as _;
 
 /// Words of a supervised tick's input.
 pub const MACHINE_INPUT_WORDS: usize = INPUT_WORDS + 2;
@@ -46,6 +47,12 @@ impl MachineInput {
             events: words[INPUT_WORDS + 1] as u32,
         }
     }
+
+    /// Of what a target was asked for and what it measured, see [`TickInput::measured`].
+    #[must_use]
+    pub fn measured(command: &[u64; COMMAND_WORDS], gauge: &[Real; 6], request: Request, events: u32) -> Self {
+        Self { tick: TickInput::measured(command, gauge), request, events }
+    }
 }
 
 /// Words in the order of [`MACHINE_OUTPUT_NAMES`], of a tick and of the machine that it left.
@@ -58,4 +65,13 @@ pub fn machine_output_words(output: &MachineOutput, machine: &Machine) -> [u64; 
     words[OUTPUT_WORDS] = output.phase.word() | output.cause.word() << 8 | (output.amplifier_on as u64) << 16;
     words[OUTPUT_WORDS + 1] = machine.supervisor.conditions as u64;
     words
+}
+
+/// Six numbers from the word `first` on; zero beyond the end.
+pub(crate) fn six(words: &[u64], first: usize) -> [Real; 6] {
+    let mut vector = [0.0; 6];
+    for (value, word) in vector.iter_mut().zip(words.iter().skip(first)) {
+        *value = Real::from_word(*word);
+    }
+    vector
 }

@@ -5,7 +5,66 @@
 
 use specgen_runtime::Permitted;
 use specgen_runtime::snapshot::Sizes;
-use crate::Real;
+use crate::{CONFIG_WORDS, Real};
+
+/// Names of the words of the settings.
+pub(crate) const NAMES: [&str; CONFIG_WORDS] = [
+    "mode",
+    "interaction",
+    "level_weight",
+    "drift_weight",
+    "max_step_codes",
+    "code_min",
+    "code_max",
+    "kp[0]",
+    "kp[1]",
+    "kp[2]",
+    "kp[3]",
+    "kp[4]",
+    "kp[5]",
+    "ki[0]",
+    "ki[1]",
+    "ki[2]",
+    "ki[3]",
+    "ki[4]",
+    "ki[5]",
+    "kv[0]",
+    "kv[1]",
+    "kv[2]",
+    "kv[3]",
+    "kv[4]",
+    "kv[5]",
+    "position_kp[0]",
+    "position_kp[1]",
+    "position_kp[2]",
+    "position_kp[3]",
+    "position_kp[4]",
+    "position_kp[5]",
+    "position_ki[0]",
+    "position_ki[1]",
+    "position_ki[2]",
+    "position_ki[3]",
+    "position_ki[4]",
+    "position_ki[5]",
+    "position_kv[0]",
+    "position_kv[1]",
+    "position_kv[2]",
+    "position_kv[3]",
+    "position_kv[4]",
+    "position_kv[5]",
+    "environment_stiffness[0]",
+    "environment_stiffness[1]",
+    "environment_stiffness[2]",
+    "environment_stiffness[3]",
+    "environment_stiffness[4]",
+    "environment_stiffness[5]",
+    "environment_rest[0]",
+    "environment_rest[1]",
+    "environment_rest[2]",
+    "environment_rest[3]",
+    "environment_rest[4]",
+    "environment_rest[5]",
+];
 
 /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
 /// most `code_max`.

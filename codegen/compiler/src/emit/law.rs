@@ -17,7 +17,7 @@ macro_rules! files {
 
 /// Of six legs with their own gauges.
 pub const LEGS: &[File] = files! {
-    "common": "dynamics", "integrity", "kinematics", "machine_words", "rest", "snapshot", "stage", "supervised";
+    "common": "dynamics", "integrity", "kinematics", "machine_words", "names", "rest", "snapshot", "stage", "supervised";
     "legs": "api", "config", "sensing", "stages", "standing", "state", "step", "waves", "words";
 };
 
@@ -26,7 +26,7 @@ pub const LEGS_PAGE: &str = include_str!("../../../../firmware/controller/law/le
 
 /// Of a platform.
 pub const PLATFORM: &[File] = files! {
-    "common": "dynamics", "integrity", "kinematics", "machine_words", "rest", "snapshot", "stage", "supervised";
+    "common": "dynamics", "integrity", "kinematics", "machine_words", "names", "rest", "snapshot", "stage", "supervised";
     "platform": "api", "config", "notch", "sensing", "stages", "standing", "state", "step", "waves", "words";
 };
 

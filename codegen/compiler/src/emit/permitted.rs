@@ -18,6 +18,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         })
         .collect();
     let count = literal::count(rows.len());
+    let names = table.names();
     let [request, reading, stiffness] =
         [table.state.request, table.state.reading, table.state.stiffness].map(|most| literal::real(Scalar::F64, most));
     quote! {
@@ -26,8 +27,10 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use specgen_runtime::Permitted;
         use specgen_runtime::snapshot::Sizes;
 
-        use crate::Real;
+        use crate::{CONFIG_WORDS, Real};
 
+        /// Names of the words of the settings.
+        pub(crate) const NAMES: [&str; CONFIG_WORDS] = [#(#names),*];
         /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
         /// most `code_max`.
         pub const SETTINGS: [(Permitted<Real>, usize); #count] = [#(#rows),*];

@@ -1,11 +1,16 @@
 //! Inputs, outputs and settings as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target
 //! reads and writes these, so that two of them can be compared bit for bit.
 
-use crate::{Config, ConfigError, LEGS, Real, SetpointKind, State, TickInput, TickOutput};
+use crate::machine_words::six;
+use crate::names::names;
+use crate::{Config, ConfigError, LEGS, Real, SetpointKind, State, TickInput, TickOutput, permitted};
 use specgen_runtime::{CodeLimits, Law, Real as _};
 
 /// Words of a tick's input.
 pub const INPUT_WORDS: usize = 12;
+
+/// Words of a command: they stand before those that are measured.
+pub const COMMAND_WORDS: usize = 6;
 
 /// Words of a tick's output.
 pub const OUTPUT_WORDS: usize = 37;
@@ -14,65 +19,14 @@ pub const OUTPUT_WORDS: usize = 37;
 pub const CONFIG_WORDS: usize = 8;
 
 /// Names of the input words.
-pub const INPUT_NAMES: [&str; INPUT_WORDS] = [
-    "setpoint[0]",
-    "setpoint[1]",
-    "setpoint[2]",
-    "setpoint[3]",
-    "setpoint[4]",
-    "setpoint[5]",
-    "displacement[0]",
-    "displacement[1]",
-    "displacement[2]",
-    "displacement[3]",
-    "displacement[4]",
-    "displacement[5]",
-];
+pub const INPUT_NAMES: [&str; INPUT_WORDS] = names![; "setpoint", "displacement";];
 
 /// Names of the output words.
-pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] = [
-    "voltage[0]",
-    "voltage[1]",
-    "voltage[2]",
-    "voltage[3]",
-    "voltage[4]",
-    "voltage[5]",
-    "requested[0]",
-    "requested[1]",
-    "requested[2]",
-    "requested[3]",
-    "requested[4]",
-    "requested[5]",
-    "demand[0]",
-    "demand[1]",
-    "demand[2]",
-    "demand[3]",
-    "demand[4]",
-    "demand[5]",
-    "level[0]",
-    "level[1]",
-    "level[2]",
-    "level[3]",
-    "level[4]",
-    "level[5]",
-    "drift[0]",
-    "drift[1]",
-    "drift[2]",
-    "drift[3]",
-    "drift[4]",
-    "drift[5]",
-    "dac_code[0]",
-    "dac_code[1]",
-    "dac_code[2]",
-    "dac_code[3]",
-    "dac_code[4]",
-    "dac_code[5]",
-    "status",
-];
+pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] =
+    names![; "voltage", "requested", "demand", "level", "drift", "dac_code"; "status"];
 
 /// Names of the settings. `mode` is 0 invhys, 1 ewma, 2 pcc; `setpoint_kind` is 0 pose, 1 leg.
-pub const CONFIG_NAMES: [&str; CONFIG_WORDS] =
-    ["mode", "setpoint_kind", "level_weight", "drift_weight", "run_interval", "max_step_codes", "code_min", "code_max"];
+pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = permitted::NAMES;
 
 /// First word of the code limits in [`CONFIG_NAMES`].
 pub(crate) const CONFIG_CODES: usize = 5;
@@ -80,12 +34,13 @@ impl TickInput {
     /// From words in the order of [`INPUT_NAMES`].
     #[must_use]
     pub fn from_words(words: &[u64; INPUT_WORDS]) -> Self {
-        let mut input = Self { setpoint: [0.0; LEGS], displacement: [0.0; LEGS] };
-        for index in 0..LEGS {
-            input.setpoint[index] = Real::from_word(words[index]);
-            input.displacement[index] = Real::from_word(words[LEGS + index]);
-        }
-        input
+        Self { setpoint: six(words, 0), displacement: six(words, COMMAND_WORDS) }
+    }
+
+    /// Of the words of a command, and of readings as a target has them.
+    #[must_use]
+    pub fn measured(words: &[u64; COMMAND_WORDS], gauge: &[Real; 6]) -> Self {
+        Self { setpoint: six(words, 0), displacement: *gauge }
     }
 }
 

@@ -2,14 +2,19 @@
 //! reads and writes these, so that two of them can be compared bit for bit.
 
 use crate::config::{Environment, damps};
+use crate::machine_words::six;
+use crate::names::names;
 use crate::task_space::MODES_TO_LEGS;
-use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput};
+use crate::{Config, ConfigError, LEGS, Real, State, TickInput, TickOutput, permitted};
 use specgen_runtime::linear::{each, transform};
 use specgen_runtime::setpoint::{Command, CommandKind, Target};
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Real as _};
 
 /// Words of a tick's input.
 pub const INPUT_WORDS: usize = 33;
+
+/// Words of a command: they stand before those that are measured.
+pub const COMMAND_WORDS: usize = 21;
 
 /// Words of a tick's output.
 pub const OUTPUT_WORDS: usize = 55;
@@ -18,182 +23,45 @@ pub const OUTPUT_WORDS: usize = 55;
 pub const CONFIG_WORDS: usize = 55;
 
 /// Names of the input words. `command` is 0 hold, 1 stream, 2 move, 3 trajectory.
-pub const INPUT_NAMES: [&str; INPUT_WORDS] = [
-    "command",
-    "selector",
-    "sequence",
-    "setpoint[0]",
-    "setpoint[1]",
-    "setpoint[2]",
-    "setpoint[3]",
-    "setpoint[4]",
-    "setpoint[5]",
-    "setpoint_rate[0]",
-    "setpoint_rate[1]",
-    "setpoint_rate[2]",
-    "setpoint_rate[3]",
-    "setpoint_rate[4]",
-    "setpoint_rate[5]",
-    "setpoint_acceleration[0]",
-    "setpoint_acceleration[1]",
-    "setpoint_acceleration[2]",
-    "setpoint_acceleration[3]",
-    "setpoint_acceleration[4]",
-    "setpoint_acceleration[5]",
-    "gauge[0]",
-    "gauge[1]",
-    "gauge[2]",
-    "gauge[3]",
-    "gauge[4]",
-    "gauge[5]",
-    "wrench[0]",
-    "wrench[1]",
-    "wrench[2]",
-    "wrench[3]",
-    "wrench[4]",
-    "wrench[5]",
-];
+pub const INPUT_NAMES: [&str; INPUT_WORDS] =
+    names!["command", "selector", "sequence"; "setpoint", "setpoint_rate", "setpoint_acceleration", "gauge", "wrench";];
 
 /// Names of the output words.
-pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] = [
-    "voltage[0]",
-    "voltage[1]",
-    "voltage[2]",
-    "voltage[3]",
-    "voltage[4]",
-    "voltage[5]",
-    "requested[0]",
-    "requested[1]",
-    "requested[2]",
-    "requested[3]",
-    "requested[4]",
-    "requested[5]",
-    "demand[0]",
-    "demand[1]",
-    "demand[2]",
-    "demand[3]",
-    "demand[4]",
-    "demand[5]",
-    "level[0]",
-    "level[1]",
-    "level[2]",
-    "level[3]",
-    "level[4]",
-    "level[5]",
-    "drift[0]",
-    "drift[1]",
-    "drift[2]",
-    "drift[3]",
-    "drift[4]",
-    "drift[5]",
-    "dac_code[0]",
-    "dac_code[1]",
-    "dac_code[2]",
-    "dac_code[3]",
-    "dac_code[4]",
-    "dac_code[5]",
-    "pose[0]",
-    "pose[1]",
-    "pose[2]",
-    "pose[3]",
-    "pose[4]",
-    "pose[5]",
-    "target[0]",
-    "target[1]",
-    "target[2]",
-    "target[3]",
-    "target[4]",
-    "target[5]",
-    "load[0]",
-    "load[1]",
-    "load[2]",
-    "load[3]",
-    "load[4]",
-    "load[5]",
-    "status",
-];
+pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] =
+    names![; "voltage", "requested", "demand", "level", "drift", "dac_code", "pose", "target", "load"; "status"];
 
 /// Names of the settings. `mode` is 0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same. `interaction` is 0
 /// neglected, 1 modelled, 2 measured. `kp`, `ki`, `kv` are the gains of P/F, `position_…` those of P.
-pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = [
-    "mode",
-    "interaction",
-    "level_weight",
-    "drift_weight",
-    "max_step_codes",
-    "code_min",
-    "code_max",
-    "kp[0]",
-    "kp[1]",
-    "kp[2]",
-    "kp[3]",
-    "kp[4]",
-    "kp[5]",
-    "ki[0]",
-    "ki[1]",
-    "ki[2]",
-    "ki[3]",
-    "ki[4]",
-    "ki[5]",
-    "kv[0]",
-    "kv[1]",
-    "kv[2]",
-    "kv[3]",
-    "kv[4]",
-    "kv[5]",
-    "position_kp[0]",
-    "position_kp[1]",
-    "position_kp[2]",
-    "position_kp[3]",
-    "position_kp[4]",
-    "position_kp[5]",
-    "position_ki[0]",
-    "position_ki[1]",
-    "position_ki[2]",
-    "position_ki[3]",
-    "position_ki[4]",
-    "position_ki[5]",
-    "position_kv[0]",
-    "position_kv[1]",
-    "position_kv[2]",
-    "position_kv[3]",
-    "position_kv[4]",
-    "position_kv[5]",
-    "environment_stiffness[0]",
-    "environment_stiffness[1]",
-    "environment_stiffness[2]",
-    "environment_stiffness[3]",
-    "environment_stiffness[4]",
-    "environment_stiffness[5]",
-    "environment_rest[0]",
-    "environment_rest[1]",
-    "environment_rest[2]",
-    "environment_rest[3]",
-    "environment_rest[4]",
-    "environment_rest[5]",
-];
+pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = permitted::NAMES;
 
 /// First word of the weights, of the code limits and of the gains in [`CONFIG_NAMES`].
 pub(crate) const CONFIG_WEIGHTS: usize = 2;
 pub(crate) const CONFIG_CODES: usize = 4;
 pub(crate) const CONFIG_GAINS: usize = 7;
 
-/// First measured word in [`INPUT_NAMES`].
-const INPUT_MEASURED: usize = 21;
 impl TickInput {
     /// From words in the order of [`INPUT_NAMES`].
     #[must_use]
     pub fn from_words(words: &[u64; INPUT_WORDS]) -> Self {
-        Self {
-            command: Command {
-                kind: CommandKind::from_word(words[0]),
-                selector: saturated(words[1]),
-                sequence: saturated(words[2]),
-                target: Target { pose: six(words, 3), rate: six(words, 9), acceleration: six(words, 15) },
-            },
-            gauge: six(words, INPUT_MEASURED),
-            wrench: six(words, INPUT_MEASURED + 6),
-        }
+        let wrench = six(words, COMMAND_WORDS + 6);
+        Self { command: command(words), gauge: six(words, COMMAND_WORDS), wrench }
+    }
+
+    /// Of the words of a command, and of readings as a target has them; it measures no wrench.
+    #[must_use]
+    pub fn measured(words: &[u64; COMMAND_WORDS], gauge: &[Real; 6]) -> Self {
+        Self { command: command(words), gauge: *gauge, wrench: [Real::NAN; 6] }
+    }
+}
+
+/// The command of a tick's first words.
+fn command(words: &[u64]) -> Command<Real> {
+    let [kind, selector, sequence] = *words.first_chunk().unwrap_or(&[0; 3]);
+    Command {
+        kind: CommandKind::from_word(kind),
+        selector: saturated(selector),
+        sequence: saturated(sequence),
+        target: Target { pose: six(words, 3), rate: six(words, 9), acceleration: six(words, 15) },
     }
 }
 
@@ -286,15 +154,6 @@ impl Config {
         }
         words
     }
-}
-
-/// Six numbers from the word `first` on; zero beyond the end.
-fn six(words: &[u64], first: usize) -> [Real; 6] {
-    let mut vector = [0.0; 6];
-    for (value, word) in vector.iter_mut().zip(words.iter().skip(first)) {
-        *value = Real::from_word(*word);
-    }
-    vector
 }
 
 /// A counter from its word.

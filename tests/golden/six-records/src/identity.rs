@@ -23,3 +23,7 @@ pub const SPEC_DIGEST: &str = "f10f257d26a71b96af4cbfdad2cd458c023b0f11bb28f8a41
 
 /// Version of the compiler.
 pub const SPECGEN_VERSION: &str = "0.1.0";
+
+/// Of the description what stands before the names of words, and what stands after them.
+pub(crate) const ABOUT: &str = "name=six-records\ndigest=f10f257d26a71b96af4cbfdad2cd458c023b0f11bb28f8a4113ff8f68cd9319e\nversion=0.1.0\nkind=legs\nscalar_bits=32\nleg_gain=6.31e-7\nperiod=0.0002\ngrid=8\ndrive_range=0.0,100.0\n";
+pub(crate) const BIAS: &str = "";

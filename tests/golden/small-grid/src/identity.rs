@@ -23,3 +23,7 @@ pub const SPEC_DIGEST: &str = "21c80547d7ab21c518d8aefbc507785a06e1dd5c2f6bfeafa
 
 /// Version of the compiler.
 pub const SPECGEN_VERSION: &str = "0.1.0";
+
+/// Of the description what stands before the names of words, and what stands after them.
+pub(crate) const ABOUT: &str = "name=small-grid\ndigest=21c80547d7ab21c518d8aefbc507785a06e1dd5c2f6bfeafad62220002371213\nversion=0.1.0\nkind=legs\nscalar_bits=64\nleg_gain=6.31e-7\nperiod=0.0002\ngrid=8\ndrive_range=0.0,100.0\n";
+pub(crate) const BIAS: &str = "";

@@ -5,7 +5,19 @@
 
 use specgen_runtime::Permitted;
 use specgen_runtime::snapshot::Sizes;
-use crate::Real;
+use crate::{CONFIG_WORDS, Real};
+
+/// Names of the words of the settings.
+pub(crate) const NAMES: [&str; CONFIG_WORDS] = [
+    "mode",
+    "setpoint_kind",
+    "level_weight",
+    "drift_weight",
+    "run_interval",
+    "max_step_codes",
+    "code_min",
+    "code_max",
+];
 
 /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
 /// most `code_max`.
