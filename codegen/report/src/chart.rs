@@ -1,92 +1,64 @@
-//! Charts as data for the page's script: few digits, thinned, so that a report stays small.
+//! What a chart shows. A page's script draws it (`page`), to be zoomed and saved; [`plot`](super::plot) draws it as SVG.
 
-use serde::Serialize;
+use serde_json::{Value, json};
 
 /// Points of a series that is drawn over time.
 const POINTS: usize = 640;
-/// Largest integer that a value is rounded to: what is drawn is finer than a printed page.
+/// Largest integer that a value on an even axis is rounded to: what is drawn is finer than a printed page.
 const STEPS: f64 = 20_000.0;
 
-/// Values of one coordinate.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum Values {
-    /// `a` + `d` k for k below `n`.
-    Even {
-        /// First.
-        a: f64,
-        /// Difference.
-        d: f64,
-        /// How many.
-        n: usize,
-    },
-    /// `k` times integers.
-    Scaled {
-        /// Factor.
-        k: f64,
-        /// Integers.
-        v: Vec<i32>,
-    },
-    /// As they are, none where there is no value.
-    Plain(Vec<Option<f64>>),
-}
-
-impl Values {
-    /// With `STEPS` over the largest magnitude.
-    #[must_use]
-    pub fn scaled(values: &[f64]) -> Self {
-        let largest = values.iter().fold(0.0, |largest: f64, v| if v.abs() > largest { v.abs() } else { largest });
-        let k = short(if largest > 0.0 { largest / STEPS } else { 1.0 });
-        Self::Scaled { k, v: values.iter().map(|v| libm::round(v / k) as i32).collect() }
-    }
-
-    /// Five digits each; for logarithmic axes.
-    #[must_use]
-    pub fn plain(values: &[f64]) -> Self {
-        Self::Plain(values.iter().map(|v| v.is_finite().then(|| short(*v))).collect())
-    }
-}
-
-/// Rounded to five digits.
-fn short(value: f64) -> f64 {
-    format!("{value:.4e}").parse().unwrap_or(value)
-}
-
 /// How a series is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Style {
-    /// A line.
-    Line,
-    /// A dashed line.
-    Dash,
-    /// Dots.
-    Dots,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mark {
+    /// A line of this width, px.
+    Line(f64),
+    /// A dashed line of this width, px.
+    Dashed(f64),
+    /// Dots of this radius, px.
+    Dots(f64),
 }
+
+/// A line as pages draw it; their script chooses sizes.
+pub const LINE: Mark = Mark::Line(1.3);
+/// A dashed line as pages draw it.
+pub const DASHED: Mark = Mark::Dashed(1.6);
+/// Dots as pages draw them.
+pub const DOTS: Mark = Mark::Dots(3.5);
 
 /// Points drawn in one way.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// In the legend.
+    /// For the legend of a page; in a picture an empty name gives no entry.
     pub name: String,
     /// How.
-    pub style: Style,
+    pub mark: Mark,
     /// Number of its colour.
     pub color: usize,
-    /// Of the x axis.
-    pub x: Values,
-    /// Of the y axis.
-    pub y: Values,
+    /// x, y in the units of the axes; a NaN breaks a line.
+    pub points: Vec<[f64; 2]>,
+    /// First x and step of points that are evenly spaced.
+    even: Option<[f64; 2]>,
+}
+
+/// A rectangle in the units of the axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Patch {
+    /// x from, to.
+    pub x: [f64; 2],
+    /// y from, to.
+    pub y: [f64; 2],
+    /// 0 white to 1 dark; none: hatched.
+    pub shade: Option<f64>,
 }
 
 /// An axis.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// What.
     pub label: String,
-    /// In what unit.
+    /// In what unit; may be empty.
     pub unit: String,
-    /// In decades.
+    /// In decades; values that are not positive are not drawn.
     pub log: bool,
 }
 
@@ -102,14 +74,39 @@ impl Axis {
     pub fn log(label: &str, unit: &str) -> Self {
         Self { log: true, ..Self::linear(label, unit) }
     }
+
+    /// Label and unit.
+    #[must_use]
+    pub fn text(&self) -> String {
+        if self.unit.is_empty() { self.label.clone() } else { format!("{} ({})", self.label, self.unit) }
+    }
+
+    fn data(&self) -> Value {
+        json!({ "label": self.label, "unit": self.unit, "log": self.log })
+    }
+
+    /// Values with few digits, so that a page stays small: five in decades, `STEPS` over the largest magnitude on an even axis.
+    fn packed(&self, values: &[f64]) -> Value {
+        if self.log {
+            return json!(values.iter().map(|v| v.is_finite().then(|| short(*v))).collect::<Vec<_>>());
+        }
+        let largest = values.iter().fold(0.0, |largest: f64, v| if v.abs() > largest { v.abs() } else { largest });
+        let k = short(if largest > 0.0 { largest / STEPS } else { 1.0 });
+        json!({ "k": k, "v": values.iter().map(|v| libm::round(v / k) as i32).collect::<Vec<_>>() })
+    }
 }
 
-/// One pair of axes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// Rounded to five digits.
+fn short(value: f64) -> f64 {
+    format!("{value:.4e}").parse().unwrap_or(value)
+}
+
+/// One pair of axes with what is drawn between them.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Chart {
-    /// For file names and the page's own links.
+    /// For file names and the links of a page; empty in a picture.
     pub id: String,
-    /// Above it, with the figure of the paper.
+    /// Above it, with the figure of the paper if there is one.
     pub title: String,
     /// Across.
     pub x: Axis,
@@ -117,20 +114,34 @@ pub struct Chart {
     pub y: Axis,
     /// Later ones on top.
     pub series: Vec<Series>,
+    /// Behind the series; in pictures only.
+    pub patches: Vec<Patch>,
+    /// Entry of the legend for hatched patches, if there are any.
+    pub hatched: Option<String>,
+    /// Fixed limits of y, else those of the series; in pictures only.
+    pub y_limits: Option<[f64; 2]>,
 }
 
 impl Chart {
-    /// Without series.
+    /// A chart with nothing in it.
     #[must_use]
     pub fn new(id: &str, title: &str, x: Axis, y: Axis) -> Self {
-        Self { id: id.to_owned(), title: title.to_owned(), x, y, series: Vec::new() }
+        Self {
+            id: id.to_owned(),
+            title: title.to_owned(),
+            x,
+            y,
+            series: Vec::new(),
+            patches: Vec::new(),
+            hatched: None,
+            y_limits: None,
+        }
     }
 
-    /// Adds points.
+    /// Adds points, in the next colour.
     #[must_use]
-    pub fn with(mut self, name: &str, style: Style, x: Values, y: Values) -> Self {
-        let color = self.series.len();
-        self.series.push(Series { name: name.to_owned(), style, color, x, y });
+    pub fn with(mut self, name: &str, mark: Mark, points: Vec<[f64; 2]>) -> Self {
+        self.series.push(Series { name: name.to_owned(), mark, color: self.series.len(), points, even: None });
         self
     }
 
@@ -146,11 +157,41 @@ impl Chart {
     /// Adds `values` at even times: the first at `start`, `step` apart (s). Long ones are thinned to the lowest and highest
     /// of each stretch, so that no peak is lost.
     #[must_use]
-    pub fn over_time(self, name: &str, style: Style, [start, step]: [f64; 2], values: &[f64]) -> Self {
+    pub fn over_time(self, name: &str, mark: Mark, [start, step]: [f64; 2], values: &[f64]) -> Self {
         let (every, thin) = thinned(values);
-        let x = Values::Even { a: short(start), d: short(step * every), n: thin.len() };
-        self.with(name, style, x, Values::scaled(&thin))
+        let points = thin.iter().enumerate().map(|(k, value)| [start + k as f64 * step * every, *value]).collect();
+        let mut chart = self.with(name, mark, points);
+        if let Some(last) = chart.series.last_mut() {
+            last.even = Some([start, step * every]);
+        }
+        chart
     }
+
+    /// As data of a page's script.
+    #[must_use]
+    pub fn data(&self) -> Value {
+        let series = |one: &Series| {
+            let of = |which: usize| one.points.iter().map(|point| point[which]).collect::<Vec<_>>();
+            let x = match one.even {
+                Some([start, step]) => json!({ "a": short(start), "d": short(step), "n": one.points.len() }),
+                None => self.x.packed(&of(0)),
+            };
+            let style = match one.mark {
+                Mark::Line(_) => "line",
+                Mark::Dashed(_) => "dash",
+                Mark::Dots(_) => "dots",
+            };
+            json!({ "name": one.name, "style": style, "color": one.color, "x": x, "y": self.y.packed(&of(1)) })
+        };
+        let series: Vec<Value> = self.series.iter().map(series).collect();
+        json!({ "id": self.id, "title": self.title, "x": self.x.data(), "y": self.y.data(), "series": series })
+    }
+}
+
+/// Points of two lists.
+#[must_use]
+pub fn pairs(x: &[f64], y: &[f64]) -> Vec<[f64; 2]> {
+    x.iter().zip(y).map(|(x, y)| [*x, *y]).collect()
 }
 
 /// Lowest and highest of stretches, in their order; and how many values one of them stands for.
@@ -195,10 +236,11 @@ mod tests {
     fn short_series_are_as_they_are_and_rounding_is_below_a_pixel() {
         let values: Vec<f64> = (0..POINTS).map(|k| libm::sin(k as f64) * 3e-7).collect();
         assert_eq!(thinned(&values), (1.0, values.clone()));
-        let Values::Scaled { k, v } = Values::scaled(&values) else { panic!("scaled") };
-        for (back, value) in v.iter().zip(&values) {
-            assert!((f64::from(*back) * k - value).abs() <= 3e-7 / STEPS);
+        let axis = Axis::linear("", "");
+        let packed = axis.packed(&values);
+        for (back, value) in packed["v"].as_array().unwrap().iter().zip(&values) {
+            assert!((back.as_f64().unwrap() * packed["k"].as_f64().unwrap() - value).abs() <= 3e-7 / STEPS);
         }
-        assert_eq!(Values::scaled(&[0.0]), Values::Scaled { k: 1.0, v: vec![0] });
+        assert_eq!(axis.packed(&[0.0]), json!({ "k": 1.0, "v": [0] }));
     }
 }

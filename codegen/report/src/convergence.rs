@@ -1,6 +1,6 @@
 //! How the genetic algorithm of Table 3 converges on this spec.
 
-use super::chart::{Axis, Chart, Style, Values};
+use super::chart::{Axis, Chart, DASHED, LINE, pairs};
 use super::section::{Grid, Section};
 use specgen_studies::paper::convergence::Convergence;
 use specgen_studies::paper::printed::TABLE_3;
@@ -19,8 +19,8 @@ pub fn section(found: &Convergence, command: &str) -> Section {
         Axis::linear("strings tried", ""),
         Axis::log("cost", "µm s²"),
     )
-    .with("best so far", Style::Line, Values::scaled(&x), Values::plain(&best))
-    .with("median of the generation", Style::Dash, Values::scaled(&x), Values::plain(&median));
+    .with("best so far", LINE, pairs(&x, &best))
+    .with("median of the generation", DASHED, pairs(&x, &median));
     let charts = if best.iter().any(|cost| cost.is_finite()) { vec![chart] } else { Vec::new() };
     let mut table = Grid::new("Table 3: settings", &["what", "paper", "here"]);
     for row in TABLE_3 {

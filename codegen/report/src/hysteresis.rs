@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use host_sim::plant::{LegParameters, LegPlant, Plant};
 
-use super::chart::{Axis, Chart, Style, Values};
+use super::chart::{Axis, Chart, LINE, pairs};
 use super::section::{Grid, Section};
 use specgen_studies::reproduce::write::digits;
 
@@ -29,8 +29,7 @@ pub fn section(leg: &LegParameters, lowest: f64) -> Section {
         let width = (displacements[3 * SAMPLES / 4] - displacements[SAMPLES / 4]) / travel;
         table.push(vec![format!("{frequency}"), digits(travel), digits(100.0 * width)]);
         let voltages: Vec<f64> = voltages.iter().map(|v| v + lowest).collect();
-        let (x, y) = (Values::scaled(&voltages), Values::scaled(&displacements));
-        chart = chart.with(&format!("{frequency} Hz"), Style::Line, x, y);
+        chart = chart.with(&format!("{frequency} Hz"), LINE, pairs(&voltages, &displacements));
     }
     Section::new("hysteresis", "Rate-dependent hysteresis", "")
         .text("The simulated leg, open loop: amplifier lag, plays with rate-dependent thresholds, creep, asymmetry, resonance. It is not of the controller's model class: no Everett table can hold it. The loop becomes rounder and wider with the rate, as in the paper.")

@@ -1,23 +1,27 @@
 //! A figure for each kind of identification.
 
-use crate::plot::{BLUE, GREY, Mark, ORANGE, PURPLE, Panel, Patch, Scale, figure};
+use crate::chart::{Axis, Chart, Mark, Patch};
+use crate::plot::{BLUE, GREY, ORANGE, PURPLE, figure};
 use specgen_identify::gauge::GaugeReport;
 use specgen_identify::linear::LinearReport;
 use specgen_identify::response::ResponseReport;
 use specgen_identify::stiffness::StiffnessReport;
 use specgen_identify::{GridChoice, Identified, Record, Trace, Validation};
 
-/// Colours of several records.
-const COLORS: [&str; 4] = [BLUE, ORANGE, PURPLE, GREY];
+fn panel(title: &str, x: Axis, y: Axis) -> Chart {
+    Chart::new("", title, x, y)
+}
 
 fn micrometres(trace: &Trace, model: bool) -> Vec<[f64; 2]> {
     let value = |k: usize| if model { trace.measured[k] - trace.residual[k] } else { trace.measured[k] };
     (0..trace.time.len()).map(|k| [trace.drive[k], value(k) * 1e6]).collect()
 }
 
-fn residual(title: &str, trace: &Trace) -> Panel {
+fn residual(title: &str, trace: &Trace) -> Chart {
     let points = trace.time.iter().zip(&trace.residual).map(|(t, r)| [*t, r * 1e9]).collect();
-    Panel::new(title, "time (s)", "measured − model (nm)").with("", PURPLE, Mark::Line(0.8), points)
+    panel(title, Axis::linear("time", "s"), Axis::linear("measured − model", "nm"))
+        .with("", Mark::Line(0.8), points)
+        .colored(PURPLE)
 }
 
 /// Loops against the model, residual, Preisach plane with what was not excited hatched, and the choice of the grid or the
@@ -25,9 +29,9 @@ fn residual(title: &str, trace: &Trace) -> Panel {
 #[must_use]
 pub fn everett(identified: &Identified, choice: Option<&GridChoice>, validation: Option<&Validation>) -> String {
     let (report, trace) = (&identified.report, &identified.trace);
-    let loops = Panel::new("Loops", "drive (V)", "displacement (µm)")
-        .with("measured", BLUE, Mark::Line(2.2), micrometres(trace, false))
-        .with("model", ORANGE, Mark::Line(0.9), micrometres(trace, true));
+    let loops = panel("Loops", Axis::linear("drive", "V"), Axis::linear("displacement", "µm"))
+        .with("measured", Mark::Line(2.2), micrometres(trace, false))
+        .with("model", Mark::Line(0.9), micrometres(trace, true));
     let mut panels = vec![
         loops,
         residual(
@@ -63,9 +67,13 @@ fn shortened(name: &str) -> &str {
     name.rsplit(['/', '\\']).next().unwrap_or(name)
 }
 
-fn plane(identified: &Identified) -> Panel {
+fn plane(identified: &Identified) -> Chart {
     let table = &identified.table;
-    let mut panel = Panel::new("Preisach plane: weight of the cells", "down_threshold (V)", "up_threshold (V)");
+    let mut chart = panel(
+        "Preisach plane: weight of the cells",
+        Axis::linear("down_threshold", "V"),
+        Axis::linear("up_threshold", "V"),
+    );
     let mut largest = 0.0;
     for up in 2..=table.grid {
         for down in 0..up - 1 {
@@ -83,23 +91,23 @@ fn plane(identified: &Identified) -> Panel {
             // The diagonal holds the reversible part, many times heavier.
             let share = if down + 1 == up || largest <= 0.0 { 1.0 } else { table.weight(up, down) / largest };
             // A weight of zero may come out of the nodes a rounding below it.
-            panel.patches.push(cell(up, down, Some(if share > 0.0 { share.sqrt() } else { 0.0 })));
+            chart.patches.push(cell(up, down, Some(if share > 0.0 { share.sqrt() } else { 0.0 })));
         }
     }
     for (up, down) in identified.report.unexcited.iter().flat_map(|r| &r.members) {
-        panel.patches.push(cell(*up, *down, None));
+        chart.patches.push(cell(*up, *down, None));
     }
     let share = 100.0 * (1.0 - identified.report.excited_share);
-    panel.hatched = Some(if share > 0.0 {
+    chart.hatched = Some(if share > 0.0 {
         format!("not excited: {share:.1} % of the cells")
     } else {
         "not excited: none".to_owned()
     });
     let ends = [[table.drive_min; 2], [table.drive_max; 2]];
-    panel.with("up = down", GREY, Mark::Line(1.0), ends.to_vec())
+    chart.with("up = down", Mark::Line(1.0), ends.to_vec()).colored(GREY)
 }
 
-fn curve(choice: &GridChoice) -> Panel {
+fn curve(choice: &GridChoice) -> Chart {
     let points: Vec<[f64; 2]> = choice.scores.iter().map(|s| [s.grid as f64, s.held_out_rms * 1e9]).collect();
     let chosen = points.iter().copied().filter(|p| p[0] == choice.chosen as f64).collect();
     let mut bars = Vec::new();
@@ -109,32 +117,39 @@ fn curve(choice: &GridChoice) -> Panel {
         bars.push([x, (s.held_out_rms + s.standard_error) * 1e9]);
         bars.push([f64::NAN; 2]);
     }
-    Panel::new(&format!("Curves held out: N = {} chosen", choice.chosen), "grid N", "held-out error (nm rms)")
-        .with("standard error to the best", GREY, Mark::Line(1.0), bars)
-        .with("error", BLUE, Mark::Line(1.5), points)
-        .with("chosen", ORANGE, Mark::Dots(5.0), chosen)
+    panel(
+        &format!("Curves held out: N = {} chosen", choice.chosen),
+        Axis::linear("grid N", ""),
+        Axis::linear("held-out error", "nm rms"),
+    )
+    .with("standard error to the best", Mark::Line(1.0), bars)
+    .colored(GREY)
+    .with("error", Mark::Line(1.5), points)
+    .colored(BLUE)
+    .with("chosen", Mark::Dots(5.0), chosen)
+    .colored(ORANGE)
 }
 
 /// Loops with their lines, and gain over frequency. `records` in the order in which they were named.
 #[must_use]
 pub fn linear(report: &LinearReport, records: &[Record]) -> String {
-    let mut loops = Panel::new("Y = ρX + δ", "drive (V)", "displacement (µm)");
-    let mut rest = Panel::new("Distance from the line", "drive (V)", "Y − ρX − δ (nm)");
+    let mut loops = panel("Y = ρX + δ", Axis::linear("drive", "V"), Axis::linear("displacement", "µm"));
+    let mut rest = panel("Distance from the line", Axis::linear("drive", "V"), Axis::linear("Y − ρX − δ", "nm"));
     for (k, relation) in report.relations.iter().enumerate() {
         let Some(record) = records.iter().find(|r| r.shown_as == relation.record) else { continue };
         let inside: Vec<usize> = (0..record.time.len())
             .filter(|&i| record.time[i] >= relation.span[0] && record.time[i] <= relation.span[1])
             .collect();
-        let color = COLORS[k % COLORS.len()];
         let name = format!("{:.4} Hz", relation.frequency);
         let points = inside.iter().map(|&i| [record.drive[i], record.displacement[i] * 1e6]).collect();
-        loops = loops.with(&name, color, Mark::Line(1.2), points);
+        loops = loops.with(&name, Mark::Line(1.2), points).colored(k);
         let off = |i: usize| record.displacement[i] - relation.gain * record.drive[i] - relation.offset;
-        rest =
-            rest.with(&name, color, Mark::Line(1.0), inside.iter().map(|&i| [record.drive[i], off(i) * 1e9]).collect());
+        rest = rest
+            .with(&name, Mark::Line(1.0), inside.iter().map(|&i| [record.drive[i], off(i) * 1e9]).collect())
+            .colored(k);
         let (low, high) = specgen_identify::extent(&inside.iter().map(|&i| record.drive[i]).collect::<Vec<_>>());
         let at = |u: f64| [u, (relation.gain * u + relation.offset) * 1e6];
-        loops = loops.with("", color, Mark::Dashed(1.0), vec![at(low), at(high)]);
+        loops = loops.with("", Mark::Dashed(1.0), vec![at(low), at(high)]).colored(k);
     }
     let gains: Vec<[f64; 2]> = report.relations.iter().map(|r| [r.frequency, r.gain * 1e6]).collect();
     let mut bars = Vec::new();
@@ -144,15 +159,19 @@ pub fn linear(report: &LinearReport, records: &[Record]) -> String {
         bars.push([f64::NAN; 2]);
     }
     let reference = vec![[report.reference_frequency, report.reference_gain * 1e6]];
-    let mut gain = Panel::new("Gain over frequency", "frequency (Hz)", "ρ (µm/V)")
-        .with("± 2 standard errors", GREY, Mark::Line(1.5), bars)
-        .with("ρ", BLUE, Mark::Dots(3.5), gains)
-        .with("reference ρ̂", ORANGE, Mark::Dots(5.0), reference);
-    gain.x_scale = Scale::Log;
+    let gain = panel("Gain over frequency", Axis::log("frequency", "Hz"), Axis::linear("ρ", "µm/V"))
+        .with("± 2 standard errors", Mark::Line(1.5), bars)
+        .colored(GREY)
+        .with("ρ", Mark::Dots(3.5), gains)
+        .colored(BLUE)
+        .with("reference ρ̂", Mark::Dots(5.0), reference)
+        .colored(ORANGE);
     let widths: Vec<[f64; 2]> = report.relations.iter().map(|r| [r.frequency, r.loop_percent]).collect();
-    let mut width =
-        Panel::new("Loop width", "frequency (Hz)", "width (% of range)").with("", BLUE, Mark::Dots(3.5), widths);
-    width.x_scale = Scale::Log;
+    let width = panel("Loop width", Axis::log("frequency", "Hz"), Axis::linear("width", "% of range")).with(
+        "",
+        Mark::Dots(3.5),
+        widths,
+    );
     let subtitle = format!(
         "reference gain {:.5} µm/V at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4}",
         report.reference_gain * 1e6,
@@ -181,8 +200,7 @@ pub fn response(report: &ResponseReport) -> String {
         })
         .collect();
     let hatched: Vec<[f64; 2]> = report.left_out.iter().map(|b| [b.low, b.high]).collect();
-    let logarithmic = |mut panel: Panel, range: [f64; 2]| {
-        panel.x_scale = Scale::Log;
+    let with_gaps = |mut panel: Chart, range: [f64; 2]| {
         panel.patches = hatched.iter().map(|x| Patch { x: *x, y: range, shade: None }).collect();
         panel.hatched = (!hatched.is_empty()).then(|| "left out".to_owned());
         panel
@@ -191,15 +209,14 @@ pub fn response(report: &ResponseReport) -> String {
     let sizes: Vec<f64> =
         shown.iter().filter(|b| inside(b.frequency)).map(|b| size(b.h)).filter(|s| *s > 0.0).collect();
     let range = specgen_identify::extent(&sizes);
-    let mut magnitude = logarithmic(Panel::new("Magnitude", "frequency (Hz)", "|H| (µm/V)"), [range.0, range.1])
-        .with(
-            "measured H1",
-            BLUE,
-            Mark::Dots(1.6),
-            shown.iter().filter(|b| inside(b.frequency)).map(|b| [b.frequency, size(b.h)]).collect(),
-        )
-        .with("model", ORANGE, Mark::Line(1.6), modelled.iter().map(|m| [m.0, m.1 * 1e6]).collect());
-    magnitude.y_scale = Scale::Log;
+    let magnitude =
+        with_gaps(panel("Magnitude", Axis::log("frequency", "Hz"), Axis::log("|H|", "µm/V")), [range.0, range.1])
+            .with(
+                "measured H1",
+                Mark::Dots(1.6),
+                shown.iter().filter(|b| inside(b.frequency)).map(|b| [b.frequency, size(b.h)]).collect(),
+            )
+            .with("model", Mark::Line(1.6), modelled.iter().map(|m| [m.0, m.1 * 1e6]).collect());
     // The measured phase is shown on the sheet nearest to the model's, which does not jump.
     let turn = |b: &&specgen_identify::response::Bin| {
         let (_, phase) = specgen_identify::response::response(&report.fitted, b.frequency);
@@ -208,15 +225,13 @@ pub fn response(report: &ResponseReport) -> String {
         [b.frequency, (phase + off).to_degrees()]
     };
     let lowest = modelled.iter().fold(0.0, |m, p| if p.2 < m { p.2 } else { m }).to_degrees();
-    let phase = logarithmic(Panel::new("Phase", "frequency (Hz)", "phase (°)"), [lowest, 0.0])
-        .with("measured H1", BLUE, Mark::Dots(1.6), shown.iter().filter(|b| inside(b.frequency)).map(turn).collect())
-        .with("model", ORANGE, Mark::Line(1.6), modelled.iter().map(|m| [m.0, m.2.to_degrees()]).collect());
-    let mut coherence = logarithmic(Panel::new("Coherence", "frequency (Hz)", "γ²"), [0.0, 1.05]).with(
-        "",
-        PURPLE,
-        Mark::Line(1.0),
-        shown.iter().map(|b| [b.frequency, b.coherence]).collect(),
-    );
+    let phase = with_gaps(panel("Phase", Axis::log("frequency", "Hz"), Axis::linear("phase", "°")), [lowest, 0.0])
+        .with("measured H1", Mark::Dots(1.6), shown.iter().filter(|b| inside(b.frequency)).map(turn).collect())
+        .with("model", Mark::Line(1.6), modelled.iter().map(|m| [m.0, m.2.to_degrees()]).collect());
+    let mut coherence =
+        with_gaps(panel("Coherence", Axis::log("frequency", "Hz"), Axis::linear("γ²", "")), [0.0, 1.05])
+            .with("", Mark::Line(1.0), shown.iter().map(|b| [b.frequency, b.coherence]).collect())
+            .colored(PURPLE);
     coherence.y_limits = Some([0.0, 1.05]);
     let f = &report.fitted;
     let subtitle = format!(
@@ -248,22 +263,18 @@ pub fn gauge(report: &GaugeReport) -> String {
     let [low, high] = report.volts;
     let line = (0..=200).map(|k| low + (high - low) * f64::from(k) / 200.0).map(|v| [v, value(v) * 1e6]).collect();
     let measured: Vec<[f64; 2]> = report.points.iter().map(|p| [p[0], (value(p[0]) + p[1]) * 1e6]).collect();
-    let calibration = Panel::new("Calibration", "gauge (V)", "reference (µm)")
-        .with("measured", BLUE, Mark::Dots(2.0), measured)
-        .with(&format!("polynomial of degree {}", report.degree), ORANGE, Mark::Line(1.4), line);
-    let rest = Panel::new("Residual", "gauge (V)", "reference − calibration (nm)").with(
-        "",
-        PURPLE,
-        Mark::Dots(2.0),
-        report.points.iter().map(|p| [p[0], p[1] * 1e9]).collect(),
-    );
+    let calibration = panel("Calibration", Axis::linear("gauge", "V"), Axis::linear("reference", "µm"))
+        .with("measured", Mark::Dots(2.0), measured)
+        .with(&format!("polynomial of degree {}", report.degree), Mark::Line(1.4), line);
+    let rest = panel("Residual", Axis::linear("gauge", "V"), Axis::linear("reference − calibration", "nm"))
+        .with("", Mark::Dots(2.0), report.points.iter().map(|p| [p[0], p[1] * 1e9]).collect())
+        .colored(PURPLE);
     let errors: Vec<[f64; 2]> =
         report.held_out_rms.iter().enumerate().map(|(k, e)| [(k + 1) as f64, e * 1e9]).collect();
     let chosen = errors.iter().copied().filter(|p| p[0] == report.degree as f64).collect();
-    let mut degrees = Panel::new("Points held out", "degree", "held-out error (nm rms)")
-        .with("error", BLUE, Mark::Line(1.5), errors)
-        .with("chosen", ORANGE, Mark::Dots(5.0), chosen);
-    degrees.y_scale = Scale::Log;
+    let degrees = panel("Points held out", Axis::linear("degree", ""), Axis::log("held-out error", "nm rms"))
+        .with("error", Mark::Line(1.5), errors)
+        .with("chosen", Mark::Dots(5.0), chosen);
     let subtitle = format!(
         "degree {}; residual {:.2} nm rms, {:.2} nm at most; hysteresis {}; least slope {:.1} % of the mean",
         report.degree,
@@ -281,11 +292,17 @@ pub fn stiffness(report: &StiffnessReport) -> String {
     let measured = report.points.iter().map(|p| [p[0], p[1] * 1e9]).collect();
     let [low, high] = report.force;
     let line = vec![[low, low / report.stiffness * 1e9], [high, high / report.stiffness * 1e9]];
-    let law = Panel::new("Displacement without offset, drift and creep", "force (N)", "displacement (nm)")
-        .with("measured", BLUE, Mark::Dots(1.6), measured)
-        .with("force / k", ORANGE, Mark::Line(1.4), line);
+    let law = panel(
+        "Displacement without offset, drift and creep",
+        Axis::linear("force", "N"),
+        Axis::linear("displacement", "nm"),
+    )
+    .with("measured", Mark::Dots(1.6), measured)
+    .with("force / k", Mark::Line(1.4), line);
     let points = report.time.iter().zip(&report.points).map(|(t, p)| [*t, p[2] * 1e9]).collect();
-    let rest = Panel::new("Residual", "time (s)", "measured − model (nm)").with("", PURPLE, Mark::Line(0.9), points);
+    let rest = panel("Residual", Axis::linear("time", "s"), Axis::linear("measured − model", "nm"))
+        .with("", Mark::Line(0.9), points)
+        .colored(PURPLE);
     let subtitle = format!(
         "k = {:.4} ± {:.4} N/µm; {}",
         report.stiffness * 1e-6,

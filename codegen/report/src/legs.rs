@@ -4,7 +4,7 @@ use host_sim::closed_loop::{RunError, Tracking};
 use host_sim::controller::TickController;
 use host_sim::scenario::{LegScenario, MODES, TRACKING_FREQUENCIES, select};
 
-use super::chart::{Axis, Chart, Style};
+use super::chart::{Axis, Chart, DASHED, LINE};
 use super::motion::TARGETS;
 use super::section::Section;
 use specgen_studies::reproduce;
@@ -39,11 +39,11 @@ pub fn section(
             let tracking = scenario.run(controller, frequency)?.tracking;
             let times = [tracking.interval, tracking.interval];
             let of = |pick: fn([f64; 2]) -> f64| values(&tracking, pick);
-            path = path.over_time(mode, Style::Line, times, &of(|[_, y]| y * 1e6));
-            error = error.over_time(mode, Style::Line, times, &of(|[t, y]| (t - y) * 1e9));
+            path = path.over_time(mode, LINE, times, &of(|[_, y]| y * 1e6));
+            error = error.over_time(mode, LINE, times, &of(|[t, y]| (t - y) * 1e9));
             // On top, for the laws lie on it.
             if mode == "pcc" {
-                path = path.over_time("target T", Style::Dash, times, &of(|[t, _]| t * 1e6)).colored(TARGETS);
+                path = path.over_time("target T", DASHED, times, &of(|[t, _]| t * 1e6)).colored(TARGETS);
             }
         }
         charts.extend([path, error]);

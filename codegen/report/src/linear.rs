@@ -11,7 +11,7 @@ use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen_runtime::Platform;
 use specgen_runtime::setpoint::{REFUSED, STALE};
 
-use super::chart::{Axis, Chart, Style, Values};
+use super::chart::{Axis, Chart, LINE, pairs};
 use super::motion::REFUSED_PATH;
 use super::section::{Grid, Section};
 use specgen_language::model::Actuator;
@@ -47,7 +47,7 @@ pub fn of_legs(
         let last = &tracking.samples[start..];
         let x: Vec<f64> = last.iter().map(|sample| sample.requested[0] / actuator.leg_gain()).collect();
         let y: Vec<f64> = last.iter().map(|sample| sample.measured[0] * 1e6).collect();
-        lines = lines.with(&format!("{frequency} Hz"), Style::Line, Values::scaled(&x), Values::scaled(&y));
+        lines = lines.with(&format!("{frequency} Hz"), LINE, pairs(&x, &y));
     }
     Ok(Section::new("linear", "Linear relation behind the inverse model", command)
         .text("Y against X: a straight line would be a perfect inverse. Its slope over ρ̂ is the λ that the adaptation must stand.")
@@ -110,7 +110,7 @@ pub fn of_platform(
                 let (x, y): (Vec<f64>, Vec<f64>) =
                     points.iter().step_by(every).map(|(x, y)| (x / actuator.leg_gain(), y * 1e6)).unzip();
                 let name = format!("leg {}, {frequency} Hz", leg + 1);
-                lines = lines.with(&name, Style::Line, Values::scaled(&x), Values::scaled(&y));
+                lines = lines.with(&name, LINE, pairs(&x, &y));
             }
         }
     }

@@ -9,7 +9,7 @@ use host_sim::platform::table::MachiningTable;
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen_runtime::setpoint::{REFUSED, STALE};
 
-use super::chart::{Axis, Chart, Style};
+use super::chart::{Axis, Chart, DASHED, LINE};
 use super::motion::{AXES, REFUSED_PATH, TARGETS, change, error};
 use super::section::Section;
 use specgen_studies::reproduce::platform::{MACHINING_FREQUENCY, parts, table_9};
@@ -63,7 +63,7 @@ pub fn section(
                 let law = if combined { "P/F" } else { "P" };
                 let values: Vec<f64> = run.samples.iter().map(|sample| error(sample, axis)).collect();
                 change(&mut errors[turning], |chart| {
-                    chart.over_time(&format!("{label}, {law}"), Style::Line, times, &values).colored(if combined {
+                    chart.over_time(&format!("{label}, {law}"), LINE, times, &values).colored(if combined {
                         axis % 3
                     } else {
                         TARGETS + axis % 3
@@ -75,13 +75,13 @@ pub fn section(
                     let load: Vec<f64> = run.samples.iter().map(|sample| sample.tick.wrench.numbers()[axis]).collect();
                     change(&mut paths[turning], |chart| {
                         chart
-                            .over_time(label, Style::Line, times, &pose)
+                            .over_time(label, LINE, times, &pose)
                             .colored(axis % 3)
-                            .over_time(&format!("{label} target"), Style::Dash, times, &target)
+                            .over_time(&format!("{label} target"), DASHED, times, &target)
                             .colored(TARGETS + axis % 3)
                     });
                     let name = [["Fx", "Fy", "Fz"], ["Tx", "Ty", "Tz"]][turning][axis % 3];
-                    change(&mut wrench[turning], |chart| chart.over_time(name, Style::Line, times, &load));
+                    change(&mut wrench[turning], |chart| chart.over_time(name, LINE, times, &load));
                 }
             }
         }

@@ -9,7 +9,7 @@ use host_sim::platform::table::{PoseRow, PoseTable};
 use host_sim::trajectory::{PaperPose, Reading};
 use specgen_runtime::setpoint::{REFUSED, STALE};
 
-use super::chart::{Axis, Chart, Style};
+use super::chart::{Axis, Chart, DASHED, LINE};
 use super::section::Section;
 use specgen_studies::reproduce::platform::{CASES, FREQUENCIES, tables};
 
@@ -118,7 +118,7 @@ impl Figures {
                 .iter()
                 .map(|sample| libm::sqrt(places.clone().map(|k| error(sample, k) * error(sample, k)).sum()))
                 .collect();
-            change(&mut self.laws[turning], |chart| chart.over_time(mode, Style::Line, times, &norm));
+            change(&mut self.laws[turning], |chart| chart.over_time(mode, LINE, times, &norm));
             if mode != "pf-pcc" {
                 continue;
             }
@@ -127,12 +127,12 @@ impl Figures {
                 let name = AXES[axis];
                 change(&mut self.paths[turning], |chart| {
                     chart
-                        .over_time(name, Style::Line, times, &of(|s, k| s.tick.pose[k] * 1e6))
+                        .over_time(name, LINE, times, &of(|s, k| s.tick.pose[k] * 1e6))
                         .colored(axis % 3)
-                        .over_time(&format!("{name} target"), Style::Dash, times, &of(|s, k| s.target[k] * 1e6))
+                        .over_time(&format!("{name} target"), DASHED, times, &of(|s, k| s.target[k] * 1e6))
                         .colored(TARGETS + axis % 3)
                 });
-                change(&mut self.errors[turning], |chart| chart.over_time(name, Style::Line, times, &of(error)));
+                change(&mut self.errors[turning], |chart| chart.over_time(name, LINE, times, &of(error)));
             }
         }
     }

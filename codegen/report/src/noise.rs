@@ -17,7 +17,7 @@ use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 
 use specgen_runtime::setpoint::{REFUSED, STALE};
 
-use super::chart::{Axis, Chart, Style, Values};
+use super::chart::{Axis, Chart, DASHED, LINE, pairs};
 use super::section::{Grid, Section};
 use super::spectrum::cumulative;
 use specgen_language::model::{Model, TaskSpace};
@@ -192,8 +192,8 @@ fn section(
         let signals: Vec<&[f64]> = one.errors[..translations].iter().map(Vec::as_slice).collect();
         let (frequencies, roots) = cumulative(&signals, interval);
         let roots: Vec<f64> = roots.iter().map(|root| root * 1e9).collect();
-        let style = if one.name == all.name { Style::Dash } else { Style::Line };
-        chart = chart.with(one.name, style, Values::plain(&frequencies), Values::scaled(&roots));
+        let style = if one.name == all.name { DASHED } else { LINE };
+        chart = chart.with(one.name, style, pairs(&frequencies, &roots));
     }
     empty()
         .text("Runs with one source each, less the run without any, on the same path and from the same state. The hysteresis residual is what is left without noise and with a drive converter of 24 bits: hysteresis and creep that model and adaptation do not take up, and the corners of the path. Linear and independent sources would make the last two rows equal.")

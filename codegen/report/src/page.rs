@@ -2,9 +2,8 @@
 
 use std::fmt::Write as _;
 
-use serde_json::json;
-
 use super::chart::Chart;
+use super::plot::escaped;
 use super::section::{Grid, Part, Section};
 
 const STYLE: &str = include_str!("assets/report.css");
@@ -116,27 +115,22 @@ fn write_charts(out: &mut String, charts: &[Chart], data: &mut serde_json::Map<S
             chart.id,
             escaped(&chart.title)
         );
-        data.insert(chart.id.clone(), json!(chart));
+        data.insert(chart.id.clone(), chart.data());
     }
     out.push_str("</div>\n");
-}
-
-/// As text of HTML or of an attribute.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::{Axis, Style, Values};
+    use crate::chart::{Axis, LINE};
 
     fn page() -> String {
-        let chart = Chart::new("a", "x < y", Axis::linear("t", "s"), Axis::linear("</script>", "nm")).with(
+        let chart = Chart::new("a", "x < y", Axis::linear("t", "s"), Axis::linear("</script>", "nm")).over_time(
             "one",
-            Style::Line,
-            Values::Even { a: 0.0, d: 1.0, n: 2 },
-            Values::scaled(&[1.0, 2.0]),
+            LINE,
+            [0.0, 1.0],
+            &[1.0, 2.0],
         );
         let mut table = Grid::new("caption & more", &["a", "b"]);
         table.push(vec!["-1.5".to_owned(), "<b>".to_owned()]);

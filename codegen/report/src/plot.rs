@@ -1,105 +1,23 @@
-//! Plots as SVG: panels with axes and units, drawn without fonts or other files, the same bytes from two runs.
+//! Charts as SVG: side by side, with axes and units, drawn without fonts or other files, the same bytes from two runs.
 
-mod axis;
+mod ruler;
 mod svg;
 
-use std::fmt::Write as _;
-
-use axis::Axis;
-pub use axis::Scale;
+use super::chart::{Chart, Mark, Series};
+use ruler::Ruler;
+pub(crate) use svg::escaped;
 use svg::{Canvas, Hatch};
 
-/// Colours, dark enough on white and distinct without red and green side by side.
-pub const BLUE: &str = "#1f5fa8";
-/// See [`BLUE`].
-pub const ORANGE: &str = "#d9730d";
-/// See [`BLUE`].
-pub const GREY: &str = "#8a8f98";
-/// See [`BLUE`].
-pub const PURPLE: &str = "#7a3fa0";
-
-/// What a series looks like.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Mark {
-    /// A line of this width, px.
-    Line(f64),
-    /// A dashed line of this width, px.
-    Dashed(f64),
-    /// Dots of this radius, px.
-    Dots(f64),
-}
-
-/// Points drawn in one way. An empty name gives no entry in the legend.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Series {
-    /// For the legend.
-    pub name: String,
-    /// CSS colour.
-    pub color: &'static str,
-    /// How.
-    pub mark: Mark,
-    /// x, y in the units of the axes; a NaN breaks a line.
-    pub points: Vec<[f64; 2]>,
-}
-
-/// A rectangle in the units of the axes.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Patch {
-    /// x from, to.
-    pub x: [f64; 2],
-    /// y from, to.
-    pub y: [f64; 2],
-    /// 0 white to 1 dark; none: hatched.
-    pub shade: Option<f64>,
-}
-
-/// One pair of axes.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Panel {
-    /// Above the frame.
-    pub title: String,
-    /// x: what and unit.
-    pub x_label: String,
-    /// y: what and unit.
-    pub y_label: String,
-    /// x scale.
-    pub x_scale: Scale,
-    /// y scale.
-    pub y_scale: Scale,
-    /// Behind the series.
-    pub patches: Vec<Patch>,
-    /// Series, later ones on top.
-    pub series: Vec<Series>,
-    /// Entry of the legend for hatched patches, if there are any.
-    pub hatched: Option<String>,
-    /// Fixed limits of y, else those of the series.
-    pub y_limits: Option<[f64; 2]>,
-}
-
-impl Panel {
-    /// A panel with linear axes and nothing in it.
-    #[must_use]
-    pub fn new(title: &str, x_label: &str, y_label: &str) -> Self {
-        Self {
-            title: title.to_owned(),
-            x_label: x_label.to_owned(),
-            y_label: y_label.to_owned(),
-            x_scale: Scale::Linear,
-            y_scale: Scale::Linear,
-            patches: Vec::new(),
-            series: Vec::new(),
-            hatched: None,
-            y_limits: None,
-        }
-    }
-
-    /// Adds a series.
-    #[must_use]
-    pub fn with(mut self, name: &str, color: &'static str, mark: Mark, points: Vec<[f64; 2]>) -> Self {
-        self.series.push(Series { name: name.to_owned(), color, mark, points });
-        self
-    }
-}
+/// Colours by number, dark enough on white and distinct without red and green side by side.
+const COLORS: [&str; 4] = ["#1f5fa8", "#d9730d", "#7a3fa0", "#8a8f98"];
+/// Number of a colour.
+pub const BLUE: usize = 0;
+/// Number of a colour.
+pub const ORANGE: usize = 1;
+/// Number of a colour.
+pub const PURPLE: usize = 2;
+/// Number of a colour.
+pub const GREY: usize = 3;
 
 const WIDTH: f64 = 620.0;
 const HEIGHT: f64 = 400.0;
@@ -113,11 +31,11 @@ const POINTS: usize = 5000;
 /// Width of a letter of the legend, px: a generous guess, since no font is measured.
 const LETTER: f64 = 6.6;
 
-/// The panels in `columns` columns under a title and a line of text.
+/// The charts in `columns` columns under a title and a line of text.
 #[must_use]
-pub fn figure(title: &str, subtitle: &str, panels: &[Panel], columns: usize) -> String {
+pub fn figure(title: &str, subtitle: &str, charts: &[Chart], columns: usize) -> String {
     let columns = columns.max(1);
-    let rows = panels.len().div_ceil(columns).max(1);
+    let rows = charts.len().div_ceil(columns).max(1);
     let (width, height) = (WIDTH * columns as f64, HEAD + HEIGHT * rows as f64);
     let mut canvas = Canvas::new(width, height);
     canvas.text(LEFT * 0.5, 28.0, 17.0, "start", "#111", title);
@@ -126,9 +44,9 @@ pub fn figure(title: &str, subtitle: &str, panels: &[Panel], columns: usize) -> 
     for (k, line) in broken(subtitle, letters).iter().take(2).enumerate() {
         canvas.text(LEFT * 0.5, 46.0 + 15.0 * k as f64, 12.0, "start", "#555", line);
     }
-    for (k, panel) in panels.iter().enumerate() {
+    for (k, chart) in charts.iter().enumerate() {
         let at = [WIDTH * (k % columns) as f64, HEAD + HEIGHT * (k / columns) as f64];
-        draw(&mut canvas, panel, at, k);
+        draw(&mut canvas, chart, at, k);
     }
     canvas.finish()
 }
@@ -136,14 +54,14 @@ pub fn figure(title: &str, subtitle: &str, panels: &[Panel], columns: usize) -> 
 /// The SVG in a page of its own.
 #[must_use]
 pub fn html(title: &str, svg: &str) -> String {
-    let mut page = String::new();
-    // Writing to a String cannot fail.
-    let _ = write!(
-        page,
+    format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title></head>\n<body>\n{svg}</body></html>\n",
-        svg::escaped(title)
-    );
-    page
+        escaped(title)
+    )
+}
+
+fn color(series: &Series) -> &'static str {
+    COLORS[series.color % COLORS.len()]
 }
 
 fn broken(text: &str, letters: usize) -> Vec<String> {
@@ -157,43 +75,43 @@ fn broken(text: &str, letters: usize) -> Vec<String> {
     lines
 }
 
-fn draw(canvas: &mut Canvas, panel: &Panel, at: [f64; 2], id: usize) {
+fn draw(canvas: &mut Canvas, chart: &Chart, at: [f64; 2], id: usize) {
     let frame = [at[0] + LEFT, at[1] + TOP, WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM];
     let all = |which: usize| {
-        let points = panel.series.iter().flat_map(move |s| s.points.iter().map(move |p| p[which]));
-        let patches = panel.patches.iter().flat_map(move |p| if which == 0 { p.x } else { p.y });
+        let points = chart.series.iter().flat_map(move |s| s.points.iter().map(move |p| p[which]));
+        let patches = chart.patches.iter().flat_map(move |p| if which == 0 { p.x } else { p.y });
         points.chain(patches)
     };
-    let x = Axis::over(all(0), panel.x_scale, None, [frame[0], frame[0] + frame[2]]);
-    let y = Axis::over(all(1), panel.y_scale, panel.y_limits, [frame[1] + frame[3], frame[1]]);
-    canvas.text(frame[0], at[1] + 20.0, 14.0, "start", "#111", &panel.title);
-    legend(canvas, panel, [frame[0], at[1] + 42.0], frame[2]);
+    let x = Ruler::over(all(0), chart.x.log, None, [frame[0], frame[0] + frame[2]]);
+    let y = Ruler::over(all(1), chart.y.log, chart.y_limits, [frame[1] + frame[3], frame[1]]);
+    canvas.text(frame[0], at[1] + 20.0, 14.0, "start", "#111", &chart.title);
+    legend(canvas, chart, [frame[0], at[1] + 42.0], frame[2]);
     canvas.clip(id, frame);
     canvas.open_clipped(id);
-    for patch in &panel.patches {
+    for patch in &chart.patches {
         let (x0, x1, y0, y1) = (x.at(patch.x[0]), x.at(patch.x[1]), y.at(patch.y[1]), y.at(patch.y[0]));
         canvas.patch([x0, y0, x1 - x0, y1 - y0], patch.shade.map_or(Hatch::Lines, Hatch::Shade));
     }
     canvas.close();
     grid(canvas, &x, &y, frame);
     canvas.open_clipped(id);
-    for series in &panel.series {
+    for series in &chart.series {
         let place = |p: &[f64; 2]| [x.at(p[0]), y.at(p[1])];
         let every = series.points.len().div_ceil(POINTS).max(1);
         let points: Vec<[f64; 2]> = series.points.iter().step_by(every).map(place).collect();
         match series.mark {
-            Mark::Line(width) => canvas.line(&points, series.color, width, false),
-            Mark::Dashed(width) => canvas.line(&points, series.color, width, true),
-            Mark::Dots(radius) => canvas.dots(&points, series.color, radius),
+            Mark::Line(width) => canvas.line(&points, color(series), width, false),
+            Mark::Dashed(width) => canvas.line(&points, color(series), width, true),
+            Mark::Dots(radius) => canvas.dots(&points, color(series), radius),
         }
     }
     canvas.close();
     canvas.frame(frame);
-    canvas.text(frame[0] + 0.5 * frame[2], at[1] + HEIGHT - 14.0, 13.0, "middle", "#222", &panel.x_label);
-    canvas.upright(at[0] + 20.0, frame[1] + 0.5 * frame[3], 13.0, &panel.y_label);
+    canvas.text(frame[0] + 0.5 * frame[2], at[1] + HEIGHT - 14.0, 13.0, "middle", "#222", &chart.x.text());
+    canvas.upright(at[0] + 20.0, frame[1] + 0.5 * frame[3], 13.0, &chart.y.text());
 }
 
-fn grid(canvas: &mut Canvas, x: &Axis, y: &Axis, frame: [f64; 4]) {
+fn grid(canvas: &mut Canvas, x: &Ruler, y: &Ruler, frame: [f64; 4]) {
     for tick in x.ticks() {
         let at = x.at(tick.value);
         canvas.rule([at, frame[1]], [at, frame[1] + frame[3]]);
@@ -206,8 +124,8 @@ fn grid(canvas: &mut Canvas, x: &Axis, y: &Axis, frame: [f64; 4]) {
     }
 }
 
-fn legend(canvas: &mut Canvas, panel: &Panel, at: [f64; 2], width: f64) {
-    let named: Vec<&Series> = panel.series.iter().filter(|s| !s.name.is_empty()).collect();
+fn legend(canvas: &mut Canvas, chart: &Chart, at: [f64; 2], width: f64) {
+    let named: Vec<&Series> = chart.series.iter().filter(|s| !s.name.is_empty()).collect();
     let mut left = at[0];
     let mut entry = |name: &str, sample: &mut dyn FnMut(f64)| {
         let wide = 30.0 + LETTER * name.chars().count() as f64 + 12.0;
@@ -224,14 +142,14 @@ fn legend(canvas: &mut Canvas, panel: &Panel, at: [f64; 2], width: f64) {
         let found = entry(&series.name, &mut |x| {
             let ends = [[x, at[1] - 4.0], [x + 22.0, at[1] - 4.0]];
             match series.mark {
-                Mark::Line(_) => canvas.line(&ends, series.color, 2.0, false),
-                Mark::Dashed(_) => canvas.line(&ends, series.color, 2.0, true),
-                Mark::Dots(r) => canvas.dots(&[[x + 11.0, at[1] - 4.0]], series.color, if r > 2.0 { r } else { 2.5 }),
+                Mark::Line(_) => canvas.line(&ends, color(series), 2.0, false),
+                Mark::Dashed(_) => canvas.line(&ends, color(series), 2.0, true),
+                Mark::Dots(r) => canvas.dots(&[[x + 11.0, at[1] - 4.0]], color(series), if r > 2.0 { r } else { 2.5 }),
             }
         });
         texts.extend(found.map(|x| (x, series.name.clone())));
     }
-    if let Some(name) = &panel.hatched {
+    if let Some(name) = &chart.hatched {
         let found = entry(name, &mut |x| canvas.patch([x, at[1] - 11.0, 22.0, 13.0], Hatch::Lines));
         texts.extend(found.map(|x| (x, name.clone())));
     }
@@ -243,13 +161,14 @@ fn legend(canvas: &mut Canvas, panel: &Panel, at: [f64; 2], width: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chart::Axis;
 
     #[test]
     fn a_figure_is_well_formed_and_escapes_its_texts() {
-        let panel = Panel::new("a < b & c", "x (V)", "y (um)")
-            .with("line", BLUE, Mark::Line(1.0), vec![[0.0, 1.0], [1.0, f64::NAN], [2.0, 3.0]])
-            .with("dots", ORANGE, Mark::Dots(2.0), vec![[0.5, 1.5]]);
-        let svg = figure("t", "s", &[panel], 1);
+        let chart = Chart::new("", "a < b & c", Axis::linear("x", "V"), Axis::linear("y", "um"))
+            .with("line", Mark::Line(1.0), vec![[0.0, 1.0], [1.0, f64::NAN], [2.0, 3.0]])
+            .with("dots", Mark::Dots(2.0), vec![[0.5, 1.5]]);
+        let svg = figure("t", "s", &[chart], 1);
         assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n"));
         assert!(svg.contains("a &lt; b &amp; c") && !svg.contains("NaN"));
         assert_eq!(svg.matches("<g").count(), svg.matches("</g>").count());
@@ -258,7 +177,9 @@ mod tests {
     #[test]
     fn empty_and_constant_series_have_axes_all_the_same() {
         for points in [vec![], vec![[1.0, 5.0]], vec![[1.0, 0.0], [1.0, 0.0]]] {
-            let svg = figure("t", "s", &[Panel::new("p", "x", "y").with("a", BLUE, Mark::Line(1.0), points)], 1);
+            let chart =
+                Chart::new("", "p", Axis::linear("x", ""), Axis::linear("y", "")).with("a", Mark::Line(1.0), points);
+            let svg = figure("t", "s", &[chart], 1);
             assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
         }
     }

@@ -2,7 +2,7 @@
 
 use host_sim::controller::{ControllerError, TickController};
 
-use super::chart::{Axis, Chart, Style, Values};
+use super::chart::{Axis, Chart, DASHED, DOTS, LINE, pairs};
 use super::section::{Grid, Section};
 use specgen_compiler::compile::Compiled;
 use specgen_studies::paper::region::{jury, limits, printed};
@@ -28,22 +28,16 @@ pub fn section(compiled: &Compiled, controller: Option<&mut dyn TickController>)
     for drift in DRIFTS {
         let limits: Vec<f64> = levels.iter().map(|level| jury(*level, drift)).collect();
         let name = drift.map_or_else(|| "EWMA".to_owned(), |drift| format!("PCC, ω2 = {drift}"));
-        chart = chart.with(&name, Style::Line, Values::scaled(&levels), Values::plain(&limits));
+        chart = chart.with(&name, LINE, pairs(&levels, &limits));
     }
-    let as_printed = [printed(levels[0], None); 2];
-    chart =
-        chart.with("(AII.18) as printed", Style::Dash, Values::scaled(&[levels[0], 1.0]), Values::plain(&as_printed));
+    let as_printed = printed(levels[0], None);
+    chart = chart.with("(AII.18) as printed", DASHED, vec![[levels[0], as_printed], [1.0, as_printed]]);
     let adaptation = &compiled.model.adaptation;
     let weights = compiled.design.as_ref().map_or([adaptation.level_weight, adaptation.drift_weight], |design| {
         [design.combined.level_bandwidth, design.combined.drift_bandwidth].map(|x| x * compiled.model.timing.period)
     });
     let highest = adaptation.gain_ratio[1];
-    chart = chart.with(
-        "this spec: weight and upper end of gain_ratio",
-        Style::Dots,
-        Values::scaled(&[weights[0]]),
-        Values::plain(&[highest]),
-    );
+    chart = chart.with("this spec: weight and upper end of gain_ratio", DOTS, vec![[weights[0], highest]]);
     let mut section = Section::new("region", "Stability region of the adaptation", "")
         .text("Below a curve the run-to-run law is stable on a leg that answers at once. With amplifier lag and modes the limit is lower: that is what the compiler checks, see margins.");
     let mut table = None;
@@ -70,8 +64,8 @@ pub fn section(compiled: &Compiled, controller: Option<&mut dyn TickController>)
                 digits(limit.emitted / limit.jury),
             ]);
         }
-        let (x, y): (Vec<f64>, Vec<f64>) = found.iter().map(|limit| (limit.level, limit.emitted)).unzip();
-        chart = chart.with("emitted controller", Style::Dots, Values::scaled(&x), Values::plain(&y));
+        let settled = found.iter().map(|limit| [limit.level, limit.emitted]).collect();
+        chart = chart.with("emitted controller", DOTS, settled);
         table = Some(grid);
     }
     section = section.charts(vec![chart]);

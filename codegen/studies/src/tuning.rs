@@ -3,7 +3,7 @@
 //! ```text
 //! spec → space (what may change) → relay test → start ─┐
 //!                genetic | cma: ask ─→ feasible (margins) ─→ evaluate (simulation) ─→ tell
-//!                                      └ archive: history, best, front ─→ write (spec), report, plot
+//!                                      └ archive: history, best, front ─→ write (spec)
 //! ```
 //! Settings are words of the controller's `Config`: nothing is built per candidate. What breaks a margin is rejected
 //! before it is simulated, what meets a limit of voltage or stroke while it is; neither is scored.
@@ -13,7 +13,6 @@ pub mod evaluate;
 pub mod feasible;
 pub mod front;
 pub mod genetic;
-pub mod plot;
 pub mod relay;
 pub mod search;
 pub mod setting;

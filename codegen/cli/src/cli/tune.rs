@@ -26,7 +26,7 @@ use specgen_studies::tuning::search::Progress;
 use specgen_studies::tuning::space::GivenBounds;
 use specgen_studies::tuning::{
     Candidate, Case, Conditions, Optimiser, Score, Search, SearchOptions, Setting, Space, TrajectoryChoice, What,
-    front, plot, write,
+    front, write,
 };
 
 /// Arguments of `tune`.
@@ -384,14 +384,14 @@ impl Job<'_> {
     ) -> Vec<(String, Vec<u8>)> {
         let best = front::front(all);
         let axes = if self.compiled.model.task_space.is_some() {
-            ["effort: motion asked for by feedback, nm rms", "pose error, nm rms (angles at the joints' radius)"]
+            ["effort: motion asked for by feedback", "pose error, angles at the joints' radius"]
         } else {
-            ["effort: change of the estimates per tick, nm rms", "leg error, nm rms"]
+            ["effort: change of the estimates per tick", "leg error"]
         };
         let title = format!("{}: {} candidates, front of error against effort", self.compiled.ir.name, all.len());
         let mut files = vec![
             ("front.csv".to_owned(), front::to_csv(&best, &self.space).into_bytes()),
-            ("front.svg".to_owned(), plot::svg(&title, axes, all, &best, marks).into_bytes()),
+            ("front.svg".to_owned(), specgen_report::front::svg(&title, axes, all, &best, marks).into_bytes()),
             ("front.json".to_owned(), format!("{:#}\n", json!(best)).into_bytes()),
             ("report.json".to_owned(), format!("{value:#}\n").into_bytes()),
         ];

@@ -134,7 +134,7 @@ impl Canvas {
     }
 }
 
-/// With the four characters that mean something in XML replaced.
-pub(super) fn escaped(text: &str) -> String {
+/// With the four characters that mean something in XML and HTML replaced.
+pub(crate) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

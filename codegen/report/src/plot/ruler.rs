@@ -1,17 +1,8 @@
-//! Linear and logarithmic axes with round ticks.
-
-/// Kind of an axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scale {
-    /// Even.
-    Linear,
-    /// Decades; values that are not positive are not drawn.
-    Log,
-}
+//! Linear and logarithmic rulers with round ticks.
 
 /// Values to pixels.
-pub(super) struct Axis {
-    scale: Scale,
+pub(super) struct Ruler {
+    log: bool,
     low: f64,
     high: f64,
     pixels: [f64; 2],
@@ -23,15 +14,15 @@ pub(super) struct Tick {
     pub(super) label: String,
 }
 
-impl Axis {
+impl Ruler {
     /// Over all finite `values`, with a little room, or over `limits`.
     pub(super) fn over(
         values: impl Iterator<Item = f64>,
-        scale: Scale,
+        log: bool,
         limits: Option<[f64; 2]>,
         pixels: [f64; 2],
     ) -> Self {
-        let fits = |v: &f64| v.is_finite() && (scale == Scale::Linear || *v > 0.0);
+        let fits = |v: &f64| v.is_finite() && (!log || *v > 0.0);
         let (mut low, mut high) = values.filter(fits).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
             (if v < a { v } else { a }, if v > b { v } else { b })
         });
@@ -41,7 +32,7 @@ impl Axis {
         if low > high {
             (low, high) = (1.0, 10.0);
         }
-        if scale == Scale::Log {
+        if log {
             (low, high) = (libm::log10(low), libm::log10(high));
         }
         if high - low <= 1e-12 * high.abs().max(low.abs()).max(1e-300) {
@@ -49,24 +40,21 @@ impl Axis {
             (low, high) = (low - room, high + room);
         }
         let room = if limits.is_some() { 0.0 } else { 0.03 * (high - low) };
-        Self { scale, low: low - room, high: high + room, pixels }
+        Self { log, low: low - room, high: high + room, pixels }
     }
 
     /// Pixel of `value`; NaN for what cannot be drawn.
     pub(super) fn at(&self, value: f64) -> f64 {
-        let value = match self.scale {
-            Scale::Linear => value,
-            Scale::Log if value > 0.0 => libm::log10(value),
-            Scale::Log => f64::NAN,
+        let value = match self.log {
+            false => value,
+            true if value > 0.0 => libm::log10(value),
+            true => f64::NAN,
         };
         self.pixels[0] + (value - self.low) / (self.high - self.low) * (self.pixels[1] - self.pixels[0])
     }
 
     pub(super) fn ticks(&self) -> Vec<Tick> {
-        match self.scale {
-            Scale::Linear => linear(self.low, self.high),
-            Scale::Log => logarithmic(self.low, self.high),
-        }
+        if self.log { logarithmic(self.low, self.high) } else { linear(self.low, self.high) }
     }
 }
 
