@@ -22,6 +22,7 @@ mod report;
 mod reproduce;
 mod robust;
 mod sim;
+mod table;
 mod tune;
 mod ui;
 
@@ -30,10 +31,12 @@ use std::process::ExitCode;
 
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
+use serde::Serialize;
 
+use specgen_compiler::ir::Ir;
 use specgen_language::interrupt;
 use specgen_toolchain as target;
-use ui::{Failure, Ui};
+use ui::{Failure, Outcome, Ui};
 
 /// Compiles one description of a piezo-driven Stewart platform into a `no_std` Rust controller.
 #[derive(Parser, Debug)]
@@ -191,9 +194,19 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
     error.exit()
 }
 
+/// Every constant of a controller.
+#[derive(Serialize)]
+struct Constants<'a>(&'a Ir);
+
+impl Outcome for Constants<'_> {
+    fn text(&self) -> String {
+        specgen_compiler::workspace::ir_text(self.0)
+    }
+}
+
 fn dump_ir(spec: &std::path::Path, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = specgen_compiler::compile::compile(spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
-    ui.result(&specgen_compiler::workspace::ir_text(&compiled.ir), serde_json::json!(compiled.ir));
+    ui.result(&Constants(&compiled.ir));
     Ok(())
 }

@@ -14,15 +14,15 @@ use specgen_language::model::Model;
 /// Ticks that are simulated at once at most: of a controller that was away for longer the rest is left out.
 const MOST_TICKS: u64 = 200_000;
 
-/// A prepared machine.
-pub enum Machine {
+/// A prepared plant.
+pub enum Plant {
     /// Six gauges see a platform.
     Platform(Box<PlatformRig>),
     /// Six legs, each with its own gauge.
     Legs(Box<Rig<LegPlant>>),
 }
 
-impl Machine {
+impl Plant {
     fn hold(&mut self, voltages: &[f64; CHANNELS], interval: f64) {
         match self {
             Self::Platform(rig) => rig.hold(voltages, interval),
@@ -39,9 +39,9 @@ impl Machine {
     }
 }
 
-/// The machine with its converters and its place in time.
+/// The plant with its converters and its place in time.
 pub struct Served {
-    machine: Machine,
+    plant: Plant,
     gauges: ir::GaugeConverter,
     volts_at_zero: f64,
     volts_per_code: f64,
@@ -61,13 +61,13 @@ pub struct Served {
 }
 
 impl Served {
-    /// The machine of a spec, with amplifiers off.
+    /// The plant of a spec, with amplifiers off.
     #[must_use]
-    pub fn new(machine: Machine, model: &Model, ir: &Ir) -> Self {
+    pub fn new(plant: Plant, model: &Model, ir: &Ir) -> Self {
         let [low, high] = model.actuator.voltage;
         let rest = Model::nearest_to_zero(low, high);
         Self {
-            machine,
+            plant,
             gauges: ir.gauge_converter.clone(),
             volts_at_zero: ir.actuation.volts_at_zero,
             volts_per_code: ir.actuation.volts_per_code,
@@ -104,7 +104,7 @@ impl Served {
         match self.last {
             Some(last) if last.tick == self.tick => last,
             _ => {
-                let (gauges, wrench) = self.machine.read();
+                let (gauges, wrench) = self.plant.read();
                 let codes = gauges.map(|value| self.code(value));
                 let sensing =
                     Sensing { session: self.session, tick: self.tick, codes, wrench: wrench.map(f64::to_bits) };
@@ -117,7 +117,7 @@ impl Served {
     fn go_on_to(&mut self, tick: u64) {
         let count = tick.saturating_sub(self.tick);
         for _ in 0..count.min(MOST_TICKS) {
-            self.machine.hold(&self.held, self.period);
+            self.plant.hold(&self.held, self.period);
             self.ticks += 1;
         }
         self.tick += count;

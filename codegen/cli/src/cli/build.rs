@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::controller::{Controller, TickController};
 use serde::Serialize;
-use serde_json::json;
 
 use super::check::describe;
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Compiled};
 use specgen_compiler::workspace;
+use specgen_language::model;
 use specgen_studies::verify::{self, Inspection, Measurement};
 use specgen_toolchain as target;
 use specgen_toolchain::budget::{self, group};
@@ -40,7 +40,6 @@ pub struct Arguments {
     require_target: bool,
 }
 
-/// What was made.
 #[derive(Debug, Serialize)]
 struct Summary {
     name: String,
@@ -56,6 +55,18 @@ struct Summary {
     /// What was left out, why, and what brings it.
     missing: Option<String>,
     over_budget: Vec<String>,
+    /// Of the controller's scalar.
+    #[serde(skip)]
+    bits: u32,
+    /// Cells per axis of its tables.
+    #[serde(skip)]
+    grid: usize,
+    /// What identification and the stability check found.
+    #[serde(skip)]
+    found: String,
+    /// Part and budget of the spec.
+    #[serde(skip)]
+    limits: model::Target,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
@@ -93,19 +104,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Err(failure) => return Err(failure),
     };
     summary.over_budget = over_budget(&compiled, &summary);
-    let text = summary.text(&compiled);
-    let failure = match (summary.verdict(), refused) {
-        (Some(message), _) => Failure::Judged { message, result: json!(summary) },
-        (None, Some(message)) => Failure::Incomplete { message, result: json!(summary) },
-        (None, None) => {
-            ui.result(&text, json!(summary));
-            return Ok(());
-        }
-    };
-    if !ui.is_json() {
-        ui.out(&text);
+    match (summary.verdict(), refused) {
+        (None, Some(message)) => Err(Failure::Incomplete { message, result: ui.shown(&summary) }),
+        (failed, _) => ui.judged(&summary, failed),
     }
-    Err(failure)
 }
 
 /// Host library, image, and the exercise on both.
@@ -149,6 +151,10 @@ impl Summary {
             image: None,
             missing: None,
             over_budget: Vec::new(),
+            bits: compiled.ir.scalar.bits(),
+            grid: hysteresis.grid,
+            found: describe(compiled),
+            limits: compiled.model.target.clone(),
         }
     }
 
@@ -170,26 +176,21 @@ impl Summary {
         }
         (!self.over_budget.is_empty()).then(|| format!("over budget: {}", self.over_budget.join("; ")))
     }
+}
 
-    fn text(&self, compiled: &Compiled) -> String {
+impl Outcome for Summary {
+    fn text(&self) -> String {
         let mut out = String::new();
-        let target = &compiled.model.target;
+        let target = &self.limits;
         // Writing to a String cannot fail.
-        let _ = writeln!(
-            out,
-            "{} → {} (f{}, digest {})",
-            self.name,
-            self.output,
-            compiled.ir.scalar.bits(),
-            &self.digest[..16]
-        );
-        out.push_str(&describe(compiled));
+        let _ = writeln!(out, "{} → {} (f{}, digest {})", self.name, self.output, self.bits, &self.digest[..16]);
+        out.push_str(&self.found);
         let _ = writeln!(
             out,
             "  tables: {} Everett table{} of N = {}, {} bytes",
             self.tables,
             if self.tables == 1 { "" } else { "s" },
-            compiled.ir.hysteresis.grid,
+            self.grid,
             group(self.table_bytes as u64)
         );
         if let Some(library) = &self.host_library {

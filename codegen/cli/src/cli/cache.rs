@@ -1,9 +1,9 @@
 //! `specgen cache`: what is kept of earlier builds.
 
 use clap::Args;
-use serde_json::json;
+use serde::Serialize;
 
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use specgen_toolchain::budget::group;
 use specgen_toolchain::cache::{Cache, LIMIT};
 use specgen_toolchain::user_cache::VARIABLE;
@@ -17,29 +17,51 @@ pub struct Arguments {
     clear: bool,
 }
 
+#[derive(Serialize)]
+struct Kept {
+    /// None if nothing is kept for this user.
+    folder: Option<String>,
+    builds: usize,
+    bytes: u64,
+    limit: u64,
+    removed: usize,
+    /// Their bytes, where they were to be removed.
+    #[serde(skip)]
+    cleared: Option<u64>,
+}
+
+impl Outcome for Kept {
+    fn text(&self) -> String {
+        let builds = |count: usize| format!("{count} build{}", if count == 1 { "" } else { "s" });
+        match (&self.folder, self.cleared) {
+            (None, _) => format!("no builds are kept: {VARIABLE} is set and empty, or there is no home folder\n"),
+            (Some(folder), Some(bytes)) => {
+                format!("removed {}, {} bytes, from {folder}\n", builds(self.removed), group(bytes))
+            }
+            (Some(folder), None) => format!(
+                "{folder}: {}, {} of at most {} bytes; what was used longest ago goes first\n",
+                builds(self.builds),
+                group(self.bytes),
+                group(self.limit)
+            ),
+        }
+    }
+}
+
 pub fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
-    let Some(cache) = Cache::of_user() else {
-        let text = format!("no builds are kept: {VARIABLE} is set and empty, or there is no home folder\n");
-        ui.result(&text, json!({ "folder": null, "builds": 0, "bytes": 0, "limit": LIMIT, "removed": 0 }));
-        return Ok(());
-    };
-    let removed = if arguments.clear { Some(cache.clear()?) } else { None };
-    let extent = cache.extent()?;
-    let shown = cache.folder().display();
-    let builds = |count: usize| format!("{count} build{}", if count == 1 { "" } else { "s" });
-    let text = match removed {
-        Some(removed) => format!("removed {}, {} bytes, from {shown}\n", builds(removed.builds), group(removed.bytes)),
-        None => format!(
-            "{shown}: {}, {} of at most {} bytes; what was used longest ago goes first\n",
-            builds(extent.builds),
-            group(extent.bytes),
-            group(LIMIT)
-        ),
-    };
-    let removed = removed.map_or(0, |removed| removed.builds);
-    let result = json!({
-        "folder": shown.to_string(), "builds": extent.builds, "bytes": extent.bytes, "limit": LIMIT, "removed": removed,
-    });
-    ui.result(&text, result);
+    let mut kept = Kept { folder: None, builds: 0, bytes: 0, limit: LIMIT, removed: 0, cleared: None };
+    if let Some(cache) = Cache::of_user() {
+        let removed = if arguments.clear { Some(cache.clear()?) } else { None };
+        let extent = cache.extent()?;
+        kept = Kept {
+            folder: Some(cache.folder().display().to_string()),
+            builds: extent.builds,
+            bytes: extent.bytes,
+            removed: removed.as_ref().map_or(0, |removed| removed.builds),
+            cleared: removed.map(|removed| removed.bytes),
+            ..kept
+        };
+    }
+    ui.result(&kept);
     Ok(())
 }

@@ -4,12 +4,19 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
+use serde::Serialize;
 
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use crate::{lint, precision, reach, stability};
 use specgen_compiler::compile::{self, Compiled, Refused};
-use specgen_compiler::lower::setpoint;
+use specgen_compiler::lint::paths::PathDemand;
+use specgen_compiler::lower::PoseNoise;
+use specgen_compiler::lower::setpoint::{self, Stopping};
+use specgen_compiler::precision::Precision;
+use specgen_compiler::reach::Reach;
+use specgen_compiler::stability::Margins;
+use specgen_compiler::stability::platform::Design;
+use specgen_identify::Report;
 
 /// Arguments of `check`.
 #[derive(Args, Debug)]
@@ -17,6 +24,32 @@ use specgen_compiler::lower::setpoint;
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,
+}
+
+/// A good spec and what is known of it.
+#[derive(Serialize)]
+struct Checked<'a> {
+    name: &'a str,
+    digest: &'a str,
+    margins: &'a Option<Margins>,
+    design: &'a Option<Design>,
+    reach: &'a Option<Reach>,
+    pose_noise: &'a Option<PoseNoise>,
+    records: &'a [Option<Report>],
+    trajectories: &'a [PathDemand],
+    stops: &'a [Stopping],
+    precision: &'a Precision,
+    precision_ratio: Ratio,
+    #[serde(skip)]
+    compiled: &'a Compiled,
+}
+
+/// Bounds of rounding errors over the largest ones found.
+#[derive(Serialize)]
+struct Ratio {
+    legs: [Option<f64>; 6],
+    commanded: [Option<f64>; 6],
+    measured: Option<[Option<f64>; 6]>,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
@@ -28,18 +61,33 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     findings.extend(lint::estimated(&compiled.model));
     findings.extend(compiled.reach.iter().flat_map(|reach| reach::notes(&compiled.model, reach)));
     ui.findings(Some(&compiled.source), &findings);
-    let text = format!(
-        "{} is good\n{}{}",
-        compiled.source.display_name,
-        describe(&compiled),
-        precision::describe(&precision, compiled.ir.scalar)
-    );
-    ui.result(&text, json!({ "name": compiled.ir.name, "digest": compiled.ir.digest, "margins": compiled.margins, "design": compiled.design, "reach": compiled.reach, "pose_noise": compiled.pose_noise, "records": compiled.records, "trajectories": compiled.demands, "stops": compiled.stops, "precision": precision, "precision_ratio": {
-        "legs": precision.legs.ratio(),
-        "commanded": precision.commanded.ratio(),
-        "measured": precision.measured.map(|figures| figures.ratio()),
-    } }));
+    let ratio = Ratio {
+        legs: precision.legs.ratio(),
+        commanded: precision.commanded.ratio(),
+        measured: precision.measured.map(|figures| figures.ratio()),
+    };
+    ui.result(&Checked {
+        name: &compiled.ir.name,
+        digest: &compiled.ir.digest,
+        margins: &compiled.margins,
+        design: &compiled.design,
+        reach: &compiled.reach,
+        pose_noise: &compiled.pose_noise,
+        records: &compiled.records,
+        trajectories: &compiled.demands,
+        stops: &compiled.stops,
+        precision: &precision,
+        precision_ratio: ratio,
+        compiled: &compiled,
+    });
     Ok(())
+}
+
+impl Outcome for Checked<'_> {
+    fn text(&self) -> String {
+        let precision = precision::describe(self.precision, self.compiled.ir.scalar);
+        format!("{} is good\n{}{precision}", self.compiled.source.display_name, describe(self.compiled))
+    }
 }
 
 /// What identification and the stability check found, a line each.

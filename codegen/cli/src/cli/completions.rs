@@ -2,9 +2,9 @@
 
 use clap::Args;
 use clap_complete::Shell;
-use serde_json::json;
+use serde::Serialize;
 
-use super::ui::Ui;
+use super::ui::{Outcome, Ui};
 
 /// Arguments of `completions`.
 #[derive(Args, Debug)]
@@ -15,10 +15,22 @@ pub struct Arguments {
     shell: Shell,
 }
 
+#[derive(Serialize)]
+struct Completions {
+    shell: String,
+    script: String,
+}
+
+impl Outcome for Completions {
+    fn text(&self) -> String {
+        self.script.clone()
+    }
+}
+
 /// Prints the script for `command`.
 pub fn run(arguments: &Arguments, mut command: clap::Command, ui: &Ui) {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "specgen", &mut script);
-    let script = String::from_utf8_lossy(&script);
-    ui.result(&script, json!({ "shell": arguments.shell.to_string(), "script": script }));
+    let script = String::from_utf8_lossy(&script).into_owned();
+    ui.result(&Completions { shell: arguments.shell.to_string(), script });
 }

@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
-use specgen_rt::histogram::time_text;
+use serde::Serialize;
+use specgen_rt::histogram::{Histogram, time_text};
 
 use super::sim::environment;
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
-use specgen_operate::doctor::latency::{self, Measured};
+use specgen_operate::doctor::latency::{self, Figures, Measured};
 use specgen_operate::doctor::{Files, Finding, Grade, equipment, system};
 
 /// Period of the measurement without a spec, ns: 10 kHz.
@@ -54,38 +54,58 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     findings.extend(equipment::tools());
 
     let (grade, verdict) = judge(&measured, period);
-    let mut text = String::new();
-    for finding in &findings {
-        // Writing to a String cannot fail, here and below.
-        let _ = writeln!(text, "{} {:<17} {}", mark(finding.grade), finding.subject, finding.found);
-        if let Some(fix) = &finding.fix {
-            let _ = writeln!(text, "{:27}→ {fix}", "");
-        }
-    }
-    let _ = writeln!(text, "wake-ups, from the planned time to running");
-    let quantiles = [(0.5, "median"), (0.99, "99 %"), (0.999, "99.9 %")];
-    let shares = quantiles.map(|(share, name)| format!("{name} {}", time_text(measured.delays.quantile(share))));
-    let _ = writeln!(text, "  {}, longest {}", shares.join(", "), time_text(measured.delays.largest()));
-    text += &measured.delays.to_text();
-    let _ = writeln!(text, "{} {verdict}", mark(grade));
-
-    let value = json!({
-        "period_ns": period,
-        "findings": findings,
-        "latency": measured.figures(),
-        "processors_kept_awake": measured.awake,
-        "preempted": measured.preempted,
-        "verdict": { "grade": grade, "text": verdict },
-    });
+    let report = Report {
+        period_ns: period,
+        findings,
+        latency: measured.figures(),
+        processors_kept_awake: measured.awake,
+        preempted: measured.preempted,
+        verdict: Verdict { grade, text: verdict },
+        delays: measured.delays,
+    };
     // Without a spec nothing is asked for that could be refused.
-    if grade == Grade::Bad && arguments.spec.is_some() {
-        if !ui.is_json() {
-            ui.out(&text);
+    let failed = (grade == Grade::Bad && arguments.spec.is_some()).then(|| report.verdict.text.clone());
+    ui.judged(&report, failed)
+}
+
+/// What was found on this computer.
+#[derive(Serialize)]
+struct Report {
+    period_ns: u64,
+    findings: Vec<Finding>,
+    latency: Figures,
+    processors_kept_awake: bool,
+    preempted: u64,
+    verdict: Verdict,
+    /// From the planned time to running, ns.
+    #[serde(skip)]
+    delays: Histogram,
+}
+
+#[derive(Serialize)]
+struct Verdict {
+    grade: Grade,
+    text: String,
+}
+
+impl Outcome for Report {
+    fn text(&self) -> String {
+        let mut text = String::new();
+        for finding in &self.findings {
+            // Writing to a String cannot fail, here and below.
+            let _ = writeln!(text, "{} {:<17} {}", mark(finding.grade), finding.subject, finding.found);
+            if let Some(fix) = &finding.fix {
+                let _ = writeln!(text, "{:27}→ {fix}", "");
+            }
         }
-        return Err(Failure::Judged { message: verdict, result: value });
+        let _ = writeln!(text, "wake-ups, from the planned time to running");
+        let Figures { p50_ns, p99_ns, p999_ns, max_ns, .. } = self.latency;
+        let [median, p99, p999, longest] = [p50_ns, p99_ns, p999_ns, max_ns].map(time_text);
+        let _ = writeln!(text, "  median {median}, 99 % {p99}, 99.9 % {p999}, longest {longest}");
+        text += &self.delays.to_text();
+        let _ = writeln!(text, "{} {}", mark(self.verdict.grade), self.verdict.text);
+        text
     }
-    ui.result(&text, value);
-    Ok(())
 }
 
 fn management(measured: &Measured) -> Finding {

@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::controller::{Controller, Dynamics};
 use nalgebra::{Rotation3, Vector3};
+use serde::Serialize;
 use serde_json::{Value, json};
 use specgen_runtime::Motion;
 
 use super::file::write_file;
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Compiled};
 use specgen_compiler::lower;
 use specgen_compiler::workspace;
@@ -92,13 +93,31 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     });
     match &arguments.output {
         Some(path) => {
-            write_file(path, format!("{document:#}\n").as_bytes())?;
-            let text = format!("wrote {} states to {}\n", states.len(), path.display());
-            ui.result(&text, json!({ "states": states.len(), "file": path.display().to_string() }));
+            write_file(path, document.text().as_bytes())?;
+            ui.result(&Written { states: states.len(), file: path.display().to_string() });
         }
-        None => ui.result(&format!("{document:#}\n"), document),
+        None => ui.result(&document),
     }
     Ok(())
+}
+
+/// What has no other text is shown as JSON.
+impl Outcome for Value {
+    fn text(&self) -> String {
+        format!("{self:#}\n")
+    }
+}
+
+#[derive(Serialize)]
+struct Written {
+    states: usize,
+    file: String,
+}
+
+impl Outcome for Written {
+    fn text(&self) -> String {
+        format!("wrote {} states to {}\n", self.states, self.file)
+    }
 }
 
 /// The range that the dynamics are exact in, see [`specgen_runtime::dynamics`]. Lengths by the textbook formula: outside, the

@@ -73,7 +73,6 @@ enum Place {
 }
 
 impl PendingFile {
-    /// Begins a file.
     pub fn create(path: &Path) -> Result<Self, Failure> {
         if path.is_dir() {
             return Err(unwritten(path, &"it is a folder, name a file in it"));
@@ -127,7 +126,7 @@ impl PendingFile {
 impl Write for PendingFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match &mut self.place {
-            // The file below: with the name that it has meanwhile an error would tell nobody anything.
+            // The file below: the name that it has meanwhile is of no use in an error.
             Place::Beside { file, .. } => file.as_file_mut().write(bytes),
             Place::Device(file) => file.write(bytes),
         }
@@ -141,7 +140,7 @@ impl Write for PendingFile {
     }
 }
 
-/// What the system says, without the name of a temporary file, which tells nobody anything.
+/// What the system says, without the name of a temporary file, which is of no use to a reader.
 fn plain(error: &io::Error) -> String {
     let below = error.get_ref().and_then(std::error::Error::source);
     below.map_or_else(|| error.to_string(), ToString::to_string)

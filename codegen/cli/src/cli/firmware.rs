@@ -11,14 +11,13 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use host_sim::controller::{Controller, TickController};
 use serde::Serialize;
-use serde_json::json;
 
 use super::build::TICKS;
 use super::ui::{Failure, Ui};
 use crate::{emit, workspace};
 use specgen_compiler::compile::{self, Compiled, Refused};
 use specgen_language::diagnostic::{Diagnostic, codes};
-use specgen_language::model::Mcu;
+use specgen_language::model::{self, Mcu};
 use specgen_studies::verify::{self, Measurement};
 use specgen_toolchain::budget::{self, Used};
 use specgen_toolchain::checks::{self, Checked, Rules};
@@ -81,23 +80,17 @@ struct Made {
     notes: Vec<String>,
     /// What is over budget or must not be: nothing is flashed then.
     failures: Vec<String>,
+    /// Of the controller's scalar.
+    #[serde(skip)]
+    bits: u32,
+    /// Part and budget of the spec.
+    #[serde(skip)]
+    limits: model::Target,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let (compiled, made) = make(&arguments.spec, &arguments.common, any, ui)?;
-    judge(&made, &text::of(&compiled, &made), ui)
-}
-
-/// Shows what was made; an error if it must not be used.
-fn judge(made: &Made, text: &str, ui: &mut Ui) -> Result<(), Failure> {
-    if made.failures.is_empty() {
-        ui.result(text, json!(made));
-        return Ok(());
-    }
-    if !ui.is_json() {
-        ui.out(text);
-    }
-    Err(Failure::Judged { message: refusal(made), result: json!(made) })
+    let made = make(&arguments.spec, &arguments.common, any, ui)?;
+    ui.judged(&made, refusal(&made))
 }
 
 /// What every ELF file begins with.
@@ -120,10 +113,10 @@ fn read_image(path: &Path) -> Result<Option<Vec<u8>>, Failure> {
     Ok(Some(bytes))
 }
 
-/// Why an image must not be used.
-fn refusal(made: &Made) -> String {
+/// Why an image must not be used, if so.
+fn refusal(made: &Made) -> Option<String> {
     let list: String = made.failures.iter().map(|failure| format!("\n  {failure}")).collect();
-    format!("{} for {} is refused:{list}", made.target, made.board)
+    (!list.is_empty()).then(|| format!("{} for {} is refused:{list}", made.target, made.board))
 }
 
 /// Every target will do.
@@ -132,12 +125,7 @@ fn any(_: Target) -> Result<(), Failure> {
 }
 
 /// Compiles, writes, builds, checks, measures. A target that the command does not `accept` is refused before anything is written.
-fn make(
-    spec: &Path,
-    common: &Common,
-    accept: fn(Target) -> Result<(), Failure>,
-    ui: &mut Ui,
-) -> Result<(Compiled, Made), Failure> {
+fn make(spec: &Path, common: &Common, accept: fn(Target) -> Result<(), Failure>, ui: &mut Ui) -> Result<Made, Failure> {
     let compiled = compile::compile(spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
     let declared = compiled.model.target.mcu;
@@ -168,8 +156,7 @@ fn make(
     ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
     let target_dir = common.target_dir.clone().unwrap_or_else(|| output.join("target"));
     let folders = Folders { output: &output, target: &target_dir };
-    let made = build(&compiled, target, &folders, common, ui)?;
-    Ok((compiled, made))
+    build(&compiled, target, &folders, common, ui)
 }
 
 /// An image for another core than the spec's would compute other bits, or in software.
@@ -195,7 +182,6 @@ fn wrong_part(compiled: &Compiled, mcu: Mcu, target: Target) -> Option<Diagnosti
     ))
 }
 
-/// Where things are.
 #[derive(Clone, Copy)]
 struct Folders<'a> {
     output: &'a Path,
@@ -227,6 +213,8 @@ fn build(
         used: None,
         notes: Vec::new(),
         failures: Vec::new(),
+        bits: compiled.ir.scalar.bits(),
+        limits: compiled.model.target.clone(),
     };
     match target.kind {
         Kind::Host => {

@@ -11,6 +11,7 @@ mod response;
 mod stiffness;
 
 use clap::{Args, Subcommand};
+use serde::Serialize;
 
 use super::ui::{Failure, Ui};
 use specgen_compiler::compile::Refused;
@@ -18,6 +19,7 @@ use specgen_language::diagnostic::Diagnostic;
 
 pub use everett::summary;
 pub(super) use everett::{grid, range};
+pub(super) use plot::wrote;
 
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
@@ -57,6 +59,18 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(Kind::Rate(arguments)) => super::identify_rate::run(arguments, ui),
         None => everett::run(&arguments.everett, ui),
     }
+}
+
+/// What was identified, by its report.
+#[derive(Serialize)]
+pub(super) struct Identified<R> {
+    /// As it was named.
+    #[serde(skip)]
+    pub record: String,
+    pub report: R,
+    /// A line for each file that was written.
+    #[serde(skip)]
+    pub files: String,
 }
 
 fn refused(findings: Vec<Diagnostic>) -> Failure {

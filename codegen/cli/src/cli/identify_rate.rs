@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::json;
 
 use super::file::write_file;
-use super::identify::{grid, range};
-use super::ui::{Failure, Ui};
+use super::identify::{Identified, grid, range, wrote};
+use super::table::{left, right, row};
+use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Refused;
 use specgen_identify::rate::{RateIdentified, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
 use specgen_identify::{Options, read_record, write_table_csv};
@@ -59,15 +59,16 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let options = Options::new(arguments.grid, arguments.drive);
     let identified = identify_rate(&records, hold_out.as_ref(), &options).map_err(refused)?;
     ui.findings(None, &identified.warnings);
-    let mut text = table(&identified.report);
-    if let Some(output) = &arguments.output {
-        for path in write(output, &identified)? {
-            // Writing to a String cannot fail.
-            let _ = writeln!(text, "wrote {}", path.display());
-        }
-    }
-    ui.result(&text, json!({ "report": identified.report }));
+    let files = arguments.output.as_ref().map(|output| write(output, &identified)).transpose()?.unwrap_or_default();
+    let files = files.iter().map(|path| wrote(path)).collect();
+    ui.result(&Identified { record: String::new(), report: identified.report, files });
     Ok(())
+}
+
+impl Outcome for Identified<RateReport> {
+    fn text(&self) -> String {
+        table(&self.report) + &self.files
+    }
 }
 
 /// Tables first, then the lines that name them.
@@ -127,18 +128,18 @@ fn table(report: &RateReport) -> String {
     if let Some(held) = &report.hold_out {
         let _ = writeln!(text, "{}: held out of every fit", held.record);
     }
-    let heads: Vec<String> = report.records.iter().map(|r| format!("{:>9}", r.frequency_text())).collect();
-    let heads = heads.concat();
     let _ = writeln!(text, "\nrms error in % of the range, grid {}", report.grid);
+    // Nine characters for each record, twice; the last column is there where a record was held out.
+    let width = 9 * report.records.len();
     let held = if report.hold_out.is_some() { "  held out" } else { "" };
-    let width = heads.chars().count();
-    let _ = writeln!(text, "{:<20}{:>width$}   {:>width$}{held}", "", "fitted on all", "fitted on the others");
-    let _ = writeln!(text, "{:<20}{heads}   {heads}", "model");
+    let heads = [left(20), right(width), right(width).behind("   "), left(0)];
+    row(&mut text, &heads, &[&"", &"fitted on all", &"fitted on the others", &held]);
+    let frequencies: String = report.records.iter().map(|record| format!("{:>9}", record.frequency_text())).collect();
+    row(&mut text, &heads, &[&"model", &frequencies, &frequencies, &""]);
     for option in &report.options {
-        let cells = |values: &[f64]| values.iter().map(|v| format!("{v:>9.3}")).collect::<String>();
+        let numbers = |values: &[f64]| values.iter().map(|v| format!("{v:>9.3}")).collect::<String>();
         let held = option.hold_out.map(|v| format!("{v:>10.3}")).unwrap_or_default();
-        let _ =
-            writeln!(text, "{:<20}{}   {}{held}", option.option.name(), cells(&option.fitted), cells(&option.left_out));
+        row(&mut text, &heads, &[&option.option.name(), &numbers(&option.fitted), &numbers(&option.left_out), &held]);
     }
     text.push('\n');
     for option in report.options.iter().filter(|o| o.dead_time > 0.0 || !o.creep.is_empty()) {

@@ -1,5 +1,6 @@
 //! `specgen operate`: one session with a machine over the link, from the command line, a script, or line by line.
 
+mod answer;
 mod operator;
 
 use std::io::{BufRead, IsTerminal};
@@ -7,10 +8,10 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 
 use clap::{ArgGroup, Args};
-use serde_json::{Value, json};
 use specgen_link::client::{Port, Timeout};
 
 use super::ui::{Failure, Ui};
+use answer::{Mistake, Report};
 use operator::{Ended, Operator};
 use specgen_compiler::compile;
 use specgen_language::interrupt;
@@ -190,7 +191,7 @@ fn lines(operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
             }
             Err(other) => return Err(other),
         };
-        operator.note(&line, json!({ "error": text }), &format!("error: {text}"), ui);
+        operator.note(&line, &Mistake { error: text }, ui);
     }
 }
 
@@ -215,10 +216,8 @@ fn finish(
     name: &str,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
-    let result = |operator: &mut Operator<_>| -> Value {
-        json!({ "device": name, "answers": std::mem::take(&mut operator.answers), "status": operator.status() })
-    };
     let open = ended.is_ok();
+    let report = Report { device: name, answers: std::mem::take(&mut operator.answers), status: operator.status() };
     match ended {
         Ok(()) | Err(Ended::Stopped) => {
             if open && operator.is_powered() {
@@ -226,22 +225,19 @@ fn finish(
                     "the amplifiers are on; without its host the machine holds, then ramps down (supervisor.host_lost)";
                 ui.progress(&format!("{name}: {}: {text}", operator.stands()));
             }
-            let result = result(operator);
-            ui.result("", result);
+            ui.result(&report);
             Ok(())
         }
-        Err(Ended::Refused(text)) => {
-            Err(Failure::Judged { message: format!("{name}: {text}"), result: result(operator) })
-        }
-        Err(Ended::Fault(text)) => {
-            Err(Failure::Judged { message: format!("{name}: {text}"), result: result(operator) })
-        }
+        Err(Ended::Refused(text) | Ended::Fault(text)) => ui.judged(&report, Some(format!("{name}: {text}"))),
         Err(Ended::Failed(failure)) => Err(failure),
         Err(Ended::Link(error)) => Err(Failure::Environment(format!(
             "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
         ))),
         Err(Ended::Interrupted) => match operator.ramp_down(ui) {
-            Ok(text) => Err(Failure::Interrupted { message: format!("interrupted; {text}"), result: result(operator) }),
+            Ok(text) => {
+                let result = ui.shown(&Report { status: operator.status(), ..report });
+                Err(Failure::Interrupted { message: format!("interrupted; {text}"), result })
+            }
             Err(error) => Err(Failure::Environment(format!("{name}: interrupted, and then: {error}"))),
         },
     }

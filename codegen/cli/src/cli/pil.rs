@@ -15,7 +15,7 @@ use specgen_link::Counted;
 use specgen_link::client::{Port, Timeout};
 
 use super::sim::{PlantArguments, environment, frequency};
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use report::Report;
 use specgen_compiler::compile::{self, Compiled};
 use specgen_compiler::workspace;
@@ -71,7 +71,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    // What is wrong with the arguments, or missing on the machine, is told before the minutes of the rest.
+    // What is wrong with the arguments, or missing on the machine, is reported before the minutes of the rest.
     arguments.plant.leg()?;
     let compiled = compile::compile(&arguments.spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
@@ -167,7 +167,7 @@ fn in_the_loop<P: Port>(
     }
     match (done, stop) {
         (Ok(()), None) => {
-            ui.result(&report.text(), json!(report));
+            ui.result(&report);
             Ok(())
         }
         (_, Some(stop)) => Err(stopped(stop, report, ui)),

@@ -5,17 +5,17 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use host_sim::platform::rig::Noise;
-use serde_json::json;
+use serde::Serialize;
 use specgen_rt::clock::{self, SECOND};
 use specgen_rt::exchange::{self, OpenError, Server};
 use specgen_rt::histogram::{Histogram, time_text};
 use specgen_rt::scheduling;
 
 use super::sim::{PlantArguments, environment};
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Compiled};
 use specgen_language::interrupt;
-use specgen_operate::served::{Machine, Served};
+use specgen_operate::served::{Plant, Served};
 use specgen_studies::machine;
 
 /// How long it waits for a controller before it looks whether it is to end, ns.
@@ -50,18 +50,48 @@ fn seconds(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|time| (0.01..=1e7).contains(time)).ok_or_else(expected)
 }
 
+/// What was served, and the times of a tick.
+#[derive(Serialize)]
+struct Summary {
+    #[serde(skip)]
+    name: String,
+    #[serde(skip)]
+    period_ns: u64,
+    digest: String,
+    ticks: u64,
+    controllers: u64,
+    p50_ns: u64,
+    p99_ns: u64,
+    max_ns: u64,
+}
+
+impl Outcome for Summary {
+    fn text(&self) -> String {
+        format!(
+            "{}: {} ticks for {} controllers; a tick took {} (median), {} (99 %), {} (longest) of {}\n",
+            self.name,
+            self.ticks,
+            self.controllers,
+            time_text(self.p50_ns),
+            time_text(self.p99_ns),
+            time_text(self.max_ns),
+            time_text(self.period_ns),
+        )
+    }
+}
+
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = exchange::path_of(&arguments.name).map_err(|error| Failure::Usage(format!("--name: {error}")))?;
     let compiled = compile::compile(&arguments.spec)?;
     ui.findings_in_brief(&compiled.source, &compiled.findings);
-    let machine = prepared(arguments, &compiled, ui)?;
-    let mut served = Served::new(machine, &compiled.model, &compiled.ir);
+    let plant = prepared(arguments, &compiled, ui)?;
+    let mut served = Served::new(plant, &compiled.model, &compiled.ir);
     for refused in
         [arguments.cpu.map_or(Ok(()), scheduling::pin), arguments.priority.map_or(Ok(()), scheduling::set_fifo)]
     {
         refused.map_err(environment)?;
     }
-    // Whatever ends it, the file is to go, and what was served is told.
+    // Whatever ends it, the file is to go, and what was served is shown.
     let stop = interrupt::heed();
     let server = Server::create(&path, &compiled.ir.digest).map_err(|error| match error {
         OpenError::Served { .. } => Failure::Usage(error.to_string()),
@@ -86,29 +116,21 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             times.add(clock::now() - start);
         }
     }
-    let text = format!(
-        "{name}: {} ticks for {} controllers; a tick took {} (median), {} (99 %), {} (longest) of {}\n",
-        served.ticks,
-        served.sessions,
-        time_text(times.quantile(0.5)),
-        time_text(times.quantile(0.99)),
-        time_text(times.largest()),
-        time_text(period),
-    );
-    let value = json!({
-        "digest": compiled.ir.digest,
-        "ticks": served.ticks,
-        "controllers": served.sessions,
-        "p50_ns": times.quantile(0.5),
-        "p99_ns": times.quantile(0.99),
-        "max_ns": times.largest(),
+    ui.result(&Summary {
+        name: compiled.ir.name.clone(),
+        period_ns: period,
+        digest: compiled.ir.digest.clone(),
+        ticks: served.ticks,
+        controllers: served.sessions,
+        p50_ns: times.quantile(0.5),
+        p99_ns: times.quantile(0.99),
+        max_ns: times.largest(),
     });
-    ui.result(&text, value);
     Ok(())
 }
 
 /// The machine after its pre-cycle, with the gauges zeroed.
-fn prepared(arguments: &Arguments, compiled: &Compiled, ui: &Ui) -> Result<Machine, Failure> {
+fn prepared(arguments: &Arguments, compiled: &Compiled, ui: &Ui) -> Result<Plant, Failure> {
     let (seed, leg) = (arguments.plant.seed, arguments.plant.leg()?);
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
     Ok(match &compiled.model.task_space {
@@ -116,12 +138,12 @@ fn prepared(arguments: &Arguments, compiled: &Compiled, ui: &Ui) -> Result<Machi
             let specimen = machine::specimen(&compiled.model, task, &leg, Some(seed));
             let noise = if arguments.plant.no_noise { Noise::NONE } else { Noise::of(&specimen) };
             let scenario = machine::scenario(&compiled.model, task, &specimen, &noise, seed);
-            Machine::Platform(Box::new(scenario.rig().clone()))
+            Plant::Platform(Box::new(scenario.rig().clone()))
         }
         None => {
             let (leg, noise) = arguments.plant.read()?;
             let legs = std::array::from_fn(|_| leg.clone());
-            Machine::Legs(Box::new(machine::legs(&compiled.model, &legs, &noise, seed, NO_TRAJECTORY).rig().clone()))
+            Plant::Legs(Box::new(machine::legs(&compiled.model, &legs, &noise, seed, NO_TRAJECTORY).rig().clone()))
         }
     })
 }

@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::controller::{MachineWord, Supervised};
 use host_sim::description::Description;
-use host_sim::record::{self, Block, Header, Piece, Reader, Replay, ReplayError};
-use serde_json::{Value, json};
+use host_sim::record::{self, Block, Header, PhaseChange, Piece, Reader, Replay, ReplayError};
+use serde::Serialize;
 
 use super::file::{PendingFile, unwritten};
 use super::sim;
-use super::ui::{Failure, Ui};
+use super::table::{left, right, row};
+use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Compiled};
 
 /// Changes of the phase that are shown.
@@ -40,23 +41,15 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let Some(spec) = &arguments.spec else {
         let found = export(&mut reader, csv.as_mut(), &refuse)?;
         let rows = csv.map(Csv::finish).transpose()?.unwrap_or_default();
-        let result = json!({ "rows": rows, "damaged": found.damaged, "cut": found.cut });
-        let cut = if found.cut { "; the file ends within a block" } else { "" };
-        let text = format!("{shown}: {rows} rows exported{cut}\n");
-        let Some((block, reason)) = found.damaged.first() else {
-            ui.result(&text, result);
-            return Ok(());
-        };
-        if !ui.is_json() {
-            ui.out(&text);
-        }
-        let message =
-            format!("{shown}: block {block} is damaged: {reason}; its rows are missing. Fetch or copy it again");
-        return Err(Failure::Judged { message, result });
+        let failed = found.damaged.first().map(|(block, reason)| {
+            format!("{shown}: block {block} is damaged: {reason}; its rows are missing. Fetch or copy it again")
+        });
+        let exported = Exported { file: shown.to_string(), rows, ..found };
+        return ui.judged(&exported, failed);
     };
     let compiled = compile::compile(spec)?;
     ui.findings_in_brief(&compiled.source, &compiled.findings);
-    // Before the library is built: a wrong spec is told at once.
+    // Before the library is built: a wrong spec is refused at once.
     same_build(arguments, &reader.header().description, &compiled)?;
     let controller = sim::emitted(&compiled, ui)?;
     let mut machine = Supervised::new(controller).map_err(sim::environment)?;
@@ -79,21 +72,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     if let Some(csv) = csv {
         csv.finish()?;
     }
-    let period = reader.header().period;
-    let result = document(&found, period);
-    let text = format!("{shown}: {}\n{}", compiled.ir.name, text(&found, period));
-    match verdict(&found) {
-        None => {
-            ui.result(&text, result);
-            Ok(())
-        }
-        Some(message) => {
-            if !ui.is_json() {
-                ui.out(&text);
-            }
-            Err(Failure::Judged { message: format!("{shown}: {message}"), result })
-        }
-    }
+    let failed = verdict(&found).map(|message| format!("{shown}: {message}"));
+    ui.judged(&Report::of(format!("{shown}: {}", compiled.ir.name), found, reader.header().period), failed)
 }
 
 /// Refuses the record of another spec or of another version of specgen.
@@ -135,83 +115,137 @@ fn verdict(found: &Replay) -> Option<String> {
     None
 }
 
-fn text(found: &Replay, period: f64) -> String {
-    let mut out = String::new();
-    let seconds = |tick: u64| tick as f64 * period;
-    // Writing to a String cannot fail, here and below.
-    let _ = writeln!(
-        out,
-        "  {} ticks, {:.4} s, in {} blocks; codes, status, supervisor and {} digests of the machine compared",
-        found.ticks,
-        seconds(found.ticks),
-        found.blocks,
-        found.digests
-    );
-    for (index, change) in found.phases.iter().enumerate() {
-        if index == SHOWN {
-            let _ = writeln!(out, "  … {} more changes of the phase", found.phases.len() - SHOWN);
-            break;
+/// A recording that was replayed.
+#[derive(Serialize)]
+struct Report {
+    /// Record and controller.
+    #[serde(skip)]
+    title: String,
+    /// s.
+    #[serde(skip)]
+    period: f64,
+    ticks: u64,
+    seconds: f64,
+    blocks: u64,
+    digests: u64,
+    bit_equal: bool,
+    first_difference: Option<Difference>,
+    phases: Vec<PhaseAt>,
+    triggers: Vec<u64>,
+    /// Ticks that are missing: the first, and the one after the last.
+    gaps: Vec<(u64, u64)>,
+    /// Blocks, and why they are not good.
+    damaged: Vec<(usize, String)>,
+    /// First tick behind the end of a file that was cut off.
+    lost_from: Option<u64>,
+}
+
+/// Words as sixteen digits.
+#[derive(Serialize)]
+struct Difference {
+    tick: u64,
+    signal: String,
+    recorded: String,
+    replayed: String,
+    #[serde(skip)]
+    text: String,
+}
+
+#[derive(Serialize)]
+struct PhaseAt {
+    tick: u64,
+    phase: u8,
+    cause: u8,
+    amplifiers_on: bool,
+}
+
+impl Report {
+    fn of(title: String, found: Replay, period: f64) -> Self {
+        let phase = |change: &PhaseChange| {
+            let MachineWord { phase, cause, amplifier_on } = MachineWord::of(u64::from(change.supervisor));
+            PhaseAt { tick: change.tick, phase, cause, amplifiers_on: amplifier_on }
+        };
+        Self {
+            title,
+            period,
+            ticks: found.ticks,
+            seconds: found.ticks as f64 * period,
+            blocks: found.blocks,
+            digests: found.digests,
+            bit_equal: found.divergence.is_none() && found.ticks > 0,
+            first_difference: found.divergence.map(|divergence| Difference {
+                text: divergence.to_string(),
+                tick: divergence.tick,
+                recorded: format!("{:016x}", divergence.recorded),
+                replayed: format!("{:016x}", divergence.replayed),
+                signal: divergence.signal,
+            }),
+            phases: found.phases.iter().map(phase).collect(),
+            triggers: found.triggers,
+            gaps: found.gaps,
+            damaged: found.damaged,
+            lost_from: found.cut,
         }
-        let _ =
-            writeln!(out, "  tick {:>9} {:>10.4} s  {}", change.tick, seconds(change.tick), name(change.supervisor));
     }
-    for tick in &found.triggers {
-        let _ = writeln!(out, "  tick {tick:>9} {:>10.4} s  trigger", seconds(*tick));
-    }
-    for (from, to) in &found.gaps {
-        let _ = writeln!(out, "  ticks {from} to {} are missing; the record goes on behind them", to.saturating_sub(1));
-    }
-    for (block, reason) in &found.damaged {
-        let _ = writeln!(out, "  block {block} is damaged: {reason}");
-    }
-    if let Some(tick) = found.cut {
-        let _ = writeln!(out, "  the file ends within a block: from tick {tick} on the record is lost");
-    }
-    match &found.divergence {
-        None => out.push_str("  bit-equal\n"),
-        Some(divergence) => {
-            let _ = writeln!(out, "  first difference: {divergence}");
+}
+
+impl Outcome for Report {
+    fn text(&self) -> String {
+        let mut out = format!(
+            "{}\n  {} ticks, {:.4} s, in {} blocks; codes, status, supervisor and {} digests of the machine compared\n",
+            self.title, self.ticks, self.seconds, self.blocks, self.digests
+        );
+        let columns = [right(9).behind("  tick "), right(10).behind(" "), left(0).behind(" s  ")];
+        let event = |out: &mut String, tick: u64, what: &str| {
+            row(out, &columns, &[&tick, &format_args!("{:.4}", tick as f64 * self.period), &what]);
+        };
+        for &PhaseAt { tick, phase, cause, amplifiers_on: amplifier_on } in self.phases.iter().take(SHOWN) {
+            let on = if amplifier_on { "on" } else { "off" };
+            event(&mut out, tick, &format!("{}, amplifiers {on}", MachineWord { phase, cause, amplifier_on }));
         }
+        let more = self.phases.len().saturating_sub(SHOWN);
+        if more > 0 {
+            // Writing to a String cannot fail, here and below.
+            let _ = writeln!(out, "  … {more} more changes of the phase");
+        }
+        for tick in &self.triggers {
+            event(&mut out, *tick, "trigger");
+        }
+        for (from, to) in &self.gaps {
+            let last = to.saturating_sub(1);
+            let _ = writeln!(out, "  ticks {from} to {last} are missing; the record goes on behind them");
+        }
+        for (block, reason) in &self.damaged {
+            let _ = writeln!(out, "  block {block} is damaged: {reason}");
+        }
+        if let Some(tick) = self.lost_from {
+            let _ = writeln!(out, "  the file ends within a block: from tick {tick} on the record is lost");
+        }
+        match &self.first_difference {
+            None => out.push_str("  bit-equal\n"),
+            Some(difference) => {
+                let _ = writeln!(out, "  first difference: {}", difference.text);
+            }
+        }
+        out
     }
-    out
 }
 
-/// Phase, cause and amplifiers in words.
-fn name(supervisor: u32) -> String {
-    let word = MachineWord::of(u64::from(supervisor));
-    format!("{word}, amplifiers {}", if word.amplifier_on { "on" } else { "off" })
-}
-
-fn document(found: &Replay, period: f64) -> Value {
-    let phases = found.phases.iter().map(|change| {
-        let MachineWord { phase, cause, amplifier_on } = MachineWord::of(u64::from(change.supervisor));
-        json!({ "tick": change.tick, "phase": phase, "cause": cause, "amplifiers_on": amplifier_on })
-    });
-    json!({
-        "ticks": found.ticks,
-        "seconds": found.ticks as f64 * period,
-        "blocks": found.blocks,
-        "digests": found.digests,
-        "bit_equal": found.divergence.is_none() && found.ticks > 0,
-        "first_difference": found.divergence.as_ref().map(|divergence| json!({
-            "tick": divergence.tick,
-            "signal": divergence.signal,
-            "recorded": format!("{:016x}", divergence.recorded),
-            "replayed": format!("{:016x}", divergence.replayed),
-        })),
-        "phases": phases.collect::<Vec<_>>(),
-        "triggers": found.triggers,
-        "gaps": found.gaps,
-        "damaged": found.damaged,
-        "lost_from": found.cut,
-    })
-}
-
-/// What is wrong with a record that was read for its CSV alone.
-#[derive(Default)]
+/// A recording that was read for its CSV alone, and what is wrong with it.
+#[derive(Default, Serialize)]
 struct Exported {
+    #[serde(skip)]
+    file: String,
+    rows: u64,
     damaged: Vec<(usize, String)>,
     cut: bool,
+}
+
+impl Outcome for Exported {
+    fn text(&self) -> String {
+        let cut = if self.cut { "; the file ends within a block" } else { "" };
+        format!("{}: {} rows exported{cut}\n", self.file, self.rows)
+    }
 }
 
 fn export(

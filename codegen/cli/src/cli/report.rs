@@ -8,12 +8,12 @@ use host_sim::controller::{Controller, TickController};
 use host_sim::plant::LegParameters;
 use host_sim::platform::rig::Noise;
 use host_sim::scenario::{MODES, select};
-use serde_json::json;
+use serde::Serialize;
 
 use super::check::describe;
 use super::file::{check_place, write_file};
 use super::sim::{emitted, environment};
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use crate::{lower, machine, precision, reproduce, target, workspace};
 use specgen_compiler::compile::{self, Compiled, Refused};
 use specgen_language::interrupt::Scratch;
@@ -48,6 +48,23 @@ pub struct Arguments {
     /// Without the emulated microcontroller: no time, memory and comparison of bits.
     #[arg(long)]
     no_target: bool,
+}
+
+/// The page that was written.
+#[derive(Serialize)]
+struct Page<'a> {
+    file: String,
+    digest: &'a str,
+    bytes: usize,
+    sections: Vec<&'a str>,
+    figures: usize,
+}
+
+impl Outcome for Page<'_> {
+    fn text(&self) -> String {
+        let (sections, figures) = (self.sections.len(), self.figures);
+        format!("wrote {}: {sections} sections, {figures} figures, {} kB\n", self.file, self.bytes / 1000)
+    }
 }
 
 /// The emitted controller, built, and what building and exercising it showed.
@@ -96,17 +113,13 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let html = page::html(&head, &sections);
     write_file(&output, html.as_bytes())?;
     let figures: usize = sections.iter().flat_map(|section| &section.parts).map(figures).sum();
-    let text = format!(
-        "wrote {}: {} sections, {figures} figures, {} kB\n",
-        output.display(),
-        sections.len(),
-        html.len() / 1000
-    );
-    let ids: Vec<&str> = sections.iter().map(|section| section.id).collect();
-    ui.result(
-        &text,
-        json!({ "file": output.display().to_string(), "digest": compiled.ir.digest, "bytes": html.len(), "sections": ids, "figures": figures }),
-    );
+    ui.result(&Page {
+        file: output.display().to_string(),
+        digest: &compiled.ir.digest,
+        bytes: html.len(),
+        sections: sections.iter().map(|section| section.id).collect(),
+        figures,
+    });
     Ok(())
 }
 

@@ -12,7 +12,7 @@ use host_sim::platform::table::{MachiningTable, PoseTable};
 
 use super::file::{claim, write_folder};
 use super::sim::{emitted, environment};
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Compiled};
 use specgen_language::interrupt::Scratch;
 use specgen_studies::machine;
@@ -43,7 +43,13 @@ pub struct Arguments {
     generations: u32,
 }
 
-/// What is done and what is left, told line by line.
+impl Outcome for Results {
+    fn text(&self) -> String {
+        self.markdown()
+    }
+}
+
+/// What is done and what is left, a line each.
 struct Steps<'a> {
     ui: &'a Ui,
     begun: Instant,
@@ -68,7 +74,7 @@ impl Steps<'_> {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    // A folder that cannot be written is told before the minutes of the rest.
+    // A folder that cannot be written is refused before the minutes of the rest.
     let _claimed = claim(&arguments.output)?;
     let scratch = Scratch::new().map_err(environment)?;
     let specs = [("legs", embedded::LEGS), ("reference", embedded::PLATFORM)];
@@ -100,7 +106,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         arguments.output.display(),
         steps.begun.elapsed().as_secs_f64()
     ));
-    ui.result(&results.markdown(), results.value());
+    ui.result(&results);
     Ok(())
 }
 

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
+use serde_json::json;
 
 use super::file::{claim, write_folder};
 use super::sim::{PlantArguments, emitted, environment, frequency};
@@ -134,7 +135,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let runs = runs.map_err(environment)?;
 
     let reasons = gate.reasons(&runs);
-    let report = report::Report {
+    let found = report::Found {
         arguments,
         compiled: &compiled,
         factors: &factors,
@@ -145,33 +146,22 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         planned: all,
         runs: &runs,
     };
-    let value = report.value();
+    let report = found.report();
     if let Some(folder) = &arguments.output {
         let files = [
-            ("runs.csv".to_owned(), report.csv().into_bytes()),
-            ("report.json".to_owned(), format!("{value:#}\n").into_bytes()),
+            ("runs.csv".to_owned(), found.csv().into_bytes()),
+            ("report.json".to_owned(), format!("{:#}\n", json!(report)).into_bytes()),
         ];
         write_folder(folder, &files)?;
         ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
     }
     ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
-    let text = report.text();
     if runs.len() < all {
-        if !ui.is_json() {
-            ui.out(&text);
-        }
         let message =
             format!("interrupted: the figures are of {} of {all} machines, and no gate is passed", runs.len());
-        return Err(Failure::Interrupted { message, result: value });
+        return Err(Failure::Interrupted { message, result: ui.shown(&report) });
     }
-    if !reasons.is_empty() {
-        if !ui.is_json() {
-            ui.out(&text);
-        }
-        return Err(Failure::Judged { message: format!("not robust: {}", reasons.join("; ")), result: value });
-    }
-    ui.result(&text, value);
-    Ok(())
+    ui.judged(&report, (!reasons.is_empty()).then(|| format!("not robust: {}", reasons.join("; "))))
 }
 
 /// Of the options, else of the spec.

@@ -13,10 +13,10 @@ use host_sim::controller::Controller;
 use host_sim::forc::ReversalExperiment;
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
-use serde_json::json;
+use serde::Serialize;
 
 use super::file::{check_place, claim, write_file};
-use super::ui::{Failure, Ui};
+use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
 use specgen_compiler::workspace;
 use specgen_language::interrupt::Scratch;
@@ -96,7 +96,7 @@ pub(super) fn environment(error: impl Display) -> Failure {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    // A bad plant file is told before the minutes of the rest.
+    // A bad plant file is refused before the minutes of the rest.
     arguments.plant.read()?;
     let compiled = compile::compile(&arguments.spec)?;
     ui.findings(Some(&compiled.source), &compiled.findings);
@@ -105,7 +105,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(task) => platform::check(arguments, task)?,
         None => legs::check(arguments)?,
     }
-    // A place that cannot be is told before the minutes of the rest, too.
+    // A place that cannot be is refused before the minutes of the rest, too.
     let _claimed = arguments.output.as_deref().map(claim).transpose()?;
     arguments.record.as_deref().map_or(Ok(()), check_place)?;
     let mut controller = emitted(&compiled, ui)?;
@@ -152,6 +152,19 @@ fn slope(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|rate| (0.1..=1e5).contains(rate)).ok_or_else(expected)
 }
 
+/// The record of reversal curves that was written.
+#[derive(Serialize)]
+struct Curves {
+    rows: usize,
+    file: String,
+}
+
+impl Outcome for Curves {
+    fn text(&self) -> String {
+        format!("wrote {} rows to {}\n", self.rows, self.file)
+    }
+}
+
 pub fn run_forc(arguments: &ForcArguments, ui: &mut Ui) -> Result<(), Failure> {
     let (parameters, noise) = arguments.plant.read()?;
     let mut leg = LegPlant::new(&parameters);
@@ -160,7 +173,6 @@ pub fn run_forc(arguments: &ForcArguments, ui: &mut Ui) -> Result<(), Failure> {
         .run(&mut leg, &mut gauge);
     let rows = record.rows.len();
     write_file(&arguments.output, record.to_csv().as_bytes())?;
-    let text = format!("wrote {rows} rows to {}\n", arguments.output.display());
-    ui.result(&text, json!({ "rows": rows, "file": arguments.output.display().to_string() }));
+    ui.result(&Curves { rows, file: arguments.output.display().to_string() });
     Ok(())
 }

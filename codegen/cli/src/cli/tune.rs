@@ -222,15 +222,15 @@ impl Job<'_> {
         let mut rows = starts.rows();
         rows.push(("tuned", best.setting));
         let other = self.case(&own, &self.scored_on())?;
-        let report = report::Report::of(self, &case, &other, &rows, &starts, &searches, &tuned, &patch)?;
+        let mut report = report::Report::of(self, &case, &other, &rows, &starts, &searches, &tuned, &patch)?;
         let all: Vec<Candidate> = searches.iter().flat_map(|(_, search)| search.scored.clone()).collect();
         if let Some(folder) = &self.arguments.output {
             let marks: Vec<(&str, Score)> = report.marks();
-            let files = self.files(&searches, &all, &marks, report.value());
+            let files = self.files(&searches, &all, &marks, &json!(report));
             write_folder(folder, &files)?;
             ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
         }
-        // Somebody may have edited it in the minutes since it was read.
+        // It may have been edited in the minutes since it was read.
         let edited =
             self.arguments.write && SpecSource::read(&self.arguments.spec).map_or(true, |now| now.text != source.text);
         let written = self.arguments.write && !edited;
@@ -239,26 +239,20 @@ impl Job<'_> {
             ui.progress(&format!("wrote the result into {}", self.arguments.spec.display()));
         }
         ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
-        let shown = report.text(!written);
+        report.with_patch = !written;
         if edited {
-            if !ui.is_json() {
-                ui.out(&shown);
-            }
             let spec = self.arguments.spec.display();
             let message = format!(
                 "`{spec}` was changed while it was tuned: nothing was written into it. Apply the patch, or tune again"
             );
-            return Err(Failure::Judged { message, result: report.value().clone() });
+            return ui.judged(&report, Some(message));
         }
         if found.is_some() {
             let done: usize = searches.iter().map(|(_, search)| search.evaluations).sum();
-            if !ui.is_json() {
-                ui.out(&shown);
-            }
             let message = format!("interrupted: this is the best of {done} candidates, not of all that were asked for");
-            return Err(Failure::Interrupted { message, result: report.value().clone() });
+            return Err(Failure::Interrupted { message, result: ui.shown(&report) });
         }
-        ui.result(&shown, report.value().clone());
+        ui.result(&report);
         Ok(())
     }
 

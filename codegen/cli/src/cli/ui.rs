@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use specgen_compiler::compile::Refused;
@@ -34,14 +35,12 @@ pub enum Failure {
     Environment(String),
     /// A gate is not passed, with the figures that say why: exit code 1.
     Judged {
-        /// Why.
         message: String,
         /// For programs; the text is out already.
         result: Value,
     },
     /// What this machine lacks or a tool refuses, after a part of the work is done: exit code 3, with that part.
     Incomplete {
-        /// What, and why.
         message: String,
         /// For programs; the text is out already.
         result: Value,
@@ -81,6 +80,12 @@ impl From<TargetError> for Failure {
     }
 }
 
+/// What a command found: the one value of which both forms are made. The document has its fields.
+pub trait Outcome: Serialize {
+    /// The text, whole lines.
+    fn text(&self) -> String;
+}
+
 /// Output in one of two forms.
 pub struct Ui {
     json: bool,
@@ -89,7 +94,7 @@ pub struct Ui {
     lost: RefCell<Option<io::Error>>,
 }
 
-/// Writes to standard error. A message that nobody can read, on a full disk say, is no reason to end.
+/// Writes to standard error. A message that cannot be written, on a full disk say, is no reason to end.
 macro_rules! say {
     ($($text:tt)*) => {
         let _ = write!(anstream::stderr(), $($text)*);
@@ -137,13 +142,32 @@ impl Ui {
         }
     }
 
-    /// The result: `text` for people, `value` for programs.
-    pub fn result(&self, text: &str, value: Value) {
+    /// The result of a command that succeeded.
+    pub fn result(&self, outcome: &impl Outcome) {
         if self.json {
-            self.document(0, value, None);
+            self.document(0, json!(outcome), None);
         } else {
-            self.out(text);
+            self.out(&outcome.text());
         }
+    }
+
+    /// The result of a command, and the failure to return if there is a reason why it does not pass.
+    pub fn judged(&self, outcome: &impl Outcome, failed: Option<String>) -> Result<(), Failure> {
+        match failed {
+            None => {
+                self.result(outcome);
+                Ok(())
+            }
+            Some(message) => Err(Failure::Judged { message, result: self.shown(outcome) }),
+        }
+    }
+
+    /// The result of a command that fails: its text goes out now, and the value is for the failure.
+    pub fn shown(&self, outcome: &impl Outcome) -> Value {
+        if !self.json {
+            self.out(&outcome.text());
+        }
+        json!(outcome)
     }
 
     /// Shows how far something is, in place of the line before where the eyes are at a terminal.
@@ -164,7 +188,7 @@ impl Ui {
         }
     }
 
-    /// Whether someone looks at standard error.
+    /// Whether standard error is a terminal.
     pub fn is_terminal(&self) -> bool {
         io::stderr().is_terminal()
     }

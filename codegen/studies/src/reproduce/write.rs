@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use serde_json::{Value, json};
+use serde::{Serialize, Serializer};
+use serde_json::json;
 
 use super::table::{Cell, Row, Table};
 use crate::paper::convergence::Convergence;
@@ -78,7 +79,7 @@ impl Results {
         let mut files = vec![
             ("reproduction.md".to_owned(), self.markdown().into_bytes()),
             ("reproduction.csv".to_owned(), self.csv().into_bytes()),
-            ("reproduction.json".to_owned(), format!("{:#}\n", self.value()).into_bytes()),
+            ("reproduction.json".to_owned(), format!("{:#}\n", json!(self)).into_bytes()),
         ];
         files.push(("convergence.csv".to_owned(), front::history_csv(&self.convergence.history).into_bytes()));
         files
@@ -153,10 +154,11 @@ impl Results {
         }
         out
     }
+}
 
-    /// For programs.
-    #[must_use]
-    pub fn value(&self) -> Value {
+impl Serialize for Results {
+    /// With the texts of the remarks, each once.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut remarks = serde_json::Map::new();
         for remark in self.tables.iter().flat_map(Table::remarks) {
             remarks.insert(remark.id().to_owned(), remark.text().into());
@@ -169,6 +171,7 @@ impl Results {
             "convergence": self.convergence,
             "remarks": remarks,
         })
+        .serialize(serializer)
     }
 }
 

@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use clap::Args;
-use serde_json::json;
+use serde::Serialize;
 
 use super::{Common, make, read_image, refusal, text};
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_language::model::{self, Mcu};
 use specgen_toolchain::budget;
-use specgen_toolchain::checks::{self, Rules};
+use specgen_toolchain::checks::{self, Checked, Rules};
 use specgen_toolchain::find_program;
-use specgen_toolchain::size::size;
+use specgen_toolchain::size::{Size, size};
 use specgen_toolchain::targets::{Kind, Target};
 
 /// The program that talks to the debug probe.
@@ -78,11 +78,38 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             }
         }
     }
-    ui.result(
-        &format!("flashed {image} to {} ({chip}), verified and restarted\n", part.board),
-        json!({ "flashed": image, "board": part.board, "chip": chip }),
-    );
+    ui.result(&Flashed { flashed: image, board: part.board, chip });
     Ok(())
+}
+
+#[derive(Serialize)]
+struct Flashed {
+    flashed: String,
+    board: &'static str,
+    chip: &'static str,
+}
+
+impl Outcome for Flashed {
+    fn text(&self) -> String {
+        format!("flashed {} to {} ({}), verified and restarted\n", self.flashed, self.board, self.chip)
+    }
+}
+
+/// An image at hand, looked at before it is flashed.
+#[derive(Serialize)]
+struct Examined {
+    image: String,
+    failures: Vec<String>,
+    #[serde(skip)]
+    size: Size,
+    #[serde(skip)]
+    checks: Checked,
+}
+
+impl Outcome for Examined {
+    fn text(&self) -> String {
+        text::sections(&self.size) + &text::checked(&self.checks)
+    }
 }
 
 /// An image that passed every check.
@@ -92,13 +119,10 @@ struct Ready {
 }
 
 fn of_spec(arguments: &Arguments, ui: &mut Ui) -> Result<Ready, Failure> {
-    let (compiled, made) = make(&arguments.file, &arguments.common, a_board, ui)?;
-    if !ui.is_json() {
-        ui.out(&text::of(&compiled, &made));
-    }
-    if !made.failures.is_empty() {
-        let message = format!("{}\nnothing was flashed", refusal(&made));
-        return Err(Failure::Judged { message, result: json!(made) });
+    let made = make(&arguments.file, &arguments.common, a_board, ui)?;
+    let result = ui.shown(&made);
+    if let Some(message) = refusal(&made) {
+        return Err(Failure::Judged { message: format!("{message}\nnothing was flashed"), result });
     }
     match Target::named(made.target).map(|target| target.kind) {
         Some(Kind::Board(mcu)) => Ok(Ready { image: made.artifact, mcu }),
@@ -123,16 +147,16 @@ fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Fai
         failures
             .push("it holds no identity of a controller: was it made by specgen, and does it check itself?".to_owned());
     }
-    if !ui.is_json() {
-        ui.out(&(text::sections(&size) + &text::checked(&checked)));
-    }
     let image = arguments.file.display().to_string();
+    let examined = Examined { image, failures, size, checks: checked };
+    let result = ui.shown(&examined);
+    let Examined { image, failures, .. } = examined;
     if failures.is_empty() {
         return Ok(Ready { image, mcu });
     }
     let list: String = failures.iter().map(|failure| format!("\n  {failure}")).collect();
     let message = format!("{image} is refused for {}:{list}\nnothing was flashed", part.board);
-    Err(Failure::Judged { message, result: json!({ "image": image, "failures": failures }) })
+    Err(Failure::Judged { message, result })
 }
 
 fn a_board(target: Target) -> Result<(), Failure> {

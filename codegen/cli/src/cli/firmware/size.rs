@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 use object::{Architecture, Object};
-use serde_json::json;
+use serde::Serialize;
 
-use super::{Common, make, read_image, refusal, text};
-use crate::cli::ui::{Failure, Ui};
+use super::{Common, Made, make, read_image, refusal, text};
+use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_toolchain::TargetError;
-use specgen_toolchain::checks::{self, Rules};
-use specgen_toolchain::size::{has_tick, size};
+use specgen_toolchain::checks::{self, Checked, Rules};
+use specgen_toolchain::size::{Size, has_tick, size};
 
 /// Arguments of `size`.
 #[derive(Args, Debug)]
@@ -29,50 +29,57 @@ pub struct Arguments {
     single: bool,
 }
 
+/// What was made of a spec, by owner and function.
+#[derive(Serialize)]
+struct Built(Made);
+
+impl Outcome for Built {
+    fn text(&self) -> String {
+        let Self(made) = self;
+        let size = made.size.iter().map(|size| text::sections(size) + &text::owners(size));
+        let checks = made.checks.iter().map(text::checked);
+        format!("{} for {}\n", made.artifact, made.board) + &size.chain(checks).collect::<String>()
+    }
+}
+
+/// An image at hand.
+#[derive(Serialize)]
+struct Examined {
+    file: String,
+    size: Size,
+    checks: Option<Checked>,
+    /// Only Thumb code is followed; on a PC the operating system's own checks apply.
+    #[serde(skip)]
+    is_thumb: bool,
+}
+
+impl Outcome for Examined {
+    fn text(&self) -> String {
+        let checks = match &self.checks {
+            Some(checks) => text::checked(checks),
+            None if self.is_thumb => {
+                format!("  no function {} in it: name the one that is a tick by --tick\n", checks::TICKS.join(", "))
+            }
+            None => "  checks of the tick and the stack bound are for images of Cortex-M\n".to_owned(),
+        };
+        format!("{}\n{}{}{checks}", self.file, text::sections(&self.size), text::owners(&self.size))
+    }
+}
+
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = &arguments.file;
     let Some(bytes) = read_image(path)? else {
-        let (_, made) = make(path, &arguments.common, super::any, ui)?;
-        let mut out = format!("{} for {}\n", made.artifact, made.board);
-        if let Some(size) = &made.size {
-            out += &(text::sections(size) + &text::owners(size));
-        }
-        if let Some(checks) = &made.checks {
-            out += &text::checked(checks);
-        }
-        if made.failures.is_empty() {
-            ui.result(&out, json!(made));
-            return Ok(());
-        }
-        if !ui.is_json() {
-            ui.out(&out);
-        }
-        return Err(Failure::Judged { message: refusal(&made), result: json!(made) });
+        let built = Built(make(path, &arguments.common, super::any, ui)?);
+        return ui.judged(&built, refusal(&built.0));
     };
     let malformed = |error: object::Error| TargetError::MalformedImage { text: format!("{}: {error}", path.display()) };
-    let machine = object::File::parse(&*bytes).map_err(malformed)?.architecture();
+    let is_thumb = object::File::parse(&*bytes).map_err(malformed)?.architecture() == Architecture::Arm;
     let size = size(&bytes)?;
-    let mut out = format!("{}\n{}{}", path.display(), text::sections(&size), text::owners(&size));
-    // Only Thumb code is followed; on a PC the operating system's own checks apply.
-    let follows = machine == Architecture::Arm && (arguments.tick.is_some() || has_tick(&bytes));
+    let follows = is_thumb && (arguments.tick.is_some() || has_tick(&bytes));
     let rules = Rules { single: arguments.single, whole_image: false };
-    let checked = if follows { Some(checks::check(&bytes, arguments.tick.as_deref(), rules)?) } else { None };
-    match &checked {
-        Some(checked) => out += &text::checked(checked),
-        None if machine == Architecture::Arm => {
-            out +=
-                &format!("  no function {} in it: name the one that is a tick by --tick\n", checks::TICKS.join(", "));
-        }
-        None => out += "  checks of the tick and the stack bound are for images of Cortex-M\n",
-    }
-    let result = json!({ "file": path.display().to_string(), "size": size, "checks": checked });
-    let faults = checked.map_or(0, |checked| checked.faults.len());
-    if faults == 0 {
-        ui.result(&out, result);
-        return Ok(());
-    }
-    if !ui.is_json() {
-        ui.out(&out);
-    }
-    Err(Failure::Judged { message: format!("{faults} faults in {}", path.display()), result })
+    let checks = if follows { Some(checks::check(&bytes, arguments.tick.as_deref(), rules)?) } else { None };
+    let faults = checks.as_ref().map_or(0, |checks| checks.faults.len());
+    let file = path.display().to_string();
+    let failed = (faults > 0).then(|| format!("{faults} faults in {file}"));
+    ui.judged(&Examined { file, size, checks, is_thumb }, failed)
 }

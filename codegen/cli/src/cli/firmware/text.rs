@@ -3,75 +3,85 @@
 use std::fmt::Write as _;
 
 use super::Made;
-use specgen_compiler::compile::Compiled;
-use specgen_toolchain::budget::group;
+use crate::cli::table::{left, right, row};
+use crate::cli::ui::Outcome;
+use specgen_toolchain::budget::{Used, group};
 use specgen_toolchain::checks::Checked;
 use specgen_toolchain::size::Size;
 
 /// As many owners and variables as are listed.
 const LISTED: usize = 12;
 
-/// The result of `build`.
-pub fn of(compiled: &Compiled, made: &Made) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = writeln!(
-        out,
-        "{} → {} for {} (f{}, digest {})",
-        made.name,
-        made.artifact,
-        made.board,
-        compiled.ir.scalar.bits(),
-        &made.digest[..16]
-    );
-    if let Some(compiler) = &made.compiler {
-        let _ = writeln!(out, "  compiler      {compiler}");
+impl Outcome for Made {
+    fn text(&self) -> String {
+        let mut out = format!(
+            "{} → {} for {} (f{}, digest {})\n",
+            self.name,
+            self.artifact,
+            self.board,
+            self.bits,
+            &self.digest[..16]
+        );
+        // Writing to a String cannot fail, here and below.
+        if let Some(compiler) = &self.compiler {
+            let _ = writeln!(out, "  compiler      {compiler}");
+        }
+        if let Some(used) = &self.used {
+            self.usage(used, &mut out);
+        }
+        if let Some(size) = &self.size {
+            out.push_str(&owners(size));
+        }
+        if let Some(checks) = &self.checks {
+            out.push_str(&checked(checks));
+        }
+        if let Some(m) = self.measurement.as_ref().filter(|m| m.first_difference.is_none()) {
+            let _ = writeln!(out, "  host and {} agree in every bit over {} ticks", m.machine, group(m.ticks));
+        }
+        for note in &self.notes {
+            let _ = writeln!(out, "  note: {note}");
+        }
+        out
     }
-    if let Some(used) = &made.used {
-        let target = &compiled.model.target;
+}
+
+impl Made {
+    /// Memory and instructions against their budgets.
+    fn usage(&self, used: &Used, out: &mut String) {
         let of = |budget: Option<u64>| budget.map_or(String::new(), |budget| format!(" of {}", group(budget)));
-        let _ = writeln!(out, "  flash         {}{} bytes", group(used.flash), of(target.flash));
+        let limits = &self.limits;
+        let _ = writeln!(out, "  flash         {}{} bytes", group(used.flash), of(limits.flash));
         let _ =
-            writeln!(out, "  RAM           {}{} bytes, the stack of a tick included", group(used.ram), of(target.ram));
+            writeln!(out, "  RAM           {}{} bytes, the stack of a tick included", group(used.ram), of(limits.ram));
         let bound = used
             .stack
-            .map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(target.stack)));
+            .map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(limits.stack)));
         let _ = writeln!(out, "  stack a tick  {bound} (static)");
         if let Some(instructions) = used.instructions {
-            let _ = writeln!(
-                out,
-                "  instructions  {}{} a tick, mean{}",
-                group(instructions),
-                of(target.instructions),
-                made.measurement.as_ref().map_or(String::new(), |m| format!(
+            let counted = self.measurement.as_ref().map_or(String::new(), |m| {
+                format!(
                     "; counted on {}, the same core and code: flash wait states and caches are not in it",
                     m.machine
-                ))
-            );
+                )
+            });
+            let of = of(limits.instructions);
+            let _ = writeln!(out, "  instructions  {}{of} a tick, mean{counted}", group(instructions));
         }
     }
-    if let Some(size) = &made.size {
-        out.push_str(&owners(size));
-    }
-    if let Some(checks) = &made.checks {
-        out.push_str(&checked(checks));
-    }
-    if let Some(m) = made.measurement.as_ref().filter(|m| m.first_difference.is_none()) {
-        let _ = writeln!(out, "  host and {} agree in every bit over {} ticks", m.machine, group(m.ticks));
-    }
-    for note in &made.notes {
-        let _ = writeln!(out, "  note: {note}");
-    }
-    out
 }
 
 /// Who takes the flash.
 pub fn owners(size: &Size) -> String {
-    let mut out = format!("  {:<26} {:>10} {:>10} {:>10}\n", "flash by owner, bytes", "code", "constants", "all");
+    let columns = [left(26).behind("  "), right(10).behind(" "), right(10).behind(" "), right(10).behind(" ")];
+    let mut out = String::new();
+    row(&mut out, &columns, &[&"flash by owner, bytes", &"code", &"constants", &"all"]);
     let (shown, rest) = size.owners.split_at(LISTED.min(size.owners.len()));
     let mut line = |name: &str, code: u64, constants: u64| {
-        let (code, constants, all) = (group(code), group(constants), group(code + constants));
-        let _ = writeln!(out, "    {name:<24} {code:>10} {constants:>10} {all:>10}");
+        row(
+            &mut out,
+            &columns,
+            &[&format_args!("  {name}"), &group(code), &group(constants), &group(code + constants)],
+        );
     };
     for owner in shown {
         line(&owner.name, owner.code, owner.constants);
@@ -83,7 +93,6 @@ pub fn owners(size: &Size) -> String {
     out
 }
 
-/// Sections and variables.
 pub fn sections(size: &Size) -> String {
     let mut out = String::new();
     if let Some(identity) = &size.identity {

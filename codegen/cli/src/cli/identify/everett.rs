@@ -4,12 +4,13 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::json;
+use serde::Serialize;
 
-use super::plot::Plot;
+use super::plot::{Plot, wrote};
 use super::refused;
 use crate::cli::file::write_file;
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::table::{right, row};
+use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_identify::{self as identify, Cause, DeadTime, GridChoice, Options, Report, Validation};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_report::identification as figure;
@@ -81,33 +82,56 @@ pub fn run(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
     if let Some(output) = &arguments.output {
         write_file(output, identify::write_table_csv(&identified.table).as_bytes())?;
     }
-    let mut text = choice.as_ref().map(curve).unwrap_or_default();
-    // Writing to a String cannot fail, here and below.
-    let _ = writeln!(text, "{shown}: {}", summary(&identified.report));
-    details(&identified.report, &mut text);
-    if let Some(validation) = &validation {
-        let _ = writeln!(
-            text,
-            "{}: predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm (start taken as {})",
-            validation.record,
-            validation.best.rms_percent,
-            validation.best.max_percent,
-            validation.displacement_range * 1e6,
-            validation.best.start.name()
-        );
-        let _ = writeln!(text, "  this residual: {}", account(&validation.cause));
-    }
-    let _ = writeln!(text, "lines for the spec:\n[hysteresis]\ngrid = {grid}");
-    if let Some(output) = &arguments.output {
-        let _ = writeln!(text, "wrote {}", output.display());
-    }
-    text.push_str(
-        &arguments
-            .plot
-            .write("Everett table", || figure::everett(&identified, choice.as_ref(), validation.as_ref()))?,
-    );
-    ui.result(&text, json!({ "report": identified.report, "validation": validation, "grid_choice": choice }));
+    let draw = || figure::everett(&identified, choice.as_ref(), validation.as_ref());
+    let plot = arguments.plot.write("Everett table", draw)?;
+    let table = arguments.output.as_ref().map(|path| wrote(path));
+    ui.result(&Table {
+        record: shown,
+        grid,
+        report: &identified.report,
+        validation: validation.as_ref(),
+        grid_choice: choice.as_ref(),
+        files: table.into_iter().chain(plot).collect(),
+    });
     Ok(())
+}
+
+/// An Everett table that was identified.
+#[derive(Serialize)]
+struct Table<'a> {
+    #[serde(skip)]
+    record: String,
+    #[serde(skip)]
+    grid: usize,
+    report: &'a Report,
+    validation: Option<&'a Validation>,
+    grid_choice: Option<&'a GridChoice>,
+    /// A line for each file that was written.
+    #[serde(skip)]
+    files: String,
+}
+
+impl Outcome for Table<'_> {
+    fn text(&self) -> String {
+        let mut text = self.grid_choice.map(curve).unwrap_or_default();
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(text, "{}: {}", self.record, summary(self.report));
+        details(self.report, &mut text);
+        if let Some(validation) = self.validation {
+            let _ = writeln!(
+                text,
+                "{}: predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm (start taken as {})",
+                validation.record,
+                validation.best.rms_percent,
+                validation.best.max_percent,
+                validation.displacement_range * 1e6,
+                validation.best.start.name()
+            );
+            let _ = writeln!(text, "  this residual: {}", account(&validation.cause));
+        }
+        let _ = writeln!(text, "lines for the spec:\n[hysteresis]\ngrid = {}", self.grid);
+        text + &self.files
+    }
 }
 
 fn validate(path: &Path, identified: &identify::Identified) -> Result<Validation, Vec<Diagnostic>> {
@@ -118,9 +142,11 @@ fn validate(path: &Path, identified: &identify::Identified) -> Result<Validation
 /// The held-out error of every grid.
 fn curve(choice: &GridChoice) -> String {
     let mut text = format!(
-        "grid by cross-validation: whole curves of {} reversal voltages held out in {} folds\n     N  held-out error      %  ± std err to the best\n",
+        "grid by cross-validation: whole curves of {} reversal voltages held out in {} folds\n",
         choice.levels, choice.folds
     );
+    let columns = [4, 14, 5, 11].map(|width| right(width).behind("  "));
+    row(&mut text, &columns, &[&"N", &"held-out error", &"%", &"± std err to the best"]);
     for s in &choice.scores {
         let mark = match (s.grid == choice.chosen, s.grid == choice.best) {
             (true, true) => "  <- chosen and best",
@@ -128,14 +154,10 @@ fn curve(choice: &GridChoice) -> String {
             (false, true) => "  <- best",
             (false, false) => "",
         };
-        let _ = writeln!(
-            text,
-            "  {:>4}  {:>11.3} nm  {:>5.3}  {:>8.3} nm{mark}",
-            s.grid,
-            s.held_out_rms * 1e9,
-            s.held_out_percent,
-            s.standard_error * 1e9
-        );
+        // The mark stands behind the columns.
+        let error = format_args!("{:>8.3} nm{mark}", s.standard_error * 1e9);
+        let held_out = format_args!("{:.3} nm", s.held_out_rms * 1e9);
+        row(&mut text, &columns, &[&s.grid, &held_out, &format_args!("{:.3}", s.held_out_percent), &error]);
     }
     let _ = writeln!(text, "  N = {}: {} (one-standard-error rule)", choice.chosen, choice.rule);
     text

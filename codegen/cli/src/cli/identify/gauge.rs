@@ -4,14 +4,14 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
+use serde::Serialize;
 
-use super::plot::Plot;
+use super::plot::{Plot, wrote};
 use super::refused;
 use crate::cli::file::write_file;
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::ui::{Failure, Outcome, Ui};
 
-use specgen_identify::gauge;
+use specgen_identify::gauge::{self, GaugeReport};
 use specgen_report::identification as figure;
 
 /// Arguments of `identify gauge`.
@@ -34,42 +34,66 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.record.display().to_string();
     let report = gauge::calibrate(&arguments.record, &shown, arguments.degree.map(usize::from)).map_err(refused)?;
     ui.findings(None, &report.warnings);
-    let errors: Vec<String> =
-        report.held_out_rms.iter().enumerate().map(|(k, e)| format!("{}: {:.3} nm", k + 1, e * 1e9)).collect();
-    let chosen = if arguments.degree.is_some() { "as given" } else { report.rule };
-    let mut text = format!(
-        "{shown}: {} samples, {:.4} V to {:.4} V, {:.4} µm to {:.4} µm\n  held-out error by degree: {}\n  degree {} ({chosen})\n  residual {:.3} nm rms, {:.3} nm at most (at {})\n",
-        report.samples,
-        report.volts[0],
-        report.volts[1],
-        report.reference[0] * 1e6,
-        report.reference[1] * 1e6,
-        errors.join(", "),
-        report.degree,
-        report.residual_rms * 1e9,
-        report.residual_max * 1e9,
-        report.residual_max_at
-    );
-    let hysteresis = report.hysteresis.map_or_else(
-        || "not known: the reference never turns back".to_owned(),
-        |h| format!("{:.3} nm between the ways up and down", h * 1e9),
-    );
-    // Writing to a String cannot fail.
-    let _ = write!(
-        text,
-        "  hysteresis {hysteresis}\n  monotonic over these voltages: least slope {:.1} % of the mean slope\nlines for the spec, in [sensor] for all gauges or in [[gauge]] for this one:\n{}\n",
-        report.least_slope_percent,
-        gauge::spec_line(&report)
-    );
+    let mut files = String::new();
     if let Some(path) = &arguments.table {
         let rows = report.table.iter().fold("gauge_V,reference_um\n".to_owned(), |mut rows, [v, y]| {
+            // Writing to a String cannot fail.
             let _ = writeln!(rows, "{v:?},{:?}", y * 1e6);
             rows
         });
         write_file(path, rows.as_bytes())?;
-        let _ = writeln!(text, "wrote {}", path.display());
+        files += &wrote(path);
     }
-    text.push_str(&arguments.plot.write("Gauge calibration", || figure::gauge(&report))?);
-    ui.result(&text, json!({ "report": report, "calibration": gauge::spec_line(&report) }));
+    files.extend(arguments.plot.write("Gauge calibration", || figure::gauge(&report))?);
+    let (calibration, is_given) = (gauge::spec_line(&report), arguments.degree.is_some());
+    ui.result(&Calibration { record: shown, is_given, report, calibration, files });
     Ok(())
+}
+
+/// A gauge that was calibrated.
+#[derive(Serialize)]
+struct Calibration {
+    #[serde(skip)]
+    record: String,
+    /// The degree was not chosen.
+    #[serde(skip)]
+    is_given: bool,
+    report: GaugeReport,
+    /// The line for the spec.
+    calibration: String,
+    /// A line for each file that was written.
+    #[serde(skip)]
+    files: String,
+}
+
+impl Outcome for Calibration {
+    fn text(&self) -> String {
+        let report = &self.report;
+        let errors: Vec<String> =
+            report.held_out_rms.iter().enumerate().map(|(k, e)| format!("{}: {:.3} nm", k + 1, e * 1e9)).collect();
+        let chosen = if self.is_given { "as given" } else { report.rule };
+        let hysteresis = report.hysteresis.map_or_else(
+            || "not known: the reference never turns back".to_owned(),
+            |h| format!("{:.3} nm between the ways up and down", h * 1e9),
+        );
+        format!(
+            "{}: {} samples, {:.4} V to {:.4} V, {:.4} µm to {:.4} µm\n  held-out error by degree: {}\n  degree {} ({chosen})\n  \
+             residual {:.3} nm rms, {:.3} nm at most (at {})\n  hysteresis {hysteresis}\n  monotonic over these voltages: least slope {:.1} % \
+             of the mean slope\nlines for the spec, in [sensor] for all gauges or in [[gauge]] for this one:\n{}\n{}",
+            self.record,
+            report.samples,
+            report.volts[0],
+            report.volts[1],
+            report.reference[0] * 1e6,
+            report.reference[1] * 1e6,
+            errors.join(", "),
+            report.degree,
+            report.residual_rms * 1e9,
+            report.residual_max * 1e9,
+            report.residual_max_at,
+            report.least_slope_percent,
+            self.calibration,
+            self.files
+        )
+    }
 }

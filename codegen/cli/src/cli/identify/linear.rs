@@ -4,15 +4,18 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::plot::Plot;
 use super::refused;
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::table::{left, right, row};
+use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Refused};
+use specgen_compiler::stability::Margins;
 use specgen_identify as identify;
 use specgen_identify::linear::{self, LinearReport, PAPER_PROPORTION};
-use specgen_language::model::Model;
+use specgen_language::diagnostic::Diagnostic;
+use specgen_language::model::Adaptation;
 use specgen_language::spec::{self, SpecSource};
 use specgen_report::identification as figure;
 
@@ -78,40 +81,87 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         return Err(refused(bad));
     }
     let report = linear::together(relations, arguments.reference).map_err(refused)?;
-    let mut text = table(&report);
-    let judged = match &arguments.spec {
-        None => {
-            static_verdict(&report, &mut text);
-            Value::Null
-        }
-        Some(path) => judge(path, &report, &mut text)?,
-    };
-    lines(&report, &judged, &mut text);
-    text.push_str(&arguments.plot.write("Linear relation", || figure::linear(&report, &read))?);
-    ui.result(&text, json!({ "report": report, "gain_ratio": report.gain_ratio_for_spec(), "spec": judged }));
+    let spec = arguments.spec.as_deref().map(|path| judge(path, &report)).transpose()?;
+    let plot = arguments.plot.write("Linear relation", || figure::linear(&report, &read))?.unwrap_or_default();
+    ui.result(&Related { gain_ratio: report.gain_ratio_for_spec(), report, spec, plot });
     Ok(())
 }
 
+/// A linear relation that was found.
+#[derive(Serialize)]
+struct Related {
+    report: LinearReport,
+    gain_ratio: [f64; 2],
+    spec: Option<Judged>,
+    /// A line about the plot.
+    #[serde(skip)]
+    plot: String,
+}
+
+/// What the sampled loop of a spec makes of the relation.
+#[derive(Serialize)]
+struct Judged {
+    stacks: f64,
+    verdict: Verdict,
+    #[serde(skip)]
+    name: String,
+    #[serde(skip)]
+    adaptation: Adaptation,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Verdict {
+    Stable { stable: bool, margins: Option<Margins>, design: bool },
+    Unstable { stable: bool, findings: Vec<Reason> },
+}
+
+#[derive(Serialize)]
+struct Reason {
+    code: &'static str,
+    message: String,
+    help: String,
+}
+
+impl Outcome for Related {
+    fn text(&self) -> String {
+        let mut text = table(&self.report);
+        match &self.spec {
+            None => static_verdict(&self.report, &mut text),
+            Some(judged) => judged.write(&mut text),
+        }
+        lines(&self.report, self.spec.as_ref().map(|judged| judged.stacks), &mut text);
+        text + &self.plot
+    }
+}
+
 fn table(report: &LinearReport) -> String {
-    let mut text =
-        "Y = ρX + δ\n  frequency Hz      ρ µm/V   ± std err        δ µm   loop µm     %  correlation  cycles  record\n"
-            .to_owned();
+    let mut text = "Y = ρX + δ\n".to_owned();
+    let columns = [12, 10, 10, 10, 8, 4, 11, 6].map(|width| right(width).behind("  "));
+    let columns = [&columns[..], &[left(0).behind("  ")]].concat();
+    row(
+        &mut text,
+        &columns,
+        &[&"frequency Hz", &"ρ µm/V", &"± std err", &"δ µm", &"loop µm", &"%", &"correlation", &"cycles", &"record"],
+    );
     for r in &report.relations {
-        // Writing to a String cannot fail, here and below.
-        let _ = writeln!(
-            text,
-            "  {:>12.4}  {:>10.6}  {:>10.6}  {:>10.4}  {:>8.4}  {:>4.1}  {:>11.5}  {:>6}  {}",
-            r.frequency,
-            r.gain * 1e6,
-            r.gain_error * 1e6,
-            r.offset * 1e6,
-            r.loop_width * 1e6,
-            r.loop_percent,
-            r.correlation,
-            r.cycles,
-            r.record
+        row(
+            &mut text,
+            &columns,
+            &[
+                &format_args!("{:.4}", r.frequency),
+                &format_args!("{:.6}", r.gain * 1e6),
+                &format_args!("{:.6}", r.gain_error * 1e6),
+                &format_args!("{:.4}", r.offset * 1e6),
+                &format_args!("{:.4}", r.loop_width * 1e6),
+                &format_args!("{:.1}", r.loop_percent),
+                &format_args!("{:.5}", r.correlation),
+                &r.cycles,
+                &r.record,
+            ],
         );
     }
+    // Writing to a String cannot fail, here and below.
     let _ = writeln!(
         text,
         "reference: ρ̂ = {:.6} µm/V, at {:.4} Hz; λ = ρ/ρ̂ from {:.4} to {:.4} (two standard errors included)",
@@ -144,49 +194,49 @@ fn static_verdict(report: &LinearReport, text: &mut String) {
 }
 
 /// Stability of the spec's own weights over the λ found.
-fn judge(path: &Path, report: &LinearReport, text: &mut String) -> Result<Value, Failure> {
+fn judge(path: &Path, report: &LinearReport) -> Result<Judged, Failure> {
     let source = SpecSource::read(path).map_err(|finding| refused(vec![finding]))?;
     let (model, findings) = spec::load(&source);
     let Some(mut model) = model else {
         return Err(Failure::from(Refused { source: Some(source), findings }));
     };
     model.adaptation.gain_ratio = report.gain_ratio_for_spec();
-    let name = path.display();
-    let stacks = f64::from(model.actuator.stacks);
     let verdict = match compile::check_stability(&model) {
-        Ok((margins, design)) => {
-            if let (Some(margins), Some(level)) = (&margins, level(&model)) {
+        Ok((margins, design)) => Verdict::Stable { stable: true, margins, design: design.is_some() },
+        Err(found) => {
+            let reason = |f: Diagnostic| Reason { code: f.code, message: f.message, help: f.help };
+            Verdict::Unstable { stable: false, findings: found.into_iter().map(reason).collect() }
+        }
+    };
+    let stacks = f64::from(model.actuator.stacks);
+    Ok(Judged { stacks, verdict, name: path.display().to_string(), adaptation: model.adaptation })
+}
+
+impl Judged {
+    fn write(&self, text: &mut String) {
+        let Self { name, adaptation, .. } = self;
+        let _ = match &self.verdict {
+            Verdict::Stable { margins: Some(margins), .. } if adaptation.level_weight > 0.0 => {
                 let largest = margins
                     .largest_level_weight
                     .map_or_else(String::new, |w| format!("; stable up to level weight {w:.4}"));
-                let _ = writeln!(
+                writeln!(
                     text,
-                    "{name}: its weights (level {level}, drift {}) are stable over this λ; spectral radius {:.4}{largest}",
-                    model.adaptation.drift_weight, margins.spectral_radius
-                );
-            } else {
-                let _ = writeln!(text, "{name}: its adaptation is stable over this λ");
+                    "{name}: its weights (level {}, drift {}) are stable over this λ; spectral radius {:.4}{largest}",
+                    adaptation.level_weight, adaptation.drift_weight, margins.spectral_radius
+                )
             }
-            json!({ "stable": true, "margins": margins, "design": design.is_some() })
-        }
-        Err(found) => {
-            let _ = writeln!(text, "{name}: its weights are NOT stable over this λ");
-            for finding in &found {
-                let _ = writeln!(text, "  {}: {}\n    help: {}", finding.code, finding.message, finding.help);
+            Verdict::Stable { .. } => writeln!(text, "{name}: its adaptation is stable over this λ"),
+            Verdict::Unstable { findings, .. } => {
+                let _ = writeln!(text, "{name}: its weights are NOT stable over this λ");
+                findings.iter().try_for_each(|f| writeln!(text, "  {}: {}\n    help: {}", f.code, f.message, f.help))
             }
-            json!({ "stable": false, "findings": found.iter().map(|f| json!({"code": f.code, "message": f.message, "help": f.help})).collect::<Vec<_>>() })
-        }
-    };
-    Ok(json!({ "stacks": stacks, "verdict": verdict }))
+        };
+    }
 }
 
-fn level(model: &Model) -> Option<f64> {
-    (model.adaptation.level_weight > 0.0).then_some(model.adaptation.level_weight)
-}
-
-fn lines(report: &LinearReport, judged: &Value, text: &mut String) {
+fn lines(report: &LinearReport, stacks: Option<f64>, text: &mut String) {
     let [low, high] = report.gain_ratio_for_spec();
-    let stacks = judged["stacks"].as_f64();
     let gain = report.reference_gain * 1e6 / stacks.unwrap_or(1.0);
     let note = match stacks {
         Some(n) if n > 1.0 => format!("of one stack: the record's, divided by {n}"),

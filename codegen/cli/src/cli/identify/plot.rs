@@ -8,7 +8,6 @@ use crate::cli::file::write_file;
 use crate::cli::ui::Failure;
 use specgen_report::plot::html;
 
-/// The option.
 #[derive(Args, Debug)]
 pub struct Plot {
     /// Draw measurement, model and residual here: .svg, or .html for a page.
@@ -36,12 +35,17 @@ fn kind(path: &Path) -> Option<bool> {
 }
 
 impl Plot {
-    /// Writes what `draw` draws, if a plot is wanted; the line that says so.
-    pub fn write(&self, title: &str, draw: impl FnOnce() -> String) -> Result<String, Failure> {
-        let Some(path) = &self.plot else { return Ok(String::new()) };
+    /// Writes what `draw` draws, if a plot is wanted; then a line about it.
+    pub fn write(&self, title: &str, draw: impl FnOnce() -> String) -> Result<Option<String>, Failure> {
+        let Some(path) = &self.plot else { return Ok(None) };
         let svg = draw();
         let text = if kind(path) == Some(true) { html(title, &svg) } else { svg };
         write_file(path, text.as_bytes())?;
-        Ok(format!("wrote {}\n", path.display()))
+        Ok(Some(wrote(path)))
     }
+}
+
+/// The line that says so.
+pub(in crate::cli) fn wrote(path: &Path) -> String {
+    format!("wrote {}\n", path.display())
 }

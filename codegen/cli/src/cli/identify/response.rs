@@ -4,13 +4,12 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::json;
 
 use super::plot::Plot;
-use super::refused;
-use crate::cli::ui::{Failure, Ui};
+use super::{Identified, refused};
+use crate::cli::ui::{Failure, Outcome, Ui};
 
-use specgen_identify::response::{self, Estimate};
+use specgen_identify::response::{self, Estimate, ResponseReport};
 use specgen_report::identification as figure;
 
 /// Arguments of `identify response`.
@@ -30,40 +29,48 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.record.display().to_string();
     let report = response::respond(&arguments.record, &shown, arguments.segment).map_err(refused)?;
     ui.findings(None, &report.warnings);
-    let f = &report.fitted;
-    let shown_in = |e: Estimate, scale: f64| format!("{:.4} ± {:.1e}", e.value * scale, e.error * scale);
-    let mut text = format!(
-        "{shown}: {} segments of {} samples at {:.1} Hz, bins of {:.3} Hz, used {:.3} to {:.1} Hz, coherence {:.4} in the middle, misfit {:.2} %\n",
-        report.segments,
-        report.segment,
-        report.rate,
-        report.resolution,
-        report.band[0],
-        report.band[1],
-        report.coherence,
-        report.misfit_percent
-    );
-    // Writing to a String cannot fail.
-    let _ = write!(
-        text,
-        "  resonance     {} Hz\n  damping ratio {}\n  lag           {} ms\n  dead time     {} ms (the hold of the converter, half a period, is in it)\n  lag + dead    {} ms (errors of the two correlated by {:.2})\n  static gain   {} µm/V\n",
-        shown_in(f.resonance, 1.0),
-        shown_in(f.damping_ratio, 1.0),
-        shown_in(f.lag, 1e3),
-        shown_in(f.dead_time, 1e3),
-        shown_in(f.lag_and_dead_time, 1e3),
-        f.lag_dead_time_correlation,
-        format_args!("{:.6} ± {:.1e}", f.gain.value * 1e6, f.gain.error * 1e6),
-    );
-    let _ = write!(
-        text,
-        "lines for the spec:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n",
-        f.resonance.value,
-        f.gain.value * 1e6,
-        f.damping_ratio.value,
-        f.lag.value * 1e3
-    );
-    text.push_str(&arguments.plot.write("Frequency response", || figure::response(&report))?);
-    ui.result(&text, json!({ "report": report }));
+    let files = arguments.plot.write("Frequency response", || figure::response(&report))?.unwrap_or_default();
+    ui.result(&Identified { record: shown, report, files });
     Ok(())
+}
+
+impl Outcome for Identified<ResponseReport> {
+    fn text(&self) -> String {
+        let Self { record, report, files } = self;
+        let f = &report.fitted;
+        let shown_in = |e: Estimate, scale: f64| format!("{:.4} ± {:.1e}", e.value * scale, e.error * scale);
+        let mut text = format!(
+            "{record}: {} segments of {} samples at {:.1} Hz, bins of {:.3} Hz, used {:.3} to {:.1} Hz, coherence {:.4} in the middle, misfit {:.2} %\n",
+            report.segments,
+            report.segment,
+            report.rate,
+            report.resolution,
+            report.band[0],
+            report.band[1],
+            report.coherence,
+            report.misfit_percent
+        );
+        // Writing to a String cannot fail.
+        let _ = write!(
+            text,
+            "  resonance     {} Hz\n  damping ratio {}\n  lag           {} ms\n  dead time     {} ms (the hold of the converter, half a period, is in it)\n  lag + dead    {} ms (errors of the two correlated by {:.2})\n  static gain   {:.6} ± {:.1e} µm/V\n",
+            shown_in(f.resonance, 1.0),
+            shown_in(f.damping_ratio, 1.0),
+            shown_in(f.lag, 1e3),
+            shown_in(f.dead_time, 1e3),
+            shown_in(f.lag_and_dead_time, 1e3),
+            f.lag_dead_time_correlation,
+            f.gain.value * 1e6,
+            f.gain.error * 1e6,
+        );
+        let _ = write!(
+            text,
+            "lines for the spec:\n[actuator]\nresonance = \"{:.1} Hz\"  # static gain here: {:.5} um/V for small amplitude, below that of a large loop\ndamping_ratio = {:.4}\n[amplifier]\nlag = \"{:.4} ms\"\n{files}",
+            f.resonance.value,
+            f.gain.value * 1e6,
+            f.damping_ratio.value,
+            f.lag.value * 1e3
+        );
+        text
+    }
 }

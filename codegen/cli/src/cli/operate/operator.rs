@@ -1,18 +1,18 @@
 //! The operator of a session: carries orders out one after the other, notices faults, keeps the link alive.
 
-use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use host_sim::controller::MachineWord;
-use serde_json::{Value, json};
+use serde_json::json;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{RecorderStatus, Refusal, Status};
 use specgen_runtime::supervisor::{Phase, Request};
 
+use super::answer::{Answer, Downloaded, MachineStatus, Plain, RecorderState, Settings};
 use crate::cli::file::{check_place, write_file};
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
 use specgen_operate::{Order, Session, Until, read_wave, refused_wave};
 
@@ -27,9 +27,7 @@ pub enum Ended {
     Fault(String),
     /// As any command can fail.
     Failed(Failure),
-    /// The link failed.
     Link(ClientError),
-    /// Ctrl-C.
     Interrupted,
     /// The program that served the link was asked to end, and has.
     Stopped,
@@ -53,7 +51,7 @@ pub struct Operator<P> {
     /// A person looks at it: a fault is shown, and ends nothing.
     pub attended: bool,
     /// Answers to the orders so far, for the JSON document.
-    pub answers: Vec<Value>,
+    pub answers: Vec<Answer>,
 }
 
 impl<P: Port> Operator<P> {
@@ -72,21 +70,21 @@ impl<P: Port> Operator<P> {
         self.session.status().amplifier_on
     }
 
-    /// How the machine stands, for the JSON document.
-    pub fn status(&self) -> Value {
-        let status = self.session.status();
-        json!({
-            "tick": status.tick,
-            "phase": status.phase,
-            "cause": status.cause,
-            "stands": self.stands(),
-            "amplifiers_on": status.amplifier_on,
-            "status": status.status,
-            "events": status.events,
-            "late": status.late,
-            "link_errors": status.link.errors(),
-            "damaged_frames": self.session.damaged(),
-        })
+    pub fn status(&self) -> MachineStatus {
+        let status = *self.session.status();
+        MachineStatus {
+            tick: status.tick,
+            phase: status.phase,
+            cause: status.cause,
+            stands: self.stands(),
+            amplifiers_on: status.amplifier_on,
+            status: status.status,
+            events: status.events,
+            late: status.late,
+            link_errors: status.link.errors(),
+            damaged_frames: self.session.damaged(),
+            period: self.session.period(),
+        }
     }
 
     /// Asks how it stands. A fault that is new ends what is not attended.
@@ -114,11 +112,11 @@ impl<P: Port> Operator<P> {
         }
     }
 
-    /// Keeps the answer of a line for programs, or shows it.
-    pub fn note(&mut self, line: &str, value: Value, text: &str, ui: &Ui) {
-        self.answers.push(json!({ "command": line, "answer": value }));
-        if !ui.is_json() && !text.is_empty() {
-            ui.out(&format!("{}\n", text.trim_end()));
+    /// Shows the answer to a line, or keeps it for the document.
+    pub fn note(&mut self, command: &str, answer: &impl Outcome, ui: &Ui) {
+        self.answers.push(Answer { command: command.to_owned(), answer: json!(answer) });
+        if !ui.is_json() {
+            ui.out(&answer.text());
         }
     }
 
@@ -136,62 +134,54 @@ impl<P: Port> Operator<P> {
     /// Carries an order out.
     pub fn obey(&mut self, order: &Order, ui: &Ui) -> Result<(), Ended> {
         self.look()?;
-        let (value, text) = match order {
-            Order::Status => (self.status(), self.text()),
-            Order::Ask(request) => {
-                self.session.supervise(*request)?;
-                (json!("done"), String::new())
-            }
-            Order::Set(assignments) => {
-                let words = self.session.assign(assignments).map_err(Ended::Refused)?;
-                self.session.command(words).map_err(waving)?;
-                (json!("done"), String::new())
-            }
+        let line = format!("{order:?}");
+        match order {
+            Order::Status => self.note(&line, &self.status(), ui),
             Order::Wait { until, limit } => {
                 self.wait(*until, *limit, ui)?;
-                (json!(self.stands()), String::new())
+                self.note(&line, &Plain(self.stands()), ui);
             }
-            Order::Config => self.config()?,
-            Order::WriteConfig(spec) => {
-                self.write_config(spec)?;
-                (json!("done"), String::new())
+            Order::Config => {
+                let settings = self.config()?;
+                self.note(&line, &settings, ui);
             }
-            Order::Record(action) => recorder(&self.session.recorder(*action)?, self.session.period()),
-            Order::Download(path) => self.download(path)?,
-            Order::Wave(path) => {
-                self.wave(path)?;
-                (json!("done"), String::new())
+            Order::Record(action) => {
+                let RecorderStatus { running, triggered, ticks, capacity } = self.session.recorder(*action)?;
+                let period = self.session.period();
+                self.note(&line, &RecorderState { running, triggered, ticks, capacity, period }, ui);
             }
-            Order::StopWave => {
-                self.session.stop_wave()?;
-                (json!("done"), String::new())
+            Order::Download(path) => {
+                let downloaded = self.download(path)?;
+                self.note(&line, &downloaded, ui);
             }
-            Order::Stop => {
-                self.session.stop().map_err(unsupported)?;
-                self.note(&format!("{order:?}"), json!("done"), "", ui);
-                return self.stopped(ui);
+            _ => {
+                self.ask(order)?;
+                self.note(&line, &Plain("done".to_owned()), ui);
+                if *order == Order::Stop {
+                    return self.stopped(ui);
+                }
             }
-        };
-        self.note(&format!("{order:?}"), value, &text, ui);
+        }
         self.look()?;
         self.show(ui);
         Ok(())
     }
 
-    fn text(&self) -> String {
-        let status = self.session.status();
-        let on = if status.amplifier_on { "on" } else { "off" };
-        let mut text = format!(
-            "tick {}, {:.4} s: {}, amplifiers {on}, status {:#x}",
-            status.tick,
-            status.tick as f64 * self.session.period(),
-            self.stands(),
-            status.status
-        );
-        // Writing to a String cannot fail, here and below.
-        let _ = write!(text, "; events {:#x}, {} late ticks", status.events, status.late);
-        let _ = write!(text, ", {} damaged frames", status.link.errors() + self.session.damaged());
-        text
+    /// Orders that are answered by being done.
+    fn ask(&mut self, order: &Order) -> Result<(), Ended> {
+        match order {
+            Order::Ask(request) => self.session.supervise(*request)?,
+            Order::Set(assignments) => {
+                let words = self.session.assign(assignments).map_err(Ended::Refused)?;
+                self.session.command(words).map_err(waving)?;
+            }
+            Order::WriteConfig(spec) => self.write_config(spec)?,
+            Order::Wave(path) => self.wave(path)?,
+            Order::StopWave => self.session.stop_wave()?,
+            Order::Stop => self.session.stop().map_err(unsupported)?,
+            Order::Status | Order::Wait { .. } | Order::Config | Order::Record(_) | Order::Download(_) => {}
+        }
+        Ok(())
     }
 
     fn wait(&mut self, until: Until, limit: Duration, ui: &Ui) -> Result<(), Ended> {
@@ -234,19 +224,15 @@ impl<P: Port> Operator<P> {
         Err(Ended::Fault(format!("it has not ended after {} s, the machine is {}", DOWN.as_secs(), self.stands())))
     }
 
-    fn config(&mut self) -> Result<(Value, String), Ended> {
+    fn config(&mut self) -> Result<Settings, Ended> {
         let words = self.session.config()?;
         let description = self.session.description();
-        let (mut map, mut text) = (serde_json::Map::new(), String::new());
-        for (name, word) in description.config_names.iter().zip(words) {
-            let value = match host_sim::word::WordKind::of(name) {
-                host_sim::word::WordKind::Integer => json!(word),
-                host_sim::word::WordKind::Real => json!(description.scalar.decode(word)),
-            };
-            let _ = writeln!(text, "{name} = {value}");
-            map.insert(name.clone(), value);
-        }
-        Ok((Value::Object(map), text))
+        let value = |name: &str, word: u64| match host_sim::word::WordKind::of(name) {
+            host_sim::word::WordKind::Integer => json!(word),
+            host_sim::word::WordKind::Real => json!(description.scalar.decode(word)),
+        };
+        let names = description.config_names.iter();
+        Ok(Settings(names.zip(words).map(|(name, word)| (name.clone(), value(name, word))).collect()))
     }
 
     /// The settings of a spec; its tables stay in the spec.
@@ -287,7 +273,7 @@ impl<P: Port> Operator<P> {
         })
     }
 
-    fn download(&mut self, path: &Path) -> Result<(Value, String), Ended> {
+    fn download(&mut self, path: &Path) -> Result<Downloaded, Ended> {
         let bytes = self.session.download().map_err(|error| match error {
             ClientError::Refused(Refusal::State) => {
                 Ended::Refused("it still records; `record stop` first, or wait for the trigger".to_owned())
@@ -295,8 +281,7 @@ impl<P: Port> Operator<P> {
             other => other.into(),
         })?;
         write_file(path, &bytes).map_err(Ended::Failed)?;
-        let text = format!("wrote {} bytes to {}", bytes.len(), path.display());
-        Ok((json!({ "file": path.display().to_string(), "bytes": bytes.len() }), text))
+        Ok(Downloaded { file: path.display().to_string(), bytes: bytes.len() })
     }
 
     fn wave_of(&self, path: &Path) -> Result<(Vec<u64>, [u64; 6]), String> {
@@ -356,20 +341,4 @@ fn unsupported(error: ClientError) -> Ended {
         }
         other => other.into(),
     }
-}
-
-/// How a recorder stands.
-fn recorder(status: &RecorderStatus, period: f64) -> (Value, String) {
-    let RecorderStatus { running, triggered, ticks, capacity } = *status;
-    let does = match (running, triggered) {
-        (true, false) => "records, waits for its trigger",
-        (true, true) => "records what comes after the trigger",
-        (false, true) => "is complete",
-        (false, false) => "is stopped",
-    };
-    let text = format!(
-        "the recorder {does}; it holds {ticks} ticks, {:.4} s; {capacity} fit whatever changes",
-        f64::from(ticks) * period
-    );
-    (json!({ "running": running, "triggered": triggered, "ticks": ticks, "capacity": capacity }), text)
 }

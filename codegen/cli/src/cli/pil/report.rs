@@ -8,6 +8,8 @@ use host_sim::table::TrackingTable;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::cli::table::{left, right, row};
+use crate::cli::ui::Outcome;
 use specgen_compiler::compile::Compiled;
 use specgen_operate::pil::{Cost, Difference};
 
@@ -16,7 +18,6 @@ use specgen_operate::pil::{Cost, Difference};
 pub struct Report {
     /// Name of the spec.
     pub name: String,
-    /// Its digest.
     pub digest: String,
     /// What was in the loop.
     pub device: String,
@@ -35,13 +36,11 @@ pub struct Report {
     pub damaged_frames: u32,
     /// What costs are counted in; empty if they are not.
     pub counted: &'static str,
-    /// Per stage.
     pub costs: Vec<Cost>,
     /// Static bound of a tick's stack, bytes; none for a board, or if the call graph cannot be bounded.
     pub stack_bound: Option<u64>,
     /// Legs: errors of the trajectory.
     pub tracking: TrackingTable,
-    /// Platform, free motion.
     #[serde(serialize_with = "rows")]
     pub free_motion: PoseTable,
     /// Platform, against a work part.
@@ -98,8 +97,10 @@ impl Report {
     fn rate(&self) -> f64 {
         if self.seconds > 0.0 { self.ticks as f64 / self.seconds } else { 0.0 }
     }
+}
 
-    pub fn text(&self) -> String {
+impl Outcome for Report {
+    fn text(&self) -> String {
         let mut out = format!(
             "{}: {} in the loop; host and device equal in every bit of {} ticks\n",
             self.name, self.device, self.ticks
@@ -107,13 +108,11 @@ impl Report {
         out.push_str(&self.errors);
         // Writing to a String cannot fail, here and below.
         if !self.costs.is_empty() {
-            let _ = writeln!(out, "{:<18}{:>10}{:>10}{:>12}{:>10}", self.counted, "calls", "min", "mean", "max");
+            let columns = [left(18), right(10), right(10), right(12), right(10)];
+            row(&mut out, &columns, &[&self.counted, &"calls", &"min", &"mean", &"max"]);
             for cost in &self.costs {
-                let _ = writeln!(
-                    out,
-                    "  {:<16}{:>10}{:>10}{:>12.1}{:>10}",
-                    cost.name, cost.calls, cost.min, cost.mean, cost.max
-                );
+                let (name, mean) = (format_args!("  {}", cost.name), format_args!("{:.1}", cost.mean));
+                row(&mut out, &columns, &[&name, &cost.calls, &cost.min, &mean, &cost.max]);
             }
         }
         if let Some(whole) = self.costs.first().filter(|whole| whole.stack > 0) {

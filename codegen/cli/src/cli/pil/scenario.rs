@@ -30,9 +30,7 @@ const MACHINING_FREQUENCY: f64 = 1.0;
 /// Control ticks per period of the leg trajectory, unless asked otherwise.
 const SAMPLES: u32 = 500;
 
-/// What to run.
 pub enum Plan {
-    /// The leg trajectory.
     Legs {
         /// Names with the values of the `mode` word.
         modes: Vec<(&'static str, u32)>,

@@ -2,10 +2,12 @@
 
 use std::fmt::Write as _;
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::Arguments;
 use super::trajectory::Followed;
+use crate::cli::table::{left, right, row};
+use crate::cli::ui::Outcome as Shown;
 use specgen_compiler::compile::Compiled;
 use specgen_studies::robust::quantiles::quantile;
 use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, Member, Outcome, Study};
@@ -23,21 +25,28 @@ struct Row {
     judged: bool,
 }
 
-const fn row(name: &'static str, key: &'static str, of: fn(&Figures) -> f64, platform_only: bool, judged: bool) -> Row {
+const fn figure(
+    name: &'static str,
+    key: &'static str,
+    of: fn(&Figures) -> f64,
+    platform_only: bool,
+    judged: bool,
+) -> Row {
     Row { name, key, of, platform_only, judged }
 }
 
 const ROWS: [Row; 6] = [
-    row("error, nm rms", "error_nm", |f| f.error_nm, false, true),
-    row("error, nm peak", "peak_nm", |f| f.peak_nm, false, false),
-    row("angles, nrad rms", "orientation_nrad", |f| f.orientation_nrad, true, true),
-    row("angles, nrad peak", "orientation_peak_nrad", |f| f.orientation_peak_nrad, true, false),
-    row("at a limit, % of ticks", "limited_percent", |f| f.limited_percent, false, false),
-    row("with a fault, ticks", "fault_ticks", |f| f.fault_ticks as f64, false, false),
+    figure("error, nm rms", "error_nm", |f| f.error_nm, false, true),
+    figure("error, nm peak", "peak_nm", |f| f.peak_nm, false, false),
+    figure("angles, nrad rms", "orientation_nrad", |f| f.orientation_nrad, true, true),
+    figure("angles, nrad peak", "orientation_peak_nrad", |f| f.orientation_peak_nrad, true, false),
+    figure("at a limit, % of ticks", "limited_percent", |f| f.limited_percent, false, false),
+    figure("with a fault, ticks", "fault_ticks", |f| f.fault_ticks as f64, false, false),
 ];
 
-/// See the module.
-pub(super) struct Report<'a> {
+/// What a study worked on, and what its machines did.
+#[derive(Clone, Copy)]
+pub(super) struct Found<'a> {
     pub(super) arguments: &'a Arguments,
     pub(super) compiled: &'a Compiled,
     pub(super) factors: &'a Factors,
@@ -51,23 +60,116 @@ pub(super) struct Report<'a> {
     pub(super) runs: &'a [(Member, Outcome)],
 }
 
-impl Report<'_> {
-    fn rows(&self) -> impl Iterator<Item = &'static Row> {
+#[derive(Serialize)]
+pub(super) struct Report<'a> {
+    name: &'a str,
+    digest: &'a str,
+    trajectory: &'a str,
+    frequency: f64,
+    seed: u64,
+    noise: bool,
+    diverged_above_nm: f64,
+    factors: &'a Factors,
+    planned: usize,
+    diverged: usize,
+    table: Vec<Line<'a>>,
+    gate: Judgement<'a>,
+    runs: Vec<Run<'a>>,
+    #[serde(skip)]
+    found: Found<'a>,
+}
+
+/// A figure over all machines; none where one of them diverged, or there are none.
+#[derive(Serialize)]
+struct Line<'a> {
+    figure: &'static str,
+    nominal: Option<f64>,
+    drawn: [Quantile; 4],
+    largest_of_corners: Option<f64>,
+    worst: Option<Worst<'a>>,
+    #[serde(skip)]
+    row: &'static Row,
+    /// Machines behind nominal, drawn and corners.
+    #[serde(skip)]
+    counts: [usize; 3],
+}
+
+#[derive(Serialize)]
+struct Quantile {
+    percent: f64,
+    value: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Worst<'a> {
+    name: &'a str,
+    replay: String,
+    #[serde(skip)]
+    run: &'a (Member, Outcome),
+}
+
+#[derive(Serialize)]
+struct Judgement<'a> {
+    asked: &'a Gate,
+    reasons: &'a [String],
+    complete: bool,
+}
+
+#[derive(Serialize)]
+struct Run<'a> {
+    #[serde(flatten)]
+    member: &'a Member,
+    outcome: &'a Outcome,
+}
+
+impl<'a> Found<'a> {
+    pub(super) fn report(self) -> Report<'a> {
+        Report {
+            name: &self.compiled.ir.name,
+            digest: &self.compiled.ir.digest,
+            trajectory: &self.followed.name,
+            frequency: self.followed.frequency,
+            seed: self.arguments.plant.seed,
+            noise: self.study.noise,
+            diverged_above_nm: self.study.bound * 1e9,
+            factors: self.factors,
+            planned: self.planned,
+            diverged: self.runs.iter().filter(|(_, outcome)| outcome.figures().is_none()).count(),
+            table: self.rows().map(|row| self.line(row)).collect(),
+            gate: Judgement { asked: self.gate, reasons: self.reasons, complete: self.runs.len() == self.planned },
+            runs: self.runs.iter().map(|(member, outcome)| Run { member, outcome }).collect(),
+            found: self,
+        }
+    }
+
+    fn rows(&self) -> impl Iterator<Item = &'static Row> + use<> {
         let platform = self.compiled.model.task_space.is_some();
         ROWS.iter().filter(move |row| platform || !row.platform_only)
     }
 
-    fn figures(&self, row: &Row, which: impl Fn(&Member) -> bool) -> Vec<Option<f64>> {
-        let chosen = self.runs.iter().filter(|(member, _)| which(member));
-        chosen.map(|(_, outcome)| outcome.figures().map(row.of)).collect()
-    }
-
-    fn diverged(&self) -> usize {
-        self.runs.iter().filter(|(_, outcome)| outcome.figures().is_none()).count()
+    fn line(&self, row: &'static Row) -> Line<'a> {
+        let figures = |which: fn(&Member) -> bool| -> Vec<Option<f64>> {
+            let chosen = self.runs.iter().filter(|(member, _)| which(member));
+            chosen.map(|(_, outcome)| outcome.figures().map(row.of)).collect()
+        };
+        let [nominal, drawn, corners] = [
+            figures(|member| member.name == "nominal"),
+            figures(|member| member.drawn),
+            figures(|member| !member.drawn),
+        ];
+        Line {
+            figure: row.key,
+            nominal: quantile(&nominal, 100.0),
+            drawn: QUANTILES.map(|percent| Quantile { percent, value: quantile(&drawn, percent) }),
+            largest_of_corners: quantile(&corners, 100.0),
+            worst: self.worst(row).map(|run| Worst { name: &run.0.name, replay: self.replay(&run.0), run }),
+            row,
+            counts: [nominal.len(), drawn.len(), corners.len()],
+        }
     }
 
     /// The run with the largest figure, diverged ones before all, the first of equals.
-    fn worst(&self, row: &Row) -> Option<&(Member, Outcome)> {
+    fn worst(&self, row: &Row) -> Option<&'a (Member, Outcome)> {
         let key = |run: &(Member, Outcome)| run.1.figures().map_or(f64::INFINITY, row.of);
         let mut worst: Option<&(Member, Outcome)> = None;
         for run in self.runs {
@@ -107,7 +209,7 @@ impl Report<'_> {
         out
     }
 
-    fn told(&self, outcome: &Outcome) -> String {
+    fn figures(&self, outcome: &Outcome) -> String {
         match outcome {
             Outcome::Ran(f) => {
                 let mut out = format!("{:.2} nm rms, {:.1} nm peak", f.error_nm, f.peak_nm);
@@ -136,79 +238,6 @@ impl Report<'_> {
         }
     }
 
-    pub(super) fn text(&self) -> String {
-        let mut out = String::new();
-        let drawn = self.runs.iter().filter(|(member, _)| member.drawn).count();
-        let _ = writeln!(
-            out,
-            "{}: {} at {} Hz on {} machines, {drawn} of them drawn (seed {}){}",
-            self.compiled.ir.name,
-            self.followed.name,
-            self.followed.frequency,
-            self.runs.len(),
-            self.arguments.plant.seed,
-            if self.study.noise { "" } else { ", without noise" },
-        );
-        out.push_str("varied, as factors on the spec:\n");
-        for one in self.factors.iter() {
-            let [low, high] = one.range;
-            let each = if one.factor.of_each_leg() { ", each leg on its own in a draw" } else { "" };
-            let _ = writeln!(out, "  {:<12}{low:>7.3} to {high:<7.3}({}{each})", one.factor.name(), one.origin);
-        }
-        match self.runs {
-            [(member, outcome)] if self.arguments.replay.is_some() => {
-                let _ = writeln!(out, "{}: {}\n{}", member.name, self.told(outcome), described(&member.deviation));
-            }
-            _ => self.table(&mut out),
-        }
-        let bound = self.study.bound * 1e9;
-        let _ = writeln!(out, "diverged, an error beyond {bound:.0} nm: {} of {}", self.diverged(), self.runs.len());
-        if self.runs.len() == self.planned {
-            if self.reasons.is_empty() {
-                let _ = writeln!(out, "gate: passed ({})", self.asked());
-            }
-            for reason in self.reasons {
-                let _ = writeln!(out, "gate: {reason}");
-            }
-        }
-        out
-    }
-
-    fn table(&self, out: &mut String) {
-        let _ = writeln!(
-            out,
-            "{:<24}{:>10} |{:>9} %{:>9} %{:>9} %{:>11} |{:>12}",
-            "", "nominal", 5, 50, 95, "max drawn", "max corners"
-        );
-        for row in self.rows() {
-            let cell = |figures: &[Option<f64>], percent: f64| match quantile(figures, percent) {
-                Some(figure) => format!("{figure:.2}"),
-                None if figures.is_empty() => "-".to_owned(),
-                None => "diverged".to_owned(),
-            };
-            let drawn = self.figures(row, |member| member.drawn);
-            let corners = self.figures(row, |member| !member.drawn);
-            let nominal = self.figures(row, |member| member.name == "nominal");
-            let [a, b, c, d] = QUANTILES.map(|percent| cell(&drawn, percent));
-            let _ = writeln!(
-                out,
-                "{:<24}{:>10} |{a:>11}{b:>11}{c:>11}{d:>11} |{:>12}",
-                row.name,
-                cell(&nominal, 100.0),
-                cell(&corners, 100.0)
-            );
-        }
-        out.push_str("corners, all six legs alike:\n");
-        for (member, outcome) in self.runs.iter().filter(|(member, _)| !member.drawn) {
-            let _ = writeln!(out, "  {:<18}{}", member.name, self.told(outcome));
-        }
-        for row in self.rows().filter(|row| row.judged) {
-            let Some((member, outcome)) = self.worst(row) else { continue };
-            let _ = writeln!(out, "worst {}: {}: {}", row.name, member.name, self.told(outcome));
-            let _ = writeln!(out, "{}\n  replay: {}", described(&member.deviation), self.replay(member));
-        }
-    }
-
     /// What the gate asks for.
     fn asked(&self) -> String {
         let mut parts = vec!["none diverged".to_owned()];
@@ -220,54 +249,6 @@ impl Report<'_> {
             parts.push(format!("{which} rms orientation error at most {limit:.2} nrad"));
         }
         parts.join(", ")
-    }
-
-    pub(super) fn value(&self) -> Value {
-        let quantiles = |figures: &[Option<f64>]| -> Vec<Value> {
-            let one = |percent: &f64| json!({ "percent": percent, "value": quantile(figures, *percent) });
-            QUANTILES.iter().map(one).collect()
-        };
-        let table: Vec<Value> = self
-            .rows()
-            .map(|row| {
-                let worst = self.worst(row);
-                json!({
-                    "figure": row.key,
-                    "nominal": quantile(&self.figures(row, |member| member.name == "nominal"), 100.0),
-                    "drawn": quantiles(&self.figures(row, |member| member.drawn)),
-                    "largest_of_corners": quantile(&self.figures(row, |member| !member.drawn), 100.0),
-                    "worst": worst.map(|(member, _)| json!({ "name": member.name, "replay": self.replay(member) })),
-                })
-            })
-            .collect();
-        let runs: Vec<Value> = self
-            .runs
-            .iter()
-            .map(|(member, outcome)| {
-                json!({
-                    "name": member.name,
-                    "seed": member.seed,
-                    "drawn": member.drawn,
-                    "deviation": member.deviation,
-                    "outcome": outcome,
-                })
-            })
-            .collect();
-        json!({
-            "name": self.compiled.ir.name,
-            "digest": self.compiled.ir.digest,
-            "trajectory": self.followed.name,
-            "frequency": self.followed.frequency,
-            "seed": self.arguments.plant.seed,
-            "noise": self.study.noise,
-            "diverged_above_nm": self.study.bound * 1e9,
-            "factors": self.factors,
-            "planned": self.planned,
-            "diverged": self.diverged(),
-            "table": table,
-            "gate": { "asked": self.gate, "reasons": self.reasons, "complete": self.runs.len() == self.planned },
-            "runs": runs,
-        })
     }
 
     /// One line per run: every figure and every factor in full digits.
@@ -303,6 +284,76 @@ impl Report<'_> {
             out.push('\n');
         }
         out
+    }
+}
+
+impl Shown for Report<'_> {
+    fn text(&self) -> String {
+        let (found, mut out) = (&self.found, String::new());
+        let drawn = self.runs.iter().filter(|run| run.member.drawn).count();
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(
+            out,
+            "{}: {} at {} Hz on {} machines, {drawn} of them drawn (seed {}){}",
+            self.name,
+            self.trajectory,
+            self.frequency,
+            self.runs.len(),
+            self.seed,
+            if self.noise { "" } else { ", without noise" },
+        );
+        out.push_str("varied, as factors on the spec:\n");
+        for one in self.factors.iter() {
+            let [low, high] = one.range;
+            let each = if one.factor.of_each_leg() { ", each leg on its own in a draw" } else { "" };
+            let _ = writeln!(out, "  {:<12}{low:>7.3} to {high:<7.3}({}{each})", one.factor.name(), one.origin);
+        }
+        match found.runs {
+            [(member, outcome)] if found.arguments.replay.is_some() => {
+                let _ = writeln!(out, "{}: {}\n{}", member.name, found.figures(outcome), described(&member.deviation));
+            }
+            _ => self.figures(&mut out),
+        }
+        let bound = self.diverged_above_nm;
+        let _ = writeln!(out, "diverged, an error beyond {bound:.0} nm: {} of {}", self.diverged, self.runs.len());
+        if self.gate.complete {
+            if self.gate.reasons.is_empty() {
+                let _ = writeln!(out, "gate: passed ({})", found.asked());
+            }
+            for reason in self.gate.reasons {
+                let _ = writeln!(out, "gate: {reason}");
+            }
+        }
+        out
+    }
+}
+
+impl Report<'_> {
+    fn figures(&self, out: &mut String) {
+        let columns =
+            [left(24), right(10), right(11).behind(" |"), right(11), right(11), right(11), right(12).behind(" |")];
+        row(out, &columns, &[&"", &"nominal", &"5 %", &"50 %", &"95 %", &"max drawn", &"max corners"]);
+        for line in &self.table {
+            let cell = |figure: Option<f64>, count: usize| match figure {
+                Some(figure) => format!("{figure:.2}"),
+                None if count == 0 => "-".to_owned(),
+                None => "diverged".to_owned(),
+            };
+            let [nominal, drawn, corners] = line.counts;
+            let [a, b, c, d] = line.drawn.each_ref().map(|quantile| cell(quantile.value, drawn));
+            let (nominal, corners) = (cell(line.nominal, nominal), cell(line.largest_of_corners, corners));
+            row(out, &columns, &[&line.row.name, &nominal, &a, &b, &c, &d, &corners]);
+        }
+        out.push_str("corners, all six legs alike:\n");
+        // Writing to a String cannot fail, here and below.
+        for run in self.runs.iter().filter(|run| !run.member.drawn) {
+            let _ = writeln!(out, "  {:<18}{}", run.member.name, self.found.figures(run.outcome));
+        }
+        for line in self.table.iter().filter(|line| line.row.judged) {
+            let Some(Worst { name, replay, run: (member, outcome) }) = &line.worst else { continue };
+            let _ = writeln!(out, "worst {}: {name}: {}", line.row.name, self.found.figures(outcome));
+            let _ = writeln!(out, "{}\n  replay: {replay}", described(&member.deviation));
+        }
     }
 }
 

@@ -5,11 +5,13 @@ use std::fmt::Write as _;
 use host_sim::controller::Controller;
 use host_sim::scenario::{LINEARITY_FREQUENCIES, MODES, TRACKING_FREQUENCIES, select};
 use host_sim::table::{LinearityTable, TrackingTable};
+use serde::Serialize;
 use serde_json::json;
 
 use super::{Arguments, environment};
 use crate::cli::file::write_folder;
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::table::{left, right, row};
+use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::Adaptation;
 use specgen_studies::machine;
@@ -66,8 +68,7 @@ pub(super) fn run(
         write_folder(output, &files)?;
         ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
     }
-    let text = text(&compiled.ir.name, &tracking, &linearity);
-    ui.result(&text, json!({ "digest": compiled.ir.digest, "tracking": tracking, "linearity": linearity }));
+    ui.result(&Tables { name: &compiled.ir.name, digest: &compiled.ir.digest, tracking, linearity });
     Ok(())
 }
 
@@ -81,30 +82,42 @@ pub(in crate::cli) fn modes(adaptation: &Adaptation) -> Vec<(&'static str, u32)>
     MODES.into_iter().filter(|(mode, _)| given(mode)).collect()
 }
 
-fn text(name: &str, tracking: &TrackingTable, linearity: &LinearityTable) -> String {
-    let mut out = String::new();
-    // Writing to a String cannot fail.
-    let _ = writeln!(out, "{name}: tracking error of the leg trajectory, nm rms of T − Y (paper's Table 2)");
-    let _ = writeln!(out, "  {:<8}{:>22}{:>22}{:>22}", "", "0.1 Hz", "1 Hz", "10 Hz");
-    for (mode, paper) in printed::TABLE_2 {
-        let _ = write!(out, "  {mode:<8}");
-        for (frequency, paper) in TRACKING_FREQUENCIES.iter().zip(paper) {
-            let ours = tracking.rmse_nm(mode, *frequency).map_or("-".to_owned(), |nm| format!("{nm:.2}"));
-            let _ = write!(out, "{:>22}", format!("{ours} ({paper:.1})"));
+/// The paper's tables of the legs.
+#[derive(Serialize)]
+struct Tables<'a> {
+    #[serde(skip)]
+    name: &'a str,
+    digest: &'a str,
+    tracking: TrackingTable,
+    linearity: LinearityTable,
+}
+
+impl Outcome for Tables<'_> {
+    fn text(&self) -> String {
+        let name = self.name;
+        let mut out = format!("{name}: tracking error of the leg trajectory, nm rms of T − Y (paper's Table 2)\n");
+        let columns = [left(8).behind("  "), right(22), right(22), right(22)];
+        row(&mut out, &columns, &[&"", &"0.1 Hz", &"1 Hz", &"10 Hz"]);
+        for (mode, paper) in printed::TABLE_2 {
+            let [a, b, c] = std::array::from_fn(|k| {
+                let ours = self.tracking.rmse_nm(mode, TRACKING_FREQUENCIES[k]);
+                format!("{} ({:.1})", ours.map_or("-".to_owned(), |nm| format!("{nm:.2}")), paper[k])
+            });
+            row(&mut out, &columns, &[&mode, &a, &b, &c]);
         }
-        out.push('\n');
+        // Writing to a String cannot fail, here and below.
+        let _ = writeln!(out, "{name}: slope of Y on q̂, as a ratio to that at 0.1 Hz (paper's Table 1)");
+        for (index, row) in self.linearity.rows.iter().enumerate() {
+            let paper = printed::slope_ratio(index);
+            let _ = writeln!(
+                out,
+                "  {:>5} Hz  λ {:.4}  offset {:>8.1} nm  ratio {:.4} ({paper:.4})",
+                row.frequency_hz,
+                row.gain_ratio,
+                row.offset_um * 1e3,
+                row.relative_slope
+            );
+        }
+        out
     }
-    let _ = writeln!(out, "{name}: slope of Y on q̂, as a ratio to that at 0.1 Hz (paper's Table 1)");
-    for (index, row) in linearity.rows.iter().enumerate() {
-        let paper = printed::slope_ratio(index);
-        let _ = writeln!(
-            out,
-            "  {:>5} Hz  λ {:.4}  offset {:>8.1} nm  ratio {:.4} ({paper:.4})",
-            row.frequency_hz,
-            row.gain_ratio,
-            row.offset_um * 1e3,
-            row.relative_slope
-        );
-    }
-    out
 }

@@ -10,14 +10,15 @@ use host_sim::closed_loop::RunError;
 use host_sim::controller::Controller;
 use host_sim::platform::rig::{Noise, PlatformRun, Record};
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select};
-use host_sim::platform::table::{AXES, MachiningTable, PoseRow, PoseTable};
+use host_sim::platform::table::{AXES, MachiningRow, MachiningTable, PoseRow, PoseTable};
 use host_sim::platform::{PlatformScenario, WorkPart};
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
-use serde_json::{Value, json};
+use serde::Serialize;
+use serde_json::json;
 
 use super::{Arguments, environment};
 use crate::cli::file::write_folder;
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::TaskSpace;
 use specgen_runtime::setpoint::{REFUSED, STALE};
@@ -77,46 +78,99 @@ pub(super) fn run(
         scenario.options.record = Record::Samples;
     }
     let mut experiment = Experiment { scenario, controller, ui, files: Vec::new(), refused: Vec::new() };
-    let (text, tables) = match &arguments.trajectory {
+    let found = match &arguments.trajectory {
         Some(name) => experiment.own(name, selector(task, name)?)?,
         None => experiment.tables(arguments.frequency.as_deref().unwrap_or(&FREQUENCIES))?,
     };
     let Experiment { mut files, refused, .. } = experiment;
-
-    let ir = &compiled.ir;
-    let records = compiled.model.hysteresis.records.len();
-    let mut out = format!(
-        "{}: a machine with legs within ±10 %, stiffness within ±5 % (seed {seed}); {} of the controller\n{text}",
-        ir.name,
-        if records == 1 {
-            "one hysteresis record for all legs".to_owned()
-        } else {
-            format!("{records} hysteresis records")
-        },
-    );
-    for line in &refused {
-        let _ = writeln!(out, "{line}");
-    }
-    let mut result = json!({
-        "digest": ir.digest,
-        "seed": seed,
-        "noise": !arguments.plant.no_noise,
-        "latency_ticks": arguments.latency,
-        "records": records,
-        "axial_stiffness_N_per_m": specimen.stiffness,
-        "leg_gain_um_per_V": specimen.legs.each_ref().map(|leg| leg.gain_um_per_v),
-        "refused": refused,
-    });
-    if let (Value::Object(result), Value::Object(tables)) = (&mut result, tables) {
-        result.extend(tables);
-    }
+    let report = Report {
+        name: &compiled.ir.name,
+        digest: &compiled.ir.digest,
+        seed,
+        noise: !arguments.plant.no_noise,
+        latency_ticks: arguments.latency,
+        records: compiled.model.hysteresis.records.len(),
+        axial_stiffness: specimen.stiffness,
+        leg_gain: specimen.legs.each_ref().map(|leg| leg.gain_um_per_v),
+        refused,
+        found,
+    };
     if let Some(output) = &arguments.output {
-        files.push(("tables.json".to_owned(), format!("{result:#}\n").into_bytes()));
+        files.push(("tables.json".to_owned(), format!("{:#}\n", json!(report)).into_bytes()));
         write_folder(output, &files)?;
         ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
     }
-    ui.result(&out, result);
+    ui.result(&report);
     Ok(())
+}
+
+/// The machine, and what was found on it.
+#[derive(Serialize)]
+struct Report<'a> {
+    #[serde(skip)]
+    name: &'a str,
+    digest: &'a str,
+    seed: u64,
+    noise: bool,
+    latency_ticks: u32,
+    /// Records of reversal curves that the controller has.
+    records: usize,
+    #[serde(rename = "axial_stiffness_N_per_m")]
+    axial_stiffness: [f64; 6],
+    #[serde(rename = "leg_gain_um_per_V")]
+    leg_gain: [f64; 6],
+    /// Runs whose set-points the controller refused, in words.
+    refused: Vec<String>,
+    #[serde(flatten)]
+    found: Found,
+}
+
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Found {
+    Tables {
+        free_motion: Vec<PoseRow>,
+        machining: Vec<MachiningRow>,
+        #[serde(skip)]
+        text: String,
+    },
+    /// The true pose against the controller's target, axis by axis.
+    Trajectory { trajectory: String, seconds: f64, rms_nano: [f64; 6], peak_nano: [f64; 6] },
+    /// The only run was refused.
+    Nothing {},
+}
+
+impl Outcome for Report<'_> {
+    fn text(&self) -> String {
+        let records = match self.records {
+            1 => "one hysteresis record for all legs".to_owned(),
+            many => format!("{many} hysteresis records"),
+        };
+        let mut out = format!(
+            "{}: a machine with legs within ±10 %, stiffness within ±5 % (seed {}); {records} of the controller\n",
+            self.name, self.seed
+        );
+        match &self.found {
+            Found::Tables { text, .. } => out += text,
+            Found::Trajectory { trajectory, seconds, rms_nano, peak_nano } => {
+                out += &format!("{trajectory}, on board, {seconds:.3} s: true pose against the controller's target\n");
+                for (axis, name) in AXES.iter().enumerate() {
+                    let unit = if axis < 3 { "nm" } else { "nrad" };
+                    // Writing to a String cannot fail, here and below.
+                    let _ = writeln!(
+                        out,
+                        "  {name:<3}{:>10.2} {unit} rms{:>10.2} {unit} peak",
+                        rms_nano[axis], peak_nano[axis]
+                    );
+                }
+            }
+            Found::Nothing {} => {}
+        }
+        for line in &self.refused {
+            let _ = writeln!(out, "{line}");
+        }
+        out
+    }
 }
 
 struct Experiment<'a> {
@@ -124,13 +178,12 @@ struct Experiment<'a> {
     controller: &'a mut Controller,
     ui: &'a Ui,
     files: Vec<(String, Vec<u8>)>,
-    /// Runs whose set-points the controller did not believe, in words.
     refused: Vec<String>,
 }
 
 impl Experiment<'_> {
     /// Tables 5 to 9.
-    fn tables(&mut self, frequencies: &[f64]) -> Result<(String, Value), Failure> {
+    fn tables(&mut self, frequencies: &[f64]) -> Result<Found, Failure> {
         let mut free = PoseTable::default();
         for (name, path) in CASES {
             for &frequency in frequencies {
@@ -164,22 +217,20 @@ impl Experiment<'_> {
             free.to_text(),
             machining.to_text()
         );
-        Ok((text, json!({ "free_motion": free.rows, "machining": machining.rows })))
+        Ok(Found::Tables { free_motion: free.rows, machining: machining.rows, text })
     }
 
     /// A trajectory of the spec, in the mode of the spec.
-    fn own(&mut self, name: &str, selector: u32) -> Result<(String, Value), Failure> {
+    fn own(&mut self, name: &str, selector: u32) -> Result<Found, Failure> {
         self.ui.progress(&format!("playing {name} on board"));
         let run = self.scenario.play(self.controller, selector, PLAYED);
-        let Some(run) = self.keep(&format!("trajectory-{name}"), run)? else { return Ok((String::new(), json!({}))) };
-        let (rms, peak) = (run.errors.rms_nano(), run.errors.peak_nano());
-        let seconds = run.errors.count() as f64 * self.scenario.options.interval;
-        let mut text = format!("{name}, on board, {seconds:.3} s: true pose against the controller's target\n");
-        for (axis, name) in AXES.iter().enumerate() {
-            let unit = if axis < 3 { "nm" } else { "nrad" };
-            let _ = writeln!(text, "  {name:<3}{:>10.2} {unit} rms{:>10.2} {unit} peak", rms[axis], peak[axis]);
-        }
-        Ok((text, json!({ "trajectory": name, "seconds": seconds, "rms_nano": rms, "peak_nano": peak })))
+        let Some(run) = self.keep(&format!("trajectory-{name}"), run)? else { return Ok(Found::Nothing {}) };
+        Ok(Found::Trajectory {
+            trajectory: name.to_owned(),
+            seconds: run.errors.count() as f64 * self.scenario.options.interval,
+            rms_nano: run.errors.rms_nano(),
+            peak_nano: run.errors.peak_nano(),
+        })
     }
 
     /// Samples of a run for its file; none, and a line about it, if the controller held instead of following.

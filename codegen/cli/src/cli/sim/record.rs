@@ -11,14 +11,14 @@ use host_sim::platform::rig::{Bench, Noise, Request};
 use host_sim::record::{Ended, Recorded, Writer};
 use host_sim::scenario::select;
 use host_sim::trajectory::{LegTrajectory, PoseTarget};
-use serde_json::json;
+use serde::Serialize;
 use specgen_runtime::record::Layout;
 use specgen_runtime::recorder::{Recorder, Settings as Recording};
 use specgen_runtime::wave::{AxisWave, Limits, Settings, Shape, Tone, Wave, step_of};
 
 use super::{Arguments, environment};
 use crate::cli::file::{PendingFile, unwritten};
-use crate::cli::ui::{Failure, Ui};
+use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::TaskSpace;
 use specgen_studies::machine;
@@ -33,7 +33,30 @@ const SHARES: [f64; 2] = [0.2, 0.03];
 /// Way to the bias pose, at most, s.
 const ARMING: f64 = 60.0;
 
-/// Runs and records.
+/// A recording that was written.
+#[derive(Serialize)]
+struct Written {
+    ticks: u64,
+    bytes: u64,
+    file: String,
+    /// s.
+    #[serde(skip)]
+    seconds: f64,
+}
+
+impl Outcome for Written {
+    fn text(&self) -> String {
+        let (bytes, ticks) = (self.bytes as f64, self.ticks as f64);
+        format!(
+            "wrote {ticks} ticks, {:.3} s, to {}: {:.1} MB, {:.0} bytes a tick\n",
+            self.seconds,
+            self.file,
+            bytes / 1e6,
+            bytes / ticks
+        )
+    }
+}
+
 pub(super) fn run(
     arguments: &Arguments,
     path: &Path,
@@ -89,14 +112,7 @@ pub(super) fn run(
     file.keep()?;
     let bytes = std::fs::metadata(path).map(|found| found.len()).unwrap_or_default();
     let ticks = recorder.tick();
-    let text = format!(
-        "wrote {ticks} ticks, {:.3} s, to {}: {:.1} MB, {:.0} bytes a tick\n",
-        ticks as f64 * period,
-        path.display(),
-        bytes as f64 / 1e6,
-        bytes as f64 / ticks as f64
-    );
-    ui.result(&text, json!({ "ticks": ticks, "bytes": bytes, "file": path.display().to_string() }));
+    ui.result(&Written { ticks, bytes, file: path.display().to_string(), seconds: ticks as f64 * period });
     Ok(())
 }
 

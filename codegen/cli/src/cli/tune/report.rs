@@ -2,10 +2,11 @@
 
 use std::fmt::Write as _;
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use super::super::sim::environment;
-use super::super::ui::Failure;
+use super::super::table::{left, right, row};
+use super::super::ui::{Failure, Outcome};
 use super::Job;
 use super::start::Starts;
 use specgen_compiler::compile::Compiled;
@@ -13,48 +14,85 @@ use specgen_compiler::stability::platform::{Adapting, Conditions, Law, ModeMargi
 use specgen_compiler::stability::{LegDynamics, phase_margin, transition};
 use specgen_language::model::{AdaptationMode, ControlMode};
 use specgen_studies::tuning::feasible::Feasibility;
-use specgen_studies::tuning::{Case, Evaluation, Score, Search, Setting};
+use specgen_studies::tuning::relay::Ultimate;
+use specgen_studies::tuning::search::Generation;
+use specgen_studies::tuning::{self, Candidate, Case, Evaluation, Score, Search, Setting, space};
 
 /// Axes in messages.
 const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 
 /// One setting with what it does on both cases.
+#[derive(Serialize)]
 struct Row {
     name: &'static str,
     setting: Setting,
-    /// Whether it holds the margins.
-    holds: bool,
+    /// Whether it has the margins that are asked for.
+    holds_margins: bool,
     tuned_on: Evaluation,
-    other: Evaluation,
+    scored_on: Evaluation,
 }
 
 /// Margins of the result.
+#[derive(Serialize)]
 struct Margins {
     gain: Option<f64>,
     phase_degrees: Option<f64>,
     delay_ticks: Option<f64>,
 }
 
-/// See the module.
-pub(super) struct Report {
-    rows: Vec<Row>,
-    head: String,
-    tail: String,
-    patch: String,
-    value: Value,
+#[derive(Serialize)]
+struct Parameter {
+    name: String,
+    bounds: [f64; 2],
+    /// Of the result, in the unit of the bounds.
+    #[serde(skip)]
+    value: Option<f64>,
 }
 
-impl Report {
+#[derive(Serialize)]
+struct Searched<'a> {
+    optimiser: &'static str,
+    evaluations: usize,
+    runs: usize,
+    interrupted: bool,
+    best: Option<&'a Candidate>,
+    history: &'a [Generation],
+}
+
+#[derive(Serialize)]
+pub(super) struct Report<'a> {
+    name: &'a str,
+    seed: u64,
+    tuned_on: tuning::Conditions,
+    scored_on: tuning::Conditions,
+    parameters: Vec<Parameter>,
+    relay: &'a Option<[Option<Ultimate>; 6]>,
+    settings: Vec<Row>,
+    margins: Margins,
+    searches: Vec<Searched<'a>>,
+    patch: &'a str,
+    /// It has task space.
+    #[serde(skip)]
+    is_platform: bool,
+    /// Of a simulated run, s.
+    #[serde(skip)]
+    seconds: f64,
+    /// The patch is not in the spec: it is shown.
+    #[serde(skip)]
+    pub(super) with_patch: bool,
+}
+
+impl<'a> Report<'a> {
     #[expect(clippy::too_many_arguments, reason = "everything that was found, once")]
     pub(super) fn of(
-        job: &Job,
+        job: &'a Job,
         case: &Case,
         other: &Case,
         settings: &[(&'static str, Setting)],
-        starts: &Starts,
-        searches: &[(&'static str, Search)],
+        starts: &'a Starts,
+        searches: &'a [(&'static str, Search)],
         tuned: &Compiled,
-        patch: &str,
+        patch: &'a str,
     ) -> Result<Self, Failure> {
         let (mut here, mut there) = (case.worker(), other.worker());
         let mut rows = Vec::new();
@@ -62,141 +100,139 @@ impl Report {
             rows.push(Row {
                 name,
                 setting,
-                holds: job.feasibility.holds(&setting),
+                holds_margins: job.feasibility.holds(&setting),
                 tuned_on: case.run(&mut here, &setting).map_err(environment)?,
-                other: other.run(&mut there, &setting).map_err(environment)?,
+                scored_on: other.run(&mut there, &setting).map_err(environment)?,
             });
         }
-        let margins = margins_of(job, tuned);
-        let mut head = String::new();
-        for (name, search) in searches {
-            let (unstable, limited) =
-                search.history.iter().fold((0, 0), |(a, b), one| (a + one.unstable, b + one.limited));
-            // Writing to a String cannot fail, here and below.
-            let _ = writeln!(
-                head,
-                "{name}: {} candidates, {} simulated ({:.0} s of machine time), {unstable} unstable or without the margins, {limited} at a limit; best cost {}",
-                search.evaluations,
-                search.runs,
-                search.runs as f64 * case.seconds(),
-                search.best().map_or("none".to_owned(), |best| format!("{:.5} µm s²", best.score.cost))
-            );
-        }
-        if let Some(ultimate) = &starts.ultimate {
-            head.push_str("relay with the notch in:");
-            for (axis, found) in AXES.iter().zip(ultimate) {
-                let _ = match found {
-                    Some(u) => write!(head, "  {axis} {:.2} K at {:.0} Hz", u.gain, 1.0 / u.period),
-                    None => write!(head, "  {axis} none"),
-                };
-            }
-            head.push('\n');
-        }
-        let or = |value: Option<f64>, none: &str| value.map_or(none.to_owned(), |value| format!("{value:.2}"));
-        let delay = if job.compiled.model.task_space.is_some() {
-            format!("{} ticks", or(margins.delay_ticks, "> 5"))
-        } else {
-            "not looked at".to_owned()
+        let result = rows.last().map(|row| row.setting);
+        let parameter = |p: &space::Parameter| Parameter {
+            name: p.role.to_string(),
+            bounds: p.bounds,
+            value: result.map(|setting| job.space.value(&setting, p.role)),
         };
-        let mut tail = format!(
-            "margins of the result: gain × {}, phase {}°, delay {delay}\n",
-            or(margins.gain, "> 30 or up to a weight of 1"),
-            margins.phase_degrees.map_or("> 180".to_owned(), |degrees| format!("{degrees:.1}"))
-        );
-        for parameter in &job.space.parameters {
-            if let Some(row) = rows.last() {
-                let _ = write!(tail, "  {} {:.4e}", parameter.role, job.space.value(&row.setting, parameter.role));
-            }
-        }
-        tail.push('\n');
-        if job.compiled.model.task_space.is_some() {
-            tail.push_str("(kp, ki, kv over the stiffness of their axis)\n");
-        }
-        let value = json!({
-            "name": job.compiled.ir.name,
-            "seed": job.arguments.plant.seed,
-            "tuned_on": job.tuned_on(),
-            "scored_on": job.scored_on(),
-            "parameters": job.space.parameters.iter().map(|p| json!({ "name": p.role.to_string(), "bounds": p.bounds })).collect::<Vec<_>>(),
-            "relay": starts.ultimate,
-            "settings": rows.iter().map(|row| json!({
-                "name": row.name,
-                "holds_margins": row.holds,
-                "setting": row.setting,
-                "tuned_on": row.tuned_on,
-                "scored_on": row.other,
-            })).collect::<Vec<_>>(),
-            "margins": { "gain": margins.gain, "phase_degrees": margins.phase_degrees, "delay_ticks": margins.delay_ticks },
-            "searches": searches.iter().map(|(name, search)| json!({
-                "optimiser": name,
-                "evaluations": search.evaluations,
-                "runs": search.runs,
-                "interrupted": search.interrupted,
-                "best": search.best(),
-                "history": search.history,
-            })).collect::<Vec<_>>(),
-            "patch": patch,
-        });
-        Ok(Self { rows, head, tail, patch: patch.to_owned(), value })
-    }
-
-    pub(super) fn value(&self) -> &Value {
-        &self.value
+        let searched = |(optimiser, search): &'a (&'static str, Search)| Searched {
+            optimiser,
+            evaluations: search.evaluations,
+            runs: search.runs,
+            interrupted: search.interrupted,
+            best: search.best(),
+            history: &search.history,
+        };
+        Ok(Self {
+            name: &job.compiled.ir.name,
+            seed: job.arguments.plant.seed,
+            tuned_on: job.tuned_on(),
+            scored_on: job.scored_on(),
+            parameters: job.space.parameters.iter().map(parameter).collect(),
+            relay: &starts.ultimate,
+            settings: rows,
+            margins: margins_of(job, tuned),
+            searches: searches.iter().map(searched).collect(),
+            patch,
+            is_platform: job.compiled.model.task_space.is_some(),
+            seconds: case.seconds(),
+            with_patch: true,
+        })
     }
 
     /// Scores on what was tuned on, by name.
     pub(super) fn marks(&self) -> Vec<(&str, Score)> {
-        self.rows.iter().filter_map(|row| Some((row.name, *row.tuned_on.score()?))).collect()
+        self.settings.iter().filter_map(|row| Some((row.name, *row.tuned_on.score()?))).collect()
     }
 
-    pub(super) fn text(&self, with_patch: bool) -> String {
-        let mut text = self.head.clone();
-        let _ = writeln!(
-            text,
-            "{:<18}{:>44}   {:>34}\n{:<18}{:>9}{:>9}{:>9}{:>9}{:>8}   {:>9}{:>9}{:>9}{:>7}",
-            "rms",
-            "tuned on",
-            "not tuned on",
-            "",
-            "nm",
-            "nrad",
-            "peak nm",
-            "effort",
-            "cost",
-            "nm",
-            "nrad",
-            "peak nm",
-            ""
-        );
-        for row in &self.rows {
-            let mark = if row.holds { "" } else { " *" };
-            let _ = write!(text, "{:<18}", format!("{}{mark}", row.name));
-            match row.tuned_on {
-                Evaluation::Scored(s) => {
-                    let _ = write!(
-                        text,
-                        "{:>9.2}{:>9.2}{:>9.1}{:>9.2}{:>8.4}   ",
-                        s.translation_nm, s.orientation_nrad, s.peak_nm, s.effort_nm, s.cost
-                    );
-                }
-                Evaluation::Limited { time, .. } => {
-                    let _ = write!(text, "{:>44}   ", format!("at a limit after {time:.4} s"));
-                }
-            }
-            let _ = match row.other {
-                Evaluation::Scored(s) => {
-                    writeln!(text, "{:>9.2}{:>9.2}{:>9.1}", s.translation_nm, s.orientation_nrad, s.peak_nm)
-                }
-                Evaluation::Limited { time, .. } => writeln!(text, "{:>27}", format!("at a limit after {time:.4} s")),
-            };
+    /// How the searches went, and what the relay found.
+    fn head(&self, text: &mut String) {
+        for search in &self.searches {
+            let (unstable, limited) =
+                search.history.iter().fold((0, 0), |(a, b), one| (a + one.unstable, b + one.limited));
+            // Writing to a String cannot fail, here and below.
+            let _ = writeln!(
+                text,
+                "{}: {} candidates, {} simulated ({:.0} s of machine time), {unstable} unstable or without the margins, {limited} at a limit; best cost {}",
+                search.optimiser,
+                search.evaluations,
+                search.runs,
+                search.runs as f64 * self.seconds,
+                search.best.map_or("none".to_owned(), |best| format!("{:.5} µm s²", best.score.cost))
+            );
         }
-        if self.rows.iter().any(|row| !row.holds) {
+        if let Some(ultimate) = self.relay {
+            text.push_str("relay with the notch in:");
+            for (axis, found) in AXES.iter().zip(ultimate) {
+                let _ = match found {
+                    Some(u) => write!(text, "  {axis} {:.2} K at {:.0} Hz", u.gain, 1.0 / u.period),
+                    None => write!(text, "  {axis} none"),
+                };
+            }
+            text.push('\n');
+        }
+    }
+
+    fn scores(&self, text: &mut String) {
+        let two = [left(18), right(44), right(34).behind("   ")];
+        row(text, &two, &[&"rms", &"tuned on", &"not tuned on"]);
+        // The columns of a score, and the first three of them again.
+        let tuned = format!("{:>9}{:>9}{:>9}{:>9}{:>8}", "nm", "nrad", "peak nm", "effort", "cost");
+        let other = format!("{:>9}{:>9}{:>9}{:>7}", "nm", "nrad", "peak nm", "");
+        row(text, &two, &[&"", &tuned, &other]);
+        let limited = |time: f64| format!("at a limit after {time:.4} s");
+        for one in &self.settings {
+            let mark = if one.holds_margins { "" } else { " *" };
+            let tuned = match one.tuned_on {
+                Evaluation::Scored(s) => format!(
+                    "{:>9.2}{:>9.2}{:>9.1}{:>9.2}{:>8.4}",
+                    s.translation_nm, s.orientation_nrad, s.peak_nm, s.effort_nm, s.cost
+                ),
+                Evaluation::Limited { time, .. } => limited(time),
+            };
+            let other = match one.scored_on {
+                Evaluation::Scored(s) => {
+                    format!("{:>9.2}{:>9.2}{:>9.1}", s.translation_nm, s.orientation_nrad, s.peak_nm)
+                }
+                Evaluation::Limited { time, .. } => limited(time),
+            };
+            let two = [left(18), right(44), right(27).behind("   ")];
+            row(text, &two, &[&format_args!("{}{mark}", one.name), &tuned, &other]);
+        }
+        if self.settings.iter().any(|one| !one.holds_margins) {
             text.push_str("* without the margins that are asked for\n");
         }
-        text.push_str(&self.tail);
-        if with_patch {
+    }
+
+    /// Margins and numbers of the result.
+    fn tail(&self, text: &mut String) {
+        let or = |value: Option<f64>, none: &str| value.map_or(none.to_owned(), |value| format!("{value:.2}"));
+        let Margins { gain, phase_degrees, delay_ticks } = self.margins;
+        let delay =
+            if self.is_platform { format!("{} ticks", or(delay_ticks, "> 5")) } else { "not looked at".to_owned() };
+        let _ = writeln!(
+            text,
+            "margins of the result: gain × {}, phase {}°, delay {delay}",
+            or(gain, "> 30 or up to a weight of 1"),
+            phase_degrees.map_or("> 180".to_owned(), |degrees| format!("{degrees:.1}"))
+        );
+        for parameter in &self.parameters {
+            if let Some(value) = parameter.value {
+                let _ = write!(text, "  {} {value:.4e}", parameter.name);
+            }
+        }
+        text.push('\n');
+        if self.is_platform {
+            text.push_str("(kp, ki, kv over the stiffness of their axis)\n");
+        }
+    }
+}
+
+impl Outcome for Report<'_> {
+    fn text(&self) -> String {
+        let mut text = String::new();
+        self.head(&mut text);
+        self.scores(&mut text);
+        self.tail(&mut text);
+        if self.with_patch {
             text.push('\n');
-            text.push_str(&self.patch);
+            text.push_str(self.patch);
         }
         text
     }

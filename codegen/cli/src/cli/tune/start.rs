@@ -29,7 +29,6 @@ pub(super) struct Starts {
     scored: Vec<(Setting, Score)>,
     /// The best of them.
     pub(super) best: Setting,
-    /// Its score.
     pub(super) score: Score,
 }
 

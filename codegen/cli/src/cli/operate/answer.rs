@@ -1,0 +1,151 @@
+//! Answers of a machine, as text and as JSON.
+
+use std::fmt::Write as _;
+
+use serde::ser::SerializeMap;
+use serde::{Serialize, Serializer};
+use serde_json::Value;
+
+use crate::cli::ui::Outcome;
+
+/// A session: every order with its answer, and how the machine stood at the end. Answers were shown as they came.
+#[derive(Serialize)]
+pub struct Report<'a> {
+    pub device: &'a str,
+    pub answers: Vec<Answer>,
+    pub status: MachineStatus,
+}
+
+impl Outcome for Report<'_> {
+    fn text(&self) -> String {
+        String::new()
+    }
+}
+
+#[derive(Serialize)]
+pub struct Answer {
+    pub command: String,
+    pub answer: Value,
+}
+
+/// A word that needs no text: that it is done, or how the machine stands by now.
+#[derive(Serialize)]
+pub struct Plain(pub String);
+
+impl Outcome for Plain {
+    fn text(&self) -> String {
+        String::new()
+    }
+}
+
+/// Why a line was not carried out.
+#[derive(Serialize)]
+pub struct Mistake {
+    pub error: String,
+}
+
+impl Outcome for Mistake {
+    fn text(&self) -> String {
+        format!("error: {}\n", self.error.trim_end())
+    }
+}
+
+/// How the machine stands.
+#[derive(Serialize)]
+pub struct MachineStatus {
+    pub tick: u64,
+    pub phase: u8,
+    pub cause: u8,
+    /// Phase and cause in words.
+    pub stands: String,
+    pub amplifiers_on: bool,
+    pub status: u32,
+    pub events: u32,
+    pub late: u32,
+    pub link_errors: u32,
+    pub damaged_frames: u32,
+    /// s.
+    #[serde(skip)]
+    pub period: f64,
+}
+
+impl Outcome for MachineStatus {
+    fn text(&self) -> String {
+        let on = if self.amplifiers_on { "on" } else { "off" };
+        format!(
+            "tick {}, {:.4} s: {}, amplifiers {on}, status {:#x}; events {:#x}, {} late ticks, {} damaged frames\n",
+            self.tick,
+            self.tick as f64 * self.period,
+            self.stands,
+            self.status,
+            self.events,
+            self.late,
+            self.link_errors + self.damaged_frames
+        )
+    }
+}
+
+/// Settings by name, in the order of the controller.
+pub struct Settings(pub Vec<(String, Value)>);
+
+impl Serialize for Settings {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for (name, value) in &self.0 {
+            map.serialize_entry(name, value)?;
+        }
+        map.end()
+    }
+}
+
+impl Outcome for Settings {
+    fn text(&self) -> String {
+        self.0.iter().fold(String::new(), |mut text, (name, value)| {
+            // Writing to a String cannot fail.
+            let _ = writeln!(text, "{name} = {value}");
+            text
+        })
+    }
+}
+
+/// A recording that was fetched.
+#[derive(Serialize)]
+pub struct Downloaded {
+    pub file: String,
+    pub bytes: usize,
+}
+
+impl Outcome for Downloaded {
+    fn text(&self) -> String {
+        format!("wrote {} bytes to {}\n", self.bytes, self.file)
+    }
+}
+
+/// How the recorder stands.
+#[derive(Serialize)]
+pub struct RecorderState {
+    pub running: bool,
+    pub triggered: bool,
+    pub ticks: u32,
+    pub capacity: u32,
+    /// s.
+    #[serde(skip)]
+    pub period: f64,
+}
+
+impl Outcome for RecorderState {
+    fn text(&self) -> String {
+        let does = match (self.running, self.triggered) {
+            (true, false) => "records, waits for its trigger",
+            (true, true) => "records what comes after the trigger",
+            (false, true) => "is complete",
+            (false, false) => "is stopped",
+        };
+        format!(
+            "the recorder {does}; it holds {} ticks, {:.4} s; {} fit whatever changes\n",
+            self.ticks,
+            f64::from(self.ticks) * self.period,
+            self.capacity
+        )
+    }
+}
