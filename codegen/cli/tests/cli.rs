@@ -84,6 +84,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["operate", "--port", "x", "--socket", "y"], "cannot be used with"),
         (&["operate", "--socket", "y", "--baud", "9600"], "cannot be used with"),
         (&["operate", "--socket", "y", "legs.toml", "go"], "`go` is none of: status, arm"),
+        (&["operate", "--socket", "y", "stop", "arm"], "`stop` ends the session: nothing comes after it"),
         (&["operate", "--socket", "y", "--script", "none.txt"], "could not read `none.txt`"),
         (&["operate", "--socket", "y", "--script", "none.txt", "arm"], "exclude each other"),
         (&["forc"], "--output"),
@@ -221,7 +222,7 @@ fn a_simulated_record_can_be_identified() {
 }
 
 #[test]
-fn a_spec_that_is_no_spec_is_refused_with_its_name_and_a_mend() {
+fn a_spec_that_is_no_spec_is_refused_with_its_name_and_a_fix() {
     let folder = Folder::new();
     folder.write("empty.toml", "");
     folder.write("huge.toml", vec![b'#'; 2 << 20]);

@@ -141,7 +141,7 @@ fn output_that_is_not_whole_is_an_error() {
     assert!(String::from_utf8(output.stdout).unwrap().ends_with("\n0\n"));
 }
 
-/// The exit code is the same whether somebody can read why, or not.
+/// The exit code is the same whether the reason can be read, or not.
 #[test]
 fn messages_that_nobody_can_read_change_nothing() {
     let folder = Folder::new();

@@ -36,7 +36,7 @@ fn kill(mut child: Child) -> bool {
 enum Way {
     /// From beside it: the folders change places.
     Swap,
-    /// By somebody who stands in it: files are replaced one by one.
+    /// By a shell that stands in it: files are replaced one by one.
     InPlace,
 }
 

@@ -124,7 +124,7 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     let csv = folder.read("run.csv");
     assert!(csv.lines().count() > 200);
 
-    // For programs; and what a device refuses is told with its reason.
+    // For programs; and what a device refuses is shown with its reason.
     let run = Run::of(&mut board.operate(&folder, &["reference.toml", "--json", "status", "config"]));
     let document: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
     assert_eq!(document["result"]["status"]["stands"], "disarmed", "{document:#}");
@@ -133,6 +133,8 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     run.says(1, &["not compared with a spec", "fast.toml: axis z (leg 2) would be faster"]);
     let run = Run::of(&mut board.operate(&folder, &["wave wave.toml"]));
     run.says(1, &["wave.toml: not now; the machine must be running"]);
+    let run = Run::of(&mut board.operate(&folder, &["stop"]));
+    run.says(1, &["a board does not end; `ramp-down` switches its amplifiers off"]);
     let run = Run::of(&mut board.operate(&folder, &["set gauge[0]=1"]));
     run.says(2, &["`gauge[0]` cannot be set; these can: command, selector"]);
     // A mistake in the last line is found before the first is carried out.
@@ -178,9 +180,9 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     wait(&board, Phase::Running);
     board.fails.store(true, Ordering::Relaxed);
     let output = running.wait_with_output().unwrap();
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(told.contains("the machine is faulted: gauge not finite, at tick "), "{told}");
+    let shown = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{shown}");
+    assert!(shown.contains("the machine is faulted: gauge not finite, at tick "), "{shown}");
 }
 
 #[test]
@@ -193,9 +195,9 @@ fn ctrl_c_ramps_down_and_waits() {
     let process = rustix::process::Pid::from_raw(running.id().cast_signed()).unwrap();
     rustix::process::kill_process(process, rustix::process::Signal::INT).unwrap();
     let output = running.wait_with_output().unwrap();
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(130), "{told}");
-    assert!(told.contains("interrupted; the machine is disarmed, amplifiers off"), "{told}");
+    let shown = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{shown}");
+    assert!(shown.contains("interrupted; the machine is disarmed, amplifiers off"), "{shown}");
     assert!(board.is(Phase::Disarmed));
 }
 

@@ -1,5 +1,5 @@
 //! The main job on machines that lack the tools for microcontrollers: it does the rest, says what was left out, and fails only
-//! if told to.
+//! if asked to.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 

@@ -115,8 +115,8 @@ fn the_folder_and_the_name_of_the_spec_do_not_matter() {
 #[test]
 fn the_environment_does_not_matter() {
     let odd = [
-        ("USER", "somebody-else"),
-        ("LOGNAME", "somebody-else"),
+        ("USER", "another-user"),
+        ("LOGNAME", "another-user"),
         ("HOME", "/nonexistent"),
         ("LANG", "tr_TR.UTF-8"),
         ("LC_ALL", "de_DE.UTF-8"),

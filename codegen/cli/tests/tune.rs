@@ -170,7 +170,7 @@ fn without_write_the_spec_stays_and_the_patch_makes_it() {
 }
 
 #[test]
-fn what_cannot_be_tuned_is_refused_with_a_mend() {
+fn what_cannot_be_tuned_is_refused_with_a_fix() {
     let folder = Folder::new();
     let cases: &[(&str, &[&str], &str, &str)] = &[
         ("minimal.toml", &[], "E0701", "adaptation.mode"),

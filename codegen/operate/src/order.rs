@@ -12,7 +12,6 @@ const TIMEOUT: Duration = Duration::from_secs(60);
 const LONGEST: f64 = 86_400.0;
 /// Rows after a trigger, if nothing else is said.
 const AFTER: u32 = 1000;
-/// What there is.
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, wait PHASE|SECONDS [TIMEOUT], config, \
                         config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, stop";
 

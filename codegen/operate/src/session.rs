@@ -9,7 +9,7 @@ use specgen_runtime::supervisor;
 
 use crate::pil::{self, OpenError, Opened};
 
-/// How often a device hears of its host, at least: five times before it takes the link for lost.
+/// How often a device gets a request, at least: five times before it takes the link for lost.
 pub const ALIVE: Duration = Duration::from_millis(20);
 
 /// An open session.
@@ -20,7 +20,7 @@ pub struct Session<P> {
     period: f64,
     /// Input words that are no measurements, as they were sent last.
     command: Vec<u64>,
-    heard: Instant,
+    asked: Instant,
     status: Status,
 }
 
@@ -52,7 +52,7 @@ impl<P: Port> Session<P> {
             description,
             period,
             command: vec![0; words],
-            heard: Instant::now(),
+            asked: Instant::now(),
             status: Status {
                 tick: 0,
                 phase: 0,
@@ -96,16 +96,16 @@ impl<P: Port> Session<P> {
         match self.client.ask(&Request::Status)? {
             Reply::Status(status) => {
                 self.status = status;
-                self.heard = Instant::now();
+                self.asked = Instant::now();
                 Ok(&self.status)
             }
             _ => Err(ClientError::Unexpected),
         }
     }
 
-    /// Time until the device must hear of its host again.
+    /// Time until the device must get the next request.
     pub fn due(&self) -> Duration {
-        ALIVE.saturating_sub(self.heard.elapsed())
+        ALIVE.saturating_sub(self.asked.elapsed())
     }
 
     fn done(&mut self, request: &Request<'_>) -> Result<(), ClientError> {
@@ -181,7 +181,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// The whole record, as the bytes of its file. Every piece tells the device that its host is there.
+    /// The whole record, as the bytes of its file. Every piece keeps the link alive.
     pub fn download(&mut self) -> Result<Vec<u8>, ClientError> {
         self.client.fetch(|offset| Request::Download { offset })
     }

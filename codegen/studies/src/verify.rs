@@ -86,7 +86,7 @@ pub struct Inspection {
     pub code: u64,
     /// Of these, constants (tables).
     pub constants: u64,
-    /// Bytes of RAM taken statically. Config and State are not in it: only a run tells their size.
+    /// Bytes of RAM taken statically. Config and State are not in it: their size is only known in a run.
     pub ram: u64,
     /// Bytes of code that a tick can reach.
     pub tick_code: u64,

@@ -141,8 +141,8 @@ impl Apt {
         if install.success() {
             return Ok(());
         }
-        let told = [update.stderr, install.stderr, install.stdout].join("\n");
-        Err(refusal(&told))
+        let said = [update.stderr, install.stderr, install.stdout].join("\n");
+        Err(refusal(&said))
     }
 
     fn call(&self, options: &[&str], packages: &[&str]) -> Result<process::Finished, Refusal> {
@@ -159,7 +159,7 @@ impl Apt {
 }
 
 /// What apt printed, in one line.
-fn refusal(told: &str) -> Refusal {
+fn refusal(said: &str) -> Refusal {
     const NO_NETWORK: [&str; 6] = [
         "Temporary failure resolving",
         "Could not resolve",
@@ -168,11 +168,11 @@ fn refusal(told: &str) -> Refusal {
         "Network is unreachable",
         "Connection timed out",
     ];
-    if NO_NETWORK.iter().any(|words| told.contains(words)) {
+    if NO_NETWORK.iter().any(|words| said.contains(words)) {
         return Refusal::NoNetwork;
     }
-    let mut removed = told.lines().skip_while(|line| !line.contains("will be REMOVED")).skip(1);
-    let line = |start: &str| told.lines().find_map(|line| line.strip_prefix(start)).map(str::trim);
+    let mut removed = said.lines().skip_while(|line| !line.contains("will be REMOVED")).skip(1);
+    let line = |start: &str| said.lines().find_map(|line| line.strip_prefix(start)).map(str::trim);
     Refusal::other(match removed.next() {
         Some(packages) => format!("apt-get would have to remove {}", packages.trim()),
         None => format!("apt-get refuses: {}", line("E:").unwrap_or("it does not say why")),

@@ -178,7 +178,7 @@ impl Cache {
         Ok(())
     }
 
-    /// Nobody else makes this meanwhile, if the folder can be written and knows locks; it is no harm if somebody does.
+    /// No other run makes this meanwhile, if the folder can be written and knows locks; it does no harm if one does.
     fn lock(&self, key: &str) -> Option<Lock> {
         fs::create_dir_all(&self.folder).ok()?;
         let path = self.folder.join(key).with_extension("lock");
@@ -273,7 +273,7 @@ impl Slot {
         let mut found = self.cache.fetch(&key);
         if found.is_none() {
             self.lock = self.cache.lock(&key);
-            // Somebody may have made it while this waited.
+            // Another run may have made it while this waited.
             found = self.cache.fetch(&key);
         }
         let Some(Found { place, bytes }) = found else { return Ok(None) };

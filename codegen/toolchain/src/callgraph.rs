@@ -1,7 +1,7 @@
 //! Who calls whom in a linked Thumb-2 image, read from its instructions.
 //!
 //! The branches themselves are decoded, so that neither relocations nor a disassembler is needed; mapping
-//! symbols tell code from data. What cannot be followed is kept, never dropped.
+//! symbols distinguish code from data. What cannot be followed is kept, never dropped.
 
 use super::error::TargetError;
 use super::thumb::{self, Branch};

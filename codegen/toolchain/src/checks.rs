@@ -32,11 +32,11 @@ pub enum Rule {
     Panic,
     /// An allocator can be reached, or is in the image.
     Allocation,
-    /// A call or jump through a register: where it leads, nobody can tell.
+    /// A call or jump through a register: where it leads is not known.
     IndirectCall,
     /// `f64` in software.
     SoftDouble,
-    /// A function that calls itself, or one that moves the stack pointer by what only a run can tell: no stack bound.
+    /// A function that calls itself, or one that moves the stack pointer by what is only known in a run: no stack bound.
     Unbounded,
     /// A tick used more stack than the bound allows: the bound is wrong.
     StackBound,
@@ -104,7 +104,7 @@ pub fn check(elf: &[u8], tick: Option<&str>, rules: Rules) -> Result<Checked, Ta
         add(Rule::Unbounded, format!("{} call each other without end in sight", cycle.join(" and ")));
     }
     for name in &bound.unsized_functions {
-        add(Rule::Unbounded, format!("{name} moves the stack pointer by what only a run can tell"));
+        add(Rule::Unbounded, format!("{name} moves the stack pointer by what is only known in a run"));
     }
     for name in &bound.strays {
         add(Rule::Unbounded, format!("{name} branches to what is no function"));

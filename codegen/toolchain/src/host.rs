@@ -7,7 +7,7 @@ use super::process::{clean_command, find_in_path};
 use crate::sha256;
 use std::path::{Path, PathBuf};
 
-/// A shared library may leave symbols undefined unless told otherwise, and then the proof that nothing can
+/// A shared library may leave symbols undefined unless asked otherwise, and then the proof that nothing can
 /// panic would never fail. libc is for `memcpy` and `memset`, which the compiler calls by itself.
 const LINK: [&str; 2] = ["-Clink-arg=-Wl,-z,defs", "-Clink-arg=-lc"];
 

@@ -20,7 +20,7 @@ use std::time::Duration;
 /// Longest time for rustup: it downloads some megabytes.
 const RUSTUP_LIMIT: Duration = Duration::from_secs(600);
 
-/// Brings what is missing and returns what is there then. `say` is told every step before it is taken.
+/// Brings what is missing and returns what is there then. `say` gets every step before it is taken.
 ///
 /// # Errors
 /// [`TargetError::SetUpFailed`] for what cannot be had, with what was tried and what is left to do by hand.

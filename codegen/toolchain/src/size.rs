@@ -1,6 +1,6 @@
 //! Who takes the memory of an image: by section, and by the source that the bytes come from.
 //!
-//! Code is told apart by line information, byte by byte, so that what was inlined counts for whom it was written by;
+//! Code is assigned by line information, byte by byte, so that what was inlined counts for whom it was written by;
 //! constants and variables by their symbols.
 
 use super::checks;
@@ -137,7 +137,7 @@ pub fn size(elf: &[u8]) -> Result<Size, TargetError> {
     Ok(Size { identity, sections, owners, variables })
 }
 
-/// The tick of an image, if it has one that can be told: see [`checks::check`].
+/// The tick of an image, if it has one that is known: see [`checks::check`].
 #[must_use]
 pub fn has_tick(elf: &[u8]) -> bool {
     let Ok(file) = object::File::parse(elf) else { return false };

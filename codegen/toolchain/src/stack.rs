@@ -25,7 +25,7 @@ pub struct StackBound {
     pub recursion: Vec<Vec<String>>,
     /// Functions that call or jump through a register.
     pub indirect: Vec<String>,
-    /// Functions that move the stack pointer by what only a run can tell; their frame counts as 0.
+    /// Functions that move the stack pointer by what is only known in a run; their frame counts as 0.
     pub unsized_functions: Vec<String>,
     /// Functions that branch to what is no function.
     pub strays: Vec<String>,

@@ -47,7 +47,7 @@ pub fn decode(address: u64, code: &[u8], marks: &BTreeMap<u64, bool>) -> Vec<Ins
 }
 
 /// Bytes of stack that a function with these instructions takes at most: all that it pushes, once each.
-/// `None` if the stack pointer is moved in a way that only a run can tell.
+/// `None` if the stack pointer is moved in a way that is only known in a run.
 ///
 /// Right for compiled code, which moves the stack pointer in its prologue and never in a loop.
 pub fn frame(instructions: &[Instruction]) -> Option<u64> {

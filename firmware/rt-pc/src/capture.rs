@@ -19,10 +19,8 @@ pub const CAPACITY: u32 = {
     ((BLOCKS - 1) * ((words - RECORD_LAYOUT.preamble()) / RECORD_LAYOUT.longest_row())) as u32
 };
 
-/// How it stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Standing {
-    /// It records.
     pub running: bool,
     /// The trigger was seen.
     pub triggered: bool,
@@ -79,7 +77,6 @@ impl Capture {
         Ok((capture, tape))
     }
 
-    /// How it stands.
     pub fn standing(&self) -> Standing {
         self.standing
     }
@@ -93,7 +90,7 @@ impl Capture {
         }
     }
 
-    /// What to tell the loop so that it records anew, until `after` ticks behind the trigger. `number` is what the order will have.
+    /// The order to the loop to record anew, until `after` ticks behind the trigger. `number` is what the order will have.
     pub fn arm(&mut self, after: u32, number: u32) -> Order {
         self.settings = settings(after);
         self.standing = Standing { running: true, ..Standing::default() };

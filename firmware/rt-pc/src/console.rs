@@ -24,7 +24,6 @@ pub enum No {
     Word(usize),
 }
 
-/// The console.
 pub struct Console {
     /// Requests and input words.
     pub operator: Operator,
@@ -70,7 +69,6 @@ impl Console {
         }
     }
 
-    /// Settings in force.
     pub fn config(&self) -> &Config {
         &self.config
     }
@@ -126,12 +124,10 @@ impl Console {
         Ok(())
     }
 
-    /// Triggers the recorder.
     pub fn trigger_recorder(&mut self) {
         self.order(Order::Trigger);
     }
 
-    /// Stops the recorder.
     pub fn stop_recorder(&mut self) {
         self.order(Order::StopRecorder);
     }

@@ -45,21 +45,15 @@ pub struct Timing {
 
 /// The loop with everything that it owns.
 pub struct Loop<'a, D> {
-    /// The machine outside.
     pub device: &'a mut D,
-    /// Settings.
     pub config: Config,
-    /// Where readings go.
     pub places: Places,
     /// Event bits that hold for the whole run, such as a failed integrity check.
     pub standing_events: u32,
     /// Its ends of the rings.
     pub rings: Inner,
-    /// The recorder, started.
     pub tape: Option<Tape>,
-    /// Flags and counters.
     pub shared: &'a Shared,
-    /// When.
     pub timing: Timing,
 }
 

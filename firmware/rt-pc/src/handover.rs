@@ -29,9 +29,7 @@ pub struct Row {
     pub tick: u64,
     /// Ticks that were run before it.
     pub count: u64,
-    /// What went in.
     pub input: Words,
-    /// What came out.
     pub output: recorder::Row,
     /// Digest of the machine after the tick; 0 where nothing records the run.
     pub digest: u64,
@@ -53,9 +51,7 @@ pub struct Row {
 pub struct Snapshot {
     /// Ticks that were run before it.
     pub count: u64,
-    /// Its digest.
     pub digest: u64,
-    /// Its words.
     pub state: [u64; MACHINE_STATE_WORDS],
 }
 
@@ -73,19 +69,15 @@ pub struct Wish {
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
 pub enum Order {
-    /// Other wishes.
     Wish(Wish),
-    /// Other settings.
     Configure(Config),
     /// A wave begins, if none is under way.
     Wave(wave::Settings<Real>),
     /// The wave comes to rest.
     StopWave,
-    /// Record with this.
     Tape(Tape),
     /// Begin anew with the recorder that the loop has.
     Record(recorder::Settings),
-    /// Trigger the recorder.
     Trigger,
     /// Stop the recorder and hand it back.
     StopRecorder,
@@ -110,7 +102,6 @@ pub struct Shared {
 
 /// The loop's ends of the rings that lead out.
 pub struct Outlets {
-    /// What was done.
     pub rows: Producer<Row>,
     /// States for the record of the run; none if there is no such record.
     pub snapshots: Option<Producer<Snapshot>>,
@@ -120,21 +111,14 @@ pub struct Outlets {
 
 /// The loop's ends of the rings.
 pub struct Inner {
-    /// See there.
     pub outlets: Outlets,
-    /// What is wanted.
     pub orders: Consumer<Order>,
 }
 
-/// The service's ends.
 pub struct Outer {
-    /// See [`Outlets`].
     pub rows: Consumer<Row>,
-    /// See [`Outlets`].
     pub snapshots: Consumer<Snapshot>,
-    /// See [`Outlets`].
     pub tapes: Consumer<(Tape, u32)>,
-    /// See [`Inner`].
     pub orders: Producer<Order>,
 }
 

@@ -81,14 +81,14 @@ fn main() -> ExitCode {
 
 /// Opens the machine outside and runs on it.
 fn open(options: &Options) -> Result<(), Failure> {
-    match &options.machine {
-        options::Machine::Simulated(name) => {
+    match &options.hardware {
+        options::Hardware::Simulated(name) => {
             let path = exchange::path_of(name).map_err(|text| Failure::Usage(format!("--sim: {text}")))?;
             let device = Simulated::open(&path, options.sim_timeout);
             run(options, &mut device.map_err(Failure::Environment)?)
         }
         #[cfg(feature = "comedi")]
-        options::Machine::Comedi(input) => {
+        options::Hardware::Comedi(input) => {
             let library = devices::comedi::library::Comedilib::open(options.comedi_library.as_deref());
             let library = library.map_err(Failure::Environment)?;
             let settings = devices::comedi::Settings {
@@ -101,7 +101,7 @@ fn open(options: &Options) -> Result<(), Failure> {
             run(options, &mut device.map_err(Failure::Environment)?)
         }
         #[cfg(not(feature = "comedi"))]
-        options::Machine::Comedi(_) => {
+        options::Hardware::Comedi(_) => {
             Err(Failure::Usage("--comedi needs another build: cargo build --release --features comedi".to_owned()))
         }
     }

@@ -18,15 +18,11 @@ const DOWN_LIMIT: u64 = 30 * SECOND;
 /// What the supervisor last said.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Said {
-    /// Phase.
     pub phase: Phase,
-    /// Cause.
     pub cause: Cause,
-    /// Amplifiers on.
     pub on: bool,
     /// Status of the control law.
     pub status: u32,
-    /// Tick of these.
     pub tick: u64,
     /// Orders that the loop had taken by then.
     pub orders: u32,
@@ -91,7 +87,6 @@ enum Step {
     Over,
 }
 
-/// The operator.
 #[derive(Debug)]
 pub struct Operator {
     places: Places,

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use lexopt::prelude::*;
 use specgen_rt::clock::SECOND;
 
-/// What `--help` prints.
 pub const HELP: &str = "\
 Runs the controller in real time on this PC.
 
@@ -45,10 +44,9 @@ Exit codes: 0 good, 1 the machine faulted or held for a cause, a record is not w
 3 environment.
 ";
 
-/// Which machine.
+/// What the controller runs on.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Machine {
-    /// Simulated, by name.
+pub enum Hardware {
     Simulated(String),
     /// A card, by device file.
     Comedi(PathBuf),
@@ -58,13 +56,11 @@ pub enum Machine {
 #[derive(Debug, Clone)]
 #[cfg_attr(not(feature = "comedi"), allow(dead_code))] // The settings of cards.
 pub struct Options {
-    /// The machine.
-    pub machine: Machine,
+    pub hardware: Hardware,
     /// Cards of the amplifiers.
     pub comedi_outputs: Vec<PathBuf>,
     /// Of inputs and of outputs, V.
     pub comedi_ranges: [[f64; 2]; 2],
-    /// The library's file.
     pub comedi_library: Option<PathBuf>,
     /// ns.
     pub sim_timeout: u64,
@@ -80,11 +76,9 @@ pub struct Options {
     pub cpu: Option<usize>,
     /// Go on without rights.
     pub allow_no_rt: bool,
-    /// Arm at once.
     pub arm: bool,
     /// Assignments of input words.
     pub set: Vec<String>,
-    /// Assignments of settings.
     pub config: Vec<String>,
     /// Socket of the link.
     pub link: Option<PathBuf>,
@@ -96,16 +90,13 @@ pub struct Options {
     pub record: Option<PathBuf>,
     /// File of the recorder.
     pub capture: Option<PathBuf>,
-    /// Summary as JSON.
     pub json: bool,
 }
 
 /// What the command line asks for.
 #[derive(Debug)]
 pub enum Asked {
-    /// To run.
     Run(Box<Options>),
-    /// For a text.
     Text(String),
 }
 
@@ -119,7 +110,7 @@ pub fn parse(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<
 
 fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked, lexopt::Error> {
     let mut options = Options {
-        machine: Machine::Simulated("plant".to_owned()),
+        hardware: Hardware::Simulated("plant".to_owned()),
         comedi_outputs: Vec::new(),
         comedi_ranges: [[-10.0, 10.0]; 2],
         comedi_library: None,
@@ -149,8 +140,8 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
                 let version = controller::SPECGEN_VERSION;
                 return Ok(Asked::Text(format!("rt-pc {version}, controller of `{name}`, digest {digest}\n")));
             }
-            Long("sim") => options.machine = Machine::Simulated(parser.value()?.string()?),
-            Long("comedi") => options.machine = Machine::Comedi(parser.value()?.into()),
+            Long("sim") => options.hardware = Hardware::Simulated(parser.value()?.string()?),
+            Long("comedi") => options.hardware = Hardware::Comedi(parser.value()?.into()),
             Long("comedi-out") => options.comedi_outputs.push(parser.value()?.into()),
             Long("comedi-range") => options.comedi_ranges[0] = range(&mut parser, "--comedi-range")?,
             Long("comedi-out-range") => options.comedi_ranges[1] = range(&mut parser, "--comedi-out-range")?,
@@ -183,7 +174,7 @@ fn read(arguments: impl IntoIterator<Item = std::ffi::OsString>) -> Result<Asked
             _ => return Err(argument.unexpected()),
         }
     }
-    if options.elastic && !matches!(options.machine, Machine::Simulated(_)) {
+    if options.elastic && !matches!(options.hardware, Hardware::Simulated(_)) {
         return Err("--elastic is for a simulated machine: a real one does not wait".into());
     }
     Ok(Asked::Run(Box::new(options)))
@@ -219,7 +210,7 @@ mod tests {
         let Ok(Asked::Run(options)) = parsed("--sim a --seconds 2.5 --set command=3 --cpu 1 --record x") else {
             unreachable!("a good line")
         };
-        assert_eq!((options.machine, options.duration), (Machine::Simulated("a".to_owned()), Some(2_500_000_000)));
+        assert_eq!((options.hardware, options.duration), (Hardware::Simulated("a".to_owned()), Some(2_500_000_000)));
         assert!(options.arm && options.cpu == Some(1) && !options.allow_no_rt);
         for (line, expected) in [
             ("--seconds", "missing argument"),

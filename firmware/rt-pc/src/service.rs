@@ -28,7 +28,6 @@ const ROUND: Timespec = Timespec { tv_sec: 0, tv_nsec: 2_000_000 };
 pub struct Service<'a> {
     /// Its ends of the rings.
     pub rings: Outer,
-    /// Flags and counters.
     pub shared: &'a Shared,
     /// What may be asked.
     pub console: Console,
@@ -38,7 +37,6 @@ pub struct Service<'a> {
     pub link: Option<Link>,
     /// Set by a signal, taken back here.
     pub signal: Arc<AtomicBool>,
-    /// Signals that came.
     pub signals: u32,
     /// Ask to ramp down at this time, ns.
     pub until: Option<u64>,
@@ -51,7 +49,6 @@ pub struct Incident {
     pub tick: u64,
     /// Phase that it led to.
     pub phase: Phase,
-    /// Cause.
     pub cause: Cause,
 }
 
@@ -68,7 +65,6 @@ pub struct Outcome {
     pub capture: Option<(PathBuf, io::Result<u64>)>,
     /// What came over the link, if there was one.
     pub link: Option<Traffic>,
-    /// Rows seen.
     pub rows: u64,
     /// Why the plan was given up.
     pub failure: Option<String>,

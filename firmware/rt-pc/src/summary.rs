@@ -10,7 +10,6 @@ use crate::service::{Incident, Outcome, Traffic};
 
 /// A run that is over.
 pub struct Summary<'a> {
-    /// The book.
     pub account: &'a Account,
     /// What the service saw.
     pub outcome: &'a Outcome,
@@ -62,7 +61,6 @@ impl Summary<'_> {
         outcome.incidents.first().map(words)
     }
 
-    /// For people.
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut text = format!("{} at {} Hz on {}\n", controller::SPEC_NAME, hertz(self.period), self.device);
@@ -211,7 +209,6 @@ fn hertz(period: u64) -> f64 {
     (1e12 / period as f64).round() / 1e3
 }
 
-/// A JSON string.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {

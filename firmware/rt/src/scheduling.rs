@@ -29,10 +29,10 @@ impl fmt::Display for Refused {
 impl std::error::Error for Refused {}
 
 /// How real-time priority is given to a user, or to a program.
-pub const MEND_PRIORITY: &str = "put `@realtime - rtprio 95` into /etc/security/limits.d/realtime.conf and join group \
+pub const FIX_PRIORITY: &str = "put `@realtime - rtprio 95` into /etc/security/limits.d/realtime.conf and join group \
      `realtime` (log in again), or `sudo setcap cap_sys_nice,cap_ipc_lock+ep` on this program";
 /// How memory may be locked.
-pub const MEND_MEMORY: &str = "put `@realtime - memlock unlimited` into /etc/security/limits.d/realtime.conf and join group \
+pub const FIX_MEMORY: &str = "put `@realtime - memlock unlimited` into /etc/security/limits.d/realtime.conf and join group \
      `realtime` (log in again), or `sudo setcap cap_sys_nice,cap_ipc_lock+ep` on this program";
 
 /// Puts the calling thread under `SCHED_FIFO` at `priority` (1 to 99).
@@ -47,7 +47,7 @@ pub fn set_fifo(priority: u8) -> Result<(), Refused> {
         // Children of this thread, if there ever are any, are ordinary ones.
         libc::sched_setscheduler(0, libc::SCHED_FIFO | libc::SCHED_RESET_ON_FORK, &raw const parameters)
     };
-    refused(answer, || format!("SCHED_FIFO at priority {priority}"), MEND_PRIORITY)
+    refused(answer, || format!("SCHED_FIFO at priority {priority}"), FIX_PRIORITY)
 }
 
 /// Keeps every page of this process in memory, those mapped later too.
@@ -57,7 +57,7 @@ pub fn set_fifo(priority: u8) -> Result<(), Refused> {
 pub fn lock_memory() -> Result<(), Refused> {
     // SAFETY: takes no pointers.
     let answer = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) };
-    refused(answer, || "locking memory (mlockall)".to_owned(), MEND_MEMORY)
+    refused(answer, || "locking memory (mlockall)".to_owned(), FIX_MEMORY)
 }
 
 /// Lets the system take pages away again.

@@ -1,7 +1,7 @@
 //! Kernel, processors and rights.
 
 use specgen_rt::clock;
-use specgen_rt::scheduling::{MEND_MEMORY, MEND_PRIORITY, Refused};
+use specgen_rt::scheduling::{FIX_MEMORY, FIX_PRIORITY, Refused};
 
 use super::Grade::{Bad, Unknown, Warning};
 use super::{Files, Finding};
@@ -31,8 +31,8 @@ pub fn rights(priority: Result<(), &Refused>, memory: Result<(), &Refused>) -> V
         Err(refused) => Finding::of(subject, Bad, format!("{}: {}", refused.what, refused.cause), fix),
     };
     vec![
-        of("priority", priority, "SCHED_FIFO is granted", MEND_PRIORITY),
-        of("memory", memory, "may be locked", MEND_MEMORY),
+        of("priority", priority, "SCHED_FIFO is granted", FIX_PRIORITY),
+        of("memory", memory, "may be locked", FIX_MEMORY),
     ]
 }
 
@@ -52,7 +52,7 @@ pub fn timer() -> Finding {
 }
 
 fn kernel(files: &Files) -> Finding {
-    const MEND: &str = "install a PREEMPT_RT kernel: `apt-get install linux-image-rt-amd64` (Debian), `pro enable \
+    const FIX: &str = "install a PREEMPT_RT kernel: `apt-get install linux-image-rt-amd64` (Debian), `pro enable \
          realtime-kernel` (Ubuntu), kernel-rt (Red Hat); without it the longest delays are not bounded";
     let version = files.text("/proc/sys/kernel/osrelease").unwrap_or_default();
     let build = files.text("/proc/sys/kernel/version").unwrap_or_default();
@@ -60,10 +60,10 @@ fn kernel(files: &Files) -> Finding {
         return Finding::good("kernel", format!("{version}, PREEMPT_RT"));
     }
     if build.is_empty() {
-        return Finding::of("kernel", Unknown, "cannot be seen", MEND);
+        return Finding::of("kernel", Unknown, "cannot be seen", FIX);
     }
     let kind = build.split_whitespace().find(|word| word.starts_with("PREEMPT")).unwrap_or("no preemption");
-    Finding::of("kernel", Warning, format!("{version}, {kind}, not PREEMPT_RT"), MEND)
+    Finding::of("kernel", Warning, format!("{version}, {kind}, not PREEMPT_RT"), FIX)
 }
 
 fn clock_source(files: &Files) -> Finding {
@@ -81,34 +81,33 @@ fn clock_source(files: &Files) -> Finding {
 }
 
 fn governor(files: &Files) -> Finding {
-    const MEND: &str = "`cpupower frequency-set -g performance`, at every start";
+    const FIX: &str = "`cpupower frequency-set -g performance`, at every start";
     let processors = files.names(CPU, "cpu");
     let governors = processors.iter().filter_map(|cpu| files.text(&format!("{CPU}/{cpu}/cpufreq/scaling_governor")));
     let mut governors: Vec<String> = governors.collect();
     governors.sort();
     governors.dedup();
     match governors.as_slice() {
-        [] => Finding::of("frequency", Unknown, "no cpufreq here (virtual machine, or a fixed clock)", MEND),
+        [] => Finding::of("frequency", Unknown, "no cpufreq here (virtual machine, or a fixed clock)", FIX),
         [only] if only == "performance" => Finding::good("frequency", "governor performance"),
-        found => Finding::of("frequency", Warning, format!("governor {}", found.join(", ")), MEND),
+        found => Finding::of("frequency", Warning, format!("governor {}", found.join(", ")), FIX),
     }
 }
 
 fn isolation(files: &Files) -> Finding {
-    const MEND: &str =
-        "boot with `isolcpus=N nohz_full=N rcu_nocbs=N` for one processor N and start rt-pc with --cpu N";
+    const FIX: &str = "boot with `isolcpus=N nohz_full=N rcu_nocbs=N` for one processor N and start rt-pc with --cpu N";
     let list = |name: &str| files.text(&format!("{CPU}/{name}")).filter(|text| !text.is_empty() && text != "(null)");
     match (list("isolated"), list("nohz_full")) {
         (Some(isolated), Some(quiet)) => {
             Finding::good("isolation", format!("processors {isolated} isolated, {quiet} without ticks"))
         }
         (Some(isolated), None) => {
-            Finding::of("isolation", Warning, format!("processors {isolated} isolated, none without ticks"), MEND)
+            Finding::of("isolation", Warning, format!("processors {isolated} isolated, none without ticks"), FIX)
         }
         (None, _) if files.text(&format!("{CPU}/online")).is_none() => {
-            Finding::of("isolation", Unknown, "cannot be seen", MEND)
+            Finding::of("isolation", Unknown, "cannot be seen", FIX)
         }
-        (None, _) => Finding::of("isolation", Warning, "no processor is kept free of other work", MEND),
+        (None, _) => Finding::of("isolation", Warning, "no processor is kept free of other work", FIX),
     }
 }
 

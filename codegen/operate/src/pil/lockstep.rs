@@ -36,7 +36,7 @@ pub enum Stop {
     Supervisor {
         /// Tick since power-up.
         tick: u64,
-        /// What it says.
+        /// Its phase and cause.
         word: MachineWord,
     },
     /// The host's controller refuses the settings.

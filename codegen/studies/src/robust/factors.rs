@@ -243,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_machine_can_have_is_refused_with_a_mend() {
+    fn what_no_machine_can_have_is_refused_with_a_fix() {
         for (text, fix) in [
             ("mass", "write NAME=PART"),
             ("weight=5%", "expected one of mass"),

@@ -153,7 +153,7 @@ impl Study<'_> {
     }
 
     /// Runs a plan in `threads` threads, until `stop` is set: what was done then, in the order of the plan. `progress` is
-    /// told how many are done.
+    /// called with how many are done.
     ///
     /// # Errors
     /// As [`Study::run`], the first in the order of the plan.

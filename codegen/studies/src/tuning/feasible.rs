@@ -28,9 +28,9 @@ pub struct Required {
 pub enum Feasibility {
     /// Six legs with their own gauges.
     Legs {
-        /// One of them.
+        /// Of each leg.
         dynamics: LegDynamics,
-        /// Of the spec.
+        /// The spec's, whose weights a candidate replaces.
         adaptation: Adaptation,
         /// What is asked for.
         required: Required,

@@ -39,7 +39,7 @@ pub struct SearchOptions<'a> {
     pub threads: usize,
     /// Set from outside to end the search with what it has.
     pub stop: &'a AtomicBool,
-    /// Told after every generation.
+    /// Called after every generation.
     pub progress: &'a dyn Fn(&Progress),
 }
 

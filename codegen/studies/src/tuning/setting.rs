@@ -25,9 +25,9 @@ pub enum Setting {
     Platform {
         /// Of P/F and F.
         combined: Tuning,
-        /// Of P alone.
+        /// Of P, which has no feed-forward.
         position: Tuning,
-        /// s.
+        /// Control interval, s.
         period: f64,
     },
 }

@@ -34,7 +34,6 @@ pub(super) struct Recipe {
     package: PathBuf,
     /// Of everything but the sources.
     context: Digester,
-    /// Of every source.
     sources: [u8; 32],
 }
 

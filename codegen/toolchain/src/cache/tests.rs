@@ -115,7 +115,7 @@ fn another_cargo_compiler_library_or_linker_changes_the_key() {
             differs(file);
         }
     }
-    // Of this size already: the time tells.
+    // Of this size already: it is seen from the time.
     File::options().append(true).open(root.join("ld")).unwrap().set_modified(SystemTime::UNIX_EPOCH).unwrap();
     differs("time");
     // A compiler that does not answer decides about bytes that nobody knows.
@@ -211,7 +211,7 @@ fn every_flipped_bit_and_every_cut_is_seen_and_removed() {
         assert_eq!(cache.fetch(&key), None, "{}", String::from_utf8_lossy(&damaged));
         assert!(!path.exists());
     }
-    // Whole, but somebody else's.
+    // Whole, but another's.
     fs::write(cache.folder.join(&other), &whole).unwrap();
     assert_eq!(cache.fetch(&other), None);
     fs::write(&path, &whole).unwrap();

@@ -69,14 +69,12 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// Triggers the recorder.
     pub fn trigger(&mut self) {
         if let Some(tape) = &mut self.tape {
             tape.trigger();
         }
     }
 
-    /// Stops the recorder.
     pub fn stop(&mut self) {
         if let Some(tape) = &mut self.tape {
             tape.stop();

@@ -18,13 +18,11 @@ pub struct Setpoints {
 }
 
 impl Setpoints {
-    /// Nothing is wanted.
     pub fn new(config: &Config) -> Self {
         let wish = Wish { words: [0; MACHINE_INPUT_WORDS], request: 0 };
         Self { wish, wave: Wave::new(waves::limits(config)), sequence: 0, waving: false }
     }
 
-    /// Other wishes.
     pub fn wish(&mut self, wish: Wish) {
         self.wish = wish;
     }

@@ -15,7 +15,6 @@ use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
 use super::Device;
 use library::{ANALOG_INPUT, ANALOG_OUTPUT, Card, Comedilib, DIGITAL, Reference, channel};
 
-/// Cards and ranges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
     /// Card of the gauges and of the enable line.

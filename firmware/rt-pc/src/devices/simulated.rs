@@ -12,7 +12,6 @@ use super::Device;
 /// How long the first reading may take, ns: the machine may be pre-cycling.
 const FIRST: u64 = 60_000_000_000;
 
-/// A simulated machine.
 pub struct Simulated {
     client: Client,
     path: String,

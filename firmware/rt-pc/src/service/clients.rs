@@ -12,14 +12,12 @@ use rustix::net::sockopt::socket_peercred;
 
 use super::listener::Listener;
 
-/// Connections at once.
 pub const MOST: usize = 8;
 /// Connections that are taken in a round.
 const TAKEN: usize = 16;
 /// Bytes that are read from a client in a round.
 const ROUND: usize = 4096;
 
-/// One connection.
 pub struct Client<T> {
     /// The connection, which never waits.
     pub stream: UnixStream,
@@ -31,14 +29,12 @@ pub struct Client<T> {
     last: u64,
 }
 
-/// All of them.
 pub struct Clients<T> {
     listener: Listener,
     all: Vec<Client<T>>,
 }
 
 impl<T> Clients<T> {
-    /// Without a client.
     pub fn new(listener: Listener) -> Self {
         Self { listener, all: Vec::with_capacity(MOST) }
     }

@@ -20,7 +20,6 @@ const _: () = assert!(CHUNK + 24 < specgen_link::MESSAGE);
 pub struct Desk<'a> {
     /// What is asked of the run.
     pub console: &'a mut Console,
-    /// Who asks.
     pub host: HostId,
     /// Events that were not yet reported to this host.
     pub events: &'a mut u32,
@@ -31,7 +30,6 @@ pub struct Desk<'a> {
 }
 
 impl<'a> Desk<'a> {
-    /// At the console.
     pub fn new(console: &'a mut Console, host: HostId, events: &'a mut u32, now: u64) -> Self {
         Self { console, host, events, now, words: [0; size_of::<[u64; CONFIG_WORDS]>()] }
     }

@@ -18,7 +18,6 @@ const UNREAD: usize = 1 << 14;
 /// What came over the link in a run.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Traffic {
-    /// Hosts that connected.
     pub hosts: u64,
     /// Requests carried out or refused.
     pub requests: u64,

@@ -13,7 +13,6 @@ use rustix::net;
 /// Connections that wait to be accepted, between two rounds.
 const BACKLOG: i32 = 128;
 
-/// The socket.
 pub struct Listener {
     listener: UnixListener,
     path: PathBuf,

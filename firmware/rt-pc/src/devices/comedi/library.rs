@@ -59,7 +59,6 @@ pub fn channel(number: u32, range: u32, reference: Reference) -> u32 {
 
 type Handle = *mut c_void;
 
-/// The library's functions.
 struct Functions {
     open: unsafe extern "C" fn(*const c_char) -> Handle,
     close: unsafe extern "C" fn(Handle) -> c_int,
@@ -77,7 +76,6 @@ struct Functions {
     _library: Library,
 }
 
-/// libcomedi.
 pub struct Comedilib {
     functions: Functions,
 }
