@@ -164,10 +164,10 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
         ("task_space", notch.sections[2].depth, legs),
         ("task_space", task.law.force_to_modes[0][1], legs),
         ("task_space", task.law.modes_to_legs[1][2], legs),
-        ("sensing", task.sensing.inverse[2][0], &["pose"]),
-        ("sensing", task.sensing.inverse[3][1], &["pose"]),
-        ("dynamics", ir.dynamics.legs[3].rest[2], &["demand", "load"]),
-        ("dynamics", ir.dynamics.mass, &["load"]),
+        ("gauges", task.sensing.inverse[2][0], &["pose"]),
+        ("gauges", task.sensing.inverse[3][1], &["pose"]),
+        ("body", ir.dynamics.legs[3].rest[2], &["demand", "load"]),
+        ("body", ir.dynamics.mass, &["load"]),
         ("setpoint", task.setpoints.square_rate, &["load"]),
         ("setpoint", task.setpoints.bias[2], &["target"]),
         ("defaults", task.defaults.gains.integral[0], legs),
@@ -177,7 +177,7 @@ fn one_ulp_of_one_constant_is_found_with_tick_and_signal() {
     let mut files = BTreeSet::new();
     for (file, value, named) in cases {
         // The first constant of some files; in the soak all.
-        let first = files.insert(file) && ["sensing", "dynamics"].contains(&file);
+        let first = files.insert(file) && ["gauges", "body"].contains(&file);
         if !specgen_tests::length(first, true) {
             continue;
         }
