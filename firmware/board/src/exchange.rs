@@ -1,10 +1,10 @@
 //! What lies between the tick and the background.
 
-use controller::{COMMAND_WORDS, Config};
 use controller::snapshot::recorder::Recorder;
 use controller::supervised::{Cause, Machine, MachineInput, MachineOutput, Phase, Request, supervise};
 use controller::supervision::HOST_TICKS;
 use controller::waves::{self, Wave};
+use controller::{COMMAND_WORDS, Config};
 use specgen_link::Silence;
 use specgen_runtime::wave::Stage;
 

@@ -7,7 +7,7 @@ use crate::hysteresis::{GRID, Memory};
 use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
 use crate::{LEGS, Real, TickInput, limits};
 use specgen_runtime::setpoint::{CommandKind, Generator};
-use specgen_runtime::snapshot::{Invalid, LARGEST, LARGEST_PLACE, Reader, Snapshot, Writer};
+use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Sizes, Snapshot, Writer};
 use specgen_runtime::{ControlMode, Digest, Estimate, Integral, Interaction, NotchState, Rate, Transfer};
 
 /// State of one leg.
@@ -56,12 +56,12 @@ pub struct State {
     pub demand: [Real; LEGS],
     /// p: deflection of each leg under the known load of the interval now running, m.
     pub load: [Real; LEGS],
-    /// Some leg was held back by a limit in the last tick.
-    pub limited: bool,
     /// Interaction wrench last believed, N and N m.
     pub wrench: [Real; 6],
     /// What is left of the last change of mode.
     pub transfer: Transfer<Real>,
+    /// Some leg was held back by a limit in the last tick.
+    pub limited: bool,
     /// Mode of the last tick; none before the first.
     pub mode: Option<ControlMode>,
     /// Where the last tick took the interaction force from.
@@ -108,139 +108,62 @@ impl State {
     #[must_use]
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::new();
-        for leg in &self.legs {
-            leg.memory.digest(&mut digest);
-            digest.real(leg.requested);
-            digest.real(leg.excess);
-            digest.word(leg.code as u32 as u64);
-        }
-        for estimate in &self.estimates {
-            estimate.digest(&mut digest);
-        }
-        let Environment { stiffness, rest } = &self.environment;
-        let vectors =
-            [&self.pose, &self.error, &self.deflection, &self.demand, &self.load, &self.wrench, stiffness, rest];
-        for vector in vectors {
-            for value in vector {
-                digest.real(*value);
-            }
-        }
-        self.rate.digest(&mut digest);
-        self.generator.digest(&mut digest);
-        self.error_notch.digest(&mut digest);
-        self.innovation_notch.digest(&mut digest);
-        self.integral.digest(&mut digest);
-        self.transfer.digest(&mut digest);
-        digest.word(self.limited as u64);
-        digest.word(match self.mode {
-            None => 0,
-            Some(mode) => 1 + mode.word(),
-        });
-        digest.word(self.interaction.word());
+        Snapshot::digest(self, &mut digest);
         digest.finish()
     }
 }
 
-impl Snapshot for LegState {
-    const WORDS: usize = <Memory as Snapshot>::WORDS + 3;
-    fn save(&self, words: &mut Writer<'_>) {
-        self.memory.save(words);
-        words.word(self.code as u32 as u64);
-        words.reals(&[self.requested, self.excess]);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        self.memory.restore(words)?;
-        if self.memory.highest() > GRID as Real {
-            return Err(words.refused());
-        }
-        self.code = words.count_to(limits::CODES[1])?;
-        if self.code < limits::CODES[0] {
-            return Err(words.refused());
-        }
-        self.requested = words.real(LARGEST_PLACE)?;
-        self.excess = words.real(words.sizes().request)?;
-        Ok(())
+specgen_runtime::state! {
+    impl[] LegState, Memory::WORDS + 3, |words| { memory, requested, excess, code } {
+        words.part(memory)?;
+        words.check(|| memory.highest() <= GRID as Real)?;
+        words.ticks(code, limits::CODES[1])?;
+        words.check(|| *code >= limits::CODES[0])?;
+        words.number(requested, LARGEST_PLACE)?;
+        words.number(excess, words.sizes().request)?;
     }
 }
 
-impl Snapshot for State {
-    const WORDS: usize = LEGS * <LegState as Snapshot>::WORDS
-        + 6 * <Estimate<Real> as Snapshot>::WORDS
+specgen_runtime::state! {
+    impl[] State,
+    LEGS * LegState::WORDS
+        + 6 * Estimate::<Real>::WORDS
         + 8 * 6
-        + <Rate<Real> as Snapshot>::WORDS
-        + <Generator<Real> as Snapshot>::WORDS
-        + 2 * <NotchState<Real> as Snapshot>::WORDS
-        + <Integral<Real> as Snapshot>::WORDS
-        + <Transfer<Real> as Snapshot>::WORDS
-        + 3;
-    fn save(&self, words: &mut Writer<'_>) {
-        for leg in &self.legs {
-            leg.save(words);
+        + Rate::<Real>::WORDS
+        + Generator::<Real>::WORDS
+        + 2 * NotchState::<Real>::WORDS
+        + Integral::<Real>::WORDS
+        + Transfer::<Real>::WORDS
+        + 3,
+    |words| {
+        pose, rate, generator, error, error_notch, innovation_notch, integral, estimates, deflection, demand, load, limited,
+        wrench, transfer, mode, interaction, environment, legs
+    } {
+        for leg in legs {
+            words.part(leg)?;
         }
-        for estimate in &self.estimates {
-            estimate.save(words);
+        for estimate in estimates {
+            words.part(estimate)?;
         }
-        for vector in [
-            &self.pose,
-            &self.error,
-            &self.deflection,
-            &self.demand,
-            &self.load,
-            &self.wrench,
-            &self.environment.stiffness,
-            &self.environment.rest,
-        ] {
-            words.reals(vector);
-        }
-        self.rate.save(words);
-        self.generator.save(words);
-        self.error_notch.save(words);
-        self.innovation_notch.save(words);
-        self.integral.save(words);
-        self.transfer.save(words);
-        words.flag(self.limited);
-        words.word(match self.mode {
-            None => 0,
-            Some(mode) => 1 + mode.word(),
-        });
-        words.word(self.interaction.word());
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        for leg in &mut self.legs {
-            leg.restore(words)?;
-        }
-        for estimate in &mut self.estimates {
-            estimate.restore(words)?;
-        }
-        words.reals(&mut self.pose, LARGEST_PLACE)?;
-        words.reals(&mut self.error, LARGEST_PLACE)?;
-        words.reals(&mut self.deflection, words.sizes().request)?;
-        words.reals(&mut self.demand, LARGEST_PLACE)?;
-        words.reals(&mut self.load, words.sizes().request)?;
-        words.reals(&mut self.wrench, LARGEST)?;
-        words.reals(&mut self.environment.stiffness, words.sizes().stiffness)?;
-        words.reals(&mut self.environment.rest, LARGEST_PLACE)?;
-        self.rate.restore(words)?;
-        self.generator.restore(words)?;
-        self.error_notch.restore(words)?;
-        self.innovation_notch.restore(words)?;
-        self.integral.restore(words)?;
-        self.transfer.restore(words)?;
-        self.limited = words.flag()?;
-        self.mode = match words.word(u64::MAX)? {
-            0 => None,
-            word => match ControlMode::from_word(word - 1) {
-                Some(mode) => Some(mode),
-                None => return Err(words.refused()),
-            },
-        };
-        let Some(interaction) = Interaction::from_word(words.word(u64::MAX)?) else {
-            return Err(words.refused());
-        };
-        self.interaction = interaction;
-        Ok(())
+        let Sizes { request, stiffness: largest_stiffness, .. } = words.sizes();
+        words.numbers(pose, LARGEST_PLACE)?;
+        words.numbers(error, LARGEST_PLACE)?;
+        words.numbers(deflection, request)?;
+        words.numbers(demand, LARGEST_PLACE)?;
+        words.numbers(load, request)?;
+        words.numbers(wrench, LARGEST)?;
+        let Environment { stiffness, rest } = environment;
+        words.numbers(stiffness, largest_stiffness)?;
+        words.numbers(rest, LARGEST_PLACE)?;
+        words.part(rate)?;
+        words.part(generator)?;
+        words.part(error_notch)?;
+        words.part(innovation_notch)?;
+        words.part(integral)?;
+        words.part(transfer)?;
+        words.set(limited)?;
+        words.choice(mode)?;
+        words.choice(interaction)?;
     }
 }
 

@@ -10,7 +10,6 @@
 //! ρ̂ X is the displacement really requested, after every limit: that is the anti-windup. The integrator form
 //! (AII.7)–(AII.13) belongs to another error (Y − Ŷ); it must not be fed with m.
 
-use crate::digest::Digest;
 use crate::real::Real;
 
 /// Which estimates are kept.
@@ -105,12 +104,6 @@ impl<T: Real> Estimate<T> {
             *estimate = Self { level: bounded(estimate.level), drift: bounded(estimate.drift) };
         }
     }
-
-    /// Adds the estimates to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        digest.real(self.level);
-        digest.real(self.drift);
-    }
 }
 
 /// Within ±1, far beyond any leg in m or in modal coordinates.
@@ -122,5 +115,12 @@ fn bounded<T: Real>(estimate: T) -> T {
         T::ONE
     } else {
         -T::ONE
+    }
+}
+
+crate::state! {
+    impl[T: Real] Estimate<T>, 2, |words| { level, drift } {
+        words.number(level, words.sizes().request)?;
+        words.number(drift, words.sizes().request)?;
     }
 }

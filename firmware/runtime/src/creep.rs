@@ -12,11 +12,10 @@
 //! Each state is a mean of past f with positive weights, so it stays within the reach of the table whatever is demanded.
 
 use crate::crc::Crc32;
-use crate::digest::Digest;
 use crate::everett::Everett;
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
-use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
+use crate::snapshot::LARGEST_PLACE;
 
 /// `K` creep operators in parallel, for one length of the tick.
 #[derive(Debug, Clone, Copy)]
@@ -179,30 +178,13 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
         }
         rest / table.creep.direct
     }
-
-    /// Adds everything that the future depends on to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        self.memory.digest(digest);
-        for state in &self.states {
-            digest.real(*state);
-        }
-        digest.real(self.displacement);
-    }
 }
 
-impl<T: Real, const CAP: usize, const K: usize> Snapshot for CreepMemory<T, CAP, K> {
-    const WORDS: usize = ReversalMemory::<T, CAP>::WORDS + K + 1;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        self.memory.save(words);
-        words.reals(&self.states);
-        words.real(self.displacement);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        self.memory.restore(words)?;
-        words.reals(&mut self.states, LARGEST_PLACE)?;
-        self.displacement = words.real(LARGEST_PLACE)?;
-        Ok(())
+crate::state! {
+    impl[T: Real, const CAP: usize, const K: usize] CreepMemory<T, CAP, K>, ReversalMemory::<T, CAP>::WORDS + K + 1,
+    |words| { memory, states, displacement } {
+        words.part(memory)?;
+        words.numbers(states, LARGEST_PLACE)?;
+        words.number(displacement, LARGEST_PLACE)?;
     }
 }

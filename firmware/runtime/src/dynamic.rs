@@ -13,11 +13,10 @@
 //! - the rate term takes away more than half of what Γ₀ gains since the last tick. On a straight branch of slope f' the inverse
 //!   is u ← (q + Γ₁ u_last)/(f' + Γ₁), and grows from tick to tick if Γ₁ < −f'/2.
 
-use crate::digest::Digest;
 use crate::everett::Everett;
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
-use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
+use crate::snapshot::LARGEST_PLACE;
 
 /// The two Everett functions of one leg.
 #[derive(Debug, Clone, Copy)]
@@ -287,17 +286,6 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     fn rate_at(&self, k: usize) -> T {
         self.rate_at[if k < CAP { k } else { CAP - 1 }]
     }
-
-    /// Adds everything that the future depends on to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        self.memory.digest(digest);
-        digest.real(self.rate);
-        digest.real(self.displacement);
-        digest.word(u64::from(self.fell_back));
-        for rate in self.rate_at.iter().take(self.memory.depth()) {
-            digest.real(*rate);
-        }
-    }
 }
 
 /// The value at `drive` on the branch from `start`, where it is `at_start`.
@@ -311,22 +299,13 @@ fn along<T: Real, const N: usize, const NODES: usize>(
     if drive > start { at_start + table.value(drive, start) } else { at_start - table.value(start, drive) }
 }
 
-impl<T: Real, const CAP: usize> Snapshot for DynamicMemory<T, CAP> {
-    const WORDS: usize = ReversalMemory::<T, CAP>::WORDS + CAP + 3;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        self.memory.save(words);
-        words.first_reals(&self.rate_at, self.memory.depth());
-        words.reals(&[self.rate, self.displacement]);
-        words.flag(self.fell_back);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        self.memory.restore(words)?;
-        words.reals(&mut self.rate_at, LARGEST_PLACE)?;
-        self.rate = words.real(LARGEST_PLACE)?;
-        self.displacement = words.real(LARGEST_PLACE)?;
-        self.fell_back = words.flag()?;
-        Ok(())
+crate::state! {
+    impl[T: Real, const CAP: usize] DynamicMemory<T, CAP>, ReversalMemory::<T, CAP>::WORDS + CAP + 3,
+    |words| { memory, rate_at, rate, displacement, fell_back } {
+        words.part(memory)?;
+        words.stored(rate_at, memory.depth(), LARGEST_PLACE)?;
+        words.number(rate, LARGEST_PLACE)?;
+        words.number(displacement, LARGEST_PLACE)?;
+        words.set(fell_back)?;
     }
 }

@@ -2,7 +2,6 @@
 //!
 //! The integral is kept as the force it exerts (N, N m), not as ∫e: a change of gain then moves nothing.
 
-use crate::digest::Digest;
 use crate::real::{Real, saturate};
 use crate::snapshot::LARGEST;
 
@@ -82,13 +81,6 @@ impl<T: Real> Integral<T> {
             *force = saturate(*force, -largest, largest);
         }
     }
-
-    /// Adds the state to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        for value in &self.force {
-            digest.real(*value);
-        }
-    }
 }
 
 /// Whether a growth that moves the legs' requests by `push` would drive a leg further beyond the limit that holds it back.
@@ -103,4 +95,10 @@ pub fn winds_up<T: Real>(excess: &[T; 6], push: &[T; 6]) -> bool {
         outward |= (*excess > T::ZERO && *push > T::ZERO) || (*excess < T::ZERO && *push < T::ZERO);
     }
     outward
+}
+
+crate::state! {
+    impl[T: Real] Integral<T>, 6, |words| { force } {
+        words.numbers(force, LARGEST)?;
+    }
 }

@@ -10,7 +10,6 @@
 //! The inverse walks the same staircase by displacement, then solves one branch ([`Everett::rise`], [`Everett::fall`]). Within
 //! a cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
 
-use crate::digest::Digest;
 use crate::everett::{Everett, Line};
 use crate::real::{Real, saturate};
 
@@ -318,18 +317,6 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     #[inline]
     pub(crate) fn extremum_at(&self, k: usize) -> T {
         self.extremum(k)
-    }
-
-    /// Adds everything that the future depends on to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        digest.word(self.len as u64);
-        digest.word(u64::from(self.dropped));
-        digest.real(self.drive);
-        digest.real(self.displacement);
-        for (extremum, displacement) in self.extrema.iter().zip(&self.displacements).take(self.len) {
-            digest.real(*extremum);
-            digest.real(*displacement);
-        }
     }
 
     /// The branch since the last extremum goes up (it left a minimum).

@@ -1,6 +1,7 @@
 //! Which parts of the control law are at work.
 
 use crate::adaptation::Law;
+use crate::snapshot::Choice;
 
 /// Control mode of section 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -102,6 +103,30 @@ impl Interaction {
             2 => Self::Measured,
             _ => return None,
         })
+    }
+}
+
+/// 0 before the first tick.
+impl Choice for Option<ControlMode> {
+    fn to_word(&self) -> u64 {
+        self.map_or(0, |mode| 1 + mode.word())
+    }
+
+    fn of_word(word: u64) -> Option<Self> {
+        match word.checked_sub(1) {
+            None => Some(None),
+            Some(mode) => ControlMode::from_word(mode).map(Some),
+        }
+    }
+}
+
+impl Choice for Interaction {
+    fn to_word(&self) -> u64 {
+        self.word()
+    }
+
+    fn of_word(word: u64) -> Option<Self> {
+        Self::from_word(word)
     }
 }
 

@@ -1,7 +1,7 @@
 //! A motion of the platform at one instant.
 
-use crate::digest::Digest;
 use crate::real::Real;
+use crate::snapshot::{LARGEST, LARGEST_PLACE};
 
 /// Six coordinates with their first and second time derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,13 +32,12 @@ impl<T: Real> Motion<T> {
     pub const fn at(pose: [T; 6]) -> Self {
         Self { pose, rate: [T::ZERO; 6], acceleration: [T::ZERO; 6] }
     }
+}
 
-    /// Adds the numbers to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        for numbers in [&self.pose, &self.rate, &self.acceleration] {
-            for number in numbers {
-                digest.real(*number);
-            }
-        }
+crate::state! {
+    impl[T: Real] Motion<T>, 18, |words| { pose, rate, acceleration } {
+        words.numbers(pose, LARGEST_PLACE)?;
+        words.numbers(rate, LARGEST)?;
+        words.numbers(acceleration, LARGEST)?;
     }
 }

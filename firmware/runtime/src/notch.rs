@@ -8,9 +8,7 @@
 //! It takes the resonance out of the feedback, so that integral action and adaptation may be fast; it passes slow signals
 //! unchanged (DC gain 1). It stands in the feedback only, never in the set-point. It does not damp the platform.
 
-use crate::digest::Digest;
 use crate::real::Real;
-use crate::snapshot::{Invalid, Reader, Snapshot, Writer};
 
 /// H(z) = 1 − g (1 − z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²): what the bilinear transformation makes of the notch. At z = 1 it is 1
 /// whatever the rounding of g, a₁ and a₂.
@@ -67,24 +65,12 @@ impl<T: Real> NotchState<T> {
         }
         filtered
     }
-
-    /// Adds what is remembered to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        for [first, second] in &self.delays {
-            digest.real(*first);
-            digest.real(*second);
-        }
-    }
 }
 
-impl<T: Real> Snapshot for NotchState<T> {
-    const WORDS: usize = 12;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        words.reals(self.delays.as_flattened());
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        words.reals(self.delays.as_flattened_mut(), words.sizes().request)
+crate::state! {
+    impl[T: Real] NotchState<T>, 12, |words| { delays } {
+        for section in delays {
+            words.numbers(section, words.sizes().request)?;
+        }
     }
 }

@@ -4,9 +4,9 @@
 //! word is one that a state can hold: a finite number of a size that a machine has, an index within its bounds, a staircase
 //! that is one. That it is the state of *this* run is for its digest to say.
 
-use crate::adaptation::Estimate;
-use crate::feedback::Integral;
-use crate::motion::Motion;
+use core::convert::Infallible;
+
+use crate::digest::Digest;
 use crate::real::Real;
 
 /// Largest |place| that is loaded, m and rad: poses, set-points, displacements.
@@ -26,13 +26,16 @@ pub struct Sizes {
     pub stiffness: f64,
 }
 
-/// Something that later ticks depend on.
+/// Something that later ticks depend on. [`state!`](crate::state) writes both methods from one walk over the fields.
 pub trait Snapshot {
     /// Words that [`Snapshot::save`] writes.
     const WORDS: usize;
 
-    /// Appends the state.
-    fn save(&self, words: &mut Writer<'_>);
+    /// Shows every word in order.
+    ///
+    /// # Errors
+    /// Never.
+    fn show(&self, words: &mut impl Words) -> Result<(), Infallible>;
 
     /// Takes the state that [`Snapshot::save`] wrote.
     ///
@@ -40,6 +43,274 @@ pub trait Snapshot {
     /// At the first word that no state holds; what was read before it is taken, so that a state which must not be lost is
     /// restored into a copy.
     fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid>;
+
+    /// Appends the state.
+    #[inline]
+    fn save(&self, words: &mut Writer<'_>) {
+        let Ok(()) = self.show(words);
+    }
+
+    /// Adds the state to a digest.
+    #[inline]
+    fn digest(&self, digest: &mut Digest) {
+        let Ok(()) = self.show(digest);
+    }
+}
+
+/// Implements [`Snapshot`] for a type: its number of words, all of its fields, and one walk over them. The walk calls the methods of
+/// [`Words`], which [`Reader`] has under the same names; in it a field is a reference, to be shown or to be restored.
+#[macro_export]
+macro_rules! state {
+    (impl[$($generics:tt)*] $type:ty, $count:expr, |$words:ident| { $($field:ident),+ $(,)? } $walk:block) => {
+        impl<$($generics)*> $crate::Snapshot for $type {
+            const WORDS: usize = $count;
+
+            fn show(&self, $words: &mut impl $crate::snapshot::Words) -> Result<(), ::core::convert::Infallible> {
+                // By name and all of them, so that a field that is added is not forgotten.
+                let Self { $($field),+ } = self;
+                $walk
+                Ok(())
+            }
+
+            fn restore(
+                &mut self,
+                $words: &mut $crate::snapshot::Reader<'_>,
+            ) -> Result<(), $crate::snapshot::Invalid> {
+                let Self { $($field),+ } = self;
+                $walk
+                Ok(())
+            }
+        }
+    };
+}
+
+/// A choice that is one word.
+pub trait Choice: Sized {
+    /// Its word.
+    fn to_word(&self) -> u64;
+    /// The inverse; none of a word that is no choice.
+    fn of_word(word: u64) -> Option<Self>;
+}
+
+/// What a state is shown to, word by word: a writer or a digest. No method fails; they return what the methods of [`Reader`] do, so
+/// that a walk does for both.
+pub trait Words: Sized {
+    /// A word.
+    fn put(&mut self, word: u64);
+
+    /// No matter: what is shown has its size.
+    #[inline]
+    fn sizes(&self) -> Sizes {
+        Sizes { request: LARGEST, reading: LARGEST, stiffness: LARGEST }
+    }
+
+    /// A number within ±`largest`.
+    #[inline]
+    fn number<T: Real>(&mut self, value: &T, _largest: f64) -> Result<(), Infallible> {
+        self.put(value.to_word());
+        Ok(())
+    }
+
+    /// Numbers within ±`largest`.
+    #[inline]
+    fn numbers<T: Real>(&mut self, values: &[T], _largest: f64) -> Result<(), Infallible> {
+        self.stored(values, values.len(), LARGEST)
+    }
+
+    /// Numbers within ±`largest`, of which the first `count` are stored; the others are zeros, which a digest leaves out.
+    #[inline]
+    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
+        for value in values.iter().take(count) {
+            self.put(value.to_word());
+        }
+        Ok(())
+    }
+
+    /// A number of ticks or the like, from 0 to `largest`.
+    #[inline]
+    fn ticks(&mut self, value: &i32, _largest: i32) -> Result<(), Infallible> {
+        self.put(u64::from(*value as u32));
+        Ok(())
+    }
+
+    /// A place from 0 to `largest`.
+    #[inline]
+    fn place(&mut self, value: &usize, _largest: usize) -> Result<(), Infallible> {
+        self.put(*value as u64);
+        Ok(())
+    }
+
+    /// A counter.
+    #[inline]
+    fn tally(&mut self, value: &u32) -> Result<(), Infallible> {
+        self.put(u64::from(*value));
+        Ok(())
+    }
+
+    /// A flag.
+    #[inline]
+    fn set(&mut self, value: &bool) -> Result<(), Infallible> {
+        self.put(u64::from(*value));
+        Ok(())
+    }
+
+    /// A choice.
+    #[inline]
+    fn choice(&mut self, value: &impl Choice) -> Result<(), Infallible> {
+        self.put(value.to_word());
+        Ok(())
+    }
+
+    /// A counter that this state has none of.
+    #[inline]
+    fn blank(&mut self) -> Result<(), Infallible> {
+        self.put(0);
+        Ok(())
+    }
+
+    /// A state within this one.
+    #[inline]
+    fn part(&mut self, part: &impl Snapshot) -> Result<(), Infallible> {
+        part.show(self)
+    }
+
+    /// Whether what was restored so far fits together.
+    #[inline]
+    fn check(&self, _fits: impl FnOnce() -> bool) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+impl Words for Digest {
+    #[inline]
+    fn put(&mut self, word: u64) {
+        self.word(word);
+    }
+}
+
+impl Words for Writer<'_> {
+    #[inline]
+    fn put(&mut self, word: u64) {
+        self.word(word);
+    }
+
+    #[inline]
+    fn numbers<T: Real>(&mut self, values: &[T], _largest: f64) -> Result<(), Infallible> {
+        self.reals(values);
+        Ok(())
+    }
+
+    #[inline]
+    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
+        self.first_reals(values, count);
+        Ok(())
+    }
+}
+
+/// The methods of [`Words`], for a state that is restored.
+impl Reader<'_> {
+    /// [`Words::number`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn number<T: Real>(&mut self, value: &mut T, largest: f64) -> Result<(), Invalid> {
+        *value = self.real(largest)?;
+        Ok(())
+    }
+
+    /// [`Words::numbers`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    pub fn numbers<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), Invalid> {
+        self.reals(values, largest)
+    }
+
+    /// [`Words::stored`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    pub fn stored<T: Real>(&mut self, values: &mut [T], _count: usize, largest: f64) -> Result<(), Invalid> {
+        self.reals(values, largest)
+    }
+
+    /// [`Words::ticks`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn ticks(&mut self, value: &mut i32, largest: i32) -> Result<(), Invalid> {
+        *value = self.count_to(largest)?;
+        Ok(())
+    }
+
+    /// [`Words::place`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn place(&mut self, value: &mut usize, largest: usize) -> Result<(), Invalid> {
+        *value = self.word(largest as u64)? as usize;
+        Ok(())
+    }
+
+    /// [`Words::tally`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn tally(&mut self, value: &mut u32) -> Result<(), Invalid> {
+        *value = self.counter()?;
+        Ok(())
+    }
+
+    /// [`Words::set`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn set(&mut self, value: &mut bool) -> Result<(), Invalid> {
+        *value = self.flag()?;
+        Ok(())
+    }
+
+    /// [`Words::choice`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn choice<C: Choice>(&mut self, value: &mut C) -> Result<(), Invalid> {
+        *value = C::of_word(self.word(u64::MAX)?).ok_or(self.refused())?;
+        Ok(())
+    }
+
+    /// [`Words::blank`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn blank(&mut self) -> Result<(), Invalid> {
+        self.counter().map(|_| ())
+    }
+
+    /// [`Words::part`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn part(&mut self, part: &mut impl Snapshot) -> Result<(), Invalid> {
+        part.restore(self)
+    }
+
+    /// [`Words::check`], restored.
+    ///
+    /// # Errors
+    /// It does not.
+    #[inline]
+    pub fn check(&self, fits: impl FnOnce() -> bool) -> Result<(), Invalid> {
+        if fits() { Ok(()) } else { Err(self.refused()) }
+    }
 }
 
 /// A word that no state holds.
@@ -236,45 +507,17 @@ impl<'a> Reader<'a> {
     }
 }
 
-impl<T: Real> Snapshot for Estimate<T> {
-    const WORDS: usize = 2;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        words.reals(&[self.level, self.drift]);
+/// None is all ones.
+impl Choice for Option<u32> {
+    fn to_word(&self) -> u64 {
+        self.map_or(u64::MAX, u64::from)
     }
 
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        let largest = words.sizes().request;
-        self.level = words.real(largest)?;
-        self.drift = words.real(largest)?;
-        Ok(())
-    }
-}
-
-impl<T: Real> Snapshot for Integral<T> {
-    const WORDS: usize = 6;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        words.reals(&self.force);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        words.reals(&mut self.force, LARGEST)
-    }
-}
-
-impl<T: Real> Snapshot for Motion<T> {
-    const WORDS: usize = 18;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        words.reals(&self.pose);
-        words.reals(&self.rate);
-        words.reals(&self.acceleration);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        words.reals(&mut self.pose, LARGEST_PLACE)?;
-        words.reals(&mut self.rate, LARGEST)?;
-        words.reals(&mut self.acceleration, LARGEST)
+    fn of_word(word: u64) -> Option<Self> {
+        match word {
+            u64::MAX => Some(None),
+            word if word <= u64::from(u32::MAX) => Some(Some(word as u32)),
+            _ => None,
+        }
     }
 }

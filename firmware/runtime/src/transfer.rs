@@ -1,8 +1,6 @@
 //! Bumpless change of mode: what the new law asks for differs from where the legs are, and the difference is faded out.
 
-use crate::digest::Digest;
 use crate::real::Real;
-use crate::snapshot::{Invalid, Reader, Snapshot, Writer};
 
 /// An offset on each leg's request that fades exponentially, m. Zero at reset.
 #[derive(Debug, Clone, Copy)]
@@ -62,27 +60,11 @@ impl<T: Real> Transfer<T> {
             self.active |= left;
         }
     }
-
-    /// Adds the state to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        for value in &self.offset {
-            digest.real(*value);
-        }
-        digest.word(u64::from(self.active));
-    }
 }
 
-impl<T: Real> Snapshot for Transfer<T> {
-    const WORDS: usize = 7;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        words.reals(&self.offset);
-        words.flag(self.active);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        words.reals(&mut self.offset, words.sizes().request)?;
-        self.active = words.flag()?;
-        Ok(())
+crate::state! {
+    impl[T: Real] Transfer<T>, 7, |words| { offset, active } {
+        words.numbers(offset, words.sizes().request)?;
+        words.set(active)?;
     }
 }

@@ -8,9 +8,8 @@
 //! (e^{−ω_c t}); a slow sine gives its derivative late by T/2 + (1 − α) T/α ≈ 1/ω_c. White noise of σ on the pose becomes
 //! σ (α/T) √(2/(2 − α)) on the rate.
 
-use crate::digest::Digest;
 use crate::real::Real;
-use crate::snapshot::{Invalid, LARGEST, LARGEST_PLACE, Reader, Snapshot, Writer};
+use crate::snapshot::{LARGEST, LARGEST_PLACE};
 
 /// The filter of one controller: constants.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,29 +79,12 @@ impl<T: Real> Rate<T> {
             *self = Self::new();
         }
     }
-
-    /// Adds what is remembered to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        for value in self.previous.iter().chain(&self.value) {
-            digest.real(*value);
-        }
-        digest.word(u64::from(self.primed));
-    }
 }
 
-impl<T: Real> Snapshot for Rate<T> {
-    const WORDS: usize = 13;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        words.reals(&self.previous);
-        words.reals(&self.value);
-        words.flag(self.primed);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        words.reals(&mut self.previous, LARGEST_PLACE)?;
-        words.reals(&mut self.value, LARGEST)?;
-        self.primed = words.flag()?;
-        Ok(())
+crate::state! {
+    impl[T: Real] Rate<T>, 13, |words| { previous, value, primed } {
+        words.numbers(previous, LARGEST_PLACE)?;
+        words.numbers(value, LARGEST)?;
+        words.set(primed)?;
     }
 }

@@ -12,7 +12,7 @@ use crate::step::{GAUGE_FAULT, LEG_LIMITED, outputs};
 use crate::supervision::SUPERVISION;
 use crate::{Config, LEGS, Real, State, TickInput, TickOutput};
 use specgen_runtime::supervisor::toward;
-use specgen_runtime::{Digest, Real as _, supervisor};
+use specgen_runtime::{Digest, Real as _, Snapshot as _, supervisor};
 
 /// State of the supervisor in this controller's arithmetic.
 pub type Supervisor = supervisor::Supervisor<Real>;

@@ -3,7 +3,7 @@
 use crate::hysteresis::{GRID, LED, Memory};
 use crate::supervision::{code_at_rest, memory_at_rest};
 use crate::{LEGS, Real, TickInput, limits};
-use specgen_runtime::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
+use specgen_runtime::snapshot::{LARGEST_PLACE, Snapshot, Writer};
 use specgen_runtime::{Digest, Estimate};
 
 /// State of one leg.
@@ -54,67 +54,32 @@ impl State {
     #[must_use]
     pub fn digest(&self) -> u64 {
         let mut digest = Digest::new();
-        for leg in &self.legs {
-            leg.memory.digest(&mut digest);
-            leg.estimate.digest(&mut digest);
-            digest.word(leg.code as u32 as u64);
-            if LED {
-                digest.real(leg.lead);
-            }
-        }
-        for demand in &self.demand {
-            digest.real(*demand);
-        }
-        digest.word(self.ticks_in_run as u64);
+        Snapshot::digest(self, &mut digest);
         digest.finish()
     }
 }
 
-impl Snapshot for LegState {
-    const WORDS: usize = <Memory as Snapshot>::WORDS + <Estimate<Real> as Snapshot>::WORDS + 1 + LED as usize;
-    fn save(&self, words: &mut Writer<'_>) {
-        self.memory.save(words);
-        words.word(self.code as u32 as u64);
-        self.estimate.save(words);
+specgen_runtime::state! {
+    impl[] LegState, Memory::WORDS + Estimate::<Real>::WORDS + 1 + LED as usize,
+    |words| { memory, estimate, code, lead } {
+        words.part(memory)?;
+        words.check(|| memory.highest() <= GRID as Real)?;
+        words.ticks(code, limits::CODES[1])?;
+        words.check(|| *code >= limits::CODES[0])?;
+        words.part(estimate)?;
         if LED {
-            words.real(self.lead);
+            words.number(lead, LARGEST_PLACE)?;
         }
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        self.memory.restore(words)?;
-        if self.memory.highest() > GRID as Real {
-            return Err(words.refused());
-        }
-        self.code = words.count_to(limits::CODES[1])?;
-        if self.code < limits::CODES[0] {
-            return Err(words.refused());
-        }
-        self.estimate.restore(words)?;
-        if LED {
-            self.lead = words.real(LARGEST_PLACE)?;
-        }
-        Ok(())
     }
 }
 
-impl Snapshot for State {
-    const WORDS: usize = LEGS * <LegState as Snapshot>::WORDS + LEGS + 1;
-    fn save(&self, words: &mut Writer<'_>) {
-        for leg in &self.legs {
-            leg.save(words);
+specgen_runtime::state! {
+    impl[] State, LEGS * LegState::WORDS + LEGS + 1, |words| { legs, demand, ticks_in_run } {
+        for leg in legs {
+            words.part(leg)?;
         }
-        words.reals(&self.demand);
-        words.word(self.ticks_in_run as u64);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        for leg in &mut self.legs {
-            leg.restore(words)?;
-        }
-        words.reals(&mut self.demand, LARGEST_PLACE)?;
-        self.ticks_in_run = words.counter()?;
-        Ok(())
+        words.numbers(demand, LARGEST_PLACE)?;
+        words.tally(ticks_in_run)?;
     }
 }
 

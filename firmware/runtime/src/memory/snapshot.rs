@@ -2,7 +2,7 @@
 
 use super::ReversalMemory;
 use crate::real::Real;
-use crate::snapshot::{Invalid, LARGEST, LARGEST_PLACE, Reader, Snapshot, Writer};
+use crate::snapshot::{LARGEST, LARGEST_PLACE};
 
 impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// The highest drive in memory, cells.
@@ -11,44 +11,30 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         // Maxima fall, and the drive is below the last of them.
         if self.len >= 2 { self.extremum(1) } else { self.drive }
     }
-
-    /// Minima rise, maxima fall, all of them nested, the first at negative saturation, the drive within the innermost.
-    fn is_staircase(&self) -> bool {
-        let mut low = T::ZERO;
-        let mut high = T::from_f64(LARGEST);
-        let mut nested = self.extremum(0) == T::ZERO;
-        for (k, extremum) in self.extrema.iter().take(self.len).enumerate() {
-            nested &= low <= *extremum && *extremum <= high;
-            if k % 2 == 0 { low = *extremum } else { high = *extremum }
-        }
-        nested && low <= self.drive && self.drive <= high
-    }
 }
 
-impl<T: Real, const CAP: usize> Snapshot for ReversalMemory<T, CAP> {
-    const WORDS: usize = 4 + 2 * CAP;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        words.word(self.len as u64);
-        words.word(u64::from(self.dropped));
-        words.real(self.drive);
-        words.real(self.displacement);
-        words.first_reals(&self.extrema, self.len);
-        words.first_reals(&self.displacements, self.len);
+/// Minima rise, maxima fall, all of them nested, the first at negative saturation, the drive within the innermost.
+fn is_staircase<T: Real>(extrema: &[T], drive: T) -> bool {
+    let mut low = T::ZERO;
+    let mut high = T::from_f64(LARGEST);
+    let mut nested = extrema.first() == Some(&T::ZERO);
+    for (k, extremum) in extrema.iter().enumerate() {
+        nested &= low <= *extremum && *extremum <= high;
+        if k % 2 == 0 { low = *extremum } else { high = *extremum }
     }
+    nested && low <= drive && drive <= high
+}
 
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        self.len = words.word(CAP as u64)? as usize;
-        if self.len == 0 {
-            return Err(words.refused());
-        }
-        self.dropped = words.counter()?;
-        self.drive = words.real(LARGEST)?;
-        self.displacement = words.real(LARGEST_PLACE)?;
-        words.reals(&mut self.extrema, LARGEST)?;
-        if !self.is_staircase() {
-            return Err(words.refused());
-        }
-        words.reals(&mut self.displacements, LARGEST_PLACE)
+crate::state! {
+    impl[T: Real, const CAP: usize] ReversalMemory<T, CAP>, 4 + 2 * CAP,
+    |words| { extrema, displacements, len, drive, displacement, dropped } {
+        words.place(len, CAP)?;
+        words.check(|| *len > 0)?;
+        words.tally(dropped)?;
+        words.number(drive, LARGEST)?;
+        words.number(displacement, LARGEST_PLACE)?;
+        words.stored(extrema, *len, LARGEST)?;
+        words.check(|| is_staircase(extrema.get(..*len).unwrap_or_default(), *drive))?;
+        words.stored(displacements, *len, LARGEST_PLACE)?;
     }
 }

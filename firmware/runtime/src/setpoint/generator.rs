@@ -25,7 +25,6 @@ use super::profile::Profile;
 use super::stop::Stop;
 use super::trajectory::Cursor;
 use super::{Command, CommandKind, Frames, Setpoints, Target};
-use crate::digest::Digest;
 use crate::real::{Real, saturate};
 
 mod snapshot;
@@ -408,29 +407,5 @@ impl<T: Real> Generator<T> {
         if ended {
             self.phase = Phase::Hold;
         }
-    }
-
-    /// Adds the state to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        let (phase, index) = match self.phase {
-            Phase::Reset => (0, 0),
-            Phase::Bias => (1, 0),
-            Phase::Hold => (2, 0),
-            Phase::Stream => (3, 0),
-            Phase::Move => (4, 0),
-            Phase::Approach(index) => (5, index),
-            Phase::Play(index) => (6, index),
-            Phase::Stop => (7, 0),
-        };
-        digest.word(phase << 32 | index as u64);
-        self.target.digest(digest);
-        for number in self.place.iter().chain(&self.rate).chain(&self.start).chain(&self.goal).chain(&self.way) {
-            digest.real(*number);
-        }
-        digest.word((self.tick as u32 as u64) << 32 | self.profile.ticks() as u32 as u64);
-        self.stop.digest(digest);
-        digest.word((self.cursor.part as u64) << 32 | self.cursor.tick as u32 as u64);
-        digest.word(self.finished.map_or(u64::MAX, u64::from));
-        digest.word((self.sequence as u64) << 32 | self.age as u64);
     }
 }

@@ -13,7 +13,6 @@
 //! root: see [`Profile::plan`].
 
 use crate::real::Real;
-use crate::snapshot::{Invalid, Reader, Snapshot, Writer};
 
 /// Longest phase that is looked for, ticks: 2²¹ is 3.5 min at 10 kHz.
 pub const LONGEST: i32 = 1 << BITS;
@@ -168,24 +167,14 @@ impl<T: Real> Profile<T> {
     }
 }
 
-impl<T: Real> Snapshot for Profile<T> {
-    const WORDS: usize = 6;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        for ticks in [self.jerk_ticks, self.rise_ticks, self.ticks] {
-            words.word(u64::from(ticks as u32));
-        }
-        words.reals(&[self.jerk, self.acceleration, self.speed]);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        self.jerk_ticks = words.count_to(LONGEST)?;
-        self.rise_ticks = words.count_to(LONGEST)?;
-        self.ticks = words.count_to(3 * LONGEST)?;
+crate::state! {
+    impl[T: Real] Profile<T>, 6, |words| { jerk_ticks, rise_ticks, ticks, jerk, acceleration, speed } {
+        words.ticks(jerk_ticks, LONGEST)?;
+        words.ticks(rise_ticks, LONGEST)?;
+        words.ticks(ticks, 3 * LONGEST)?;
         // Shares of the way, per tick at the least.
-        self.jerk = words.real(1.0)?;
-        self.acceleration = words.real(1.0)?;
-        self.speed = words.real(1.0)?;
-        Ok(())
+        for share in [jerk, acceleration, speed] {
+            words.number(share, 1.0)?;
+        }
     }
 }

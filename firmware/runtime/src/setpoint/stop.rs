@@ -7,9 +7,8 @@
 
 use super::profile::{LONGEST, largest, least};
 use super::{Frames, Setpoints, Target};
-use crate::digest::Digest;
 use crate::real::Real;
-use crate::snapshot::{Invalid, LARGEST_PLACE, Reader, Snapshot, Writer};
+use crate::snapshot::LARGEST_PLACE;
 
 /// Halvings of D that are tried: after them a tick is all that is left.
 const HALVINGS: u32 = 21;
@@ -115,33 +114,14 @@ impl<T: Real> Stop<T> {
         }
         (target, false)
     }
-
-    pub(super) fn digest(&self, digest: &mut Digest) {
-        for number in self.start.iter().chain(&self.rate) {
-            digest.real(*number);
-        }
-        digest.word((self.ticks as u32 as u64) << 32 | self.tick as u32 as u64);
-    }
 }
 
-impl<T: Real> Snapshot for Stop<T> {
-    const WORDS: usize = 14;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        words.reals(&self.start);
-        words.reals(&self.rate);
-        words.word(u64::from(self.ticks as u32));
-        words.word(u64::from(self.tick as u32));
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        words.reals(&mut self.start, LARGEST_PLACE)?;
-        words.reals(&mut self.rate, LARGEST_PLACE)?;
-        self.ticks = words.count_to(LONGEST)?;
-        if self.ticks == 0 {
-            return Err(words.refused());
-        }
-        self.tick = words.count_to(LONGEST)?;
-        Ok(())
+crate::state! {
+    impl[T: Real] Stop<T>, 14, |words| { start, rate, ticks, tick } {
+        words.numbers(start, LARGEST_PLACE)?;
+        words.numbers(rate, LARGEST_PLACE)?;
+        words.ticks(ticks, LONGEST)?;
+        words.check(|| *ticks != 0)?;
+        words.ticks(tick, LONGEST)?;
     }
 }

@@ -1,7 +1,7 @@
 //! Set-points of a controller without a generator, from where the legs are to where they are asked for.
 
-use crate::digest::Digest;
 use crate::real::Real;
+use crate::snapshot::{Choice, LARGEST_PLACE};
 
 /// How far an approach has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,45 +78,25 @@ impl<T: Real> Approach<T> {
         }
         setpoint
     }
+}
 
-    /// Three words and six: the stage, and what [`Approach::from_words`] reads back.
-    #[must_use]
-    pub fn to_words(&self) -> [u64; 7] {
-        let stage = match self.stage {
-            Stage::Done => 0,
-            Stage::Waiting => 1,
-            Stage::Fading => 2,
-        };
-        let mut words = [stage; 7];
-        for (word, offset) in words.iter_mut().skip(1).zip(&self.offset) {
-            *word = offset.to_word();
+impl Choice for Stage {
+    fn to_word(&self) -> u64 {
+        match self {
+            Self::Done => 0,
+            Self::Waiting => 1,
+            Self::Fading => 2,
         }
-        words
     }
 
-    /// The inverse of [`Approach::to_words`]; none if a number is not finite or the stage is none.
-    #[must_use]
-    pub fn from_words(words: &[u64; 7]) -> Option<Self> {
-        let stage = match words[0] {
-            0 => Stage::Done,
-            1 => Stage::Waiting,
-            2 => Stage::Fading,
-            _ => return None,
-        };
-        let mut offset = [T::ZERO; 6];
-        for (value, word) in offset.iter_mut().zip(words.iter().skip(1)) {
-            *value = T::from_word(*word);
-            if !value.is_finite() {
-                return None;
-            }
-        }
-        Some(Self { stage, offset })
+    fn of_word(word: u64) -> Option<Self> {
+        [Self::Done, Self::Waiting, Self::Fading].into_iter().find(|stage| stage.to_word() == word)
     }
+}
 
-    /// Adds the state to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        for word in self.to_words() {
-            digest.word(word);
-        }
+crate::state! {
+    impl[T: Real] Approach<T>, 7, |words| { stage, offset } {
+        words.choice(stage)?;
+        words.numbers(offset, LARGEST_PLACE)?;
     }
 }

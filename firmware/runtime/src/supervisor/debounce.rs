@@ -2,7 +2,6 @@
 
 use super::kinds::Cause;
 use super::supervision::Supervision;
-use crate::digest::Digest;
 
 /// Causes that are timed tick by tick, in the order of [`Supervision::timeout`]. Those of the watch are counted in samples there; all
 /// others act at once.
@@ -83,12 +82,5 @@ impl Debounce {
         }
         *busy = any != 0;
         lasted
-    }
-
-    /// Adds the state to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        for count in &self.counts {
-            digest.word(u64::from(*count));
-        }
     }
 }

@@ -5,7 +5,6 @@ use super::debounce::Debounce;
 use super::kinds::{Cause, HOLDS, Phase, RAMPS_DOWN, Request, SWITCHES_OFF};
 use super::supervision::Supervision;
 use super::watch::{Sample, Watch};
-use crate::digest::Digest;
 use crate::real::Real;
 
 /// Event bits begin at the bit of [`Cause::MissedTick`], in the order of the causes.
@@ -219,17 +218,6 @@ impl<T: Real> Supervisor<T> {
     #[inline]
     pub fn look(&mut self, supervision: &Supervision<T>, channel: usize, sample: &Sample<T>) {
         self.watch.look(supervision, channel, sample);
-    }
-
-    /// Adds the state to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        digest.word(self.phase.word() | self.cause.word() << 8 | self.request.word() << 16);
-        digest.word(self.fresh as u64 | (self.wants_arming as u64) << 1 | (self.busy as u64) << 2);
-        digest.word(u64::from(self.seen) | u64::from(self.conditions) << 32);
-        digest.word(u64::from(self.ticks));
-        self.debounce.digest(digest);
-        self.watch.digest(digest);
-        self.approach.digest(digest);
     }
 }
 

@@ -3,7 +3,6 @@
 
 use super::kinds::Cause;
 use super::supervision::Supervision;
-use crate::digest::Digest;
 use crate::real::Real;
 
 /// One gauge in one tick.
@@ -154,21 +153,6 @@ impl<T: Real> Watch<T> {
     #[must_use]
     pub fn suspected(&self) -> u32 {
         self.suspects[0] | self.suspects[1] | self.suspects[2]
-    }
-
-    /// Adds the state to a digest.
-    pub fn digest(&self, digest: &mut Digest) {
-        for channel in &self.channels {
-            digest.real(channel.word);
-            digest.real(channel.expected[0]);
-            digest.real(channel.expected[1]);
-            digest.word(u64::from(channel.stuck) | u64::from(channel.known) << 32);
-            digest.word(u64::from(channel.disagreed) << 32 | u64::from(channel.astray));
-        }
-        for word in [self.suspects[0], self.suspects[1], self.suspects[2], self.present, self.lasted] {
-            digest.word(u64::from(word));
-        }
-        digest.word(self.turn as u64);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Properties of the reversal memory, by the names of the theorems, against brute-force relays.
 
 use crate::common::*;
-use specgen_runtime::{Digest, ReversalMemory};
+use specgen_runtime::{Digest, ReversalMemory, Snapshot};
 
 /// 1e-12 µm.
 const EXACT: f64 = 1e-18;

@@ -2,7 +2,9 @@
 
 use crate::common;
 use crate::common::*;
-use specgen_runtime::{Creep, CreepEverett, CreepMemory, Digest, DynamicEverett, DynamicMemory, ReversalMemory};
+use specgen_runtime::{
+    Creep, CreepEverett, CreepMemory, Digest, DynamicEverett, DynamicMemory, ReversalMemory, Snapshot,
+};
 
 const EXACT: f64 = 1e-18;
 /// An eighth of a code of 1365 codes a cell, over 60 µm on 32 cells.

@@ -8,6 +8,7 @@ mod stops;
 mod support;
 
 use crate::common::Random;
+use specgen_runtime::Snapshot;
 use specgen_runtime::setpoint::{
     BUSY, Command, CommandKind, Generator, MoveLimits, Parallel, Profile, REFUSED, STALE, Setpoints, StopLimits, Target,
 };
