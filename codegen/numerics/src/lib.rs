@@ -4,6 +4,8 @@
 //! | part | what |
 //! |---|---|
 //! | [`Matrix`], [`Matrix6`] | dense matrices, eigenvalues, modes of mass and stiffness, exponential |
+//! | [`dot`], [`cross`], [`norm`], [`rotation`] | vectors of space |
+//! | [`diagonalize`] | eigenvalues of a symmetric matrix of any size, by Jacobi rotations |
 //! | [`Double`] | numbers of 106 bits: the reference for rounding errors |
 //! | [`Traced`] | numbers that record every operation: bounds of rounding errors over a box of poses |
 //! | [`ewma_limit`], [`pcc_limit`] | Jury limits of the run-to-run laws |
@@ -20,6 +22,7 @@ mod jury;
 mod kernels;
 mod matrix;
 pub mod nnls;
+mod space;
 mod symmetric;
 mod traced;
 
@@ -30,5 +33,6 @@ pub use form::magnitude;
 pub use jury::{ewma_limit, pcc_limit};
 pub use kernels::{Kernels, displacements, jacobian};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
-pub use symmetric::{generalized_modes, inverse_of_modes, symmetric_eigen};
+pub use space::{cross, dot, norm, rotation};
+pub use symmetric::{diagonalize, generalized_modes, inverse_of_modes, symmetric_eigen};
 pub use traced::{Trace, Traced, trace};

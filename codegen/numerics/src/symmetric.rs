@@ -4,7 +4,7 @@
 
 use super::matrix::{Matrix6, multiply6, transpose6};
 
-/// Sweeps at most; a 6 × 6 matrix needs fewer than ten.
+/// Sweeps at most; a 6 × 6 matrix needs fewer than ten, a larger one hardly more.
 const SWEEPS: usize = 40;
 /// Two ω² closer than this, relatively, are one: which vectors span their plane is chosen by axes, not by rounding.
 const EQUAL: f64 = 1e-9;
@@ -21,51 +21,61 @@ pub fn symmetric_eigen(matrix: &Matrix6) -> ([f64; 6], Matrix6) {
             a[i][j] = a[j][i];
         }
     }
+    diagonalize(&mut a, &mut vectors);
+    (core::array::from_fn(|i| a[i][i]), vectors)
+}
+
+/// Rotates the symmetric `a` (n rows of n) until it is diagonal: its diagonal is then the eigenvalues, in no order. `vectors` is
+/// turned with it; where it was I, its columns become the eigenvectors.
+///
+/// # Panics
+/// If a row of either has fewer than n numbers.
+pub fn diagonalize<R: AsRef<[f64]> + AsMut<[f64]>>(a: &mut [R], vectors: &mut [R]) {
     for _ in 0..SWEEPS {
         let mut rotated = false;
-        for p in 0..6 {
-            for q in p + 1..6 {
+        for p in 0..a.len() {
+            for q in p + 1..a.len() {
+                let at = |i: usize, j: usize| a[i].as_ref()[j];
                 // Off-diagonal entries that no longer change the diagonal are zero.
-                if a[p][q].abs() <= f64::EPSILON * 0.125 * libm::sqrt((a[p][p] * a[q][q]).abs()) {
-                    a[p][q] = 0.0;
-                    a[q][p] = 0.0;
+                if at(p, q).abs() <= f64::EPSILON * 0.125 * libm::sqrt((at(p, p) * at(q, q)).abs()) {
+                    a[p].as_mut()[q] = 0.0;
+                    a[q].as_mut()[p] = 0.0;
                     continue;
                 }
                 rotated = true;
-                rotate(&mut a, &mut vectors, p, q);
+                rotate(a, vectors, p, q);
             }
         }
         if !rotated {
             break;
         }
     }
-    (core::array::from_fn(|i| a[i][i]), vectors)
 }
 
 /// The rotation in the plane of p and q that makes a[p][q] zero.
-fn rotate(a: &mut Matrix6, vectors: &mut Matrix6, p: usize, q: usize) {
-    let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+fn rotate<R: AsRef<[f64]> + AsMut<[f64]>>(a: &mut [R], vectors: &mut [R], p: usize, q: usize) {
+    let at = |i: usize, j: usize| a[i].as_ref()[j];
+    let theta = (at(q, q) - at(p, p)) / (2.0 * at(p, q));
     let root = libm::sqrt(theta * theta + 1.0);
     let t = if theta >= 0.0 { 1.0 / (theta + root) } else { 1.0 / (theta - root) };
     let c = 1.0 / libm::sqrt(t * t + 1.0);
     let s = t * c;
-    for row in a.iter_mut() {
-        let (x, y) = (row[p], row[q]);
-        row[p] = c * x - s * y;
-        row[q] = s * x + c * y;
+    let turn = |rows: &mut [R]| {
+        for row in rows.iter_mut().map(AsMut::as_mut) {
+            let (x, y) = (row[p], row[q]);
+            row[p] = c * x - s * y;
+            row[q] = s * x + c * y;
+        }
+    };
+    turn(a);
+    for k in 0..a.len() {
+        let (x, y) = (a[p].as_ref()[k], a[q].as_ref()[k]);
+        a[p].as_mut()[k] = c * x - s * y;
+        a[q].as_mut()[k] = s * x + c * y;
     }
-    for k in 0..6 {
-        let (x, y) = (a[p][k], a[q][k]);
-        a[p][k] = c * x - s * y;
-        a[q][k] = s * x + c * y;
-    }
-    a[p][q] = 0.0;
-    a[q][p] = 0.0;
-    for row in vectors.iter_mut() {
-        let (x, y) = (row[p], row[q]);
-        row[p] = c * x - s * y;
-        row[q] = s * x + c * y;
-    }
+    a[p].as_mut()[q] = 0.0;
+    a[q].as_mut()[p] = 0.0;
+    turn(vectors);
 }
 
 /// L of M = L Lᵀ, if M is positive definite.
@@ -248,6 +258,23 @@ mod tests {
             largest = largest.max((x - y).abs());
         }
         largest
+    }
+
+    #[test]
+    fn rotations_diagonalize_a_matrix_of_any_size() {
+        let n = 7;
+        let m: Vec<Vec<f64>> = (0..n)
+            .map(|i| (0..n).map(|j| 1.0 / (1.0 + (i + j) as f64) + if i == j { 1.0 } else { 0.0 }).collect())
+            .collect();
+        let mut v: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| f64::from(u8::from(i == j))).collect()).collect();
+        let mut a = m.clone();
+        diagonalize(&mut a, &mut v);
+        for i in 0..n {
+            for k in 0..n {
+                let left: f64 = (0..n).map(|j| m[i][j] * v[j][k]).sum();
+                assert!((left - a[k][k] * v[i][k]).abs() < 1e-13);
+            }
+        }
     }
 
     #[test]

@@ -5,6 +5,7 @@ use nalgebra::Matrix6;
 use super::{Facts, Found, figure};
 use specgen_language::diagnostic::codes;
 use specgen_language::model::Probe;
+use specgen_numerics::{cross, dot};
 
 /// A layout is suspected if undoing one slip makes its condition this many times better.
 const MUCH_BETTER: f64 = 1.5;
@@ -61,13 +62,12 @@ fn condition(probes: &[Probe; 6], height: f64, radius: f64) -> f64 {
     let mut rows = Matrix6::zeros();
     for (k, probe) in probes.iter().enumerate() {
         let (n, m) = (probe.direction, probe.plane_normal);
-        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let start = [probe.point[0], probe.point[1], probe.point[2] - height];
         let across = dot(m, n);
         let way = dot(m, core::array::from_fn(|j| probe.plane_point[j] - start[j])) / across;
         let c: [f64; 3] = core::array::from_fn(|j| start[j] + way * n[j]);
         let m = m.map(|part| part / across);
-        let turn = [c[1] * m[2] - c[2] * m[1], c[2] * m[0] - c[0] * m[2], c[0] * m[1] - c[1] * m[0]];
+        let turn = cross(c, m);
         for j in 0..3 {
             rows[(k, j)] = m[j];
             rows[(k, j + 3)] = turn[j] / radius;

@@ -9,6 +9,7 @@ use super::kinematics::joint_positions;
 use crate::ir::{Dynamics, DynamicsLeg, LEGS, Scalar};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
+use specgen_numerics::{cross, dot};
 
 /// Standard gravity of the project's reference data, m/s², along −z of {B}.
 pub const GRAVITY: f64 = 9.81;
@@ -152,7 +153,7 @@ fn equations_at_rest(model: &Model, pole: usize, reach: f64) -> [[f64; LEGS]; 6]
         let length = libm::sqrt(dot(r, r));
         let s = r.map(|r| r / length);
         let a = difference(p, joint[pole]).map(|a| a / reach);
-        let moment = [a[1] * s[2] - a[2] * s[1], a[2] * s[0] - a[0] * s[2], a[0] * s[1] - a[1] * s[0]];
+        let moment = cross(a, s);
         for k in 0..3 {
             m[k][leg] = s[k];
             m[k + 3][leg] = moment[k];
@@ -239,10 +240,6 @@ fn ill_conditioned(model: &Model, ratio: f64) -> Diagnostic {
         "spread the leg directions: make the height comparable to the radii, bring the joints of base and platform closer in \
                different pairs (small base_angle and platform_angle), or reduce workspace.rotation",
     )
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn difference(a: Vector, b: Vector) -> Vector {

@@ -1,6 +1,6 @@
 //! 6×6 matrices in plain loops: the same bits on every machine.
 
-pub(super) use specgen_numerics::Matrix6 as Matrix;
+pub(super) use specgen_numerics::{Matrix6 as Matrix, cross, dot, norm};
 
 /// The inverse by Gauss-Jordan elimination with complete pivoting; none if a pivot vanishes.
 pub(super) fn inverse(matrix: &Matrix) -> Option<Matrix> {
@@ -63,18 +63,6 @@ pub(super) fn without_dust(matrix: Matrix, size_of_row: [f64; 6]) -> Matrix {
 /// Zero for a value below 10⁻¹³ of `size`.
 pub(super) fn dusted(value: f64, size: f64) -> f64 {
     if value.abs() < 1e-13 * size { 0.0 } else { value }
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn norm(v: [f64; 3]) -> f64 {
-    libm::sqrt(dot(v, v))
 }
 
 /// The 3⁶ poses whose coordinates are at their bound, its negative, or zero.

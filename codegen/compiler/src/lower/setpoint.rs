@@ -22,6 +22,7 @@ use crate::ir::{Frames, Scalar, Setpoints, Trajectory};
 use specgen_identify::waveform::Waveform;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
+use specgen_numerics::rotation;
 
 /// Ticks of the longest trajectory: counted exactly in f32, and 7 min at 10 kHz.
 const LONGEST: f64 = 4_194_304.0;
@@ -216,16 +217,6 @@ impl User {
         }
         findings
     }
-}
-
-/// Rz Ry Rx (AI.1).
-fn rotation([x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
-    let [(sx, cx), (sy, cy), (sz, cz)] = [x, y, z].map(|angle| (libm::sin(angle), libm::cos(angle)));
-    [
-        [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
-        [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
-        [-sy, sx * cy, cx * cy],
-    ]
 }
 
 fn too_wide(model: &Model, found: f64, largest: f64) -> Diagnostic {

@@ -1,6 +1,6 @@
 //! The pose from the gauges.
 
-use specgen_numerics::{Double, Kernels, Trace, Traced, magnitude, trace};
+use specgen_numerics::{Double, Kernels, Trace, Traced, cross, magnitude, trace};
 use specgen_runtime::{Gauges, Real};
 
 use super::kinematics::{Exact as ExactLegs, FromReal, TracedLegs, cut, kept};
@@ -30,10 +30,6 @@ struct Exact {
     curvature: Matrix,
     arc_sine: Vec<Double>,
     arc_tangent: Vec<Double>,
-}
-
-fn cross(a: [Double; 3], b: [Double; 3]) -> [Double; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn product(a: &Matrix, b: &Matrix) -> Matrix {

@@ -2,6 +2,7 @@
 
 use super::{Pose, travel};
 use specgen_language::model::Geometry;
+use specgen_numerics::{cross, dot, norm, rotation};
 
 /// Largest angle between a leg and its direction at rest over corners and interior of the workspace `bounds`, rad: seen from
 /// the base, and from the platform.
@@ -30,17 +31,5 @@ pub fn angles(geometry: &Geometry, bounds: &Pose) -> [f64; 2] {
 
 /// By sine and cosine, so that a small one keeps its digits.
 fn angle(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    libm::atan2(libm::sqrt(dot(&cross, &cross)), dot(a, b))
-}
-
-/// Rz Ry Rx (AI.1).
-fn rotation([x, y, z]: [f64; 3]) -> [[f64; 3]; 3] {
-    let [(sx, cx), (sy, cy), (sz, cz)] = [x, y, z].map(|angle| (libm::sin(angle), libm::cos(angle)));
-    [
-        [cy * cz, sx * sy * cz - cx * sz, cx * sy * cz + sx * sz],
-        [cy * sz, sx * sy * sz + cx * cz, cx * sy * sz - sx * cz],
-        [-sy, sx * cy, cx * cy],
-    ]
+    libm::atan2(norm(cross(*a, *b)), dot(*a, *b))
 }

@@ -9,6 +9,7 @@ use rand_chacha::rand_core::SeedableRng;
 
 use super::genetic::unit;
 use super::search::{Optimiser, ranked};
+use specgen_numerics::diagonalize;
 
 /// First step, in parts of the range, and the step at which it begins again.
 const STEP: f64 = 0.15;
@@ -63,8 +64,7 @@ impl Cma {
 
     fn begin(&mut self) {
         let n = self.mean.len();
-        let identity: Vec<Vec<f64>> =
-            (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
+        let identity = identity(n);
         self.step = STEP;
         self.covariance.clone_from(&identity);
         self.axes.clone_from(&identity);
@@ -107,6 +107,10 @@ impl Cma {
             })
             .collect()
     }
+}
+
+fn identity(n: usize) -> Vec<Vec<f64>> {
+    (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -198,7 +202,9 @@ impl Optimiser for Cma {
         }
         let change = step_rate / damping * (length / expected - 1.0);
         self.step *= libm::exp(if change < 1.0 { change } else { 1.0 });
-        let (values, vectors) = eigen(&self.covariance);
+        let (mut turned, mut vectors) = (self.covariance.clone(), identity(n));
+        diagonalize(&mut turned, &mut vectors);
+        let values: Vec<f64> = (0..n).map(|k| turned[k][k]).collect();
         let floor = 1e-14 * values.iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
         let roots: Vec<f64> = values.iter().map(|v| libm::sqrt(if *v > floor { *v } else { floor })).collect();
         for (i, vector) in vectors.iter().enumerate() {
@@ -216,44 +222,6 @@ impl Optimiser for Cma {
             self.begin();
         }
     }
-}
-
-/// Eigenvalues and eigenvectors (columns) of a symmetric matrix, by Jacobi rotations in a fixed order.
-#[allow(clippy::needless_range_loop)] // Rows p and q change together.
-fn eigen(matrix: &[Vec<f64>]) -> (Vec<f64>, Vec<Vec<f64>>) {
-    let n = matrix.len();
-    let mut a = matrix.to_vec();
-    let mut v: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
-    for _ in 0..50 {
-        let mut largest = 0.0;
-        for p in 0..n {
-            for q in p + 1..n {
-                let size = a[p][q].abs() / libm::sqrt((a[p][p] * a[q][q]).abs() + f64::MIN_POSITIVE);
-                largest = if size > largest { size } else { largest };
-                if size < 1e-15 {
-                    continue;
-                }
-                let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-                let sign = if theta >= 0.0 { 1.0 } else { -1.0 };
-                let t = sign / (theta.abs() + libm::sqrt(theta * theta + 1.0));
-                let c = 1.0 / libm::sqrt(t * t + 1.0);
-                let s = t * c;
-                for row in &mut a {
-                    (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-                }
-                for k in 0..n {
-                    (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-                }
-                for row in &mut v {
-                    (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-                }
-            }
-        }
-        if largest < 1e-15 {
-            break;
-        }
-    }
-    ((0..n).map(|k| a[k][k]).collect(), v)
 }
 
 #[cfg(test)]
@@ -293,20 +261,5 @@ mod tests {
         // Lagrange: x0 = 0.4, x1 = 0.2.
         let best = minimise(2, 2000, 2, f);
         assert!((best - 0.24).abs() < 1e-3, "{best}");
-    }
-
-    #[test]
-    fn jacobi_rotations_diagonalise() {
-        let n = 7;
-        let m: Vec<Vec<f64>> = (0..n)
-            .map(|i| (0..n).map(|j| 1.0 / (1.0 + (i + j) as f64) + if i == j { 1.0 } else { 0.0 }).collect())
-            .collect();
-        let (values, v) = eigen(&m);
-        for i in 0..n {
-            for k in 0..n {
-                let left: f64 = (0..n).map(|j| m[i][j] * v[j][k]).sum();
-                assert!((left - values[k] * v[i][k]).abs() < 1e-13);
-            }
-        }
     }
 }
