@@ -9,7 +9,7 @@ use super::sanity::extent;
 /// only about creep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Branch {
-    /// First sample.
+    /// Its first sample.
     pub first: usize,
     /// One past the last sample.
     pub end: usize,

@@ -26,7 +26,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// For messages.
+    /// The cause as messages name it.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

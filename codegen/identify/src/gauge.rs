@@ -14,9 +14,9 @@ use specgen_language::diagnostic::{Diagnostic, codes};
 pub struct GaugeReport {
     /// Name of the record.
     pub record: String,
-    /// Samples.
+    /// Samples of the record.
     pub samples: usize,
-    /// Degree chosen.
+    /// Degree of the polynomial, 1 to 5.
     pub degree: usize,
     /// Cross-validated error of each degree from 1 on, m.
     pub held_out_rms: Vec<f64>,
@@ -26,13 +26,13 @@ pub struct GaugeReport {
     pub coefficients: Vec<f64>,
     /// Standard error of each.
     pub errors: Vec<f64>,
-    /// Voltages covered.
+    /// Least and largest voltage of the record, V.
     pub volts: [f64; 2],
-    /// Displacements covered.
+    /// Least and largest displacement of the reference, m.
     pub reference: [f64; 2],
-    /// Residual.
+    /// Reference less calibration, root mean square, m.
     pub residual_rms: f64,
-    /// Largest absolute residual.
+    /// Largest magnitude of reference less calibration, m.
     pub residual_max: f64,
     /// Where that is: time or line.
     pub residual_max_at: String,

@@ -33,7 +33,7 @@ const SAME_LEVEL: f64 = 0.005;
 /// Held-out error of one grid.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Score {
-    /// N.
+    /// Intervals per axis of this candidate.
     pub grid: usize,
     /// Root mean square error on held-out curves within their branches, over all folds, m.
     pub held_out_rms: f64,
@@ -46,15 +46,15 @@ pub struct Score {
 /// How the grid was chosen.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GridChoice {
-    /// N chosen.
+    /// Intervals per axis that were chosen.
     pub chosen: usize,
     /// N of least held-out error.
     pub best: usize,
-    /// Folds.
+    /// Parts into which the curves were divided; each was held out once.
     pub folds: usize,
     /// Groups of curves that turn back at the same voltage.
     pub levels: usize,
-    /// Rule, in words.
+    /// How the grid was chosen from the scores, in words.
     pub rule: &'static str,
     /// Every grid tried, ascending.
     pub scores: Vec<Score>,

@@ -7,11 +7,11 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 /// A linear fit y ≈ Σ coefficient·column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// One per column.
+    /// Coefficients in the order of the columns.
     pub coefficients: Vec<f64>,
     /// Covariance of the coefficients for residuals of unit variance.
     pub covariance: DMatrix<f64>,
-    /// y minus fit.
+    /// y less the fit, one value for each of y.
     pub residual: Vec<f64>,
 }
 

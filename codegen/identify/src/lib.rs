@@ -99,7 +99,7 @@ pub enum DeadTime {
 pub struct Identified {
     /// The table, monotone.
     pub table: EverettTable,
-    /// Figures.
+    /// Figures of record and fit.
     pub report: Report,
     /// Samples and residual behind the first usable one.
     pub trace: Trace,

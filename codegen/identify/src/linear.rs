@@ -15,7 +15,7 @@ use specgen_numerics::{ewma_limit, pcc_limit};
 pub struct Relation {
     /// Name of the record.
     pub record: String,
-    /// Hz.
+    /// Frequency of the cycles, Hz.
     pub frequency: f64,
     /// Whether the frequency was found in the record (or given).
     pub frequency_detected: bool,
@@ -23,11 +23,11 @@ pub struct Relation {
     pub cycles: usize,
     /// Start and end of these cycles, s.
     pub span: [f64; 2],
-    /// ρ, m/V.
+    /// Slope ρ of the line, m/V.
     pub gain: f64,
     /// Standard error of ρ: from cycle to cycle if there are three or more, else of the line's residual; m/V.
     pub gain_error: f64,
-    /// δ, m.
+    /// Displacement δ of the line at 0 V, m.
     pub offset: f64,
     /// Correlation of X and Y.
     pub correlation: f64,
@@ -39,12 +39,12 @@ pub struct Relation {
     pub residual_rms: f64,
 }
 
-/// All records together.
+/// The relations of all records, and what they say together.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LinearReport {
-    /// By rising frequency.
+    /// One relation for each record, by rising frequency.
     pub relations: Vec<Relation>,
-    /// ρ̂, m/V.
+    /// Gain ρ̂ that λ is counted from, m/V.
     pub reference_gain: f64,
     /// Frequency that ρ̂ was taken at, Hz.
     pub reference_frequency: f64,

@@ -25,7 +25,7 @@ pub struct Normal {
     pub rhs: Vec<Vec<f64>>,
     /// Σ of the squares of each centred target.
     pub energy: Vec<f64>,
-    /// Samples used.
+    /// Samples in the sums.
     pub samples: usize,
 }
 
@@ -53,7 +53,7 @@ pub fn each_row_from(
 /// How much each sample counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Weighting {
-    /// All the same.
+    /// Every sample counts the same.
     Even,
     /// Most where the drive is at a threshold of the grid, see [`node_weight`].
     AtNodes,

@@ -34,11 +34,11 @@ pub use report::{HoldOut, Measured, OptionReport, RateReport, Verdict};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RateOption {
-    /// One Everett table.
+    /// One Everett table, at any rate.
     Static,
     /// One table behind a dead time.
     DeadTime,
-    /// (6).
+    /// A second table times the rate of the drive (6).
     DynamicPreisach,
     /// Table, creep and dead time.
     Creep,
@@ -72,7 +72,7 @@ pub struct CreepTerm {
 /// A fitted option. What it does not have is empty or zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RateModel {
-    /// Γ₀, m.
+    /// Γ₀: the table that holds at any rate, m.
     pub still: EverettTable,
     /// Γ₁, m s/V, on the grid of `still`; its weights are of either sign.
     pub rate: Option<EverettTable>,
@@ -87,7 +87,7 @@ pub struct RateModel {
 pub struct RateIdentified {
     /// The options fitted to all records, in the order of [`RateOption::ALL`].
     pub models: Vec<(RateOption, RateModel)>,
-    /// Figures.
+    /// Figures of records and options.
     pub report: RateReport,
     /// Findings that refuse nothing.
     pub warnings: Vec<Diagnostic>,

@@ -21,7 +21,7 @@ pub enum Branches {
 pub struct Report {
     /// Name of the record.
     pub record: String,
-    /// N.
+    /// Intervals per axis of the table.
     pub grid: usize,
     /// Samples in the record.
     pub samples: usize,
@@ -71,7 +71,7 @@ pub struct Report {
     pub unexcited: Vec<Region>,
     /// Weights that are zero because the data would make them negative.
     pub zero_weights: usize,
-    /// Weights in all.
+    /// Weights of the table, zero or not.
     pub weights: usize,
     /// Factorisations of the solver.
     pub solver_iterations: usize,

@@ -41,7 +41,7 @@ pub struct ResponseReport {
     pub left_out: Vec<Band>,
     /// Median coherence of the bins used.
     pub coherence: f64,
-    /// The fit.
+    /// Resonance, lag and dead time with their errors.
     pub fitted: Fitted,
     /// Root mean square of |H1/H − 1| over the bins used, weighted as in the fit, %.
     pub misfit_percent: f64,
@@ -56,9 +56,9 @@ pub struct ResponseReport {
 /// A band of frequencies, Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
-    /// From, Hz.
+    /// Lowest frequency of the band, Hz.
     pub low: f64,
-    /// To, Hz.
+    /// Highest frequency of the band, Hz.
     pub high: f64,
     /// Mean coherence in it.
     pub coherence: f64,

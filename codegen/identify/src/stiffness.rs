@@ -19,9 +19,9 @@ use specgen_language::diagnostic::{Diagnostic, codes};
 pub struct StiffnessReport {
     /// Name of the record.
     pub record: String,
-    /// Samples.
+    /// Samples of the record.
     pub samples: usize,
-    /// k, N/m.
+    /// Stiffness k, N/m: force over displacement without creep.
     pub stiffness: f64,
     /// Standard error of k, N/m, for as many samples as the correlation of the residual leaves independent.
     pub error: f64,
@@ -31,18 +31,18 @@ pub struct StiffnessReport {
     pub creep_time: Option<f64>,
     /// Creep in % of the elastic displacement.
     pub creep_percent: f64,
-    /// Drift, m/s.
+    /// Drift of the displacement that was taken out, m/s.
     pub drift: f64,
-    /// Force covered, N.
+    /// Least and largest force of the record, N.
     pub force: [f64; 2],
-    /// Residual, m.
+    /// Displacement less the model, root mean square, m.
     pub residual_rms: f64,
-    /// Independent samples.
+    /// How many independent samples the residual is worth.
     pub independent: f64,
     /// Force (N), displacement without offset, drift and creep (m), residual (m) of each sample, for drawing.
     #[serde(skip)]
     pub points: Vec<[f64; 3]>,
-    /// Time, s.
+    /// Time of each of the `points`, s.
     #[serde(skip)]
     pub time: Vec<f64>,
     /// Findings that refuse nothing.

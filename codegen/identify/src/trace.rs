@@ -3,9 +3,9 @@
 /// Columns of equal length.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trace {
-    /// s.
+    /// Time of each sample, s.
     pub time: Vec<f64>,
-    /// V.
+    /// Drive of each sample, V.
     pub drive: Vec<f64>,
     /// Displacement moved by the dead time, m.
     pub measured: Vec<f64>,

@@ -7,7 +7,7 @@ pub struct Line {
     pub level: f64,
     /// Unit of y per s.
     pub slope: f64,
-    /// s.
+    /// Time at which the line has its `level`, s.
     pub middle: f64,
 }
 

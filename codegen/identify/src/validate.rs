@@ -29,7 +29,7 @@ pub enum Start {
 }
 
 impl Start {
-    /// In words.
+    /// The assumption in words, for messages.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -43,15 +43,15 @@ impl Start {
 /// Result under one assumption about the start. Lengths in m; percentages are of the displacement range.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StartResult {
-    /// The assumption.
+    /// What was assumed of the state before the record.
     pub start: Start,
     /// Root mean square error after removal of one offset and one linear drift.
     pub rms: f64,
-    /// Largest absolute error.
+    /// Largest magnitude of the error, m.
     pub max: f64,
-    /// `rms` in %.
+    /// `rms` in percent of the range of the displacement.
     pub rms_percent: f64,
-    /// `max` in %.
+    /// `max` in percent of the range of the displacement.
     pub max_percent: f64,
 }
 

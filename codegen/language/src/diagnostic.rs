@@ -44,13 +44,13 @@ pub enum Place {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Diagnostic {
-    /// How bad.
+    /// How bad it is, as its code says.
     pub severity: Severity,
     /// Stable code such as `E0102`, documented in `docs/diagnostics.md`.
     pub code: &'static str,
     /// Key path such as `actuator.voltage[1]`, empty if no key is to blame.
     pub key: String,
-    /// Where.
+    /// Where it is.
     pub place: Place,
     /// What is wrong, with the value found and what was expected.
     pub message: String,

@@ -42,7 +42,7 @@ fn two_product(a: f64, b: f64) -> Double {
 }
 
 impl Double {
-    /// The nearest double.
+    /// The double nearest to it.
     #[must_use]
     pub fn value(self) -> f64 {
         self.high + self.low

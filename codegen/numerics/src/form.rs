@@ -67,7 +67,7 @@ impl Form {
         if a < b { a } else { b }
     }
 
-    /// A single value.
+    /// The value of a form that holds one only.
     pub(crate) fn point(self) -> Option<f64> {
         (self.low == self.high).then_some(self.low)
     }

@@ -5,7 +5,7 @@ use core::ops::{Index, IndexMut};
 /// 6 × 6, rows of columns.
 pub type Matrix6 = [[f64; 6]; 6];
 
-/// A B.
+/// The product A B.
 #[must_use]
 pub fn multiply6(a: &Matrix6, b: &Matrix6) -> Matrix6 {
     let mut product = [[0.0; 6]; 6];
@@ -19,13 +19,13 @@ pub fn multiply6(a: &Matrix6, b: &Matrix6) -> Matrix6 {
     product
 }
 
-/// Aᵀ.
+/// The transposed matrix Aᵀ.
 #[must_use]
 pub fn transpose6(a: &Matrix6) -> Matrix6 {
     core::array::from_fn(|i| core::array::from_fn(|j| a[j][i]))
 }
 
-/// Square matrix.
+/// A square matrix of any size, row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrix {
     size: usize,
@@ -33,13 +33,13 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// All zero.
+    /// A matrix of `size` rows whose entries are zero.
     #[must_use]
     pub fn zeros(size: usize) -> Self {
         Self { size, entries: vec![0.0; size * size] }
     }
 
-    /// I.
+    /// The identity of `size` rows.
     #[must_use]
     pub fn identity(size: usize) -> Self {
         let mut matrix = Self::zeros(size);
@@ -49,19 +49,19 @@ impl Matrix {
         matrix
     }
 
-    /// Rows, and columns.
+    /// How many rows it has, and columns.
     #[must_use]
     pub fn size(&self) -> usize {
         self.size
     }
 
-    /// One row.
+    /// The entries of one row; rows count from 0.
     #[must_use]
     pub fn row(&self, row: usize) -> &[f64] {
         &self.entries[row * self.size..(row + 1) * self.size]
     }
 
-    /// Replaces one row.
+    /// Replaces the entries of one row by as many values.
     pub fn set_row(&mut self, row: usize, values: &[f64]) {
         self.entries[row * self.size..(row + 1) * self.size].copy_from_slice(values);
     }

@@ -13,12 +13,12 @@ const TRIALS: usize = 3;
 /// Relative tolerance of the sign tests, on a problem scaled to unit diagonal.
 const TOLERANCE: f64 = 1e-11;
 
-/// A solution.
+/// Non-negative weights, and how they were found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
     /// w, every entry ≥ 0.
     pub weights: Vec<f64>,
-    /// Factorisations.
+    /// Factorisations that it took.
     pub iterations: usize,
 }
 

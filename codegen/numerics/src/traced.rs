@@ -26,7 +26,6 @@ pub struct Traced<const SINGLE: bool> {
     node: Option<u32>,
 }
 
-/// One operation.
 #[derive(Debug, Clone, Copy)]
 struct Node {
     /// Operands that may be off, with the derivative of the result by each.
@@ -96,7 +95,7 @@ impl Trace {
         number.node.and_then(|node| derivatives.get(node as usize).copied()).unwrap_or([0.0; 2])
     }
 
-    /// By every node.
+    /// Lowest and highest derivative of the weighted sum of `results` by each node.
     fn derivatives<const SINGLE: bool>(&self, results: &[(Traced<SINGLE>, f64)]) -> Vec<[f64; 2]> {
         let mut derivatives = vec![[0.0; 2]; self.0.len()];
         for (result, weight) in results {

@@ -30,7 +30,7 @@ pub const DOTS: Mark = Mark::Dots(3.5);
 pub struct Series {
     /// For the legend of a page; in a picture an empty name gives no entry.
     pub name: String,
-    /// How.
+    /// How they are drawn.
     pub mark: Mark,
     /// Number of its colour.
     pub color: usize,
@@ -43,18 +43,18 @@ pub struct Series {
 /// A rectangle in the units of the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch {
-    /// x from, to.
+    /// Lowest and highest x.
     pub x: [f64; 2],
-    /// y from, to.
+    /// Lowest and highest y.
     pub y: [f64; 2],
     /// 0 white to 1 dark; none: hatched.
     pub shade: Option<f64>,
 }
 
-/// An axis.
+/// What is counted along an axis, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// What.
+    /// What is counted.
     pub label: String,
     /// In what unit; may be empty.
     pub unit: String,
@@ -63,19 +63,19 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Even.
+    /// An axis with even steps.
     #[must_use]
     pub fn linear(label: &str, unit: &str) -> Self {
         Self { label: label.to_owned(), unit: unit.to_owned(), log: false }
     }
 
-    /// In decades.
+    /// An axis in decades.
     #[must_use]
     pub fn log(label: &str, unit: &str) -> Self {
         Self { log: true, ..Self::linear(label, unit) }
     }
 
-    /// Label and unit.
+    /// Label and unit, as they stand beside the axis.
     #[must_use]
     pub fn text(&self) -> String {
         if self.unit.is_empty() { self.label.clone() } else { format!("{} ({})", self.label, self.unit) }
@@ -108,9 +108,9 @@ pub struct Chart {
     pub id: String,
     /// Above it, with the figure of the paper if there is one.
     pub title: String,
-    /// Across.
+    /// The axis across.
     pub x: Axis,
-    /// Upward.
+    /// The axis upward.
     pub y: Axis,
     /// Later ones on top.
     pub series: Vec<Series>,

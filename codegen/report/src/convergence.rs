@@ -6,7 +6,7 @@ use specgen_studies::paper::convergence::Convergence;
 use specgen_studies::paper::printed::TABLE_3;
 use specgen_studies::reproduce::write::fell;
 
-/// From a search.
+/// The section of a search; `command` makes its content again.
 #[must_use]
 pub fn section(found: &Convergence, command: &str) -> Section {
     let x: Vec<f64> = found.history.iter().map(|generation| generation.evaluations as f64).collect();

@@ -11,7 +11,7 @@ use specgen_language::model::Target;
 use specgen_studies::reproduce::write::digits;
 use specgen_studies::verify::Measurement;
 
-/// What `check` says.
+/// What `specgen check` says of the spec.
 #[must_use]
 pub fn summary(compiled: &Compiled, described: &str, command: &str) -> Section {
     let section = Section::new("summary", "Summary", command);
@@ -173,7 +173,7 @@ pub struct Bits<'a> {
     pub measured: Result<&'a Measurement, &'a str>,
 }
 
-/// Digests.
+/// Digests of spec, controller and the runs that were compared by bits.
 #[must_use]
 pub fn digests(compiled: &Compiled, bits: &Bits, command: &str) -> Section {
     let mut table = Grid::new("Digests", &["what", "value"]);

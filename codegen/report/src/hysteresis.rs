@@ -8,7 +8,6 @@ use super::chart::{Axis, Chart, LINE, pairs};
 use super::section::{Grid, Section};
 use specgen_studies::reproduce::write::digits;
 
-/// Rates, Hz.
 const FREQUENCIES: [f64; 6] = [0.1, 1.0, 10.0, 20.0, 40.0, 50.0];
 /// Held voltages in a period.
 const SAMPLES: usize = 400;

@@ -40,9 +40,9 @@ fn sources(all: &NoiseParameters) -> [(&'static str, NoiseParameters); 3] {
 
 /// The emitted controller, and one whose drive converter has the steps of [`FINE_BITS`].
 pub struct Pair<'a> {
-    /// Of the spec.
+    /// The controller of the spec.
     pub own: &'a mut dyn TickController,
-    /// Of the spec with a fine converter.
+    /// The controller of the spec with a fine converter.
     pub fine: &'a mut dyn TickController,
 }
 

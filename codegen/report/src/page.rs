@@ -15,7 +15,7 @@ const SCRIPT: &str =
 pub struct Head {
     /// Name of the platform.
     pub name: String,
-    /// Spec digest.
+    /// Digest of the spec, hexadecimal.
     pub digest: String,
     /// The command that makes the page.
     pub command: String,

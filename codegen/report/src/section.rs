@@ -9,9 +9,9 @@ use specgen_studies::reproduce::write::{cell, digits};
 /// A part of the page with a heading.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Section {
-    /// For links.
+    /// Name of the section in links.
     pub id: &'static str,
-    /// Heading.
+    /// The heading.
     pub title: String,
     /// The command that makes its content again; empty: this report alone.
     pub command: String,
@@ -37,16 +37,16 @@ pub enum Part {
 /// A table of texts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Grid {
-    /// Above it.
+    /// What stands above the table.
     pub caption: String,
-    /// Of the columns.
+    /// Names of the columns.
     pub head: Vec<String>,
     /// As many texts each as the head.
     pub rows: Vec<Vec<String>>,
 }
 
 impl Grid {
-    /// Without rows.
+    /// A table without rows.
     #[must_use]
     pub fn new(caption: &str, head: &[&str]) -> Self {
         Self {
@@ -56,14 +56,14 @@ impl Grid {
         }
     }
 
-    /// Adds a row.
+    /// Adds a row at the end.
     pub fn push(&mut self, row: Vec<String>) {
         self.rows.push(row);
     }
 }
 
 impl Section {
-    /// Without parts.
+    /// A section without parts.
     #[must_use]
     pub fn new(id: &'static str, title: &str, command: &str) -> Self {
         Self { id, title: title.to_owned(), command: command.to_owned(), parts: Vec::new() }

@@ -22,7 +22,6 @@ const TERMS: [f64; 2] = [3.0, 6.0];
 const SHORTEST: f64 = 20.0;
 /// Longest time constant, share of the longest record: anything slower is a line.
 const LONGEST: f64 = 1.0 / 3.0;
-/// Most turns.
 const TURNS: usize = 60;
 /// A turn that lowers the residual by less than this share is the last.
 const WORTHWHILE: f64 = 2e-4;
@@ -76,7 +75,7 @@ fn rounded(seconds: f64) -> f64 {
 }
 
 struct Linear {
-    /// s.
+    /// s: the scale of f.
     scale: f64,
     /// w_j.
     weights: Vec<f64>,

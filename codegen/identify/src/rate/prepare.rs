@@ -27,7 +27,6 @@ pub(super) struct Prepared<'a> {
 }
 
 impl Prepared<'_> {
-    /// Samples used.
     pub(super) fn samples(&self) -> usize {
         self.record.time.len() - self.first
     }

@@ -22,7 +22,7 @@ pub struct Measured {
     pub frequency: f64,
     /// Median |u̇|, V/s.
     pub speed: f64,
-    /// Samples used.
+    /// Samples of the record that were fitted.
     pub samples: usize,
     /// Range of the displacement over them, m.
     pub range: f64,
@@ -42,11 +42,11 @@ impl Measured {
 /// One option. Errors are rms in % of each record's range.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct OptionReport {
-    /// Which.
+    /// The option that the figures are of.
     pub option: RateOption,
-    /// s.
+    /// Dead time that was fitted with it, s.
     pub dead_time: f64,
-    /// Empty without creep.
+    /// Creep terms that were fitted; empty for options without creep.
     pub creep: Vec<CreepTerm>,
     /// Fitted to all records.
     pub fitted: Vec<f64>,
@@ -59,7 +59,7 @@ pub struct OptionReport {
 /// The record that took part in no fit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HoldOut {
-    /// Its name.
+    /// Name of the record that was held out.
     pub record: String,
 }
 
@@ -74,10 +74,10 @@ pub struct Verdict {
     pub text: String,
 }
 
-/// Result figures.
+/// Figures of every option on every record, and what follows from them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RateReport {
-    /// N.
+    /// Intervals per axis of the tables.
     pub grid: usize,
     /// The records, in the order given.
     pub records: Vec<Measured>,
@@ -85,7 +85,7 @@ pub struct RateReport {
     pub hold_out: Option<HoldOut>,
     /// The options, plainest first.
     pub options: Vec<OptionReport>,
-    /// What follows.
+    /// The option to choose, and why.
     pub verdict: Verdict,
 }
 

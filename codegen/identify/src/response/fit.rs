@@ -8,24 +8,24 @@ use super::welch::Bin;
 /// A value and its standard error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Value.
+    /// The value, in the unit of what is estimated.
     pub value: f64,
     /// Standard error, in its unit; 0 for a parameter held at zero.
     pub error: f64,
 }
 
-/// The fitted model.
+/// A second-order resonance with a first-order lag and a dead time, as fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Fitted {
-    /// K, m/V.
+    /// Static gain K, m/V.
     pub gain: Estimate,
-    /// ω0/2π, Hz.
+    /// Undamped resonance ω0/2π, Hz.
     pub resonance: Estimate,
-    /// ζ.
+    /// Damping ratio ζ of the resonance.
     pub damping_ratio: Estimate,
-    /// τ, s.
+    /// Time constant τ of the lag, s.
     pub lag: Estimate,
-    /// T, s.
+    /// Dead time T, s.
     pub dead_time: Estimate,
     /// τ + T, s: told better than its parts, which look alike far below 1/τ.
     pub lag_and_dead_time: Estimate,

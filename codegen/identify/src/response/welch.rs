@@ -6,7 +6,7 @@ use rustfft::num_complex::Complex;
 /// One bin of the response.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bin {
-    /// Hz.
+    /// Frequency of the bin, Hz.
     pub frequency: f64,
     /// Real and imaginary part of H1, m/V.
     pub h: [f64; 2],

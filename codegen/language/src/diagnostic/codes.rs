@@ -12,7 +12,7 @@ use super::Severity;
 pub struct Code {
     /// Such as `E0102`: E for an error, W for a warning, N for a note.
     pub id: &'static str,
-    /// A few words.
+    /// What is wrong, in a few words.
     pub title: &'static str,
     /// Why it is refused or pointed out, and how to fix it.
     pub explanation: &'static str,

@@ -12,7 +12,7 @@ pub(super) struct Lines<'a> {
 /// Where a span begins, and the part of it on that line.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Spot<'a> {
-    /// From 1.
+    /// Counted from 1.
     pub(super) line: usize,
     /// In characters, from 1.
     pub(super) column: usize,

@@ -1,6 +1,5 @@
 //! Linear and logarithmic rulers with round ticks.
 
-/// Values to pixels.
 pub(super) struct Ruler {
     log: bool,
     low: f64,
@@ -8,7 +7,6 @@ pub(super) struct Ruler {
     pixels: [f64; 2],
 }
 
-/// A marked value.
 pub(super) struct Tick {
     pub(super) value: f64,
     pub(super) label: String,

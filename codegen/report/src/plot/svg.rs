@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 /// How a patch is filled.
 #[derive(Clone, Copy)]
 pub(super) enum Hatch {
-    /// Slanted lines.
     Lines,
     /// 0 white to 1 dark.
     Shade(f64),
