@@ -179,13 +179,21 @@ fn under_a_flood(site: &Site) {
             let mut reader = stream.try_clone().unwrap();
             // Answers are read, so that it is not closed for leaving them.
             std::thread::spawn(move || std::io::copy(&mut reader, &mut std::io::sink()));
-            while !over.load(Ordering::Relaxed) && stream.write_all(&noise).is_ok() {}
+            while !over.load(Ordering::Relaxed) {
+                if stream.write_all(&noise).is_err() {
+                    break;
+                }
+            }
         }
     };
     let asking = || {
         while !over.load(Ordering::Relaxed) {
             let Ok(mut host) = Host::open(&site.link, 50) else { continue };
-            while !over.load(Ordering::Relaxed) && host.is_answered() {}
+            while !over.load(Ordering::Relaxed) {
+                if !host.is_answered() {
+                    break;
+                }
+            }
         }
     };
     std::thread::scope(|scope| {
