@@ -51,7 +51,6 @@ pub fn build_program(dir: &Path, folder: &str, target_dir: &Path) -> Result<Path
     Ok(program.path)
 }
 
-/// The cargo of this machine.
 fn cargo() -> Result<PathBuf, TargetError> {
     find_in_path("cargo").ok_or_else(|| TargetError::MissingTool {
         tool: "cargo".into(),

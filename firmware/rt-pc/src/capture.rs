@@ -22,16 +22,13 @@ pub const CAPACITY: u32 = {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Standing {
     pub running: bool,
-    /// The trigger was seen.
     pub triggered: bool,
-    /// Ticks that it holds.
     pub ticks: u64,
 }
 
 /// The recorder's other side.
 pub struct Capture {
     here: Option<Tape>,
-    /// What it is to record.
     settings: Settings,
     standing: Standing,
     /// Number of the order by which it was last started anew while it was away.

@@ -15,7 +15,6 @@ use crate::words::Places;
 /// Orders that may wait for room in the ring: the loop takes one a tick.
 const MOST_ORDERS: usize = 64;
 
-/// Why something is not done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum No {
     /// Not in this state of the machine, of the wave or of the recorder.
@@ -25,11 +24,8 @@ pub enum No {
 }
 
 pub struct Console {
-    /// Requests and input words.
     pub operator: Operator,
-    /// The recorder of the loop.
     pub capture: Capture,
-    /// What the supervisor said last.
     pub said: Option<Said>,
     places: Places,
     /// Settings that are in force once all orders are taken.

@@ -50,7 +50,6 @@ pub struct Loop<'a, D> {
     pub places: Places,
     /// Event bits that hold for the whole run, such as a failed integrity check.
     pub standing_events: u32,
-    /// Its ends of the rings.
     pub rings: Inner,
     pub tape: Option<Tape>,
     pub shared: &'a Shared,

@@ -73,7 +73,6 @@ pub enum Order {
     Configure(Config),
     /// A wave begins, if none is under way.
     Wave(wave::Settings<Real>),
-    /// The wave comes to rest.
     StopWave,
     Tape(Tape),
     /// Begin anew with the recorder that the loop has.
@@ -83,12 +82,9 @@ pub enum Order {
     StopRecorder,
 }
 
-/// What both threads see.
 #[derive(Debug, Default)]
 pub struct Shared {
-    /// The loop is to end.
     pub stop: AtomicBool,
-    /// The loop has ended.
     pub ended: AtomicBool,
     /// Last sign of life of the service, ns of [`specgen_rt::clock::now`].
     pub service_alive: AtomicU64,

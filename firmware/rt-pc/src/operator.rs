@@ -41,7 +41,6 @@ pub struct HostId(pub u64);
 pub enum Denied {
     /// The program is ramping down to end.
     Ending,
-    /// Another host has them.
     Others,
 }
 
@@ -65,12 +64,10 @@ enum Owner {
         /// When it last sent a request, and when it last ordered something, ns.
         seen: u64,
         ordered: u64,
-        /// Its connection has ended.
         left: bool,
     },
 }
 
-/// Where the plan stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Step {
     /// No plan: hosts alone.
@@ -100,7 +97,6 @@ pub struct Operator {
     pub failure: Option<String>,
     changed: bool,
     owner: Owner,
-    /// Requests over the link.
     requests: u64,
     /// The host from which the orders were taken last.
     evicted: Option<HostId>,

@@ -52,12 +52,10 @@ pub enum Hardware {
     Comedi(PathBuf),
 }
 
-/// What is asked for.
 #[derive(Debug, Clone)]
 #[cfg_attr(not(feature = "comedi"), allow(dead_code))] // The settings of cards.
 pub struct Options {
     pub hardware: Hardware,
-    /// Cards of the amplifiers.
     pub comedi_outputs: Vec<PathBuf>,
     /// Of inputs and of outputs, V.
     pub comedi_ranges: [[f64; 2]; 2],
@@ -72,15 +70,11 @@ pub struct Options {
     pub elastic: bool,
     /// 1 to 99.
     pub priority: u8,
-    /// Processor of the loop.
     pub cpu: Option<usize>,
-    /// Go on without rights.
     pub allow_no_rt: bool,
     pub arm: bool,
-    /// Assignments of input words.
     pub set: Vec<String>,
     pub config: Vec<String>,
-    /// Socket of the link.
     pub link: Option<PathBuf>,
     /// ns.
     pub link_silence: Option<u64>,

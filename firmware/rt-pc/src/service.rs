@@ -24,12 +24,9 @@ pub use link::{Link, Traffic};
 /// Between two rounds, unless a host sends something: the ring holds many times what comes in it.
 const ROUND: Timespec = Timespec { tv_sec: 0, tv_nsec: 2_000_000 };
 
-/// What the service works with.
 pub struct Service<'a> {
-    /// Its ends of the rings.
     pub rings: Outer,
     pub shared: &'a Shared,
-    /// What may be asked.
     pub console: Console,
     /// Where ticks are written, if anywhere.
     pub record: Option<(PathBuf, record::Writer)>,
@@ -45,7 +42,6 @@ pub struct Service<'a> {
 /// Something that the supervisor did for a cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Incident {
-    /// First tick of it.
     pub tick: u64,
     /// Phase that it led to.
     pub phase: Phase,
@@ -55,7 +51,6 @@ pub struct Incident {
 /// What is known at the end.
 #[derive(Debug, Default)]
 pub struct Outcome {
-    /// What the supervisor said last.
     pub last: Option<Said>,
     /// Faults, and holds for a cause, in order.
     pub incidents: Vec<Incident>,

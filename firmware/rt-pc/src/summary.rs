@@ -8,20 +8,16 @@ use specgen_rt::allocation;
 
 use crate::service::{Incident, Outcome, Traffic};
 
-/// A run that is over.
 pub struct Summary<'a> {
     pub account: &'a Account,
-    /// What the service saw.
     pub outcome: &'a Outcome,
     /// Rows that found no room.
     pub lost_rows: u64,
     /// Readings or outputs that failed.
     pub device_faults: u64,
-    /// The machine in words.
     pub device: String,
     /// Control period, ns.
     pub period: u64,
-    /// Rights that were missing.
     pub missing_rights: Vec<String>,
 }
 

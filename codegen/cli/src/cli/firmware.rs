@@ -65,10 +65,8 @@ struct Made {
     name: String,
     digest: String,
     target: &'static str,
-    /// What it was built for.
     board: String,
     output: String,
-    /// Library, image or program.
     artifact: String,
     /// `rustc --version` of the cross compiler.
     compiler: Option<String>,
@@ -185,7 +183,6 @@ fn wrong_part(compiled: &Compiled, mcu: Mcu, target: Target) -> Option<Diagnosti
 #[derive(Clone, Copy)]
 struct Folders<'a> {
     output: &'a Path,
-    /// Of cargo.
     target: &'a Path,
 }
 

@@ -45,7 +45,6 @@ pub struct Arguments {
 
 /// Where commands come from.
 enum Source {
-    /// All of them are known.
     List(Vec<Order>),
     /// Lines as they come, from a person or program that sees what happens.
     Lines,

@@ -131,7 +131,6 @@ fn built(compiled: &Compiled, output: &Path, target_dir: &Path, ui: &Ui) -> Resu
     Ok(target::build_pil(output, mcu, target_dir)?)
 }
 
-/// Runs the plan and reports.
 #[allow(clippy::too_many_arguments, reason = "called once for each kind of line")]
 fn in_the_loop<P: Port>(
     host: Supervised,
@@ -203,7 +202,6 @@ fn stopped(stop: Stop, mut report: Report, ui: &Ui) -> Failure {
 
 /// Why a plan did not end.
 enum Broken {
-    /// Not as a run.
     Command(Failure),
     /// As a run; why, the lock-step knows best.
     Run(RunError),

@@ -118,7 +118,6 @@ fn verdict(found: &Replay) -> Option<String> {
 /// A recording that was replayed.
 #[derive(Serialize)]
 struct Report {
-    /// Record and controller.
     #[serde(skip)]
     title: String,
     /// s.

@@ -50,7 +50,6 @@ pub struct Arguments {
     no_target: bool,
 }
 
-/// The page that was written.
 #[derive(Serialize)]
 struct Page<'a> {
     file: String,

@@ -47,7 +47,6 @@ pub enum Failure {
     },
     /// Ended from outside with a result: what was found so far.
     Interrupted {
-        /// What is left undone.
         message: String,
         /// For programs; the text is out already.
         result: Value,

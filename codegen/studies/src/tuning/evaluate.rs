@@ -376,7 +376,6 @@ fn reach(model: &Model, task: &TaskSpace) -> [f64; 6] {
 /// x and y drive the legs against each other: half of the others.
 const REACH_OF_AXIS: [f64; 6] = [0.5, 0.5, 0.8, 0.6, 0.6, 0.6];
 
-/// Sums of a run.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     count: usize,

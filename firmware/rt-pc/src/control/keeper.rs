@@ -16,7 +16,6 @@ use crate::handover::{Outlets, Row, SNAPSHOT_EVERY, Shared, Snapshot, Tape};
 pub struct Keeper<'a> {
     outlets: Outlets,
     tape: Option<Tape>,
-    /// Orders taken so far.
     taken: u32,
     shared: &'a Shared,
     /// The row to come begins a block of the record of the run, and its state was handed over.
@@ -45,7 +44,6 @@ impl<'a> Keeper<'a> {
         self.outlets.snapshots.is_some() || self.tape.is_some()
     }
 
-    /// An order was taken.
     pub fn ordered(&mut self) {
         self.taken = self.taken.wrapping_add(1);
     }
@@ -61,7 +59,6 @@ impl<'a> Keeper<'a> {
         }
     }
 
-    /// Begins the recording anew.
     pub fn record(&mut self, settings: Settings, count: u64) {
         if let Some(tape) = &mut self.tape {
             tape.start(settings);

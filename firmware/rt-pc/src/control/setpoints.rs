@@ -27,7 +27,6 @@ impl Setpoints {
         self.wish = wish;
     }
 
-    /// Number of the request.
     pub fn request(&self) -> u64 {
         self.wish.request
     }
@@ -42,7 +41,6 @@ impl Setpoints {
         }
     }
 
-    /// Brings the wave to rest.
     pub fn stop(&mut self) {
         self.wave.stop();
     }

@@ -21,7 +21,6 @@ const ROUND: usize = 4096;
 pub struct Client<T> {
     /// The connection, which never waits.
     pub stream: UnixStream,
-    /// What belongs to it.
     pub state: T,
     /// Its process, as the system says; 0 if it does not.
     process: i32,
@@ -77,7 +76,6 @@ impl<T> Clients<T> {
         self.all.iter()
     }
 
-    /// What to wait for.
     pub fn descriptors(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         std::iter::once(self.listener.descriptor()).chain(self.all.iter().map(|client| client.stream.as_fd()))
     }

@@ -25,7 +25,6 @@ pub struct Desk<'a> {
     pub events: &'a mut u32,
     /// Now, ns.
     pub now: u64,
-    /// Settings in an answer.
     pub words: [u8; size_of::<[u64; CONFIG_WORDS]>()],
 }
 

@@ -34,7 +34,6 @@ impl Traffic {
     }
 }
 
-/// The socket with its connections.
 pub struct Link {
     hosts: Clients<Line>,
     traffic: Traffic,
@@ -83,12 +82,10 @@ impl Link {
         }
     }
 
-    /// What to wait for.
     pub fn descriptors(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
         self.hosts.descriptors()
     }
 
-    /// What came in all.
     pub fn traffic(&self) -> Traffic {
         let mut traffic = self.traffic;
         for client in self.hosts.iter() {

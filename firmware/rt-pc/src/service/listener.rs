@@ -58,7 +58,6 @@ impl Listener {
         stream.set_nonblocking(true).is_ok().then_some(stream)
     }
 
-    /// What to wait for.
     pub fn descriptor(&self) -> BorrowedFd<'_> {
         self.listener.as_fd()
     }

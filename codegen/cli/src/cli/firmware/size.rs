@@ -42,7 +42,6 @@ impl Outcome for Built {
     }
 }
 
-/// An image at hand.
 #[derive(Serialize)]
 struct Examined {
     file: String,

@@ -59,7 +59,6 @@ struct Calibration {
     #[serde(skip)]
     is_given: bool,
     report: GaugeReport,
-    /// The line for the spec.
     calibration: String,
     /// A line for each file that was written.
     #[serde(skip)]

@@ -93,7 +93,6 @@ struct Related {
     report: LinearReport,
     gain_ratio: [f64; 2],
     spec: Option<Judged>,
-    /// A line about the plot.
     #[serde(skip)]
     plot: String,
 }

@@ -50,13 +50,11 @@ impl Outcome for Mistake {
     }
 }
 
-/// How the machine stands.
 #[derive(Serialize)]
 pub struct MachineStatus {
     pub tick: u64,
     pub phase: u8,
     pub cause: u8,
-    /// Phase and cause in words.
     pub stands: String,
     pub amplifiers_on: bool,
     pub status: u32,
@@ -108,7 +106,6 @@ impl Outcome for Settings {
     }
 }
 
-/// A recording that was fetched.
 #[derive(Serialize)]
 pub struct Downloaded {
     pub file: String,
@@ -121,7 +118,6 @@ impl Outcome for Downloaded {
     }
 }
 
-/// How the recorder stands.
 #[derive(Serialize)]
 pub struct RecorderState {
     pub running: bool,

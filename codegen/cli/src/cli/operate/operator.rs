@@ -25,7 +25,6 @@ pub enum Ended {
     Refused(String),
     /// The machine faulted, or did not do in time what was waited for.
     Fault(String),
-    /// As any command can fail.
     Failed(Failure),
     Link(ClientError),
     Interrupted,
@@ -131,7 +130,6 @@ impl<P: Port> Operator<P> {
         })
     }
 
-    /// Carries an order out.
     pub fn obey(&mut self, order: &Order, ui: &Ui) -> Result<(), Ended> {
         self.look()?;
         let line = format!("{order:?}");

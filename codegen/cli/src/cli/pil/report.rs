@@ -13,10 +13,8 @@ use crate::cli::ui::Outcome;
 use specgen_compiler::compile::Compiled;
 use specgen_operate::pil::{Cost, Difference};
 
-/// Everything that a run found.
 #[derive(Debug, Serialize)]
 pub struct Report {
-    /// Name of the spec.
     pub name: String,
     pub digest: String,
     /// What was in the loop.
@@ -59,7 +57,6 @@ fn rows<S: serde::Serializer>(table: &PoseTable, serializer: S) -> Result<S::Ok,
 }
 
 impl Report {
-    /// Before the first tick.
     pub fn new(compiled: &Compiled, device: String, stack_bound: Option<u64>) -> Self {
         Self {
             name: compiled.ir.name.clone(),

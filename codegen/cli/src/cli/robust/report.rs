@@ -56,7 +56,6 @@ pub(super) struct Found<'a> {
     pub(super) reasons: &'a [String],
     /// Machines that were asked for.
     pub(super) planned: usize,
-    /// Those that were run.
     pub(super) runs: &'a [(Member, Outcome)],
 }
 

@@ -32,7 +32,6 @@ struct Row {
     scored_on: Evaluation,
 }
 
-/// Margins of the result.
 #[derive(Serialize)]
 struct Margins {
     gain: Option<f64>,

@@ -27,7 +27,6 @@ pub(super) struct Starts {
     pub(super) ultimate: Option<[Option<Ultimate>; 6]>,
     /// Starts made smaller until they hold, with their scores.
     scored: Vec<(Setting, Score)>,
-    /// The best of them.
     pub(super) best: Setting,
     pub(super) score: Score,
 }
