@@ -8,6 +8,8 @@ pub mod compile;
 pub mod demand;
 pub mod emit;
 mod figure;
+#[cfg(test)]
+mod golden;
 pub mod ir;
 pub mod lint;
 pub mod lower;

@@ -1,0 +1,445 @@
+//! Every constant, margin and finding of many specs against committed text (`golden/`), so that a wrong number is seen at the
+//! field that it is in. Detects changes, proves nothing: what is right is for the tests of each module, and for those of `tests/`.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::compile::check_stability;
+use crate::ir::Ir;
+use crate::lower::setpoint;
+use crate::{lint, lower};
+use specgen_identify::everett::EverettTable;
+use specgen_identify::waveform::{self, Waveform};
+use specgen_language::diagnostic::{Diagnostic, Place, Severity};
+use specgen_language::model::{Model, RateDependence, TrajectoryKind};
+use specgen_language::spec::{self, SpecSource};
+
+mod cases;
+#[expect(dead_code, reason = "of each rule only the texts are used here")]
+#[path = "../../../tests/tests/physical_lint/support/rules.rs"]
+mod rules;
+#[path = "../../../tests/tests/physical_lint/support/rules_of_control.rs"]
+mod rules_of_control;
+#[path = "../../../tests/tests/physical_lint/support/rules_of_slips.rs"]
+mod rules_of_slips;
+
+/// Specs below `specs/`: both kinds of controller first, each written in full; of the others, what is not as in these.
+const SPECS: [&str; 18] = [
+    "reference.toml",
+    "legs.toml",
+    "minimal.toml",
+    "features/ewma-bandwidth.toml",
+    "features/f32.toml",
+    "features/leg-setpoint.toml",
+    "features/m4f.toml",
+    "features/offset-load.toml",
+    "features/platform-calibration.toml",
+    "features/platform-environment.toml",
+    "features/platform-f32.toml",
+    "features/platform-force-sensor.toml",
+    "features/platform-frames.toml",
+    "features/platform-gains.toml",
+    "features/platform-joints.toml",
+    "features/platform-no-notch.toml",
+    "features/run-interval.toml",
+    "features/six-records.toml",
+];
+/// How many of them are written in full.
+const IN_FULL: usize = 2;
+/// Specs that slips are made in, and by what each line's numbers are then multiplied.
+const SLIPPED: [&str; 3] = ["reference.toml", "legs.toml", "features/platform-calibration.toml"];
+const FACTORS: [f64; 5] = [-1.0, 1e-3, 0.3, 10.0, 1e3];
+/// A line of numbers longer than this is written as its digest.
+const WIDEST: usize = 160;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn read(name: &str) -> SpecSource {
+    let path = root().join("specs").join(name);
+    SpecSource { display_name: name.to_owned(), ..SpecSource::read(&path).unwrap() }
+}
+
+/// A committed text that is written anew, line by line, and stops at the first that differs; SPECGEN_BLESS=1 keeps it.
+struct Golden {
+    file: &'static str,
+    committed: Vec<String>,
+    found: Vec<String>,
+    bless: bool,
+}
+
+impl Golden {
+    fn open(file: &'static str) -> Self {
+        let text = std::fs::read_to_string(Self::path(file)).unwrap_or_default();
+        let bless = std::env::var_os("SPECGEN_BLESS").is_some();
+        Self { file, committed: text.lines().map(str::to_owned).collect(), found: Vec::new(), bless }
+    }
+
+    fn path(file: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("golden").join(file)
+    }
+
+    fn line(&mut self, line: impl Into<String>) {
+        let line = line.into();
+        self.compare(self.committed.get(self.found.len()), Some(&line));
+        self.found.push(line);
+    }
+
+    fn end(self) {
+        self.compare(self.committed.get(self.found.len()), None);
+        if self.bless {
+            std::fs::write(Self::path(self.file), self.found.join("\n") + "\n").unwrap();
+        }
+    }
+
+    fn compare(&self, committed: Option<&String>, found: Option<&String>) {
+        assert!(
+            self.bless || committed == found,
+            "golden/{}, `SPECGEN_BLESS=1 cargo test -p specgen-compiler golden` if that is meant:\nwas {committed:?}\nis  {found:?}",
+            self.file
+        );
+    }
+}
+
+/// One line for each field, with every bit of its numbers: the shortest text that is read back as the same number.
+fn fields(path: &str, value: &Value, lines: &mut Vec<String>) {
+    match value {
+        Value::Object(map) => map.iter().for_each(|(key, value)| fields(&format!("{path}.{key}"), value, lines)),
+        Value::Array(items) if !items.iter().all(is_numbers) => {
+            items.iter().enumerate().for_each(|(at, value)| fields(&format!("{path}[{at}]"), value, lines));
+        }
+        value => {
+            let mut text = value.to_string();
+            if text.len() > WIDEST {
+                text = format!("{} bytes, sha256 {}", text.len(), digest(&text));
+            }
+            lines.push(format!("{path} = {text}"));
+        }
+    }
+}
+
+fn is_numbers(value: &Value) -> bool {
+    value.as_array().map_or(value.is_number(), |items| items.iter().all(is_numbers))
+}
+
+fn digest(text: &str) -> String {
+    let mut digest = specgen_toolchain::sha256(text.as_bytes());
+    digest.truncate(16);
+    digest
+}
+
+/// What a spec compiles to.
+struct Built {
+    ir: Ir,
+    /// Margins, demands of the trajectories and lengths of the stops, noise of the pose.
+    figures: Value,
+    findings: Vec<Diagnostic>,
+}
+
+/// A table that no record has to be identified for: uneven, so that no two nodes are the same.
+fn table(model: &Model, scale: f64) -> EverettTable {
+    let (grid, [min, max]) = (model.hysteresis.grid, model.actuator.voltage);
+    let share = |k: usize| k as f64 / grid as f64;
+    let node = |up: usize, down: usize| {
+        let (u, v) = (share(up), share(down));
+        scale * model.actuator.leg_gain() * (max - min) * (u - v) * (0.8 + 0.15 * u + 0.05 * v)
+    };
+    let nodes = (1..=grid).flat_map(|up| (0..up).map(move |down| node(up, down))).collect();
+    EverettTable { grid, drive_min: min, drive_max: max, nodes }
+}
+
+fn waveforms(source: &SpecSource, model: &Model, table: Option<&str>) -> Vec<Option<Waveform>> {
+    let trajectories = model.task_space.iter().flat_map(|task| &task.trajectories);
+    trajectories
+        .map(|trajectory| match &trajectory.kind {
+            TrajectoryKind::Waveform { file, period, .. } => {
+                let read = || waveform::read_file(&source.dir.join(file), file).ok();
+                waveform::parse(&table.map(str::to_owned).or_else(read)?, file, *period).ok()
+            }
+            TrajectoryKind::Paper { .. } => None,
+        })
+        .collect()
+}
+
+/// The phases of the compiler that this crate computes in, without reading records and without emitting; with
+/// a table of poses, where the spec names one.
+fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<Built, Vec<Diagnostic>> {
+    let (model, _) = spec::load_as_far(source);
+    let Some(model) = model else { return Err(Vec::new()) };
+    let mut findings = lint::check(&model);
+    findings.extend(lint::estimated(&model));
+    if findings.iter().any(|finding| finding.severity == Severity::Error) {
+        return Err(findings);
+    }
+    let stability = check_stability(&model).map_err(|found| findings.extend(found));
+    let lowered = match &model.task_space {
+        None => Ok(None),
+        Some(task) => {
+            setpoint::lower(&model, task, &waveforms(source, &model, table_of_poses), lower::scalar(&model)).map(Some)
+        }
+    };
+    let lowered = lowered.map_err(|found| findings.extend(found));
+    let (Ok((margins, design)), Ok(lowered)) = (stability, lowered) else { return Err(findings) };
+    findings.extend(design.iter().flat_map(|design| design.findings.clone()));
+    let setpoints = lowered.map(|(setpoints, warnings)| {
+        findings.extend(warnings);
+        setpoints
+    });
+    let mut figures = json!({ "margins": margins, "design": design });
+    if let (Some(task), Some(setpoints)) = (&model.task_space, &setpoints) {
+        let platform = lower::platform(&model)?;
+        let paths = setpoint::stretches(&model, task, setpoints)?;
+        let (demands, found) = lint::paths::check(&model, task, &platform, &paths);
+        findings.extend(found);
+        figures["demands"] = json!(demands);
+        match setpoint::check_stops(&model, task, setpoints, &platform, model.actuator.stroke) {
+            Ok(stops) => figures["stops"] = json!(stops),
+            Err(found) => {
+                findings.extend(found);
+                return Err(findings);
+            }
+        }
+    }
+    let scales = (0..model.hysteresis.records.len()).map(|leg| 1.0 - 0.01 * leg as f64);
+    let tables: Vec<EverettTable> = scales.map(|scale| table(&model, scale)).collect();
+    let rate_tables = match &model.hysteresis.rate {
+        RateDependence::DynamicPreisach(files) => files.iter().map(|_| table(&model, 1e-3)).collect(),
+        _ => Vec::new(),
+    };
+    let task = design.as_ref().zip(setpoints);
+    let lowered = lower::lower(&model, task, &tables, &rate_tables, "digest").map_err(|found| findings.extend(found));
+    let Ok(ir) = lowered else { return Err(findings) };
+    figures["noise"] = json!(format!("{:?}", lower::pose_noise(&model)));
+    Ok(Built { ir, figures, findings })
+}
+
+/// One after the other: for a mutant, the first difference is enough.
+#[test]
+fn specs_compile_to_what_is_committed() {
+    boundaries();
+    constants();
+    slipped();
+    refusals();
+}
+
+/// Every constant and figure of every spec.
+fn constants() {
+    let (mut golden, mut known) = (Golden::open("constants.txt"), BTreeSet::new());
+    for (index, name) in SPECS.into_iter().enumerate() {
+        let source = read(name);
+        let built = build(&source, None).unwrap_or_else(|findings| panic!("{name}: {findings:#?}"));
+        let mut lines = Vec::new();
+        fields("ir", &json!(built.ir), &mut lines);
+        fields("figures", &built.figures, &mut lines);
+        lines.extend(built.findings.iter().map(|finding| line(&source, finding)));
+        golden.line(format!("# {name}"));
+        for line in lines {
+            if !known.contains(&line) {
+                golden.line(line.as_str());
+            }
+            if index < IN_FULL {
+                known.insert(line);
+            }
+        }
+    }
+    golden.end();
+}
+
+/// A finding with all its words and what stands in the spec at its place.
+fn line(source: &SpecSource, finding: &Diagnostic) -> String {
+    let Diagnostic { severity, code, key, place, message, help } = finding;
+    let place = match place {
+        Place::Spec(span) => format!("{:?}", &source.text[span.clone()]),
+        place => format!("{place:?}"),
+    };
+    format!("{severity:?} {code} {key} at {place}: {message}; {help}")
+}
+
+/// What is refused or warned of.
+fn refusals() {
+    let (mut golden, mut known) = (Golden::open("refusals.txt"), BTreeSet::new());
+    let (of_parts, of_paths) = (cases::OF_PARTS.iter(), cases::OF_PATHS.iter());
+    for (trajectories, (base, edits, table)) in of_parts.map(|case| (0, case)).chain(of_paths.map(|case| (1, case))) {
+        let source = read(base);
+        let changed = edits.iter().fold(with_trajectories(&source.text, trajectories), |text, (from, to)| {
+            assert!(text.contains(from), "{base}: no {from:?}");
+            text.replacen(from, to, 1)
+        });
+        let source = SpecSource { text: changed, ..source };
+        let rows = table.map(|row| cases::HEAD.to_owned() + &(0..=100).map(|k| row(k) + "\n").collect::<String>());
+        golden.line(format!("# {base}: {edits:?}"));
+        let findings = build(&source, rows.as_deref()).map_or_else(
+            |found| found,
+            |built| {
+                let mut lines = Vec::new();
+                fields("ir", &json!(built.ir), &mut lines);
+                fields("figures", &built.figures, &mut lines);
+                golden.line(format!("accepted: {}", digest(&lines.join("\n"))));
+                built.findings
+            },
+        );
+        for line in findings.iter().map(|finding| line(&source, finding)) {
+            if !known.contains(&line) {
+                golden.line(line.as_str());
+            }
+            known.insert(line);
+        }
+    }
+    golden.end();
+}
+
+/// The text with the first so many of its trajectories.
+fn with_trajectories(text: &str, count: usize) -> String {
+    const BEGIN: &str = "[[trajectory]]";
+    let at: Vec<usize> = text.match_indices(BEGIN).map(|(at, _)| at).collect();
+    match at.get(count) {
+        Some(&first) => text[..first].to_owned() + &text[text.find("[timing]").unwrap()..],
+        None => text.to_owned(),
+    }
+}
+
+/// What the physical lint says at the boundary of each rule.
+fn boundaries() {
+    let mut golden = Golden::open("boundaries.txt");
+    for rule in rules::all() {
+        let source = read(rule.base);
+        let with = rule.with.iter().fold(source.text.clone(), |text, (from, to)| text.replacen(from, to, 1));
+        let base = said(&SpecSource { text: with.clone(), ..source.clone() });
+        for to in [rule.raises, rule.passes] {
+            let changed = with.replacen(rule.text, to, 1);
+            golden.line(format!("# {}: {} {:?} -> {to:?}", rule.base, rule.code, rule.text));
+            for line in said(&SpecSource { text: changed, ..source.clone() }).difference(&base) {
+                golden.line(line.as_str());
+            }
+        }
+    }
+    golden.end();
+}
+
+/// Findings of the physical lint.
+fn said(source: &SpecSource) -> BTreeSet<String> {
+    let (model, _) = spec::load_as_far(source);
+    model.iter().flat_map(lint::check).map(|finding| line(source, &finding)).collect()
+}
+
+/// What it says about slips.
+fn slipped() {
+    let mut golden = Golden::open("slips.txt");
+    for name in SLIPPED {
+        let source = read(name);
+        golden.line(format!("# {name}: line, factor, codes and digest of what the physical lint says"));
+        for factor in FACTORS {
+            for (at, slip) in slips(&source.text, factor) {
+                let source = SpecSource { text: slip, ..source.clone() };
+                let (model, _) = spec::load_as_far(&source);
+                let Some(model) = model else { continue };
+                let found = lint::check(&model);
+                let codes: Vec<&str> = found.iter().map(|finding| finding.code).collect();
+                let said: String = found.iter().map(|finding| line(&source, finding)).collect();
+                golden.line(format!("{at} x {factor}: {} {}", codes.join(" "), digest(&said)));
+            }
+        }
+    }
+    golden.end();
+}
+
+/// The text with the numbers of one line multiplied, for each line that has any.
+fn slips(text: &str, factor: f64) -> Vec<(usize, String)> {
+    let lines: Vec<&str> = text.lines().collect();
+    let slip = |at: usize| {
+        let (key, value) = lines[at].split_once('=')?;
+        let changed = format!("{key}={}", multiplied(value.split('#').next()?, factor)?);
+        let lines = [&lines[..at], &[changed.as_str()], &lines[at + 1..]].concat();
+        Some((at + 1, lines.join("\n") + "\n"))
+    };
+    (0..lines.len()).filter_map(slip).collect()
+}
+
+/// Every number in a value multiplied; none if there is no number.
+fn multiplied(value: &str, factor: f64) -> Option<String> {
+    const ENDS: [char; 5] = [' ', ',', '[', ']', '"'];
+    let mut changed = String::new();
+    let mut any = false;
+    for word in value.split_inclusive(ENDS) {
+        let (number, end) = word.split_at(word.trim_end_matches(ENDS).len());
+        match number.parse::<f64>() {
+            Ok(number) if number != 0.0 => {
+                any = true;
+                let _ = write!(changed, "{}{end}", number * factor);
+            }
+            _ => changed.push_str(word),
+        }
+    }
+    any.then_some(changed)
+}
+
+#[test]
+fn numbers_are_multiplied_and_words_are_not() {
+    assert_eq!(multiplied(" [\"40 um\", \"-1e-3 m/s^2\"] ", 10.0).unwrap(), " [\"400 um\", \"-0.01 m/s^2\"] ");
+    assert_eq!(multiplied("0.5", 2.0).unwrap(), "1");
+    assert_eq!(multiplied(" \"case-1\"", 2.0), None);
+    let found = slips("[a]\nb = 1 # 3\nc = \"x\"\nd = [2, 4]\n", 3.0);
+    let expected = [(2, "[a]\nb = 3 \nc = \"x\"\nd = [2, 4]\n"), (4, "[a]\nb = 1 # 3\nc = \"x\"\nd = [6, 12]\n")];
+    assert_eq!(found, expected.map(|(line, text)| (line, text.to_owned())));
+}
+
+#[test]
+fn one_ulp_in_any_field_is_a_difference() {
+    let built = build(&read("legs.toml"), None).unwrap_or_else(|findings| panic!("{findings:#?}"));
+    let text = |value: &Value| {
+        let mut lines = Vec::new();
+        fields("all", value, &mut lines);
+        lines.join("\n")
+    };
+    let long: Vec<f64> = (1..100).map(|k| 1.0 / f64::from(k)).collect();
+    let value =
+        json!({ "margins": built.figures, "kinematics": built.ir.kinematics, "bounds": built.ir.bounds, "long": long });
+    let committed = text(&value);
+    let mut tried = 0;
+    let mut wrong = value.clone();
+    each_number(&value, &mut String::new(), &mut |at| {
+        let number = wrong.pointer_mut(at).unwrap();
+        let right = number.clone();
+        *number = json!(right.as_f64().unwrap().next_up());
+        assert_ne!(text(&wrong), committed, "{at}");
+        *wrong.pointer_mut(at).unwrap() = right;
+        tried += 1;
+    });
+    assert!(tried > 100, "{tried} numbers");
+}
+
+#[test]
+fn a_line_that_is_another_or_missing_or_one_too_many_is_a_difference() {
+    let run = |lines: &'static [&str]| {
+        std::panic::catch_unwind(|| {
+            let committed = vec!["a".to_owned(), "b".to_owned()];
+            let mut golden = Golden { file: "none", committed, found: Vec::new(), bless: false };
+            lines.iter().for_each(|line| golden.line(*line));
+            golden.end();
+        })
+    };
+    assert!(run(&["a", "b"]).is_ok());
+    for wrong in [&["a"][..], &["a", "c"], &["b", "b"], &["a", "b", "c"], &[]] {
+        assert!(run(wrong).is_err(), "{wrong:?}");
+    }
+}
+
+/// Every floating-point number, by its JSON pointer.
+fn each_number(value: &Value, at: &mut String, act: &mut impl FnMut(&str)) {
+    let length = at.len();
+    let mut inside = |key: &str, value: &Value| {
+        let _ = write!(at, "/{key}");
+        each_number(value, at, act);
+        at.truncate(length);
+    };
+    match value {
+        Value::Object(map) => map.iter().for_each(|(key, value)| inside(key, value)),
+        Value::Array(items) => items.iter().enumerate().for_each(|(k, value)| inside(&k.to_string(), value)),
+        value if value.is_f64() => act(at),
+        _ => {}
+    }
+}
