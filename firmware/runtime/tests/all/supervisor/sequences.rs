@@ -325,3 +325,30 @@ fn channels_beyond_the_last_are_the_first() {
     supervisor.watch.turn = usize::MAX;
     assert_eq!((supervisor.watch.take_turn(), supervisor.watch.turn), (0, 1));
 }
+
+/// Zeros of either sign are equal numbers and different words, and every word of the state is in the digest.
+#[test]
+fn of_equal_expectations_the_first_is_kept() {
+    let plan = plan(&Bounds::legs());
+    for (first, second) in [(0.0, -0.0), (-0.0, 0.0)] {
+        let mut supervisor = Supervisor::<f64>::new();
+        for expected in [first, second] {
+            supervisor.look(&plan, 0, &Sample { word: 1.0, reading: 0.0, expected, error: None });
+        }
+        let kept = supervisor.watch.channels[0].expected;
+        assert_eq!(kept.map(f64::to_bits), [first; 2].map(f64::to_bits), "{second:?} after {first:?}");
+    }
+}
+
+/// However long something lasted, it is forgotten as fast as it was learned.
+#[test]
+fn a_count_of_samples_stops_where_they_have_lasted() {
+    let plan = plan(&Bounds::legs());
+    let mut supervisor = Supervisor::<f64>::new();
+    let sample = Sample { word: 1.0, reading: 1.0, expected: 0.0, error: Some(1.0) };
+    for _ in 0..20 {
+        supervisor.look(&plan, 0, &sample);
+    }
+    let channel = &supervisor.watch.channels[0];
+    assert_eq!((channel.disagreed, channel.astray), (plan.disagreement_samples, plan.tracking_samples));
+}
