@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use crate::controller::{ControllerError, TickController};
 use crate::description::DescriptionError;
 use crate::noise::{Gauge, Gaussian, amplifier};
-use crate::plant::{NoiseParameters, Plant};
+use crate::plant::{LegParameters, NoiseParameters, Plant};
 use crate::trace::Trace;
 use crate::trajectory::LegTrajectory;
 
@@ -51,6 +51,14 @@ pub struct Preparation {
     pub update: f64,
     /// Drive at which the legs then stand, V, ≥ 0.
     pub rest: f64,
+}
+
+impl Preparation {
+    /// As the parameters of a leg say, to a drive of `rest` (V).
+    #[must_use]
+    pub fn of(leg: &LegParameters, rest: f64) -> Self {
+        Self { peak: leg.u_max, rate: leg.forc_rate_v_per_s, settle: leg.settle_s, update: leg.step_s, rest }
+    }
 }
 
 /// What the legs did, in metres.
@@ -327,18 +335,11 @@ struct Wiring {
 impl Wiring {
     fn of(controller: &dyn TickController) -> Result<Self, DescriptionError> {
         let description = controller.description();
-        let six = |stem: &str, find: &dyn Fn(&str) -> Result<usize, DescriptionError>| {
-            let mut places = [0; LEGS];
-            for (leg, place) in places.iter_mut().enumerate() {
-                *place = find(&format!("{stem}[{leg}]"))?;
-            }
-            Ok::<_, DescriptionError>(places)
-        };
         Ok(Self {
-            setpoint: six("setpoint", &|name| description.input(name))?,
-            displacement: six("displacement", &|name| description.input(name))?,
-            voltage: six("voltage", &|name| description.output(name))?,
-            requested: six("requested", &|name| description.output(name))?,
+            setpoint: description.inputs("setpoint")?,
+            displacement: description.inputs("displacement")?,
+            voltage: description.outputs("voltage")?,
+            requested: description.outputs("requested")?,
         })
     }
 }
@@ -346,10 +347,11 @@ impl Wiring {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::description::{Description, tests::six_legs};
+    use crate::controller::StandIn;
+    use crate::description::tests::six_legs;
     use crate::word::Scalar;
 
-    /// A leg of 1 µm/V, at once; it notes what it was told.
+    /// A leg of 1 µm/V, without delay.
     #[derive(Clone, Default)]
     struct Spring {
         drive: f64,
@@ -362,43 +364,6 @@ mod tests {
         }
         fn displacement(&self) -> f64 {
             5e-6 + self.drive * 1e-6
-        }
-        fn reset(&mut self) {
-            self.drive = 0.0;
-        }
-    }
-
-    /// Outputs setpoint · 1e6 V, requests the set-point, and counts ticks in its digest.
-    struct Follower {
-        description: Description,
-        ticks: u64,
-        gain: f64,
-    }
-
-    impl TickController for Follower {
-        fn description(&self) -> &Description {
-            &self.description
-        }
-        fn default_config(&self) -> Vec<u64> {
-            vec![0; 3]
-        }
-        fn configure(&mut self, _words: &[u64]) -> Result<(), ControllerError> {
-            Ok(())
-        }
-        fn reset(&mut self) {
-            self.ticks = 0;
-        }
-        fn step(&mut self, input: &[u64], output: &mut [u64]) {
-            let scalar = self.description.scalar;
-            for leg in 0..LEGS {
-                let setpoint = scalar.decode(input[leg]);
-                output[leg] = scalar.encode(setpoint * self.gain);
-                output[LEGS + leg] = input[leg];
-            }
-            self.ticks += 1;
-        }
-        fn state_digest(&self) -> u64 {
-            self.ticks
         }
     }
 
@@ -420,8 +385,16 @@ mod tests {
         rig
     }
 
-    fn follower(gain: f64) -> Follower {
-        Follower { description: six_legs(Scalar::F64), ticks: 99, gain }
+    /// Outputs setpoint · `gain` V, requests the set-point, and counts ticks in its digest.
+    fn follower(gain: f64) -> StandIn<impl FnMut(&mut u64, &[u64], &mut [u64])> {
+        let tick = move |ticks: &mut u64, input: &[u64], output: &mut [u64]| {
+            for leg in 0..LEGS {
+                output[leg] = (f64::from_bits(input[leg]) * gain).to_bits();
+                output[LEGS + leg] = input[leg];
+            }
+            *ticks += 1;
+        };
+        StandIn { description: six_legs(Scalar::F64), state: 99, tick }
     }
 
     #[test]

@@ -45,6 +45,38 @@ pub trait TickController {
     fn state_digest(&self) -> u64;
 }
 
+/// A controller of a few lines, for tests: a function of its state, input and output is its tick. It takes any settings and
+/// has none; its digest is its state, which a reset makes 0.
+pub struct StandIn<F> {
+    /// Names and arithmetic.
+    pub description: Description,
+    /// What it remembers.
+    pub state: u64,
+    /// One tick.
+    pub tick: F,
+}
+
+impl<F: FnMut(&mut u64, &[u64], &mut [u64])> TickController for StandIn<F> {
+    fn description(&self) -> &Description {
+        &self.description
+    }
+    fn default_config(&self) -> Vec<u64> {
+        vec![0; self.description.config_names.len()]
+    }
+    fn configure(&mut self, _words: &[u64]) -> Result<(), ControllerError> {
+        Ok(())
+    }
+    fn reset(&mut self) {
+        self.state = 0;
+    }
+    fn step(&mut self, input: &[u64], output: &mut [u64]) {
+        (self.tick)(&mut self.state, input, output);
+    }
+    fn state_digest(&self) -> u64 {
+        self.state
+    }
+}
+
 /// Why a controller cannot be run.
 #[derive(Debug)]
 pub enum ControllerError {

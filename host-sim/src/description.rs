@@ -138,6 +138,22 @@ impl Description {
         position(&self.output_names, name)
     }
 
+    /// Places of the six input words `stem[0]` to `stem[5]`.
+    ///
+    /// # Errors
+    /// If one is missing.
+    pub fn inputs(&self, stem: &str) -> Result<[usize; 6], DescriptionError> {
+        six(&self.input_names, stem)
+    }
+
+    /// Places of the six output words `stem[0]` to `stem[5]`.
+    ///
+    /// # Errors
+    /// If one is missing.
+    pub fn outputs(&self, stem: &str) -> Result<[usize; 6], DescriptionError> {
+        six(&self.output_names, stem)
+    }
+
     /// Sets one configuration word by name, as a real or an integer according to its kind.
     ///
     /// # Errors
@@ -170,6 +186,20 @@ pub(crate) fn fields(text: &str) -> BTreeMap<&str, &str> {
     text.lines().filter_map(|line| line.split_once('=')).collect()
 }
 
+/// Names of words that come in sixes, `stem[0]` to `stem[5]` of each stem.
+#[must_use]
+pub fn indexed(stems: &[&str]) -> Vec<String> {
+    stems.iter().flat_map(|stem| (0..6).map(move |k| format!("{stem}[{k}]"))).collect()
+}
+
+fn six(names: &[String], stem: &str) -> Result<[usize; 6], DescriptionError> {
+    let mut places = [0; 6];
+    for (place, name) in places.iter_mut().zip(indexed(&[stem])) {
+        *place = position(names, &name)?;
+    }
+    Ok(places)
+}
+
 fn position(names: &[String], name: &str) -> Result<usize, DescriptionError> {
     names
         .iter()
@@ -183,9 +213,6 @@ pub(crate) mod tests {
 
     /// A controller of six legs with the interface of the emitted one.
     pub(crate) fn six_legs(scalar: Scalar) -> Description {
-        let indexed = |stems: &[&str]| -> Vec<String> {
-            stems.iter().flat_map(|stem| (0..6).map(move |leg| format!("{stem}[{leg}]"))).collect()
-        };
         let mut output_names = indexed(&["voltage", "requested", "demand", "level", "drift", "dac_code"]);
         output_names.push("status".to_owned());
         Description {

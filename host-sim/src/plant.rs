@@ -9,7 +9,7 @@ mod play;
 mod stack;
 
 pub use leg::LegPlant;
-pub(crate) use parameters::Bound;
+pub(crate) use parameters::{Bound, checked};
 pub use parameters::{LegParameters, NoiseParameters, ParameterError, REFERENCE_LEG};
 pub use stack::Stack;
 
@@ -21,9 +21,6 @@ pub trait Plant {
 
     /// Displacement now, m, as [`Plant::hold`] returned it last.
     fn displacement(&self) -> f64;
-
-    /// Back to the leg as built: never driven, at rest.
-    fn reset(&mut self);
 
     /// Drives a straight line from `from` to `to` (V) in `duration` (s), as steps of `update` (s) or a little less,
     /// each at the value of its end, and returns the displacement at the end (m).

@@ -22,48 +22,24 @@ pub fn replay(controller: &mut dyn TickController, recording: &InputRecording) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::controller::ControllerError;
-    use crate::description::{Description, tests::six_legs};
+    use crate::controller::StandIn;
+    use crate::description::tests::six_legs;
     use crate::stimulus::{Setpoints, record};
     use crate::trace::first_difference;
     use crate::word::Scalar;
-
-    /// Adds its inputs' bits, scaled by one constant: every bit of history shows in its digest.
-    struct Mixer {
-        description: Description,
-        constant: u64,
-        sum: u64,
-    }
-
-    impl TickController for Mixer {
-        fn description(&self) -> &Description {
-            &self.description
-        }
-        fn default_config(&self) -> Vec<u64> {
-            vec![0; 3]
-        }
-        fn configure(&mut self, _words: &[u64]) -> Result<(), ControllerError> {
-            Ok(())
-        }
-        fn reset(&mut self) {
-            self.sum = 0;
-        }
-        fn step(&mut self, input: &[u64], output: &mut [u64]) {
-            for (word, slot) in input.iter().zip(output) {
-                self.sum = self.sum.wrapping_mul(31).wrapping_add(*word);
-                *slot = word.wrapping_add(if *word == 0 { self.constant } else { 0 });
-            }
-        }
-        fn state_digest(&self) -> u64 {
-            self.sum
-        }
-    }
 
     fn trace(constant: u64) -> Trace {
         let setpoints = Setpoints::Leg { stroke: 6e-5, everett: vec![vec![0.0], vec![6e-5, 0.0]] };
         let description = six_legs(Scalar::F64);
         let recording = record(&description, &setpoints, 2000, 5).unwrap();
-        replay(&mut Mixer { description, constant, sum: 77 }, &recording)
+        // Adds its inputs' bits, scaled by one constant: every bit of history shows in its digest.
+        let tick = |sum: &mut u64, input: &[u64], output: &mut [u64]| {
+            for (word, slot) in input.iter().zip(output) {
+                *sum = sum.wrapping_mul(31).wrapping_add(*word);
+                *slot = word.wrapping_add(if *word == 0 { constant } else { 0 });
+            }
+        };
+        replay(&mut StandIn { description, state: 77, tick }, &recording)
     }
 
     #[test]

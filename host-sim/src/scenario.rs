@@ -45,16 +45,9 @@ impl LegScenario {
         samples_per_period: u32,
         [lowest, rest]: [f64; 2],
     ) -> Self {
-        let first = &legs[0];
         let mut prepared = Rig::new(legs.each_ref().map(LegPlant::new), noise, seed);
         prepared.set_lowest_voltage(lowest);
-        prepared.prepare(&Preparation {
-            peak: first.u_max,
-            rate: first.forc_rate_v_per_s,
-            settle: first.settle_s,
-            update: first.step_s,
-            rest: rest - lowest,
-        });
+        prepared.prepare(&Preparation::of(&legs[0], rest - lowest));
         Self { prepared, samples_per_period: samples_per_period.max(1) }
     }
 
@@ -120,7 +113,7 @@ impl LegScenario {
     }
 }
 
-/// The spec's configuration with another mode, and leg displacements as set-points.
+/// The spec's configuration with another mode; for six legs with leg displacements as set-points.
 ///
 /// # Errors
 /// If the controller has no such word or refuses the mode.

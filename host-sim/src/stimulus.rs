@@ -69,9 +69,6 @@ enum Kind {
 const CYCLE: [Kind; 7] =
     [Kind::Smooth, Kind::White, Kind::Thresholds, Kind::Saturating, Kind::Hold, Kind::Special, Kind::White];
 
-/// Shortest and longest stretch, rows.
-const STRETCH: (u64, u64) = (20, 200);
-
 /// Makes `rows` rows for a controller from `seed`.
 ///
 /// # Errors
@@ -82,32 +79,39 @@ pub fn record(
     rows: usize,
     seed: u64,
 ) -> Result<InputRecording, DescriptionError> {
-    let width = description.input_names.len();
-    let mut places = [[0; LEGS]; 2];
-    for (stem, places) in ["setpoint", "displacement"].iter().zip(&mut places) {
-        for (leg, place) in places.iter_mut().enumerate() {
-            *place = description.input(&format!("{stem}[{leg}]"))?;
-        }
-    }
+    let places = [description.inputs("setpoint")?, description.inputs("displacement")?];
     let mut generator = Generator::new(setpoints, seed);
-    let mut words = vec![0; rows * width];
-    let mut stretches = CYCLE.iter().cycle();
-    let mut kind = Kind::Smooth;
-    let mut left = 0;
-    for row in words.chunks_exact_mut(width.max(1)) {
-        if left == 0 {
-            kind = stretches.next().copied().unwrap_or(kind);
-            left = STRETCH.0 + generator.draw.below(STRETCH.1 - STRETCH.0);
-            generator.begin(kind);
-        }
-        left -= 1;
+    Ok(in_stretches(description, rows, &CYCLE, &mut generator, Generator::begin, |generator, kind, row| {
         let (setpoint, displacement) = generator.row(kind);
         for leg in 0..LEGS {
             row[places[0][leg]] = generator.draw.word(description.scalar, kind == Kind::Special, setpoint[leg]);
             row[places[1][leg]] = generator.draw.word(description.scalar, kind == Kind::Special, displacement[leg]);
         }
+    }))
+}
+
+/// Rows in stretches, whose kinds follow each other as in `cycle`: `begin` says how many rows a stretch has, `fill` makes them.
+fn in_stretches<G, K: Copy>(
+    description: &Description,
+    rows: usize,
+    cycle: &[K],
+    generator: &mut G,
+    begin: impl Fn(&mut G, K) -> u64,
+    fill: impl Fn(&mut G, K, &mut [u64]),
+) -> InputRecording {
+    let width = description.input_names.len();
+    let mut words = vec![0; rows * width];
+    let mut rows = words.chunks_exact_mut(width.max(1));
+    for kind in cycle.iter().cycle() {
+        if rows.len() == 0 {
+            break;
+        }
+        let length = begin(generator, *kind);
+        for row in rows.by_ref().take(length as usize) {
+            fill(generator, *kind, row);
+        }
     }
-    Ok(InputRecording { width, words })
+    InputRecording { width, words }
 }
 
 /// State of the generator within and between stretches.
@@ -146,7 +150,8 @@ impl<'a> Generator<'a> {
         }
     }
 
-    fn begin(&mut self, kind: Kind) {
+    fn begin(&mut self, kind: Kind) -> u64 {
+        let length = self.draw.stretch();
         if kind == Kind::Smooth {
             for leg in 0..LEGS {
                 // 10 to 1000 rows per period.
@@ -156,6 +161,7 @@ impl<'a> Generator<'a> {
         if kind == Kind::Thresholds {
             self.walks = std::array::from_fn(|_| Walk::default());
         }
+        length
     }
 
     fn row(&mut self, kind: Kind) -> ([f64; LEGS], [f64; LEGS]) {

@@ -6,31 +6,15 @@
 use std::time::Instant;
 
 use host_sim::plant::LegParameters;
-use host_sim::platform::rig::{Noise, Record, RunOptions};
+use host_sim::platform::rig::{Noise, PoseSample, Record, RunOptions};
 use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, PLATFORM_MODES, select};
 use host_sim::platform::{PlatformRig, PlatformScenario, Specimen, WorkPart};
-use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
+use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use oracle::design::{Deviation, Gains, Rule};
 use oracle::{PlatformOracle, Settings};
 
 const PERIOD: f64 = 1e-4;
-const PARTS: [(&str, WorkPart); 2] = [
-    ("glass", WorkPart { stiffness: [2.4e6, 2.4e6, 3e6], tip: [0.0, 0.0, 0.04], one_sided: false }),
-    ("aluminium", WorkPart { stiffness: [0.96e6, 0.96e6, 1.2e6], tip: [0.0, 0.0, 0.04], one_sided: false }),
-];
-
-fn paper(path: PaperPath, frequency: f64) -> PaperPose {
-    PaperPose { path, reading: Reading::Corrected, frequency }
-}
-
-/// Base N of the study: notch of ζ_d = 1 and gains by hand; P alone as tuned there.
-fn base_n(specimen: &Specimen) -> Settings {
-    Settings {
-        combined: Gains { proportional: 0.05, integral: 150.0, level: 450.0, drift: 19.6 },
-        position: Gains { proportional: 0.056, integral: 1007.0, level: 0.0, drift: 0.0 },
-        ..Settings::of(specimen, PERIOD, Some(1.0))
-    }
-}
+const PARTS: [(&str, WorkPart); 2] = [("glass", WorkPart::glass()), ("aluminium", WorkPart::aluminium())];
 
 fn scenario(specimen: &Specimen, settings: &Settings) -> PlatformScenario {
     PlatformScenario::new(specimen, &Noise::of(specimen), 1, RunOptions::new(settings.plant.period, settings.bias))
@@ -42,12 +26,12 @@ fn oracle(settings: &Settings) -> PlatformOracle {
 
 /// Tables 5 to 8.
 fn free(specimen: &Specimen) {
-    let settings = base_n(specimen);
+    let settings = Settings::base_n(specimen);
     let scenario = scenario(specimen, &settings);
     let mut controller = oracle(&settings);
     let runs: Vec<(&str, f64, PaperPose)> = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)]
         .into_iter()
-        .flat_map(|(name, path)| [0.1, 1.0, 10.0].map(|f| (name, f, paper(path, f))))
+        .flat_map(|(name, path)| [0.1, 1.0, 10.0].map(|f| (name, f, PaperPose::corrected(path, f))))
         .collect();
     let named: Vec<NamedTrajectory> = runs
         .iter()
@@ -67,11 +51,13 @@ fn free(specimen: &Specimen) {
 
 /// Table 9.
 fn machining(specimen: &Specimen) {
-    let settings = base_n(specimen);
+    let settings = Settings::base_n(specimen);
     let scenario = scenario(specimen, &settings);
     let mut controller = oracle(&settings);
     let modes = [MACHINING_MODES[0], PLATFORM_MODES[3], MACHINING_MODES[1]];
-    let table = scenario.machining(&mut controller, &modes, &PARTS, &paper(PaperPath::Machining, 1.0)).expect("a run");
+    let table = scenario
+        .machining(&mut controller, &modes, &PARTS, &PaperPose::corrected(PaperPath::Machining, 1.0))
+        .expect("a run");
     println!("{}", table.to_text());
     println!("study, base N, no K_e: P 15.0 nm 74 nrad, F 4.9/26, P/F 2.3/21; aluminium 11.9/73, 3.1/22, 2.3/21\n");
 }
@@ -105,21 +91,41 @@ impl PoseTrajectory for Climb {
     }
 }
 
+/// A run without noise, `delay` ticks late, with every sample.
+fn samples(
+    specimen: &Specimen,
+    settings: &Settings,
+    mode: u32,
+    delay: usize,
+    trajectory: &dyn PoseTrajectory,
+) -> Vec<PoseSample> {
+    let mut options = RunOptions::new(settings.plant.period, settings.bias);
+    options.latency = delay;
+    options.record = Record::Samples;
+    let mut controller = oracle(settings);
+    select(&mut controller, mode).expect("a mode");
+    let scenario = PlatformScenario::new(specimen, &Noise::NONE, 1, options);
+    scenario.run(&mut controller, trajectory).expect("a run").samples
+}
+
+/// The largest number between two, to 1 %, that is `good`.
+fn largest(mut low: f64, mut high: f64, good: impl Fn(f64) -> bool) -> f64 {
+    while high / low > 1.01 {
+        let middle = (low * high).sqrt();
+        if good(middle) { low = middle } else { high = middle }
+    }
+    (low * high).sqrt()
+}
+
 /// P alone while climbing: largest factor on its gains without ringing, and λ, the legs' slope over ρ̂, seen there.
 fn simulated_position_limit(specimen: &Specimen, settings: &Settings, delay: usize, linear: f64) -> (f64, f64) {
     let run = |factor: f64| {
         let scaled = Settings { position: settings.position.scaled(factor), ..settings.clone() };
-        let mut options = RunOptions::new(settings.plant.period, settings.bias);
-        options.latency = delay;
-        options.record = Record::Samples;
-        let scenario = PlatformScenario::new(specimen, &Noise::NONE, 1, options);
-        let mut controller = oracle(&scaled);
-        select(&mut controller, PLATFORM_MODES[0].1).expect("a mode");
-        scenario.run(&mut controller, &Climb).expect("a run").samples
+        samples(specimen, &scaled, PLATFORM_MODES[0].1, delay, &Climb)
     };
     let legs = |pose: &[f64; 6]| specimen.nominal.geometry().extensions(pose);
     // Second differences over ten ticks see ringing and not the climb.
-    let ringing = |samples: &[host_sim::platform::rig::PoseSample]| {
+    let ringing = |samples: &[PoseSample]| {
         let late = &samples[samples.len() * 8 / 10..];
         let mut sum = 0.0;
         for window in late.windows(21) {
@@ -131,17 +137,13 @@ fn simulated_position_limit(specimen: &Specimen, settings: &Settings, delay: usi
         }
         (sum / (6 * late.len()) as f64).sqrt()
     };
-    let (mut low, mut high) = (0.4 * linear, 2.5 * linear);
-    let quiet = ringing(&run(low));
-    while high / low > 1.01 {
-        let middle = (low * high).sqrt();
-        if ringing(&run(middle)) < 3.0 * quiet + 2e-9 { low = middle } else { high = middle }
-    }
     let calm = run(0.4 * linear);
+    let quiet = ringing(&calm);
+    let limit = largest(0.4 * linear, 2.5 * linear, |factor| ringing(&run(factor)) < 3.0 * quiet + 2e-9);
     let (from, to) = (&calm[calm.len() / 2], &calm[calm.len() - 1]);
     let (a, b) = (legs(&from.tick.pose), legs(&to.tick.pose));
     let slopes = (0..6).map(|leg| (b[leg] - a[leg]) / (to.tick.voltage[leg] - from.tick.voltage[leg]));
-    ((low * high).sqrt(), slopes.sum::<f64>() / 6.0 / settings.drive.gain)
+    (limit, slopes.sum::<f64>() / 6.0 / settings.drive.gain)
 }
 
 /// Largest factor on the gains at which the simulated platform settles.
@@ -152,16 +154,10 @@ fn simulated_limit(specimen: &Specimen, settings: &Settings, mode: u32, delay: u
             position: settings.position.scaled(factor),
             ..settings.clone()
         };
-        let mut options = RunOptions::new(settings.plant.period, settings.bias);
-        options.latency = delay;
-        options.record = Record::Samples;
-        let scenario = PlatformScenario::new(specimen, &Noise::NONE, 1, options);
-        let mut controller = oracle(&scaled);
-        select(&mut controller, mode).expect("a mode");
-        let run = scenario.run(&mut controller, &Nudge).expect("a run");
+        let samples = samples(specimen, &scaled, mode, delay, &Nudge);
         // Growth of the error's rms from the third to the last tenth of the run.
         let rms = |from: usize, to: usize| {
-            let part = &run.samples[from * run.samples.len() / 10..to * run.samples.len() / 10];
+            let part = &samples[from * samples.len() / 10..to * samples.len() / 10];
             let legs = |pose: &[f64; 6]| specimen.nominal.geometry().extensions(pose);
             let mean: Vec<f64> =
                 (0..6).map(|k| part.iter().map(|s| legs(&s.tick.pose)[k]).sum::<f64>() / part.len() as f64).collect();
@@ -174,18 +170,13 @@ fn simulated_limit(specimen: &Specimen, settings: &Settings, mode: u32, delay: u
         // Converter steps keep a stable loop humming at some nanometres.
         rms(9, 10) < 20e-9 || rms(9, 10) < 0.5 * rms(2, 3)
     };
-    let (mut low, mut high) = (0.7 * linear, 1.4 * linear);
-    while high / low > 1.01 {
-        let middle = (low * high).sqrt();
-        if settles(middle) { low = middle } else { high = middle }
-    }
-    (low * high).sqrt()
+    largest(0.7 * linear, 1.4 * linear, settles)
 }
 
 /// Predicted against simulated limits of P alone. Its gain is that of the legs themselves: while plays stand it is half of
 /// what it is while they move, so its limit depends on the motion.
 fn positions(specimen: &Specimen) {
-    let settings = base_n(specimen);
+    let settings = Settings::base_n(specimen);
     let rule = Rule::of(&specimen.nominal, LegParameters::reference().tau_amp_s, PERIOD, Some(1.0));
     for delay in [0, 1] {
         let nominal = rule.margin(settings.position, Deviation { delay, ..Deviation::NONE });
@@ -221,7 +212,7 @@ fn limits(specimen: &Specimen) {
     }
     for delay in [0, 1] {
         let rule = Rule::of(&specimen.nominal, LegParameters::reference().tau_amp_s, PERIOD, Some(1.0));
-        let settings = base_n(specimen);
+        let settings = Settings::base_n(specimen);
         let linear = rule.margin(settings.combined, Deviation { delay, ..Deviation::NONE });
         let simulated = simulated_limit(specimen, &settings, 6, delay, linear);
         println!(
@@ -252,7 +243,7 @@ impl PoseTrajectory for OverRange {
 /// Recovery from an over-range demand.
 fn windup(specimen: &Specimen) {
     for (name, mode) in [PLATFORM_MODES[0], PLATFORM_MODES[6]] {
-        let settings = base_n(specimen);
+        let settings = Settings::base_n(specimen);
         let mut scenario = scenario(specimen, &settings);
         scenario.options.record = Record::Samples;
         let mut controller = oracle(&settings);
@@ -280,7 +271,7 @@ fn random(count: u32) {
         let mut controller = oracle(&settings);
         print!("  k {:.2e} ζ {:.3}", specimen.nominal.axial_stiffness_n_per_m, specimen.nominal.modal_damping);
         let table = scenario
-            .machining(&mut controller, &MACHINING_MODES, &PARTS, &paper(PaperPath::Machining, 1.0))
+            .machining(&mut controller, &MACHINING_MODES, &PARTS, &PaperPose::corrected(PaperPath::Machining, 1.0))
             .expect("a run");
         for (part, _) in PARTS {
             let (p, pf) = (table.row(part, "p").expect("made"), table.row(part, "pf-pcc").expect("made"));
@@ -290,7 +281,7 @@ fn random(count: u32) {
                 p.translation_nm, p.orientation_nrad, pf.translation_nm, pf.orientation_nrad, ratio[0], ratio[1]
             );
         }
-        let case = paper(PaperPath::Case1, 10.0);
+        let case = PaperPose::corrected(PaperPath::Case1, 10.0);
         let named = [NamedTrajectory { name: "case-1", frequency: 10.0, trajectory: &case }];
         let free = scenario.free_motion(&mut controller, &FREE_MODES, &named).expect("a run");
         let nm: Vec<String> = free.rows.iter().map(|row| format!("{:.1}", row.translation_nm())).collect();

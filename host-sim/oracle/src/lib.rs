@@ -5,7 +5,7 @@
 
 use host_sim::closed_loop::LEGS;
 use host_sim::controller::{ControllerError, TickController};
-use host_sim::description::Description;
+use host_sim::description::{Description, indexed};
 use host_sim::word::Scalar;
 
 pub mod design;
@@ -52,15 +52,14 @@ impl Oracle {
 
 /// The emitted controller's interface, as far as it goes here.
 fn description() -> Description {
-    let six = |stem: &str| (0..LEGS).map(move |leg| format!("{stem}[{leg}]")).collect::<Vec<_>>();
     Description {
         name: "oracle".to_owned(),
         digest: "0".to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scalar: Scalar::F64,
         config_names: ["mode", "level_weight", "drift_weight"].map(str::to_owned).to_vec(),
-        input_names: [six("setpoint"), six("displacement")].concat(),
-        output_names: [six("voltage"), six("requested"), six("demand"), six("level"), six("drift")].concat(),
+        input_names: indexed(&["setpoint", "displacement"]),
+        output_names: indexed(&["voltage", "requested", "demand", "level", "drift"]),
     }
 }
 

@@ -9,7 +9,7 @@
 //! ```
 //! N is the modal notch; J in the feedback is that of rest. Velocity forces C ḣ are left out: below 1 pm of leg
 //! displacement for the motion of a piezo platform. No bumpless change between modes. Set-points: bias by a fifth-order
-//! polynomial, hold and stream; another [`Generator`] can be plugged in.
+//! polynomial, hold and stream.
 
 mod generator;
 mod settings;
@@ -21,13 +21,12 @@ use super::notch::{Notch, NotchState};
 use super::preisach::{Memory, Table};
 use host_sim::closed_loop::LEGS;
 use host_sim::controller::{ControllerError, TickController};
-use host_sim::description::Description;
+use host_sim::description::{Description, indexed};
 use host_sim::platform::{Geometry, Masses, Matrix6, Probe, Six};
 use host_sim::trajectory::PoseTarget;
 use host_sim::word::Scalar;
 
-pub use generator::Generator;
-use generator::Plain;
+use generator::Generator;
 pub use settings::{Drive, Settings};
 
 type Matrix = SMatrix<f64, 6, 6>;
@@ -135,7 +134,7 @@ pub struct PlatformOracle {
     notch: Option<Notch>,
     config: Config,
     default: Config,
-    generator: Box<dyn Generator>,
+    generator: Generator,
     state: State,
     description: Description,
 }
@@ -189,27 +188,12 @@ impl PlatformOracle {
             notch,
             config: default.clone(),
             default,
-            generator: Box::new(Plain::new(settings.bias, settings.bias_time, plant.period)),
+            generator: Generator::new(settings.bias, settings.bias_time, plant.period),
             state: State::new(),
             description: description(),
         };
         out.gauge_inverse = out.gauge_slopes().try_inverse()?;
         Some(out)
-    }
-
-    /// Takes set-points from `generator` instead of its own.
-    pub fn set_generator(&mut self, generator: Box<dyn Generator>) {
-        self.generator = generator;
-    }
-
-    /// Default configuration with another stiffness of the environment (diagonal, N/m and N m/rad) and the pose at which it
-    /// is unloaded.
-    pub fn set_environment(&mut self, stiffness: &Six, rest: &Six) {
-        for config in [&mut self.default, &mut self.config] {
-            config.environment_stiffness = vector(stiffness);
-            config.environment_rest = vector(rest);
-            config.interaction = 1;
-        }
     }
 
     fn readings(&self, pose: &Vector) -> Vector {
@@ -254,9 +238,6 @@ impl PlatformOracle {
 
 /// The emitted controller's interface.
 pub fn description() -> Description {
-    let six = |stems: &[&str]| -> Vec<String> {
-        stems.iter().flat_map(|stem| (0..LEGS).map(move |k| format!("{stem}[{k}]"))).collect()
-    };
     let one = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
     Description {
         name: "platform-oracle".to_owned(),
@@ -265,17 +246,17 @@ pub fn description() -> Description {
         scalar: Scalar::F64,
         config_names: [
             one(&["mode", "interaction", "level_weight", "drift_weight", "max_step_codes", "code_min", "code_max"]),
-            six(&["kp", "ki", "kv", "position_kp", "position_ki", "position_kv"]),
-            six(&["environment_stiffness", "environment_rest"]),
+            indexed(&["kp", "ki", "kv", "position_kp", "position_ki", "position_kv"]),
+            indexed(&["environment_stiffness", "environment_rest"]),
         ]
         .concat(),
         input_names: [
             one(&["command", "selector", "sequence"]),
-            six(&["setpoint", "setpoint_rate", "setpoint_acceleration", "gauge", "wrench"]),
+            indexed(&["setpoint", "setpoint_rate", "setpoint_acceleration", "gauge", "wrench"]),
         ]
         .concat(),
         output_names: [
-            six(&["voltage", "requested", "demand", "level", "drift", "dac_code", "pose", "target", "load"]),
+            indexed(&["voltage", "requested", "demand", "level", "drift", "dac_code", "pose", "target", "load"]),
             one(&["status"]),
         ]
         .concat(),
@@ -398,7 +379,7 @@ impl TickController for PlatformOracle {
         }
 
         // Target and load of the coming interval.
-        let (target, generator_status) = self.generator.next(input[0], input[1], input[2], &wanted);
+        let (target, generator_status) = self.generator.next(input[0], &wanted);
         status |= generator_status;
         let mut push = match config.interaction {
             1 => config.environment_stiffness.component_mul(&(vector(&target.pose) - config.environment_rest)),

@@ -7,11 +7,13 @@
 /// A leg as built has every c at 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CreepBank {
-    rates: Vec<f64>,
-    weights: Vec<f64>,
-    thresholds: Vec<f64>,
-    /// Row per rate, column per threshold.
-    states: Vec<f64>,
+    /// a_j, 1/s.
+    pub(super) rates: Vec<f64>,
+    pub(super) weights: Vec<f64>,
+    /// r_k, V.
+    pub(super) thresholds: Vec<f64>,
+    /// c_jk, V: a row per rate, a column per threshold.
+    pub(super) states: Vec<f64>,
     /// 1 − e^(−a_j dt), per rate.
     gains: Vec<f64>,
 }
@@ -27,36 +29,6 @@ impl CreepBank {
             states: vec![0.0; rates.len() * thresholds.len()],
             gains: vec![0.0; rates.len()],
         }
-    }
-
-    /// a_j, 1/s.
-    pub(super) fn rates(&self) -> &[f64] {
-        &self.rates
-    }
-
-    /// w_j.
-    pub(super) fn weights(&self) -> &[f64] {
-        &self.weights
-    }
-
-    /// r_k, V.
-    pub(super) fn thresholds(&self) -> &[f64] {
-        &self.thresholds
-    }
-
-    /// c_jk, V: a row per rate.
-    pub(super) fn states(&self) -> &[f64] {
-        &self.states
-    }
-
-    /// Puts operator `k` to a state (V).
-    pub(super) fn set_state(&mut self, k: usize, state: f64) {
-        self.states[k] = state;
-    }
-
-    /// All operators back to 0.
-    pub fn reset(&mut self) {
-        self.states.fill(0.0);
     }
 
     /// Fixes the length of the steps that follow, s.

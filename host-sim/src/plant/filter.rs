@@ -5,7 +5,8 @@
 pub struct Lag {
     time_constant: f64,
     decay: f64,
-    output: f64,
+    /// Output now.
+    pub(super) output: f64,
 }
 
 impl Lag {
@@ -15,30 +16,14 @@ impl Lag {
         Self { time_constant, decay: 0.0, output: 0.0 }
     }
 
-    /// Output back to 0.
-    pub fn reset(&mut self) {
-        self.output = 0.0;
-    }
-
     /// Fixes the length of the steps that follow, s.
     pub fn set_step(&mut self, step: f64) {
         self.decay = self.decay_over(step);
     }
 
-    /// Output now.
-    #[must_use]
-    pub fn output(&self) -> f64 {
-        self.output
-    }
-
     /// e^(−step/τ).
     pub(super) fn decay_over(&self, step: f64) -> f64 {
         if self.time_constant > 0.0 { libm::exp(-step / self.time_constant) } else { 0.0 }
-    }
-
-    /// Puts the output to a value.
-    pub(super) fn set_output(&mut self, output: f64) {
-        self.output = output;
     }
 
     /// Holds `input` for one step.
@@ -69,12 +54,6 @@ impl Resonance {
             velocity: 0.0,
             transition: [[1.0, 0.0], [0.0, 1.0]],
         }
-    }
-
-    /// At rest at 0.
-    pub fn reset(&mut self) {
-        self.position = 0.0;
-        self.velocity = 0.0;
     }
 
     /// Fixes the length of the steps that follow, s.
@@ -118,7 +97,7 @@ mod tests {
             for _ in 0..steps {
                 lag.advance(1.0);
             }
-            assert!((lag.output() - (1.0 - libm::exp(-1.0))).abs() < 1e-12);
+            assert!((lag.output - (1.0 - libm::exp(-1.0))).abs() < 1e-12);
         }
     }
 

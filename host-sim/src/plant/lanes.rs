@@ -34,7 +34,8 @@ pub(crate) struct StackLanes {
     gain: Lane,
 }
 
-fn lane(of: impl Fn(usize) -> f64) -> Lane {
+/// A number of each leg, 0 in the idle lanes.
+pub(crate) fn lane(of: impl Fn(usize) -> f64) -> Lane {
     std::array::from_fn(|leg| if leg < 6 { of(leg) } else { 0.0 })
 }
 
@@ -42,32 +43,33 @@ impl StackLanes {
     /// Six stacks as they are, for steps of `step` (s). None if they have different numbers of operators.
     pub(crate) fn of(stacks: &[&Stack; 6], step: f64) -> Option<Self> {
         let first = stacks[0];
-        let (plays, rates, thresholds) = (first.plays.len(), first.creep.rates().len(), first.creep.thresholds().len());
-        let alike = |s: &&Stack| {
-            s.plays.len() == plays && s.creep.rates().len() == rates && s.creep.thresholds().len() == thresholds
-        };
-        if !stacks.iter().all(alike) {
+        let operators = |s: &Stack| [s.plays.states.len(), s.creep.rates.len(), s.creep.thresholds.len()];
+        let [plays, rates, thresholds] = operators(first);
+        if !stacks.iter().all(|stack| operators(stack) == operators(first)) {
             return None;
         }
         let play = |k: usize| {
-            let part = |which: usize| lane(|leg| stacks[leg].plays.operator(k)[which]);
-            [part(0), part(1), part(2)]
+            [
+                lane(|leg| stacks[leg].plays.thresholds[k]),
+                lane(|leg| stacks[leg].plays.weights[k]),
+                lane(|leg| stacks[leg].plays.states[k]),
+            ]
         };
         let creep = |k: usize| {
             let (rate, threshold) = (k / thresholds, k % thresholds);
             [
-                lane(|leg| -libm::expm1(-stacks[leg].creep.rates()[rate] * step)),
-                lane(|leg| stacks[leg].creep.weights()[rate] / thresholds as f64),
-                lane(|leg| stacks[leg].creep.thresholds()[threshold]),
-                lane(|leg| stacks[leg].creep.states()[k]),
+                lane(|leg| -libm::expm1(-stacks[leg].creep.rates[rate] * step)),
+                lane(|leg| stacks[leg].creep.weights[rate] / thresholds as f64),
+                lane(|leg| stacks[leg].creep.thresholds[threshold]),
+                lane(|leg| stacks[leg].creep.states[k]),
             ]
         };
         Some(Self {
             step,
             rate_decay: lane(|leg| stacks[leg].rate.decay_over(step)),
-            rate: lane(|leg| stacks[leg].rate.output()),
-            rate_sensitivity: lane(|leg| stacks[leg].plays.rate().0),
-            rate_scale: lane(|leg| stacks[leg].plays.rate().1),
+            rate: lane(|leg| stacks[leg].rate.output),
+            rate_sensitivity: lane(|leg| stacks[leg].plays.rate_sensitivity),
+            rate_scale: lane(|leg| stacks[leg].plays.rate_scale),
             widening: lane(|leg| stacks[leg].widening),
             age: 0,
             plays: (0..plays).map(play).collect(),
@@ -80,13 +82,13 @@ impl StackLanes {
 
     /// Puts the states back into stacks of the same legs.
     pub(crate) fn put(&self, leg: usize, stack: &mut Stack) {
-        stack.rate.set_output(self.rate[leg]);
+        stack.rate.output = self.rate[leg];
         stack.widening = self.widening[leg];
         for (k, play) in self.plays.iter().enumerate() {
-            stack.plays.set_state(k, play[2][leg]);
+            stack.plays.states[k] = play[2][leg];
         }
         for (k, operator) in self.creep.iter().enumerate() {
-            stack.creep.set_state(k, operator[3][leg]);
+            stack.creep.states[k] = operator[3][leg];
         }
     }
 

@@ -57,7 +57,7 @@ impl LegPlant {
     }
 
     fn advance(&mut self, drive: f64) {
-        let before = self.amplifier.output();
+        let before = self.amplifier.output;
         let v = self.amplifier.advance(drive);
         let free = self.stack.advance(before, v);
         self.structure.advance(free);
@@ -77,12 +77,6 @@ impl Plant for LegPlant {
     fn displacement(&self) -> f64 {
         self.structure.position() * 1e-6
     }
-
-    fn reset(&mut self) {
-        self.amplifier.reset();
-        self.stack.reset();
-        self.structure.reset();
-    }
 }
 
 #[cfg(test)]
@@ -91,15 +85,6 @@ mod tests {
 
     fn reference() -> LegPlant {
         LegPlant::new(&LegParameters::reference())
-    }
-
-    #[test]
-    fn reset_is_the_leg_as_built() {
-        let mut leg = reference();
-        let first = leg.ramp(0.0, 60.0, 0.1, 1e-4);
-        leg.reset();
-        assert_eq!(leg.displacement(), 0.0);
-        assert_eq!(leg.ramp(0.0, 60.0, 0.1, 1e-4).to_bits(), first.to_bits());
     }
 
     #[test]

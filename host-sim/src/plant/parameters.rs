@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 
 /// Parameters of [`super::LegPlant`], field for field as in the file. Its module has the equations.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -124,11 +125,13 @@ impl LegParameters {
     /// If the file cannot be read, is not JSON of this shape, or a value is out of range: all findings, each with its field.
     pub fn load(path: &Path) -> Result<Self, ParameterError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| ParameterError {
-            file: file.clone(),
-            findings: vec![format!("cannot be read as text: {error}; name a JSON file of a leg plant")],
-        })?;
-        Self::from_json(&text, &file)
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::from_json(&text, &file),
+            Err(error) => {
+                let finding = format!("cannot be read as text: {error}; name a JSON file of a leg plant");
+                Err(ParameterError { file, findings: vec![finding] })
+            }
+        }
     }
 
     /// Parses and checks the text of a parameter file; `file` names it in errors.
@@ -136,12 +139,7 @@ impl LegParameters {
     /// # Errors
     /// As [`LegParameters::load`].
     pub fn from_json(text: &str, file: &str) -> Result<Self, ParameterError> {
-        let parameters: Self = serde_json::from_str(text).map_err(|error| ParameterError {
-            file: file.to_owned(),
-            findings: vec![format!("{error}; compare with plants/reference-leg.json")],
-        })?;
-        let findings = parameters.findings();
-        if findings.is_empty() { Ok(parameters) } else { Err(ParameterError { file: file.to_owned(), findings }) }
+        checked(text, file, "reference-leg.json", Self::findings)
     }
 
     fn findings(&self) -> Vec<String> {
@@ -198,6 +196,20 @@ impl LegParameters {
         }
         out
     }
+}
+
+/// Parameters from the text of a file, if there are no findings; `example` is the shipped file to compare with.
+pub(crate) fn checked<P: DeserializeOwned>(
+    text: &str,
+    file: &str,
+    example: &str,
+    findings: fn(&P) -> Vec<String>,
+) -> Result<P, ParameterError> {
+    let refused = |findings| ParameterError { file: file.to_owned(), findings };
+    let parameters =
+        serde_json::from_str(text).map_err(|error| refused(vec![format!("{error}; compare with plants/{example}")]))?;
+    let findings = findings(&parameters);
+    if findings.is_empty() { Ok(parameters) } else { Err(refused(findings)) }
 }
 
 /// One end of a range.

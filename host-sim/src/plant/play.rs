@@ -6,11 +6,15 @@
 /// A leg as built has every p at 0.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlayBank {
-    thresholds: Vec<f64>,
-    weights: Vec<f64>,
-    states: Vec<f64>,
-    rate_sensitivity: f64,
-    rate_scale: f64,
+    /// r_i, V.
+    pub(super) thresholds: Vec<f64>,
+    pub(super) weights: Vec<f64>,
+    /// p_i, V.
+    pub(super) states: Vec<f64>,
+    /// κ.
+    pub(super) rate_sensitivity: f64,
+    /// v0, V/s.
+    pub(super) rate_scale: f64,
 }
 
 impl PlayBank {
@@ -24,31 +28,6 @@ impl PlayBank {
             rate_sensitivity,
             rate_scale,
         }
-    }
-
-    /// Number of operators.
-    pub(super) fn len(&self) -> usize {
-        self.states.len()
-    }
-
-    /// Threshold (V), weight and state (V) of operator `k`.
-    pub(super) fn operator(&self, k: usize) -> [f64; 3] {
-        [self.thresholds[k], self.weights[k], self.states[k]]
-    }
-
-    /// κ and v0 (V/s).
-    pub(super) fn rate(&self) -> (f64, f64) {
-        (self.rate_sensitivity, self.rate_scale)
-    }
-
-    /// Puts operator `k` to a state (V).
-    pub(super) fn set_state(&mut self, k: usize, state: f64) {
-        self.states[k] = state;
-    }
-
-    /// All operators back to 0.
-    pub fn reset(&mut self) {
-        self.states.fill(0.0);
     }
 
     /// Factor on the thresholds at filtered rate `rate` (V/s).

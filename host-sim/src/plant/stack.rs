@@ -35,14 +35,6 @@ impl Stack {
         }
     }
 
-    /// As built: never driven.
-    pub fn reset(&mut self) {
-        self.rate.reset();
-        self.widening = 1.0;
-        self.plays.reset();
-        self.creep.reset();
-    }
-
     /// Fixes the length of the steps that follow, s.
     pub fn set_step(&mut self, step: f64) {
         self.step = step;

@@ -3,13 +3,16 @@
 /// τ v̇ = u − v, but |v̇| ≤ I/C. Exact for a held input, whichever of the two holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Amplifier {
-    time_constant: f64,
-    slew: f64,
+    /// τ, s.
+    pub(super) time_constant: f64,
+    /// I/C, V/s.
+    pub(super) slew: f64,
     /// Largest |u − v| that the lag alone may have, V.
-    reach: f64,
+    pub(super) reach: f64,
     step: f64,
     decay: f64,
-    voltage: f64,
+    /// Stack voltage now, V.
+    pub(super) voltage: f64,
 }
 
 impl Amplifier {
@@ -24,37 +27,6 @@ impl Amplifier {
     pub fn set_step(&mut self, step: f64) {
         self.step = step;
         self.decay = if self.time_constant > 0.0 { libm::exp(-step / self.time_constant) } else { 0.0 };
-    }
-
-    /// τ, s.
-    pub(super) fn time_constant(&self) -> f64 {
-        self.time_constant
-    }
-
-    /// Largest |u − v| of the lag alone, V.
-    pub(super) fn reach(&self) -> f64 {
-        self.reach
-    }
-
-    /// I/C, V/s.
-    pub(super) fn slew(&self) -> f64 {
-        self.slew
-    }
-
-    /// Puts the stack to a voltage, V.
-    pub(super) fn set_voltage(&mut self, voltage: f64) {
-        self.voltage = voltage;
-    }
-
-    /// Stack voltage now, V.
-    #[must_use]
-    pub fn voltage(&self) -> f64 {
-        self.voltage
-    }
-
-    /// Discharged: 0 V.
-    pub fn reset(&mut self) {
-        self.voltage = 0.0;
     }
 
     /// Holds `input` (V) for one step; returns the stack voltage at its end.
@@ -91,7 +63,7 @@ mod tests {
         for _ in 0..steps {
             amplifier.advance(input);
         }
-        amplifier.voltage()
+        amplifier.voltage
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A work part that the tip on the platform presses into.
 
 use super::geometry::{angles, point_jacobian, rate_matrix, rotation};
-use super::linear::{Matrix3, Matrix6, Six, Three, add_congruent, apply, cross};
+use super::linear::{Matrix3, Matrix6, Six, Three, apply, congruent, cross};
 
 /// A spring between tip and surroundings, in axes parallel to the base frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,19 +17,19 @@ pub struct WorkPart {
 impl WorkPart {
     /// Diamond tip 40 mm above P_C on a part of `stiffness` k (N/m): K = diag(0.8, 0.8, 1) k, held both ways.
     #[must_use]
-    pub fn of_stiffness(stiffness: f64) -> Self {
+    pub const fn of_stiffness(stiffness: f64) -> Self {
         Self { stiffness: [0.8 * stiffness, 0.8 * stiffness, stiffness], tip: [0.0, 0.0, 0.04], one_sided: false }
     }
 
     /// Glass, k = 3 MN/m: order of magnitude of a Rockwell tip at 1 to 10 µm of indentation.
     #[must_use]
-    pub fn glass() -> Self {
+    pub const fn glass() -> Self {
         Self::of_stiffness(3e6)
     }
 
     /// Aluminium, k = 1.2 MN/m.
     #[must_use]
-    pub fn aluminium() -> Self {
+    pub const fn aluminium() -> Self {
         Self::of_stiffness(1.2e6)
     }
 
@@ -37,9 +37,7 @@ impl WorkPart {
     #[must_use]
     pub fn stiffness_matrix(&self, pose: &Six) -> Matrix6 {
         let arm = apply(&rotation(angles(pose)), &self.tip);
-        let mut out = [[0.0; 6]; 6];
-        add_congruent(&mut out, &point_jacobian(arm, &rate_matrix(angles(pose))), &self.stiffness);
-        out
+        congruent(&point_jacobian(arm, &rate_matrix(angles(pose))), &self.stiffness)
     }
 }
 

@@ -1,7 +1,7 @@
 //! User coordinates: what a set-point means for P_C when the work frame is turned and rotations turn about a tool point.
 
 use super::geometry::{angles, rotation};
-use super::linear::{Matrix3, Six, Three, apply};
+use super::linear::{Matrix3, Six, Three, apply, product, transposed};
 
 /// Work axes and tool point of a controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,16 +36,6 @@ impl UserFrames {
         let z = libm::atan2(turn[1][0], turn[0][0]);
         [at[0], at[1], at[2], x, y, z]
     }
-}
-
-fn transposed(m: &Matrix3) -> Matrix3 {
-    std::array::from_fn(|row| std::array::from_fn(|column| m[column][row]))
-}
-
-fn product(a: &Matrix3, b: &Matrix3) -> Matrix3 {
-    std::array::from_fn(|row| {
-        std::array::from_fn(|column| a[row][0] * b[0][column] + a[row][1] * b[1][column] + a[row][2] * b[2][column])
-    })
 }
 
 #[cfg(test)]

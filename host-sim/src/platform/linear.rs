@@ -69,6 +69,13 @@ pub(crate) fn add_congruent<const R: usize>(sum: &mut Matrix6, a: &[[f64; 6]; R]
     }
 }
 
+/// Aᵀ · diag(weights) · A.
+pub(crate) fn congruent<const R: usize>(a: &[[f64; 6]; R], weights: &[f64; R]) -> Matrix6 {
+    let mut sum = [[0.0; 6]; 6];
+    add_congruent(&mut sum, a, weights);
+    sum
+}
+
 /// Transposed matrix.
 pub(crate) fn transposed<const R: usize, const C: usize>(matrix: &[[f64; C]; R]) -> [[f64; R]; C] {
     std::array::from_fn(|column| std::array::from_fn(|row| matrix[row][column]))

@@ -29,7 +29,7 @@ impl Actuator {
 
     /// Holds `voltage` for one step, the `first` of an interval or a later one.
     fn advance(&mut self, voltage: f64, first: bool) {
-        let before = self.amplifier.voltage();
+        let before = self.amplifier.voltage;
         let after = self.amplifier.advance(voltage);
         self.displacement =
             if first { self.stack.advance(before, after) } else { self.stack.advance_on(before, after) };
@@ -187,7 +187,7 @@ impl Machine {
     #[must_use]
     pub fn stack_voltages(&self) -> Six {
         match &self.whole_tick {
-            None => self.actuators.each_ref().map(|actuator| actuator.amplifier.voltage()),
+            None => self.actuators.each_ref().map(|actuator| actuator.amplifier.voltage),
             Some(whole) => std::array::from_fn(|leg| whole.leg(leg).1),
         }
     }

@@ -1,15 +1,13 @@
 //! Parameter file of a platform plant: JSON, SI units. What the paper does not give is assumed, as in the spec of the
 //! reference platform; the legs have a file of their own ([`LegParameters`]).
 
-use std::path::Path;
-
 use serde::Deserialize;
 
 use super::gauge::Probe;
 use super::geometry::Geometry;
 use super::inertia::Masses;
 use super::linear::{Matrix3, Six, Three, dot};
-use crate::plant::{Bound, ParameterError};
+use crate::plant::{Bound, ParameterError, checked};
 
 /// Places of the joints.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -109,30 +107,12 @@ impl PlatformParameters {
         }
     }
 
-    /// Reads and checks a parameter file.
-    ///
-    /// # Errors
-    /// If the file cannot be read, is not JSON of this shape, or a value is out of range: all findings, each with its field.
-    pub fn load(path: &Path) -> Result<Self, ParameterError> {
-        let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| ParameterError {
-            file: file.clone(),
-            findings: vec![format!("cannot be read as text: {error}; name a JSON file of a platform plant")],
-        })?;
-        Self::from_json(&text, &file)
-    }
-
     /// Parses and checks the text of a parameter file; `file` names it in errors.
     ///
     /// # Errors
-    /// As [`PlatformParameters::load`].
+    /// If it is not JSON of this shape, or a value is out of range: all findings, each with its field.
     pub fn from_json(text: &str, file: &str) -> Result<Self, ParameterError> {
-        let parameters: Self = serde_json::from_str(text).map_err(|error| ParameterError {
-            file: file.to_owned(),
-            findings: vec![format!("{error}; compare with plants/reference-platform.json")],
-        })?;
-        let findings = parameters.findings();
-        if findings.is_empty() { Ok(parameters) } else { Err(ParameterError { file: file.to_owned(), findings }) }
+        checked(text, file, "reference-platform.json", Self::findings)
     }
 
     /// Joints.

@@ -102,14 +102,6 @@ impl PlatformRig {
         self
     }
 
-    /// Replaces the gauges' places.
-    #[must_use]
-    pub fn with_probes(mut self, probes: [Probe; 6]) -> Self {
-        self.probes = probes;
-        self.rest_distances = probes.map(|probe| probe.distance(self.height, &[0.0; 6]));
-        self
-    }
-
     /// Pre-cycle, rest and zero of the gauges, see [`Machine::prepare`].
     pub fn prepare(&mut self, preparation: &Preparation) {
         self.machine.prepare(preparation);

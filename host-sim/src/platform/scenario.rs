@@ -5,8 +5,10 @@ use super::rig::{Noise, PlatformRig, PlatformRun, RunOptions};
 use super::specimen::Specimen;
 use super::table::{MachiningTable, PoseRow, PoseTable};
 use crate::closed_loop::{Preparation, RunError};
-use crate::controller::{ControllerError, TickController};
+use crate::controller::TickController;
 use crate::trajectory::PoseTrajectory;
+
+pub use crate::scenario::select;
 
 /// Modes of a platform controller with the value of the `mode` word: P, F and P/F with the inverse hysteresis alone, with
 /// EWMA and with PCC.
@@ -42,14 +44,8 @@ impl PlatformScenario {
     #[must_use]
     pub fn new(specimen: &Specimen, noise: &Noise, seed: u64, options: RunOptions) -> Self {
         let mut prepared = PlatformRig::new(specimen, noise, seed);
-        let first = &specimen.legs[0];
-        prepared.prepare(&Preparation {
-            peak: first.u_max,
-            rate: first.forc_rate_v_per_s,
-            settle: first.settle_s,
-            update: first.step_s,
-            rest: specimen.nominal.rest_voltage_v - specimen.nominal.lowest_voltage_v,
-        });
+        let nominal = &specimen.nominal;
+        prepared.prepare(&Preparation::of(&specimen.legs[0], nominal.rest_voltage_v - nominal.lowest_voltage_v));
         Self { prepared, options }
     }
 
@@ -146,14 +142,4 @@ impl PlatformScenario {
         }
         Ok(table)
     }
-}
-
-/// The spec's configuration with another mode.
-///
-/// # Errors
-/// If the controller has no such word or refuses the mode.
-pub fn select(controller: &mut dyn TickController, mode: u32) -> Result<(), ControllerError> {
-    let mut words = controller.default_config();
-    controller.description().set_config(&mut words, "mode", f64::from(mode))?;
-    controller.configure(&words)
 }

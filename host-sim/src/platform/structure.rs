@@ -15,7 +15,9 @@
 use super::contact::{Contact, WorkPart};
 use super::geometry::{Geometry, angles, rate_matrix};
 use super::inertia::Masses;
-use super::linear::{Matrix6, Six, apply, apply_transposed, exponential, generalised_eigen, inverse, product};
+use super::linear::{
+    Matrix6, Six, apply, apply_transposed, congruent, exponential, generalised_eigen, inverse, product,
+};
 
 mod lanes;
 
@@ -81,12 +83,6 @@ impl StructureParameters {
         }
         out
     }
-}
-
-fn congruent(jacobian: &Matrix6, weights: &Six) -> Matrix6 {
-    let mut out = [[0.0; 6]; 6];
-    super::linear::add_congruent(&mut out, jacobian, weights);
-    out
 }
 
 fn sum(a: &Matrix6, b: &Matrix6) -> Matrix6 {

@@ -9,6 +9,11 @@ use super::linear::Six;
 /// Names of the pose coordinates.
 pub const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
+/// Length of the first three numbers, and of the last three.
+fn norms([x, y, z, a, b, c]: Six) -> [f64; 2] {
+    [libm::sqrt(x * x + y * y + z * z), libm::sqrt(a * a + b * b + c * c)]
+}
+
 /// Errors of a pose over a run, added up as it goes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PoseErrors {
@@ -30,10 +35,9 @@ impl PoseErrors {
                 self.peaks[k] = error[k].abs();
             }
         }
-        let norm = |a: f64, b: f64, c: f64| libm::sqrt(a * a + b * b + c * c);
-        let translation = norm(error[0], error[1], error[2]);
+        let [translation, orientation] = norms(*error);
         self.translation_norms += translation;
-        self.orientation_norms += norm(error[3], error[4], error[5]);
+        self.orientation_norms += orientation;
         if translation > self.largest_translation {
             self.largest_translation = translation;
         }
@@ -64,15 +68,13 @@ impl PoseErrors {
     /// Norm of the root mean squares of x, y and z, nm.
     #[must_use]
     pub fn rms_translation_nm(&self) -> f64 {
-        let [x, y, z, ..] = self.rms_nano();
-        libm::sqrt(x * x + y * y + z * z)
+        norms(self.rms_nano())[0]
     }
 
     /// Norm of the root mean squares of the three angles, nrad.
     #[must_use]
     pub fn rms_orientation_nrad(&self) -> f64 {
-        let [.., a, b, c] = self.rms_nano();
-        libm::sqrt(a * a + b * b + c * c)
+        norms(self.rms_nano())[1]
     }
 
     /// Mean of |error of P_C|, nm.
@@ -125,15 +127,13 @@ impl PoseRow {
     /// Norm of the errors of x, y and z, nm.
     #[must_use]
     pub fn translation_nm(&self) -> f64 {
-        let [x, y, z, ..] = self.rms_nano;
-        libm::sqrt(x * x + y * y + z * z)
+        norms(self.rms_nano)[0]
     }
 
     /// Norm of the errors of the angles, nrad.
     #[must_use]
     pub fn orientation_nrad(&self) -> f64 {
-        let [.., a, b, c] = self.rms_nano;
-        libm::sqrt(a * a + b * b + c * c)
+        norms(self.rms_nano)[1]
     }
 }
 
@@ -191,77 +191,53 @@ impl PoseTable {
 /// The paper's tables in nm and nrad: columns 0.1, 1 and 10 Hz for each of x, y, z (5, 7) and θx, θy, θz (6, 8).
 ///
 /// Rotations are printed as "n rad" and read as µrad: π/72 must be mrad for legs of 60 µm to reach it.
-const PAPER: [(&str, &str, [[f64; 3]; 6]); 6] = [
+const PAPER: [(&str, &str, [f64; 18]); 6] = [
     (
         "case-1",
         "pf-invhys",
         [
-            [282.595, 660.4, 786.138],
-            [281.976, 544.273, 768.052],
-            [1730.732, 2560.3, 3149.452],
-            [229.0, 546.0, 580.0],
-            [622.0, 675.0, 1384.0],
-            [426.0, 1365.0, 783.0],
+            282.595, 660.4, 786.138, 281.976, 544.273, 768.052, 1730.732, 2560.3, 3149.452, 229.0, 546.0, 580.0, 622.0,
+            675.0, 1384.0, 426.0, 1365.0, 783.0,
         ],
     ),
     (
         "case-1",
         "pf-ewma",
         [
-            [245.074, 332.574, 390.431],
-            [279.067, 330.510, 392.128],
-            [1093.873, 838.412, 998.552],
-            [211.0, 307.0, 369.0],
-            [453.0, 430.0, 524.0],
-            [369.0, 430.0, 597.0],
+            245.074, 332.574, 390.431, 279.067, 330.510, 392.128, 1093.873, 838.412, 998.552, 211.0, 307.0, 369.0,
+            453.0, 430.0, 524.0, 369.0, 430.0, 597.0,
         ],
     ),
     (
         "case-1",
         "pf-pcc",
         [
-            [189.004, 237.211, 270.949],
-            [214.04, 268.265, 284.321],
-            [100.149, 531.8, 631.13],
-            [201.0, 241.0, 287.0],
-            [369.0, 397.0, 429.0],
-            [259.0, 298.0, 325.0],
+            189.004, 237.211, 270.949, 214.04, 268.265, 284.321, 100.149, 531.8, 631.13, 201.0, 241.0, 287.0, 369.0,
+            397.0, 429.0, 259.0, 298.0, 325.0,
         ],
     ),
     (
         "case-2",
         "pf-invhys",
         [
-            [85.281, 128.905, 140.329],
-            [278.405, 304.039, 418.17],
-            [1537.291, 2486.483, 2888.631],
-            [1867.0, 3007.0, 3475.0],
-            [1522.0, 3049.0, 3661.0],
-            [1424.0, 1637.0, 2147.0],
+            85.281, 128.905, 140.329, 278.405, 304.039, 418.17, 1537.291, 2486.483, 2888.631, 1867.0, 3007.0, 3475.0,
+            1522.0, 3049.0, 3661.0, 1424.0, 1637.0, 2147.0,
         ],
     ),
     (
         "case-2",
         "pf-ewma",
         [
-            [75.235, 85.442, 128.691],
-            [149.682, 183.826, 224.769],
-            [991.101, 1623.527, 1812.541],
-            [1687.0, 1823.0, 2771.0],
-            [1484.0, 2047.0, 2578.0],
-            [576.0, 828.0, 865.0],
+            75.235, 85.442, 128.691, 149.682, 183.826, 224.769, 991.101, 1623.527, 1812.541, 1687.0, 1823.0, 2771.0,
+            1484.0, 2047.0, 2578.0, 576.0, 828.0, 865.0,
         ],
     ),
     (
         "case-2",
         "pf-pcc",
         [
-            [68.236, 75.146, 102.296],
-            [122.484, 150.953, 183.944],
-            [812.071, 1366.833, 1389.31],
-            [791.0, 917.0, 1351.0],
-            [1398.0, 1431.0, 2101.0],
-            [513.0, 540.0, 689.0],
+            68.236, 75.146, 102.296, 122.484, 150.953, 183.944, 812.071, 1366.833, 1389.31, 791.0, 917.0, 1351.0,
+            1398.0, 1431.0, 2101.0, 513.0, 540.0, 689.0,
         ],
     ),
 ];
@@ -271,7 +247,7 @@ const PAPER: [(&str, &str, [[f64; 3]; 6]); 6] = [
 pub fn paper_rms(trajectory: &str, mode: &str, frequency: f64) -> Option<Six> {
     let column = [0.1, 1.0, 10.0].iter().position(|f| *f == frequency)?;
     let (.., values) = PAPER.iter().find(|(case, law, _)| *case == trajectory && *law == mode)?;
-    Some(values.map(|row| row[column]))
+    Some(std::array::from_fn(|axis| values[3 * axis + column]))
 }
 
 /// One machining run, a cell of Table 9.
@@ -296,7 +272,7 @@ pub struct MachiningTable {
     pub rows: Vec<MachiningRow>,
 }
 
-/// Table 9 as printed: part, mode, nm, nrad.
+/// Table 9 of the paper: part, mode, nm, nrad.
 const PAPER_MACHINING: [(&str, &str, f64, f64); 4] = [
     ("glass", "p", 5702.0, 28.0),
     ("glass", "pf-pcc", 988.0, 1.6),
@@ -347,7 +323,7 @@ impl MachiningTable {
         out
     }
 
-    /// Text, one line per run, with the paper's figures where it has them. Its orientations are as printed: at or below
+    /// Text, one line per run, with the paper's figures where it has them. Its orientations are those of the print: at or below
     /// what its own gauges can see (2.2 nm on ±80 mm is 20 nrad).
     #[must_use]
     pub fn to_text(&self) -> String {
@@ -358,8 +334,7 @@ impl MachiningTable {
                 "{:<11}{:<10}{:>8.2}{:>10.1}",
                 row.part, row.mode, row.translation_nm, row.orientation_nrad
             );
-            let paper = PAPER_MACHINING.iter().find(|(part, mode, ..)| *part == row.part && *mode == row.mode);
-            if let Some((.., nm, nrad)) = paper {
+            if let Some([nm, nrad]) = paper_machining(&row.part, &row.mode) {
                 let _ = write!(out, "{nm:>11.0}{nrad:>10.1}");
             }
             out.push('\n');

@@ -13,7 +13,7 @@ use super::amplifier::Amplifier;
 use super::linear::Six;
 use super::structure::{Structure, StructureLanes};
 use crate::plant::Stack;
-use crate::plant::lanes::{LANES, Lane, StackLanes};
+use crate::plant::lanes::{LANES, Lane, StackLanes, lane};
 
 /// See the module.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,20 +41,18 @@ impl WholeTick {
         structure: &Structure,
         interval: f64,
     ) -> Option<Self> {
-        let lane =
-            |of: &dyn Fn(usize) -> f64| -> Lane { std::array::from_fn(|leg| if leg < 6 { of(leg) } else { 0.0 }) };
-        let lag: Six = std::array::from_fn(|leg| amplifiers[leg].time_constant());
+        let lag: Six = std::array::from_fn(|leg| amplifiers[leg].time_constant);
         let decay = |leg: usize| if lag[leg] > 0.0 { libm::exp(-interval / lag[leg]) } else { 0.0 };
         Some(Self {
             interval,
-            voltage: lane(&|leg| amplifiers[leg].voltage()),
-            decay: lane(&decay),
-            mean: lane(&|leg| 1.0 / (1.0 - decay(leg)) - lag[leg] / interval),
-            reach: lane(&|leg| amplifiers[leg].reach()),
-            slew: lane(&|leg| amplifiers[leg].slew()),
-            lag: lane(&|leg| lag[leg]),
+            voltage: lane(|leg| amplifiers[leg].voltage),
+            decay: lane(decay),
+            mean: lane(|leg| 1.0 / (1.0 - decay(leg)) - lag[leg] / interval),
+            reach: lane(|leg| amplifiers[leg].reach),
+            slew: lane(|leg| amplifiers[leg].slew),
+            lag: lane(|leg| lag[leg]),
             stacks: StackLanes::of(stacks, interval)?,
-            rest: lane(&|leg| rest[leg]),
+            rest: lane(|leg| rest[leg]),
             structure: StructureLanes::of(structure, interval, &lag),
         })
     }
@@ -141,7 +139,7 @@ impl WholeTick {
 
     /// Puts the state of one leg back.
     pub(super) fn put_leg(&self, leg: usize, amplifier: &mut Amplifier, stack: &mut Stack) {
-        amplifier.set_voltage(self.voltage[leg]);
+        amplifier.voltage = self.voltage[leg];
         self.stacks.put(leg, stack);
     }
 

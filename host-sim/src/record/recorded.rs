@@ -64,10 +64,7 @@ impl<'r, 'm> Recorded<'r, 'm> {
         taker: &'r mut dyn Taker,
     ) -> Result<Self, ControllerError> {
         let description = machine.controller().description();
-        let mut codes = [0; 6];
-        for (leg, place) in codes.iter_mut().enumerate() {
-            *place = description.output(&format!("dac_code[{leg}]"))?;
-        }
+        let codes = description.outputs("dac_code")?;
         let status = description.output("status")?;
         Ok(Self {
             config: machine.controller().default_config(),

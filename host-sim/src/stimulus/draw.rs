@@ -9,6 +9,9 @@ use crate::word::Scalar;
 /// In a stretch of special numbers, one word in this many is special.
 const SPECIAL_SHARE: u64 = 16;
 
+/// Shortest and longest stretch, rows.
+const STRETCH: (u64, u64) = (20, 200);
+
 /// A stream of random numbers.
 pub(super) struct Draw(ChaCha8Rng);
 
@@ -20,6 +23,11 @@ impl Draw {
     /// One of 0 to `bound` − 1; 0 for a bound of 0.
     pub(super) fn below(&mut self, bound: u64) -> u64 {
         self.0.next_u64() % bound.max(1)
+    }
+
+    /// Rows of a stretch.
+    pub(super) fn stretch(&mut self) -> u64 {
+        STRETCH.0 + self.below(STRETCH.1 - STRETCH.0)
     }
 
     /// Uniform in [0, 1).

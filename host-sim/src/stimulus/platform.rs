@@ -4,7 +4,7 @@
 use core::f64::consts::TAU;
 
 use super::draw::Draw;
-use super::{InputRecording, STRETCH};
+use super::{InputRecording, in_stretches};
 use crate::description::{Description, DescriptionError};
 
 /// Words of the command.
@@ -69,33 +69,16 @@ pub fn record(
     rows: usize,
     seed: u64,
 ) -> Result<InputRecording, DescriptionError> {
-    let width = description.input_names.len();
     let mut command = [0; COMMAND.len()];
     for (place, name) in command.iter_mut().zip(COMMAND) {
         *place = description.input(name)?;
     }
     let mut vectors = [[0; 6]; VECTORS.len()];
     for (places, stem) in vectors.iter_mut().zip(VECTORS) {
-        for (axis, place) in places.iter_mut().enumerate() {
-            *place = description.input(&format!("{stem}[{axis}]"))?;
-        }
+        *places = description.inputs(stem)?;
     }
     let mut generator = Generator::new(inputs, seed);
-    let mut words = vec![0; rows * width];
-    let mut stretches = CYCLE.iter().cycle();
-    let mut kind = Kind::Smooth;
-    let mut left = 0;
-    for row in words.chunks_exact_mut(width.max(1)) {
-        if left == 0 {
-            kind = stretches.next().copied().unwrap_or(kind);
-            left = STRETCH.0 + generator.draw.below(STRETCH.1 - STRETCH.0);
-            // A move or a trajectory takes its time.
-            if matches!(kind, Kind::Move | Kind::Trajectory | Kind::Smooth) {
-                left *= 8;
-            }
-            generator.begin();
-        }
-        left -= 1;
+    Ok(in_stretches(description, rows, &CYCLE, &mut generator, Generator::begin, |generator, kind, row| {
         let made = generator.row(kind);
         for (place, word) in command.iter().zip(made.command) {
             row[*place] = generator.draw.integer(kind == Kind::Special, word);
@@ -105,8 +88,7 @@ pub fn record(
                 row[*place] = generator.draw.word(description.scalar, kind == Kind::Special, value);
             }
         }
-    }
-    Ok(InputRecording { width, words })
+    }))
 }
 
 struct Generator<'a> {
@@ -146,7 +128,10 @@ impl<'a> Generator<'a> {
         self.inputs.bounds[axis] - self.inputs.bias[axis].abs()
     }
 
-    fn begin(&mut self) {
+    fn begin(&mut self, kind: Kind) -> u64 {
+        // A move or a trajectory takes its time.
+        let times = if matches!(kind, Kind::Move | Kind::Trajectory | Kind::Smooth) { 8 } else { 1 };
+        let length = times * self.draw.stretch();
         for axis in 0..6 {
             // 1 to 30 Hz, and a phase that begins at the bias so that the stream can be joined.
             self.frequency[axis] = TAU * libm::exp(3.4 * self.draw.unit());
@@ -156,6 +141,7 @@ impl<'a> Generator<'a> {
             self.wrench[axis] = 3.0 * self.draw.symmetric();
         }
         self.selector = self.draw.below(u64::from(self.inputs.trajectories) + 1);
+        length
     }
 
     fn row(&mut self, kind: Kind) -> Row {
@@ -210,21 +196,17 @@ impl<'a> Generator<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::description::indexed;
     use crate::word::Scalar;
 
     fn description() -> Description {
-        let six = |stem: &str| (0..6).map(|k| format!("{stem}[{k}]")).collect::<Vec<_>>();
         Description {
             name: "platform".to_owned(),
             digest: "0".to_owned(),
             version: "0".to_owned(),
             scalar: Scalar::F64,
             config_names: vec!["mode".to_owned()],
-            input_names: COMMAND
-                .iter()
-                .map(|name| (*name).to_owned())
-                .chain(VECTORS.iter().flat_map(|v| six(v)))
-                .collect(),
+            input_names: [COMMAND.map(str::to_owned).to_vec(), indexed(&VECTORS)].concat(),
             output_names: vec!["status".to_owned()],
         }
     }
@@ -267,7 +249,7 @@ mod tests {
     fn a_smooth_stream_is_what_its_rates_say() {
         let inputs = inputs();
         let mut generator = Generator::new(&inputs, 5);
-        generator.begin();
+        generator.begin(Kind::Smooth);
         let rows: Vec<Row> = (0..400).map(|_| generator.row(Kind::Smooth)).collect();
         for three in rows.windows(3) {
             let [before, now, after] = three else { continue };

@@ -83,6 +83,12 @@ const ROUNDING: f64 = 1e-12;
 const UNITS: [f64; 6] = [1e-6, 1e-6, 1e-6, 1e-3, 1e-3, 1e-3];
 
 impl PaperPose {
+    /// A path in its corrected form, at f_c (Hz).
+    #[must_use]
+    pub fn corrected(path: PaperPath, frequency: f64) -> Self {
+        Self { path, reading: Reading::Corrected, frequency }
+    }
+
     /// The paper's time factor t_f.
     fn time_factor(&self) -> f64 {
         match (self.path, self.reading) {

@@ -3,17 +3,8 @@
 use host_sim::platform::Six;
 use host_sim::trajectory::PoseTarget;
 
-/// The set-point of each tick.
-pub trait Generator {
-    /// As at power-up.
-    fn reset(&mut self);
-
-    /// The target at the end of the coming interval, with the bias, and the status bits (16 to 18).
-    fn next(&mut self, command: u64, selector: u64, sequence: u64, wanted: &PoseTarget) -> (PoseTarget, u64);
-}
-
-/// Bias by a polynomial of the fifth order, then hold and stream.
-pub(super) struct Plain {
+/// The set-point of each tick: bias by a polynomial of the fifth order, then hold and stream.
+pub(super) struct Generator {
     bias: Six,
     ticks: u64,
     period: f64,
@@ -21,21 +12,21 @@ pub(super) struct Plain {
     last: PoseTarget,
 }
 
-impl Plain {
+impl Generator {
     /// To `bias` within `time`, s, at a control period, s.
     pub(super) fn new(bias: Six, time: f64, period: f64) -> Self {
         let ticks = libm::round(time / period) as u64;
         Self { bias, ticks, period, tick: 0, last: PoseTarget::default() }
     }
-}
 
-impl Generator for Plain {
-    fn reset(&mut self) {
+    /// As at power-up.
+    pub(super) fn reset(&mut self) {
         self.tick = 0;
         self.last = PoseTarget::default();
     }
 
-    fn next(&mut self, command: u64, _: u64, _: u64, wanted: &PoseTarget) -> (PoseTarget, u64) {
+    /// The target at the end of the coming interval, with the bias, and the status bits (16 to 18).
+    pub(super) fn next(&mut self, command: u64, wanted: &PoseTarget) -> (PoseTarget, u64) {
         if self.tick < self.ticks {
             self.tick += 1;
             let length = self.ticks as f64 * self.period;

@@ -89,6 +89,16 @@ impl Settings {
             bias_time: 0.3,
         }
     }
+
+    /// Base N of the study for a machine, at 10 kHz: notch of ζ_d = 1 and gains by hand; P alone as tuned there.
+    #[must_use]
+    pub fn base_n(specimen: &Specimen) -> Self {
+        Self {
+            combined: Gains { proportional: 0.05, integral: 150.0, level: 450.0, drift: 19.6 },
+            position: Gains { proportional: 0.056, integral: 1007.0, level: 0.0, drift: 0.0 },
+            ..Self::of(specimen, 1e-4, Some(1.0))
+        }
+    }
 }
 
 /// Everett tables of six legs as built, each from its own record with its gauge's noise; equal legs share one.

@@ -8,18 +8,14 @@ use host_sim::platform::rig::{GaugeFault, Record};
 use host_sim::platform::rig::{Noise, RunOptions};
 use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, PLATFORM_MODES, select};
 use host_sim::platform::{PlatformScenario, Specimen, WorkPart};
-use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
+use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use oracle::design::{Deviation, Gains, Rule};
 use oracle::{PlatformOracle, Settings};
 
 /// Base N of the study at 10 kHz.
 fn base_n() -> (Specimen, Settings) {
     let specimen = Specimen::ideal(&PlatformParameters::reference(), &LegParameters::reference());
-    let settings = Settings {
-        combined: Gains { proportional: 0.05, integral: 150.0, level: 450.0, drift: 19.6 },
-        position: Gains { proportional: 0.056, integral: 1007.0, level: 0.0, drift: 0.0 },
-        ..Settings::of(&specimen, 1e-4, Some(1.0))
-    };
+    let settings = Settings::base_n(&specimen);
     (specimen, settings)
 }
 
@@ -28,16 +24,12 @@ fn scenario(specimen: &Specimen, settings: &Settings, noise: &Noise) -> Platform
     PlatformScenario::new(specimen, noise, 1, options)
 }
 
-fn paper(path: PaperPath, frequency: f64) -> PaperPose {
-    PaperPose { path, reading: Reading::Corrected, frequency }
-}
-
 #[test]
 fn case_1_at_10_hz_and_machining_have_the_figures_of_the_study() {
     let (specimen, settings) = base_n();
     let scenario = scenario(&specimen, &settings, &Noise::of(&specimen));
     let mut controller = PlatformOracle::new(&settings).unwrap();
-    let case = paper(PaperPath::Case1, 10.0);
+    let case = PaperPose::corrected(PaperPath::Case1, 10.0);
     let named = [NamedTrajectory { name: "case-1", frequency: 10.0, trajectory: &case }];
     let table = scenario.free_motion(&mut controller, &FREE_MODES, &named).unwrap();
     println!("{}", table.to_text());
@@ -54,8 +46,9 @@ fn case_1_at_10_hz_and_machining_have_the_figures_of_the_study() {
     }
 
     let parts = [("glass", WorkPart::glass())];
-    let table =
-        scenario.machining(&mut controller, &MACHINING_MODES, &parts, &paper(PaperPath::Machining, 1.0)).unwrap();
+    let table = scenario
+        .machining(&mut controller, &MACHINING_MODES, &parts, &PaperPose::corrected(PaperPath::Machining, 1.0))
+        .unwrap();
     println!("{}", table.to_text());
     let combined = table.row("glass", "pf-pcc").unwrap();
     let [translation, orientation] = table.ratio("glass", "p", "pf-pcc").unwrap();
@@ -102,7 +95,7 @@ fn a_bad_gauge_holds_the_pose_and_nothing_else_happens() {
     scenario.options.record = Record::Samples;
     scenario.options.faults = vec![(1, 0.1, 0.101, GaugeFault::Reading(f64::INFINITY))];
     let mut controller = PlatformOracle::new(&settings).unwrap();
-    let run = scenario.run(&mut controller, &paper(PaperPath::Case1, 10.0)).unwrap();
+    let run = scenario.run(&mut controller, &PaperPose::corrected(PaperPath::Case1, 10.0)).unwrap();
     assert_eq!(run.status, 1 << 9);
     assert!(run.errors.peak_translation_nm() < 2000.0, "{}", run.errors.peak_translation_nm());
     assert_eq!(run.samples.iter().filter(|s| s.tick.status != 0).count(), 10);
@@ -118,7 +111,7 @@ fn measured_forces_do_what_a_known_stiffness_does() {
         controller.description().set_config(&mut words, "interaction", interaction).unwrap();
         controller.description().set_config(&mut words, "mode", 3.0).unwrap();
         controller.configure(&words).unwrap();
-        let path = paper(PaperPath::Machining, 1.0);
+        let path = PaperPose::corrected(PaperPath::Machining, 1.0);
         scenario.machine(&mut controller, &path, WorkPart::glass()).unwrap().errors.mean_translation_nm()
     };
     let (blind, seeing) = (run(0.0), run(2.0));

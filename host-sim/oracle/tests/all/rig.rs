@@ -1,6 +1,5 @@
 use host_sim::closed_loop::{Preparation, RunError};
-use host_sim::controller::{ControllerError, TickController};
-use host_sim::description::Description;
+use host_sim::controller::StandIn;
 use host_sim::plant::LegParameters;
 use host_sim::platform::Specimen;
 use host_sim::platform::rig::{BUSY, GaugeFault, Noise, PlatformRig, Record, RunOptions};
@@ -8,49 +7,6 @@ use host_sim::platform::{PlatformParameters, WorkPart};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 
 const INTERVAL: f64 = 1e-4;
-
-/// Busy for some ticks, then a voltage of `gain` V per metre of the z set-point on every leg.
-struct Follower {
-    description: Description,
-    tick: usize,
-    busy: usize,
-    gain: f64,
-}
-
-impl Follower {
-    fn new(busy: usize, gain: f64) -> Self {
-        Self { description: oracle::platform::description(), tick: 99, busy, gain }
-    }
-
-    fn input(&self, name: &str) -> usize {
-        self.description.input(name).unwrap()
-    }
-}
-
-impl TickController for Follower {
-    fn description(&self) -> &Description {
-        &self.description
-    }
-    fn default_config(&self) -> Vec<u64> {
-        Vec::new()
-    }
-    fn configure(&mut self, _: &[u64]) -> Result<(), ControllerError> {
-        Ok(())
-    }
-    fn reset(&mut self) {
-        self.tick = 0;
-    }
-    fn step(&mut self, input: &[u64], output: &mut [u64]) {
-        self.tick += 1;
-        let z = f64::from_bits(input[self.input("setpoint[2]")]);
-        output.fill(0);
-        output[..6].fill((z * self.gain).to_bits());
-        output[54] = if self.tick <= self.busy { u64::from(BUSY) } else { 0 };
-    }
-    fn state_digest(&self) -> u64 {
-        self.tick as u64
-    }
-}
 
 /// z rises at 10 µm/s.
 struct Rise;
@@ -66,6 +22,23 @@ impl PoseTrajectory for Rise {
             acceleration: [0.0; 6],
         }
     }
+}
+
+/// Place of an input word of a platform.
+fn input(name: &str) -> usize {
+    oracle::platform::description().input(name).unwrap()
+}
+
+/// Busy for some ticks, then a voltage of `gain` V per metre of the z set-point on every leg.
+fn follower(busy: u64, gain: f64) -> StandIn<impl FnMut(&mut u64, &[u64], &mut [u64])> {
+    let tick = move |ticks: &mut u64, row: &[u64], output: &mut [u64]| {
+        *ticks += 1;
+        let z = f64::from_bits(row[input("setpoint[2]")]);
+        output.fill(0);
+        output[..6].fill((z * gain).to_bits());
+        output[54] = if *ticks <= busy { u64::from(BUSY) } else { 0 };
+    };
+    StandIn { description: oracle::platform::description(), state: 99, tick }
 }
 
 fn rig(noise: &Noise, seed: u64) -> PlatformRig {
@@ -85,20 +58,14 @@ fn options() -> RunOptions {
 
 #[test]
 fn set_points_are_those_of_the_end_of_the_interval_and_come_after_the_bias() {
-    let run = rig(&Noise::NONE, 1).run(&mut Follower::new(30, 0.0), &Rise, &options()).unwrap();
+    let run = rig(&Noise::NONE, 1).run(&mut follower(30, 0.0), &Rise, &options()).unwrap();
     assert!((run.arming - 31.0 * INTERVAL).abs() < 1e-12);
     assert_eq!(run.samples.len(), 200);
     assert_eq!(run.errors.count(), 200);
     let trace = run.trace.unwrap();
     // 31 ticks to arm, 100 of rest, 200 of the trajectory.
     assert_eq!(trace.len(), 331);
-    let follower = Follower::new(0, 0.0);
-    let (command, sequence, z, rate) = (
-        follower.input("command"),
-        follower.input("sequence"),
-        follower.input("setpoint[2]"),
-        follower.input("setpoint_rate[2]"),
-    );
+    let [command, sequence, z, rate] = ["command", "sequence", "setpoint[2]", "setpoint_rate[2]"].map(input);
     for (tick, row) in trace.rows().enumerate() {
         let streamed = tick.saturating_sub(130);
         assert_eq!(row[command], u64::from(streamed > 0));
@@ -114,25 +81,25 @@ fn set_points_are_those_of_the_end_of_the_interval_and_come_after_the_bias() {
 
 #[test]
 fn a_controller_that_never_arms_or_lacks_a_word_or_asks_for_no_number_is_an_error() {
-    let impatient = RunOptions { arming: 0.01, ..options() };
-    let error = rig(&Noise::NONE, 1).run(&mut Follower::new(1000, 0.0), &Rise, &impatient).unwrap_err();
+    let short = RunOptions { arming: 0.01, ..options() };
+    let error = rig(&Noise::NONE, 1).run(&mut follower(1000, 0.0), &Rise, &short).unwrap_err();
     assert!(matches!(error, RunError::NotReady { status: BUSY, .. }), "{error}");
     assert!(error.to_string().contains("bias pose after 0.01 s (status 0x40000)"), "{error}");
-    let mut lacking = Follower::new(0, 0.0);
+    let mut lacking = follower(0, 0.0);
     lacking.description.input_names[23] = "gage".to_owned();
     let error = rig(&Noise::NONE, 1).run(&mut lacking, &Rise, &options()).unwrap_err().to_string();
     assert!(error.contains("no word `gauge["), "{error}");
-    let error = rig(&Noise::NONE, 1).run(&mut Follower::new(0, f64::NAN), &Rise, &options()).unwrap_err();
+    let error = rig(&Noise::NONE, 1).run(&mut follower(0, f64::NAN), &Rise, &options()).unwrap_err();
     assert!(matches!(error, RunError::NotFinite { tick: 0, leg: 0 }), "{error}");
 }
 
 #[test]
 fn gauge_words_are_whole_codes_and_seeds_repeat() {
-    let run = |seed| rig(&noise(), seed).run(&mut Follower::new(0, 1e6), &Rise, &options()).unwrap();
+    let run = |seed| rig(&noise(), seed).run(&mut follower(0, 1e6), &Rise, &options()).unwrap();
     let first = run(5);
     assert_eq!(first, run(5));
     assert_ne!(first.trace, run(6).trace);
-    let gauge = Follower::new(0, 0.0).input("gauge[0]");
+    let gauge = input("gauge[0]");
     let mut different = 0;
     for row in first.trace.unwrap().rows() {
         let codes = f64::from_bits(row[gauge]) / 0.76e-9;
@@ -146,7 +113,7 @@ fn gauge_words_are_whole_codes_and_seeds_repeat() {
 fn latency_delays_what_the_platform_feels() {
     let poses = |latency| {
         let options = RunOptions { latency, ..options() };
-        let run = rig(&Noise::NONE, 1).run(&mut Follower::new(0, 3e7), &Rise, &options).unwrap();
+        let run = rig(&Noise::NONE, 1).run(&mut follower(0, 3e7), &Rise, &options).unwrap();
         run.samples.iter().map(|sample| sample.tick.pose[2]).collect::<Vec<_>>()
     };
     let (prompt, late) = (poses(0), poses(3));
@@ -158,15 +125,14 @@ fn latency_delays_what_the_platform_feels() {
 }
 
 #[test]
-fn faulty_gauges_read_as_told_and_recover() {
+fn faulty_gauges_read_as_declared_and_recover() {
     let options = RunOptions {
         faults: vec![(2, 0.002, 0.004, GaugeFault::Reading(f64::NAN)), (4, 0.002, 0.004, GaugeFault::Stuck)],
         ..options()
     };
-    let run = rig(&noise(), 1).run(&mut Follower::new(0, 1e6), &Rise, &options).unwrap();
-    let whole = rig(&noise(), 1).run(&mut Follower::new(0, 1e6), &Rise, &self::options()).unwrap();
-    let follower = Follower::new(0, 0.0);
-    let (nan, stuck) = (follower.input("gauge[2]"), follower.input("gauge[4]"));
+    let run = rig(&noise(), 1).run(&mut follower(0, 1e6), &Rise, &options).unwrap();
+    let whole = rig(&noise(), 1).run(&mut follower(0, 1e6), &Rise, &self::options()).unwrap();
+    let (nan, stuck) = (input("gauge[2]"), input("gauge[4]"));
     let (run, whole) = (run.trace.unwrap(), whole.trace.unwrap());
     let start = run.len() - 200;
     for (tick, (row, good)) in run.rows().zip(whole.rows()).enumerate() {

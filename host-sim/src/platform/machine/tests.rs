@@ -12,6 +12,25 @@ fn prepared(specimen: &Specimen) -> Machine {
     machine
 }
 
+/// 10 Hz on all legs from rest, slower than the current limit, as a controller would drive them.
+fn voltages(tick: u32) -> Six {
+    let rise = 40.0 - 40.0 * libm::cos(2.0 * core::f64::consts::PI * 10.0 * f64::from(tick) * 1e-4);
+    std::array::from_fn(|leg| rise * (1.0 - 0.1 * leg as f64))
+}
+
+fn driven(machine: &mut Machine, ticks: u32) -> Vec<Six> {
+    let pose = |tick| {
+        machine.hold(&voltages(tick), 1e-4);
+        machine.pose()
+    };
+    (0..ticks).map(pose).collect()
+}
+
+fn worst(run: &[Six], other: &[Six]) -> f64 {
+    let one = |a: &Six, b: &Six| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max);
+    run.iter().zip(other).map(|(a, b)| one(a, b)).fold(0.0, f64::max)
+}
+
 /// Holds equal voltages and lets the platform settle; the pose.
 fn raised(machine: &mut Machine, volts: f64, time: f64) -> Six {
     for _ in 0..(time / 1e-4) as usize {
@@ -79,29 +98,12 @@ fn the_current_limit_binds() {
 #[test]
 fn halving_the_step_shows_second_order_and_a_nanometre_at_most() {
     let specimen = Specimen::reference();
-    let mut runs = [2e-5, 1e-5, 2.5e-6].map(|step| {
+    let [coarse, half, finest] = [2e-5, 1e-5, 2.5e-6].map(|step| {
         let mut machine = prepared(&specimen);
         machine.set_longest_step(step);
-        let mut poses = Vec::new();
-        for tick in 0..1000 {
-            let volts = std::array::from_fn(|leg| {
-                40.0 - 40.0
-                    * libm::cos(2.0 * core::f64::consts::PI * 10.0 * f64::from(tick) * 1e-4)
-                    * (1.0 - 0.1 * leg as f64)
-            });
-            machine.hold(&volts, 1e-4);
-            poses.push(machine.pose());
-        }
-        poses
+        driven(&mut machine, 1000)
     });
-    let finest = runs[2].clone();
-    let worst = |run: &mut Vec<Six>| {
-        run.iter()
-            .zip(&finest)
-            .map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max))
-            .fold(0.0, f64::max)
-    };
-    let (coarse, half) = (worst(&mut runs[0]), worst(&mut runs[1]));
+    let (coarse, half) = (worst(&coarse, &finest), worst(&half, &finest));
     println!("10 Hz: {:.1} pm at 20 µs, {:.1} pm at 10 µs from 2.5 µs", coarse * 1e12, half * 1e12);
     assert!(coarse < 2e-9 && half < 0.6 * coarse, "{coarse} {half}");
 }
@@ -114,26 +116,6 @@ fn the_same_voltages_give_the_same_bits() {
         raised(&mut machine, 33.0, 0.05).map(f64::to_bits)
     };
     assert_eq!(run(), run());
-}
-
-/// 10 Hz on all legs from rest, slower than the current limit, as a controller would drive them.
-fn voltages(tick: u32) -> Six {
-    let rise = 40.0 - 40.0 * libm::cos(2.0 * core::f64::consts::PI * 10.0 * f64::from(tick) * 1e-4);
-    std::array::from_fn(|leg| rise * (1.0 - 0.1 * leg as f64))
-}
-
-fn driven(machine: &mut Machine, ticks: u32) -> Vec<Six> {
-    let mut poses = Vec::new();
-    for tick in 0..ticks {
-        machine.hold(&voltages(tick), 1e-4);
-        poses.push(machine.pose());
-    }
-    poses
-}
-
-fn worst(run: &[Six], other: &[Six]) -> f64 {
-    let one = |a: &Six, b: &Six| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max);
-    run.iter().zip(other).map(|(a, b)| one(a, b)).fold(0.0, f64::max)
 }
 
 #[test]

@@ -263,28 +263,19 @@ struct Wiring {
 impl Wiring {
     fn of(controller: &dyn TickController) -> Result<Self, DescriptionError> {
         let description = controller.description();
-        let six = |stem: &str, find: &dyn Fn(&str) -> Result<usize, DescriptionError>| {
-            let mut places = [0; 6];
-            for (k, place) in places.iter_mut().enumerate() {
-                *place = find(&format!("{stem}[{k}]"))?;
-            }
-            Ok::<_, DescriptionError>(places)
-        };
-        let input = |name: &str| description.input(name);
-        let output = |name: &str| description.output(name);
         Ok(Self {
-            command: input("command")?,
-            selector: input("selector")?,
-            sequence: input("sequence")?,
-            pose: six("setpoint", &input)?,
-            rate: six("setpoint_rate", &input)?,
-            acceleration: six("setpoint_acceleration", &input)?,
-            gauge: six("gauge", &input)?,
-            wrench: six("wrench", &input)?,
-            voltage: six("voltage", &output)?,
-            target: six("target", &output)?,
-            measured: six("pose", &output)?,
-            status: output("status")?,
+            command: description.input("command")?,
+            selector: description.input("selector")?,
+            sequence: description.input("sequence")?,
+            pose: description.inputs("setpoint")?,
+            rate: description.inputs("setpoint_rate")?,
+            acceleration: description.inputs("setpoint_acceleration")?,
+            gauge: description.inputs("gauge")?,
+            wrench: description.inputs("wrench")?,
+            voltage: description.outputs("voltage")?,
+            target: description.outputs("target")?,
+            measured: description.outputs("pose")?,
+            status: description.output("status")?,
         })
     }
 }
