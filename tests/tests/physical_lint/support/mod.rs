@@ -3,8 +3,6 @@
 pub mod mutants;
 pub mod plausible;
 pub mod rules;
-mod rules_of_control;
-mod rules_of_slips;
 pub mod slips;
 pub mod tally;
 pub mod undetectable;

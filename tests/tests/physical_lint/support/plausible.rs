@@ -1,4 +1,4 @@
-//! Platforms as somebody might build them: sizes, masses, stacks, electronics and rates that fit together.
+//! Platforms as they might be built: sizes, masses, stacks, electronics and rates that fit together.
 
 use std::f64::consts::{PI, TAU};
 use std::fs;
