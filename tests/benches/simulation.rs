@@ -9,7 +9,7 @@ use host_sim::controller::TickController;
 use host_sim::plant::LegParameters;
 use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{Bench, Noise, Request};
-use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory, Reading};
+use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory};
 use specgen::machine;
 use specgen_tests::Emitted;
 
@@ -28,33 +28,20 @@ fn scenario(emitted: &Emitted) -> PlatformScenario {
     machine::scenario(model, task, &specimen, &Noise::of(&specimen), 1)
 }
 
-/// The plant alone under six voltages that change every tick.
-#[divan::bench]
-fn plant(bencher: Bencher) {
+/// The plant alone under six voltages that change every tick, in small steps or in one per tick.
+#[divan::bench(args = [false, true])]
+fn plant(bencher: Bencher, whole_ticks: bool) {
     let emitted = Emitted::new("bench-plant", "reference.toml", &[]);
-    let scenario = scenario(&emitted);
-    let mut rig = scenario.rig().clone();
-    bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
-        for tick in 0..TICKS {
-            let voltage = std::array::from_fn(|leg| 40.0 + 0.01 * ((tick * (leg + 3)) % 500) as f64);
-            rig.machine_mut().hold(black_box(&voltage), INTERVAL);
-        }
-        black_box(rig.machine().pose());
-    });
-}
-
-/// The same in one step per tick.
-#[divan::bench]
-fn plant_in_whole_ticks(bencher: Bencher) {
-    let emitted = Emitted::new("bench-whole", "reference.toml", &[]);
     let mut rig = scenario(&emitted).rig().clone();
-    rig.machine_mut().step_whole_ticks(INTERVAL);
+    if whole_ticks {
+        rig.plant_mut().step_whole_ticks(INTERVAL);
+    }
     bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
         for tick in 0..TICKS {
             let voltage = std::array::from_fn(|leg| 40.0 + 0.01 * ((tick * (leg + 3)) % 500) as f64);
-            rig.machine_mut().hold(black_box(&voltage), INTERVAL);
+            rig.plant_mut().hold(black_box(&voltage), INTERVAL);
         }
-        black_box(rig.machine().pose());
+        black_box(rig.plant().pose());
     });
 }
 
@@ -85,7 +72,7 @@ fn force_sensor(bencher: Bencher) {
 /// Set-points of the paper's case 1.
 #[divan::bench]
 fn set_points(bencher: Bencher) {
-    let trajectory = PaperPose { path: PaperPath::Case1, reading: Reading::Corrected, frequency: 1.25 };
+    let trajectory = PaperPose::corrected(PaperPath::Case1, 1.25);
     bencher.counter(ItemsCount::new(TICKS)).bench_local(|| {
         for tick in 0..TICKS {
             black_box(trajectory.target(black_box(tick as f64 * INTERVAL)));
@@ -101,7 +88,7 @@ fn whole_loop(bencher: Bencher) {
     let mut controller = emitted.controller();
     let words = controller.default_config();
     controller.configure(&words).expect("the spec's settings");
-    let trajectory = PaperPose { path: PaperPath::Case1, reading: Reading::Corrected, frequency: 1.25 };
+    let trajectory = PaperPose::corrected(PaperPath::Case1, 1.25);
     let mut rig = scenario.rig().clone();
     let mut bench = Bench::new(&mut rig, &mut controller, INTERVAL, 0).expect("a platform");
     bench.arm(60.0).expect("at its bias pose");

@@ -4,7 +4,7 @@ use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, TickController};
 use host_sim::platform::PlatformScenario;
 use host_sim::platform::rig::{Record, RunOptions};
-use host_sim::platform::scenario::{self, PLATFORM_MODES};
+use host_sim::platform::scenario::PLATFORM_MODES;
 use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, select};
 use host_sim::table::Line;
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
@@ -74,7 +74,7 @@ pub fn of_platform(
         "Straight line through the points of each leg, Y = λ q̂ + δ",
         &["leg", "Hz", "λ = ρ/ρ̂", "δ, nm", "deviation from the line, nm rms"],
     );
-    scenario::select(controller, PLATFORM_MODES[1].1)?;
+    select(controller, PLATFORM_MODES[1].1)?;
     let first = controller.description().output("requested[0]")?;
     let (words, scalar) = (controller.description().input_names.len(), controller.description().scalar);
     for frequency in PLATFORM_FREQUENCIES {

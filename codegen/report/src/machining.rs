@@ -51,7 +51,7 @@ pub fn section(
         let times = [sampled.options.interval; 2];
         for (mode, word) in MACHINING_MODES {
             select(controller, word)?;
-            let run = sampled.machine(controller, &trajectory, part)?;
+            let run = sampled.against(controller, &trajectory, part)?;
             if run.status & (REFUSED | STALE) != 0 {
                 refused.push(format!("{name} with {mode}"));
                 continue;

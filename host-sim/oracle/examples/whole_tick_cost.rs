@@ -31,9 +31,9 @@ fn main() {
     for whole in [false, true] {
         let mut rig = rig.clone();
         if whole {
-            rig.machine_mut().step_whole_ticks(1e-4);
+            rig.plant_mut().step_whole_ticks(1e-4);
         }
-        let plant = least(|tick| rig.machine_mut().hold(&voltages(tick), 1e-4));
+        let plant = least(|tick| rig.plant_mut().hold(&voltages(tick), 1e-4));
         println!("plant{}: {plant:.0} ns", if whole { " in whole ticks" } else { "" });
     }
     for ahead in [false, true] {
@@ -70,7 +70,7 @@ fn main() {
     let (inputs, outputs) = (controller.description().input_names.len(), controller.description().output_names.len());
     let (input, mut output) = (vec![0; inputs], vec![0; outputs]);
     println!("controller on zeros: {:.0} ns", least(|_| controller.step(&input, &mut output)));
-    rig.machine_mut().step_whole_ticks(1e-4);
+    rig.plant_mut().step_whole_ticks(1e-4);
     rig.draw_ahead(400 * TICKS);
     let mut bench = match Bench::new(&mut rig, &mut controller, 1e-4, 0) {
         Ok(bench) => bench,

@@ -1,7 +1,7 @@
-//! A machine with gauges, converters and noise, and what a controller does to it.
+//! A plant with gauges, converters and noise, and what a controller does to it.
 //!
 //! ```text
-//! PlatformRig   the machine as a controller sees it
+//! PlatformRig   the plant as a controller sees it
 //!   └ Bench     rig and controller, tick by tick
 //!       └ run   a trajectory on a bench, scored against the true pose
 //! ```
@@ -12,7 +12,7 @@ mod run;
 use super::gauge::{GaugeSignal, Probe};
 use super::geometry::{angles, rotation};
 use super::linear::Six;
-use super::machine::Machine;
+use super::plant::PlatformPlant;
 use super::sensor::ForceSensor;
 use super::specimen::Specimen;
 use crate::closed_loop::Preparation;
@@ -23,7 +23,7 @@ pub(super) use bench::Paused;
 pub use bench::{BUSY, Bench, Command, Request, Tick};
 pub use run::{PlatformRun, PoseSample, Record, RunOptions};
 
-/// Noise around a machine.
+/// Noise around a plant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Gauges and amplifiers; the gauge's figures are per reading of each of the six.
@@ -52,10 +52,10 @@ pub enum GaugeFault {
     Reading(f64),
 }
 
-/// A machine with gauges, converters, force sensor and noise.
+/// A plant with gauges, converters, force sensor and noise.
 #[derive(Debug, Clone)]
 pub struct PlatformRig {
-    machine: Machine,
+    plant: PlatformPlant,
     height: f64,
     /// Voltage from which the drive of the legs counts, V.
     lowest_voltage: f64,
@@ -74,12 +74,12 @@ pub struct PlatformRig {
 }
 
 impl PlatformRig {
-    /// A machine as built, with noise from one seed. Gauges give metres.
+    /// A plant as built, with noise from one seed. Gauges give metres.
     #[must_use]
     pub fn new(specimen: &Specimen, noise: &Noise, seed: u64) -> Self {
         let nominal = &specimen.nominal;
         Self {
-            machine: Machine::new(specimen),
+            plant: PlatformPlant::new(specimen),
             height: nominal.height_m,
             lowest_voltage: nominal.lowest_voltage_v,
             rest_voltage: nominal.rest_voltage_v,
@@ -102,9 +102,9 @@ impl PlatformRig {
         self
     }
 
-    /// Pre-cycle, rest and zero of the gauges, see [`Machine::prepare`].
+    /// Pre-cycle, rest and zero of the gauges, see [`PlatformPlant::prepare`].
     pub fn prepare(&mut self, preparation: &Preparation) {
-        self.machine.prepare(preparation);
+        self.plant.prepare(preparation);
     }
 
     /// Draws the noise of the next `ticks` ticks now: clones made after this share it. The bits of a run stay as they are.
@@ -114,15 +114,15 @@ impl PlatformRig {
         self.force_sensor.draw_ahead(ticks);
     }
 
-    /// The machine.
+    /// The plant.
     #[must_use]
-    pub fn machine(&self) -> &Machine {
-        &self.machine
+    pub fn plant(&self) -> &PlatformPlant {
+        &self.plant
     }
 
-    /// The machine, to touch work parts or to change its step.
-    pub fn machine_mut(&mut self) -> &mut Machine {
-        &mut self.machine
+    /// The plant, to touch work parts or to change its step.
+    pub fn plant_mut(&mut self) -> &mut PlatformPlant {
+        &mut self.plant
     }
 
     /// Makes gauge `index` faulty, or whole again.
@@ -134,7 +134,7 @@ impl PlatformRig {
 
     /// Reads the six gauges, in m or V.
     pub fn read_gauges(&mut self) -> Six {
-        let pose = self.machine.pose();
+        let pose = self.plant.pose();
         let turn = rotation(angles(&pose));
         let [low, high] = self.range;
         for k in 0..6 {
@@ -159,7 +159,7 @@ impl PlatformRig {
 
     /// Reads the force sensor: force and torque on the platform, N and N m.
     pub fn read_wrench(&mut self) -> Six {
-        let wrench = self.machine.wrench();
+        let wrench = self.plant.wrench();
         self.force_sensor.read(&wrench)
     }
 
@@ -169,6 +169,6 @@ impl PlatformRig {
         for (input, noise) in inputs.iter_mut().zip(&mut self.amplifiers) {
             *input += noise.draw() - self.lowest_voltage;
         }
-        self.machine.hold(&inputs, interval);
+        self.plant.hold(&inputs, interval);
     }
 }

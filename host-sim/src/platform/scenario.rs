@@ -31,7 +31,7 @@ pub struct NamedTrajectory<'a> {
     pub trajectory: &'a dyn PoseTrajectory,
 }
 
-/// One machine, prepared once; every run starts from the same state.
+/// One plant, prepared once; every run starts from the same state.
 #[derive(Debug, Clone)]
 pub struct PlatformScenario {
     prepared: PlatformRig,
@@ -40,7 +40,7 @@ pub struct PlatformScenario {
 }
 
 impl PlatformScenario {
-    /// A machine, pre-cycled, settled and zeroed as the parameters of its first leg say, with noise from `seed`.
+    /// A plant, pre-cycled, settled and zeroed as the parameters of its first leg say, with noise from `seed`.
     #[must_use]
     pub fn new(specimen: &Specimen, noise: &Noise, seed: u64, options: RunOptions) -> Self {
         let mut prepared = PlatformRig::new(specimen, noise, seed);
@@ -89,7 +89,7 @@ impl PlatformScenario {
     ///
     /// # Errors
     /// As [`PlatformRig::run`].
-    pub fn machine(
+    pub fn against(
         &self,
         controller: &mut dyn TickController,
         trajectory: &dyn PoseTrajectory,
@@ -136,7 +136,7 @@ impl PlatformScenario {
         for &(name, part) in parts {
             for &(mode, word) in modes {
                 select(controller, word)?;
-                let run = self.machine(controller, trajectory, part)?;
+                let run = self.against(controller, trajectory, part)?;
                 table.push(name, mode, &run.errors);
             }
         }

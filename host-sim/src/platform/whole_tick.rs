@@ -1,8 +1,8 @@
-//! The machine in one step per control interval, legs in lanes: for studies of many runs, such as tuning.
+//! The plant in one step per control interval, legs in lanes: for studies of many runs, such as tuning.
 //!
-//! The same equations as the machine of small steps, with the shape that the amplifiers' lag gives to the free
+//! The same equations as the plant of small steps, with the shape that the amplifiers' lag gives to the free
 //! displacements within an interval taken into account ([`StructureLanes`], [`StackLanes`]); without contact. Compared with
-//! the small steps by the tests of [`super::Machine`].
+//! the small steps by the tests of [`super::PlatformPlant`].
 //!
 //! The step is compiled a second time for AVX2, of which additions and multiplications have the same bits as any other:
 //! nothing is fused, sums keep their written order.
@@ -32,7 +32,7 @@ pub(super) struct WholeTick {
 }
 
 impl WholeTick {
-    /// The machine as it is, for intervals of `interval` (s). `rest` is the free displacement at rest of each leg, µm.
+    /// The plant as it is, for intervals of `interval` (s). `rest` is the free displacement at rest of each leg, µm.
     /// None if the legs have different numbers of operators.
     pub(super) fn of(
         amplifiers: &[&Amplifier; 6],

@@ -62,7 +62,7 @@ fn a_gauge_stuck_within_its_range_stays_within_limits_and_is_recovered_from() {
                 all_status(&after)
             );
             let limited = all_status(&stuck).iter().all(|status| status & !0x3f == 0);
-            assert!(limited, "it cannot be told from a gauge that works");
+            assert!(limited, "it cannot be distinguished from a gauge that works");
             assert_eq!(all_status(&after[LAP / 4..]), [0]);
             assert!(worst(&after[LAP / 4..]) < 1e-6 && worst(&after[LAP..]) < 1.3 * error);
         });
@@ -257,7 +257,7 @@ fn a_wrench_that_cannot_be_is_not_believed() {
     run(|run| {
         run.set(&[("interaction", 2.0)]);
         run.ticks(500, &Request::default());
-        run.bench.rig().machine_mut().touch(WorkPart::glass());
+        run.bench.rig().plant_mut().touch(WorkPart::glass());
         let (error, step, last) = undisturbed(run);
         let load = |run: &Run| {
             let place = run.description.output("load[0]").expect("a word");
@@ -335,7 +335,7 @@ fn any_change_of_mode_in_motion_is_without_a_jump() {
 fn settings_changed_in_flight_make_no_jump_and_bad_ones_change_nothing() {
     run(|run| {
         let (error, step, _) = undisturbed(run);
-        run.bench.rig().machine_mut().touch(WorkPart::glass());
+        run.bench.rig().plant_mut().touch(WorkPart::glass());
         run.stream(LAP / 2);
         let changes: [(&str, &[(&str, f64)]); 9] = [
             ("measured", &[("interaction", 2.0)]),

@@ -105,7 +105,7 @@ pub fn machining(
         PaperPose { path: PaperPath::Machining, reading: Reading::Corrected, frequency: MACHINING_FREQUENCY };
     for (mode, word) in MACHINING_MODES {
         select(controller, word)?;
-        let run = scenario.machine(controller, &trajectory, part)?;
+        let run = scenario.against(controller, &trajectory, part)?;
         table.push(name, mode, &run.errors);
     }
     Ok(())

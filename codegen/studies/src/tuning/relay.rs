@@ -80,7 +80,7 @@ fn one_axis(
 ) -> Result<Option<Ultimate>, RunError> {
     let options = &scenario.options;
     let mut rig = scenario.rig().clone();
-    rig.machine_mut().step_whole_ticks(options.interval);
+    rig.plant_mut().step_whole_ticks(options.interval);
     let mut bench = Bench::new(&mut rig, controller, options.interval, options.latency)?;
     bench.arm(options.arming)?;
     for _ in 0..(options.settle / options.interval) as usize {
@@ -94,11 +94,11 @@ fn one_axis(
     let motion: [f64; 6] =
         std::array::from_fn(|k| force * (0..6).map(|i| basis.from_modal[k][i] * modal[i]).sum::<f64>());
     let mut notch = ModalNotch::of(closed_loop);
-    let center = bench.rig().machine().pose();
+    let center = bench.rig().plant().pose();
     let mut relay = Relay::default();
     let mut asked = 0.0;
     for tick in 0..MOST_TICKS {
-        let pose = bench.rig().machine().pose();
+        let pose = bench.rig().plant().pose();
         let error = notch.filter(&std::array::from_fn(|k| center[k] - pose[k]))[axis];
         let output = relay.switch(tick, error / amplitude);
         if let Some((gain, period)) = relay.found {

@@ -112,7 +112,7 @@ fn measured_forces_do_what_a_known_stiffness_does() {
         controller.description().set_config(&mut words, "mode", 3.0).unwrap();
         controller.configure(&words).unwrap();
         let path = PaperPose::corrected(PaperPath::Machining, 1.0);
-        scenario.machine(&mut controller, &path, WorkPart::glass()).unwrap().errors.mean_translation_nm()
+        scenario.against(&mut controller, &path, WorkPart::glass()).unwrap().errors.mean_translation_nm()
     };
     let (blind, seeing) = (run(0.0), run(2.0));
     println!("F+PCC on glass: {blind:.2} nm without, {seeing:.2} nm with measured forces");

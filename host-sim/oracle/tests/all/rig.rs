@@ -150,11 +150,11 @@ fn faulty_gauges_read_as_declared_and_recover() {
 #[test]
 fn the_wrench_word_is_what_the_part_does_to_the_platform() {
     let mut rig = rig(&Noise::NONE, 1);
-    rig.machine_mut().touch(WorkPart::glass());
+    rig.plant_mut().touch(WorkPart::glass());
     for _ in 0..3000 {
         rig.hold(&[20.0; 6], INTERVAL);
     }
-    let z = rig.machine().pose()[2];
+    let z = rig.plant().pose()[2];
     let wrench = rig.read_wrench();
     assert!(z > 5e-6 && (wrench[2] + 3e6 * z).abs() < 1e-6, "{z} {wrench:?}");
 }

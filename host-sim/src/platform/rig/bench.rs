@@ -222,8 +222,8 @@ impl<'a> Bench<'a> {
             target,
             measured,
             voltage,
-            pose: self.rig.machine.pose(),
-            wrench: self.rig.machine.wrench(),
+            pose: self.rig.plant.pose(),
+            wrench: self.rig.plant.wrench(),
         })
     }
 

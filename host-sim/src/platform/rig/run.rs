@@ -179,7 +179,7 @@ impl PlatformRig {
             }
         }
         if let Some(part) = options.part {
-            bench.rig().machine_mut().touch(part);
+            bench.rig().plant_mut().touch(part);
         }
         Ok((bench, arming))
     }

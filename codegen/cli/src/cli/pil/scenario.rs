@@ -148,7 +148,7 @@ impl Plan {
                     select_platform(lockstep, word).map_err(host_sim::closed_loop::RunError::from)?;
                     let run = timed(&mut report.seconds, || match part {
                         None => scenario.run(lockstep, &trajectory),
-                        Some(part) => scenario.machine(lockstep, &trajectory, *part),
+                        Some(part) => scenario.against(lockstep, &trajectory, *part),
                     })?;
                     refused(name, &run, report);
                     match part {

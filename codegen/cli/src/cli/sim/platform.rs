@@ -204,7 +204,7 @@ impl Experiment<'_> {
             self.ui.progress(&format!("Table 9: machining {part}"));
             for (mode, word) in MACHINING {
                 select(self.controller, word).map_err(environment)?;
-                let run = self.scenario.machine(self.controller, &trajectory, work);
+                let run = self.scenario.against(self.controller, &trajectory, work);
                 if let Some(run) = self.keep(&format!("machining-{part}-{mode}"), run)? {
                     machining.push(part, mode, &run.errors);
                 }

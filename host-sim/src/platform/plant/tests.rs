@@ -6,10 +6,10 @@ fn preparation(specimen: &Specimen) -> Preparation {
     Preparation { peak: specimen.legs[0].u_max, rate: 200.0, settle: 0.2, update: 5e-5, rest: 0.0 }
 }
 
-fn prepared(specimen: &Specimen) -> Machine {
-    let mut machine = Machine::new(specimen);
-    machine.prepare(&preparation(specimen));
-    machine
+fn prepared(specimen: &Specimen) -> PlatformPlant {
+    let mut plant = PlatformPlant::new(specimen);
+    plant.prepare(&preparation(specimen));
+    plant
 }
 
 /// 10 Hz on all legs from rest, slower than the current limit, as a controller would drive them.
@@ -18,10 +18,10 @@ fn voltages(tick: u32) -> Six {
     std::array::from_fn(|leg| rise * (1.0 - 0.1 * leg as f64))
 }
 
-fn driven(machine: &mut Machine, ticks: u32) -> Vec<Six> {
+fn driven(plant: &mut PlatformPlant, ticks: u32) -> Vec<Six> {
     let pose = |tick| {
-        machine.hold(&voltages(tick), 1e-4);
-        machine.pose()
+        plant.hold(&voltages(tick), 1e-4);
+        plant.pose()
     };
     (0..ticks).map(pose).collect()
 }
@@ -32,23 +32,23 @@ fn worst(run: &[Six], other: &[Six]) -> f64 {
 }
 
 /// Holds equal voltages and lets the platform settle; the pose.
-fn raised(machine: &mut Machine, volts: f64, time: f64) -> Six {
+fn raised(plant: &mut PlatformPlant, volts: f64, time: f64) -> Six {
     for _ in 0..(time / 1e-4) as usize {
-        machine.hold(&[volts; 6], 1e-4);
+        plant.hold(&[volts; 6], 1e-4);
     }
-    machine.pose()
+    plant.pose()
 }
 
 #[test]
 fn without_a_load_the_platform_goes_where_the_free_legs_are() {
     let specimen = Specimen::reference();
-    let mut machine = prepared(&specimen);
-    assert_eq!(machine.pose(), [0.0; 6]);
-    let pose = raised(&mut machine, 50.0, 0.3);
+    let mut plant = prepared(&specimen);
+    assert_eq!(plant.pose(), [0.0; 6]);
+    let pose = raised(&mut plant, 50.0, 0.3);
     let lengths = specimen.nominal.geometry().extensions(&pose);
-    for (found, free) in lengths.iter().zip(machine.free_displacements()) {
+    for (found, free) in lengths.iter().zip(plant.free_displacements()) {
         // Creep goes on at some nm/ms; the weight's moments bend the platform by picometres.
-        assert!((found - free).abs() < 1e-10, "{lengths:?} {:?}", machine.free_displacements());
+        assert!((found - free).abs() < 1e-10, "{lengths:?} {:?}", plant.free_displacements());
     }
     assert!(pose[2] > 25e-6 && pose[2] < 60e-6, "{pose:?}");
     // Legs within ±10 % tilt and turn it.
@@ -58,19 +58,19 @@ fn without_a_load_the_platform_goes_where_the_free_legs_are() {
 #[test]
 fn equal_legs_raise_it_straight_and_a_part_holds_it_down() {
     let specimen = Specimen::ideal(&PlatformParameters::reference(), &LegParameters::reference());
-    let mut machine = prepared(&specimen);
-    let free = raised(&mut machine.clone(), 50.0, 0.3);
+    let mut plant = prepared(&specimen);
+    let free = raised(&mut plant.clone(), 50.0, 0.3);
     // Equal legs but for the pairs' angle: the platform rises, and turns by less than a millionth of that.
     assert!(free[0].abs() < 1e-12 && free[1].abs() < 1e-12 && free[3].abs() < 1e-11, "{free:?}");
-    machine.touch(WorkPart::glass());
-    let pressed = raised(&mut machine, 50.0, 0.3);
+    plant.touch(WorkPart::glass());
+    let pressed = raised(&mut plant, 50.0, 0.3);
     let share = 3.97e7 / (3.97e7 + 3e6);
     assert!((pressed[2] / free[2] / share - 1.0).abs() < 1e-3, "{pressed:?} {free:?}");
-    let wrench = machine.wrench();
+    let wrench = plant.wrench();
     assert!((wrench.force[2] + 3e6 * pressed[2]).abs() < 1e-6, "{wrench:?}");
-    machine.release();
-    assert_eq!(machine.wrench(), Wrench::default());
-    let again = raised(&mut machine, 50.0, 0.3);
+    plant.release();
+    assert_eq!(plant.wrench(), Wrench::default());
+    let again = raised(&mut plant, 50.0, 0.3);
     assert!((again[2] / free[2] - 1.0).abs() < 0.01);
 }
 
@@ -78,13 +78,13 @@ fn equal_legs_raise_it_straight_and_a_part_holds_it_down() {
 fn the_current_limit_binds() {
     let mut specimen = Specimen::reference();
     let stack = |specimen: &Specimen, time: f64| {
-        let mut machine = prepared(specimen);
+        let mut plant = prepared(specimen);
         let mut left = time;
         while left > 1e-12 {
-            machine.hold(&[80.0; 6], 1e-4);
+            plant.hold(&[80.0; 6], 1e-4);
             left -= 1e-4;
         }
-        machine.stack_voltages()[0]
+        plant.stack_voltages()[0]
     };
     // 0.3 A into 7 µF is 42.9 V/ms, which 80 V across 0.35 ms (229 V/ms) exceed.
     assert!((stack(&specimen, 1e-3) - 300.0 / 7.0).abs() < 1e-6, "{}", stack(&specimen, 1e-3));
@@ -99,9 +99,9 @@ fn the_current_limit_binds() {
 fn halving_the_step_shows_second_order_and_a_nanometre_at_most() {
     let specimen = Specimen::reference();
     let [coarse, half, finest] = [2e-5, 1e-5, 2.5e-6].map(|step| {
-        let mut machine = prepared(&specimen);
-        machine.set_longest_step(step);
-        driven(&mut machine, 1000)
+        let mut plant = prepared(&specimen);
+        plant.set_longest_step(step);
+        driven(&mut plant, 1000)
     });
     let (coarse, half) = (worst(&coarse, &finest), worst(&half, &finest));
     println!("10 Hz: {:.1} pm at 20 µs, {:.1} pm at 10 µs from 2.5 µs", coarse * 1e12, half * 1e12);
@@ -111,9 +111,9 @@ fn halving_the_step_shows_second_order_and_a_nanometre_at_most() {
 #[test]
 fn the_same_voltages_give_the_same_bits() {
     let run = || {
-        let mut machine = prepared(&Specimen::random(3, 4));
-        machine.touch(WorkPart::aluminium());
-        raised(&mut machine, 33.0, 0.05).map(f64::to_bits)
+        let mut plant = prepared(&Specimen::random(3, 4));
+        plant.touch(WorkPart::aluminium());
+        raised(&mut plant, 33.0, 0.05).map(f64::to_bits)
     };
     assert_eq!(run(), run());
 }
@@ -128,13 +128,13 @@ fn whole_ticks_are_of_second_order_and_half_a_nanometre_from_the_finest_steps() 
     half.step_whole_ticks(0.5e-4);
     let reference = driven(&mut finest, 1000);
     // Two intervals of half the length under the same voltage.
-    let halves = |machine: &mut Machine| {
+    let halves = |plant: &mut PlatformPlant| {
         (0..1000)
             .map(|tick| {
                 let volts = voltages(tick);
-                machine.hold(&volts, 0.5e-4);
-                machine.hold(&volts, 0.5e-4);
-                machine.pose()
+                plant.hold(&volts, 0.5e-4);
+                plant.hold(&volts, 0.5e-4);
+                plant.pose()
             })
             .collect::<Vec<Six>>()
     };
@@ -152,11 +152,11 @@ fn a_kick_rings_alike_in_whole_ticks_and_at_the_current_limit() {
     let mut whole = usual.clone();
     whole.step_whole_ticks(1e-4);
     for (volts, bound) in [(10.0, 3e-9), (80.0, 100e-9)] {
-        let kick = |machine: &mut Machine| -> Vec<Six> {
+        let kick = |plant: &mut PlatformPlant| -> Vec<Six> {
             (0..300)
                 .map(|_| {
-                    machine.hold(&[volts, 0.0, volts, 0.0, 0.0, 0.5 * volts], 1e-4);
-                    machine.pose()
+                    plant.hold(&[volts, 0.0, volts, 0.0, 0.0, 0.5 * volts], 1e-4);
+                    plant.pose()
                 })
                 .collect()
         };
@@ -169,20 +169,20 @@ fn a_kick_rings_alike_in_whole_ticks_and_at_the_current_limit() {
 #[test]
 fn whole_ticks_have_the_same_bits_on_every_processor_and_end_where_they_must() {
     let specimen = Specimen::reference();
-    let mut machine = prepared(&specimen);
-    machine.step_whole_ticks(1e-4);
-    let mut plain = machine.clone();
+    let mut plant = prepared(&specimen);
+    plant.step_whole_ticks(1e-4);
+    let mut plain = plant.clone();
     for tick in 0..500 {
         let volts = std::array::from_fn(|leg| f64::from(tick % (50 + 7 * leg as u32)));
-        machine.hold(&volts, 1e-4);
+        plant.hold(&volts, 1e-4);
         plain.whole_tick.as_mut().unwrap().hold_plainly(&volts);
-        assert_eq!(machine.pose().map(f64::to_bits), plain.pose().map(f64::to_bits), "tick {tick}");
+        assert_eq!(plant.pose().map(f64::to_bits), plain.pose().map(f64::to_bits), "tick {tick}");
     }
-    let (pose, voltages, free) = (machine.pose(), machine.stack_voltages(), machine.free_displacements());
-    machine.touch(WorkPart::glass());
-    assert!(machine.whole_tick.is_none());
-    assert_eq!((machine.pose(), machine.stack_voltages()), (pose, voltages));
-    for (after, before) in machine.free_displacements().iter().zip(free) {
+    let (pose, voltages, free) = (plant.pose(), plant.stack_voltages(), plant.free_displacements());
+    plant.touch(WorkPart::glass());
+    assert!(plant.whole_tick.is_none());
+    assert_eq!((plant.pose(), plant.stack_voltages()), (pose, voltages));
+    for (after, before) in plant.free_displacements().iter().zip(free) {
         assert!((after - before).abs() < 1e-18);
     }
 }

@@ -1,4 +1,4 @@
-//! The whole machine: six amplifiers and stacks that drive the structure.
+//! The whole plant: six amplifiers and stacks that drive the structure.
 
 use super::amplifier::Amplifier;
 use super::contact::{WorkPart, Wrench};
@@ -43,19 +43,19 @@ impl Actuator {
 
 /// A platform that takes six held voltages and moves.
 ///
-/// Poses count from where it stands without drive after the pre-cycle of [`Machine::prepare`].
+/// Poses count from where it stands without drive after the pre-cycle of [`PlatformPlant::prepare`].
 #[derive(Debug, Clone, PartialEq)]
-pub struct Machine {
+pub struct PlatformPlant {
     actuators: [Actuator; 6],
     structure: Structure,
     longest_step: f64,
     step: f64,
-    /// In use instead of actuators and structure, see [`Machine::step_whole_ticks`].
+    /// In use instead of actuators and structure, see [`PlatformPlant::step_whole_ticks`].
     whole_tick: Option<Box<WholeTick>>,
 }
 
-impl Machine {
-    /// A machine as built: legs never driven, at rest.
+impl PlatformPlant {
+    /// A plant as built: legs never driven, at rest.
     #[must_use]
     pub fn new(specimen: &Specimen) -> Self {
         let nominal = &specimen.nominal;
@@ -77,7 +77,7 @@ impl Machine {
     }
 
     /// From here on intervals of `interval` (s) are one step each, some ten times as fast and not of the same bits. Second
-    /// order as well: at 100 µs half a nanometre at the peak of 56 µm at 10 Hz, a thousandth of what a kick makes ring. Contact, [`Machine::prepare`] and other intervals
+    /// order as well: at 100 µs half a nanometre at the peak of 56 µm at 10 Hz, a thousandth of what a kick makes ring. Contact, [`PlatformPlant::prepare`] and other intervals
     /// end it. Legs that differ in the number of their operators are left as they are.
     pub fn step_whole_ticks(&mut self, interval: f64) {
         self.step_small();
@@ -192,7 +192,7 @@ impl Machine {
         }
     }
 
-    /// The structure, as it was when [`Machine::step_whole_ticks`] was called if that is in force.
+    /// The structure, as it was when [`PlatformPlant::step_whole_ticks`] was called if that is in force.
     #[must_use]
     pub fn structure(&self) -> &Structure {
         &self.structure
