@@ -11,12 +11,13 @@
 
 use core::mem::{align_of, size_of};
 
-use controller::dynamics::{ANALYSIS_WORDS, MOTION_WORDS};
+use controller::dynamics::{Motion, PLATFORM};
 use controller::snapshot::MACHINE_STATE_WORDS;
 use controller::supervised::{
     MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, machine_output_words, supervise,
 };
 use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput};
+use specgen_runtime::Real;
 
 /// Version of this interface.
 const ABI_VERSION: u32 = 2;
@@ -259,14 +260,28 @@ pub unsafe extern "C" fn specgen_machine_load(machine: *mut u8, words: *const u6
     }
 }
 
-/// The dynamics at a motion, see `controller::dynamics::analysis`.
+/// The dynamics at a motion (words of pose, rate and acceleration): words of J and M row by row, C ḣ, G, leg forces, leg
+/// displacements.
 ///
 /// # Safety
-/// `motion` points to `MOTION_WORDS` words, `analysis` to `ANALYSIS_WORDS` writable words.
+/// `motion` points to 18 words, `analysis` to 96 writable words.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn specgen_dynamics(motion: *const u64, analysis: *mut u64) {
     // SAFETY: the caller's duty.
-    let words = controller::dynamics::analysis(unsafe { &*motion.cast::<[u64; MOTION_WORDS]>() });
+    let [pose, rate, acceleration] = unsafe { &*motion.cast::<[[u64; 6]; 3]>() }.map(|six| six.map(Real::from_word));
+    let motion = Motion { pose, rate, acceleration };
+    let words = |six: [controller::Real; 6]| six.map(Real::to_word);
+    let last = [
+        PLATFORM.coriolis(&pose, &rate),
+        PLATFORM.gravity(&pose),
+        PLATFORM.leg_forces(&motion),
+        PLATFORM.load(&motion, None).displacement,
+    ];
     // SAFETY: the caller's duty.
-    unsafe { analysis.cast::<[u64; ANALYSIS_WORDS]>().write(words) }
+    unsafe {
+        let matrices = analysis.cast::<[[u64; 6]; 6]>();
+        matrices.write(PLATFORM.jacobian(&pose).map(words));
+        matrices.add(1).write(PLATFORM.mass_matrix(&pose).map(words));
+        matrices.add(2).cast::<[[u64; 6]; 4]>().write(last.map(words));
+    }
 }
