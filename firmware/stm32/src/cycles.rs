@@ -7,7 +7,7 @@ use specgen_link::Counted;
 /// DWT CYCCNT.
 pub const CYCLES: Stopwatch = Stopwatch { counted: Counted::Cycles, now: DWT::cycle_count };
 
-/// Switches the counter on. An M7 keeps it locked until it is told the key; an M4 has no lock.
+/// Switches the counter on. An M7 keeps it locked until it gets the key; an M4 has no lock.
 pub fn start(dcb: &mut DCB, dwt: &mut DWT) {
     dcb.enable_trace();
     DWT::unlock();

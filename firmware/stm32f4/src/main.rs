@@ -8,150 +8,15 @@
 //! | idle | shows the tick that the background is alive, sleeps |
 #![no_std]
 #![no_main]
-#![allow(unsafe_code)] // Names for the linker.
+#![allow(unsafe_code)] // Names and sections for the linker.
 
 mod clocks;
 mod pins;
-mod safe;
-
-use specgen_board::{Exchange, Noticed};
-use specgen_stm32::converters;
-
-/// The machine on this board's converters.
-type Board = converters::OnBoard<{ clocks::DELAY }>;
-
-/// A tick without its timer, under a name that the analyses of the image know.
-#[unsafe(no_mangle)]
-#[inline(never)]
-fn specgen_tick(board: &mut Board, exchange: &mut Exchange, noticed: Noticed) -> bool {
-    board.tick(exchange, noticed)
-}
 
 /// Words of the recorder: what the 128 KiB of RAM have besides the 24 KiB of the rest and some in reserve, 80 KiB.
 const RECORD: usize = 80 * 1024 / size_of::<u64>();
 
-/// Of the watchdog, µs: some hundred ticks, and starting the converters anew.
-const WATCHDOG: u32 = 20_000;
+/// This core has no caches.
+fn prepare(_: &mut cortex_m::Peripherals) {}
 
-#[rtic::app(device = embassy_stm32, peripherals = false, dispatchers = [CEC])]
-mod app {
-    use core::mem::MaybeUninit;
-
-    use controller::supervised::Machine;
-    use embassy_stm32::gpio::Input;
-    use embassy_stm32::interrupt::{InterruptExt, Priority};
-    use embassy_stm32::mode::Async;
-    use embassy_stm32::peripherals::IWDG;
-    use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
-    use embassy_stm32::wdg::IndependentWatchdog;
-    use specgen_board::{Desk, Exchange, Health, Noticed, Schedule, recorder};
-    use specgen_link::Endpoint;
-    use specgen_stm32::converters::BusCell;
-    use specgen_stm32::cycles::{self, CYCLES};
-    use specgen_stm32::{converters, serial, timer};
-
-    use crate::{Board, RECORD, WATCHDOG, clocks, pins};
-
-    #[shared]
-    struct Shared {
-        exchange: &'static mut Exchange,
-        board: Board,
-    }
-
-    #[local]
-    struct Local {
-        schedule: Schedule,
-        health: Health,
-        watchdog: IndependentWatchdog<'static, IWDG>,
-        stop: Input<'static>,
-        receiver: RingBufferedUartRx<'static>,
-        sender: UartTx<'static, Async>,
-    }
-
-    // What is large is made where it stays: a move of some kilobytes would go over the stack.
-    #[init(local = [
-        dac_bus: BusCell = MaybeUninit::uninit(),
-        machine: MaybeUninit<Machine> = MaybeUninit::uninit(),
-        exchange: Exchange = Exchange::new(),
-        ring: [u8; serial::RING] = [0; serial::RING],
-        #[unsafe(link_section = ".record.memory")]
-        record: [u64; RECORD] = [0; RECORD],
-    ])]
-    fn init(mut context: init::Context) -> (Shared, Local) {
-        cycles::start(&mut context.core.DCB, &mut context.core.DWT);
-        let wiring = pins::take(embassy_stm32::init(clocks::config()));
-        let mut watchdog = IndependentWatchdog::new(wiring.watchdog, WATCHDOG);
-        // From here on a start that does not come to its end is a reset.
-        watchdog.unleash();
-
-        let intact = controller::integrity::intact();
-        let exchange = context.local.exchange;
-        exchange.recorder = recorder(context.local.record);
-        let machine = converters::at_reset(context.local.machine);
-        let board = converters::board(wiring.adc, wiring.dac, context.local.dac_bus, machine, intact);
-        let (Some(mut board), Ok(uart)) = (board, wiring.uart) else { crate::safe::stop() };
-        board.start(&mut exchange.report);
-
-        embassy_stm32::interrupt::USART2.set_priority(Priority::P8);
-        let (sender, receiver) = uart.split();
-        let receiver = receiver.into_ring_buffered(context.local.ring);
-
-        let mut schedule = Schedule::new(timer::period(clocks::TIMER), 0);
-        if !timer::start(&mut schedule, clocks::TIMER) || link::spawn().is_err() {
-            crate::safe::stop();
-        }
-        watchdog.pet();
-        (
-            Shared { exchange, board },
-            Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, receiver, sender },
-        )
-    }
-
-    /// One control tick.
-    #[task(binds = TIM2, priority = 16, shared = [exchange, board], local = [schedule, health, watchdog, stop])]
-    fn tick(context: tick::Context) {
-        let local = context.local;
-        let begin = timer::now();
-        timer::acknowledge();
-        let due = local.schedule.begin(begin);
-        timer::arm(due.next);
-        let noticed = Noticed { missed: due.missed, stop: local.stop.is_high() };
-        (context.shared.exchange, context.shared.board).lock(|exchange, board| {
-            if crate::specgen_tick(board, exchange, noticed) {
-                timer::arm(local.schedule.restart(timer::now()));
-            }
-            exchange.report.took(due.late, timer::now().wrapping_sub(begin));
-            if local.health.tick(exchange.beat, due.missed, exchange.report.amplifier_on) {
-                local.watchdog.pet();
-            }
-        });
-    }
-
-    /// Requests of the host.
-    #[task(
-        priority = 1,
-        shared = [exchange, board],
-        local = [
-            receiver, sender,
-            endpoint: Endpoint = Endpoint::new(),
-            desk: Desk = Desk::new(CYCLES),
-            answer: [u8; serial::ANSWER] = [0; serial::ANSWER],
-        ]
-    )]
-    async fn link(context: link::Context) {
-        let local = context.local;
-        let mut shared = (context.shared.exchange, context.shared.board);
-        serial::serve(local.receiver, local.sender, local.endpoint, local.desk, local.answer, |action| {
-            shared.lock(|exchange, board| action(exchange, board.machine_mut()));
-        })
-        .await;
-    }
-
-    #[idle(shared = [exchange])]
-    fn idle(mut context: idle::Context) -> ! {
-        loop {
-            context.shared.exchange.lock(|exchange| exchange.beat = exchange.beat.wrapping_add(1));
-            cortex_m::asm::wfi();
-        }
-    }
-}
+include!("../../stm32/program.rs");

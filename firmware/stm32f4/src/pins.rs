@@ -2,8 +2,10 @@
 
 use embassy_stm32::Peripherals;
 use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
+pub use embassy_stm32::interrupt::USART2 as LINK;
 use embassy_stm32::mode::Async;
-use embassy_stm32::peripherals::{IWDG, USART2};
+pub use embassy_stm32::peripherals::IWDG as Watchdog;
+use embassy_stm32::peripherals::USART2;
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{ConfigError, Uart};
 use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals, usart};
@@ -30,7 +32,7 @@ pub struct Wiring {
     /// Virtual COM port of the ST-LINK.
     pub uart: Result<Uart<'static, Async>, ConfigError>,
     /// Watchdog.
-    pub watchdog: Peri<'static, IWDG>,
+    pub watchdog: Peri<'static, Watchdog>,
 }
 
 /// Takes the pins. The enable line comes first and is driven low.

@@ -10,6 +10,7 @@ pub const PART: Part = Part {
     with: &["board", "hal", "link"],
     files: files! { "stm32":
         "Cargo.toml",
+        "program.rs",
         "src/converters.rs",
         "src/cycles.rs",
         "src/delay.rs",

@@ -16,6 +16,5 @@ pub const PART: Part = Part {
         "src/clocks.rs",
         "src/main.rs",
         "src/pins.rs",
-        "src/safe.rs",
     },
 };
