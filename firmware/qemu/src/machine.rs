@@ -5,13 +5,12 @@
 use crate::counted::counted_tick;
 use crate::instructions::{InstructionCounter, SelfTest};
 use crate::semihosting::{Exit, File};
-use crate::stats::{self, Stage, Summary};
+use crate::stats::{self, Stage};
 use crate::{is_due, specgen_step, stack};
 use controller::supervised::{
     MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, MachineInput, Phase, machine_output_words,
 };
 use controller::{CONFIG_WORDS, Config, State, TickInput, TickOutput};
-use core::mem::MaybeUninit;
 
 /// Ticks per file access.
 const BATCH: usize = 64;
@@ -74,17 +73,7 @@ pub fn replay(
         }
     }
     let sizes = [CONFIG_WORDS, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, size_of::<Machine>(), size_of::<Config>()];
-    let summary = Summary {
-        ticks,
-        sizes: sizes.map(|n| n as u64),
-        stack: [deepest as u64, stack::WINDOW as u64],
-        overhead: u64::from(counter.overhead()),
-        self_test,
-        overflows: counter.overflows(),
-    };
-    let stats_file = File::create(b"stats.bin\0").ok_or(Exit::CannotWrite)?;
-    let written = stats::write(&stats_file, &summary, &stages);
-    if written && stats_file.close() && output.close() { Ok(()) } else { Err(Exit::CannotWrite) }
+    stats::finish(output, counter, self_test, ticks, sizes, [deepest, stack::WINDOW], &stages)
 }
 
 /// Instructions of the control law alone, on a copy of the state.
@@ -92,13 +81,7 @@ pub fn replay(
 #[allow(unsafe_code)] // The step is called from assembly that counts it.
 fn count_law(counter: &mut InstructionCounter, config: &Config, state: &State, input: &TickInput) -> u32 {
     let mut copy = *state;
-    let mut output = MaybeUninit::<TickOutput>::uninit();
-    let arguments = [
-        (&raw mut output) as usize,
-        (&raw const *config) as usize,
-        (&raw mut copy) as usize,
-        (&raw const *input) as usize,
-    ];
-    // SAFETY: C passes the address of a result this large first, then the three references.
-    unsafe { counter.measure_call(specgen_step as *const (), arguments) }
+    let arguments = [(&raw const *config) as usize, (&raw mut copy) as usize, (&raw const *input) as usize];
+    // SAFETY: a C function of these three references.
+    unsafe { stack::measure::<TickOutput>(counter, specgen_step as *const (), arguments, false).1 }
 }

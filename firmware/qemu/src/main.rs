@@ -18,12 +18,10 @@ mod stages;
 mod stats;
 
 use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, output_words, step};
-use core::mem::MaybeUninit;
-use cortex_m_rt::{ExceptionFrame, entry, exception};
+use cortex_m_rt::entry;
 use instructions::InstructionCounter;
 use semihosting::{Exit, File, exit};
 use stages::Stages;
-use stats::Summary;
 
 /// Ticks per file access.
 const BATCH: usize = 256;
@@ -37,6 +35,7 @@ fn main() -> ! {
 }
 
 /// The whole run: files in, files out.
+#[allow(unsafe_code)] // The step is called from assembly that counts it.
 fn replay() -> Result<(), Exit> {
     if !controller::integrity::intact() {
         return Err(Exit::Corrupt);
@@ -73,7 +72,10 @@ fn replay() -> Result<(), Exit> {
             if due {
                 stages.measure(&mut counter, &config, &state, &tick_input);
             }
-            let (tick_output, instructions, depth) = tick(&mut counter, &config, &mut state, &tick_input, due);
+            let arguments = [(&raw const config) as usize, (&raw mut state) as usize, (&raw const tick_input) as usize];
+            // SAFETY: a C function of these three references.
+            let (tick_output, instructions, depth) =
+                unsafe { stack::measure::<TickOutput>(&mut counter, specgen_step as *const (), arguments, due) };
             stages.add_step(instructions);
             if depth > deepest {
                 deepest = depth;
@@ -90,17 +92,8 @@ fn replay() -> Result<(), Exit> {
         }
     }
 
-    let summary = Summary {
-        ticks,
-        sizes: [CONFIG_WORDS, INPUT_WORDS, OUTPUT_WORDS, size_of::<State>(), size_of::<Config>()].map(|n| n as u64),
-        stack: [deepest as u64, stack::WINDOW as u64],
-        overhead: u64::from(counter.overhead()),
-        self_test,
-        overflows: counter.overflows(),
-    };
-    let stats_file = File::create(b"stats.bin\0").ok_or(Exit::CannotWrite)?;
-    let written = stats::write(&stats_file, &summary, stages.all());
-    if written && stats_file.close() && output.close() { Ok(()) } else { Err(Exit::CannotWrite) }
+    let sizes = [CONFIG_WORDS, INPUT_WORDS, OUTPUT_WORDS, size_of::<State>(), size_of::<Config>()];
+    stats::finish(output, &counter, self_test, ticks, sizes, [deepest, stack::WINDOW], stages.all())
 }
 
 fn read_config() -> Result<Config, Exit> {
@@ -120,40 +113,6 @@ const fn is_due(tick: u64) -> bool {
     tick.is_multiple_of(if tick < 20_000 { 8 } else { 64 })
 }
 
-/// One step with its instructions and, if it is to be `painted`, its stack, bytes; else 0. In a frame of its own, so
-/// that the stack pointer stands still around the call.
-#[inline(never)]
-#[allow(unsafe_code)] // The step is called from assembly that counts it.
-fn tick(
-    counter: &mut InstructionCounter,
-    config: &Config,
-    state: &mut State,
-    input: &TickInput,
-    painted: bool,
-) -> (TickOutput, u32, usize) {
-    let mut output = MaybeUninit::<TickOutput>::uninit();
-    let arguments = [
-        (&raw mut output) as usize,
-        (&raw const *config) as usize,
-        (&raw mut *state) as usize,
-        (&raw const *input) as usize,
-    ];
-    // SAFETY: C passes the address of a result this large first, then the three references; the step writes it.
-    unsafe {
-        let step = specgen_step as *const ();
-        let (instructions, depth) = if painted {
-            stack::measure_depth(|| counter.measure_call(step, arguments))
-        } else {
-            (counter.measure_call(step, arguments), 0)
-        };
-        (output.assume_init(), instructions, depth)
-    }
-}
-
-/// C returns what is larger through memory of the caller, whatever its fields.
-const LARGEST_RESULT_IN_REGISTERS: usize = 32;
-const _: () = assert!(size_of::<TickOutput>() > LARGEST_RESULT_IN_REGISTERS);
-
 /// What the instruction count, the painted stack and the static stack bound all refer to.
 #[unsafe(no_mangle)]
 #[inline(never)]
@@ -161,18 +120,4 @@ const _: () = assert!(size_of::<TickOutput>() > LARGEST_RESULT_IN_REGISTERS);
 #[allow(improper_ctypes_definitions)] // Caller and callee are compiled together; only the registers matter.
 extern "C" fn specgen_step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
     step(config, state, input)
-}
-
-#[exception]
-#[allow(unsafe_code)] // cortex-m-rt wants it so.
-// SAFETY: called by the vector table alone; ends the program.
-unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-    exit(Exit::Fault)
-}
-
-#[exception]
-#[allow(unsafe_code)] // cortex-m-rt wants it so.
-// SAFETY: called by the vector table alone; ends the program.
-unsafe fn DefaultHandler(_: i16) {
-    exit(Exit::Fault)
 }

@@ -18,7 +18,7 @@ mod stages;
 mod stats;
 mod steps;
 
-use cortex_m_rt::{ExceptionFrame, entry, exception};
+use cortex_m_rt::entry;
 use instructions::InstructionCounter;
 use pipe::Pipe;
 use semihosting::{Exit, exit};
@@ -58,18 +58,4 @@ fn serve() -> Result<(), Exit> {
             }
         }
     }
-}
-
-#[exception]
-#[allow(unsafe_code)] // cortex-m-rt wants it so.
-// SAFETY: called by the vector table alone; ends the program.
-unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-    exit(Exit::Fault)
-}
-
-#[exception]
-#[allow(unsafe_code)] // cortex-m-rt wants it so.
-// SAFETY: called by the vector table alone; ends the program.
-unsafe fn DefaultHandler(_: i16) {
-    exit(Exit::Fault)
 }

@@ -5,6 +5,7 @@
 
 #![allow(unsafe_code)] // A semihosting call passes raw addresses to the emulator.
 
+use crate::semihosting::open;
 use cortex_m_semihosting::{nr, syscall};
 
 /// An open pipe.
@@ -15,19 +16,12 @@ pub struct Pipe {
 impl Pipe {
     /// Opens the end that bytes come out of; `name` ends with a zero byte. Waits for the host.
     pub fn reader(name: &'static [u8]) -> Option<Self> {
-        Self::open(name, nr::open::R_BINARY)
+        Some(Self { handle: open(name, nr::open::R_BINARY)? })
     }
 
     /// Opens the end that bytes go into; `name` ends with a zero byte. Waits for the host.
     pub fn writer(name: &'static [u8]) -> Option<Self> {
-        Self::open(name, nr::open::W_TRUNC_BINARY)
-    }
-
-    fn open(name: &'static [u8], mode: usize) -> Option<Self> {
-        let length = name.len().saturating_sub(1);
-        // SAFETY: SYS_OPEN reads `length` bytes and the zero byte at `name`.
-        let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, length) };
-        (handle != usize::MAX).then_some(Self { handle })
+        Some(Self { handle: open(name, nr::open::W_TRUNC_BINARY)? })
     }
 
     /// Waits for bytes and takes those that are there; how many. 0: the host has closed its end.

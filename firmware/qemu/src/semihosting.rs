@@ -57,6 +57,14 @@ pub fn exit(code: Exit) -> ! {
     }
 }
 
+/// Opens what has that `name`, which ends with a zero byte, on the emulator's host; its handle.
+pub fn open(name: &'static [u8], mode: usize) -> Option<usize> {
+    let length = name.len().saturating_sub(1);
+    // SAFETY: SYS_OPEN reads `length` bytes and the zero byte at `name`.
+    let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, length) };
+    (handle != usize::MAX).then_some(handle)
+}
+
 /// An open file of the emulator's host.
 pub struct File {
     handle: usize,
@@ -65,19 +73,12 @@ pub struct File {
 impl File {
     /// Opens a file for reading; `name` ends with a zero byte.
     pub fn open(name: &'static [u8]) -> Option<Self> {
-        Self::open_as(name, nr::open::R_BINARY)
+        Some(Self { handle: open(name, nr::open::R_BINARY)? })
     }
 
     /// Creates a file, or empties it; `name` ends with a zero byte.
     pub fn create(name: &'static [u8]) -> Option<Self> {
-        Self::open_as(name, nr::open::W_TRUNC_BINARY)
-    }
-
-    fn open_as(name: &'static [u8], mode: usize) -> Option<Self> {
-        let length = name.len().saturating_sub(1);
-        // SAFETY: SYS_OPEN reads `length` bytes and the zero byte at `name`.
-        let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, length) };
-        (handle != usize::MAX).then_some(Self { handle })
+        Some(Self { handle: open(name, nr::open::W_TRUNC_BINARY)? })
     }
 
     /// Fills `words` (little endian) as far as the file goes; returns the bytes read.

@@ -6,13 +6,46 @@
 #![allow(unsafe_code)] // Writes and reads memory below the stack pointer.
 
 use core::arch::asm;
+use core::mem::MaybeUninit;
 use core::sync::atomic::{Ordering, compiler_fence};
+
+use crate::instructions::InstructionCounter;
 
 /// How far below the stack pointer the paint reaches, bytes: 8 KiB, a multiple of 4.
 /// A use of this much or more is reported as exactly this much.
 pub const WINDOW: usize = 8192;
 
 const PAINT: u32 = 0x5AFE_C0DE;
+
+/// C returns what is larger through memory of the caller, whatever its fields.
+const LARGEST_RESULT_IN_REGISTERS: usize = 32;
+
+/// Calls a C function; its result, its instructions and, if it is to be `painted`, its stack, bytes; else 0. In a frame of
+/// its own, so that the stack pointer stands still around the call.
+///
+/// # Safety
+/// `function` returns an `R`, and so first takes the address that it writes it to; then the three `arguments`.
+#[inline(never)]
+pub unsafe fn measure<R>(
+    counter: &mut InstructionCounter,
+    function: *const (),
+    arguments: [usize; 3],
+    painted: bool,
+) -> (R, u32, usize) {
+    const { assert!(size_of::<R>() > LARGEST_RESULT_IN_REGISTERS) };
+    let mut result = MaybeUninit::<R>::uninit();
+    let [first, second, third] = arguments;
+    let arguments = [(&raw mut result) as usize, first, second, third];
+    // SAFETY: the caller's duty; the function writes the result.
+    unsafe {
+        let (instructions, depth) = if painted {
+            measure_depth(|| counter.measure_call(function, arguments))
+        } else {
+            (counter.measure_call(function, arguments), 0)
+        };
+        (result.assume_init(), instructions, depth)
+    }
+}
 
 /// Runs `f` and returns the bytes that it used below the stack pointer of the function this is inlined into.
 #[inline(always)]

@@ -18,8 +18,8 @@
 //! | +2 | calls |
 //! | +3, +4, +5 | instructions per call: smallest, sum over the calls, largest |
 
-use crate::instructions::SelfTest;
-use crate::semihosting::File;
+use crate::instructions::{InstructionCounter, SelfTest};
+use crate::semihosting::{Exit, File};
 
 const MAGIC: u64 = u64::from_le_bytes(*b"SPECSTAT");
 const VERSION: u64 = 1;
@@ -79,32 +79,25 @@ impl Stage {
     }
 }
 
-/// Words 2 to 16, but for the number of stages.
-pub struct Summary {
-    /// Rows of `input.bin`.
-    pub ticks: u64,
-    /// Words 3 to 7.
-    pub sizes: [u64; 5],
-    /// Words 8 and 9.
-    pub stack: [u64; 2],
-    /// Word 10.
-    pub overhead: u64,
-    /// Words 11 to 14.
-    pub self_test: SelfTest,
-    /// Word 15.
-    pub overflows: u64,
-}
-
-/// Writes all of it; false if the file does not take it.
-pub fn write(file: &File, summary: &Summary, stages: &[Stage]) -> bool {
-    let mut good = file.write(&[MAGIC, VERSION, summary.ticks]);
-    good &= file.write(&summary.sizes);
-    good &= file.write(&summary.stack);
-    good &= file.write(&[summary.overhead]);
-    good &= file.write(&summary.self_test);
-    good &= file.write(&[summary.overflows, stages.len() as u64]);
+/// Closes `output` and writes all of it: `sizes` are words 3 to 7, `stack` words 8 and 9.
+pub fn finish(
+    output: File,
+    counter: &InstructionCounter,
+    self_test: SelfTest,
+    ticks: u64,
+    sizes: [usize; 5],
+    stack: [usize; 2],
+    stages: &[Stage],
+) -> Result<(), Exit> {
+    let file = File::create(b"stats.bin\0").ok_or(Exit::CannotWrite)?;
+    let mut good = file.write(&[MAGIC, VERSION, ticks]);
+    good &= file.write(&sizes.map(|size| size as u64));
+    good &= file.write(&stack.map(|bytes| bytes as u64));
+    good &= file.write(&[u64::from(counter.overhead())]);
+    good &= file.write(&self_test);
+    good &= file.write(&[counter.overflows(), stages.len() as u64]);
     for stage in stages {
         good &= file.write(&stage.words());
     }
-    good
+    if good && file.close() && output.close() { Ok(()) } else { Err(Exit::CannotWrite) }
 }

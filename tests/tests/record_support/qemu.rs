@@ -17,10 +17,10 @@ use controller::supervised::{
 };
 use controller::{CONFIG_WORDS, Config};
 use core::mem::MaybeUninit;
-use cortex_m_rt::{ExceptionFrame, entry, exception};
+use cortex_m_rt::entry;
 use instructions::InstructionCounter;
 use semihosting::{Exit, File, exit};
-use stats::{Stage, Summary};
+use stats::Stage;
 
 const BATCH: usize = 64;
 /// Words of a block; the host's test has the same.
@@ -92,18 +92,9 @@ fn replay() -> Result<(), Exit> {
             return Err(Exit::CannotWrite);
         }
     }
-    let summary = Summary {
-        ticks,
-        sizes: [CONFIG_WORDS, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS + 2, size_of::<Machine>(), size_of::<Config>()]
-            .map(|n| n as u64),
-        stack: [0, 0],
-        overhead: u64::from(counter.overhead()),
-        self_test,
-        overflows: counter.overflows(),
-    };
-    let stats_file = File::create(b"stats.bin\0").ok_or(Exit::CannotWrite)?;
-    let written = stats::write(&stats_file, &summary, &stages);
-    if written && stats_file.close() && output.close() { Ok(()) } else { Err(Exit::CannotWrite) }
+    let sizes =
+        [CONFIG_WORDS, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS + 2, size_of::<Machine>(), size_of::<Config>()];
+    stats::finish(output, &counter, self_test, ticks, sizes, [0, 0], &stages)
 }
 
 /// The host's test has the same.
@@ -175,16 +166,4 @@ extern "C" fn specgen_save(machine: &Machine, words: &mut [u64; MACHINE_STATE_WO
 #[allow(improper_ctypes_definitions)]
 extern "C" fn specgen_digest(machine: &Machine) -> u64 {
     machine.digest()
-}
-
-#[exception]
-// SAFETY: called by the vector table alone; ends the program.
-unsafe fn HardFault(_: &ExceptionFrame) -> ! {
-    exit(Exit::Fault)
-}
-
-#[exception]
-// SAFETY: called by the vector table alone; ends the program.
-unsafe fn DefaultHandler(_: i16) {
-    exit(Exit::Fault)
 }
