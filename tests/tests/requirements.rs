@@ -94,7 +94,7 @@ fn the_step_of_the_platform_is_the_worst_of_all_roundings() {
 }
 
 #[test]
-fn microcontrollers_that_do_not_fit_are_refused_with_a_mend_that_is_accepted() {
+fn microcontrollers_that_do_not_fit_are_refused_with_a_fix_that_is_accepted() {
     let mcu = "mcu = \"mps2-an500\"";
     for (part, flash, ram) in [("stm32f446re", 512, 128), ("mps2-an386", 4096, 4096)] {
         let single = format!("mcu = \"{part}\"");

@@ -107,7 +107,7 @@ impl Default for Exchange {
 }
 
 impl Exchange {
-    /// At power-up: nothing wanted, the spec's settings, the link lost until the host is heard, nothing recorded.
+    /// At power-up: nothing wanted, the spec's settings, the link lost until the host sends something, nothing recorded.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -170,7 +170,7 @@ impl Exchange {
         at_rest
     }
 
-    /// Ends a lock-step, if there is one: machine and settings are as at power-up, and the recorder is told.
+    /// Ends a lock-step, if there is one: machine and settings are as at power-up, which the recorder notes.
     pub(crate) fn leave_lockstep(&mut self, machine: &mut Machine) {
         if self.in_lockstep() {
             self.lockstep = None;

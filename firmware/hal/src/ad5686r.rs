@@ -61,7 +61,7 @@ pub enum Channel {
 const LEG_CHANNELS: [Channel; LEGS_PER_PART] = [Channel::A, Channel::B, Channel::C];
 const ALL: u8 = 0xf;
 
-/// What a part is told.
+/// Commands to a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Command {
     /// Nothing; brings out what was asked for.

@@ -23,7 +23,7 @@ use specgen_link::client::{Client, ClientError, Port, Timeout};
 use specgen_link::{Refusal, Reply, Request};
 use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
-/// Converters: codes of the gauges, and what the amplifiers were told last.
+/// Converters: codes of the gauges, and the last codes for the amplifiers.
 #[derive(Clone, Default)]
 pub struct Parts(Rc<RefCell<State>>);
 

@@ -33,7 +33,7 @@ fn begins(kind: Kind, mode: f64, more: &[(&str, &str)]) -> i64 {
         for _ in 0..20 {
             bench.tick(HOLD, 0);
         }
-        // Somebody asks for another place in the very tick in which the law begins.
+        // Another place is asked for in the very tick in which the law begins.
         bench.setpoint = match kind {
             Kind::Legs => std::array::from_fn(|_| 3e-6 + draw(35e-6)),
             // Within reach: the bias leaves the legs 8 µm downwards.
@@ -75,8 +75,8 @@ fn six_legs_begin_without_a_jump() {
 #[test]
 fn a_platform_begins_without_a_jump() {
     // On its way from rest to the bias a platform may want legs shorter than they get.
-    let patient = [("voltage_time      = \"2 ms\"", "voltage_time      = \"500 ms\"")];
+    let tolerant = [("voltage_time      = \"2 ms\"", "voltage_time      = \"500 ms\"")];
     for mode in [1.0, 3.0, 6.0] {
-        assert!(begins(Kind::Platform, mode, &patient) <= MOST_CODES);
+        assert!(begins(Kind::Platform, mode, &tolerant) <= MOST_CODES);
     }
 }

@@ -29,7 +29,7 @@ fn verdict(spec: &str, line: &str) -> Result<(), (String, String)> {
 }
 
 #[test]
-fn what_cannot_work_is_refused_with_a_mend_that_works() {
+fn what_cannot_work_is_refused_with_a_fix_that_works() {
     let cases = [
         ("legs.toml", "stuck_time = \"2 ms\"", "E0470"),
         ("reference.toml", "tracking_time = \"1 ms\"", "E0470"),
@@ -60,7 +60,7 @@ fn what_cannot_work_is_refused_with_a_mend_that_works() {
     }
 }
 
-/// Between −20 V and 80 V legs rest at 0 V; where 0 V is not permitted, at the limit nearest to it; else where they are told to.
+/// Between −20 V and 80 V legs rest at 0 V; where 0 V is not permitted, at the limit nearest to it; else where the spec says.
 #[test]
 fn legs_rest_where_amplifiers_that_are_off_leave_them() {
     let record = fs::read_to_string(repository().join("specs/records/reference-forc.csv")).expect("a record");

@@ -178,11 +178,11 @@ fn phases_and_causes_of_a_platform_are_those_of_the_oracle() {
     for cause in [1, 4, 6, 8, 9, 10, 11, 12, 13, 14] {
         assert!(met.iter().any(|(_, found)| *found == cause), "cause {cause} never came: {met:?}");
     }
-    // The comparison can fail: an oracle whose gauges are given a tick more is told apart.
+    // The comparison can fail: an oracle whose gauges are given a tick more is distinguished.
     let other = Bounds { gauge_ticks: bounds.gauge_ticks + 1, ..bounds };
     let mut bench = Bench::new(Kind::Platform, &emitted, &[("mode", 6.0)]);
     let followed = catch_unwind(AssertUnwindSafe(|| follow(&mut bench, Oracle::new(other), max_step, 1000)));
-    assert!(followed.is_err(), "the oracle of other times was not told apart");
+    assert!(followed.is_err(), "the oracle of other times was not distinguished");
 }
 
 /// Legs that rest above their lowest voltage: there after reset, without moving, and there again after every ramp.

@@ -35,8 +35,8 @@ fn streaming(emitted: &specgen_tests::Emitted) -> (Bench, u32) {
 
 #[test]
 fn a_platform_in_motion_is_brought_to_rest_before_its_codes_are_held_or_ramped_down() {
-    let patient = [("voltage_time      = \"2 ms\"", "voltage_time      = \"500 ms\"")];
-    let emitted = emitted("supervisor-stops", "reference.toml", &patient);
+    let tolerant = [("voltage_time      = \"2 ms\"", "voltage_time      = \"500 ms\"")];
+    let emitted = emitted("supervisor-stops", "reference.toml", &tolerant);
     let setpoints = &emitted.compiled.ir.task_space.as_ref().expect("in task space").setpoints;
     let limits = StopLimits {
         acceleration: setpoints.stop_acceleration_limit,

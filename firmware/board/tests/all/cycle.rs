@@ -1,4 +1,4 @@
-//! The tick against the controller called by hand, on converters that do as they are told, faults included.
+//! The tick against the controller called by hand, on converters that take every code, faults included.
 
 #![allow(clippy::unwrap_used)]
 
@@ -23,7 +23,7 @@ enum Done {
     Write([i32; 6]),
 }
 
-/// What the converters answer next, and what they were told.
+/// What the converters answer next, and what was sent to them.
 #[derive(Default)]
 struct Bench {
     codes: [i32; 6],
@@ -191,7 +191,7 @@ fn a_code_taken_with_another_shift_is_seen() {
 }
 
 #[test]
-fn a_link_that_was_never_heard_or_fell_silent_is_an_event() {
+fn a_link_without_a_frame_or_that_fell_silent_is_an_event() {
     let parts = Parts::default();
     let mut board = Board::new(parts.clone(), parts, at_reset(), true);
     let mut exchange = Exchange::new();

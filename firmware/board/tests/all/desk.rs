@@ -64,7 +64,7 @@ fn what_is_refused_changes_nothing() {
         (Request::Setpoint { words: Bytes(&[0; 8]) }, Refusal::Length { expected: COMMAND_WORDS as u16 }),
         (Request::WriteConfig { words: Bytes(&[0; 7]) }, Refusal::Length { expected: CONFIG_WORDS as u16 }),
         (Request::WriteConfig { words: Bytes(&bytes(&config)) }, Refusal::Word { index: 0 }),
-        // Nobody counts here, there is no recorder, no tick has told yet that nothing moves.
+        // Nothing counts here, there is no recorder, no tick has shown yet that nothing moves.
         (Request::LockstepStage { index: 0 }, Refusal::Unsupported),
         (Request::Recorder { action: RecorderAction::Look }, Refusal::Unsupported),
         (Request::Download { offset: 0 }, Refusal::Unsupported),
@@ -123,7 +123,7 @@ fn the_description_comes_in_pieces() {
 
 /// Events that come up after the status was given out are still there for the next one.
 #[test]
-fn events_are_kept_until_the_host_was_told() {
+fn events_are_kept_until_the_host_has_them() {
     let mut bench = Bench::new();
     bench.exchange.report.events = 0b0101;
     bench.ask(&Request::ReadConfig, |_| ());
