@@ -1,6 +1,5 @@
 //! What was built is not built again, and nothing that was kept is believed.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 #![cfg(unix)]
 
 use std::fs;

@@ -1,7 +1,5 @@
 //! The command as a user meets it: exit codes, `--json`, help, and what it says about arguments and files that are wrong.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use crate::support;
 use std::ffi::OsString;
 use std::fs;

@@ -1,7 +1,5 @@
 //! What the hand-written documents name is there: links, files, tests, commands and their options.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use std::collections::BTreeSet;
 use std::fs;
 

@@ -1,6 +1,4 @@
 //! `specgen dynamics` as a user runs it.
-#![allow(clippy::unwrap_used)] // A test.
-
 use crate::support::{Folder, repository};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

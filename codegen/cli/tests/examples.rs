@@ -1,8 +1,6 @@
 //! The examples of every help text run as they stand; commands in documents are at least such that the program takes them.
 
 #![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use crate::support;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;

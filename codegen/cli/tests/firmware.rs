@@ -2,24 +2,16 @@
 //!
 //! Needs a cross compiler; without one it fails, or skips if `SPECGEN_ALLOW_MISSING=1`.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use std::ffi::OsString;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-use crate::support::{Document, Folder, Run};
-use specgen::target;
+use crate::support::{Document, Folder, Run, tools};
 
 /// Where images are built: kept between runs, so that `core` is compiled once.
 fn target_dir() -> String {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("images").display().to_string()
-}
-
-fn has_tools() -> bool {
-    let test = std::thread::current().name().unwrap_or_default().to_owned();
-    target::available_or_skip(&test).unwrap_or_else(|error| panic!("{error}")).is_some()
 }
 
 /// A folder in front of `PATH` with a `probe-rs` that writes its arguments to `asked.txt` and ends with `status`.
@@ -40,11 +32,6 @@ fn without_probe_rs() -> OsString {
     std::env::join_paths(std::env::split_paths(&path).filter(|folder| !folder.join("probe-rs").exists())).unwrap()
 }
 
-/// Adds keys to the table `[target.budget]` of legs.toml.
-fn with_budget(folder: &Folder, name: &str, old: &str, new: &str) {
-    folder.spec(name, &[(old, new)]);
-}
-
 fn json(folder: &Folder, arguments: &[&str]) -> (i32, serde_json::Value) {
     let run = Run::of(folder.command().args(arguments).arg("--json"));
     let value: serde_json::Value =
@@ -55,7 +42,7 @@ fn json(folder: &Folder, arguments: &[&str]) -> (i32, serde_json::Value) {
 
 #[test]
 fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
-    if !has_tools() {
+    if tools().is_none() {
         return;
     }
     let folder = Folder::new();
@@ -92,7 +79,7 @@ fn an_image_is_built_checked_weighed_and_only_flashed_if_it_passes() {
     assert_eq!(weighed["result"]["checks"], made["checks"]);
 
     // Over budget: who takes most, and by how much to shrink; nothing is flashed.
-    with_budget(&folder, "tight.toml", "flash        = \"128 KiB\"", &format!("flash = \"{} B\"", flash - 10));
+    folder.spec("tight.toml", &[("flash        = \"128 KiB\"", &format!("flash = \"{} B\"", flash - 10))]);
     let tight = ["build", "tight.toml", "--target", "qemu", "-o", "tight", "--no-measure", "--target-dir", &dir];
     folder.run(&tight).says(1, &["target.budget.flash allows", "shrink it by 10", "most of it: "]);
     let (code, document) = json(&folder, &tight);

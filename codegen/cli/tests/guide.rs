@@ -1,7 +1,5 @@
 //! docs/guide.md walked as a reader would: its commands in order, in one folder, their output in the form that it shows.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use std::fs;
 use std::time::Instant;
 

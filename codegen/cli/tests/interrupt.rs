@@ -1,6 +1,5 @@
 //! What is left when a command is interrupted, and when standard output or standard error takes nothing more.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 #![cfg(unix)]
 
 use crate::support;
@@ -43,12 +42,7 @@ fn interrupted(folder: &Folder, arguments: &[&str], signal: Signal) -> Run {
         std::thread::sleep(Duration::from_millis(10));
     }
     kill_process_group(Pid::from_raw(child.id().cast_signed()).unwrap(), signal).unwrap();
-    let output = child.wait_with_output().unwrap();
-    Run {
-        code: output.status.code().unwrap_or_else(|| panic!("{arguments:?} ended by a signal: {output:?}")),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
+    Run::ended(&format!("{arguments:?}"), child.wait_with_output().unwrap())
 }
 
 fn is_empty(folder: &Folder, name: &str) -> bool {
@@ -104,7 +98,7 @@ fn a_folder_in_use_names_the_run_that_has_it() {
 }
 
 #[test]
-fn an_end_from_outside_is_told_to_programs() {
+fn an_end_from_outside_is_reported_to_programs() {
     let folder = with_slow_cargo();
     for signal in [Signal::TERM, Signal::HUP] {
         let run = interrupted(&folder, &["sim", "legs.toml", "--json"], signal);
@@ -141,7 +135,7 @@ fn output_that_is_not_whole_is_an_error() {
     assert!(String::from_utf8(output.stdout).unwrap().ends_with("\n0\n"));
 }
 
-/// The exit code is the same whether the reason can be read, or not.
+/// The exit code is the same whether the message can be read or not.
 #[test]
 fn messages_that_nobody_can_read_change_nothing() {
     let folder = Folder::new();

@@ -1,6 +1,5 @@
 //! `kill -9` at any time: every next run succeeds, what was written is whole, and nothing of the user's is lost.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -36,7 +35,7 @@ fn kill(mut child: Child) -> bool {
 enum Way {
     /// From beside it: the folders change places.
     Swap,
-    /// By a shell that stands in it: files are replaced one by one.
+    /// From a shell that stands in it: files are replaced one by one.
     InPlace,
 }
 

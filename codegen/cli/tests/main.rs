@@ -1,4 +1,5 @@
 //! The command and the compiler as a user meets them, in one binary: a module for each subject.
+#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
 
 #[path = "../../../tests/tests/board_support/mod.rs"]
 mod board_support;

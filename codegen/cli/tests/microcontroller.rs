@@ -2,26 +2,19 @@
 //!
 //! Needs a cross compiler and QEMU; without them it fails, or skips if `SPECGEN_ALLOW_MISSING=1`.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 mod faults;
 mod fixture;
 
+use crate::support::tools;
 use fixture::{INPUT_WORDS, OUTPUT_WORDS, Workspace, expected, target_dir};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::model::Mcu;
 use specgen::target::stack::{STEP_SYMBOL, StackBound, bound};
-use specgen::target::{self, Image, TargetError, Tools, build_image, replay};
+use specgen::target::{self, Image, TargetError, build_image, replay};
 use std::time::Duration;
 
 const LIMIT: Duration = Duration::from_secs(120);
-
-/// The tools, or `None` if their absence is excused.
-fn tools() -> Option<Tools> {
-    let test = std::thread::current().name().unwrap_or_default().to_owned();
-    target::available_or_skip(&test).unwrap_or_else(|error| panic!("{error}"))
-}
 
 fn build(workspace: &Workspace, mcu: Mcu) -> Image {
     build_image(workspace.dir(), mcu, &target_dir()).unwrap_or_else(|error| panic!("{error}"))

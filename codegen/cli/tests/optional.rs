@@ -1,7 +1,5 @@
 //! The main job on machines that lack the tools for microcontrollers: it does the rest, says what was left out, and fails only
-//! if asked to.
-
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+//! if that is asked for.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,6 +1,4 @@
-//! The output folder is written whole or not at all, and nobody's work is overwritten.
-
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
+//! The output folder is written whole or not at all, and no work of a user is overwritten.
 
 use std::fs;
 use std::os::unix::fs::symlink;
@@ -110,13 +108,13 @@ fn a_target_that_is_built_for_no_more_leaves_only_what_cargo_made_and_may_come_b
     }
     fs::remove_dir_all(folder.path("out/rt-pc")).unwrap();
     assert_eq!(listing(&folder.path("out")), fresh);
-    // Anything else in it is another's.
+    // Anything else in it belongs to a user.
     fs::create_dir_all(folder.path("out/rt-pc/src")).unwrap();
     folder.write("out/rt-pc/src/main.rs", "mine");
     refused(&folder, "out", 1, &["rt-pc/"]);
 }
 
-/// Cargo makes a lock file beside a manifest of ours; any other is another's.
+/// Cargo makes a lock file beside a manifest of ours; any other belongs to a user.
 #[test]
 fn a_lock_file_in_a_folder_that_specgen_did_not_write_is_not_overwritten() {
     let folder = Folder::new();
@@ -140,7 +138,7 @@ fn what_a_killed_run_left_is_taken_up() {
     write(&folder);
     let fresh = folder.listing();
     let work = folder.path(".out.specgen");
-    // After the swap: cargo's folder and what another had put there meanwhile lie in the old output.
+    // After the swap: cargo's folder and what a user had put there meanwhile lie in the old output.
     for (path, text) in [("target/object.o", "built"), ("Cargo.lock", "locked")] {
         fs::create_dir_all(folder.path("out/target")).unwrap();
         fs::write(folder.path("out").join(path), text).unwrap();
@@ -153,7 +151,7 @@ fn what_a_killed_run_left_is_taken_up() {
     write(&folder);
     assert_eq!(folder.listing(), with_target);
 
-    // What is not cargo's comes back too, and is then another's in the way.
+    // What is not cargo's comes back too, and is then a user's file in the way.
     fs::create_dir(&work).unwrap();
     fs::rename(folder.path("out"), work.join("new")).unwrap();
     fs::write(work.join("new/notes.txt"), "mine").unwrap();
@@ -173,7 +171,7 @@ fn what_a_killed_run_left_is_taken_up() {
     assert_eq!(folder.listing(), fresh);
 }
 
-/// Both at once is neither a mixture nor anyone's mistake.
+/// Both at once is neither a mixture nor a mistake of the user.
 #[test]
 fn runs_at_once_write_one_after_the_other() {
     let folder = Folder::new();
@@ -211,7 +209,7 @@ fn an_empty_folder_and_one_whose_parents_are_missing_are_taken() {
 }
 
 #[test]
-fn a_file_of_another_is_not_overwritten() {
+fn a_file_of_the_user_is_not_overwritten() {
     let folder = Folder::new();
     write(&folder);
     folder.write("out/notes.txt", "mine");
@@ -234,7 +232,7 @@ fn a_file_of_another_is_not_overwritten() {
 }
 
 #[test]
-fn a_link_in_the_output_is_of_another() {
+fn a_link_in_the_output_belongs_to_the_user() {
     let folder = Folder::new();
     write(&folder);
     fs::rename(folder.path("out/README.md"), folder.path("moved.md")).unwrap();

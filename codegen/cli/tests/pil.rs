@@ -2,8 +2,6 @@
 //!
 //! Needs a cross compiler and QEMU but for the serial port; without them it fails, or skips if `SPECGEN_ALLOW_MISSING=1`.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 mod board;
 
 use crate::support;
@@ -48,11 +46,6 @@ fn document(command: &mut Command, code: i32) -> Value {
     value
 }
 
-fn tools() -> bool {
-    let test = std::thread::current().name().unwrap_or_default().to_owned();
-    target::available_or_skip(&test).unwrap_or_else(|error| panic!("{error}")).is_some()
-}
-
 /// The image of six legs, with a file of it beside the workspace, and the controller on this machine.
 fn legs(folder: &Path) -> (Image, PathBuf, Supervised) {
     let image = built(folder, true).unwrap();
@@ -79,7 +72,7 @@ fn number(value: &Value) -> f64 {
 
 #[test]
 fn six_legs_and_a_platform_are_bit_equal_in_closed_loop_and_legs_outrun_real_time() {
-    if !tools() {
+    if support::tools().is_none() {
         return;
     }
     let (_one, folder) = workspace();
@@ -137,7 +130,7 @@ fn six_legs_and_a_platform_are_bit_equal_in_closed_loop_and_legs_outrun_real_tim
 
 #[test]
 fn a_flipped_bit_in_a_table_of_the_image_is_found_with_its_tick_and_signal() {
-    if !tools() {
+    if support::tools().is_none() {
         return;
     }
     let (_one, folder) = workspace();
@@ -169,7 +162,7 @@ static NEVER: AtomicBool = AtomicBool::new(false);
 
 #[test]
 fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
-    if !tools() {
+    if support::tools().is_none() {
         return;
     }
     let (_one, folder) = workspace();
@@ -207,7 +200,7 @@ fn an_emulator_that_ends_or_hangs_is_an_error_in_words() {
 
 #[test]
 fn ctrl_c_ends_it_with_what_was_done_and_leaves_no_emulator() {
-    if !tools() {
+    if support::tools().is_none() {
         return;
     }
     let (_one, folder) = workspace();

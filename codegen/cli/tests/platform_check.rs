@@ -1,7 +1,5 @@
 //! `specgen check` on a platform: what is reported, and that what a refusal offers is accepted when put into the file.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use std::fs;
 
 use crate::support::{Folder, repository};

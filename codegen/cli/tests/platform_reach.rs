@@ -1,7 +1,5 @@
 //! Reach of the reference platform against the study's figures and against leg lengths by Pythagoras.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use std::path::Path;
 
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTrajectory, Reading};

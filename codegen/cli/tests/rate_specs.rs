@@ -1,7 +1,5 @@
 //! What `specgen check` says of rate options that do not fit together.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use std::fs;
 
 use crate::support::{Folder, repository};

@@ -1,7 +1,5 @@
 //! `specgen sim --record` and `specgen replay` as a user runs them, for both kinds of controller.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use std::fs;
 
 use crate::support::Folder;

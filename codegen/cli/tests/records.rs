@@ -1,8 +1,6 @@
 //! A record that is no use is refused with the line or time, what was expected, and a fix; nothing is written. Each is made
 //! from a good one, and met both ways: named in a spec, and given to `identify`.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use std::fmt::Write as _;
 use std::fs;
 

@@ -1,7 +1,5 @@
 //! `specgen report` and `specgen reproduce` as a user runs them: bytes, sizes, and the page in a browser where there is one.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use crate::support;
 use std::path::Path;
 use std::process::Command;

@@ -1,7 +1,5 @@
 //! The output depends on the spec and its records, and on nothing else.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use crate::support;
 use std::collections::BTreeMap;
 use std::fs;

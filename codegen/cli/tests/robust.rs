@@ -1,12 +1,8 @@
 //! `specgen robust` as a user runs it: replay to the bit, threads, the gate, what it calls diverged, what it refuses.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use std::collections::BTreeSet;
-use std::io::{BufRead, BufReader, Read};
-use std::process::Stdio;
 
-use crate::support::{Folder, contents, length};
+use crate::support::{Folder, Run, contents, length};
 use serde_json::Value;
 use specgen::compile::compile;
 use specgen::model::AdaptationMode;
@@ -147,7 +143,7 @@ fn the_gate_of_options_or_spec_fails_a_build_with_the_reason_and_the_figures() {
 }
 
 #[test]
-fn what_cannot_be_run_is_refused_with_a_mend_and_nothing_is_written() {
+fn what_cannot_be_run_is_refused_with_a_fix_and_nothing_is_written() {
     let folder = Folder::new();
     let before = folder.listing();
     let cases: &[(&str, &[&str], &str)] = &[
@@ -189,25 +185,11 @@ fn what_cannot_be_run_is_refused_with_a_mend_and_nothing_is_written() {
 #[test]
 fn ctrl_c_keeps_what_was_run_and_says_so() {
     let folder = Folder::new();
-    let mut child = folder
-        .command()
-        .args(["robust", "legs.toml", "--draws", "2000", "--frequency", "10", "--threads", "1"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut stderr = BufReader::new(child.stderr.take().unwrap());
-    let mut line = String::new();
-    while !line.starts_with("robust: ") {
-        line.clear();
-        assert_ne!(stderr.read_line(&mut line).unwrap(), 0, "it ended before it was interrupted");
-    }
-    crate::support::send(rustix::process::Signal::INT, child.id());
-    let mut said = String::new();
-    stderr.read_to_string(&mut said).unwrap();
-    let output = child.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(130), "{said}");
-    assert!(said.contains("interrupted: the figures are of ") && said.contains("no gate is passed"), "{said}");
-    let shown = String::from_utf8(output.stdout).unwrap();
+    let mut command = folder.command();
+    command.args(["robust", "legs.toml", "--draws", "2000", "--frequency", "10", "--threads", "1"]);
+    let runs = |stderr: &str| stderr.lines().last().is_some_and(|line| line.starts_with("robust: "));
+    let run = Run::meanwhile(&mut command, runs, |process| crate::support::send(rustix::process::Signal::INT, process));
+    run.says(130, &["interrupted: the figures are of ", "no gate is passed"]);
+    let shown = run.stdout;
     assert!(shown.contains("worst error") && !shown.contains("gate: passed"), "{shown}");
 }

@@ -1,10 +1,6 @@
 //! `specgen tune` as a user runs it: the figure it reaches, the bytes it gives, what it refuses, what it writes.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 use crate::support;
-use std::io::{BufRead, BufReader, Read};
-use std::process::Stdio;
 
 use crate::support::{Folder, Run, contents};
 use serde_json::Value;
@@ -198,18 +194,9 @@ fn an_edit_made_while_it_is_tuned_is_not_lost() {
     let folder = Folder::new();
     let mut command = folder.command();
     command.args(["tune", "legs.toml", "--evaluations", "20", "--seconds", "0.2", "--write"]);
-    let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut lines = BufReader::new(child.stderr.take().unwrap());
-    let mut stderr = String::new();
-    while !stderr.contains("preparing the machine") {
-        assert_ne!(lines.read_line(&mut stderr).unwrap(), 0, "it ended before the spec was edited: {stderr}");
-    }
     let edited = folder.read("legs.toml") + "# mine\n";
-    folder.write("legs.toml", &edited);
-    lines.read_to_string(&mut stderr).unwrap();
-    let output = child.wait_with_output().unwrap();
-    let stdout = String::from_utf8(output.stdout).unwrap();
-    let run = Run { code: output.status.code().unwrap_or_default(), stdout, stderr };
+    let prepares = |stderr: &str| stderr.contains("preparing the machine");
+    let run = Run::meanwhile(&mut command, prepares, |_| folder.write("legs.toml", &edited));
     run.says(1, &["`legs.toml` was changed while it was tuned", "nothing was written", "tune again"]);
     assert!(run.stdout.contains("+++ legs.toml"), "{}", run.stdout);
     assert_eq!(folder.read("legs.toml"), edited);
@@ -220,26 +207,10 @@ fn an_edit_made_while_it_is_tuned_is_not_lost() {
 #[test]
 fn ctrl_c_keeps_the_best_so_far_and_says_so() {
     let folder = Folder::new();
-    let mut child = folder
-        .command()
-        .args(["tune", "legs.toml", "--evaluations", "1000000", "--threads", "1"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut lines = BufReader::new(child.stderr.take().unwrap());
-    let mut stderr = String::new();
-    while !stderr.lines().last().is_some_and(|line| line.starts_with("cma: ")) {
-        assert_ne!(lines.read_line(&mut stderr).unwrap(), 0, "it ended before it was interrupted: {stderr}");
-    }
-    support::send(rustix::process::Signal::INT, child.id());
-    lines.read_to_string(&mut stderr).unwrap();
-    let output = child.wait_with_output().unwrap();
-    let run = Run {
-        code: output.status.code().unwrap_or_default(),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr,
-    };
+    let mut command = folder.command();
+    command.args(["tune", "legs.toml", "--evaluations", "1000000", "--threads", "1"]);
+    let runs = |stderr: &str| stderr.lines().last().is_some_and(|line| line.starts_with("cma: "));
+    let run = Run::meanwhile(&mut command, runs, |process| support::send(rustix::process::Signal::INT, process));
     run.says(130, &["interrupted: this is the best of"]);
     assert!(run.stdout.contains("tuned") && run.stdout.contains("+++ legs.toml"), "{}", run.stdout);
 }

@@ -2,8 +2,6 @@
 //! with it.
 
 #![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 mod design;
 mod simulation;
 mod study;

@@ -1,8 +1,5 @@
 //! The real binary as a user runs it: on a copy of the specs, with everything it prints looked at.
 
-#![allow(dead_code)] // Each test file uses its part.
-#![allow(clippy::unwrap_used, clippy::panic)] // Helpers of tests, where a panic is a failed test.
-
 pub mod commands;
 pub mod unprivileged;
 
@@ -10,11 +7,13 @@ use rustix::process::{Pid, Signal, kill_process};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 use specgen::diagnostic::codes;
+use specgen::target::{self, Tools};
 
 pub const BINARY: &str = env!("CARGO_BIN_EXE_specgen");
 
@@ -91,15 +90,32 @@ pub struct Run {
 
 impl Run {
     pub fn of(command: &mut Command) -> Self {
-        let output = command.output().unwrap();
-        let run = Self {
-            code: output.status.code().unwrap_or_else(|| panic!("{command:?} ended by a signal: {output:?}")),
-            stdout: String::from_utf8(output.stdout).unwrap(),
-            stderr: String::from_utf8(output.stderr).unwrap(),
-        };
+        let run = Self::ended(&format!("{command:?}"), command.output().unwrap());
         assert!(!run.stderr.contains("panicked at"), "{command:?}: {}", run.stderr);
         assert!((0..=3).contains(&run.code), "{command:?}: exit code {}\n{}", run.code, run.stderr);
         run
+    }
+
+    /// What a process left that ended by itself.
+    pub fn ended(what: &str, output: Output) -> Self {
+        Self {
+            code: output.status.code().unwrap_or_else(|| panic!("{what} ended by a signal: {output:?}")),
+            stdout: String::from_utf8(output.stdout).unwrap(),
+            stderr: String::from_utf8(output.stderr).unwrap(),
+        }
+    }
+
+    /// Runs `command`, and once standard error is as `seen` wants it, does something to the process.
+    pub fn meanwhile(command: &mut Command, seen: impl Fn(&str) -> bool, act: impl FnOnce(u32)) -> Self {
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut lines = BufReader::new(child.stderr.take().unwrap());
+        let mut stderr = String::new();
+        while !seen(&stderr) {
+            assert_ne!(lines.read_line(&mut stderr).unwrap(), 0, "{command:?} ended too early: {stderr}");
+        }
+        act(child.id());
+        lines.read_to_string(&mut stderr).unwrap();
+        Self { stderr, ..Self::ended(&format!("{command:?}"), child.wait_with_output().unwrap()) }
     }
 
     /// The text must have failed with `code` and say all of `words` on standard error.
@@ -204,6 +220,12 @@ pub fn send(signal: Signal, process: u32) {
 /// How much of what only gains by length is run: the long length in the soak.
 pub fn length<T>(short: T, long: T) -> T {
     if std::env::var_os("SPECGEN_SOAK").is_some() { long } else { short }
+}
+
+/// Cross compiler and emulator; none, with a line that says so, if their absence is excused.
+pub fn tools() -> Option<Tools> {
+    let test = std::thread::current().name().unwrap_or_default().to_owned();
+    target::available_or_skip(&test).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Says why part of a test did not run.

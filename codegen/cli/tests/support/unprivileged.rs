@@ -1,4 +1,4 @@
-//! Runs the command as a user whom permissions bind, as root is not.
+//! Runs the command as a user whom permissions bind, as they do not bind root.
 
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, chown};
