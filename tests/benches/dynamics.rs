@@ -28,28 +28,27 @@ fn motions() -> Vec<Motion<f64>> {
     (0..1024).map(|_| Motion { pose: six(1e-3), rate: six(0.1), acceleration: six(10.0) }).collect()
 }
 
+/// Times `compute` on every motion.
+fn each(bencher: Bencher, motions: &[Motion<f64>], compute: impl Fn(&Motion<f64>) -> f64) {
+    bencher.counter(ItemsCount::new(motions.len())).bench_local(|| {
+        for motion in motions {
+            black_box(compute(black_box(motion)));
+        }
+    });
+}
+
 /// h, ḣ, ḧ to six leg forces, the kernel of the controller.
 #[divan::bench]
 fn leg_forces(bencher: Bencher) {
     let platform = lower::platform(&model()).expect("a sound geometry");
-    let motions = motions();
-    bencher.counter(ItemsCount::new(motions.len())).bench_local(|| {
-        for motion in &motions {
-            black_box(platform.leg_forces(black_box(motion)));
-        }
-    });
+    each(bencher, &motions(), |motion| black_box(platform.leg_forces(motion))[0]);
 }
 
 /// With displacements and a wrench, as the tick takes it.
 #[divan::bench]
 fn load(bencher: Bencher) {
     let platform = lower::platform(&model()).expect("a sound geometry");
-    let motions = motions();
-    bencher.counter(ItemsCount::new(motions.len())).bench_local(|| {
-        for motion in &motions {
-            black_box(platform.load(black_box(motion), black_box(Some(&[1.0; 6]))));
-        }
-    });
+    each(bencher, &motions(), |motion| black_box(platform.load(motion, black_box(Some(&[1.0; 6])))).force[0]);
 }
 
 /// The same forces as one writes them with nalgebra from the errata: M and C ḣ + G by summing over the legs, LU of Jᵀ.
@@ -62,11 +61,7 @@ fn leg_forces_in_plain_nalgebra(bencher: Bencher) {
         let difference = plain.leg_forces(motion) - Vector6::from(kernel.leg_forces(motion));
         assert!(difference.norm() < 1e-10, "both compute the same");
     }
-    bencher.counter(ItemsCount::new(motions.len())).bench_local(|| {
-        for motion in &motions {
-            black_box(plain.leg_forces(black_box(motion)));
-        }
-    });
+    each(bencher, &motions, |motion| black_box(plain.leg_forces(motion))[0]);
 }
 
 /// Textbook recursion.

@@ -34,8 +34,10 @@ fn record(name: &str, mode: f64) -> (Emitted, Controller, Vec<Vec<u64>>) {
     (emitted, controller, rows)
 }
 
-fn ticks(bencher: Bencher, name: &str, mode: f64) {
-    let (_, mut controller, rows) = record(name, mode);
+/// A whole tick in P, F with PCC, and P/F with PCC.
+#[divan::bench(args = [0.0, 3.0, 6.0])]
+fn tick(bencher: Bencher, mode: f64) {
+    let (_, mut controller, rows) = record(&format!("bench-tick-{mode}"), mode);
     let mut output = vec![0; controller.description().output_names.len()];
     bencher.counter(ItemsCount::new(rows.len())).bench_local(|| {
         controller.reset();
@@ -44,24 +46,6 @@ fn ticks(bencher: Bencher, name: &str, mode: f64) {
         }
         black_box(&output);
     });
-}
-
-/// Six gauges to six voltages, P/F with PCC.
-#[divan::bench]
-fn tick_pf_pcc(bencher: Bencher) {
-    ticks(bencher, "bench-pf", 6.0);
-}
-
-/// The same without feedback.
-#[divan::bench]
-fn tick_f_pcc(bencher: Bencher) {
-    ticks(bencher, "bench-f", 3.0);
-}
-
-/// The same without inverse hysteresis and adaptation.
-#[divan::bench]
-fn tick_p(bencher: Bencher) {
-    ticks(bencher, "bench-p", 0.0);
 }
 
 /// Gauge readings of the record.

@@ -15,10 +15,11 @@ use host_sim::description::Description;
 use host_sim::replay;
 use host_sim::stimulus::platform::{self as platform_stimulus, PlatformInputs};
 use host_sim::stimulus::{self, InputRecording, Setpoints};
-use host_sim::trace::Trace;
+use host_sim::trace::{Trace, first_difference};
 use specgen::compile::{Compiled, compile};
 use specgen::model::Mcu;
 use specgen::target::{self, Image};
+use specgen::verify;
 use specgen::workspace;
 
 /// The repository.
@@ -271,6 +272,17 @@ pub fn host_trace(controller: &mut Controller, settings: &[(&str, f64)], inputs:
     }
     controller.configure(&words).expect("a permitted setting");
     (replay::replay(controller, inputs), words)
+}
+
+/// Replays the host's trace on an image: every word of every tick has the same bits.
+///
+/// # Panics
+/// If the image does not run, or with `what` and the first word that differs.
+pub fn assert_same_bits(what: &str, image: &Image, config: &[u64], host: &Trace) {
+    let (target, _) = verify::replay(image, config, host).unwrap_or_else(|error| panic!("{error}"));
+    let difference = first_difference(host, &target);
+    assert!(difference.is_none(), "{what}, {:?}: {}", image.mcu, difference.expect("a difference"));
+    println!("{what}, {:?}: {} ticks, no differing word", image.mcu, host.len());
 }
 
 /// Numbers of an output word over a trace, by name.

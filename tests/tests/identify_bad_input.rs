@@ -1,7 +1,5 @@
 //! Every way in which a record can be wrong gives a message that names the place and the fix, and nothing panics.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
-
 use std::fmt::Write as _;
 use std::path::Path;
 

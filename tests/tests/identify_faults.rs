@@ -1,8 +1,6 @@
 //! Faults injected into a good record of reversal curves: each is refused or gets no weight, and is named with its time.
 //! The choice of the grid and the account of the residual, on records whose truth is known.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
-
 use crate::identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;

@@ -1,7 +1,5 @@
 //! Linear relation, frequency response, gauge calibration and stiffness from synthetic records of known truth.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
-
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 
@@ -112,7 +110,7 @@ fn records_without_a_cycle_or_of_two_frequencies_are_refused_with_the_time() {
             .unwrap()
     };
     expect(&linear::relation(&cut(700), None).unwrap_err(), "E0625", "from 0 s to");
-    // Exactly one cycle, told so.
+    // Exactly one cycle, given as such.
     assert!(linear::relation(&cut(801), Some(1.0)).is_ok());
     expect(&linear::relation(&one, Some(3.0)).unwrap_err(), "E0626", "cycle from 0.25 s to 1.25");
     // From 4 s on at twice the frequency.

@@ -2,8 +2,6 @@
 //!
 //! Each test prints that it is skipped where the data is absent.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
-
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

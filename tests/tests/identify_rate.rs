@@ -1,8 +1,6 @@
 //! Identification from records at several rates: known models come back, the verdict goes both ways, bad input is named, and
 //! the figures on measured records (`../shared/data/piezo-forc`; skipped, with a line that says so, where they are absent).
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
-
 use std::path::Path;
 
 use rand_chacha::ChaCha8Rng;

@@ -1,7 +1,5 @@
 //! Identification of actuators whose truth is known: exact Preisach planes, and a play-and-creep plant outside the model class.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
-
 use crate::identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::everett::EverettTable;
 use specgen::identify::regressor::{Plane, evaluate};

@@ -1,7 +1,5 @@
 //! Properties that the identification's memory, regressor and solver must have, each against an independent basis.
 
-#![allow(clippy::unwrap_used, clippy::panic, reason = "helpers of tests may fail the test")]
-
 use crate::identify_support::{Relays, generator, random_table, uniform};
 use nalgebra::DMatrix;
 use specgen::identify::Staircase;

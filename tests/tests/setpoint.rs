@@ -163,7 +163,7 @@ fn paths_on_board_are_the_hosts_to_a_picometre_in_f64_and_a_tenth_of_a_nanometre
         let double = plan::<f64>(&model, &lowered(&model, &[], Scalar::F64).unwrap());
         let single = plan::<f32>(&model, &lowered(&model, &[], Scalar::F32).unwrap());
         for (selector, (_, path)) in (0..).zip(PATHS) {
-            let host = PaperPose { path, reading: Reading::Corrected, frequency };
+            let host = PaperPose::corrected(path, frequency);
             let targets = play(&model, &double, selector);
             assert_eq!(targets.len(), (host.duration() / model.timing.period).round() as usize);
             let f64s = deviation(&targets, &host, model.timing.period);
@@ -185,7 +185,7 @@ fn paths_on_board_are_the_hosts_to_a_picometre_in_f64_and_a_tenth_of_a_nanometre
 #[test]
 fn the_comparison_of_paths_sees_a_wrong_phase_and_a_late_tick() {
     let model = with_trajectories(vec![paper(model::PaperPath::Machining, false, 1.0)]);
-    let host = PaperPose { path: PaperPath::Machining, reading: Reading::Corrected, frequency: 1.0 };
+    let host = PaperPose::corrected(PaperPath::Machining, 1.0);
     let good = lowered(&model, &[], Scalar::F64).unwrap();
     let mut wrong = good.clone();
     if let ir::Path::Segments { segments, .. } = &mut wrong.trajectories[0].path {
@@ -203,7 +203,7 @@ fn pieces_need_not_end_on_a_tick() {
     model.timing.period = 130e-6;
     let plan = plan::<f64>(&model, &lowered(&model, &[], Scalar::F64).unwrap());
     for (selector, (_, path)) in (0..).zip(PATHS) {
-        let host = PaperPose { path, reading: Reading::Corrected, frequency: 3.7 };
+        let host = PaperPose::corrected(path, 3.7);
         let found = deviation(&play(&model, &plan, selector), &host, model.timing.period);
         assert!(found[0][0] <= 1e-12 && found[0][1] <= 1e-12 && found[1][0] <= 1e-12, "{path:?}: {found:?}");
     }
@@ -406,7 +406,7 @@ fn the_emitted_controller_plays_the_papers_paths_and_a_table() {
         let mut controller = emitted.controller();
         for (selector, (_, path)) in (0..).zip(PATHS) {
             controller.reset();
-            let host = PaperPose { path, reading: Reading::Corrected, frequency: 1.0 };
+            let host = PaperPose::corrected(path, 1.0);
             let (poses, bias) = emitted_targets(&mut controller, selector);
             assert!((bias[2] - 10e-6).abs() < 1e-12 && bias[0] == 0.0);
             let mut worst = 0.0_f64;

@@ -1,19 +1,18 @@
 //! The corpus of bad specs with the text that a user sees, and what is wrong with a file as a whole.
 
 // Clippy sees the helpers of an integration test as production code.
-#![allow(clippy::expect_used, clippy::panic)]
-
 use std::fs;
 
-use crate::support::specs::{errors, every_key, folder_with_records, root, source};
+use crate::support::specs::{errors, every_key, folder_with_records, source};
 use specgen::diagnostic::{Diagnostic, Place, codes, render, to_json};
 use specgen::spec::{self, SpecSource};
+use specgen_tests::repository;
 
 /// The text that a user sees, against the committed one; SPECGEN_BLESS=1 writes it.
 #[test]
 fn the_corpus_is_rendered_as_committed() {
     let folder = folder_with_records();
-    let corpus = root().join("tests/corpus");
+    let corpus = repository().join("tests/corpus");
     let mut files: Vec<_> = fs::read_dir(&corpus).expect("tests/corpus").map(|e| e.expect("readable").path()).collect();
     files.retain(|path| path.extension().is_some_and(|e| e == "toml"));
     files.sort();

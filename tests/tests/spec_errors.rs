@@ -1,8 +1,6 @@
 //! Bad input to the spec reader: every key wrong in every way, and the corpus with the text that a user sees.
 
 // Clippy sees the helpers of an integration test as production code.
-#![allow(clippy::expect_used, clippy::panic)]
-
 use crate::support::specs::{
     Choice, LEGS, PLATFORM, errors, every_key, folder_with_records, line_of, source, spec_files,
 };

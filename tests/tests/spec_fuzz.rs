@@ -3,16 +3,15 @@
 //! 5,000 inputs, and 200,000 in the soak. The seed is fixed: a failure repeats.
 
 // Clippy sees the helpers of an integration test as production code.
-#![allow(clippy::expect_used, clippy::panic)]
-
 use std::fs;
 
 use crate::fuzz_corpus::targets;
-use crate::support::specs::{every_key, folder_with_records, root, source, spec_files};
+use crate::support::specs::{every_key, folder_with_records, source, spec_files};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 use specgen::diagnostic::{Diagnostic, Place, Severity, codes, render, to_json};
 use specgen::spec;
+use specgen_tests::repository;
 
 /// Pieces that have broken parsers before.
 const TOKENS: &[&str] = &[
@@ -179,7 +178,7 @@ fn mutated_specs_are_read_without_a_panic() {
     corpus.push(every_key().into_bytes());
     let good = corpus.len();
     let mut bad: Vec<_> =
-        fs::read_dir(root().join("tests/corpus")).expect("corpus").map(|e| e.expect("readable").path()).collect();
+        fs::read_dir(repository().join("tests/corpus")).expect("corpus").map(|e| e.expect("readable").path()).collect();
     bad.retain(|path| path.extension().is_some_and(|e| e == "toml"));
     bad.sort();
     corpus.extend(bad.iter().map(|path| fs::read(path).expect("readable")));

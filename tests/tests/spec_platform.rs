@@ -1,22 +1,21 @@
 //! The specs of the task-space controller as models: every value of the reference in SI, and what each feature changes.
 
 // Clippy sees the helpers of an integration test as production code.
-#![allow(clippy::expect_used, clippy::panic)]
-
 use crate::support;
 use std::f64::consts::{FRAC_PI_6, PI};
 use std::fs;
 
-use crate::support::specs::{errors, folder_with_records, root, source};
+use crate::support::specs::{errors, folder_with_records, source};
 use specgen::diagnostic::{codes, render};
 use specgen::model::{
     AdaptationMode, ControlMode, Environment, Frames, Gains, Interaction, Mcu, Model, PaperPath, Probe, Scalar,
     SetpointKind, SetpointRules, TaskSpace, Trajectory, TrajectoryKind,
 };
 use specgen::spec::{self, SpecSource};
+use specgen_tests::repository;
 
 fn model(name: &str) -> Model {
-    let source = SpecSource::read(&root().join("specs").join(name)).expect("readable");
+    let source = SpecSource::read(&repository().join("specs").join(name)).expect("readable");
     let (model, findings) = spec::load(&source);
     assert!(findings.is_empty(), "{}", render(&findings, &source, false));
     model.expect("no findings")
@@ -237,7 +236,7 @@ fn each_feature_changes_what_it_says() {
 #[test]
 fn a_waveform_is_named_and_not_read() {
     let folder = folder_with_records();
-    let text = fs::read_to_string(root().join("specs/reference.toml")).expect("readable");
+    let text = fs::read_to_string(repository().join("specs/reference.toml")).expect("readable");
     let waveform =
         "[[trajectory]]\nname = \"w\"\nkind = \"waveform\"\nfile = \"none.csv\"\nperiod = \"2 ms\"\nrepeat = true\n";
     let (model, findings) = spec::load(&source(&format!("{text}\n{waveform}"), "spec.toml", &folder));
@@ -255,7 +254,7 @@ fn a_waveform_is_named_and_not_read() {
 #[test]
 fn too_many_of_anything_are_refused() {
     let folder = folder_with_records();
-    let text = fs::read_to_string(root().join("specs/reference.toml")).expect("readable");
+    let text = fs::read_to_string(repository().join("specs/reference.toml")).expect("readable");
     let gauge = "[[gauge]]\npoint = [\"80 mm\", \"0 mm\", \"180 mm\"]\ndirection = [0, 0, 1]\n";
     let path = |i: usize| format!("[[trajectory]]\nname = \"t{i}\"\nkind = \"case-1\"\nfrequency = \"1 Hz\"\n");
     let many: String = (0..29).map(path).collect();
@@ -280,7 +279,7 @@ fn too_many_of_anything_are_refused() {
 /// Later phases point at the spec: the places of gauges, trajectories and gains are known.
 #[test]
 fn places_of_tables_and_values_are_known() {
-    let text = fs::read_to_string(root().join("specs/features/platform-gains.toml")).expect("readable");
+    let text = fs::read_to_string(repository().join("specs/features/platform-gains.toml")).expect("readable");
     let model = model("features/platform-gains.toml");
     for (key, written) in [
         ("control", "control"),

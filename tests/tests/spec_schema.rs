@@ -1,13 +1,11 @@
 //! The published JSON Schema and the generated documents against the key table. A validator judges the schema in `tests/schema`.
 
 // Clippy sees the helpers of an integration test as production code.
-#![allow(clippy::expect_used, clippy::panic)]
-
 use std::fs;
 use std::path::Path;
 
-use crate::support::specs::root;
 use specgen::{diagnostic, spec};
+use specgen_tests::repository;
 
 /// With SPECGEN_BLESS=1 in the environment the file is written instead.
 fn assert_fresh(path: &Path, text: &str) {
@@ -25,9 +23,9 @@ fn assert_fresh(path: &Path, text: &str) {
 
 #[test]
 fn generated_documents_are_fresh() {
-    assert_fresh(&root().join("specs/platform.schema.json"), &spec::json_schema());
-    assert_fresh(&root().join("docs/spec-reference.md"), &spec::reference_markdown());
-    assert_fresh(&root().join("docs/diagnostics.md"), &diagnostic::reference_markdown());
+    assert_fresh(&repository().join("specs/platform.schema.json"), &spec::json_schema());
+    assert_fresh(&repository().join("docs/spec-reference.md"), &spec::reference_markdown());
+    assert_fresh(&repository().join("docs/diagnostics.md"), &diagnostic::reference_markdown());
 }
 
 /// Every file below `folder` whose name ends in `.rs`, sorted.
@@ -56,7 +54,7 @@ fn code_literals(text: &str) -> Vec<&str> {
 fn codes_of_findings_stand_in_their_table_alone() {
     assert_eq!(code_literals(r#"f("E0101", "W0", "E010x", "W0301", "N0862")"#), ["E0101", "W0301", "N0862"]);
     let mut files = Vec::new();
-    rust_files(&root().join("codegen"), &mut files);
+    rust_files(&repository().join("codegen"), &mut files);
     let mut of_table = 0;
     for path in files {
         let text = fs::read_to_string(&path).expect("readable");

@@ -1,7 +1,5 @@
 //! Records with a known truth, and an independent model: brute-force relays.
 
-#![allow(dead_code, reason = "each test binary uses another part")]
-
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::everett::EverettTable;

@@ -8,7 +8,7 @@ use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use specgen::machine;
 use specgen_tests::length;
 
-use super::bench::{BIAS, Bench, PERIOD, in_parallel, paper, reference_machine};
+use super::bench::{BIAS, Bench, PERIOD, in_parallel, reference_machine};
 
 const LEG_LIMITED: u32 = 0x3f;
 /// One step of the converter, V.
@@ -130,7 +130,7 @@ fn change(scenario: &PlatformScenario, bench: &Bench, from: u32, to: u32, motion
 fn a_change_of_mode_moves_no_leg() {
     let bench = reference_machine();
     let scenario = bench.scenario();
-    let path = paper(PaperPath::Case1, 1.0);
+    let path = PaperPose::corrected(PaperPath::Case1, 1.0);
     for (what, motion) in [("holding", None), ("moving", Some(&path))] {
         let pairs: Vec<(u32, u32)> =
             (0..7).flat_map(|from| (0..7).map(move |to| (from, to))).filter(|(from, to)| from != to).collect();
@@ -160,7 +160,7 @@ fn trajectories_on_board_are_those_streamed() {
     scenario.options.record = Record::Samples;
     let mut controller = bench.controller();
     for (selector, path) in [(0, PaperPath::Case1), (1, PaperPath::Case2), (2, PaperPath::Machining)] {
-        let path = paper(path, 1.0);
+        let path = PaperPose::corrected(path, 1.0);
         let played = scenario.play(&mut controller, selector, 60.0).expect("a run");
         let streamed = scenario.run(&mut controller, &path).expect("a run");
         assert_eq!((played.status, streamed.status), (0, 0));
@@ -200,7 +200,7 @@ fn a_turned_work_frame_and_a_tool_point_are_followed() {
     let frames = UserFrames::new(&angles, [4e-3, -2e-3, 30e-3]);
     assert!((scenario.options.bias[2] - 10.3e-6).abs() < 1e-18, "bias and offset of the work frame");
     scenario.options.frames = Some(frames);
-    let run = scenario.run(&mut bench.controller(), &paper(PaperPath::Case2, 1.0)).expect("a run");
+    let run = scenario.run(&mut bench.controller(), &PaperPose::corrected(PaperPath::Case2, 1.0)).expect("a run");
     assert_eq!(run.status & !(1 << 18), 0, "{:#x}", run.status);
     let off = |s: &host_sim::platform::rig::PoseSample| {
         (0..6).map(|k| (s.target[k] - s.tick.target[k]).abs()).fold(0.0, f64::max)
@@ -220,7 +220,7 @@ fn a_tick_of_latency_costs_little() {
     let bench = reference_machine();
     let mut scenario = bench.scenario();
     let mut controller = bench.controller();
-    let path = paper(PaperPath::Case1, 10.0);
+    let path = PaperPose::corrected(PaperPath::Case1, 10.0);
     let nm = [0, 1].map(|latency| {
         scenario.options.latency = latency;
         scenario.run(&mut controller, &path).expect("a run").errors.rms_translation_nm()
@@ -236,7 +236,7 @@ fn a_stream_that_ends_and_a_command_to_hold_stand_still() {
     let mut prepared = bench.scenario().rig().clone();
     let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, 0).expect("the words");
     rig.arm(60.0).expect("the bias");
-    let path = paper(PaperPath::Case1, 1.0);
+    let path = PaperPose::corrected(PaperPath::Case1, 1.0);
     for tick in 0..4000 {
         rig.tick(&Request::stream(path.target((tick + 1) as f64 * PERIOD))).expect("a tick");
     }
@@ -320,7 +320,7 @@ fn excursion(
 fn a_change_of_mode_in_motion_disturbs_no_more_than_the_modes_themselves() {
     let bench = reference_machine();
     let scenario = bench.scenario();
-    let path = paper(PaperPath::Case1, 1.0);
+    let path = PaperPose::corrected(PaperPath::Case1, 1.0);
     let pairs: Vec<(u32, u32)> =
         (0..7).flat_map(|from| (0..7).map(move |to| (from, to))).filter(|(from, to)| from != to).collect();
     let ticks = length(&[7000][..], &[7000, 9000, 11_000]);

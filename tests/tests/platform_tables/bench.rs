@@ -11,7 +11,6 @@ use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant};
 use host_sim::platform::rig::{Noise, RunOptions};
 use host_sim::platform::{PlatformScenario, Specimen};
-use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen::stability::platform::Design;
 use specgen_tests::{Emitted, length};
 
@@ -23,10 +22,6 @@ pub const BIAS: [f64; 6] = [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0];
 pub const SEED: u64 = 1;
 
 /// A corrected path of the paper.
-pub fn paper(path: PaperPath, frequency: f64) -> PaperPose {
-    PaperPose { path, reading: Reading::Corrected, frequency }
-}
-
 /// A machine with its controller.
 pub struct Bench {
     pub specimen: Specimen,

@@ -3,10 +3,10 @@
 use host_sim::platform::WorkPart;
 use host_sim::platform::scenario::{FREE_MODES, MACHINING_MODES, NamedTrajectory, PLATFORM_MODES};
 use host_sim::platform::table::{MachiningTable, PoseRow, PoseTable, paper_rms};
-use host_sim::trajectory::PaperPath;
+use host_sim::trajectory::{PaperPath, PaperPose};
 use specgen_tests::length;
 
-use super::bench::{Bench, in_parallel, median, paper, plants, random_machines, reference_machine};
+use super::bench::{Bench, in_parallel, median, plants, random_machines, reference_machine};
 
 const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)];
 #[allow(clippy::type_complexity)] // A table of two.
@@ -18,7 +18,7 @@ fn free_motion(bench: &Bench, frequencies: &[f64]) -> PoseTable {
     let mut table = PoseTable::default();
     for (name, path) in CASES {
         for &frequency in frequencies {
-            let trajectory = paper(path, frequency);
+            let trajectory = PaperPose::corrected(path, frequency);
             let named = [NamedTrajectory { name, frequency, trajectory: &trajectory }];
             // No ranking is asked of F alone but in case 1 above the noise.
             let alone: &[_] = if name == "case-1" && frequency > 0.5 { &PLATFORM_MODES[2..4] } else { &[] };
@@ -31,7 +31,7 @@ fn free_motion(bench: &Bench, frequencies: &[f64]) -> PoseTable {
 
 fn machining(bench: &Bench) -> MachiningTable {
     let parts = PARTS.map(|(name, part)| (name, part()));
-    let path = paper(PaperPath::Machining, 1.0);
+    let path = PaperPose::corrected(PaperPath::Machining, 1.0);
     bench.scenario().machining(&mut bench.controller(), &MACHINING_MODES, &parts, &path).expect("a run")
 }
 
@@ -73,7 +73,8 @@ fn tables_5_to_9_on_the_reference_machine() {
 #[test]
 fn case_1_at_10_hz_on_the_reference_machine() {
     let bench = reference_machine();
-    let run = bench.scenario().run(&mut bench.controller(), &paper(PaperPath::Case1, 10.0)).expect("a run");
+    let run =
+        bench.scenario().run(&mut bench.controller(), &PaperPose::corrected(PaperPath::Case1, 10.0)).expect("a run");
     let found = run.errors.rms_translation_nm();
     println!("P+PCC, case 1 at 10 Hz: {found:.2} nm (at most 25)");
     assert!(found <= 25.0, "{found} nm");

@@ -1,5 +1,4 @@
 //! Platforms with gauges, as models: layouts that no spec file needs to hold.
-#![allow(dead_code)] // each test binary uses its own part
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};

@@ -1,21 +1,17 @@
 //! What the tests of the spec language share: the specs of the repository, and a folder with the records they name.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use specgen::diagnostic::{Diagnostic, Place, Severity};
 use specgen::spec::SpecSource;
 use specgen::spec::keys::{Key, Kind, Presence, SECTIONS, Section};
-
-/// Folder of the repository.
-pub fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ is in the repository").to_path_buf()
-}
+use specgen_tests::repository;
 
 /// Every spec of the repository, sorted.
 pub fn spec_files() -> Vec<PathBuf> {
     let mut files = Vec::new();
-    for folder in [root().join("specs"), root().join("specs/features")] {
+    for folder in [repository().join("specs"), repository().join("specs/features")] {
         for entry in fs::read_dir(&folder).expect("specs/ is there") {
             let path = entry.expect("readable").path();
             // The paper's data as printed are there to be refused.
