@@ -82,14 +82,14 @@ impl<F: FnMut(&mut u64, &[u64], &mut [u64])> TickController for StandIn<F> {
 pub enum ControllerError {
     /// The library cannot be opened, or lacks a function.
     Load {
-        /// The file.
+        /// The library file.
         path: PathBuf,
         /// What the loader says.
         cause: libloading::Error,
     },
     /// It speaks another version of the interface.
     Abi {
-        /// The file.
+        /// The library file.
         path: PathBuf,
         /// Its version.
         found: u32,

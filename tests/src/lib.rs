@@ -3,8 +3,6 @@
 //! Controllers are emitted into `target/tests`, built there for the host and for the emulated microcontrollers, and run
 //! through their words: what is tested is what a user gets.
 
-pub mod pair;
-
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -2,22 +2,13 @@
 //!
 //! Each test prints that it is skipped where the data is absent.
 
-use std::path::{Path, PathBuf};
+use crate::identify_support::measured;
 use std::time::Instant;
 
 use specgen::everett::EverettTable;
-use specgen::identify::{Branches, DeadTime, Identified, Options, Record, Validation, identify, read_record, validate};
+use specgen::identify::{Branches, DeadTime, Identified, Options, Record, Validation, identify, validate};
 
 const DRIVE: [f64; 2] = [-90.0, 90.0];
-
-fn data(name: &str) -> Option<Record> {
-    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/piezo-forc").join(name);
-    if path.exists() {
-        return Some(read_record(&path, name).unwrap_or_else(|d| panic!("{d:#?}")));
-    }
-    println!("skipped: ../shared/data/piezo-forc/{name} is not here");
-    None
-}
 
 fn found(record: &Record, options: &Options) -> Identified {
     let result = identify(record, options).unwrap_or_else(|d| panic!("{d:#?}"));
@@ -53,7 +44,7 @@ fn predicted(table: &EverettTable, record: &Record, dead_time: f64) -> Validatio
 
 #[test]
 fn measured_record_is_fitted_and_predicts_another_one() {
-    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv")) else {
+    let (Some(forc), Some(triangle)) = (measured("forc-20hz.csv"), measured("validate-triangle-50hz.csv")) else {
         return;
     };
     let result = found(&forc, &Options::new(32, DRIVE));
@@ -75,7 +66,7 @@ fn measured_record_is_fitted_and_predicts_another_one() {
 /// The limits hold without the dead time too, which a static table cannot know.
 #[test]
 fn the_table_alone_stays_within_the_limits() {
-    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv")) else {
+    let (Some(forc), Some(triangle)) = (measured("forc-20hz.csv"), measured("validate-triangle-50hz.csv")) else {
         return;
     };
     let result = found(&forc, &Options { dead_time: DeadTime::Fixed(0.0), ..Options::new(32, DRIVE) });
@@ -86,7 +77,7 @@ fn the_table_alone_stays_within_the_limits() {
 
 #[test]
 fn a_table_without_hysteresis_fails_the_limits() {
-    let (Some(forc), Some(triangle)) = (data("forc-20hz.csv"), data("validate-triangle-50hz.csv")) else {
+    let (Some(forc), Some(triangle)) = (measured("forc-20hz.csv"), measured("validate-triangle-50hz.csv")) else {
         return;
     };
     let result = found(&forc, &Options::new(32, DRIVE));
@@ -102,11 +93,11 @@ fn a_table_without_hysteresis_fails_the_limits() {
 
 #[test]
 fn all_three_rates_and_all_grids_identify() {
-    let Some(triangle) = data("validate-triangle-50hz.csv") else {
+    let Some(triangle) = measured("validate-triangle-50hz.csv") else {
         return;
     };
     for name in ["forc-20hz.csv", "forc-40hz.csv", "forc-100hz.csv"] {
-        let Some(forc) = data(name) else { return };
+        let Some(forc) = measured(name) else { return };
         let grids: &[usize] = if name == "forc-20hz.csv" { &[8, 16, 25, 32, 64] } else { &[8, 16, 25, 32] };
         for &grid in grids {
             let started = Instant::now();

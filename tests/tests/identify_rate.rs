@@ -1,8 +1,7 @@
 //! Identification from records at several rates: known models come back, the verdict goes both ways, bad input is named, and
 //! the figures on measured records (`../shared/data/piezo-forc`; skipped, with a line that says so, where they are absent).
 
-use std::path::Path;
-
+use crate::identify_support::measured;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::diagnostic::Diagnostic;
@@ -10,7 +9,7 @@ use specgen::everett::EverettTable;
 use specgen::identify::rate::{
     RateIdentified, RateOption, RateReport, identify_rate, read_rate_csv, spec_lines, write_rate_csv,
 };
-use specgen::identify::{Options, Record, read_record};
+use specgen::identify::{Options, Record};
 
 const DRIVE: [f64; 2] = [0.0, 100.0];
 const GRID: usize = 8;
@@ -206,15 +205,6 @@ fn a_second_table_reads_back_and_a_broken_one_is_named() {
     }
     let short: String = text.lines().take(9).map(|line| format!("{line}\n")).collect();
     assert_eq!(read_rate_csv(&short, "mu1.csv").unwrap_err()[0].code, "E0641");
-}
-
-fn measured(name: &str) -> Option<Record> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/piezo-forc").join(name);
-    if path.exists() {
-        return Some(read_record(&path, name).unwrap_or_else(|d| panic!("{d:#?}")));
-    }
-    println!("skipped: ../shared/data/piezo-forc/{name} is not here");
-    None
 }
 
 /// Issue 4: one model for 20, 40 and 100 Hz, and who beats the static table on the rate that it was not fitted on.

@@ -1,11 +1,11 @@
 //! Leg displacements of the emitted controllers against the textbook formula |P + R P_i − B_i| − l₀, computed apart.
 
+use crate::support::exact;
 use host_sim::controller::TickController;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::lower::joint_positions;
 use specgen_tests::Emitted;
-use specgen_tests::pair::Pair;
 
 const POSES: usize = 20_000;
 const F32: (&str, &str) = ("scalar   = \"f64\"", "scalar   = \"f32\"");
@@ -39,25 +39,6 @@ fn emitted(name: &str, edits: &[(&str, &str)], poses: &[[f64; 6]]) -> (Vec<[f64;
     (rounded, displacements)
 }
 
-/// |P + R P_i − B_i| − l₀ with R = Rz Ry Rx, in pairs: (AI.1), (AI.2).
-fn textbook(pose: &[f64; 6], base: &[[f64; 3]; 6], platform: &[[f64; 3]; 6], height: f64) -> [f64; 6] {
-    let r = Pair::rotation([pose[3], pose[4], pose[5]]);
-    let rest = [0.0, 0.0, height];
-    std::array::from_fn(|leg| {
-        let length = |turned: [Pair; 3], moved: [f64; 3]| {
-            let square = (0..3).fold(Pair::of(0.0), |sum, k| {
-                let part = turned[k].add(Pair::of(moved[k])).add(Pair::of(rest[k])).add(Pair::of(-base[leg][k]));
-                sum.add(part.mul(part))
-            });
-            square.sqrt()
-        };
-        let p = platform[leg];
-        let turned = std::array::from_fn(|k| (0..3).fold(Pair::of(0.0), |sum, j| sum.add(r[k][j].mul(Pair::of(p[j])))));
-        let difference = length(turned, [pose[0], pose[1], pose[2]]).add(length(p.map(Pair::of), [0.0; 3]).neg());
-        difference.0 + difference.1
-    })
-}
-
 fn worst(a: &[[f64; 6]], b: &[[f64; 6]]) -> f64 {
     a.iter().flatten().zip(b.iter().flatten()).fold(0.0, |worst, (a, b)| f64::max(worst, (a - b).abs()))
 }
@@ -68,9 +49,8 @@ fn f64_is_exact_to_a_femtometre_and_f32_to_50_picometres() {
     let poses = poses();
     let reference = Emitted::new("kinematics-geometry", "legs.toml", &[WIDE, STROKE]);
     let geometry = &reference.compiled.model.geometry;
-    let (base, platform) = joint_positions(geometry);
     let exact = |poses: &[[f64; 6]]| -> Vec<[f64; 6]> {
-        poses.iter().map(|pose| textbook(pose, &base, &platform, geometry.height)).collect()
+        poses.iter().map(|pose| exact::displacements(geometry, pose)).collect()
     };
 
     let (same, double) = emitted("kinematics-f64", &[WIDE, STROKE], &poses);
@@ -90,6 +70,7 @@ fn f64_is_exact_to_a_femtometre_and_f32_to_50_picometres() {
     assert!(error <= 0.05e-9 && with_rounding <= 0.05e-9, "{error:e} m, {with_rounding:e} m");
 
     // What the difference form is for: the plain formula in f32.
+    let (base, platform) = joint_positions(geometry);
     let plain = plain_f32(&rounded, &base, &platform, geometry.height);
     let error = worst(&plain, &exact(&rounded));
     println!("the plain formula in f32: {:.1} nm", error * 1e9);

@@ -1,5 +1,6 @@
 //! Pose from gauges, and from leg displacements, against geometry in 32 digits; layouts that cannot work are refused.
 
+use crate::support::exact::{self, dot};
 use crate::support::gauges::{
     Random, double, legs, lowered, model, probe, real, runtime, sensing, series, task, three_two_one, tilted,
     with_scalar,
@@ -8,26 +9,26 @@ use host_sim::noise::Gaussian;
 use specgen::ir::{Ir, Scalar as IrScalar};
 use specgen::lower::pose_noise;
 use specgen::model::{Model, Probe, Scalar};
+use specgen_numerics::Double;
 use specgen_runtime::{Calibration, Gauges, Real};
-use specgen_tests::pair::Pair;
 
 const POSES: usize = 2000;
 
 /// Where the line of a gauge meets its plane, from its point, along its direction, less the same at rest: by the rotated plane
-/// itself, in pairs.
-fn exact_reading(model: &Model, probe: &Probe, pose: &[f64; 6]) -> Pair {
+/// itself, in 106 bits.
+fn exact_reading(model: &Model, probe: &Probe, pose: &[f64; 6]) -> Double {
     let along_line = |pose: &[f64; 6]| {
-        let r = Pair::rotation([pose[3], pose[4], pose[5]]);
-        let vector = |v: [f64; 3]| v.map(Pair::of);
-        let turned = |v: [f64; 3]| r.map(|row| Pair::dot(row, vector(v)));
+        let r = exact::rotation(pose);
+        let vector = |v: [f64; 3]| v.map(Double::from);
+        let turned = |v: [f64; 3]| r.map(|row| dot(row, vector(v)));
         let normal = turned(probe.plane_normal);
         let on_plane = turned(probe.plane_point);
         let rest = [0.0, 0.0, model.geometry.height];
-        let from_line =
-            [0, 1, 2].map(|k| on_plane[k].add(Pair::of(pose[k])).add(Pair::of(rest[k])).sub(Pair::of(probe.point[k])));
-        Pair::dot(normal, from_line).div(Pair::dot(normal, vector(probe.direction)))
+        let moved = |k: usize| on_plane[k] + Double::from(pose[k]) + Double::from(rest[k]);
+        let from_line = [0, 1, 2].map(|k| moved(k) - Double::from(probe.point[k]));
+        dot(normal, from_line) / dot(normal, vector(probe.direction))
     };
-    along_line(pose).sub(along_line(&[0.0; 6]))
+    along_line(pose) - along_line(&[0.0; 6])
 }
 
 fn exact_readings(model: &Model, pose: &[f64; 6]) -> [f64; 6] {
@@ -187,7 +188,7 @@ fn forward_kinematics_undoes_the_inverse_over_the_workspace() {
     let (mut worst, mut worst32) = ([0.0_f64; 2], [0.0_f64; 2]);
     for _ in 0..POSES {
         let pose = random.pose(&model);
-        let lengths = exact_displacements(&model, &pose);
+        let lengths = exact::displacements(&model.geometry, &pose);
         let found = legs64.pose(&inverse64, ir.kinematics.corrections as usize, &lengths);
         let rounded = lengths.map(|length| length as f32);
         let found32 = legs32.pose(&inverse32, single.kinematics.corrections as usize, &rounded);
@@ -205,26 +206,6 @@ fn forward_kinematics_undoes_the_inverse_over_the_workspace() {
     );
     assert!(worst[0] <= 1e-12 && worst[1] <= 1e-12, "{worst:?}");
     assert!(worst32[0] <= 0.1e-9 && 0.1 * worst32[1] <= 0.1e-9, "{worst32:?}");
-}
-
-/// |P₀ + t + R P_i − B_i| − l₀ in pairs.
-fn exact_displacements(model: &Model, pose: &[f64; 6]) -> [f64; 6] {
-    let g = &model.geometry;
-    let rest = [0.0, 0.0, g.height];
-    std::array::from_fn(|leg| {
-        let length = |pose: &[f64; 6]| {
-            let r = Pair::rotation([pose[3], pose[4], pose[5]]);
-            let joint = g.platform_joints[leg].map(Pair::of);
-            let part = [0, 1, 2].map(|k| {
-                Pair::dot(r[k], joint)
-                    .add(Pair::of(pose[k]))
-                    .add(Pair::of(rest[k]))
-                    .sub(Pair::of(g.base_joints[leg][k]))
-            });
-            Pair::dot(part, part).sqrt()
-        };
-        length(pose).sub(length(&[0.0; 6])).value()
-    })
 }
 
 /// Independent gauges of the declared noise behind a converter of the declared step, through the whole solution.

@@ -14,7 +14,6 @@ pub(crate) type Lane = [f64; LANES];
 /// Steps between two looks at the rate that widens the thresholds.
 const WIDENED: u32 = 10;
 
-/// See the module.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StackLanes {
     step: f64,

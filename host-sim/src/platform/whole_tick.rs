@@ -15,7 +15,6 @@ use super::structure::{Structure, StructureLanes};
 use crate::plant::Stack;
 use crate::plant::lanes::{LANES, Lane, StackLanes, lane};
 
-/// See the module.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct WholeTick {
     interval: f64,

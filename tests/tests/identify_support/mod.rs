@@ -3,8 +3,9 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::everett::EverettTable;
+use specgen::identify::{Record, read_record};
+use std::path::Path;
 
-/// Seeded generator.
 pub fn generator(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
@@ -18,6 +19,16 @@ pub fn uniform(random: &mut ChaCha8Rng) -> f64 {
 pub fn normal(random: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * (1.0 - uniform(random)).ln()).sqrt();
     radius * (std::f64::consts::TAU * uniform(random)).cos()
+}
+
+/// A measured record of real hardware; none, and a line that says so, where the data is absent.
+pub fn measured(name: &str) -> Option<Record> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/piezo-forc").join(name);
+    if path.exists() {
+        return Some(read_record(&path, name).unwrap_or_else(|d| panic!("{d:#?}")));
+    }
+    println!("skipped: ../shared/data/piezo-forc/{name} is not here");
+    None
 }
 
 /// Table from weights by the definition: E(i, j) = Σ of the weights with up ≤ i and down ≥ j.
@@ -80,7 +91,6 @@ impl Drive {
         self
     }
 
-    /// Sudden step.
     pub fn jump(mut self, target: f64) -> Self {
         self.samples.push(target);
         self
@@ -108,7 +118,6 @@ pub struct Relays {
 }
 
 impl Relays {
-    /// All off.
     pub fn off(grid: usize) -> Self {
         Self { grid, on: vec![false; grid * (grid + 1) / 2] }
     }

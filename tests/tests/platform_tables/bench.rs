@@ -59,7 +59,6 @@ impl Bench {
         Self { specimen, emitted, library }
     }
 
-    /// The emitted controller.
     pub fn controller(&self) -> Controller {
         Controller::load(&self.library).unwrap_or_else(|error| panic!("{error}"))
     }
@@ -138,7 +137,7 @@ impl Pair {
     }
 }
 
-/// How many.
+/// Random machines of a run; more in the soak.
 pub fn plants() -> u32 {
     length(2, 12)
 }

@@ -1,4 +1,5 @@
 //! What several modules share.
 
+pub mod exact;
 pub mod gauges;
 pub mod specs;

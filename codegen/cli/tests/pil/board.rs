@@ -102,7 +102,6 @@ impl Machine for Stepped {
 
 /// The board, on a thread of its own. Dropped, it is unplugged.
 pub struct Board {
-    /// The serial device.
     pub port: PathBuf,
     unplugged: Arc<AtomicBool>,
     thread: Option<JoinHandle<Counters>>,

@@ -148,7 +148,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Where it stands.
+    /// Ends it where [`Bench::resume`] can go on.
     pub(in crate::platform) fn pause(self) -> Paused {
         Paused { sequence: self.sequence, ticks: self.ticks, underway: self.underway }
     }

@@ -10,7 +10,6 @@ use crate::platform::linear::{Matrix6, Six, exponential, inverse, product};
 
 type Column = [f64; STATES];
 
-/// See the module.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::platform) struct StructureLanes {
     from_state: [Column; STATES],

@@ -10,7 +10,6 @@ pub struct Mutant {
     pub key: String,
     /// What was written, and what is written now.
     pub change: String,
-    /// The whole text.
     pub text: String,
 }
 
