@@ -1,4 +1,8 @@
-//! The compiler's crates stand on floors, and an arrow only goes down: the manifests say so, and this reads them.
+//! The compiler's crates stand on floors, and an arrow only goes down: the manifests say so, and this reads them. Within a crate
+//! no modules use each other in a circle.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 use specgen_tests::repository;
 
@@ -52,4 +56,153 @@ fn an_arrow_that_goes_up_is_found() {
     assert_eq!(upward(1, manifest), ["cli"]);
     assert_eq!(upward(0, manifest), ["numerics", "cli"]);
     assert!(upward(8, "specgen-report = { path = \"../report\" }").is_empty());
+}
+
+/// Crates in which no two top-level modules use each other, neither directly nor by way of others.
+const WITHOUT_CIRCLES: [&str; 18] = [
+    "codegen/numerics",
+    "codegen/language",
+    "codegen/identify",
+    "codegen/toolchain",
+    "codegen/compiler",
+    "codegen/studies",
+    "codegen/operate",
+    "codegen/report",
+    "codegen/cli",
+    "host-sim",
+    "host-sim/oracle",
+    "firmware/runtime",
+    "firmware/rt",
+    "firmware/link",
+    "firmware/hal",
+    "firmware/board",
+    "firmware/rt-pc",
+    "xtask",
+];
+
+/// What the top-level modules of a crate name of each other.
+#[derive(Default)]
+struct Modules {
+    /// Words behind `crate::` in the files of each, tests aside.
+    named: BTreeMap<String, BTreeSet<String>>,
+    /// The module of what the root re-exports.
+    exported: BTreeMap<String, String>,
+}
+
+impl Modules {
+    fn of(source: &Path) -> Self {
+        let mut modules = Self::default();
+        for file in files(source) {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let path = file.strip_prefix(source).unwrap().with_extension("");
+            modules.add(&path.iter().map(|part| part.to_str().unwrap()).collect::<Vec<_>>(), &text);
+        }
+        modules
+    }
+
+    /// Adds the file of the module at `path`.
+    fn add(&mut self, path: &[&str], text: &str) {
+        let lines = text.lines().take_while(|line| !line.contains("#[cfg(test)]"));
+        let code = lines.filter_map(|line| line.split("//").next()).collect::<Vec<_>>().join("\n");
+        if matches!(path, ["lib" | "main"]) {
+            for tree in code.split("pub use ").skip(1).filter_map(|rest| rest.split(';').next()) {
+                let words = tree.split(|c: char| !c.is_alphanumeric() && c != '_');
+                self.exported.extend(words.map(|word| (word.to_owned(), heads(tree)[0].clone())));
+            }
+        } else {
+            let code = code.replace(&"super::".repeat(path.len()), "crate::");
+            self.named.entry(path[0].to_owned()).or_default().extend(code.split("crate::").skip(1).flat_map(heads));
+        }
+    }
+
+    /// Modules of which each uses the next, and the last the first.
+    fn circle(&self) -> Option<Vec<&str>> {
+        let mut done = BTreeSet::new();
+        self.named.keys().find_map(|module| self.circle_behind(module, &mut Vec::new(), &mut done))
+    }
+
+    fn circle_behind<'a>(
+        &'a self,
+        module: &'a str,
+        way: &mut Vec<&'a str>,
+        done: &mut BTreeSet<&'a str>,
+    ) -> Option<Vec<&'a str>> {
+        if let Some(first) = way.iter().position(|before| *before == module) {
+            return Some(way[first..].to_vec());
+        }
+        if !done.insert(module) {
+            return None;
+        }
+        way.push(module);
+        let used = self.named[module].iter().map(|word| self.exported.get(word).unwrap_or(word));
+        let others = used.filter(|other| *other != module && self.named.contains_key(*other));
+        let found = others.into_iter().find_map(|other| self.circle_behind(other, way, done));
+        way.pop();
+        found
+    }
+}
+
+/// First words of a path; `{a::b, c}` has two.
+fn heads(path: &str) -> Vec<String> {
+    let first = |text: &str| text.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+    let Some(group) = path.strip_prefix('{') else { return vec![first(path)] };
+    let (mut words, mut depth, mut start) = (Vec::new(), 0, 0);
+    for (at, c) in group.char_indices() {
+        match c {
+            '{' => depth += 1,
+            '}' if depth > 0 => depth -= 1,
+            '}' | ',' if depth == 0 => {
+                words.push(first(&group[start..at]));
+                start = at + 1;
+                if c == '}' {
+                    break;
+                }
+            }
+            _ => {}
+        }
+    }
+    words
+}
+
+/// Every Rust file in `folder`.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let each = entries.map(|path| if path.is_dir() { files(&path) } else { vec![path] });
+    each.flatten().filter(|path| path.extension().is_some_and(|end| end == "rs")).collect()
+}
+
+#[test]
+fn no_modules_of_a_crate_use_each_other_in_a_circle() {
+    for name in WITHOUT_CIRCLES {
+        let modules = Modules::of(&repository().join(name).join("src"));
+        assert!(!modules.named.is_empty(), "{name} has no modules");
+        assert_eq!(modules.circle(), None, "in {name}");
+    }
+}
+
+#[test]
+fn a_circle_of_modules_is_found() {
+    let circle = |files: &[(&[&str], &str)]| {
+        let mut modules = Modules::default();
+        files.iter().for_each(|(path, text)| modules.add(path, text));
+        modules.circle().map(|circle| circle.join(" "))
+    };
+    let straight: [(&[&str], &str); 4] = [
+        (&["lib"], "mod a;\nmod b;\npub use b::{Item, c::Other};"),
+        (&["a"], "use crate::b;\nfn f() -> crate::Item {}\n#[cfg(test)]\nmod tests {}"),
+        (&["b"], "// crate::a is not used here.\nmod c;\n#[cfg(test)]\nmod tests { use crate::a; }"),
+        (&["b", "c"], "use super::Item;"),
+    ];
+    assert_eq!(circle(&straight), None);
+    for back in
+        ["use crate::a::f;", "use super::super::a;", "use crate::{b::Item, a::{f, g}};", "fn f() { crate::a::f() }"]
+    {
+        let with = [&straight[..], &[(&["b", "c"], back)]].concat();
+        assert_eq!(circle(&with).as_deref(), Some("a b"), "{back}");
+    }
+    // By way of what the root hands on, too.
+    let by_root =
+        [&straight[..2], &[(&["b"], "mod c;"), (&["b", "c"], "use crate::run;"), (&["d"], "use crate::a;")]].concat();
+    assert_eq!(circle(&by_root), None);
+    assert_eq!(circle(&[&by_root[..], &[(&["lib"], "pub use d::run;")]].concat()).as_deref(), Some("a b d"));
 }

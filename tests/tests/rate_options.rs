@@ -97,7 +97,7 @@ fn cost(name: &str, emitted: &Emitted, image: &Image) {
     assert_eq!(figures::held("rate.json", &name, &m.compiler, figures), Vec::<String>::new());
     // The gate names who costs most.
     let mut tight = model.target.clone();
-    tight.instructions = Some(m.used.instructions.unwrap() - 1);
+    tight.budget.instructions = Some(m.used.instructions.unwrap() - 1);
     let words = specgen::budget::over(&tight, &m.used).join("; ");
     assert!(words.contains("shrink it by 1; most of it: "), "{words}");
 }

@@ -58,8 +58,11 @@ fn every_value_of_the_reference_is_in_si() {
     assert_eq!(model.workspace.translation, [50e-6, 50e-6, 52e-6]);
     assert_eq!(model.workspace.rotation, [0.4e-3, 0.35e-3, 0.5e-3]);
     assert_eq!((model.controller.scalar, model.controller.setpoint), (Scalar::F64, SetpointKind::Pose));
-    assert_eq!((model.target.mcu, model.target.instructions), (Mcu::Mps2An500, Some(4500)));
-    assert_eq!((model.target.flash, model.target.ram, model.target.stack), (Some(131_072), Some(32_768), Some(2048)));
+    assert_eq!((model.target.mcu, model.target.budget.instructions), (Mcu::Mps2An500, Some(4500)));
+    assert_eq!(
+        (model.target.budget.flash, model.target.budget.ram, model.target.budget.stack),
+        (Some(131_072), Some(32_768), Some(2048))
+    );
 
     let paper = |name: &str, path| Trajectory {
         name: name.to_owned(),

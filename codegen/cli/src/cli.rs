@@ -13,7 +13,6 @@ mod examples;
 mod file;
 mod firmware;
 mod identify;
-mod identify_rate;
 mod operate;
 mod pil;
 mod plant;

@@ -33,7 +33,7 @@ pub fn steps(model: &Model) -> Steps {
 /// # Errors
 /// One finding at that key, with the number of bits that would do.
 pub fn check(model: &Model) -> Result<(), Vec<Diagnostic>> {
-    let Some(precision) = model.precision else { return Ok(()) };
+    let Some(precision) = model.requirements.precision else { return Ok(()) };
     let steps = steps(model);
     let (mut largest, mut what) = (steps.leg, "one code moves a leg".to_owned());
     for (axis, step) in AXES.iter().zip(steps.platform) {

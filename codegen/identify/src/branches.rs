@@ -1,7 +1,7 @@
 //! Cuts the drive of a record into monotone branches between its reversals, and finds where the record becomes usable.
 
 use super::record::Record;
-use super::sanity::extent;
+use super::statistics::extent;
 
 /// A branch: the drive goes from one reversal to the next, samples `first..end`.
 ///

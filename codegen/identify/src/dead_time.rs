@@ -10,7 +10,7 @@ use super::branches::Branch;
 use super::normal::{Weighting, accumulate};
 use super::record::Record;
 use super::regressor::Plane;
-use super::{prior, sanity};
+use super::{prior, statistics};
 
 /// Ratio of the fast to the slow branches (90 % and 10 % quantile of |du/dt|) from which a dead time can be identified.
 const RATE_RATIO: f64 = 2.0;
@@ -32,7 +32,7 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
         return (0.0, why);
     }
     let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
-    let step = sanity::median(&mut intervals) / PER_INTERVAL as f64;
+    let step = statistics::median(&mut intervals) / PER_INTERVAL as f64;
     let tried: Vec<f64> = (0..=LONGEST * PER_INTERVAL).map(|k| k as f64 * step).collect();
     let scale = 1.0 / record.displacement_range();
     let mut shifts: Vec<Shift> = tried.iter().map(|&tau| Shift { tau, next: 0 }).collect();

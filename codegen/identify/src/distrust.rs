@@ -1,8 +1,7 @@
 //! Samples that a record holds but that a fit must not believe: they get no weight, and a finding says when they were.
 
 use super::findings::Findings;
-use super::sanity::{extent, median};
-use super::trend::noise_floor;
+use super::statistics::{extent, median, noise_floor};
 use specgen_language::diagnostic::codes;
 
 /// A sample that differs from the median of its neighbourhood by this share of the displacement range is a glitch, if

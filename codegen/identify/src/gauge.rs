@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::findings::Findings;
 use super::least_squares::{Fit, fit, mean_square};
-use super::sanity::{extent, median};
 use super::signals::{self, Signals, Wanted};
+use super::statistics::{extent, median};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A calibration and how well it is founded. Lengths in m, voltages in V.

@@ -166,7 +166,7 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
         );
         return None;
     }
-    let (bottom, top) = super::sanity::extent(&record.displacement[used.first..]);
+    let (bottom, top) = super::statistics::extent(&record.displacement[used.first..]);
     Some(decide(&errors, folds, levels, 1.0 / scale, top - bottom))
 }
 

@@ -36,6 +36,7 @@ mod sanity;
 mod selection;
 mod signals;
 mod staircase;
+mod statistics;
 pub mod stiffness;
 mod sweep;
 mod trace;
@@ -46,7 +47,6 @@ pub mod waveform;
 use crate::everett::EverettTable;
 use findings::Findings;
 use normal::Normal;
-use regressor::Plane;
 use residual::Residual;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_numerics::nnls;
@@ -57,9 +57,9 @@ pub use export::{is_table_csv, read_table_csv, write_table_csv};
 pub use grid_choice::{GridChoice, Score, choose_grid};
 pub use record::{MAX_FILE_BYTES, Record, parse_record, read_file, read_record};
 pub use report::{Branches, Report};
-pub use sanity::extent;
 pub use specgen_language::model::MAX_GRID;
 pub use staircase::Staircase;
+pub use statistics::extent;
 pub use trace::Trace;
 pub use validate::{Start, StartResult, Validation, validate};
 
@@ -156,7 +156,7 @@ fn identify_checked(
 
     prior::add(plane.grid, &mut normal.gram);
     let solution = solve(&normal, findings)?;
-    let table = table_of(&plane, &solution.weights, 1.0 / scale);
+    let table = normal::table_of(&plane, &solution.weights, 1.0 / scale);
 
     let residual = Residual::of(&plane, record, &used, &displacement, &table);
     let fitted_branches = match fitted {
@@ -166,7 +166,7 @@ fn identify_checked(
     let percent = 100.0 / residual.range;
     let (fit_rms, fit_max) = trend::rms_and_max(&residual.detrended);
     let branch_rms = residual.within(&fitted_branches, used.first);
-    let noise_floor = trend::noise_floor(&record.displacement[used.first..]);
+    let noise_floor = statistics::noise_floor(&record.displacement[used.first..]);
     let gain = residual.range / (plane.range[1] - plane.range[0]);
     let cause = residual.cause(record, used.first, noise_floor, gain);
     let report = Report {
@@ -223,12 +223,4 @@ fn solve(normal: &Normal, findings: &mut Findings) -> Option<nnls::Solution> {
             findings.add(codes::NOT_DETERMINED, None, message, help);
         })
         .ok()
-}
-
-/// The table of cell weights that are in units of `unit` (m).
-fn table_of(plane: &Plane, weights: &[f64], unit: f64) -> EverettTable {
-    let mut nodes: Vec<f64> = weights.iter().map(|w| w * unit).collect();
-    normal::weights_to_nodes(plane.grid, &mut nodes);
-    let [drive_min, drive_max] = plane.range;
-    EverettTable { grid: plane.grid, drive_min, drive_max, nodes }
 }

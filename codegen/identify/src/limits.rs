@@ -2,8 +2,7 @@
 //! still on it, or an amplifier at its limit.
 
 use super::findings::Findings;
-use super::sanity::{extent, median};
-use super::trend::noise_floor;
+use super::statistics::{extent, median, noise_floor};
 use specgen_language::diagnostic::codes;
 
 /// Travel of the drive over which it is judged, as a share of its range, and least number of samples in it.

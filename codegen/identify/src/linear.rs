@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::findings::Findings;
 use super::least_squares::fit;
 use super::record::Record;
-use super::sanity::extent;
+use super::statistics::extent;
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_numerics::{ewma_limit, pcc_limit};
 
@@ -102,7 +102,7 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
         return line(record, frequency, false, &[0, end], findings);
     }
     let mut periods: Vec<f64> = crossings.windows(2).map(|w| w[1] - w[0]).collect();
-    let typical = super::sanity::median(&mut periods);
+    let typical = super::statistics::median(&mut periods);
     if let Some(k) = crossings.windows(2).position(|w| ((w[1] - w[0]) / typical - 1.0).abs() > STEADY) {
         let message = format!(
             "the cycle from {} s to {} s lasts {:.4e} s, the others {typical:.4e} s: the record has no one frequency",

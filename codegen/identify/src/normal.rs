@@ -119,7 +119,7 @@ pub fn accumulate(
 }
 
 /// Cell weights to Everett nodes, in place: E(i, j) is the sum of the weights with up ≤ i, down ≥ j.
-pub fn weights_to_nodes(grid: usize, values: &mut [f64]) {
+fn weights_to_nodes(grid: usize, values: &mut [f64]) {
     for up in 1..=grid {
         for down in (0..up.saturating_sub(1)).rev() {
             values[EverettTable::index(up, down)] += values[EverettTable::index(up, down + 1)];
@@ -130,4 +130,12 @@ pub fn weights_to_nodes(grid: usize, values: &mut [f64]) {
             values[EverettTable::index(up, down)] += values[EverettTable::index(up - 1, down)];
         }
     }
+}
+
+/// The table of cell weights that are in units of `unit` (m, or m s/V).
+pub fn table_of(plane: &Plane, weights: &[f64], unit: f64) -> EverettTable {
+    let mut nodes: Vec<f64> = weights.iter().map(|w| w * unit).collect();
+    weights_to_nodes(plane.grid, &mut nodes);
+    let [drive_min, drive_max] = plane.range;
+    EverettTable { grid: plane.grid, drive_min, drive_max, nodes }
 }

@@ -19,6 +19,7 @@ mod normal;
 mod prepare;
 mod report;
 mod score;
+mod table;
 
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::Diagnostic;

@@ -9,7 +9,7 @@ use std::path::Path;
 use super::columns::{self, Header, RECORD};
 use super::distrust;
 use super::findings::Findings;
-use super::sanity;
+use super::{sanity, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// Time of the sample, s.
@@ -78,7 +78,7 @@ impl Record {
     /// Difference of the largest and the smallest displacement, m.
     #[must_use]
     pub fn displacement_range(&self) -> f64 {
-        let (low, high) = sanity::extent(&self.displacement);
+        let (low, high) = statistics::extent(&self.displacement);
         high - low
     }
 }

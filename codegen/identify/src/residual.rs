@@ -6,7 +6,7 @@ use super::record::Record;
 use super::regressor::{self, Plane};
 use super::selection::Used;
 use super::trace::Trace;
-use super::{normal, sanity, trend};
+use super::{normal, statistics, trend};
 use crate::everett::EverettTable;
 
 /// Displacement minus model, from the first used sample on.
@@ -35,7 +35,7 @@ impl Residual {
         let (time, kept) = (believed(&record.time[used.first..]), believed(&plain));
         let line = trend::Line::fit(&time, &kept);
         let detrended = kept.iter().zip(&time).map(|(r, t)| r - line.at(*t)).collect();
-        let (low, high) = sanity::extent(&believed(&displacement[used.first..]));
+        let (low, high) = statistics::extent(&believed(&displacement[used.first..]));
         Self { plain, detrended, line, range: high - low }
     }
 

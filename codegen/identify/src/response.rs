@@ -14,8 +14,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::findings::Findings;
-use super::sanity::{extent, median};
 use super::signals::{self, Signals, Wanted};
+use super::statistics::{extent, median};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 pub use fit::response;

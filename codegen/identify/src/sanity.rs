@@ -2,7 +2,7 @@
 
 use super::findings::Findings;
 use super::limits;
-use super::record::{DISPLACEMENT, DRIVE, TIME};
+use super::statistics::{extent, median};
 use specgen_language::diagnostic::codes;
 
 /// Fewer samples are no record.
@@ -26,9 +26,9 @@ pub(crate) fn check(lines: &[usize], columns: &[Vec<f64>; 3], findings: &mut Fin
         return;
     }
     check_time(lines, time, findings);
-    let moving = [(drive, "drive_V", DRIVE), (displacement, "displacement_um", DISPLACEMENT)]
+    let moving = [(drive, "drive_V", 1.0), (displacement, "displacement_um", 1e6)]
         .into_iter()
-        .all(|(column, name, which)| check_not_constant(time, column, name, which, findings));
+        .all(|(column, name, unit)| check_not_constant(time, column, name, unit, findings));
     if moving {
         check_stuck(lines, time, drive, displacement, findings);
         check_sign(time, drive, displacement, findings);
@@ -72,12 +72,13 @@ pub(crate) fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings)
     }
 }
 
-fn check_not_constant(time: &[f64], column: &[f64], name: &str, which: usize, findings: &mut Findings) -> bool {
+/// `unit`: how many of the unit in `name` are one of the column's.
+fn check_not_constant(time: &[f64], column: &[f64], name: &str, unit: f64, findings: &mut Findings) -> bool {
     let (low, high) = extent(column);
     if low < high {
         return true;
     }
-    let shown = if which == DISPLACEMENT { low * 1e6 } else { low };
+    let shown = low * unit;
     let message = format!("`{name}` is {shown} in every sample, from {} s to {} s", time[0], time[time.len() - 1]);
     findings.add(
         codes::RECORD_CONSTANT,
@@ -198,22 +199,3 @@ fn check_displacement_unit(time: &[f64], displacement: &[f64], findings: &mut Fi
         findings.add(codes::RECORD_UNIT, None, message, "convert the column to micrometres");
     }
 }
-
-/// Smallest and largest value of finite numbers; (+inf, -inf) if there are none.
-pub fn extent(values: &[f64]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &x| {
-        (if x < low { x } else { low }, if x > high { x } else { high })
-    })
-}
-
-/// Middle value (upper middle of an even count); 0 for an empty slice. Reorders the slice.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-/// Which columns exist, for readers of this module: the order of [`TIME`], [`DRIVE`], [`DISPLACEMENT`].
-const _: () = assert!(TIME == 0 && DRIVE == 1 && DISPLACEMENT == 2);

@@ -7,7 +7,7 @@ use super::normal::{self, Normal, Weighting};
 use super::record::Record;
 use super::regressor::Plane;
 use super::report::Branches;
-use super::{sanity, trend};
+use super::{statistics, trend};
 use specgen_language::diagnostic::codes;
 
 /// Share of the drive range within which the drive counts as being at its minimum.
@@ -101,6 +101,6 @@ pub(crate) fn drift_of_returns(record: &Record, branches: &[Branch], plane: &Pla
 
 /// Drive in V up to which it counts as being at its minimum.
 fn at_minimum(record: &Record, plane: &Plane) -> f64 {
-    let (low, _) = sanity::extent(&record.drive);
+    let (low, _) = statistics::extent(&record.drive);
     low + AT_MINIMUM * (plane.range[1] - plane.range[0])
 }

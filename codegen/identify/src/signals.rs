@@ -5,7 +5,7 @@ use std::path::Path;
 use super::columns::{self, RECORD};
 use super::findings::Findings;
 use super::record::read_file;
-use super::sanity;
+use super::{sanity, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A column that a record may have.
@@ -87,7 +87,7 @@ impl Signals {
     /// Refuses a column that never changes, or that stands exactly still while `input` travels 5 % of its range.
     pub(crate) fn check_moves(&self, input: usize, output: usize, names: [&str; 2], findings: &mut Findings) {
         for (which, name) in [input, output].into_iter().zip(names) {
-            let (low, high) = sanity::extent(self.column(which));
+            let (low, high) = statistics::extent(self.column(which));
             if low >= high {
                 let message = format!(
                     "`{name}` is {low} in every sample, from {} to {}",
@@ -104,12 +104,12 @@ impl Signals {
             }
         }
         let (x, y) = (self.column(input), self.column(output));
-        let (low, high) = sanity::extent(x);
-        let (bottom, top) = sanity::extent(y);
+        let (low, high) = statistics::extent(x);
+        let (bottom, top) = statistics::extent(y);
         let mut first = 0;
         while first < y.len() {
             let run = y[first..].iter().take_while(|v| **v == y[first]).count();
-            let (a, b) = sanity::extent(&x[first..first + run]);
+            let (a, b) = statistics::extent(&x[first..first + run]);
             if run > 2 && b - a > 0.05 * (high - low) {
                 let what = if y[first] == bottom || y[first] == top { "is limited at" } else { "is stuck at" };
                 let message = format!(

@@ -10,8 +10,8 @@ use std::path::Path;
 use super::cause::lagging;
 use super::findings::Findings;
 use super::least_squares::{Fit, fit, independent_samples, mean_square};
-use super::sanity::extent;
 use super::signals::{self, Signals, Wanted};
+use super::statistics::extent;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A stiffness and how well it is founded.

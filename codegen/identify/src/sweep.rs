@@ -4,8 +4,8 @@ use super::findings::Findings;
 use super::record::Record;
 use super::regressor::Plane;
 use super::report::Report;
-use super::sanity::median;
 use super::selection::Used;
+use super::statistics::median;
 use specgen_language::diagnostic::codes;
 
 /// A lag that widens the loop by this share of the range is worth a warning.

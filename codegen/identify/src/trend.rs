@@ -48,14 +48,6 @@ pub fn rms_and_max(errors: &[f64]) -> (f64, f64) {
     ((sum / errors.len() as f64).sqrt(), max)
 }
 
-/// Standard deviation of white noise on `y`, from the median of its second differences: smooth motion hardly counts.
-#[must_use]
-pub fn noise_floor(y: &[f64]) -> f64 {
-    let mut second: Vec<f64> = y.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).abs()).collect();
-    // The median of |N(0, s)| is 0.6745 s; second differences of white noise have the variance 6 σ².
-    super::sanity::median(&mut second) / (0.674_489_75 * 6f64.sqrt())
-}
-
 /// Median slope of all pairs (Theil–Sen): a line through points of which some are wrong. 0 for fewer than two points.
 #[must_use]
 pub fn median_slope(points: &[(f64, f64)]) -> f64 {
@@ -66,5 +58,5 @@ pub fn median_slope(points: &[(f64, f64)]) -> f64 {
     for (k, (t0, y0)) in points.iter().enumerate() {
         slopes.extend(points[k + 1..].iter().filter(|(t1, _)| t1 > t0).map(|(t1, y1)| (y1 - y0) / (t1 - t0)));
     }
-    super::sanity::median(&mut slopes)
+    super::statistics::median(&mut slopes)
 }

@@ -10,9 +10,10 @@ use super::normal;
 use super::record::Record;
 use super::regressor::{self, Plane};
 use super::staircase::Staircase;
+use super::statistics::noise_floor;
 use super::trace::Trace;
-use super::trend::{Line, noise_floor, rms_and_max};
-use super::{dead_time, sanity};
+use super::trend::{Line, rms_and_max};
+use super::{dead_time, statistics};
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -95,7 +96,7 @@ const SWINGS: u32 = 100;
 pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result<Validation, Vec<Diagnostic>> {
     let mut findings = Findings::new(&record.shown_as);
     let plane = Plane { grid: table.grid, range: [table.drive_min, table.drive_max] };
-    let (low, high) = sanity::extent(&record.drive);
+    let (low, high) = statistics::extent(&record.drive);
     let allowed = 0.02 * (plane.range[1] - plane.range[0]);
     if low < plane.range[0] - allowed || high > plane.range[1] + allowed {
         let message = format!(
@@ -121,7 +122,7 @@ pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result
     let samples_after_jumps = record.time.len() - first - jumps.len();
     let compared: Vec<usize> = jumps.into_iter().filter(|&k| !record.weightless[k]).collect();
     let time: Vec<f64> = compared.iter().map(|&k| record.time[k]).collect();
-    let (bottom, top) = sanity::extent(&compared.iter().map(|&k| displacement[k]).collect::<Vec<_>>());
+    let (bottom, top) = statistics::extent(&compared.iter().map(|&k| displacement[k]).collect::<Vec<_>>());
     let range = top - bottom;
     let errors_of = |start: Start| {
         let mut all = Vec::with_capacity(displacement.len() - first);

@@ -8,8 +8,10 @@
 
 pub mod diagnostic;
 pub mod interrupt;
+mod keys;
 pub mod lock;
 pub mod model;
+pub mod quantity;
 mod source;
 pub mod spec;
 

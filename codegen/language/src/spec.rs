@@ -1,26 +1,22 @@
 //! Reads the spec file: TOML text to a checked [`Model`]. The only module that knows TOML.
 //!
 //! ```text
-//! text → tree with spans (syntax) → values by key path (read, value, quantity) → checks → model (build)
+//! text → tree with spans (syntax) → values by key path (read, value) → checks → model
 //! ```
-//! Everything about a key stands in one table, [`keys`]; the JSON Schema and the reference are printed from it.
+//! Everything about a key stands where [`crate::model`] declares its field; the JSON Schema and the reference are printed from
+//! that, too.
 //! A run reports every finding, in the order of the file.
 
-mod build;
 mod check;
-mod fields;
 mod findings;
-mod joints;
 pub mod keys;
 mod messages;
 mod names;
-pub mod quantity;
 mod read;
 mod reference;
 mod schema;
 mod source;
 mod syntax;
-mod task_space;
 mod text;
 mod value;
 
@@ -30,6 +26,7 @@ use crate::diagnostic::{Code, Diagnostic, Severity, codes};
 use crate::model::Model;
 
 pub use crate::SpecSource;
+pub use crate::quantity;
 pub use reference::reference_markdown;
 pub use schema::json_schema;
 pub use source::MAX_BYTES;
@@ -92,7 +89,7 @@ pub fn load_as_far(source: &SpecSource) -> (Option<Model>, Vec<Diagnostic>) {
     let whole = |finding: &Diagnostic| {
         finding.severity < Severity::Error || UNPHYSICAL.iter().any(|code| finding.code == *code)
     };
-    let model = if findings.all().iter().all(whole) { build::model(&fields) } else { None };
+    let model = if findings.all().iter().all(whole) { Model::read(&fields) } else { None };
     (model, findings.finish())
 }
 

@@ -124,6 +124,7 @@ pub fn rounding(rounding: &Precision, scalar: Scalar, command: &str) -> Section 
 /// Time and memory on the emulated machine, or why they were not measured.
 #[must_use]
 pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &str) -> Section {
+    let budget = &target.budget;
     let section = Section::new("budget", "Time and memory", command);
     let m = match measured {
         Ok(measurement) => measurement,
@@ -135,14 +136,14 @@ pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &s
         let declared = declared.map_or_else(String::new, |declared| declared.to_string());
         table.push(vec![what.to_owned(), format!("{used:.0}"), declared, share]);
     };
-    row("flash, bytes", m.flash as f64, target.flash);
+    row("flash, bytes", m.flash as f64, budget.flash);
     row("of which code a tick can reach, bytes", m.tick_code as f64, None);
-    row("RAM, bytes", m.ram as f64, target.ram);
+    row("RAM, bytes", m.ram as f64, budget.ram);
     row("of which State, bytes", m.state as f64, None);
     if let Some(bound) = m.stack_bound {
-        row("stack of a tick, bytes (static bound)", bound as f64, target.stack);
+        row("stack of a tick, bytes (static bound)", bound as f64, budget.stack);
     }
-    row("stack of a tick, bytes (seen)", m.stack_painted as f64, target.stack);
+    row("stack of a tick, bytes (seen)", m.stack_painted as f64, budget.stack);
     let mut stages = Grid::new(
         "Instructions of each stage, counted exactly; they are not cycles",
         &["stage", "mean", "fewest", "most", "calls"],
@@ -150,7 +151,7 @@ pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &s
     for stage in &m.stages {
         let whole = stage.name == "step";
         if whole {
-            row("instructions of a tick, mean", stage.mean, target.instructions);
+            row("instructions of a tick, mean", stage.mean, budget.instructions);
         }
         let counts = [stage.min, stage.max, stage.calls].map(|count| count.to_string());
         let name = if whole { "whole tick".to_owned() } else { stage.name.clone() };

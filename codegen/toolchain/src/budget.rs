@@ -31,8 +31,8 @@ pub struct Used {
 /// What is over budget, in words; nothing if all is within.
 #[must_use]
 pub fn over(target: &Target, used: &Used) -> Vec<String> {
-    let part = target.mcu.part();
-    let limit = |budget: Option<u64>, key: &str, has: u64| match budget {
+    let (part, budget) = (target.mcu.part(), &target.budget);
+    let limit = |declared: Option<u64>, key: &str, has: u64| match declared {
         Some(bytes) => (bytes, format!("target.budget.{key} allows {}", group(bytes))),
         None => (has, format!("{} has {}", part.name, group(has))),
     };
@@ -47,16 +47,16 @@ pub fn over(target: &Target, used: &Used) -> Vec<String> {
             ));
         }
     };
-    check("flash", "bytes", used.flash, limit(target.flash, "flash", part.flash), &used.flash_by);
-    check("ram", "bytes", used.ram, limit(target.ram, "ram", part.ram), &used.ram_by);
+    check("flash", "bytes", used.flash, limit(budget.flash, "flash", part.flash), &used.flash_by);
+    check("ram", "bytes", used.ram, limit(budget.ram, "ram", part.ram), &used.ram_by);
     if let Some(stack) = used.stack {
-        check("stack", "bytes", stack, limit(target.stack, "stack", part.ram), &used.stack_by);
+        check("stack", "bytes", stack, limit(budget.stack, "stack", part.ram), &used.stack_by);
     }
-    if let (Some(instructions), Some(most)) = (used.instructions, target.instructions) {
+    if let (Some(instructions), Some(most)) = (used.instructions, budget.instructions) {
         let words = format!("target.budget.instructions allows {}", group(most));
         check("instructions", "per tick", instructions, (most, words), &used.instructions_by);
     }
-    if target.stack.is_some() && used.stack.is_none() {
+    if budget.stack.is_some() && used.stack.is_none() {
         over.push("the stack of a tick cannot be bounded".to_owned());
     }
     over
@@ -92,7 +92,7 @@ pub fn group(value: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use specgen_language::model::Mcu;
+    use specgen_language::model::{Budget, Mcu};
 
     fn used() -> Used {
         let list = |parts: &[(&str, u64)]| parts.iter().map(|(name, amount)| ((*name).to_owned(), *amount)).collect();
@@ -110,12 +110,11 @@ mod tests {
 
     #[test]
     fn what_is_over_is_named_with_who_takes_most_and_by_how_much_to_shrink() {
-        let mut target = Target { mcu: Mcu::Mps2An500, flash: None, ram: None, stack: None, instructions: None };
+        let mut target = Target { mcu: Mcu::Mps2An500, budget: Budget::NONE };
         assert_eq!(over(&target, &used()), Vec::<String>::new());
-        (target.flash, target.ram, target.stack, target.instructions) =
-            (Some(60_000), Some(9000), Some(1672), Some(4107));
+        target.budget = Budget { flash: Some(60_000), ram: Some(9000), stack: Some(1672), instructions: Some(4107) };
         assert_eq!(over(&target, &used()), Vec::<String>::new());
-        target.instructions = Some(4000);
+        target.budget.instructions = Some(4000);
         assert_eq!(
             over(&target, &used()),
             [
@@ -123,17 +122,17 @@ mod tests {
                  load 1,761 (43 %), learn 437 (11 %)"
             ]
         );
-        target.flash = Some(59_999);
+        target.budget.flash = Some(59_999);
         let words = over(&target, &used()).join("\n");
         assert!(words.contains("shrink it by 1; most of it: controller 40,000 (67 %), runtime"), "{words}");
-        (target.ram, target.stack) = (Some(1), Some(1));
+        (target.budget.ram, target.budget.stack) = (Some(1), Some(1));
         assert_eq!(over(&target, &used()).len(), 4);
         assert!(over(&target, &Used { stack: None, ..used() }).iter().any(|words| words.contains("cannot be bounded")));
     }
 
     #[test]
     fn without_a_budget_the_part_is_the_limit() {
-        let target = Target { mcu: Mcu::Stm32F446Re, flash: None, ram: None, stack: None, instructions: None };
+        let target = Target { mcu: Mcu::Stm32F446Re, budget: Budget::NONE };
         assert_eq!(over(&target, &used()), Vec::<String>::new());
         let words = over(&target, &Used { flash: 600_000, ..used() }).join("\n");
         assert!(words.contains("stm32f446re has 524,288") && words.contains("shrink it by 75,712"), "{words}");

@@ -1,12 +1,14 @@
 //! Where the tools for microcontrollers may be: the one list of folders that every search goes through.
 
-use super::unpacked::{self, Unpacked};
 use super::user_cache;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The variable of the environment with the folders to search instead of `PATH` and the usual ones, written as `PATH` is.
 pub const VARIABLE: &str = "SPECGEN_TOOLS";
 
+/// Name of the folder of unpacked packages in the user's cache.
+const FOLDER: &str = "tools";
 /// Where programs are even if `PATH` does not say so.
 const USUAL: [&str; 3] = ["/usr/local/bin", "/usr/bin", "/opt/homebrew/bin"];
 
@@ -28,7 +30,7 @@ impl Places {
             let path = folders("PATH").unwrap_or_default();
             path.into_iter().chain(USUAL.map(PathBuf::from)).collect()
         });
-        Self::of(programs, user_cache::folder().map(|cache| cache.join(unpacked::FOLDER)))
+        Self::of(programs, user_cache::folder().map(|cache| cache.join(FOLDER)))
     }
 
     /// Each folder once, and so that it is found from another working folder too.
@@ -61,6 +63,45 @@ impl Places {
     #[must_use]
     pub fn cache(&self) -> Option<&Path> {
         self.unpacked.as_deref()
+    }
+}
+
+/// A folder with unpacked packages.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unpacked {
+    root: PathBuf,
+}
+
+impl Unpacked {
+    /// The folder, if it is there.
+    #[must_use]
+    pub fn at(root: &Path) -> Option<Self> {
+        root.is_dir().then(|| Self { root: root.to_owned() })
+    }
+
+    /// A program in it.
+    #[must_use]
+    pub fn program(&self, name: &str) -> Option<PathBuf> {
+        Some(self.programs().join(name)).filter(|file| file.is_file())
+    }
+
+    /// Folder of its programs.
+    #[must_use]
+    pub fn programs(&self) -> PathBuf {
+        self.root.join("usr/bin")
+    }
+
+    /// Folders of its libraries: those that Debian names after the architecture, whichever that is.
+    #[must_use]
+    pub fn libraries(&self) -> Vec<PathBuf> {
+        let mut found = Vec::new();
+        for base in ["usr/lib", "lib"] {
+            let Ok(entries) = fs::read_dir(self.root.join(base)) else { continue };
+            let named = entries.flatten().filter(|entry| entry.file_name().to_string_lossy().contains("-linux-gnu"));
+            found.extend(named.map(|entry| entry.path()).filter(|path| path.is_dir()));
+        }
+        found.sort();
+        found
     }
 }
 

@@ -10,57 +10,16 @@ use super::process;
 use specgen_language::interrupt::Scratch;
 use std::fs::{self, File};
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 
-/// Name of the folder in the user's cache.
-pub const FOLDER: &str = "tools";
 /// Not unpacked: the loader of this machine fits its own C library only.
 const OF_THE_SYSTEM: [&str; 2] = ["libc6_", "libc-bin_"];
 /// Texts for people, which no program here reads.
 const UNUSED: [&str; 4] = ["usr/share/doc", "usr/share/man", "usr/share/info", "usr/share/locale"];
 /// Longest time for one package, s.
 const LIMIT: Duration = Duration::from_secs(300);
-
-/// A folder with unpacked packages.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unpacked {
-    root: PathBuf,
-}
-
-impl Unpacked {
-    /// The folder, if it is there.
-    #[must_use]
-    pub fn at(root: &Path) -> Option<Self> {
-        root.is_dir().then(|| Self { root: root.to_owned() })
-    }
-
-    /// A program in it.
-    #[must_use]
-    pub fn program(&self, name: &str) -> Option<PathBuf> {
-        Some(self.programs().join(name)).filter(|file| file.is_file())
-    }
-
-    /// Folder of its programs.
-    #[must_use]
-    pub fn programs(&self) -> PathBuf {
-        self.root.join("usr/bin")
-    }
-
-    /// Folders of its libraries: those that Debian names after the architecture, whichever that is.
-    #[must_use]
-    pub fn libraries(&self) -> Vec<PathBuf> {
-        let mut found = Vec::new();
-        for base in ["usr/lib", "lib"] {
-            let Ok(entries) = fs::read_dir(self.root.join(base)) else { continue };
-            let named = entries.flatten().filter(|entry| entry.file_name().to_string_lossy().contains("-linux-gnu"));
-            found.extend(named.map(|entry| entry.path()).filter(|path| path.is_dir()));
-        }
-        found.sort();
-        found
-    }
-}
 
 /// Downloads packages with all that they depend on and unpacks them as `name`; what was there under this name goes.
 /// If `works` says so once it is this process' turn, another has done it meanwhile.

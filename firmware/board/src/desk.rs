@@ -1,6 +1,6 @@
 //! What a board answers over the link.
 
-use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Machine, Phase, Request as Wanted};
+use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
 use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, Real};
 use specgen_link::lockstep::{Session, piece};
@@ -10,7 +10,7 @@ use specgen_link::{
 use specgen_runtime::wave::{self, Settings};
 
 use crate::download::{self, Download};
-use crate::exchange::Exchange;
+use crate::exchange::{Access, Exchange};
 use crate::recording;
 use crate::stepper::{Costs, Stepper, Stopwatch};
 
@@ -30,9 +30,6 @@ pub struct Desk {
     session: Session<WORDS>,
     download: Download,
 }
-
-/// Gives access to the exchange and the machine, with the tick held off for as long as that takes.
-pub type Access<'a> = dyn FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine)) + 'a;
 
 /// A desk while bytes are looked at. `dyn`, so that there is one copy of it, compiled as this crate is.
 pub struct Visit<'d, 'a> {

@@ -106,6 +106,9 @@ impl Default for Exchange {
     }
 }
 
+/// Gives access to the exchange and the machine, with the tick held off for as long as that takes.
+pub type Access<'a> = dyn FnMut(&mut dyn FnMut(&mut Exchange, &mut Machine)) + 'a;
+
 impl Exchange {
     /// At power-up: nothing wanted, the spec's settings, the link lost until the host sends something, nothing recorded.
     #[must_use]

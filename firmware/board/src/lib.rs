@@ -26,8 +26,8 @@ mod words;
 
 pub use controller::COMMAND_WORDS;
 pub use cycle::{Board, Noticed};
-pub use desk::{Access, Desk, Visit};
-pub use exchange::{Exchange, Orders, Report};
+pub use desk::{Desk, Visit};
+pub use exchange::{Access, Exchange, Orders, Report};
 pub use health::{BACKGROUND_SILENCE, Health};
 pub use recording::recorder;
 pub use schedule::{Due, Schedule};

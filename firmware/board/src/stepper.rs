@@ -4,8 +4,7 @@ use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, MachineI
 use controller::{CONFIG_WORDS, Config, DESCRIPTION};
 use specgen_link::{Counted, Stage, lockstep};
 
-use crate::desk::Access;
-use crate::exchange;
+use crate::exchange::{self, Access};
 
 /// Name of the whole tick.
 const WHOLE: &str = "supervise";

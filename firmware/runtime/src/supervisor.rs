@@ -30,12 +30,12 @@ mod supervision;
 mod watch;
 
 pub use approach::Approach;
-pub use debounce::{Debounce, TIMED, TIMERS};
+pub use debounce::Debounce;
 pub use kinds::{
     CONVERTER, Cause, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, RAMPS_DOWN, Request, STOP, SWITCHES_OFF,
 };
 pub use phases::Supervisor;
-pub use supervision::Supervision;
+pub use supervision::{Supervision, TIMED, TIMERS};
 pub use watch::{Channel, Sample, Watch};
 
 /// `code` moved towards `goal` by at most `step` (≥ 0) codes.

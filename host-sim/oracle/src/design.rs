@@ -6,11 +6,8 @@ use nalgebra::DMatrix;
 
 use host_sim::platform::{Matrix6, PlatformParameters, Specimen, StructureParameters};
 
+use super::linear::{Matrix, Vector, matrix, vector};
 use super::notch::{Notch, NotchState};
-use super::platform::{matrix, vector};
-
-type Matrix = nalgebra::SMatrix<f64, 6, 6>;
-type Vector = nalgebra::SVector<f64, 6>;
 
 /// What a platform controller is designed from, SI.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,6 +9,7 @@ use host_sim::description::{Description, indexed};
 use host_sim::word::Scalar;
 
 pub mod design;
+mod linear;
 mod notch;
 pub mod platform;
 mod preisach;

@@ -1,9 +1,6 @@
 //! Modal notch: six biquads in modal coordinates.
 
-use nalgebra::{SMatrix, SVector};
-
-type Matrix = SMatrix<f64, 6, 6>;
-type Vector = SVector<f64, 6>;
+use super::linear::{Matrix, Vector};
 
 /// (s² + 2ζω s + ω²)/(s² + 2ζ_d ω s + ω²) by the bilinear transform, exact at ω.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -14,35 +14,19 @@
 mod generator;
 mod settings;
 
-use nalgebra::{SMatrix, SVector};
-
 use super::design::Gains;
+use super::linear::{Matrix, Vector, matrix, numbers, vector};
 use super::notch::{Notch, NotchState};
 use super::preisach::{Memory, Table};
 use host_sim::closed_loop::LEGS;
 use host_sim::controller::{ControllerError, TickController};
 use host_sim::description::{Description, indexed};
-use host_sim::platform::{Geometry, Masses, Matrix6, Probe, Six};
+use host_sim::platform::{Geometry, Masses, Probe, Six};
 use host_sim::trajectory::PoseTarget;
 use host_sim::word::Scalar;
 
 use generator::Generator;
 pub use settings::{Drive, Settings};
-
-type Matrix = SMatrix<f64, 6, 6>;
-type Vector = SVector<f64, 6>;
-
-pub(super) fn matrix(rows: &Matrix6) -> Matrix {
-    Matrix::from_fn(|row, column| rows[row][column])
-}
-
-pub(super) fn vector(values: &Six) -> Vector {
-    Vector::from_column_slice(values)
-}
-
-fn numbers(vector: &Vector) -> Six {
-    std::array::from_fn(|k| vector[k])
-}
 
 /// Values of the configuration words.
 #[derive(Debug, Clone, PartialEq)]

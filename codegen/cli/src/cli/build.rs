@@ -181,7 +181,7 @@ impl Summary {
 impl Outcome for Summary {
     fn text(&self) -> String {
         let mut out = String::new();
-        let target = &self.limits;
+        let budget = &self.limits.budget;
         // Writing to a String cannot fail.
         let _ = writeln!(out, "{} → {} (f{}, digest {})", self.name, self.output, self.bits, &self.digest[..16]);
         out.push_str(&self.found);
@@ -198,14 +198,14 @@ impl Outcome for Summary {
         }
         let of = |budget: Option<u64>| budget.map_or(String::new(), |b| format!(" of {}", group(b)));
         let bound = |bytes: Option<u64>| {
-            bytes.map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(target.stack)))
+            bytes.map_or("unbounded".to_owned(), |bytes| format!("{}{} bytes at most", group(bytes), of(budget.stack)))
         };
         let flash = |out: &mut String, [all, code, constants, tick]: [u64; 4]| {
             let _ = writeln!(
                 out,
                 "    flash         {}{} bytes: {} code, {} constants; a tick reaches {} bytes of code",
                 group(all),
-                of(target.flash),
+                of(budget.flash),
                 group(code),
                 group(constants),
                 group(tick)
@@ -214,7 +214,7 @@ impl Outcome for Summary {
         if let Some(i) = &self.image {
             let _ = writeln!(out, "  {} ({}), not run:", i.machine, i.compiler);
             flash(&mut out, [i.flash, i.code, i.constants, i.tick_code]);
-            let _ = writeln!(out, "    RAM           {}{} bytes static, without State", group(i.ram), of(target.ram));
+            let _ = writeln!(out, "    RAM           {}{} bytes static, without State", group(i.ram), of(budget.ram));
             let _ = writeln!(out, "    stack a tick  {} (static)", bound(i.stack_bound));
         }
         if let Some(m) = &self.measurement {
@@ -224,13 +224,13 @@ impl Outcome for Summary {
                 out,
                 "    RAM           {}{} bytes, of which State {}",
                 group(m.ram),
-                of(target.ram),
+                of(budget.ram),
                 group(m.state)
             );
             let _ =
                 writeln!(out, "    stack a tick  {} (static), {} seen", bound(m.stack_bound), group(m.stack_painted));
             for stage in &m.stages {
-                let budget = if stage.name == "step" { of(target.instructions) } else { String::new() };
+                let budget = if stage.name == "step" { of(budget.instructions) } else { String::new() };
                 let _ = writeln!(
                     out,
                     "    {:<13} {}{budget} instructions mean, {} to {} ({} calls)",

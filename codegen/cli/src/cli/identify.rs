@@ -7,6 +7,7 @@ mod everett;
 mod gauge;
 mod linear;
 mod plot;
+mod rate;
 mod response;
 mod stiffness;
 
@@ -18,8 +19,6 @@ use specgen_compiler::compile::Refused;
 use specgen_language::diagnostic::Diagnostic;
 
 pub use everett::summary;
-pub(super) use everett::{grid, range};
-pub(super) use plot::wrote;
 
 /// Arguments of `identify`.
 #[derive(Args, Debug)]
@@ -47,7 +46,7 @@ enum Kind {
     /// Axial stiffness from force and displacement at constant drive.
     Stiffness(stiffness::Arguments),
     /// Compare rate-dependent models on records of one leg at several rates.
-    Rate(super::identify_rate::Arguments),
+    Rate(rate::Arguments),
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
@@ -56,7 +55,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(Kind::Response(arguments)) => response::run(arguments, ui),
         Some(Kind::Gauge(arguments)) => gauge::run(arguments, ui),
         Some(Kind::Stiffness(arguments)) => stiffness::run(arguments, ui),
-        Some(Kind::Rate(arguments)) => super::identify_rate::run(arguments, ui),
+        Some(Kind::Rate(arguments)) => rate::run(arguments, ui),
         None => everett::run(&arguments.everett, ui),
     }
 }

@@ -27,8 +27,8 @@ pub fn least(model: &Model) -> [u64; 2] {
 
 /// Says what of a declared budget only a build can tell.
 pub fn estimated(model: &Model) -> Option<Diagnostic> {
-    let target = &model.target;
-    if [target.flash, target.ram, target.stack, target.instructions] == [None; 4] {
+    let budget = &model.target.budget;
+    if [budget.flash, budget.ram, budget.stack, budget.instructions] == [None; 4] {
         return None;
     }
     let [tables, memory] = least(model);
@@ -45,12 +45,12 @@ pub fn estimated(model: &Model) -> Option<Diagnostic> {
 
 /// A budget below what the tables take, or so far above it that it checks nothing.
 pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
-    let target = &facts.model.target;
+    let budget = &facts.model.target.budget;
     let [table, memory] = least(facts.model);
     let lines = [
-        ("flash", target.flash, table, "the hysteresis tables alone take"),
-        ("ram", target.ram, memory, "the reversal memories alone take"),
-        ("stack", target.stack, LEAST_STACK, "no tick gets by with less than about"),
+        ("flash", budget.flash, table, "the hysteresis tables alone take"),
+        ("ram", budget.ram, memory, "the reversal memories alone take"),
+        ("stack", budget.stack, LEAST_STACK, "no tick gets by with less than about"),
     ];
     for (name, declared, least, what) in lines {
         let Some(declared) = declared else { continue };
@@ -75,7 +75,7 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
             );
         }
     }
-    if let (Some(flash), Some(ram)) = (target.flash, target.ram)
+    if let (Some(flash), Some(ram)) = (budget.flash, budget.ram)
         && ram > flash
     {
         found.add(
@@ -85,7 +85,7 @@ pub(super) fn tables_fit(facts: &Facts, found: &mut Found) {
             "code and tables are in flash, which is the larger on every part: are `target.budget.flash` and `target.budget.ram` in each other's place?",
         );
     }
-    if let Some(declared) = target.instructions
+    if let Some(declared) = budget.instructions
         && declared < LEAST_INSTRUCTIONS
     {
         found.add(

@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 
 use super::forward::{kept, parts};
 use super::prepare::Prepared;
-use super::{CreepTerm, RateModel, fit, mixed};
+use super::{CreepTerm, RateModel, mixed, table};
 use crate::regressor::Plane;
 use crate::trend::Line;
 use specgen_numerics::nnls::Failure;
@@ -50,7 +50,7 @@ pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Re
                 target
             })
             .collect();
-        model.still = fit::table(plane, records, &targets)?;
+        model.still = table::fit(plane, records, &targets)?;
         let terms = times.iter().zip(&linear.weights);
         model.creep = kept(terms.map(|(tau, w)| CreepTerm { time_constant: *tau, weight: w / linear.scale }).collect());
     }

@@ -1,16 +1,13 @@
 //! Fits of the options to several records at once.
 
-use super::normal::{Normal, accumulate};
+use super::normal::accumulate;
 use super::prepare::Prepared;
-use super::{RateModel, creep, mixed};
-use crate::dead_time;
-use crate::everett::EverettTable;
+use super::{RateModel, creep, mixed, table};
 use crate::findings::Findings;
-use crate::normal::weights_to_nodes;
-use crate::prior;
 use crate::regressor::Plane;
+use crate::{dead_time, normal, prior};
 use specgen_language::diagnostic::codes;
-use specgen_numerics::nnls::{self, Failure};
+use specgen_numerics::nnls::Failure;
 
 /// Longest dead time tried, sampling intervals of the fastest sampled record.
 const LONGEST: usize = 16;
@@ -43,26 +40,10 @@ pub(super) fn all(
         .ok()
 }
 
-/// Sum of the normal equations of the records, with one target each and none of the second table.
-pub(super) fn sum(plane: &Plane, records: &[&Prepared], targets: &[Vec<f64>]) -> Option<Normal> {
-    let each = records.iter().zip(targets).map(|(p, y)| accumulate(plane, p, core::slice::from_ref(y), None));
-    each.reduce(|sum, more| sum.add(&more))
-}
-
-/// The table that fits `targets` (m, one for each record) best.
-pub(super) fn table(plane: &Plane, records: &[&Prepared], targets: &[Vec<f64>]) -> Result<EverettTable, Failure> {
-    let mut normal = sum(plane, records, targets).ok_or(Failure::Singular)?;
-    prior::add(plane.grid, &mut normal.gram);
-    // To order one: the tolerances of the solver are relative, and so small weights keep their digits.
-    let scale = 1.0 / size(&normal.rhs[0]);
-    let rhs: Vec<f64> = normal.rhs[0].iter().map(|b| b * scale).collect();
-    Ok(table_of(plane, &nnls::solve(&normal.gram, &rhs)?.weights, 1.0 / scale))
-}
-
 /// One table for all records behind `dead_time` (s).
 fn still(plane: &Plane, records: &[&Prepared], dead_time: f64) -> Result<RateModel, Failure> {
     let targets: Vec<Vec<f64>> = records.iter().map(|p| p.delayed(dead_time)).collect();
-    Ok(RateModel { still: table(plane, records, &targets)?, rate: None, creep: Vec::new(), dead_time })
+    Ok(RateModel { still: table::fit(plane, records, &targets)?, rate: None, creep: Vec::new(), dead_time })
 }
 
 /// The dead time (s) with which one table fits all records best, bounds of the weights aside; zero if none helps.
@@ -102,27 +83,14 @@ fn dynamic(plane: &Plane, records: &[&Prepared]) -> Result<RateModel, Failure> {
             }
         }
     }
-    let scale = 1.0 / size(&normal.rhs[0]);
+    let scale = 1.0 / table::size(&normal.rhs[0]);
     let rhs: Vec<f64> = normal.rhs[0].iter().map(|b| b * scale).collect();
     let weights = mixed::solve(&normal.gram, &rhs, nodes)?;
     let (still, rate) = weights.split_at(nodes);
     Ok(RateModel {
-        still: table_of(plane, still, 1.0 / scale),
-        rate: Some(table_of(plane, rate, 1.0 / (scale * unit))),
+        still: normal::table_of(plane, still, 1.0 / scale),
+        rate: Some(normal::table_of(plane, rate, 1.0 / (scale * unit))),
         creep: Vec::new(),
         dead_time: 0.0,
     })
-}
-
-/// Largest absolute value, not zero.
-fn size(values: &[f64]) -> f64 {
-    values.iter().fold(f64::MIN_POSITIVE, |most, v| if v.abs() > most { v.abs() } else { most })
-}
-
-/// The table of weights that are in units of `unit`.
-fn table_of(plane: &Plane, weights: &[f64], unit: f64) -> EverettTable {
-    let mut nodes: Vec<f64> = weights.iter().map(|w| w * unit).collect();
-    weights_to_nodes(plane.grid, &mut nodes);
-    let [drive_min, drive_max] = plane.range;
-    EverettTable { grid: plane.grid, drive_min, drive_max, nodes }
 }

@@ -4,7 +4,7 @@ use crate::branches::Branch;
 use crate::findings::Findings;
 use crate::record::Record;
 use crate::regressor::Plane;
-use crate::{coverage, dead_time, sanity, selection};
+use crate::{coverage, dead_time, selection, statistics};
 use specgen_language::diagnostic::codes;
 
 /// Records whose rates differ by less than this factor tell nothing about rate dependence.
@@ -63,9 +63,9 @@ pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Find
     let mut prepared = Prepared {
         record,
         first: used.first,
-        speed: sanity::median(&mut speeds),
+        speed: statistics::median(&mut speeds),
         frequency: 0.0,
-        interval: sanity::median(&mut intervals),
+        interval: statistics::median(&mut intervals),
         slope,
         branches: used.branches,
     };

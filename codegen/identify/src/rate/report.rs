@@ -7,7 +7,7 @@ use super::score::{Unknown, on};
 use super::{CreepTerm, RateModel, RateOption};
 use crate::record::Record;
 use crate::regressor::Plane;
-use crate::{sanity, trend};
+use crate::statistics;
 use specgen_language::diagnostic::Diagnostic;
 
 /// An option beats the static table on a rate if its error there is lower by this share at least.
@@ -119,14 +119,14 @@ pub(super) fn report(
 
 fn measured(p: &Prepared) -> Measured {
     let y = &p.record.displacement[p.first..];
-    let (low, high) = sanity::extent(y);
+    let (low, high) = statistics::extent(y);
     Measured {
         record: p.record.shown_as.clone(),
         frequency: p.frequency,
         speed: p.speed,
         samples: p.samples(),
         range: high - low,
-        noise_percent: 100.0 * trend::noise_floor(y) / (high - low),
+        noise_percent: 100.0 * statistics::noise_floor(y) / (high - low),
     }
 }
 

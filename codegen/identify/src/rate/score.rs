@@ -9,7 +9,7 @@ use crate::record::Record;
 use crate::regressor::Plane;
 use crate::staircase::Staircase;
 use crate::trend::{Line, rms_and_max};
-use crate::{dead_time, sanity};
+use crate::{dead_time, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// A step between two samples by this share of the drive range is a jump, after which the actuator rings.
@@ -44,7 +44,7 @@ impl<'a> Unknown<'a> {
     pub(super) fn new(record: &'a Record, plane: &Plane) -> Result<Self, Vec<Diagnostic>> {
         let mut findings = Findings::new(&record.shown_as);
         let span = plane.range[1] - plane.range[0];
-        let (low, high) = sanity::extent(&record.drive);
+        let (low, high) = statistics::extent(&record.drive);
         if low < plane.range[0] - BEYOND * span || high > plane.range[1] + BEYOND * span {
             let message = format!(
                 "the drive goes from {low} V to {high} V, outside the table's {} V to {} V",
@@ -96,7 +96,7 @@ impl<'a> Unknown<'a> {
 fn percent(time: &[f64], y: &[f64], predicted: &[f64], compared: &[usize]) -> f64 {
     let at: Vec<f64> = compared.iter().map(|k| time[*k]).collect();
     let mut errors: Vec<f64> = compared.iter().map(|k| y[*k] - predicted[*k]).collect();
-    let (low, high) = sanity::extent(&compared.iter().map(|k| y[*k]).collect::<Vec<_>>());
+    let (low, high) = statistics::extent(&compared.iter().map(|k| y[*k]).collect::<Vec<_>>());
     let line = Line::fit(&at, &errors);
     errors.iter_mut().zip(&at).for_each(|(e, t)| *e -= line.at(*t));
     100.0 * rms_and_max(&errors).0 / (high - low)

@@ -1,127 +1,282 @@
 //! The task-space controller of a spec: what of section 4 of the paper the user chooses.
 
-use super::Gains;
+use std::f64::consts::PI;
 
-/// The task-space controller, section 4 of the paper. A pose is x, y, z, θx, θy, θz from rest, m and rad.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TaskSpace {
-    /// Loops that are closed at start-up; how the feed-forward adapts is [`Adaptation::mode`](super::Adaptation::mode).
-    pub mode: ControlMode,
-    /// What the six gauges see, in the order of the words `gauge[0]` to `gauge[5]`.
-    pub probes: [Probe; 6],
-    /// Reading of each gauge, a polynomial V → m with the lowest power first, at least two coefficients. None: the
-    /// gauge words are metres.
-    pub calibration: Option<[Vec<f64>; 6]>,
-    /// ζ of the lowest mode of the platform on its legs, in (0, 1); the leg damper is c_a = 2 ζ k_a / ω_1.
-    pub modal_damping: f64,
-    /// ζ_d of the modal notch, in (0, 1] and above `modal_damping`. None: no notch.
-    pub notch_damping: Option<f64>,
-    /// Gains of P and F together. None: the compiler's start rule.
-    pub gains: Option<Gains>,
-    /// Gains of P alone. None: the compiler's start rule.
-    pub position_gains: Option<Gains>,
-    /// Ω1 (level) and Ω2 (drift), rad/s: the weight per tick is Ω T_s, at most 1. None: the compiler's start rule.
-    pub adaptation: Option<[f64; 2]>,
-    /// First-order low-pass of the pose derivative, rad/s, below half the angular tick rate.
-    pub velocity_cutoff: f64,
+use super::electronics::CALIBRATION;
+use super::hysteresis::BANDWIDTH;
+use super::{LARGEST_TRAVEL, LARGEST_TURN};
+use crate::keys::MAX_TABLES;
+use crate::keys::declare::*;
+
+/// Largest gain and stiffness that a spec may say, in SI units: products with it stay finite in both scalars.
+pub const LARGEST_GAIN: f64 = 1e15;
+/// Share of half the tick rate that the velocity filter passes if the spec does not say.
+const CUTOFF_SHARE: f64 = 0.6;
+
+const GAIN: Range = Range::closed(0.0, LARGEST_GAIN);
+const fn gains(along: Dimension, along_unit: &'static str, about: Dimension, about_unit: &'static str) -> [Item; 6] {
+    let (a, t) = (item(along, GAIN, along_unit), item(about, GAIN, about_unit));
+    [a, a, a, t, t, t]
+}
+const STIFFNESSES: &[Item] = &gains(Dimension::STIFFNESS, "N/m", Dimension::TURN_STIFFNESS, "N m/rad");
+const STIFFNESS_RATES: &[Item] =
+    &gains(Dimension::STIFFNESS_RATE, "N/(m s)", Dimension::TURN_STIFFNESS_RATE, "N m/(rad s)");
+const DAMPINGS: &[Item] = &gains(Dimension::DAMPING, "N s/m", Dimension::TURN_DAMPING, "N m s/rad");
+const DIRECTION: Item = Item::Number(Range::closed(-1e3, 1e3));
+const POSE: &[Item] = &six(
+    item(Dimension::LENGTH, Range::closed(-LARGEST_TRAVEL, LARGEST_TRAVEL), "um"),
+    item(Dimension::ANGLE, Range::closed(-LARGEST_TURN, LARGEST_TURN), "urad"),
+);
+const FRAME: &[Item] = &six(CENTER, item(Dimension::ANGLE, Range::closed(-TURN_AROUND, TURN_AROUND), "rad"));
+const TURN_AROUND: f64 = PI;
+const SPEEDS: &[Item] = &six(
+    item(Dimension::SPEED, Range::above(0.0, 100.0), "um/s"),
+    item(Dimension::ANGULAR_RATE, Range::above(0.0, 1e3), "mrad/s"),
+);
+const ACCELERATIONS: &[Item] = &six(
+    item(Dimension::ACCELERATION, Range::above(0.0, 1e5), "mm/s^2"),
+    item(Dimension::ANGULAR_ACCELERATION, Range::above(0.0, 1e6), "mrad/s^2"),
+);
+const JERKS: &[Item] = &six(
+    item(Dimension::JERK, Range::above(0.0, 1e8), "m/s^3"),
+    item(Dimension::ANGULAR_JERK, Range::above(0.0, 1e9), "rad/s^3"),
+);
+const NO_POSE: &str = r#"["0 um", "0 um", "0 um", "0 urad", "0 urad", "0 urad"]"#;
+const SLOW_SPEED: &str = r#"["100 um/s", "100 um/s", "100 um/s", "1 mrad/s", "1 mrad/s", "1 mrad/s"]"#;
+const SLOW_ACCELERATION: &str =
+    r#"["10 mm/s^2", "10 mm/s^2", "10 mm/s^2", "100 mrad/s^2", "100 mrad/s^2", "100 mrad/s^2"]"#;
+const SLOW_JERK: &str = r#"["1 m/s^3", "1 m/s^3", "1 m/s^3", "10 rad/s^3", "10 rad/s^3", "10 rad/s^3"]"#;
+const STREAM_SPEED: &str = r#"["1 mm/s", "1 mm/s", "1 mm/s", "10 mrad/s", "10 mrad/s", "10 mrad/s"]"#;
+
+choice! {
+    /// Which loops are closed. The paper's "P", "F" and "P/F".
+    ControlMode {
+        /// Both.
+        PF = "p/f",
+        /// Position feedback alone: no inverse model, no adaptation.
+        P = "p",
+        /// Feed-forward alone.
+        F = "f",
+    }
+}
+
+choice! {
     /// Where the interaction force of the feed-forward comes from.
-    pub interaction: Interaction,
-    /// The work piece of [`Interaction::Modelled`]; zero if the spec gives none.
-    pub environment: Environment,
-    /// Time by which the leg displacements of the set-point are asked for early, s; not negative.
-    pub lead: f64,
-    /// Time constant with which the offset of a bumpless change of mode fades, s.
-    pub transfer_time: f64,
-    /// What set-points are believed and how fast moves are.
-    pub setpoint: SetpointRules,
+    Interaction {
+        /// None is fed forward.
+        None = "none",
+        /// K_e (h_d − h_e).
+        Modelled = "modelled",
+        /// A force sensor: the words `wrench[0]` to `wrench[5]`.
+        Measured = "measured",
+    }
+}
+
+section! {
+    /// The task-space controller of section 4. With it the six gauges see the platform ([[gauge]]); without it each leg has its own gauge and its own feed-forward.
+    ///
+    /// A pose is x, y, z, θx, θy, θz from rest, m and rad; times in s.
+    "control", Optional => TaskSpace {
+        /// Loops closed at start-up: position feedback and feed-forward, feedback alone, feed-forward alone. How the feed-forward adapts is `adaptation.mode`.
+        mode: ControlMode = one_of(ControlMode::WORDS), Default("p/f"), "", "p/f";
+        /// Damping ratio of the lowest mode of the platform on its legs. Give what is measured, or less: less is the cautious side.
+        modal_damping: f64 = number(Range::open(0.0, 1.0)), Required, "zeta", 0.02;
+        /// Whether a modal notch stands in the feedback; without one the bandwidth falls to about a twelfth.
+        notch = FLAG, Default(true), "", true;
+        /// Damping ratio that the notch leaves of each mode, above `modal_damping`.
+        notch_damping = number(Range::above(0.0, 1.0)), Rule("1, with a notch"), "zeta_d", 1.0;
+        /// First-order low-pass of the pose derivative, below half the tick rate (pi rad / period).
+        velocity_cutoff = BANDWIDTH, Rule("0.6 pi rad / period"), "", "9e3 rad/s";
+        /// Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words.
+        interaction: Interaction = one_of(Interaction::WORDS), Default("none"), "", "none";
+        /// Time by which the leg displacements are asked for early, in proportion to their rate: about the amplifier lag less one period. Takes out part of the lag of fast motion; a set-point that steps is overshot by step x lead / period for one tick.
+        lead: f64 = one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Default("0 ms"), "", "0.2 ms";
+        /// Time constant with which the offset of a change of mode fades, where neither estimates nor an integral on every axis take it over, as in F with Invhys.
+        transfer_time: f64 = one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("50 ms"), "", "50 ms";
+    }
+    and |fields, _table| {
+        /// What the six gauges see, in the order of the words `gauge[0]` to `gauge[5]`.
+        probes: [Probe; 6] = of_gauges(|gauge| Probe::read(fields, &gauge))?;
+        /// Reading of each gauge, a polynomial V → m with the lowest power first, at least two coefficients. None: the
+        /// gauge words are metres.
+        calibration: Option<[Vec<f64>; 6]> = calibration(fields);
+        /// ζ_d of the modal notch, in (0, 1] and above `modal_damping`. None: no notch.
+        notch_damping: Option<f64> =
+            fields.flag("control.notch")?.then(|| fields.number("control.notch_damping").unwrap_or(1.0));
+        /// Gains of P and F together. None: the compiler's start rule.
+        gains: Option<Gains> = Gains::read(fields, "gains");
+        /// Gains of P alone. None: the compiler's start rule.
+        position_gains: Option<Gains> = Gains::read(fields, "position_gains");
+        /// Ω1 (level) and Ω2 (drift), rad/s: the weight per tick is Ω T_s, at most 1. None: the compiler's start rule.
+        adaptation: Option<[f64; 2]> = bandwidths(fields);
+        /// First-order low-pass of the pose derivative, rad/s, below half the angular tick rate.
+        velocity_cutoff: f64 = match fields.number("control.velocity_cutoff") {
+            Some(cutoff) => cutoff,
+            None => CUTOFF_SHARE * PI / fields.number("timing.period")?,
+        };
+        /// The work piece of [`Interaction::Modelled`]; zero if the spec gives none.
+        environment: Environment = Environment::read(fields, "control.environment").unwrap_or(Environment::NONE);
+        /// What set-points are believed and how fast moves are.
+        setpoint: SetpointRules = SetpointRules::read(fields, "control.setpoint")?;
+        /// Coordinates that set-points are given in.
+        frames: Frames = Frames::read(fields, "control.frames")?;
+        /// Trajectories by the word `selector`, in the order of the spec; names are unique.
+        trajectories: Vec<Trajectory> = (0..fields.count("trajectory"))
+            .map(|index| Trajectory::read(fields, &format!("trajectory[{index}]")))
+            .collect::<Option<_>>()?;
+    }
+}
+
+/// What `each` makes of the table of each gauge, if there are six.
+fn of_gauges<T>(each: impl Fn(String) -> Option<T>) -> Option<[T; 6]> {
+    (0..6).map(|gauge| each(format!("gauge[{gauge}]"))).collect::<Option<Vec<T>>>()?.try_into().ok()
+}
+
+/// Each gauge's own, or that of all; `None` if the gauge words are metres.
+fn calibration(fields: &Fields) -> Option<[Vec<f64>; 6]> {
+    let of_all = fields.numbers("sensor.calibration");
+    of_gauges(|gauge| fields.numbers(&join(&gauge, "calibration")).or(of_all).map(<[f64]>::to_vec))
+}
+
+fn bandwidths(fields: &Fields) -> Option<[f64; 2]> {
+    Some([fields.number("adaptation.level_bandwidth")?, fields.number("adaptation.drift_bandwidth")?])
+}
+
+section! {
+    /// The work piece that the platform presses on, (5), in the order x, y, z, theta_x, theta_y, theta_z at P_C.
+    ///
+    /// Stiffness in N/m and N m/rad, pose in m and rad.
+    "control.environment", Optional => Environment {
+        /// Diagonal of its stiffness.
+        stiffness: [f64; 6] = list(STIFFNESSES), Required, "K_e", ["0 N/m", "0 N/m", "3e6 N/m", "0 N m/rad", "0 N m/rad", "0 N m/rad"];
+        /// Pose, from rest, at which it is unloaded.
+        rest: [f64; 6] = list(POSE), Default(NO_POSE), "h_e", NO_POSE;
+    }
+}
+
+impl Environment {
+    /// No work piece.
+    const NONE: Self = Self { stiffness: [0.0; 6], rest: [0.0; 6] };
+}
+
+section! {
+    /// Limits of the set-point generator, in the order x, y, z, theta_x, theta_y, theta_z of {B}.
+    ///
+    /// In m or rad and their time derivatives. Stop limits that are none are derived by the compiler.
+    "control.setpoint", Plain => SetpointRules {
+        /// Pose, from rest, that every set-point is added to: room for corrections downward. It is approached slowly after start-up.
+        bias: [f64; 6] = list(POSE), Default(NO_POSE), "", ["0 um", "0 um", "10 um", "0 urad", "0 urad", "0 urad"];
+        /// Largest speed of bias and point-to-point moves.
+        speed: [f64; 6] = list(SPEEDS), Default(SLOW_SPEED), "", SLOW_SPEED;
+        /// Their largest acceleration.
+        acceleration: [f64; 6] = list(ACCELERATIONS), Default(SLOW_ACCELERATION), "", SLOW_ACCELERATION;
+        /// Their largest jerk.
+        jerk: [f64; 6] = list(JERKS), Default(SLOW_JERK), "", SLOW_JERK;
+        /// Largest deceleration of stops: of a stream that runs dry or is not believed, and of any motion that another command ends. The rate falls smoothly, from v to 0 in 1.5 v over this at least, over half of v times that time, and never within less than two thirds of the time that a stop from the largest declared speed takes; `specgen check` states the distances.
+        stop_acceleration: Option<[f64; 6]> = list(ACCELERATIONS), Rule("derived from the platform's modes, `amplifier.lag`, `actuator.slew_rate` and `actuator.stroke`, for a stop from `stream_speed`"), "", ["5 m/s^2", "5 m/s^2", "5 m/s^2", "50 rad/s^2", "50 rad/s^2", "50 rad/s^2"];
+        /// Their largest jerk.
+        stop_jerk: Option<[f64; 6]> = list(JERKS), Rule("the jerk at which a stop from the largest declared speed just reaches `stop_acceleration`"), "", ["1e4 m/s^3", "1e4 m/s^3", "1e4 m/s^3", "1e5 rad/s^3", "1e5 rad/s^3", "1e5 rad/s^3"];
+        /// A streamed set-point further from the last one than this in a period is a jump, and refused.
+        stream_speed: [f64; 6] = list(SPEEDS), Default(STREAM_SPEED), "", STREAM_SPEED;
+        /// A stream that brings nothing new for so many ticks is stale, and the last set-point is held.
+        stale_ticks: u32 = integer(1, 1_000_000), Default(10), "", 10;
+    }
+}
+
+section! {
     /// Coordinates that set-points are given in.
-    pub frames: Frames,
-    /// Trajectories by the word `selector`, in the order of the spec; names are unique.
-    pub trajectories: Vec<Trajectory>,
+    ///
+    /// In m and rad.
+    "control.frames", Plain => Frames {
+        /// Work frame in {B}, about P_C at rest: offset and angles, R = Rz Ry Rx.
+        work: [f64; 6] = list(FRAME), Default(NO_POSE), "", ["0 mm", "0 mm", "0 mm", "0 deg", "0 deg", "30 deg"];
+        /// Tool point in {P}: what set-points place, and what rotations turn about.
+        tool: [f64; 3] = POINT, Default(["0 mm", "0 mm", "0 mm"]), "", ["0 mm", "0 mm", "40 mm"];
+    }
 }
 
-/// Which loops are closed. The paper's "P", "F" and "P/F".
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ControlMode {
-    /// Position feedback alone: no inverse model, no adaptation.
-    P,
-    /// Feed-forward alone.
-    F,
-    /// Both.
-    PF,
+section! {
+    /// Diagonal gains of (7) for P/F in the order x, y, z, theta_x, theta_y, theta_z. Without it the compiler derives them.
+    ///
+    /// In N/m, N m/rad and, with their times, N/(m s), N m/(rad s), N s/m, N m s/rad.
+    "gains", Optional => Gains {
+        /// Proportional gain.
+        proportional: [f64; 6] = list(STIFFNESSES), Required, "k_p", ["5e6 N/m", "5e6 N/m", "2e7 N/m", "1e5 N m/rad", "1e5 N m/rad", "5e4 N m/rad"];
+        /// Integral gain.
+        integral: [f64; 6] = list(STIFFNESS_RATES), Required, "k_I", ["4e7 N/(m s)", "4e7 N/(m s)", "2e8 N/(m s)", "1e6 N m/(rad s)", "1e6 N m/(rad s)", "5e5 N m/(rad s)"];
+        /// Derivative gain.
+        derivative: [f64; 6] = list(DAMPINGS), Required, "k_v", ["0 N s/m", "0 N s/m", "0 N s/m", "0 N m s/rad", "0 N m s/rad", "0 N m s/rad"];
+    }
 }
 
-/// One gauge between base and platform: the target is a plane on the platform, the probe measures along a line fixed in
-/// the base. The reading is the distance from the probe point to the plane along `direction`, from rest.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Probe {
-    /// A point of the measuring line in {B}, m.
-    pub point: [f64; 3],
-    /// Unit vector of the line in {B}: the reading grows when the target moves this way.
-    pub direction: [f64; 3],
-    /// A point of the target plane in {P}, m.
-    pub plane_point: [f64; 3],
-    /// Unit normal of the target plane in {P}; its sign does not matter.
-    pub plane_normal: [f64; 3],
+impl Gains {
+    pub(crate) const OF_POSITION: Section =
+        Section { name: "position_gains", doc: "The same for P alone.", ..Self::SECTION };
 }
 
-/// Where the interaction force of the feed-forward comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Interaction {
-    /// None is fed forward.
-    None,
-    /// K_e (h_d − h_e).
-    Modelled,
-    /// A force sensor: the words `wrench[0]` to `wrench[5]`.
-    Measured,
+section! {
+    /// One of the six gauges that see the platform, in the order of the gauge words; with [control], and with it alone. A gauge fixed in {B} measures along a line to a plane on the platform, from rest.
+    ///
+    /// The reading is the distance (m) from the probe point to the plane along `direction`, from rest.
+    "gauge", Repeated(6, 6) => Probe {
+        /// A point of the measuring line in {B}.
+        point: [f64; 3] = POINT, Required, "", ["80 mm", "0 mm", "180 mm"];
+        /// Direction of the line in {B}, of any length: the reading grows when the target moves this way.
+        direction = list(&[DIRECTION; 3]), Required, "", [0, 0, 1];
+        /// A point of the target plane in {P}.
+        target_point = POINT, Rule("`point`, at rest"), "", ["80 mm", "0 mm", "0 mm"];
+        /// Normal of the target plane in {P}, of any length and either sign.
+        target_normal = list(&[DIRECTION; 3]), Rule("`direction`"), "", [0, 0, 1];
+        /// Displacement of this gauge as a polynomial of its voltage, lowest power first.
+        calibration = CALIBRATION, Rule("`sensor.calibration`"), "", ["-2 um", "5 um/V"];
+    }
+    and |fields, table| {
+        /// Unit vector of the line in {B}: the reading grows when the target moves this way.
+        direction: [f64; 3] = unit(fields.list(&join(table, "direction"))?)?;
+        /// A point of the target plane in {P}, m.
+        plane_point: [f64; 3] = fields.list(&join(table, "target_point")).or_else(|| facing(fields, table))?;
+        /// Unit normal of the target plane in {P}; its sign does not matter.
+        plane_normal: [f64; 3] = {
+            let normal = fields.list(&join(table, "target_normal"));
+            unit(normal.or_else(|| fields.list(&join(table, "direction")))?)?
+        };
+    }
 }
 
-/// A linear work piece.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Environment {
-    /// Diagonal of K_e, N/m and N m/rad.
-    pub stiffness: [f64; 6],
-    /// h_e, the pose at which it is unloaded, m and rad.
-    pub rest: [f64; 6],
+/// What faces the gauge at rest, where {P} differs from {B} by the height alone.
+fn facing(fields: &Fields, gauge: &str) -> Option<[f64; 3]> {
+    let [x, y, z] = fields.list(&join(gauge, "point"))?;
+    Some([x, y, z - fields.number("geometry.height")?])
 }
 
-/// Limits of the set-point generator, per axis, m or rad and their time derivatives.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SetpointRules {
-    /// Pose that every set-point is added to, m and rad; approached slowly after start-up.
-    pub bias: [f64; 6],
-    /// Of bias and moves, per s.
-    pub speed: [f64; 6],
-    /// Of bias and moves, per s².
-    pub acceleration: [f64; 6],
-    /// Of bias and moves, per s³.
-    pub jerk: [f64; 6],
-    /// Largest deceleration of stops, per s². None: the compiler derives it.
-    pub stop_acceleration: Option<[f64; 6]>,
-    /// Their largest jerk, per s³. None: the compiler derives it.
-    pub stop_jerk: Option<[f64; 6]>,
-    /// A streamed step beyond `stream_speed` · T_s is a jump, per s.
-    pub stream_speed: [f64; 6],
-    /// A stream without a fresh set-point for this many ticks is stale, at least 1.
-    pub stale_ticks: u32,
+/// `vector` with length 1; `None` if it has none worth speaking of.
+pub(crate) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
+    let length = libm::sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+    (length > 1e-9).then(|| vector.map(|component| component / length))
 }
 
-/// Coordinates that set-points are given in.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Frames {
-    /// Work frame in {B}, about P_C at rest: x, y, z (m), θx, θy, θz (rad), R = Rz Ry Rx.
-    pub work: [f64; 6],
-    /// Tool point in {P}, m: what is placed, and what rotations turn about.
-    pub tool: [f64; 3],
-}
-
-/// A trajectory that the controller can play.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Trajectory {
-    /// ASCII letters, digits, `-` and `_`.
-    pub name: String,
-    /// What it is.
-    pub kind: TrajectoryKind,
+section! {
+    /// A trajectory that the controller can play, numbered from 0 in the order of the file; with [control] alone.
+    "trajectory", Repeated(0, MAX_TABLES) => Trajectory {
+        /// Its name, once in the file.
+        name: String = NAME, Required, "", "circle";
+        /// One of the paper's paths, or a table of poses.
+        kind = one_of(&["case-1", "case-2", "machining", "waveform"]), Required, "", "case-1";
+        /// Of a paper's path: operating frequency.
+        frequency = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Rule("error, but for a waveform"), "f_c", "1 Hz";
+        /// Of a paper's path: the formulas as printed, with their jumps.
+        as_printed = FLAG, Rule("`false`"), "", false;
+        /// Of a waveform: the table of poses, a CSV file relative to the spec.
+        file = Shape::One(Item::File), Rule("error for a waveform"), "", "waveforms/circle.csv";
+        /// Of a waveform: time from one row to the next.
+        period = one(Dimension::TIME, Range::closed(1e-6, 3600.0), "ms"), Rule("error for a waveform"), "", "1 ms";
+        /// Of a waveform: whether it begins again after the last row.
+        repeat = FLAG, Rule("`false`"), "", false;
+    }
+    and |fields, table| {
+        /// What it is.
+        kind: TrajectoryKind = TrajectoryKind::read(fields, table)?;
+    }
 }
 
 /// Kinds of trajectory.
@@ -145,6 +300,29 @@ pub enum TrajectoryKind {
         /// Begins again after the last row.
         repeat: bool,
     },
+}
+
+impl TrajectoryKind {
+    fn read(fields: &Fields, table: &str) -> Option<Self> {
+        let key = |name: &str| join(table, name);
+        let paper = |path| {
+            Some(Self::Paper {
+                path,
+                as_printed: fields.flag(&key("as_printed")).unwrap_or(false),
+                frequency: fields.number(&key("frequency"))?,
+            })
+        };
+        match fields.choice(&key("kind"))? {
+            "case-1" => paper(PaperPath::Case1),
+            "case-2" => paper(PaperPath::Case2),
+            "machining" => paper(PaperPath::Machining),
+            _ => Some(Self::Waveform {
+                file: fields.name(&key("file"))?.to_owned(),
+                period: fields.number(&key("period"))?,
+                repeat: fields.flag(&key("repeat")).unwrap_or(false),
+            }),
+        }
+    }
 }
 
 /// Paths of section 4 of the paper.

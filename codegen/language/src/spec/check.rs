@@ -16,9 +16,9 @@ mod trajectories;
 
 use std::path::Path;
 
-use super::fields::Fields;
 use super::findings::Findings;
 use crate::diagnostic::codes;
+use crate::keys::fields::Fields;
 
 /// A check: `None` if a value that it needs is missing.
 type Check = fn(&Fields, &mut Findings) -> Option<()>;

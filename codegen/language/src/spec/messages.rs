@@ -3,9 +3,9 @@
 use toml::de::DeValue;
 
 use super::keys::{Item, Key, Range, Shape};
-use super::quantity::{self, Dimension, Problem};
 use super::text;
 use crate::diagnostic::{Code, codes};
+use crate::quantity::{self, Dimension, Problem};
 
 /// "a number", "a text" and so on, with article.
 pub(super) fn kind_of(value: &DeValue<'_>) -> &'static str {

@@ -6,13 +6,13 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::fields::{Field, Fields};
 use super::findings::Findings;
 use super::keys::{self, Key, Kind, MAX_TABLES, Presence, SECTIONS, Section};
 use super::names::{Meaning, child_name, elsewhere, known_names, lookup};
 use super::value::ValueReader;
 use super::{messages, text};
 use crate::diagnostic::codes;
+use crate::keys::fields::{Field, Fields};
 
 /// Reads every value of `root`; what is wrong goes to `findings`.
 pub(super) fn read(source: &str, root: &DeTable<'_>, findings: &mut Findings) -> Fields {

@@ -7,11 +7,11 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::DeValue;
 
-use super::fields::{Field, Parsed};
 use super::findings::Findings;
 use super::keys::{Item, Key, MAX_NAME, Shape};
 use super::{messages, text};
 use crate::diagnostic::codes;
+use crate::keys::fields::{Field, Parsed};
 
 /// A value with its place: the file's own, or the parsed text of a default.
 pub(super) struct ValueReader<'a> {

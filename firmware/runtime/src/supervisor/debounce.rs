@@ -1,22 +1,7 @@
 //! For how long a condition must last before it is a cause.
 
 use super::kinds::Cause;
-use super::supervision::Supervision;
-
-/// Causes that are timed tick by tick, in the order of [`Supervision::timeout`]. Those of the watch are counted in samples there; all
-/// others act at once.
-pub const TIMED: [Cause; TIMERS] = [
-    Cause::GaugeNotFinite,
-    Cause::GaugeRange,
-    Cause::VoltageSaturation,
-    Cause::SlewSaturation,
-    Cause::MissedTick,
-    Cause::Converter,
-    Cause::HostGone,
-    Cause::ConverterSilent,
-];
-/// How many these are.
-pub const TIMERS: usize = 8;
+use super::supervision::{Supervision, TIMED, TIMERS};
 
 /// Causes that act in the tick in which they are seen.
 const AT_ONCE: u32 = Cause::LinkLost.bit() | Cause::Integrity.bit() | Cause::EmergencyStop.bit();

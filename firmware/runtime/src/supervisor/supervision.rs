@@ -1,6 +1,21 @@
 //! What the spec fixes about the supervisor.
 
-use super::debounce::TIMERS;
+use super::kinds::Cause;
+
+/// Causes that are timed tick by tick, in the order of [`Supervision::timeout`]. Those of the watch are counted in samples there; all
+/// others act at once.
+pub const TIMED: [Cause; TIMERS] = [
+    Cause::GaugeNotFinite,
+    Cause::GaugeRange,
+    Cause::VoltageSaturation,
+    Cause::SlewSaturation,
+    Cause::MissedTick,
+    Cause::Converter,
+    Cause::HostGone,
+    Cause::ConverterSilent,
+];
+/// How many these are.
+pub const TIMERS: usize = 8;
 
 /// Constants of the supervisor; from `supervisor`. Six gauges are looked at in turn, so what they show is counted in samples, one
 /// in six ticks.
@@ -14,7 +29,7 @@ pub struct Supervision<T> {
     pub ramp_step: i32,
     /// See [`Supervision::ramp_step`].
     pub ramp_every: u32,
-    /// For each of [`super::TIMED`], the count at which the condition is a cause, ≥ 1.
+    /// For each of [`TIMED`], the count at which the condition is a cause, ≥ 1.
     pub timeout: [u32; TIMERS],
     /// For each of them, what a tick with the condition counts; one without it takes 1 off.
     pub weight: [u32; TIMERS],

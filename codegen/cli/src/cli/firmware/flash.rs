@@ -139,7 +139,7 @@ fn of_image(arguments: &Arguments, elf: &[u8], ui: &mut Ui) -> Result<Ready, Fai
     let part = mcu.part();
     let checked = checks::check(elf, None, Rules { single: !part.double, whole_image: false })?;
     let size = size(elf)?;
-    let limits = model::Target { mcu, flash: None, ram: None, stack: None, instructions: None };
+    let limits = model::Target { mcu, budget: model::Budget::NONE };
     let used = budget::Used { flash: size.flash(), ram: size.ram(), stack: checked.stack, ..budget::Used::default() };
     let mut failures: Vec<String> = checked.faults.iter().map(|fault| fault.text.clone()).collect();
     failures.extend(budget::over(&limits, &used));

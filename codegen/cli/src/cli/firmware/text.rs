@@ -49,7 +49,7 @@ impl Made {
     /// Memory and instructions against their budgets.
     fn usage(&self, used: &Used, out: &mut String) {
         let of = |budget: Option<u64>| budget.map_or(String::new(), |budget| format!(" of {}", group(budget)));
-        let limits = &self.limits;
+        let limits = &self.limits.budget;
         let _ = writeln!(out, "  flash         {}{} bytes", group(used.flash), of(limits.flash));
         let _ =
             writeln!(out, "  RAM           {}{} bytes, the stack of a tick included", group(used.ram), of(limits.ram));

@@ -2,9 +2,9 @@
 
 use super::{control, in_order};
 use crate::diagnostic::codes;
+use crate::keys::fields::Fields;
+use crate::keys::fields::Value as _;
 use crate::model::AdaptationMode;
-use crate::spec::build;
-use crate::spec::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text::number;
 
@@ -39,7 +39,7 @@ pub(super) fn weights_for_mode(f: &Fields, findings: &mut Findings) -> Option<()
     if control::there(f).is_some() {
         return None;
     }
-    let mode = build::mode(f)?;
+    let mode = AdaptationMode::read(f, "adaptation.mode")?;
     let word = f.choice("adaptation.mode")?;
     for which in WHICH {
         let (weight, bandwidth) = (format!("adaptation.{which}_weight"), format!("adaptation.{which}_bandwidth"));

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::diagnostic::codes;
-use crate::spec::fields::Fields;
+use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text::number;
 

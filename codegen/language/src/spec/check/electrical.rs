@@ -2,7 +2,7 @@
 
 use super::in_order;
 use crate::diagnostic::codes;
-use crate::spec::fields::Fields;
+use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text::number;
 

@@ -2,9 +2,9 @@
 
 use super::control;
 use crate::diagnostic::codes;
-use crate::spec::fields::Fields;
+use crate::keys::fields::Fields;
+use crate::model;
 use crate::spec::findings::Findings;
-use crate::spec::task_space;
 use crate::spec::text::number;
 
 /// Least |cos| between the measuring line and the normal of its target.
@@ -38,7 +38,7 @@ pub(super) fn directions(f: &Fields, findings: &mut Findings) -> Option<()> {
             let Some(vector) = f.list::<3>(path) else {
                 continue;
             };
-            *unit = task_space::unit(vector);
+            *unit = model::unit(vector);
             if unit.is_none() {
                 findings.add(
                     codes::BAD_DIRECTION,

@@ -3,9 +3,8 @@
 use nalgebra::{Matrix3, Matrix6, RowVector6, Vector3, Vector6};
 
 use crate::diagnostic::codes;
+use crate::keys::fields::Fields;
 use crate::model::Geometry;
-use crate::spec::build;
-use crate::spec::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text::number;
 
@@ -37,7 +36,7 @@ const SHORTEST_LEG: f64 = 1e-3;
 const SOUND: std::ops::RangeInclusive<f64> = 0.1..=3.0;
 
 fn shortest_leg(f: &Fields) -> Option<f64> {
-    let legs = legs_at_rest(&build::geometry(f)?);
+    let legs = legs_at_rest(&Geometry::read(f, "geometry")?);
     if legs.lengths.iter().any(|length| *length < SHORTEST_LEG) {
         return None;
     }
@@ -123,7 +122,7 @@ pub(super) fn platform_inertia(f: &Fields, findings: &mut Findings) -> Option<()
 pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<()> {
     let mass = f.number("platform.mass")?;
     let moments = f.list::<3>("platform.inertia")?;
-    let size = build::geometry(f)?.joint_radius();
+    let size = Geometry::read(f, "geometry")?.joint_radius();
     let radii = moments.map(|moment| (moment / mass).sqrt());
     let largest = radii.into_iter().fold(0.0, |a, b| if b > a { b } else { a });
     let ratio = largest / size;
@@ -152,7 +151,7 @@ pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<(
 
 /// A leg without length has no direction.
 pub(super) fn legs_have_length(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let lengths = legs_at_rest(&build::geometry(f)?).lengths;
+    let lengths = legs_at_rest(&Geometry::read(f, "geometry")?).lengths;
     let leg = lengths.iter().position(|length| *length < SHORTEST_LEG)?;
     let path = if f.given("geometry.base_joints") { "geometry.platform_joints" } else { "geometry.height" };
     findings.add(
@@ -166,7 +165,7 @@ pub(super) fn legs_have_length(f: &Fields, findings: &mut Findings) -> Option<()
 }
 
 pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let geometry = build::geometry(f)?;
+    let geometry = Geometry::read(f, "geometry")?;
     let legs = legs_at_rest(&geometry);
     if legs.lengths.iter().any(|length| *length < SHORTEST_LEG) {
         return None;
@@ -209,7 +208,7 @@ fn rounded_down(value: f64) -> f64 {
 /// Whether each axis alone, within its bound, needs no more than the stroke. The whole box may need more: the
 /// controller limits each leg.
 pub(super) fn workspace_in_reach(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let Legs { jacobian, lengths } = legs_at_rest(&build::geometry(f)?);
+    let Legs { jacobian, lengths } = legs_at_rest(&Geometry::read(f, "geometry")?);
     if lengths.iter().any(|length| *length < SHORTEST_LEG) {
         return None;
     }
@@ -254,7 +253,7 @@ mod tests {
     use std::f64::consts::FRAC_PI_3;
 
     use super::*;
-    use crate::spec::joints;
+    use crate::model::joints;
 
     const ANGLE: f64 = 0.0377;
 

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::Path;
 
 use crate::diagnostic::codes;
-use crate::spec::fields::Fields;
+use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text;
 

@@ -1,7 +1,7 @@
 //! Ranges of `[robust]`.
 
 use super::in_order;
-use crate::spec::fields::Fields;
+use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 
 const RANGES: [&str; 8] = [

@@ -1,8 +1,8 @@
 //! What the controller runs on.
 
 use crate::diagnostic::codes;
+use crate::keys::fields::Fields;
 use crate::model::Mcu;
-use crate::spec::fields::Fields;
 use crate::spec::findings::Findings;
 
 /// In software a multiplication takes some thirty instructions, and a tick ten times as long.

@@ -1,7 +1,7 @@
 //! The trajectories that the controller can play; what a waveform holds is read later.
 
 use crate::diagnostic::codes;
-use crate::spec::fields::Fields;
+use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::keys::{self, MAX_TABLES};
 

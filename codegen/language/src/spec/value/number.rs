@@ -7,8 +7,8 @@ use toml::de::DeValue;
 
 use super::ValueReader;
 use crate::diagnostic::codes;
+use crate::quantity::{self, Dimension};
 use crate::spec::keys::Item;
-use crate::spec::quantity::{self, Dimension};
 use crate::spec::{messages, text};
 
 impl ValueReader<'_> {

@@ -32,11 +32,11 @@ fn joints(radius: f64, angles: [f64; 6]) -> [[f64; 3]; 6] {
 }
 
 /// B_i in {B}, m, from r_B (m) and α_B (rad).
-pub(super) fn base_joints(radius: f64, angle: f64) -> [[f64; 3]; 6] {
+pub(crate) fn base_joints(radius: f64, angle: f64) -> [[f64; 3]; 6] {
     joints(radius, base_angles(angle))
 }
 
 /// P_i in {P}, m, from r_P (m) and α_P (rad).
-pub(super) fn platform_joints(radius: f64, angle: f64) -> [[f64; 3]; 6] {
+pub(crate) fn platform_joints(radius: f64, angle: f64) -> [[f64; 3]; 6] {
     joints(radius, platform_angles(angle))
 }

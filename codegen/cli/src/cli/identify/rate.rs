@@ -5,17 +5,19 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::file::write_file;
-use super::identify::{Identified, grid, range, wrote};
-use super::table::{left, right, row};
-use super::ui::{Failure, Outcome, Ui};
+use super::Identified;
+use super::everett::{grid, range};
+use super::plot::wrote;
+use crate::cli::file::write_file;
+use crate::cli::table::{left, right, row};
+use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Refused;
 use specgen_identify::rate::{RateIdentified, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
 use specgen_identify::{Options, read_record, write_table_csv};
 
 /// Arguments of `identify rate`.
 #[derive(Args, Debug)]
-#[command(after_help = super::examples::RATE)]
+#[command(after_help = crate::cli::examples::RATE)]
 pub struct Arguments {
     /// Records of one leg at different rates, at least two: CSV with columns time_s, drive_V, displacement_um.
     #[arg(required = true, value_name = "RECORD")]

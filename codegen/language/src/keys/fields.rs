@@ -5,7 +5,7 @@ use std::ops::Range;
 
 /// A value that stands where its key wants it, of the right kind and in range.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Parsed {
+pub(crate) enum Parsed {
     /// A quantity (SI) or a number; one or a list.
     Numbers(Vec<f64>),
     Integer(i64),
@@ -17,20 +17,20 @@ pub(super) enum Parsed {
 
 /// One value and where it stands.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Field {
-    pub(super) parsed: Parsed,
+pub(crate) struct Field {
+    pub(crate) parsed: Parsed,
     /// The value, or the section's name if the value is a default.
-    pub(super) span: Range<usize>,
+    pub(crate) span: Range<usize>,
     /// The values of a list.
-    pub(super) items: Vec<Range<usize>>,
+    pub(crate) items: Vec<Range<usize>>,
     /// Whether it stands in the file.
-    pub(super) given: bool,
+    pub(crate) given: bool,
 }
 
 /// All values of a spec that could be read. What is missing or wrong has its finding already, so that a check
 /// that needs it is simply left out.
 #[derive(Debug, Default)]
-pub(super) struct Fields {
+pub(crate) struct Fields {
     map: BTreeMap<String, Field>,
     /// Tables that stand in the file, by path (`control`, `gauge[2]`), and where.
     tables: BTreeMap<String, Range<usize>>,
@@ -39,42 +39,42 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    pub(super) fn insert(&mut self, path: String, field: Field) {
+    pub(crate) fn insert(&mut self, path: String, field: Field) {
         self.map.insert(path, field);
     }
 
-    pub(super) fn insert_table(&mut self, path: String, span: Range<usize>) {
+    pub(crate) fn insert_table(&mut self, path: String, span: Range<usize>) {
         self.tables.insert(path, span);
     }
 
-    pub(super) fn insert_count(&mut self, section: &'static str, count: usize) {
+    pub(crate) fn insert_count(&mut self, section: &'static str, count: usize) {
         self.counts.insert(section, count);
     }
 
     /// Where the table at `path` stands, `None` if it is not in the file.
-    pub(super) fn table(&self, path: &str) -> Option<Range<usize>> {
+    pub(crate) fn table(&self, path: &str) -> Option<Range<usize>> {
         self.tables.get(path).cloned()
     }
 
     /// How many tables of a repeated section there are.
-    pub(super) fn count(&self, section: &str) -> usize {
+    pub(crate) fn count(&self, section: &str) -> usize {
         self.counts.get(section).copied().unwrap_or(0)
     }
 
-    pub(super) fn get(&self, path: &str) -> Option<&Field> {
+    pub(crate) fn get(&self, path: &str) -> Option<&Field> {
         self.map.get(path)
     }
 
     /// Whether the key stands in the file with a good value.
-    pub(super) fn given(&self, path: &str) -> bool {
+    pub(crate) fn given(&self, path: &str) -> bool {
         self.get(path).is_some_and(|field| field.given)
     }
 
-    pub(super) fn number(&self, path: &str) -> Option<f64> {
+    pub(crate) fn number(&self, path: &str) -> Option<f64> {
         self.list::<1>(path).map(|[value]| value)
     }
 
-    pub(super) fn list<const N: usize>(&self, path: &str) -> Option<[f64; N]> {
+    pub(crate) fn list<const N: usize>(&self, path: &str) -> Option<[f64; N]> {
         match &self.get(path)?.parsed {
             Parsed::Numbers(values) => values.as_slice().try_into().ok(),
             _ => None,
@@ -82,15 +82,15 @@ impl Fields {
     }
 
     /// All numbers of a list whose length is not fixed.
-    pub(super) fn numbers(&self, path: &str) -> Option<&[f64]> {
+    pub(crate) fn numbers(&self, path: &str) -> Option<&[f64]> {
         match &self.get(path)?.parsed {
             Parsed::Numbers(values) => Some(values),
             _ => None,
         }
     }
 
-    /// The rows of a [`super::keys::Shape::Rows`].
-    pub(super) fn rows<const R: usize, const C: usize>(&self, path: &str) -> Option<[[f64; C]; R]> {
+    /// The rows of a [`super::Shape::Rows`].
+    pub(crate) fn rows<const R: usize, const C: usize>(&self, path: &str) -> Option<[[f64; C]; R]> {
         let mut rows = [[0.0; C]; R];
         let values = self.numbers(path)?;
         if values.len() != R * C {
@@ -102,14 +102,14 @@ impl Fields {
         Some(rows)
     }
 
-    pub(super) fn flag(&self, path: &str) -> Option<bool> {
+    pub(crate) fn flag(&self, path: &str) -> Option<bool> {
         match self.get(path)?.parsed {
             Parsed::Flag(value) => Some(value),
             _ => None,
         }
     }
 
-    pub(super) fn integer(&self, path: &str) -> Option<i64> {
+    pub(crate) fn integer(&self, path: &str) -> Option<i64> {
         match self.get(path)?.parsed {
             Parsed::Integer(value) => Some(value),
             _ => None,
@@ -117,25 +117,25 @@ impl Fields {
     }
 
     /// An integer whose range in the key table fits `T`.
-    pub(super) fn whole<T: TryFrom<i64>>(&self, path: &str) -> Option<T> {
+    pub(crate) fn whole<T: TryFrom<i64>>(&self, path: &str) -> Option<T> {
         T::try_from(self.integer(path)?).ok()
     }
 
-    pub(super) fn choice(&self, path: &str) -> Option<&'static str> {
+    pub(crate) fn choice(&self, path: &str) -> Option<&'static str> {
         match self.get(path)?.parsed {
             Parsed::Choice(word) => Some(word),
             _ => None,
         }
     }
 
-    pub(super) fn name(&self, path: &str) -> Option<&str> {
+    pub(crate) fn name(&self, path: &str) -> Option<&str> {
         match &self.get(path)?.parsed {
             Parsed::Name(text) => Some(text),
             _ => None,
         }
     }
 
-    pub(super) fn texts(&self, path: &str) -> Option<&[String]> {
+    pub(crate) fn texts(&self, path: &str) -> Option<&[String]> {
         match &self.get(path)?.parsed {
             Parsed::Texts(texts) => Some(texts),
             _ => None,
@@ -143,17 +143,17 @@ impl Fields {
     }
 
     /// Where the value at `path` stands; the start of the file if it is not known.
-    pub(super) fn span(&self, path: &str) -> Range<usize> {
+    pub(crate) fn span(&self, path: &str) -> Range<usize> {
         self.get(path).map_or(0..0, |field| field.span.clone())
     }
 
     /// Where the value `index` of the list at `path` stands.
-    pub(super) fn item_span(&self, path: &str, index: usize) -> Range<usize> {
+    pub(crate) fn item_span(&self, path: &str, index: usize) -> Range<usize> {
         self.get(path).and_then(|field| field.items.get(index).cloned()).unwrap_or_else(|| self.span(path))
     }
 
     /// Where every table and value stands, lists item by item too: `actuator.voltage` and `actuator.voltage[1]`.
-    pub(super) fn spans(&self) -> BTreeMap<String, Range<usize>> {
+    pub(crate) fn spans(&self) -> BTreeMap<String, Range<usize>> {
         let mut spans = self.tables.clone();
         for (path, field) in &self.map {
             spans.insert(path.clone(), field.span.clone());
@@ -162,5 +162,61 @@ impl Fields {
             }
         }
         spans
+    }
+}
+
+/// What a key fills in the model.
+pub(crate) trait Value: Sized {
+    /// The value at `path`; none if it is missing, for which there is a finding.
+    fn read(fields: &Fields, path: &str) -> Option<Self>;
+}
+
+impl Value for f64 {
+    fn read(fields: &Fields, path: &str) -> Option<Self> {
+        fields.number(path)
+    }
+}
+
+impl<const N: usize> Value for [f64; N] {
+    fn read(fields: &Fields, path: &str) -> Option<Self> {
+        fields.list(path)
+    }
+}
+
+impl Value for u32 {
+    fn read(fields: &Fields, path: &str) -> Option<Self> {
+        fields.whole(path)
+    }
+}
+
+impl Value for usize {
+    fn read(fields: &Fields, path: &str) -> Option<Self> {
+        fields.whole(path)
+    }
+}
+
+/// A count, or a quantity of memory in bytes.
+impl Value for u64 {
+    fn read(fields: &Fields, path: &str) -> Option<Self> {
+        fields.whole(path).or_else(|| fields.number(path).map(|bytes| bytes as Self))
+    }
+}
+
+impl Value for String {
+    fn read(fields: &Fields, path: &str) -> Option<Self> {
+        fields.name(path).map(str::to_owned)
+    }
+}
+
+impl Value for Vec<String> {
+    fn read(fields: &Fields, path: &str) -> Option<Self> {
+        fields.texts(path).map(<[String]>::to_vec)
+    }
+}
+
+/// What may be left out.
+impl<T: Value> Value for Option<T> {
+    fn read(fields: &Fields, path: &str) -> Option<Self> {
+        Some(T::read(fields, path))
     }
 }

@@ -1,0 +1,217 @@
+//! How sections and keys of a spec are declared: kind, range, default and meaning of each key, and the field that it fills.
+//!
+//! The declarations are in [`crate::model`]. Reading, messages, the JSON Schema and `docs/spec-reference.md` all come from them.
+
+pub(crate) mod declare;
+pub(crate) mod fields;
+
+use crate::quantity::Dimension;
+
+/// The version of the language that `schema = …` names.
+pub const SCHEMA_VERSION: i64 = 1;
+
+/// A table of the file.
+#[derive(Debug)]
+pub struct Section {
+    /// Path such as `target.budget`; empty for the keys before the first table.
+    pub name: &'static str,
+    /// How often it stands in a file.
+    pub kind: Kind,
+    /// One line for the reference.
+    pub doc: &'static str,
+    /// Its keys, in the order of the reference.
+    pub keys: &'static [Key],
+}
+
+/// How often a section stands in a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Once; it may be left out if no key in it must be given.
+    Plain,
+    /// Once, or left out as a whole although keys in it are required.
+    Optional,
+    /// At least and at most so many times, with double brackets: `[[gauge]]`. Checks count them.
+    Repeated(usize, usize),
+}
+
+/// Most tables of a repeated section that are read; no section may have more.
+pub const MAX_TABLES: usize = 32;
+
+/// One key.
+#[derive(Debug)]
+pub struct Key {
+    /// Name within the section.
+    pub name: &'static str,
+    /// What may stand there.
+    pub shape: Shape,
+    /// What happens if it is left out.
+    pub presence: Presence,
+    /// One line for the reference.
+    pub doc: &'static str,
+    /// Symbol of the paper, empty if it has none.
+    pub symbol: &'static str,
+    /// A TOML literal that is right.
+    pub example: &'static str,
+}
+
+/// One value or several.
+#[derive(Debug, Clone, Copy)]
+pub enum Shape {
+    /// A single value.
+    One(Item),
+    /// An array with exactly these items.
+    List(&'static [Item]),
+    /// An array of so many arrays, each with exactly these items.
+    Rows(usize, &'static [Item]),
+    /// An array with at least so many of these items, from the first one on.
+    Leading(usize, &'static [Item]),
+    /// An array of one or six file names, relative to the spec.
+    Records,
+}
+
+/// A single value.
+#[derive(Debug, Clone, Copy)]
+pub enum Item {
+    /// A string with number and unit.
+    Quantity {
+        /// What it measures.
+        dimension: Dimension,
+        /// Bounds in SI.
+        range: Range,
+        /// Unit in which messages speak of it.
+        unit: &'static str,
+    },
+    /// A number without dimension.
+    Number(Range),
+    /// A whole number, bounds inclusive.
+    Integer(i64, i64),
+    /// One of these strings.
+    Choice(&'static [&'static str]),
+    /// `true` or `false`.
+    Flag,
+    /// A file name relative to the spec.
+    File,
+    /// A name: ASCII letter first, then letters, digits, `-` and `_`, at most [`MAX_NAME`] characters.
+    Name,
+}
+
+/// Longest name of a platform.
+pub const MAX_NAME: usize = 64;
+
+/// Bounds on a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    /// Whether `min` itself is allowed.
+    pub min_included: bool,
+    /// Whether `max` itself is allowed.
+    pub max_included: bool,
+}
+
+impl Range {
+    /// Both bounds allowed.
+    #[must_use]
+    pub const fn closed(min: f64, max: f64) -> Self {
+        Self { min, max, min_included: true, max_included: true }
+    }
+
+    /// More than `min`, up to `max`.
+    #[must_use]
+    pub const fn above(min: f64, max: f64) -> Self {
+        Self { min, max, min_included: false, max_included: true }
+    }
+
+    /// Neither bound allowed.
+    #[must_use]
+    pub const fn open(min: f64, max: f64) -> Self {
+        Self { min, max, min_included: false, max_included: false }
+    }
+
+    /// Whether `value` lies inside.
+    #[must_use]
+    pub fn contains(&self, value: f64) -> bool {
+        let above = value > self.min || (self.min_included && value >= self.min);
+        let below = value < self.max || (self.max_included && value <= self.max);
+        above && below
+    }
+}
+
+/// What happens if a key is left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Presence {
+    /// It must be there (in an optional section: if the section is there).
+    Required,
+    /// This TOML literal takes its place.
+    Default(&'static str),
+    /// Nothing takes its place.
+    Optional,
+    /// Instead of another key, which must not stand beside it; whether one is needed depends on the mode.
+    InsteadOf(&'static str),
+    /// It belongs to the form of this name: the keys of exactly one form stand in the section, all of them.
+    Form(&'static str),
+    /// What this says happens; a check or the building of the model sees to it.
+    Rule(&'static str),
+}
+
+impl Section {
+    /// Whether a file without this table is refused.
+    #[must_use]
+    pub fn is_required(&self) -> bool {
+        let needed = |key: &Key| matches!(key.presence, Presence::Required | Presence::Form(_));
+        self.kind == Kind::Plain && self.keys.iter().any(needed)
+    }
+
+    /// Key path of one of its keys: `geometry.height`, or `name` before the first table.
+    #[must_use]
+    pub fn path(&self, key: &str) -> String {
+        join(self.name, key)
+    }
+
+    /// Its header, `[name]` or `[[name]]`; empty before the first section.
+    #[must_use]
+    pub fn header(&self) -> String {
+        match self.kind {
+            _ if self.name.is_empty() => String::new(),
+            Kind::Repeated(..) => format!("[[{}]]", self.name),
+            Kind::Plain | Kind::Optional => format!("[{}]", self.name),
+        }
+    }
+
+    /// The forms of its keys ([`Presence::Form`]), in the order of the table.
+    #[must_use]
+    pub fn forms(&self) -> Vec<&'static str> {
+        let mut forms = Vec::new();
+        for key in self.keys {
+            match key.presence {
+                Presence::Form(form) if !forms.contains(&form) => forms.push(form),
+                _ => {}
+            }
+        }
+        forms
+    }
+
+    /// The section as it may be written, from the examples of its keys.
+    #[must_use]
+    pub fn example(&self, required_only: bool) -> String {
+        let mut text = self.header();
+        if !text.is_empty() {
+            text.push('\n');
+        }
+        let first_form = self.forms().first().map(|form| Presence::Form(form));
+        let needed =
+            |key: &&Key| key.presence == Presence::Required || Some(key.presence) == first_form || !required_only;
+        for key in self.keys.iter().filter(needed) {
+            text.push_str(&format!("{} = {}\n", key.name, key.example));
+        }
+        text
+    }
+}
+
+/// Key path of `key` in the table at `table`: `gauge[2].point`, or `name` before the first table.
+#[must_use]
+pub fn join(table: &str, key: &str) -> String {
+    if table.is_empty() { key.to_owned() } else { format!("{table}.{key}") }
+}

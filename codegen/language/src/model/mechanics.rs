@@ -1,0 +1,120 @@
+//! The platform as a mechanism: joints, bodies, legs, workspace.
+
+use super::joints;
+use crate::keys::declare::*;
+
+/// Furthest that a workspace or a pose may reach from rest, m.
+pub const LARGEST_TRAVEL: f64 = 0.1;
+/// The same of angles, rad: the controller's series for small angles are sized by it.
+pub const LARGEST_TURN: f64 = 0.5;
+
+const RADIUS: Range = Range::closed(1e-3, 10.0);
+const JOINT_ANGLE: Range = Range::open(0.0, 2.0 * std::f64::consts::FRAC_PI_3);
+const CIRCLES: &str = "joint circles";
+const JOINTS: &str = "joints one by one";
+const JOINT: &[Item] = &[CENTER; 3];
+const BASE_JOINTS: &str = r#"[["78 mm", "128 mm", "0 mm"], ["72 mm", "132 mm", "0 mm"], ["-150 mm", "3 mm", "0 mm"], ["-150 mm", "-3 mm", "0 mm"], ["72 mm", "-132 mm", "0 mm"], ["78 mm", "-128 mm", "0 mm"]]"#;
+const PLATFORM_JOINTS: &str = r#"[["100 mm", "2 mm", "0 mm"], ["-48 mm", "88 mm", "0 mm"], ["-52 mm", "86 mm", "0 mm"], ["-52 mm", "-86 mm", "0 mm"], ["-48 mm", "-88 mm", "0 mm"], ["100 mm", "-2 mm", "0 mm"]]"#;
+const BODY_MASS: Range = Range::closed(1e-6, 1e4);
+const MOMENT: Range = Range::above(0.0, 1e4);
+const PRODUCT: Item = item(Dimension::INERTIA, Range::closed(-1e4, 1e4), "g mm^2");
+const LEG_CENTER: Shape = one(Dimension::LENGTH, Range::closed(0.0, 10.0), "mm");
+const TRAVEL: Item = item(Dimension::LENGTH, Range::closed(0.0, LARGEST_TRAVEL), "um");
+const TURN: Item = item(Dimension::ANGLE, Range::closed(0.0, LARGEST_TURN), "mrad");
+
+section! {
+    /// Joints of base and platform, on circles as in equations (1) and (2) or one by one, and the pose at rest.
+    ///
+    /// Radii and angles of a spec, (1) and (2), are joints here already. Lengths in m.
+    "geometry", Plain => Geometry {
+        /// Radius of the circle through the six base joints.
+        base_radius = one(Dimension::LENGTH, RADIUS, "mm"), Form(CIRCLES), "r_B", "150 mm";
+        /// Radius of the circle through the six platform joints.
+        platform_radius = one(Dimension::LENGTH, RADIUS, "mm"), Form(CIRCLES), "r_P", "100 mm";
+        /// Angle between the two base joints of a pair.
+        base_angle = one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Form(CIRCLES), "alpha_B", "0.012 pi rad";
+        /// Angle between the two platform joints of a pair.
+        platform_angle = one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Form(CIRCLES), "alpha_P", "0.012 pi rad";
+        /// Height of P_C, the origin of {P}, above that of {B} at rest; with joint circles, of the platform's joint plane above the base's.
+        height: f64 = one(Dimension::LENGTH, RADIUS, "mm"), Required, "P_z", "180 mm";
+        /// The six base joints in {B}, leg by leg: where the joints lie on no circle.
+        base_joints = Shape::Rows(6, JOINT), Form(JOINTS), "B_i", BASE_JOINTS;
+        /// The six platform joints in {P}, leg by leg.
+        platform_joints = Shape::Rows(6, JOINT), Form(JOINTS), "P_i", PLATFORM_JOINTS;
+    }
+    and |fields, _table| {
+        /// B_i in {B}, m.
+        base_joints: [[f64; 3]; 6] = joints(fields)?[0];
+        /// P_i in {P}, m.
+        platform_joints: [[f64; 3]; 6] = joints(fields)?[1];
+    }
+}
+
+/// B_i and P_i in whichever form the spec gives them.
+fn joints(fields: &Fields) -> Option<[[[f64; 3]; 6]; 2]> {
+    let number = |key: &str| fields.number(&join("geometry", key));
+    if let Some(base) = fields.rows("geometry.base_joints") {
+        return Some([base, fields.rows("geometry.platform_joints")?]);
+    }
+    let base = joints::base_joints(number("base_radius")?, number("base_angle")?);
+    Some([base, joints::platform_joints(number("platform_radius")?, number("platform_angle")?)])
+}
+
+impl Geometry {
+    /// Largest distance of a platform joint from P_C, m.
+    #[must_use]
+    pub fn joint_radius(&self) -> f64 {
+        let distances = self.platform_joints.map(|[x, y, z]| libm::sqrt(x * x + y * y + z * z));
+        distances.into_iter().fold(0.0, |largest, d| if d > largest { d } else { largest })
+    }
+}
+
+section! {
+    /// The moving platform as a rigid body, in its own frame {P}, Table 4: its part of (4).
+    ///
+    /// In kg, kg m² and m; I_xy is −∫xy dm.
+    "platform", Plain => RigidBody {
+        /// Mass with everything that is mounted on it.
+        mass: f64 = one(Dimension::MASS, BODY_MASS, "kg"), Required, "m", "1.195 kg";
+        /// Moments of inertia about the centre of mass.
+        inertia: [f64; 3] = list(&[item(Dimension::INERTIA, MOMENT, "g mm^2"); 3]), Required, "I_xx I_yy I_zz", ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"];
+        /// Entries of the inertia matrix off the diagonal: I_xy is minus the integral of x y dm.
+        products: [f64; 3] = list(&[PRODUCT; 3]), Default(["0 g mm^2", "0 g mm^2", "0 g mm^2"]), "I_xy I_xz I_yz", ["0 g mm^2", "0 g mm^2", "0 g mm^2"];
+        /// Centre of mass, from the centre of the platform joints.
+        center_of_mass: [f64; 3] = POINT, Default(["0 mm", "0 mm", "0 mm"]), "", ["0 mm", "0 mm", "0 mm"];
+    }
+}
+
+section! {
+    /// The two parts of a leg, the same for all six, Table 4: masses and inertias of (AI.9) and (AI.12).
+    ///
+    /// In kg, kg m², m and rad.
+    "leg", Plain => LegBody {
+        /// Mass of the part at the base joint.
+        fixed_mass: f64 = one(Dimension::MASS, BODY_MASS, "g"), Required, "m_s", "90.26 g";
+        /// Mass of the part at the platform joint.
+        extensible_mass: f64 = one(Dimension::MASS, BODY_MASS, "g"), Required, "m_e", "73.62 g";
+        /// Moment of inertia of the base-side part about a transverse axis through its mass centre.
+        fixed_inertia: f64 = one(Dimension::INERTIA, MOMENT, "g mm^2"), Required, "I_s", "1.07e5 g mm^2";
+        /// The same of the platform-side part.
+        extensible_inertia: f64 = one(Dimension::INERTIA, MOMENT, "g mm^2"), Required, "I_e", "5.27e4 g mm^2";
+        /// Mass centre of the base-side part, from the base joint.
+        fixed_center: f64 = LEG_CENTER, Required, "l_s", "50 mm";
+        /// Mass centre of the platform-side part, from the platform joint.
+        extensible_center: f64 = LEG_CENTER, Required, "l_e", "50 mm";
+        /// Angle by which the joints of a leg may turn from rest, either way.
+        joint_angle: Option<f64> = one(Dimension::ANGLE, Range::above(0.0, 1.5), "mrad"), Optional, "", "20 mrad";
+    }
+}
+
+section! {
+    /// Bounds on the pose that may be asked for, from rest.
+    ///
+    /// Translations in m, rotations in rad.
+    "workspace", Plain => Workspace {
+        /// Bounds on |x|, |y|, |z|.
+        translation: [f64; 3] = list(&[TRAVEL; 3]), Required, "", ["40 um", "40 um", "40 um"];
+        /// Bounds on |theta_x|, |theta_y|, |theta_z|.
+        rotation: [f64; 3] = list(&[TURN; 3]), Required, "", ["0.6 mrad", "0.6 mrad", "0.6 mrad"];
+    }
+}

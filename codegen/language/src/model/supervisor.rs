@@ -1,0 +1,73 @@
+//! Faults, and what is declared about uncertainty.
+
+use crate::keys::declare::*;
+
+const TIMEOUT: Shape = one(Dimension::TIME, Range::closed(1e-6, 60.0), "ms");
+const SILENCE: Item = item(Dimension::TIME, Range::closed(1e-6, 3600.0), "ms");
+const FACTORS: Shape = Shape::List(&[RATIO; 2]);
+
+section! {
+    /// What the supervisor in the controller takes for a fault, and for how long it must last; docs/supervisor.md. Gauges are looked at in turn, one a tick.
+    ///
+    /// In V, s, V/s and m; none where the rule of the key holds.
+    "supervisor", Plain => Supervisor {
+        /// Voltage at which the legs stand while disarmed and to which they ramp down. Amplifiers that are switched off leave a stack at 0 V: from any other rest it jumps when they are switched on and off.
+        rest_voltage: Option<f64> = Shape::One(VOLTS), Rule("0 V, or the limit of `actuator.voltage` that is nearest to it"), "", "0 V";
+        /// Time without any condition that arming takes. Of six legs with their own gauges also the time constant with which the set-point is approached from where the legs are.
+        arm_time: Option<f64> = TIMEOUT, Rule("100 ms, at least a period"), "", "100 ms";
+        /// Rate at which voltages go to rest when they ramp down, at most the slew rate.
+        ramp_rate: Option<f64> = one(Dimension::SLEW_RATE, Range::closed(1e-3, 1e12), "V/ms"), Rule("the whole voltage in a second, or `actuator.slew_rate` if that is less"), "", "0.1 V/ms";
+        /// Time after which a gauge that is not finite or out of range, or a converter that does not answer, is a fault.
+        gauge_time: Option<f64> = TIMEOUT, Rule("10 ms, at least a period"), "", "10 ms";
+        /// Motion along a gauge that the voltages sent must have caused before an unchanged reading shows that the gauge is stuck.
+        stuck_motion: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-2), "nm"), Rule("10 steps of the gauge's converter or 10 times `sensor.noise`, whichever is more"), "", "100 nm";
+        /// Time after that for which the reading must still be the same.
+        stuck_time: Option<f64> = TIMEOUT, Rule("50 ms, at least 12 periods"), "", "50 ms";
+        /// Largest difference between a gauge's reading and what the hysteresis model gives for the voltages sent and the known load.
+        disagreement: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-2), "um"), Rule("a fifth of `actuator.stroke`"), "", "12 um";
+        /// Time for which it must be larger.
+        disagreement_time: Option<f64> = TIMEOUT, Rule("100 ms, at least 12 periods"), "", "100 ms";
+        /// Largest tracking error of each axis, as a share of its workspace bound; of six legs with their own gauges, of a leg as a share of `actuator.stroke`.
+        tracking_error: f64 = number(Range::above(0.0, 10.0)), Default(0.2), "", 0.2;
+        /// Time for which it must be larger.
+        tracking_time: Option<f64> = TIMEOUT, Rule("100 ms, at least 12 periods"), "", "100 ms";
+        /// Time that a leg may stay at a limit of its voltage or table.
+        voltage_time: Option<f64> = TIMEOUT, Rule("500 ms, at least a period"), "", "500 ms";
+        /// Time that a leg may stay at the limit of its slew rate.
+        slew_time: Option<f64> = TIMEOUT, Rule("50 ms, at least a period"), "", "50 ms";
+        /// Missed ticks within a second that are a fault.
+        missed_ticks: u32 = integer(1, 1000), Default(3), "", 3;
+        /// How long a host that has the orders may be silent until the machine holds, and until it ramps down and switches off. A converter that stays silent holds after `gauge_time`, and ramps down after the second time.
+        host_lost: Option<[f64; 2]> = list(&[SILENCE; 2]), Rule(r#"["100 ms", "10 s"]"#), "", ["100 ms", "10 s"];
+    }
+}
+
+section! {
+    /// What `specgen robust` varies: smallest and largest factor on what the other sections say, and the error that it lets pass. Nothing of it is in the controller.
+    ///
+    /// Errors in m and rad; none where the spec does not say.
+    "robust", Optional => Robust {
+        /// On mass and inertia of the platform.
+        mass: Option<[f64; 2]> = FACTORS, Rule("[0.95, 1.05]"), "", [0.95, 1.05];
+        /// On the axial stiffness of a leg.
+        stiffness: Option<[f64; 2]> = FACTORS, Rule("[0.95, 1.05]"), "", [0.95, 1.05];
+        /// On the damping ratio of the structure.
+        damping: Option<[f64; 2]> = FACTORS, Rule("[0.7, 1.3]"), "", [0.7, 1.3];
+        /// On the gain of a leg.
+        gain: Option<[f64; 2]> = FACTORS, Rule("`adaptation.gain_ratio`"), "lambda", [0.9, 1.1];
+        /// On the width of a leg's hysteresis: the thresholds of its plays.
+        hysteresis: Option<[f64; 2]> = FACTORS, Rule("[0.9, 1.1]"), "", [0.9, 1.1];
+        /// On the creep of a leg.
+        creep: Option<[f64; 2]> = FACTORS, Rule("[0.9, 1.1]"), "", [0.9, 1.1];
+        /// On the lag of an amplifier.
+        lag: Option<[f64; 2]> = FACTORS, Rule("[0.8, 1.2]"), "", [0.8, 1.2];
+        /// On the noise of gauges, amplifiers and force sensor.
+        noise: Option<[f64; 2]> = FACTORS, Rule("[0.5, 1.5]"), "", [0.5, 1.5];
+        /// Control intervals by which voltages come late, at most: none to so many are tried.
+        delay_ticks: Option<u32> = integer(0, 100), Rule("1"), "", 1;
+        /// Gate: largest rms error of the translation, or of the legs.
+        max_error: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "200 nm";
+        /// Gate: largest rms error of the angles.
+        max_orientation: Option<f64> = one(Dimension::ANGLE, Range::closed(1e-12, 0.1), "nrad"), Optional, "", "1 urad";
+    }
+}
