@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_kind_of_difference_is_found_and_blessing_mends_it() {
+    fn every_kind_of_difference_is_found_and_blessing_removes_it() {
         let root = tempfile::tempdir().unwrap();
         let folder = root.path().join("made");
         fs::create_dir_all(folder.join("src")).unwrap();

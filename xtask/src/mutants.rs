@@ -15,7 +15,7 @@ const INSTALL: &str = "cargo install cargo-mutants --locked";
 /// What is run together.
 struct Group {
     package: &'static str,
-    /// What cargo-mutants is told beside the package, before and behind its `--`.
+    /// Arguments of cargo-mutants beside the package, before and behind its `--`.
     arguments: [&'static [&'static str]; 2],
     /// The sample that is run unless another is asked for: one in so many.
     one_in: u32,

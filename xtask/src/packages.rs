@@ -66,12 +66,12 @@ fn judge(output: &Output) -> Outcome {
     ))
 }
 
-/// Packages from elsewhere whose licence is not allowed, or not told.
+/// Packages from elsewhere whose licence is not allowed, or not stated.
 fn refused(metadata: &Value) -> Vec<String> {
     let packages = metadata["packages"].as_array().into_iter().flatten().filter(|one| !one["source"].is_null());
     let refused = packages.filter(|one| !one["license"].as_str().is_some_and(is_allowed));
     let name = |one: &Value| one["name"].as_str().unwrap_or("?").to_owned();
-    refused.map(|one| format!("{} ({})", name(one), one["license"].as_str().unwrap_or("none told"))).collect()
+    refused.map(|one| format!("{} ({})", name(one), one["license"].as_str().unwrap_or("none stated"))).collect()
 }
 
 /// Whether a licence expression can be met with what is allowed: `OR` offers a choice, `AND` binds tighter and asks for both.
@@ -194,6 +194,6 @@ mod tests {
             package("silent", "registry".into(), Value::Null),
             package("viral", "registry".into(), "GPL-3.0-only".into()),
         ] });
-        assert_eq!(refused(&metadata), ["silent (none told)", "viral (GPL-3.0-only)"]);
+        assert_eq!(refused(&metadata), ["silent (none stated)", "viral (GPL-3.0-only)"]);
     }
 }

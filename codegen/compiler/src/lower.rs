@@ -1,6 +1,6 @@
 //! Model and tables to IR: all arithmetic on constants happens here.
 //!
-//! Trigonometry goes through `libm`, so that the same spec gives the same bytes on every machine.
+//! Trigonometry goes through `libm`, so that the same spec gives the same bytes on every computer.
 
 mod actuation;
 mod dynamics;
@@ -51,8 +51,6 @@ pub fn lower(
     let (actuation, max_step) = actuation::lower(model, scalar)?;
     let stroke = model.actuator.stroke;
     let round = |value| scalar.round(value);
-    let [tx, ty, tz] = model.workspace.translation;
-    let [rx, ry, rz] = model.workspace.rotation;
     let defaults = Defaults {
         law: match model.adaptation.mode {
             model::AdaptationMode::Invhys => Law::Invhys,
@@ -97,7 +95,7 @@ pub fn lower(
         supervision: supervision::lower(model, &hysteresis, &actuation, max_step, scalar)?,
         hysteresis,
         bounds: Bounds {
-            pose: [tx, ty, tz, rx, ry, rz].map(round),
+            pose: model.workspace.bounds().map(round),
             leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
             sensor: model.sensor.range.map(round),
         },

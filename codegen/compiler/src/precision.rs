@@ -95,7 +95,7 @@ pub fn tried(model: &Model, ir: &Ir, seed: u64, samples: usize) -> Result<Precis
 
 /// Corners of the workspace and seeded random poses in it, as numbers of the scalar.
 fn poses(model: &Model, scalar: Scalar, seed: u64, samples: usize) -> Vec<[f64; 6]> {
-    let bounds = bounds(model);
+    let bounds = model.workspace.bounds();
     let corners = (0..64_u32)
         .map(|corner| core::array::from_fn(|axis| if corner >> axis & 1 == 0 { -bounds[axis] } else { bounds[axis] }));
     let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -110,11 +110,6 @@ fn boxes(bounds: &[f64; 6]) -> impl Iterator<Item = [[f64; 2]; 6]> {
     (0..64_u32).map(|part| {
         core::array::from_fn(|axis| if part >> axis & 1 == 0 { [-bounds[axis], 0.0] } else { [0.0, bounds[axis]] })
     })
-}
-
-fn bounds(model: &Model) -> [f64; 6] {
-    let ([x, y, z], [a, b, c]) = (model.workspace.translation, model.workspace.rotation);
-    [x, y, z, a, b, c]
 }
 
 /// Rounding errors beyond the noise of the gauges are worth a warning: another scalar would control better.

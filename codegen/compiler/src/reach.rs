@@ -116,9 +116,9 @@ pub fn notes(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
 
 /// What is reached, with set-points about `bias`.
 fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose) -> Reach {
-    let bounds = bounds(model);
+    let bounds = model.workspace.bounds();
     let legs = travel::Legs { platform, stroke };
-    let lengths = rest_lengths(model);
+    let lengths = model.geometry.rest_legs().map(|[x, y, z]| libm::sqrt(x * x + y * y + z * z));
     let middle = legs.middle();
     let from = |pose: &Pose, axis: usize| [legs.travel(pose, axis, -1.0), legs.travel(pose, axis, 1.0)];
     Reach {
@@ -161,22 +161,6 @@ pub fn check_poses(
         None => Ok(path),
         Some(found) => Err(vec![found]),
     }
-}
-
-/// Declared bounds of the six axes.
-fn bounds(model: &Model) -> Pose {
-    let ([x, y, z], [a, b, c]) = (model.workspace.translation, model.workspace.rotation);
-    [x, y, z, a, b, c]
-}
-
-/// l₀, m.
-fn rest_lengths(model: &Model) -> [f64; 6] {
-    let geometry = &model.geometry;
-    core::array::from_fn(|leg| {
-        let ([bx, by, bz], [px, py, pz]) = (geometry.base_joints[leg], geometry.platform_joints[leg]);
-        let (x, y, z) = (px - bx, py - by, geometry.height + pz - bz);
-        libm::sqrt(x * x + y * y + z * z)
-    })
 }
 
 fn shortest(lengths: &[f64; 6]) -> f64 {

@@ -1,6 +1,6 @@
 //! Dead time between the drive column and the displacement column: amplifier lag, filters, sensor processing.
 //!
-//! A dead time widens the measured loop in proportion to the rate. It can be told from hysteresis only when the
+//! A dead time widens the measured loop in proportion to the rate. It can be distinguished from hysteresis only when the
 //! record holds branches of different rates; on a record of one rate, creep and hysteresis would be mistaken for it,
 //! and the estimate is refused.
 

@@ -82,7 +82,7 @@ fn relation_checked(record: &Record, frequency: Option<f64>, findings: &mut Find
     let crossings: Vec<f64> = starts.iter().map(|&k| record.time[k]).collect();
     let duration = record.time[record.time.len() - 1] - record.time[0];
     if starts.len() < 2 {
-        // A record from one trough to the next has a cycle, but no two upward crossings: its frequency must be told.
+        // A record from one trough to the next has a cycle, but no two upward crossings: its frequency must be given.
         let Some(frequency) = frequency.filter(|f| duration * f >= 0.99) else {
             let message = format!(
                 "from {} s to {} s the drive crosses its middle upward {} times: there is no whole cycle to find the frequency from",

@@ -12,7 +12,7 @@ use specgen_language::diagnostic::codes;
 const WIDENING: f64 = 0.01;
 /// The lag that is thought of: one sampling interval, but no more than amplifiers and gauges have, s.
 const LONGEST_LAG: f64 = 1e-3;
-/// Curves are told apart if their ends differ by this many noise floors.
+/// Curves count as different if their ends differ by this many noise floors.
 const ABOVE_NOISE: f64 = 2.0;
 /// Curves that turn back within this share of the range of each other repeat one curve.
 const SAME_LEVEL: f64 = 0.005;

@@ -1,6 +1,6 @@
 //! Ctrl-C, SIGTERM and a terminal that is closed: what is half done is taken away, then the process ends.
 //!
-//! A command that has a result to show on the way, or a machine to bring down, asks by [`heed`] to be told instead, and ends
+//! A command that has a result to show on the way, or a machine to bring down, asks by [`heed`] to be notified instead, and ends
 //! by itself.
 
 use std::fs::{self, File};
@@ -93,7 +93,7 @@ fn locked<T>(mutex: &'static Mutex<T>) -> MutexGuard<'static, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps the name of something that an interrupt is to take away; dropped when it is gone, or somebody's.
+/// Keeps the name of something that an interrupt is to take away; dropped when it is gone, or another process'.
 #[derive(Debug)]
 pub struct Guard(Passing);
 
@@ -194,7 +194,7 @@ impl Claimed {
                 claimed.0.push(Guard::of(Passing::EmptyFolder(path.to_owned())));
             }
         }
-        // Another run may have removed it meanwhile; what is there and is no folder is told by trying.
+        // Another run may have removed it meanwhile; what is there and is no folder shows when it is tried.
         let _whole = whole();
         if !folder.is_dir() && make_folder(folder)? {
             claimed.0.push(Guard::of(Passing::EmptyFolder(folder.to_owned())));

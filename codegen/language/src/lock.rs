@@ -1,10 +1,10 @@
-//! Locks that end with their process, however that ends: what a killed process left is told from what another one works on.
+//! Locks that end with their process, however that ends: what a killed process left is distinguished from what another one works on.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::Path;
 
-/// Makes the file unless it is there, and locks it; `WouldBlock` if somebody has it.
+/// Makes the file unless it is there, and locks it; `WouldBlock` if another process has it.
 ///
 /// # Errors
 /// `WouldBlock`, or what the file system says.

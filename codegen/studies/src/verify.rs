@@ -133,7 +133,7 @@ pub fn inspect(image: &Image) -> Result<Inspection, TargetError> {
     let rules = Rules { single: !image.mcu.part().double, whole_image: true };
     let checks = checks::check(&image.elf, Some(stack::STEP_SYMBOL), rules)?;
     Ok(Inspection {
-        machine: image.mcu.part().machine.to_owned(),
+        machine: image.mcu.part().emulated.to_owned(),
         compiler: image.compiler.clone(),
         flash: footprint.flash,
         code: footprint.code,

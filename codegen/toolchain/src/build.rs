@@ -84,7 +84,7 @@ fn build_program(
     program: &[&str],
 ) -> Result<Image, TargetError> {
     let package = dir.join(folder);
-    let place = if folder == EMULATED { mcu.part().machine } else { mcu.part().name };
+    let place = if folder == EMULATED { mcu.part().emulated } else { mcu.part().name };
     let what = format!("{} for {place}", package.display());
     // Parts share the folder: cargo keeps what was made with other flags, and what runs on the host is made once.
     let request = BuildRequest { package: &package, target_dir, rustc_args: &[], locked: true };

@@ -103,7 +103,7 @@ impl Emulator {
         let mut command = Command::new(&self.program);
         with_libraries(&mut command, &self.libraries)
             .current_dir(folder)
-            .args(["-machine", image.mcu.part().machine, "-cpu", image.mcu.part().core])
+            .args(["-machine", image.mcu.part().emulated, "-cpu", image.mcu.part().core])
             .args(["-icount", "shift=10", "-semihosting-config", "enable=on,target=native"])
             .args(["-display", "none", "-monitor", "none", "-serial", "none"])
             .args(["-kernel", "image.elf"]);

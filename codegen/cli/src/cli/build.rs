@@ -123,7 +123,7 @@ fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> 
 
     let toolchain = target::toolchain::find()?;
     let mcu = compiled.model.target.mcu;
-    ui.progress(&format!("building and measuring for {}", mcu.part().machine));
+    ui.progress(&format!("building and measuring for {}", mcu.part().emulated));
     let image = target::build::build_image_with(&toolchain, output, mcu, &target_dir)?;
     match verify::measure(&image, &controller.default_config(), &host) {
         Ok(measurement) => summary.measurement = Some(measurement),

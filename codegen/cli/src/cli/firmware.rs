@@ -225,7 +225,7 @@ fn build(
             made.artifact = target::host::build_program(output, target.folder, target_dir)?.display().to_string();
         }
         Kind::Emulated => {
-            made.board = declared.part().machine.to_owned();
+            made.board = declared.part().emulated.to_owned();
             let toolchain = target::toolchain::find()?;
             ui.progress(&format!("building for {}", made.board));
             let image = target::build::build_image_with(&toolchain, output, declared, target_dir)?;
@@ -289,7 +289,7 @@ fn emulate(
     };
     let mcu = compiled.model.target.mcu;
     let Folders { output, target: target_dir } = *folders;
-    ui.progress(&format!("counting instructions on {}", mcu.part().machine));
+    ui.progress(&format!("counting instructions on {}", mcu.part().emulated));
     let library = target::host::build_library(output, &output.join("target"))?;
     let environment = |error: String| Failure::Environment(error);
     let mut controller = Controller::load(&library).map_err(|error| environment(error.to_string()))?;

@@ -106,7 +106,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             drop(hold);
             let bound = stack::bound(&image.elf, SUPERVISE)?;
             let bound = bound.is_complete().then_some(bound.bytes);
-            let name = format!("{} ({}) in {}", image.mcu.part().machine, image.mcu.part().core, emulator.version);
+            let name = format!("{} ({}) in {}", image.mcu.part().emulated, image.mcu.part().core, emulator.version);
             let report = Report::new(&compiled, name, bound);
             let pipes = Pipes::start(&emulator, &image)?;
             in_the_loop(host, pipes, Timeout::PIPE, report, &plan, &compiled, arguments, ui)
@@ -127,7 +127,7 @@ fn given(path: &Path, compiled: &Compiled) -> Result<Image, Failure> {
 
 fn built(compiled: &Compiled, output: &Path, target_dir: &Path, ui: &Ui) -> Result<Image, Failure> {
     let mcu = compiled.model.target.mcu;
-    ui.progress(&format!("building the image for {}", mcu.part().machine));
+    ui.progress(&format!("building the image for {}", mcu.part().emulated));
     Ok(target::build_pil(output, mcu, target_dir)?)
 }
 

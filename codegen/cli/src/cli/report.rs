@@ -179,7 +179,7 @@ fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure
         Err("left out by --no-target".to_owned())
     } else {
         let mcu = compiled.model.target.mcu;
-        ui.progress(&format!("building and measuring for {}", mcu.part().machine));
+        ui.progress(&format!("building and measuring for {}", mcu.part().emulated));
         let measured = target::available()
             .and_then(|_| target::build_image(&folder, mcu, &cache))
             .and_then(|image| verify::measure(&image, &controller.default_config(), &host));

@@ -2,7 +2,7 @@
 
 use super::{AXES, Facts, Found, figure};
 use specgen_language::diagnostic::codes;
-use specgen_language::model::Gains;
+use specgen_language::model::{Gains, TaskSpace};
 
 /// A coefficient of a calibration against the middle one of the six.
 const CALIBRATION_SPREAD: f64 = 3.0;
@@ -82,37 +82,41 @@ pub(super) fn calibrations_straight(facts: &Facts, found: &mut Found) {
     }
 }
 
+/// The gains that the spec gives, by key.
+fn gains_of(task: &TaskSpace) -> Vec<(String, [f64; 6])> {
+    let sections = [("gains", &task.gains), ("position_gains", &task.position_gains)];
+    let given = sections.into_iter().filter_map(|(section, gains)| Some((section, gains.as_ref()?)));
+    let keys = |(section, gains): (&str, &Gains)| {
+        [("proportional", gains.proportional), ("integral", gains.integral), ("derivative", gains.derivative)]
+            .map(|(name, values)| (format!("{section}.{name}"), values))
+    };
+    given.flat_map(keys).collect()
+}
+
 /// Gains go with the stiffness of the axes.
 pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
-    let sections: [(&str, Option<&Gains>); 2] =
-        [("gains", task.gains.as_ref()), ("position_gains", task.position_gains.as_ref())];
-    for (section, gains) in sections {
-        let Some(gains) = gains else { continue };
-        for (name, values) in
-            [("proportional", gains.proportional), ("integral", gains.integral), ("derivative", gains.derivative)]
-        {
-            let ratios: [f64; 6] = core::array::from_fn(|axis| values[axis] / stiffness[axis]);
-            let usual = middle(ratios);
-            for (axis, ratio) in ratios.into_iter().enumerate() {
-                // Zero switches an axis off.
-                if ratio == 0.0 || usual == 0.0 || (1.0 / GAIN_SPREAD..=GAIN_SPREAD).contains(&(ratio / usual)) {
-                    continue;
-                }
-                found.add(
-                    codes::GAIN_UNEVEN,
-                    &format!("{section}.{name}[{axis}]"),
-                    format!(
-                        "the gain of {} is {}: {} times what the other axes have for their stiffness (its own is {})",
-                        AXES[axis],
-                        figure(values[axis]),
-                        figure(ratio / usual),
-                        figure(stiffness[axis])
-                    ),
-                    &format!("about {:.3e} goes with the others: check the unit", usual * stiffness[axis]),
-                );
+    for (key, values) in gains_of(task) {
+        let ratios: [f64; 6] = core::array::from_fn(|axis| values[axis] / stiffness[axis]);
+        let usual = middle(ratios);
+        for (axis, ratio) in ratios.into_iter().enumerate() {
+            // Zero switches an axis off.
+            if ratio == 0.0 || usual == 0.0 || (1.0 / GAIN_SPREAD..=GAIN_SPREAD).contains(&(ratio / usual)) {
+                continue;
             }
+            found.add(
+                codes::GAIN_UNEVEN,
+                &format!("{key}[{axis}]"),
+                format!(
+                    "the gain of {} is {}: {} times what the other axes have for their stiffness (its own is {})",
+                    AXES[axis],
+                    figure(values[axis]),
+                    figure(ratio / usual),
+                    figure(stiffness[axis])
+                ),
+                &format!("about {:.3e} goes with the others: check the unit", usual * stiffness[axis]),
+            );
         }
     }
 }
@@ -121,37 +125,30 @@ pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
 pub(super) fn gains_in_order(facts: &Facts, found: &mut Found) {
     let (Some(task), Some(legs)) = (&facts.model.task_space, &facts.legs) else { return };
     let stiffness = legs.stiffness(facts.model.actuator.axial_stiffness);
-    let sections: [(&str, Option<&Gains>); 2] =
-        [("gains", task.gains.as_ref()), ("position_gains", task.position_gains.as_ref())];
-    for (section, gains) in sections {
-        let Some(gains) = gains else { continue };
-        for (name, values) in
-            [("proportional", gains.proportional), ("integral", gains.integral), ("derivative", gains.derivative)]
-        {
-            // Translations among themselves, and rotations: across them the units would not fit.
-            for (a, b) in [(0, 1), (0, 2), (1, 2), (3, 4), (3, 5), (4, 5)] {
-                if values[a] == 0.0 || values[b] == 0.0 {
-                    continue;
-                }
-                let apart = |one: f64, other: f64| libm::fabs(libm::log((one / stiffness[a]) / (other / stiffness[b])));
-                let (now, exchanged) = (apart(values[a], values[b]), apart(values[b], values[a]));
-                if now <= libm::log(EXCHANGED_NOW) || exchanged >= libm::log(EXCHANGED_THEN) {
-                    continue;
-                }
-                found.add(
-                    codes::GAINS_EXCHANGED,
-                    &format!("{section}.{name}[{a}]"),
-                    format!(
-                        "the gains of {} and {} are {} and {}, while the platform is {} times as stiff along the first as along the second",
-                        AXES[a],
-                        AXES[b],
-                        figure(values[a]),
-                        figure(values[b]),
-                        figure(stiffness[a] / stiffness[b])
-                    ),
-                    &format!("in each other's place they would go with the stiffness: check the order of `{section}.{name}`"),
-                );
+    for (key, values) in gains_of(task) {
+        // Translations among themselves, and rotations: across them the units would not fit.
+        for (a, b) in [(0, 1), (0, 2), (1, 2), (3, 4), (3, 5), (4, 5)] {
+            if values[a] == 0.0 || values[b] == 0.0 {
+                continue;
             }
+            let apart = |one: f64, other: f64| libm::fabs(libm::log((one / stiffness[a]) / (other / stiffness[b])));
+            let (now, exchanged) = (apart(values[a], values[b]), apart(values[b], values[a]));
+            if now <= libm::log(EXCHANGED_NOW) || exchanged >= libm::log(EXCHANGED_THEN) {
+                continue;
+            }
+            found.add(
+                codes::GAINS_EXCHANGED,
+                &format!("{key}[{a}]"),
+                format!(
+                    "the gains of {} and {} are {} and {}, while the platform is {} times as stiff along the first as along the second",
+                    AXES[a],
+                    AXES[b],
+                    figure(values[a]),
+                    figure(values[b]),
+                    figure(stiffness[a] / stiffness[b])
+                ),
+                &format!("in each other's place they would go with the stiffness: check the order of `{key}`"),
+            );
         }
     }
 }

@@ -53,8 +53,7 @@ pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
 /// The joints of a leg stand what the workspace asks of them.
 pub(super) fn joints_turn(facts: &Facts, found: &mut Found) {
     let Some(most) = facts.model.leg.joint_angle else { return };
-    let ([x, y, z], [a, b, c]) = (facts.model.workspace.translation, facts.model.workspace.rotation);
-    let [base, platform] = joints::angles(&facts.model.geometry, &[x, y, z, a, b, c]);
+    let [base, platform] = joints::angles(&facts.model.geometry, &facts.model.workspace.bounds());
     let (end, angle) = if base > platform { ("base", base) } else { ("platform", platform) };
     if angle <= most {
         return;

@@ -19,8 +19,7 @@ fn rules<'a>(facts: &Facts<'a>) -> Option<&'a SetpointRules> {
 
 /// Both ways from the middle, m or rad.
 fn way(facts: &Facts, axis: usize) -> f64 {
-    let workspace = &facts.model.workspace;
-    2.0 * if axis < 3 { workspace.translation[axis] } else { workspace.rotation[axis - 3] }
+    2.0 * facts.model.workspace.bounds()[axis]
 }
 
 /// The voltage follows a move at its largest speed.
@@ -50,7 +49,7 @@ pub(super) fn moves_within_slew(facts: &Facts, found: &mut Found) {
     }
 }
 
-/// A move across the workspace ends while somebody waits.
+/// A move across the workspace ends within the time that an operator waits.
 pub(super) fn moves_end(facts: &Facts, found: &mut Found) {
     let Some(rules) = rules(facts) else { return };
     for (axis, speed) in rules.speed.into_iter().enumerate() {

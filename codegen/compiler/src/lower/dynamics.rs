@@ -198,9 +198,7 @@ fn elimination(model: &Model, first: usize, reach: f64) -> ([usize; LEGS], [usiz
 
 /// Rest, the corners of the declared workspace, and poses spread through it (Halton).
 fn poses(model: &Model) -> Vec<[f64; 6]> {
-    let [tx, ty, tz] = model.workspace.translation;
-    let [rx, ry, rz] = model.workspace.rotation;
-    let bounds = [tx, ty, tz, rx, ry, rz];
+    let bounds = model.workspace.bounds();
     let mut poses = vec![[0.0; 6]];
     for corner in 0..64_u32 {
         poses.push(std::array::from_fn(|k| if corner >> k & 1 == 1 { bounds[k] } else { -bounds[k] }));

@@ -18,18 +18,9 @@ pub fn joint_positions(geometry: &Geometry) -> ([[f64; 3]; LEGS], [[f64; 3]; LEG
     (geometry.base_joints, geometry.platform_joints)
 }
 
-/// r₀ = P₀ + P_i − B_i (AI.2), base frame, m.
-fn rest_legs(geometry: &Geometry) -> [[f64; 3]; LEGS] {
-    let mut rest_leg = [[0.0; 3]; LEGS];
-    for ((rest, b), p) in rest_leg.iter_mut().zip(&geometry.base_joints).zip(&geometry.platform_joints) {
-        *rest = [p[0] - b[0], p[1] - b[1], geometry.height + p[2] - b[2]];
-    }
-    rest_leg
-}
-
 pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<Kinematics, Vec<Diagnostic>> {
     let platform = model.geometry.platform_joints;
-    let rest_leg = rest_legs(&model.geometry);
+    let rest_leg = model.geometry.rest_legs();
     let rest_length = rest_leg.map(norm);
     let largest_angle = model.workspace.rotation.iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
     // |Δl| ≤ |t| + |θ| |P_i|: a chord is no longer than its arc.
@@ -49,7 +40,7 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<Kinematics, Vec<Dia
         series: Series { sine: &sine, versine: &versine },
         newton_steps: newton_steps(largest_displacement / shortest, Scalar::F64) as usize,
     };
-    let corrections = corrections(&legs, &inverse, bounds(model), scalar)
+    let corrections = corrections(&legs, &inverse, model.workspace.bounds(), scalar)
         .ok_or_else(|| vec![too_large(model, largest_displacement, shortest)])?;
     let round3 = |v: [f64; 3]| v.map(|x| scalar.round(x));
     Ok(Kinematics {
@@ -63,12 +54,6 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<Kinematics, Vec<Dia
         inverse_jacobian: inverse.map(|row| row.map(|x| scalar.round(x))),
         corrections,
     })
-}
-
-/// Bounds of the accepted poses, m and rad.
-pub(super) fn bounds(model: &Model) -> [f64; 6] {
-    let ([x, y, z], [a, b, c]) = (model.workspace.translation, model.workspace.rotation);
-    [x, y, z, a, b, c]
 }
 
 /// Largest error that a fixed number of corrections may leave over the declared workspace: 10⁻¹³ m or rad, or a quarter of
@@ -102,7 +87,7 @@ pub fn inverse_jacobian(geometry: &Geometry) -> Option<[[f64; 6]; LEGS]> {
 /// J = ∂l/∂h of the legs at rest, in f64; none if a leg has no length.
 #[must_use]
 pub fn leg_jacobian(geometry: &Geometry) -> Option<[[f64; 6]; LEGS]> {
-    let rest_leg = rest_legs(geometry);
+    let rest_leg = geometry.rest_legs();
     let rest_length = rest_leg.map(norm);
     let whole = rest_length.iter().all(|length| *length > 0.0);
     whole.then(|| jacobian_at_rest(&rest_leg, &rest_length, &geometry.platform_joints))

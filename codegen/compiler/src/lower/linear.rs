@@ -1,4 +1,4 @@
-//! 6×6 matrices in plain loops: the same bits on every machine.
+//! 6×6 matrices in plain loops: the same bits on every computer.
 
 pub(super) use specgen_numerics::{Matrix6 as Matrix, cross, dot, norm};
 

@@ -8,7 +8,7 @@ pub use noise::{PoseNoise, pose_noise, readings_per_pose};
 
 use specgen_runtime::{Gauges, Series};
 
-use super::kinematics::{bounds, leg_jacobian, series_of, tolerance};
+use super::kinematics::{leg_jacobian, series_of, tolerance};
 use super::linear::{grid, norm};
 use crate::ir::{Scalar, Sensing};
 use layout::Layout;
@@ -68,7 +68,7 @@ struct Solution {
 impl Solution {
     /// Counted in f64 at 3⁶ poses on the faces of the workspace, and tried at the ends of the gauges' range.
     fn of(model: &Model, layout: &Layout, scalar: Scalar) -> Result<Self, Vec<Diagnostic>> {
-        let bounds = bounds(model);
+        let bounds = model.workspace.bounds();
         let tolerance = tolerance(bounds, scalar);
         let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
         let (sine, versine) = series_of(largest, Scalar::F64);
@@ -174,7 +174,7 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
     let [low, high] = model.sensor.range;
     let legs = leg_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
     let mut worst: Option<(f64, usize, usize, f64)> = None;
-    for (axis, bound) in bounds(model).into_iter().enumerate() {
+    for (axis, bound) in model.workspace.bounds().into_iter().enumerate() {
         for motion in [-bound, bound] {
             if legs.iter().all(|leg| leg[axis] * motion < 0.0) {
                 continue;
@@ -197,7 +197,7 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
         format!(
             "within the declared workspace, {} of ±{:.4} {unit} alone takes gauge {k} to {:.3} µm, beyond its range of {:.3} µm to {:.3} µm",
             AXES[axis],
-            bounds(model)[axis] * scale,
+            model.workspace.bounds()[axis] * scale,
             reading * 1e6,
             low * 1e6,
             high * 1e6

@@ -120,7 +120,6 @@ pub(super) struct User {
 
 impl User {
     fn of(model: &Model, task: &TaskSpace) -> Result<Self, Vec<Diagnostic>> {
-        let [tx, ty, tz] = model.workspace.translation;
         let [rx, ry, rz] = model.workspace.rotation;
         let [ox, oy, oz, ax, ay, az] = task.frames.work;
         let tool = task.frames.tool;
@@ -148,7 +147,7 @@ impl User {
             // Wᵀ (−offset); 0 without one, not −0.
             home[axis] = 0.0 - (axes[0][axis] * ox + axes[1][axis] * oy + axes[2][axis] * oz);
         }
-        Ok(Self { frames, bias, home, bound: [tx, ty, tz, rx, ry, rz] })
+        Ok(Self { frames, bias, home, bound: model.workspace.bounds() })
     }
 
     /// Rate of the platform's pose at rest when the user's axis moves at a rate of 1.

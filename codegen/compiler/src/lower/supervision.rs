@@ -214,11 +214,7 @@ fn gauge_bounds(model: &Model, findings: &mut Vec<Diagnostic>) -> (f64, f64) {
 fn tracking(model: &Model, noise: Option<&PoseNoise>, findings: &mut Vec<Diagnostic>) -> [f64; 6] {
     let share = model.supervisor.tracking_error;
     let (full, noise) = match noise {
-        Some(noise) => {
-            let [x, y, z] = model.workspace.translation;
-            let [a, b, c] = model.workspace.rotation;
-            ([x, y, z, a, b, c], noise.pose)
-        }
+        Some(noise) => (model.workspace.bounds(), noise.pose),
         None => ([model.actuator.stroke; 6], [model.sensor.noise; 6]),
     };
     let mut least = 0.0;

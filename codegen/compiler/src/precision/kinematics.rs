@@ -3,7 +3,7 @@
 use specgen_numerics::{Double, Kernels, Traced, trace};
 use specgen_runtime::{Legs, Real, Series};
 
-use super::{Figures, bounds, boxes, keep};
+use super::{Figures, boxes, keep};
 use crate::ir::{Kinematics, Scalar};
 use specgen_language::model::{Geometry, Model};
 
@@ -183,7 +183,7 @@ fn bound<const SINGLE: bool>(
 where
     Traced<SINGLE>: Kernels,
 {
-    let bounds = bounds(model);
+    let bounds = model.workspace.bounds();
     let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
     let (mut of_legs, mut of_pose) = ([0.0; 6], [0.0; 6]);
     for corner in boxes(&bounds) {

@@ -4,7 +4,7 @@ use specgen_numerics::{Double, Kernels, Trace, Traced, cross, magnitude, trace};
 use specgen_runtime::{Gauges, Real};
 
 use super::kinematics::{Exact as ExactLegs, FromReal, TracedLegs, cut, kept};
-use super::{Figures, bounds, boxes, keep};
+use super::{Figures, boxes, keep};
 use crate::ir::{Kinematics, Scalar, Sensing};
 use crate::lower;
 use specgen_language::diagnostic::Diagnostic;
@@ -169,7 +169,7 @@ fn bound<const SINGLE: bool>(
 where
     Traced<SINGLE>: Kernels,
 {
-    let bounds = bounds(model);
+    let bounds = model.workspace.bounds();
     let largest = bounds[3..].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a });
     let mut bound = [0.0; 6];
     for corner in boxes(&bounds) {

@@ -1,4 +1,4 @@
-//! What the user is told about reach.
+//! Findings about reach, and its figures for people.
 
 use std::fmt::Write as _;
 

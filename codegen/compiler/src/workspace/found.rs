@@ -1,6 +1,6 @@
 //! What lies in an output folder, and whose it is.
 //!
-//! The manifest (`.specgen`) lists every file with its SHA-256, so that a later run can tell its own output from somebody's
+//! The manifest (`.specgen`) lists every file with its SHA-256, so that a later run can distinguish its own output from the user's
 //! work. While files are replaced one by one it has a line for the old and one for the new state of each.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -15,7 +15,7 @@ use specgen_toolchain::sha256;
 pub(super) const MANIFEST: &str = ".specgen";
 /// The work folder where it cannot stand beside the output.
 pub(super) const WORK: &str = ".specgen-work";
-/// As many files of somebody else as a message names.
+/// As many files that specgen did not write as a message names.
 const NAMED: usize = 5;
 
 /// Files and their digests, of which a file may have two.

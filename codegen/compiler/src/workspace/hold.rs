@@ -20,7 +20,7 @@ const ROUND: Duration = Duration::from_millis(20);
 pub struct Hold {
     work: PathBuf,
     _file: File,
-    // Told to interrupts: what goes away with the process.
+    // An interrupt removes it with the process.
     _lock: Guard,
     _made: Claimed,
 }
@@ -32,7 +32,7 @@ impl Hold {
         loop {
             match Self::attempt(work) {
                 Ok(hold) => return Ok(hold),
-                // Somebody has it, or has just removed it.
+                // Another run has it, or has just removed it.
                 Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::NotFound) => {}
                 Err(error) => return Err(WriteError::io("write", dir, error)),
             }

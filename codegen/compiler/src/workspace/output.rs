@@ -128,7 +128,7 @@ fn put(place: &Place, change: &Change<'_>) -> Result<(), WriteError> {
         let _ = place.dir.parent().map(sync);
         return Ok(());
     }
-    // Without a manifest the earlier one could not be told, after a kill, from files that are not yet all there.
+    // Without a manifest the earlier one could not be distinguished, after a kill, from files that are not yet all there.
     if place.may_swap && !change.earlier.is_empty() && swap(&new, &place.dir).is_ok() {
         // The output is whole; what cannot be carried over now, the next run takes up.
         let _ = carry_over(&new, &place.dir);

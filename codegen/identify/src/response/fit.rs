@@ -27,7 +27,7 @@ pub struct Fitted {
     pub lag: Estimate,
     /// Dead time T, s.
     pub dead_time: Estimate,
-    /// τ + T, s: told better than its parts, which look alike far below 1/τ.
+    /// τ + T, s: better determined than its parts, which look alike far below 1/τ.
     pub lag_and_dead_time: Estimate,
     /// Correlation of the errors of τ and T.
     pub lag_dead_time_correlation: f64,

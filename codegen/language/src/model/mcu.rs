@@ -30,8 +30,8 @@ pub struct Part {
     pub board: &'static str,
     /// As probe-rs names the chip; none for an emulated one.
     pub chip: Option<&'static str>,
-    /// QEMU's machine with this core, where instructions are counted.
-    pub machine: &'static str,
+    /// QEMU's board with this core, where instructions are counted.
+    pub emulated: &'static str,
 }
 
 const KIB: u64 = 1024;
@@ -44,7 +44,7 @@ const M7: Part = Part {
     ram: 4096 * KIB,
     board: "QEMU mps2-an500",
     chip: None,
-    machine: "mps2-an500",
+    emulated: "mps2-an500",
 };
 
 const M4F: Part = Part {
@@ -52,7 +52,7 @@ const M4F: Part = Part {
     core: "cortex-m4",
     double: false,
     board: "QEMU mps2-an386",
-    machine: "mps2-an386",
+    emulated: "mps2-an386",
     ..M7
 };
 
@@ -114,10 +114,10 @@ mod tests {
         for mcu in Mcu::ALL {
             let part = mcu.part();
             assert_eq!(Mcu::named(part.name), Some(mcu));
-            // Counted on a machine of the same core, and flashed only where there is something to flash.
-            let emulated = Mcu::named(part.machine).unwrap().part();
+            // Counted on a board of the same core, and flashed only where there is something to flash.
+            let emulated = Mcu::named(part.emulated).unwrap().part();
             assert_eq!((emulated.core, emulated.double), (part.core, part.double));
-            assert_eq!(part.chip.is_none(), part.name == part.machine);
+            assert_eq!(part.chip.is_none(), part.name == part.emulated);
         }
         assert_eq!(Mcu::named("z80"), None);
     }

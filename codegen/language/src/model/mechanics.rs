@@ -61,6 +61,15 @@ fn joints(fields: &Fields) -> Option<[[[f64; 3]; 6]; 2]> {
 }
 
 impl Geometry {
+    /// r₀ = P₀ + P_i − B_i (AI.2), the legs at rest from joint to joint in {B}, m.
+    #[must_use]
+    pub fn rest_legs(&self) -> [[f64; 3]; 6] {
+        core::array::from_fn(|leg| {
+            let ([bx, by, bz], [px, py, pz]) = (self.base_joints[leg], self.platform_joints[leg]);
+            [px - bx, py - by, self.height + pz - bz]
+        })
+    }
+
     /// Largest distance of a platform joint from P_C, m.
     #[must_use]
     pub fn joint_radius(&self) -> f64 {
@@ -116,5 +125,14 @@ section! {
         translation: [f64; 3] = list(&[TRAVEL; 3]), Required, "", ["40 um", "40 um", "40 um"];
         /// Bounds on |theta_x|, |theta_y|, |theta_z|.
         rotation: [f64; 3] = list(&[TURN; 3]), Required, "", ["0.6 mrad", "0.6 mrad", "0.6 mrad"];
+    }
+}
+
+impl Workspace {
+    /// Bounds on the magnitudes of x, y, z (m), θx, θy, θz (rad).
+    #[must_use]
+    pub fn bounds(&self) -> [f64; 6] {
+        let ([x, y, z], [a, b, c]) = (self.translation, self.rotation);
+        [x, y, z, a, b, c]
     }
 }

@@ -14,10 +14,11 @@ pub const LARGEST_GAIN: f64 = 1e15;
 const CUTOFF_SHARE: f64 = 0.6;
 
 const GAIN: Range = Range::closed(0.0, LARGEST_GAIN);
+
 const fn gains(along: Dimension, along_unit: &'static str, about: Dimension, about_unit: &'static str) -> [Item; 6] {
-    let (a, t) = (item(along, GAIN, along_unit), item(about, GAIN, about_unit));
-    [a, a, a, t, t, t]
+    six(item(along, GAIN, along_unit), item(about, GAIN, about_unit))
 }
+
 const STIFFNESSES: &[Item] = &gains(Dimension::STIFFNESS, "N/m", Dimension::TURN_STIFFNESS, "N m/rad");
 const STIFFNESS_RATES: &[Item] =
     &gains(Dimension::STIFFNESS_RATE, "N/(m s)", Dimension::TURN_STIFFNESS_RATE, "N m/(rad s)");
@@ -27,8 +28,7 @@ const POSE: &[Item] = &six(
     item(Dimension::LENGTH, Range::closed(-LARGEST_TRAVEL, LARGEST_TRAVEL), "um"),
     item(Dimension::ANGLE, Range::closed(-LARGEST_TURN, LARGEST_TURN), "urad"),
 );
-const FRAME: &[Item] = &six(CENTER, item(Dimension::ANGLE, Range::closed(-TURN_AROUND, TURN_AROUND), "rad"));
-const TURN_AROUND: f64 = PI;
+const FRAME: &[Item] = &six(CENTER, item(Dimension::ANGLE, Range::closed(-PI, PI), "rad"));
 const SPEEDS: &[Item] = &six(
     item(Dimension::SPEED, Range::above(0.0, 100.0), "um/s"),
     item(Dimension::ANGULAR_RATE, Range::above(0.0, 1e3), "mrad/s"),

@@ -45,9 +45,7 @@ const SWING: [f64; 2] = [0.2, 0.03];
 /// A motion from rest with a share of the room that the workspace leaves.
 fn motion(model: &Model, task: &TaskSpace, time: f64) -> PoseTarget {
     let mut target = PoseTarget::default();
-    let [x, y, z] = model.workspace.translation;
-    let [tilt_x, tilt_y, tilt_z] = model.workspace.rotation;
-    for (axis, bound) in [x, y, z, tilt_x, tilt_y, tilt_z].into_iter().enumerate() {
+    for (axis, bound) in model.workspace.bounds().into_iter().enumerate() {
         let amplitude = SWING[usize::from(axis != 2)] * (bound - task.setpoint.bias[axis].abs());
         let frequency = TAU * (2.0 + 0.7 * axis as f64);
         let (sine, cosine) = libm::sincos(frequency * time);

@@ -38,7 +38,7 @@ impl Excesses {
     }
 
     /// How the place can be fixed: numbers that are themselves accepted, as far as the workspace is concerned.
-    pub fn mend_place(&self, user: &User) -> Option<String> {
+    pub fn fix_of_place(&self, user: &User) -> Option<String> {
         let Worst { axis, value, .. } = self.place?;
         let bound = user.bound[axis];
         let beyond = if value > 0.0 { value - bound } else { value + bound };
@@ -51,14 +51,14 @@ impl Excesses {
     }
 
     /// Speed that control.setpoint.stream_speed would have to permit on the worst axis, with its key.
-    pub fn mend_speed(&self) -> Option<String> {
+    pub fn fix_of_speed(&self) -> Option<String> {
         let Worst { axis, value, .. } = self.speed?;
         Some(format!("raise control.setpoint.stream_speed[{axis}] to {}/s", outwards(axis, value.abs())))
     }
 
     /// The frequency at which a path of the paper, whose speeds go with it, is within the speed; rounded down. Seen at
     /// ticks of `period` (s), the largest speed may be missed by the cosine of half a tick's phase.
-    pub fn mend_frequency(&self, frequency: f64, period: f64) -> Option<f64> {
+    pub fn fix_of_frequency(&self, frequency: f64, period: f64) -> Option<f64> {
         let missed = libm::cos(core::f64::consts::PI * frequency * period);
         let slower = frequency / self.speed?.excess * missed;
         let scale = libm::pow(10.0, 2.0 - libm::floor(libm::log10(slower)));

@@ -54,12 +54,12 @@ pub(super) fn lower(
     let excesses = excesses(model, task, user, &pieces, &firsts, frequency);
     let [place, speed] = excesses.messages(model, user, &task.setpoint);
     if let Some((_, message)) = place {
-        let help = excesses.mend_place(user).unwrap_or_default();
+        let help = excesses.fix_of_place(user).unwrap_or_default();
         findings.push(refuse(codes::TRAJECTORY_OUTSIDE, message, &help));
     }
     if let Some((_, message)) = speed {
-        let slower = excesses.mend_frequency(frequency, period).unwrap_or_default();
-        let help = format!("at most {slower} Hz is slow enough; or {}", excesses.mend_speed().unwrap_or_default());
+        let slower = excesses.fix_of_frequency(frequency, period).unwrap_or_default();
+        let help = format!("at most {slower} Hz is slow enough; or {}", excesses.fix_of_speed().unwrap_or_default());
         findings.push(refuse(codes::TRAJECTORY_TOO_FAST, message, &help));
     }
     if !findings.is_empty() {

@@ -139,11 +139,13 @@ fn between(
     };
     let mut findings = Vec::new();
     if let Some((worst, message)) = place {
-        let help = format!("check the unit in the column's name; or {}", excesses.mend_place(user).unwrap_or_default());
+        let help =
+            format!("check the unit in the column's name; or {}", excesses.fix_of_place(user).unwrap_or_default());
         findings.push(in_file(waveform, line(worst.time), codes::TRAJECTORY_OUTSIDE, message, &help));
     }
     if let Some((worst, message)) = speed {
-        let help = format!("check unit and period, smooth the table, or {}", excesses.mend_speed().unwrap_or_default());
+        let help =
+            format!("check unit and period, smooth the table, or {}", excesses.fix_of_speed().unwrap_or_default());
         findings.push(in_file(waveform, line(worst.time), codes::TRAJECTORY_TOO_FAST, message, &help));
     }
     findings

@@ -1,4 +1,4 @@
-//! What the user is told about a platform that is unstable, or nearly so.
+//! Findings about a platform that is unstable, or nearly so.
 
 use core::f64::consts::{PI, TAU};
 

@@ -1,4 +1,4 @@
-//! The controller as a shared library for this machine.
+//! The controller as a shared library for this computer.
 
 use super::{Part, files};
 
