@@ -74,6 +74,7 @@ macro_rules! section {
     (@toml true) => { "true" };
     (@toml false) => { "false" };
     (@toml $text:ident) => { $text };
+    // Of one line: a longer value is a constant, for `stringify` breaks it.
     (@toml $literal:tt) => { stringify!($literal) };
 }
 

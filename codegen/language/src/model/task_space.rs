@@ -46,6 +46,9 @@ const SLOW_SPEED: &str = r#"["100 um/s", "100 um/s", "100 um/s", "1 mrad/s", "1 
 const SLOW_ACCELERATION: &str =
     r#"["10 mm/s^2", "10 mm/s^2", "10 mm/s^2", "100 mrad/s^2", "100 mrad/s^2", "100 mrad/s^2"]"#;
 const SLOW_JERK: &str = r#"["1 m/s^3", "1 m/s^3", "1 m/s^3", "10 rad/s^3", "10 rad/s^3", "10 rad/s^3"]"#;
+const STOP_JERK: &str = r#"["1e4 m/s^3", "1e4 m/s^3", "1e4 m/s^3", "1e5 rad/s^3", "1e5 rad/s^3", "1e5 rad/s^3"]"#;
+const INTEGRAL: &str =
+    r#"["4e7 N/(m s)", "4e7 N/(m s)", "2e8 N/(m s)", "1e6 N m/(rad s)", "1e6 N m/(rad s)", "5e5 N m/(rad s)"]"#;
 const STREAM_SPEED: &str = r#"["1 mm/s", "1 mm/s", "1 mm/s", "10 mrad/s", "10 mrad/s", "10 mrad/s"]"#;
 
 choice! {
@@ -175,7 +178,7 @@ section! {
         /// Largest deceleration of stops: of a stream that runs dry or is not believed, and of any motion that another command ends. The rate falls smoothly, from v to 0 in 1.5 v over this at least, over half of v times that time, and never within less than two thirds of the time that a stop from the largest declared speed takes; `specgen check` states the distances.
         stop_acceleration: Option<[f64; 6]> = list(ACCELERATIONS), Rule("derived from the platform's modes, `amplifier.lag`, `actuator.slew_rate` and `actuator.stroke`, for a stop from `stream_speed`"), "", ["5 m/s^2", "5 m/s^2", "5 m/s^2", "50 rad/s^2", "50 rad/s^2", "50 rad/s^2"];
         /// Their largest jerk.
-        stop_jerk: Option<[f64; 6]> = list(JERKS), Rule("the jerk at which a stop from the largest declared speed just reaches `stop_acceleration`"), "", ["1e4 m/s^3", "1e4 m/s^3", "1e4 m/s^3", "1e5 rad/s^3", "1e5 rad/s^3", "1e5 rad/s^3"];
+        stop_jerk: Option<[f64; 6]> = list(JERKS), Rule("the jerk at which a stop from the largest declared speed just reaches `stop_acceleration`"), "", STOP_JERK;
         /// A streamed set-point further from the last one than this in a period is a jump, and refused.
         stream_speed: [f64; 6] = list(SPEEDS), Default(STREAM_SPEED), "", STREAM_SPEED;
         /// A stream that brings nothing new for so many ticks is stale, and the last set-point is held.
@@ -203,7 +206,7 @@ section! {
         /// Proportional gain.
         proportional: [f64; 6] = list(STIFFNESSES), Required, "k_p", ["5e6 N/m", "5e6 N/m", "2e7 N/m", "1e5 N m/rad", "1e5 N m/rad", "5e4 N m/rad"];
         /// Integral gain.
-        integral: [f64; 6] = list(STIFFNESS_RATES), Required, "k_I", ["4e7 N/(m s)", "4e7 N/(m s)", "2e8 N/(m s)", "1e6 N m/(rad s)", "1e6 N m/(rad s)", "5e5 N m/(rad s)"];
+        integral: [f64; 6] = list(STIFFNESS_RATES), Required, "k_I", INTEGRAL;
         /// Derivative gain.
         derivative: [f64; 6] = list(DAMPINGS), Required, "k_v", ["0 N s/m", "0 N s/m", "0 N s/m", "0 N m s/rad", "0 N m s/rad", "0 N m s/rad"];
     }

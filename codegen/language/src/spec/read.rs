@@ -301,6 +301,7 @@ mod tests {
                     _ => None,
                 };
                 for literal in default.into_iter().chain([key.example]) {
+                    assert!(!literal.contains('\n'), "{literal}");
                     let value = DeValue::parse(literal).expect(literal);
                     let mut findings = Findings::default();
                     let path = section.path(key.name);

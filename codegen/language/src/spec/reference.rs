@@ -6,7 +6,7 @@ use super::keys::{Key, Kind, Presence, SECTIONS, Shape};
 use super::messages::range_of;
 
 const HEAD: &str = "\
-<!-- Generated from the key table in codegen/language/src/model/; do not edit. -->
+<!-- Generated from the sections in codegen/language/src/model/; do not edit. -->
 
 # Spec reference
 
