@@ -114,8 +114,8 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         let [a, b] = ["a", "b"].map(|name| root.path().join(name));
         for folder in [&a, &b] {
-            std::fs::create_dir(folder).unwrap();
-            std::fs::write(folder.join("tool"), "").unwrap();
+            fs::create_dir(folder).unwrap();
+            fs::write(folder.join("tool"), "").unwrap();
         }
         let places = Places::of(vec![b.clone(), a.clone(), PathBuf::new(), b.clone()], None);
         assert_eq!(places.programs, [b.clone(), a.clone()]);

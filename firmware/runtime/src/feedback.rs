@@ -3,7 +3,7 @@
 //! The integral is kept as the force it exerts (N, N m), not as ∫e: a change of gain then moves nothing.
 
 use crate::real::{Real, saturate};
-use crate::snapshot::{Invalid, LARGEST, Reader, Snapshot, Writer};
+use crate::snapshot::LARGEST;
 
 /// Diagonal gains of (7): x, y, z, θx, θy, θz.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,18 +80,6 @@ impl<T: Real> Integral<T> {
         for force in &mut self.force {
             *force = saturate(*force, -largest, largest);
         }
-    }
-}
-
-impl<T: Real> Snapshot for Integral<T> {
-    const WORDS: usize = 6;
-
-    fn save(&self, words: &mut Writer<'_>) {
-        words.reals(&self.force);
-    }
-
-    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
-        words.reals(&mut self.force, LARGEST)
     }
 }
 

@@ -21,7 +21,7 @@ use super::preisach::{Memory, Table};
 use host_sim::closed_loop::LEGS;
 use host_sim::controller::{ControllerError, TickController};
 use host_sim::description::{Description, indexed};
-use host_sim::platform::{Geometry, Masses, Probe, Six};
+use host_sim::platform::{Geometry, Masses, Probe};
 use host_sim::trajectory::PoseTarget;
 use host_sim::word::Scalar;
 
