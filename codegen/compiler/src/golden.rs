@@ -175,7 +175,9 @@ fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<Built, Vec
     let lowered = match &model.task_space {
         None => Ok(None),
         Some(task) => {
-            setpoint::lower(&model, task, &waveforms(source, &model, table_of_poses), lower::scalar(&model)).map(Some)
+            let waveforms = waveforms(source, &model, table_of_poses);
+            findings.extend(waveforms.iter().flatten().filter_map(lint::paths::steps));
+            setpoint::lower(&model, task, &waveforms, lower::scalar(&model)).map(Some)
         }
     };
     let lowered = lowered.map_err(|found| findings.extend(found));
@@ -203,7 +205,9 @@ fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<Built, Vec
     let scales = (0..model.hysteresis.records.len()).map(|leg| 1.0 - 0.01 * leg as f64);
     let tables: Vec<EverettTable> = scales.map(|scale| table(&model, scale)).collect();
     let rate_tables = match &model.hysteresis.rate {
-        RateDependence::DynamicPreisach(files) => files.iter().map(|_| table(&model, 1e-3)).collect(),
+        RateDependence::DynamicPreisach(files) => {
+            (1..=files.len()).map(|leg| table(&model, 1e-3 / leg as f64)).collect()
+        }
         _ => Vec::new(),
     };
     let task = design.as_ref().zip(setpoints);

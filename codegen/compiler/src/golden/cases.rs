@@ -12,6 +12,8 @@ const GAINS: &str = "features/platform-gains.toml";
 const CALIBRATION: &str = "features/platform-calibration.toml";
 const FRAMES: &str = "features/platform-frames.toml";
 const ENVIRONMENT: &str = "features/platform-environment.toml";
+const F32: &str = "features/f32.toml";
+const SIX: &str = "features/six-records.toml";
 const NO_NOTCH: &str = "features/platform-no-notch.toml";
 const FORCE: &str = "features/platform-force-sensor.toml";
 
@@ -95,6 +97,25 @@ pub const OF_PARTS: &[Case] = &[
     (CALIBRATION, &[("\"9.97 um/V\"", "\"-9.97 um/V\"")], None),
     (REFERENCE, &[("bits  = 16", "bits  = 8"), ("[\"0 V\", \"150 V\"]", "[\"0 V\", \"1500 V\"]")], None),
     (REFERENCE, &[("slew_rate       = \"40 V/ms\"", "slew_rate       = \"0.01 V/ms\"")], None),
+    // Patterns of gauges: one that is aside of all others.
+    (REFERENCE, &[("direction = [0, 1, 0]", "direction = [0.3, 1, 0]")], None),
+    (REFERENCE, &[("direction = [1, 0, 0]", "direction = [1, 0.3, 0.1]")], None),
+    (REFERENCE, &[("[\"-40 mm\", \"69.282 mm\", \"180 mm\"]", "[\"-40 mm\", \"62 mm\", \"180 mm\"]")], None),
+    (REFERENCE, &[("[\"-40 mm\", \"69.282 mm\", \"180 mm\"]", "[\"-40 mm\", \"69.282 mm\", \"171 mm\"]")], None),
+    (REFERENCE, &[("[\"0 mm\", \"80 mm\", \"180 mm\"]", "[\"0 mm\", \"70 mm\", \"180 mm\"]")], None),
+    (REFERENCE, &[("[\"-55 um\", \"55 um\"]", "[\"-55 um\", \"0 um\"]")], None),
+    (REFERENCE, &[("[\"-55 um\", \"55 um\"]", "[\"0 um\", \"55 um\"]")], None),
+    (REFERENCE, &[("[\"-55 um\", \"55 um\"]", "[\"-25 um\", \"30 um\"]")], None),
+    // Gauges in a line with the centre but for the sign of one.
+    (REFERENCE, &[("point     = [\"-80 mm\", \"0 mm\", \"180 mm\"]\ndirection = [0, 1, 0]", "point     = [\"-40 mm\", \"69.282 mm\", \"180 mm\"]\ndirection = [0.866, -0.5, 0]"), (LAST_GAUGE, "point     = [\"-40 mm\", \"-69.282 mm\", \"180 mm\"]\ndirection = [0.866, -0.5, 0]")], None),
+    // Converters that begin below zero.
+    (LEGS, &[("[\"0 V\", \"150 V\"]", "[\"-25.7 V\", \"150 V\"]"), ("[\"0 V\", \"100 V\"]", "[\"-11.3 V\", \"101.7 V\"]")], None),
+    (F32, &[("[\"0 V\", \"150 V\"]", "[\"-25.7 V\", \"150 V\"]"), ("[\"0 V\", \"100 V\"]", "[\"11.3 V\", \"101.7 V\"]")], None),
+    // Dependence on rate.
+    (LEGS, &[("[hysteresis]", "[hysteresis]\nrate = \"creep\"\ncreep_times = [\"0.8 s\", \"40 ms\"]\ncreep_weights = [0.03, 0.09]\ndead_time = \"0.13 ms\"")], None),
+    (REFERENCE, &[("[hysteresis]", "[hysteresis]\nrate = \"creep\"\ncreep_times = [\"0.8 s\"]\ncreep_weights = [0.03]")], None),
+    (LEGS, &[("[hysteresis]", "[hysteresis]\nrate = \"dynamic-preisach\"\nrate_tables = [\"records/leg1.csv\"]\ndead_time = \"0.01 ms\"")], None),
+    (SIX, &[("[hysteresis]", "[hysteresis]\nrate = \"dynamic-preisach\"\nrate_tables = [\"../records/leg1.csv\", \"../records/leg2.csv\", \"../records/leg3.csv\", \"../records/leg4.csv\", \"../records/leg5.csv\", \"../records/leg6.csv\"]"), ("[timing]", "[supervisor]\nrest_voltage = \"7 V\"\n\n[timing]")], None),
     // The supervisor.
     (NO_NOTCH, &[("[timing]", "[supervisor]\nrest_voltage = \"12 V\"\narm_time = \"30 ms\"\nramp_rate = \"0.3 V/ms\"\ngauge_time = \"7 ms\"\nstuck_motion = \"130 nm\"\nstuck_time = \"41 ms\"\ndisagreement = \"9 um\"\ndisagreement_time = \"73 ms\"\ntracking_error = 0.31\ntracking_time = \"87 ms\"\nvoltage_time = \"210 ms\"\nslew_time = \"33 ms\"\nmissed_ticks = 5\nhost_lost = [\"70 ms\", \"4 s\"]\n\n[timing]")], None),
     (LEGS, &[("[timing]", "[supervisor]\nrest_voltage = \"12 V\"\narm_time = \"30 ms\"\nramp_rate = \"0.3 V/ms\"\ngauge_time = \"7 ms\"\nstuck_motion = \"130 nm\"\nstuck_time = \"41 ms\"\ndisagreement = \"9 um\"\ndisagreement_time = \"73 ms\"\ntracking_error = 0.31\ntracking_time = \"87 ms\"\nvoltage_time = \"210 ms\"\nslew_time = \"33 ms\"\nmissed_ticks = 5\nhost_lost = [\"70 ms\", \"4 s\"]\n\n[timing]")], None),
@@ -125,6 +146,28 @@ pub const OF_PARTS: &[Case] = &[
 /// Paths and stops: the spec with the first of its trajectories.
 #[rustfmt::skip]
 pub const OF_PATHS: &[Case] = &[
+    // No two numbers alike, and none zero.
+    (
+        FRAMES,
+        &[
+            ("\"1.195 kg\"", "\"1.195 kg\"\ncenter_of_mass = [\"1.1 mm\", \"-2.3 mm\", \"3.7 mm\"]\nproducts = [\"1.1e6 g mm^2\", \"-0.7e6 g mm^2\", \"0.9e6 g mm^2\"]"),
+            ("[\"3.26e7 g mm^2\", \"3.26e7 g mm^2\", \"9.7e6 g mm^2\"]", "[\"3.21e7 g mm^2\", \"3.37e7 g mm^2\", \"1.27e7 g mm^2\"]"),
+            ("base_angle      = \"0.012 pi rad\"", "base_angle      = \"0.032 pi rad\""),
+            ("fixed_center       = \"50 mm\"", "fixed_center       = \"47 mm\""),
+            ("extensible_center  = \"50 mm\"", "extensible_center  = \"61 mm\""),
+            ("[\"0 V\", \"100 V\"]", "[\"-11.3 V\", \"101.7 V\"]"),
+            ("[\"0 V\", \"150 V\"]", "[\"-25.7 V\", \"147 V\"]"),
+            ("[\"-40 mm\", \"69.282 mm\", \"180 mm\"]\ndirection = [0, 0, 1]", "[\"-37 mm\", \"66 mm\", \"171 mm\"]\ndirection = [0.1, -0.2, 0.97]\ntarget_normal = [0.05, 0.1, 0.99]\ntarget_point = [\"-38 mm\", \"65 mm\", \"177 mm\"]"),
+            ("[\"-45 um\", \"55 um\"]", "[\"-71 um\", \"83 um\"]"),
+            ("bias = [\"0 um\", \"0 um\", \"10 um\", \"0 urad\", \"0 urad\", \"0 urad\"]", "bias = [\"1.3 um\", \"-2.1 um\", \"11 um\", \"3 urad\", \"-5 urad\", \"7 urad\"]\nspeed = [\"90 um/s\", \"110 um/s\", \"70 um/s\", \"0.9 mrad/s\", \"1.1 mrad/s\", \"0.7 mrad/s\"]\nacceleration = [\"9 mm/s^2\", \"11 mm/s^2\", \"7 mm/s^2\", \"90 mrad/s^2\", \"110 mrad/s^2\", \"70 mrad/s^2\"]\njerk = [\"0.9 m/s^3\", \"1.1 m/s^3\", \"0.7 m/s^3\", \"9 rad/s^3\", \"11 rad/s^3\", \"7 rad/s^3\"]"),
+            ("[timing]", "[[trajectory]]\nname = \"table\"\nkind = \"waveform\"\nfile = \"table.csv\"\nperiod = \"1 ms\"\n\n[timing]"),
+        ],
+        Some(wave),
+    ),
+    (REFERENCE, &[("[amplifier]", "[amplifier]\ncurrent = \"20 mA\""), ("damping_ratio   = 0.1", "damping_ratio   = 0.1\ncapacitance = \"3 uF\"")], None),
+    (REFERENCE, &[("[amplifier]", "[amplifier]\ncurrent = \"1 uA\""), ("damping_ratio   = 0.1", "damping_ratio   = 0.1\ncapacitance = \"3 uF\"")], None),
+    (REFERENCE, &[("slew_rate       = \"40 V/ms\"", "slew_rate       = \"0.1 V/ms\"")], None),
+    (REFERENCE, &[(CASE_1, "kind      = \"case-1\"\nfrequency = \"20 Hz\""), ("axial_stiffness = \"1e7 N/m\"", "axial_stiffness = \"1e5 N/m\"")], None),
     (REFERENCE, &[(BIAS_Z, "\"53 um\", \"0 urad\"")], None),
     (REFERENCE, &[(BIAS_Z, "\"51 um\", \"0 urad\"")], None),
     (REFERENCE, &[("\"50 um\", \"52 um\"]", "\"50 um\", \"47 um\"]")], None),

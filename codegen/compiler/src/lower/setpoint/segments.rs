@@ -220,3 +220,26 @@ fn turns_to_phase(turns: f64) -> u64 {
     let fraction = turns - libm::floor(turns);
     (fraction * 18_446_744_073_709_551_616.0) as u64
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{TAU, turned, turns_to_phase};
+
+    #[test]
+    fn quarters_of_a_turn_are_exact_and_others_are_sine_and_cosine() {
+        for eighths in -20_i32..=20 {
+            let turns = 0.125 * f64::from(eighths);
+            let (s, c) = turned(turns);
+            assert!((s - libm::sin(TAU * turns)).abs() < 1e-14, "sin of {turns}: {s}");
+            assert!((c - libm::cos(TAU * turns)).abs() < 1e-14, "cos of {turns}: {c}");
+            assert!(eighths % 2 != 0 || [s, c].iter().all(|part| [-1.0, 0.0, 1.0].contains(part)), "{turns}: {s}, {c}");
+        }
+    }
+
+    #[test]
+    fn a_phase_is_the_fraction_of_the_turns() {
+        for (turns, phase) in [(0.0, 0), (0.5, 1 << 63), (3.25, 1 << 62), (7.0, 0)] {
+            assert_eq!(turns_to_phase(turns), phase, "{turns}");
+        }
+    }
+}
