@@ -12,7 +12,9 @@ mod dynamics;
 mod examples;
 mod file;
 mod firmware;
+mod forc;
 mod identify;
+mod new;
 mod operate;
 mod pil;
 mod plant;
@@ -69,6 +71,8 @@ struct Common {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// Begin: a folder with a commented spec of your platform and a simulated record of its legs, from some fifteen answers.
+    New(new::Arguments),
     /// Report every finding about a spec; write nothing.
     Check(check::Arguments),
     /// Build for one target, check the image, hold it against the budget.
@@ -97,8 +101,8 @@ enum Command {
     Dynamics(dynamics::Arguments),
     /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
     Identify(identify::Arguments),
-    /// Simulate the reversal-curve experiment that `identify` needs, on the reference leg or another.
-    Forc(sim::ForcArguments),
+    /// Simulate the reversal-curve experiment that `identify` needs, on a leg of a spec or the reference leg.
+    Forc(forc::Arguments),
     /// Serve the simulated machine of a spec to a real-time controller on this computer.
     Plant(plant::Arguments),
     /// Measure how well this computer keeps time, and say what to change for real time.
@@ -135,6 +139,7 @@ pub fn run() -> ExitCode {
     }
     let done = match &cli.command {
         None => build::run(&cli.build, &mut ui),
+        Some(Command::New(arguments)) => new::run(arguments, &mut ui),
         Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
         Some(Command::Build(arguments)) => firmware::run(arguments, &mut ui),
         Some(Command::Size(arguments)) => firmware::run_size(arguments, &mut ui),
@@ -149,7 +154,7 @@ pub fn run() -> ExitCode {
         Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
-        Some(Command::Forc(arguments)) => sim::run_forc(arguments, &mut ui),
+        Some(Command::Forc(arguments)) => forc::run(arguments, &mut ui),
         Some(Command::Plant(arguments)) => plant::run(arguments, &mut ui),
         Some(Command::Doctor(arguments)) => doctor::run(arguments, &mut ui),
         Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),

@@ -13,6 +13,7 @@ mod guide;
 mod interrupt;
 mod kills;
 mod microcontroller;
+mod new;
 mod operate;
 mod optional;
 mod output_folder;

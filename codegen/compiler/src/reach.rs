@@ -114,8 +114,9 @@ pub fn notes(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
     if model.task_space.is_some() { Vec::new() } else { findings::notes_of_legs(model, reach) }
 }
 
-/// What is reached, with set-points about `bias`.
-fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose) -> Reach {
+/// What is reached, with set-points about `bias` (m and rad, from rest). `stroke`: what every leg can do, m.
+#[must_use]
+pub fn measure(model: &Model, platform: &Platform<f64>, stroke: f64, bias: &Pose) -> Reach {
     let bounds = model.workspace.bounds();
     let legs = travel::Legs { platform, stroke };
     let lengths = model.geometry.rest_legs().map(|[x, y, z]| libm::sqrt(x * x + y * y + z * z));

@@ -33,13 +33,14 @@ pub use source::MAX_BYTES;
 
 /// Errors that leave every value that the model needs as it stands in the file. A gain without a unit counts: gains may be
 /// left out.
-const UNPHYSICAL: [Code; 6] = [
+const UNPHYSICAL: [Code; 7] = [
     codes::GYRATION,
     codes::INERTIA_UNPHYSICAL,
     codes::CENTER_OUTSIDE_LEG,
     codes::WORKSPACE_UNREACHABLE,
     codes::STROKE_IMPOSSIBLE,
     codes::UNIT_MISSING,
+    codes::RECORD_UNREADABLE,
 ];
 
 /// Checks a spec and builds its model.

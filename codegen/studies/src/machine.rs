@@ -39,7 +39,7 @@ pub fn legs(
 /// gives the shape of the hysteresis.
 #[must_use]
 pub fn specimen(model: &Model, task: &TaskSpace, leg: &LegParameters, seed: Option<u64>) -> Specimen {
-    let leg = scaled(model, leg);
+    let leg = self::leg(model, leg);
     let mut nominal = nominal(model, task);
     // A stiff light platform has modes that the usual step is too long for.
     let fastest = Specimen::ideal(&nominal, &leg).structure().modes().0[5] / core::f64::consts::TAU;
@@ -81,8 +81,10 @@ fn bias(task: &TaskSpace) -> [f64; 6] {
     bias
 }
 
-/// The reference leg with the displacement, the voltages, the lag and the noise of the spec.
-fn scaled(model: &Model, leg: &LegParameters) -> LegParameters {
+/// A leg with the displacement (µm), the voltages (V, from the lowest), the lag (s) and the noise of the spec; what a spec does
+/// not say is as in `leg`: the shape of the hysteresis, the creep.
+#[must_use]
+pub fn leg(model: &Model, leg: &LegParameters) -> LegParameters {
     let [low, high] = model.actuator.voltage;
     let stretch = (high - low) / leg.u_max;
     let volts = |values: &[f64]| values.iter().map(|v| v * stretch).collect();

@@ -19,6 +19,14 @@ docs/guide.md leads from the bench to running firmware. Every command has exampl
 
 Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment, 130 interrupted.";
 
+pub const NEW: &str = "\
+Examples:
+  specgen new bench --like reference                       # asks nothing: a platform as the paper's
+  specgen new mine --like reference --r_B \"200 mm\" --stroke \"100 um\" --rate \"20 kHz\"
+  specgen new six --like legs --stroke \"30 um\"             # six legs with gauges of their own
+
+Without --like it asks; an empty line takes the value in brackets. The paper's symbols are options, too: --r_B, --r_P, --alpha_B, --alpha_P, --m, --k_a, --T_s.";
+
 pub const CHECK: &str = "\
 Examples:
   specgen check platform.toml              # every finding with line, column and fix
@@ -129,7 +137,8 @@ Examples:
 
 pub const FORC: &str = "\
 Examples:
-  specgen forc -o record.csv                               # 32 curves at 20 V/s
+  specgen forc -o record.csv                               # the reference leg, 32 curves at 20 V/s
+  specgen forc platform.toml -o leg.csv                    # a leg of this spec
   specgen forc -o fast.csv --rate 2000 --grid 16           # a second rate, for `identify rate`";
 
 pub const PLANT: &str = "\

@@ -1,5 +1,4 @@
-//! `specgen sim`: the paper's experiments with the emitted controller; `specgen forc`: the experiment that records reversal
-//! curves. Both on simulated machines that are not of the controller's model class.
+//! `specgen sim`: the paper's experiments with the emitted controller, on simulated machines that are not of its model class.
 
 pub(super) mod legs;
 pub(super) mod platform;
@@ -10,13 +9,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use host_sim::controller::Controller;
-use host_sim::forc::ReversalExperiment;
-use host_sim::noise::Gauge;
-use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
-use serde::Serialize;
+use host_sim::plant::{LegParameters, NoiseParameters};
 
-use super::file::{check_place, claim, write_file};
-use super::ui::{Failure, Outcome, Ui};
+use super::file::{check_place, claim};
+use super::ui::{Failure, Ui};
 use specgen_compiler::compile;
 use specgen_compiler::workspace;
 use specgen_language::interrupt::Scratch;
@@ -127,52 +123,4 @@ pub(super) fn emitted(compiled: &compile::Compiled, ui: &Ui) -> Result<Controlle
     ui.progress("building the emitted controller for this host");
     let library = target::host::build_library(&workspace, &scratch.path().join("target"))?;
     Controller::load(&library).map_err(environment)
-}
-
-/// Arguments of `forc`.
-#[derive(Args, Debug)]
-#[command(after_help = super::examples::FORC)]
-pub struct ForcArguments {
-    /// File to write: CSV with time_s, drive_V, displacement_um.
-    #[arg(short, long, value_name = "FILE")]
-    output: PathBuf,
-    /// Reversal curves, and cells per axis of the grid that they identify.
-    #[arg(long, default_value_t = 32, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=256))]
-    grid: u32,
-    /// Slope of the drive, V/s: records at several rates are what `identify rate` needs.
-    #[arg(long, value_name = "V/S", default_value_t = 20.0, allow_negative_numbers = true, value_parser = slope)]
-    rate: f64,
-    #[command(flatten)]
-    plant: PlantArguments,
-}
-
-/// Slopes from one sweep in hours to one in milliseconds.
-fn slope(text: &str) -> Result<f64, String> {
-    let expected = || format!("expected a slope from 0.1 to 100000 V/s, found `{text}`");
-    text.parse().ok().filter(|rate| (0.1..=1e5).contains(rate)).ok_or_else(expected)
-}
-
-/// The record of reversal curves that was written.
-#[derive(Serialize)]
-struct Curves {
-    rows: usize,
-    file: String,
-}
-
-impl Outcome for Curves {
-    fn text(&self) -> String {
-        format!("wrote {} rows to {}\n", self.rows, self.file)
-    }
-}
-
-pub fn run_forc(arguments: &ForcArguments, ui: &mut Ui) -> Result<(), Failure> {
-    let (parameters, noise) = arguments.plant.read()?;
-    let mut leg = LegPlant::new(&parameters);
-    let mut gauge = Gauge::new(&noise, arguments.plant.seed, 0);
-    let record = ReversalExperiment { rate: arguments.rate, ..ReversalExperiment::reference(arguments.grid) }
-        .run(&mut leg, &mut gauge);
-    let rows = record.rows.len();
-    write_file(&arguments.output, record.to_csv().as_bytes())?;
-    ui.result(&Curves { rows, file: arguments.output.display().to_string() });
-    Ok(())
 }

@@ -1,0 +1,123 @@
+//! `specgen forc`: the experiment that records reversal curves, on a simulated leg that is not of the controller's model class.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::forc::{ReversalExperiment, ReversalRecord};
+use host_sim::noise::Gauge;
+use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
+use serde::Serialize;
+use specgen_compiler::compile::Refused;
+use specgen_language::model::Model;
+use specgen_language::spec::{self, SpecSource};
+use specgen_studies::machine;
+
+use super::file::write_file;
+use super::sim::PlantArguments;
+use super::ui::{Failure, Outcome, Ui};
+
+/// Curves where nothing else is said.
+const CURVES: u32 = 32;
+/// Time in which the drive crosses its range, s.
+const CROSSING: f64 = 5.0;
+
+/// Arguments of `forc`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::FORC)]
+pub struct Arguments {
+    /// Simulate a leg of this spec: its stroke, voltages, amplifier and gauge noise. Without it, the reference leg. The records
+    /// that the spec names need not be there.
+    spec: Option<PathBuf>,
+    /// File to write: CSV with time_s, drive_V, displacement_um.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Reversal curves, and cells per axis of the grid that they identify; 32, or the grid of the spec.
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=256))]
+    grid: Option<u32>,
+    /// Slope of the drive, V/s; a fifth of the voltage range if not given. Records at several rates are what `identify rate`
+    /// needs.
+    #[arg(long, value_name = "V/S", allow_negative_numbers = true, value_parser = slope)]
+    rate: Option<f64>,
+    #[command(flatten)]
+    plant: PlantArguments,
+}
+
+/// Slopes from one sweep in hours to one in milliseconds.
+fn slope(text: &str) -> Result<f64, String> {
+    let expected = || format!("expected a slope from 0.1 to 100000 V/s, found `{text}`");
+    text.parse().ok().filter(|rate| (0.1..=1e5).contains(rate)).ok_or_else(expected)
+}
+
+/// The record of reversal curves that was written.
+#[derive(Serialize)]
+struct Curves {
+    rows: usize,
+    file: String,
+}
+
+impl Outcome for Curves {
+    fn text(&self) -> String {
+        format!("wrote {} rows to {}\n", self.rows, self.file)
+    }
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let experiment = Experiment {
+        grid: arguments.grid,
+        rate: arguments.rate,
+        seed: arguments.plant.seed,
+        no_noise: arguments.plant.no_noise,
+        shape: arguments.plant.leg()?,
+    };
+    let record = match &arguments.spec {
+        Some(path) => {
+            let source = SpecSource::read(path).map_err(|finding| Refused { source: None, findings: vec![finding] })?;
+            let (model, findings) = spec::load_as_far(&source);
+            let Some(model) = model else {
+                return Err(Refused { source: Some(source), findings }.into());
+            };
+            simulate(&model, &experiment)
+        }
+        None => experiment.run(&experiment.shape, CURVES, 0.0),
+    };
+    let rows = record.rows.len();
+    write_file(&arguments.output, record.to_csv().as_bytes())?;
+    ui.result(&Curves { rows, file: arguments.output.display().to_string() });
+    Ok(())
+}
+
+/// How a leg is recorded.
+pub struct Experiment {
+    grid: Option<u32>,
+    rate: Option<f64>,
+    seed: u64,
+    no_noise: bool,
+    /// What a spec does not say of a leg: the shape of its hysteresis, its creep.
+    shape: LegParameters,
+}
+
+impl Default for Experiment {
+    fn default() -> Self {
+        Self { grid: None, rate: None, seed: 1, no_noise: false, shape: LegParameters::reference() }
+    }
+}
+
+impl Experiment {
+    /// Records `leg`, whose lowest voltage is `lowest`, V.
+    fn run(&self, leg: &LegParameters, curves: u32, lowest: f64) -> ReversalRecord {
+        let noise = if self.no_noise { NoiseParameters::NONE } else { leg.noise };
+        let reference = ReversalExperiment::reference(self.grid.unwrap_or(curves));
+        let rate = self.rate.unwrap_or(leg.u_max / CROSSING);
+        let experiment = ReversalExperiment { drive_max: leg.u_max, rate, ..reference };
+        let mut record = experiment.run(&mut LegPlant::new(leg), &mut Gauge::new(&noise, self.seed, 0));
+        record.rows.iter_mut().for_each(|row| row.drive += lowest);
+        record
+    }
+}
+
+/// A record of a leg as `model` describes it.
+pub fn simulate(model: &Model, experiment: &Experiment) -> ReversalRecord {
+    let leg = machine::leg(model, &experiment.shape);
+    // At most `MAX_GRID`.
+    experiment.run(&leg, model.hysteresis.grid as u32, model.actuator.voltage[0])
+}

@@ -1,0 +1,128 @@
+//! The text of a new spec: a template in which values stand for keys, each with where it comes from.
+
+use std::collections::BTreeMap;
+
+const TEMPLATE: &str = include_str!("template.toml");
+const HEAD: &str = "\
+#:schema ./platform.schema.json
+# Values that were not given are marked: (assumed) is as in the paper's platform, (computed) follows from the others. Replace
+# them as you measure. `specgen check` says what does not fit together; docs/spec-reference.md has every key.
+";
+
+/// Where a value comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Origin {
+    Given,
+    Computed,
+}
+
+/// A spec that is being written: TOML literals by key path, such as `geometry.height` or `gauge[2].point`.
+#[derive(Debug, Clone, Default)]
+pub struct Draft {
+    values: BTreeMap<String, (String, Origin)>,
+    /// Sections that the spec does not have.
+    without: &'static [&'static str],
+}
+
+impl Draft {
+    /// Puts `literal` at `key`.
+    pub fn set(&mut self, key: &str, literal: String, origin: Origin) {
+        self.values.insert(key.to_owned(), (literal, origin));
+    }
+
+    /// Puts a computed value where none was given and any of what it is computed `from` is no longer the template's.
+    pub fn compute(&mut self, key: &str, from: &[&str], literal: String) {
+        if !self.is_given(key) && from.iter().any(|input| self.values.contains_key(*input)) {
+            self.set(key, literal, Origin::Computed);
+        }
+    }
+
+    pub fn is_given(&self, key: &str) -> bool {
+        matches!(self.values.get(key), Some((_, Origin::Given)))
+    }
+
+    /// Leaves sections out, their subsections too.
+    pub fn leave_out(&mut self, sections: &'static [&'static str]) {
+        self.without = sections;
+    }
+
+    /// Whether the spec has this key.
+    pub fn has(&self, key: &str) -> bool {
+        self.entries().any(|(found, ..)| found == key)
+    }
+
+    /// The TOML literal at `key`; that of the template where nothing else was set.
+    pub fn literal(&self, key: &str) -> String {
+        let set = self.values.get(key).map(|(literal, _)| literal.clone());
+        set.or_else(|| lines().find(|(found, ..)| found == key).map(|(_, _, value, _)| value.to_owned()))
+            .unwrap_or_default()
+    }
+
+    /// Values that nobody gave and nothing was computed from.
+    pub fn assumed(&self) -> usize {
+        self.entries().filter(|(key, _, _, comment)| !comment.is_empty() && !self.values.contains_key(key)).count()
+    }
+
+    /// The whole file.
+    pub fn text(&self, name: &str) -> String {
+        let mut text = format!("{HEAD}schema = 1\nname = \"{name}\"\n");
+        let mut header = "";
+        let mut section: Vec<[String; 3]> = Vec::new();
+        let mut last = String::new();
+        for (key, name, _, comment) in self.entries() {
+            let (at, short) = key.rsplit_once('.').unwrap_or(("", &key));
+            if at != last {
+                text.push_str(&aligned(header, &section));
+                section.clear();
+                (header, last) = (name, at.to_owned());
+            }
+            let origin = match self.values.get(&key) {
+                _ if comment.is_empty() => "",
+                None => " (assumed)",
+                Some((_, Origin::Computed)) => " (computed)",
+                Some((_, Origin::Given)) => "",
+            };
+            section.push([short.to_owned(), self.literal(&key), format!("{comment}{origin}")]);
+        }
+        text.push_str(&aligned(header, &section));
+        text
+    }
+
+    fn entries(&self) -> impl Iterator<Item = (String, &'static str, &'static str, &'static str)> {
+        let left_out = |header: &str| self.without.iter().any(|name| header.trim_matches(['[', ']']).starts_with(name));
+        lines().filter(move |(_, header, ..)| !left_out(header))
+    }
+}
+
+/// Of each line of the template: key path, header of its section, value, comment.
+fn lines() -> impl Iterator<Item = (String, &'static str, &'static str, &'static str)> {
+    let mut header = "";
+    let mut gauges = 0;
+    TEMPLATE.lines().filter_map(move |line| {
+        if line.starts_with('[') {
+            header = line;
+            gauges += usize::from(line.starts_with("[["));
+        }
+        let (key, rest) = line.split_once(" = ")?;
+        let (value, comment) = rest.split_once(" # ").unwrap_or((rest, ""));
+        let section = header.trim_matches(['[', ']']);
+        let section = if header.starts_with("[[") { format!("{section}[{}]", gauges - 1) } else { section.to_owned() };
+        Some((format!("{section}.{key}"), header, value, comment))
+    })
+}
+
+/// A section with its values and comments in columns.
+fn aligned(header: &str, rows: &[[String; 3]]) -> String {
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let (keys, values) = (width(0), width(1));
+    let mut text = if rows.is_empty() { String::new() } else { format!("\n{header}\n") };
+    for [key, value, comment] in rows {
+        let line = if comment.is_empty() {
+            format!("{key:keys$} = {value}\n")
+        } else {
+            format!("{key:keys$} = {value:values$}  # {comment}\n")
+        };
+        text.push_str(&line);
+    }
+    text
+}

@@ -1,0 +1,116 @@
+//! What `specgen new` asks or takes as options, and how an answer becomes a TOML literal.
+
+use specgen_language::spec::keys::{self, Item, Shape};
+use specgen_language::spec::quantity::{self, Dimension};
+
+/// One value that a user can give.
+pub struct Question {
+    /// Its option, without the dashes.
+    pub option: &'static str,
+    /// The paper's symbol and common names, taken as options too.
+    pub aliases: &'static [&'static str],
+    /// Where it stands in the spec.
+    pub key: &'static str,
+    /// Whether it is asked for; the rest has a value that fits most platforms.
+    pub asked: bool,
+    /// What is asked.
+    pub text: &'static str,
+}
+
+const fn ask(
+    option: &'static str,
+    aliases: &'static [&'static str],
+    key: &'static str,
+    text: &'static str,
+) -> Question {
+    Question { option, aliases, key, asked: true, text }
+}
+
+const fn option(
+    option: &'static str,
+    aliases: &'static [&'static str],
+    key: &'static str,
+    text: &'static str,
+) -> Question {
+    Question { option, aliases, key, asked: false, text }
+}
+
+/// In the order in which they are asked.
+// One question a line: this is a table.
+#[rustfmt::skip]
+pub const QUESTIONS: &[Question] = &[
+    ask("base-radius", &["r_B"], "geometry.base_radius", "Radius of the circle through the base joints, r_B"),
+    ask("platform-radius", &["r_P"], "geometry.platform_radius", "Radius of the circle through the platform joints, r_P"),
+    ask("base-angle", &["alpha_B"], "geometry.base_angle", "Angle between the two base joints of a pair, alpha_B"),
+    ask("platform-angle", &["alpha_P"], "geometry.platform_angle", "Angle between the two platform joints of a pair, alpha_P"),
+    ask("height", &["P_z"], "geometry.height", "Height of the platform joints above the base joints"),
+    ask("mass", &["m", "payload"], "platform.mass", "Moving mass, with everything mounted on it"),
+    ask("inertia", &["I"], "platform.inertia", "Moments of inertia I_xx, I_yy, I_zz about the centre of mass"),
+    ask("stroke", &["travel"], "actuator.stroke", "Free stroke of a leg"),
+    ask("voltage", &["drive"], "actuator.voltage", "Lowest and highest voltage of a leg"),
+    ask("stiffness", &["k_a", "axial-stiffness"], "actuator.axial_stiffness", "Axial stiffness of a leg, k_a"),
+    ask("resonance", &["f_0"], "actuator.resonance", "First axial resonance of a leg as mounted"),
+    ask("slew-rate", &["slew"], "actuator.slew_rate", "Fastest change of voltage that amplifier and stack stand"),
+    ask("gauge-noise", &["sensor-noise"], "sensor.noise", "Noise of a gauge, rms"),
+    ask("rate", &["period", "T_s"], "timing.period", "Control rate or period"),
+    option("gauge-range", &["sensor-range"], "sensor.range", "Smallest and largest displacement that a gauge can report"),
+    option("gauge-bits", &["sensor-bits"], "sensor.bits", "Resolution of the gauges' converter, bits"),
+    option("dac-bits", &[], "dac.bits", "Resolution of the output converter, bits"),
+    option("dac-range", &[], "dac.range", "Volts at the stack at code 0 and at full scale"),
+    option("amplifier-lag", &["lag"], "amplifier.lag", "Time constant of the amplifiers"),
+    option("amplifier-noise", &[], "amplifier.noise", "Noise of the amplifiers, rms"),
+    option("modal-damping", &["zeta"], "control.modal_damping", "Damping ratio of the lowest mode of the platform"),
+    option("translation", &[], "workspace.translation", "Bounds on x, y and z from rest; what the legs reach if not given"),
+    option("rotation", &[], "workspace.rotation", "Bounds on the three angles; what the legs reach if not given"),
+    option("mcu", &[], "target.mcu", "Microcontroller"),
+];
+
+impl Question {
+    /// What an answer looks like, for help and prompt.
+    pub fn example(&self) -> String {
+        let example = keys::key(self.key).map_or("", |key| key.example);
+        if self.option == "rate" { "20 kHz or 50 us".to_owned() } else { plain(example) }
+    }
+}
+
+/// A TOML literal as a user types it: without quotes and brackets.
+pub fn plain(literal: &str) -> String {
+    literal.replace(['[', ']', '"'], "")
+}
+
+/// The TOML literal of an answer: quoted where the key takes text, a list where it takes one, a rate as its period.
+pub fn literal(question: &Question, answer: &str) -> String {
+    let Some(key) = keys::key(question.key) else { return quoted(answer) };
+    let (item, list) = match key.shape {
+        Shape::One(item) => (item, false),
+        Shape::List(items) | Shape::Leading(_, items) | Shape::Rows(_, items) => (items[0], true),
+        Shape::Records => (Item::File, true),
+    };
+    let one = |text: &str| {
+        let text = text.trim();
+        match item {
+            Item::Number(_) | Item::Integer(..) | Item::Flag if !text.is_empty() => text.to_owned(),
+            Item::Quantity { dimension: Dimension::TIME, .. } => quoted(&period(text)),
+            _ => quoted(text),
+        }
+    };
+    let inner = answer.trim().trim_start_matches('[').trim_end_matches(']').replace('"', "");
+    match (list, inner.split(',').map(one).collect::<Vec<_>>()) {
+        (true, items) => format!("[{}]", items.join(", ")),
+        (false, _) => one(&inner),
+    }
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{}\"", text.replace(['\\', '"', '\n', '\r'], ""))
+}
+
+/// The period of a rate such as "20 kHz"; anything else as it is.
+fn period(text: &str) -> String {
+    match quantity::parse(text) {
+        Ok(found) if found.dimension == Dimension::FREQUENCY && found.value > 0.0 => {
+            format!("{} us", 1e6 / found.value)
+        }
+        _ => text.to_owned(),
+    }
+}
