@@ -14,6 +14,7 @@ mod file;
 mod firmware;
 mod forc;
 mod identify;
+mod lsp;
 mod new;
 mod operate;
 mod pil;
@@ -107,6 +108,8 @@ enum Command {
     Plant(plant::Arguments),
     /// Measure how well this computer keeps time, and say what to change for real time.
     Doctor(doctor::Arguments),
+    /// Serve an editor by the Language Server Protocol: findings while one types, meanings of keys, completion, fixes.
+    Lsp(lsp::Arguments),
     /// Print the intermediate representation of a spec: every constant of its controller.
     #[command(after_help = examples::DUMP_IR)]
     DumpIr {
@@ -157,6 +160,7 @@ pub fn run() -> ExitCode {
         Some(Command::Forc(arguments)) => forc::run(arguments, &mut ui),
         Some(Command::Plant(arguments)) => plant::run(arguments, &mut ui),
         Some(Command::Doctor(arguments)) => doctor::run(arguments, &mut ui),
+        Some(Command::Lsp(arguments)) => lsp::run(arguments),
         Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),
         Some(Command::Cache(arguments)) => cache::run(arguments, &ui),
         Some(Command::Completions(arguments)) => {

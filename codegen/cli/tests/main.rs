@@ -12,6 +12,7 @@ mod firmware;
 mod guide;
 mod interrupt;
 mod kills;
+mod lsp;
 mod microcontroller;
 mod new;
 mod operate;

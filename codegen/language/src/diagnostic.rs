@@ -56,6 +56,8 @@ pub struct Diagnostic {
     pub message: String,
     /// How to fix it.
     pub help: String,
+    /// Text that may stand at `place` instead, where the fix is as simple as that.
+    pub replacement: Option<String>,
 }
 
 impl Diagnostic {
@@ -63,7 +65,7 @@ impl Diagnostic {
     #[must_use]
     pub fn new(code: Code, key: &str, place: Place, message: impl Into<String>, help: impl Into<String>) -> Self {
         let (message, help) = (message.into(), help.into());
-        Self { severity: code.severity(), code: code.id, key: key.to_owned(), place, message, help }
+        Self { severity: code.severity(), code: code.id, key: key.to_owned(), place, message, help, replacement: None }
     }
 
     /// A finding at the first of `keys` that stands in the spec, by its `spans`; at none of them, about the whole spec

@@ -27,7 +27,7 @@ use crate::model::Model;
 
 pub use crate::SpecSource;
 pub use crate::quantity;
-pub use reference::reference_markdown;
+pub use reference::{key_markdown, reference_markdown};
 pub use schema::json_schema;
 pub use source::MAX_BYTES;
 

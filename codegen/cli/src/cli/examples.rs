@@ -27,6 +27,9 @@ Examples:
 
 Without --like it asks; an empty line takes the value in brackets. The paper's symbols are options, too: --r_B, --r_P, --alpha_B, --alpha_P, --m, --k_a, --T_s.";
 
+pub const LSP: &str = "\
+An editor starts it: docs/editors.md has the lines for VS Code, Helix and Neovim.";
+
 pub const CHECK: &str = "\
 Examples:
   specgen check platform.toml              # every finding with line, column and fix

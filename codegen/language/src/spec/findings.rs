@@ -27,6 +27,13 @@ impl Findings {
         self.list.push(Diagnostic::new(code, key, Place::Spec(span), message, help));
     }
 
+    /// Says what may stand in the place of the last finding, if that is about `key`.
+    pub(super) fn replace_by(&mut self, key: &str, text: Option<String>) {
+        if let Some(last) = self.list.last_mut().filter(|last| last.key == key) {
+            last.replacement = text;
+        }
+    }
+
     /// Counts findings that were not even made.
     pub(super) fn leave_out(&mut self, count: usize) {
         self.left_out += count;

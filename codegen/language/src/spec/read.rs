@@ -174,6 +174,7 @@ impl Reader<'_> {
         };
         let span = text::clamp(self.source, name.span());
         self.findings.add(code, &path, span, format!("unknown {what} {}{place}", text::quote(written)), help);
+        self.findings.replace_by(&path, meant.map(str::to_owned));
     }
 
     fn section(

@@ -55,6 +55,19 @@ pub fn reference_markdown() -> String {
     text
 }
 
+/// One key as Markdown, for an editor: path, symbol, meaning, example, range, what stands if it is left out.
+#[must_use]
+pub fn key_markdown(path: &str, key: &Key) -> String {
+    let symbol = if key.symbol.is_empty() { String::new() } else { format!(", {} in the paper", key.symbol) };
+    format!(
+        "`{path}`{symbol}\n\n{}\n\n- example: {}\n- range: {}\n- if left out: {}\n",
+        key.doc,
+        form(key),
+        range(key),
+        absence(key)
+    )
+}
+
 fn form(key: &Key) -> String {
     match key.shape {
         Shape::One(_) | Shape::Records => format!("`{}`", key.example),

@@ -76,6 +76,7 @@ fn unquoted(source: &str, span: Range<usize>, findings: &mut Findings) {
         format!("{} is a text without quotes", text::quote(found)),
         format!("texts and quantities stand in quotes: write \"{}\"", text::shorten(found.trim())),
     );
+    findings.replace_by("", Some(format!("\"{}\"", found.trim())));
 }
 
 /// The text without quotes that the parser took for a bad number or truth value: `150mm`, `f32`, `invhys`.

@@ -165,6 +165,7 @@ impl ValueReader<'_> {
                         format!("`{path}` is \"{}\", expected {}", text::shorten(found), text::alternatives(words)),
                         format!("{did_you_mean}write {}. {}", text::alternatives(words), self.key.doc),
                     );
+                    self.findings.replace_by(path, meant.map(|word| format!("\"{word}\"")));
                 }
                 known.map(|word| Scalar::Choice(word))
             }

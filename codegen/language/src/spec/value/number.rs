@@ -7,7 +7,7 @@ use toml::de::DeValue;
 
 use super::ValueReader;
 use crate::diagnostic::codes;
-use crate::quantity::{self, Dimension};
+use crate::quantity::{self, Dimension, Problem};
 use crate::spec::keys::Item;
 use crate::spec::{messages, text};
 
@@ -47,7 +47,15 @@ impl ValueReader<'_> {
             Err(error) => {
                 let place = self.inside(&span, found, &error.range);
                 let (code, message, help) = messages::bad_quantity(self.key, path, found, &error.problem);
+                let replacement = match &error.problem {
+                    // Where escapes moved it, the place is the whole value.
+                    Problem::UnknownUnit(unit, Some(meant)) if self.source.get(place.clone()) == Some(unit) => {
+                        Some((*meant).to_owned())
+                    }
+                    _ => None,
+                };
                 self.findings.add(code, path, place, message, help);
+                self.findings.replace_by(path, replacement);
                 None
             }
         }

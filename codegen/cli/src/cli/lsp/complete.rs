@@ -1,0 +1,151 @@
+//! What may be typed at a place of a spec.
+
+use std::path::Path;
+
+use lsp_types::{CompletionItem, CompletionItemKind};
+use specgen_language::spec::keys::{Item, Presence, SECTIONS, Section, Shape};
+use specgen_language::spec::quantity;
+
+use super::text::Spot;
+
+/// Units that are offered where their dimension fits; any other unit of it will do, too.
+const UNITS: &[&str] = &[
+    "m",
+    "mm",
+    "um",
+    "nm",
+    "kg",
+    "g",
+    "rad",
+    "mrad",
+    "urad",
+    "nrad",
+    "deg",
+    "s",
+    "ms",
+    "us",
+    "Hz",
+    "kHz",
+    "V",
+    "mV",
+    "V/ms",
+    "V/s",
+    "um/V",
+    "nm/V",
+    "N/m",
+    "N/um",
+    "N m/rad",
+    "N s/m",
+    "N m s/rad",
+    "N/(m s)",
+    "N m/(rad s)",
+    "kg m^2",
+    "g mm^2",
+    "um/s",
+    "mm/s",
+    "mrad/s",
+    "rad/s",
+    "mm/s^2",
+    "m/s^2",
+    "mrad/s^2",
+    "rad/s^2",
+    "m/s^3",
+    "rad/s^3",
+    "A",
+    "mA",
+    "uF",
+    "nF",
+    "KiB",
+    "MiB",
+];
+
+pub fn at(text: &str, spot: &Spot, folder: &Path) -> Vec<CompletionItem> {
+    if spot.is_header || spot.before.trim_start().starts_with('[') && !spot.in_value {
+        return sections(&spot.before);
+    }
+    if spot.in_value {
+        return spot.key.map_or_else(Vec::new, |key| values(key.shape, key.example, &spot.before, folder));
+    }
+    spot.section.map_or_else(Vec::new, |section| names(text, spot, section))
+}
+
+fn item(label: impl Into<String>, kind: CompletionItemKind, insert: impl Into<String>, detail: &str) -> CompletionItem {
+    CompletionItem {
+        label: label.into(),
+        kind: Some(kind),
+        insert_text: Some(insert.into()),
+        detail: Some(detail.to_owned()),
+        ..Default::default()
+    }
+}
+
+fn sections(before: &str) -> Vec<CompletionItem> {
+    let typed = before.chars().filter(|letter| *letter == '[').count();
+    let known = SECTIONS.iter().filter(|section| !section.name.is_empty());
+    let offered = known.map(|section| {
+        let header = section.header();
+        // Brackets that are there are not typed again.
+        item(section.name, CompletionItemKind::STRUCT, header.get(typed..).unwrap_or(section.name), section.doc)
+    });
+    offered.collect()
+}
+
+/// Keys of the section, each with a value that is right. The ones that must be there come first.
+fn names(text: &str, spot: &Spot, section: &'static Section) -> Vec<CompletionItem> {
+    let offered = section.keys.iter().enumerate().map(|(place, key)| {
+        let optional = key.presence != Presence::Required;
+        CompletionItem {
+            sort_text: Some(format!("{}{place:03}", u8::from(optional))),
+            ..item(key.name, CompletionItemKind::PROPERTY, format!("{} = {}", key.name, key.example), key.doc)
+        }
+    });
+    let there = |name: &str| spot.has(text, name);
+    offered.filter(|offered| !there(&offered.label)).collect()
+}
+
+fn values(shape: Shape, example: &str, before: &str, folder: &Path) -> Vec<CompletionItem> {
+    let quoted = before.matches('"').count() % 2 == 1;
+    let text = |word: &str| if quoted { word.to_owned() } else { format!("\"{word}\"") };
+    let first = match shape {
+        Shape::One(item) => item,
+        Shape::List(items) | Shape::Leading(_, items) | Shape::Rows(_, items) => match items {
+            // In the last items of a list of six stand angles.
+            [.., last] if before.matches(',').count() >= 3 => *last,
+            [first, ..] => *first,
+            [] => return Vec::new(),
+        },
+        Shape::Records => Item::File,
+    };
+    match first {
+        Item::Quantity { dimension, .. } if quoted => {
+            let fits = |unit: &&&str| quantity::unit_value(unit).is_some_and(|found| found.dimension == dimension);
+            UNITS.iter().filter(fits).map(|unit| item(*unit, CompletionItemKind::UNIT, *unit, "unit")).collect()
+        }
+        Item::Choice(words) => {
+            words.iter().map(|word| item(*word, CompletionItemKind::ENUM_MEMBER, text(word), "")).collect()
+        }
+        Item::Flag => ["true", "false"].map(|word| item(word, CompletionItemKind::VALUE, word, "")).to_vec(),
+        Item::File => files(folder).iter().map(|name| item(name, CompletionItemKind::FILE, text(name), "")).collect(),
+        _ if quoted => Vec::new(),
+        _ => vec![item(example, CompletionItemKind::VALUE, example, "the form of a value")],
+    }
+}
+
+/// CSV files beside the spec and one folder below.
+fn files(folder: &Path) -> Vec<String> {
+    let names = |folder: &Path| -> Vec<(String, bool)> {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.map(|entry| (entry.file_name().to_string_lossy().into_owned(), entry.path().is_dir())).collect()
+    };
+    let mut found = Vec::new();
+    for (name, is_folder) in names(folder) {
+        if is_folder {
+            found.extend(names(&folder.join(&name)).into_iter().map(|(below, _)| format!("{name}/{below}")));
+        } else {
+            found.push(name);
+        }
+    }
+    found.retain(|name| name.ends_with(".csv"));
+    found.sort();
+    found
+}
