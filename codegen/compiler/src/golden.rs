@@ -176,7 +176,7 @@ fn build(source: &SpecSource, table_of_poses: Option<&str>) -> Result<Built, Vec
         None => Ok(None),
         Some(task) => {
             let waveforms = waveforms(source, &model, table_of_poses);
-            findings.extend(waveforms.iter().flatten().filter_map(lint::paths::steps));
+            findings.extend(waveforms.iter().flatten().filter_map(setpoint::step));
             setpoint::lower(&model, task, &waveforms, lower::scalar(&model)).map(Some)
         }
     };

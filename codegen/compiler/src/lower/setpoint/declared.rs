@@ -55,7 +55,7 @@ pub fn declared(model: &Model, dir: &Path) -> Result<Declared, Vec<Diagnostic>> 
 }
 
 /// A step of a table that stands out from those around it: a jump that no speed limit sees.
-fn step(waveform: &Waveform) -> Option<Diagnostic> {
+pub(crate) fn step(waveform: &Waveform) -> Option<Diagnostic> {
     let largest = |steps: [f64; 4]| steps.into_iter().fold(0.0, |a: f64, b| if b > a { b } else { a });
     (0..6).find_map(|axis| {
         let steps: Vec<f64> = waveform.rows.windows(2).map(|pair| (pair[1][axis] - pair[0][axis]).abs()).collect();
