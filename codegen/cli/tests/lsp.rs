@@ -16,8 +16,8 @@ fn session(folder: &Folder, messages: &[Value]) -> Vec<Value> {
         .stdout(Stdio::piped())
         .stderr(Stdio::inherit())
         .spawn()
-        .expect("started");
-    let mut input = server.stdin.take().expect("piped");
+        .unwrap();
+    let mut input = server.stdin.take().unwrap();
     let begin = [
         json!({ "jsonrpc": "2.0", "id": 0, "method": "initialize", "params": { "capabilities": {} } }),
         json!({ "jsonrpc": "2.0", "method": "initialized", "params": {} }),
@@ -28,22 +28,22 @@ fn session(folder: &Folder, messages: &[Value]) -> Vec<Value> {
     ];
     for message in begin.iter().chain(messages).chain(&end) {
         let text = message.to_string();
-        write!(input, "Content-Length: {}\r\n\r\n{text}", text.len()).expect("taken");
+        write!(input, "Content-Length: {}\r\n\r\n{text}", text.len()).unwrap();
     }
     drop(input);
-    let mut output = BufReader::new(server.stdout.take().expect("piped"));
+    let mut output = BufReader::new(server.stdout.take().unwrap());
     let mut answers = Vec::new();
     loop {
         let mut header = String::new();
-        if output.read_line(&mut header).expect("text") == 0 {
+        if output.read_line(&mut header).unwrap() == 0 {
             break;
         }
-        let length: usize = header.trim().trim_start_matches("Content-Length: ").parse().expect("a length");
+        let length: usize = header.trim().trim_start_matches("Content-Length: ").parse().unwrap();
         let mut body = vec![0; length + 2];
-        output.read_exact(&mut body).expect("a message");
-        answers.push(serde_json::from_slice(&body).expect("JSON"));
+        output.read_exact(&mut body).unwrap();
+        answers.push(serde_json::from_slice(&body).unwrap());
     }
-    assert!(server.wait().expect("ended").success());
+    assert!(server.wait().unwrap().success());
     answers
 }
 
@@ -54,7 +54,7 @@ fn open(folder: &Folder, text: &str) -> Value {
 }
 
 fn request(folder: &Folder, id: u32, method: &str, text: &str, words: &str) -> Value {
-    let at = text.find(words).expect("there") + words.len();
+    let at = text.find(words).unwrap() + words.len();
     let line = text[..at].matches('\n').count();
     let column = at - text[..at].rfind('\n').map_or(0, |found| found + 1);
     let uri = format!("file://{}", folder.path("open.toml").display());
@@ -65,7 +65,7 @@ fn request(folder: &Folder, id: u32, method: &str, text: &str, words: &str) -> V
 }
 
 fn answer(answers: &[Value], id: u32) -> &Value {
-    &answers.iter().find(|answer| answer["id"] == id && answer["method"].is_null()).expect("answered")["result"]
+    &answers.iter().find(|answer| answer["id"] == id && answer["method"].is_null()).unwrap()["result"]
 }
 
 #[test]
@@ -81,12 +81,12 @@ fn findings_are_those_of_check_and_their_fixes_are_accepted() {
             &[open(&folder, &text), request(&folder, 1, "textDocument/codeAction", &text, wrong.trim_end_matches('"'))],
         );
         let shown = answers.iter().rfind(|answer| answer["method"] == "textDocument/publishDiagnostics");
-        let shown = shown.expect("published")["params"]["diagnostics"].as_array().expect("a list").clone();
+        let shown = shown.unwrap()["params"]["diagnostics"].as_array().unwrap().clone();
         let check = folder.json(&["check", "open.toml"]);
         let codes = |list: &[Value]| list.iter().map(|one| one["code"].clone()).collect::<Vec<_>>();
-        assert_eq!(codes(&shown), codes(&check.findings()), "{wrong}");
+        assert_eq!(codes(&shown), codes(check.findings()), "{wrong}");
         let first = &check.findings()[0];
-        assert_eq!(shown[0]["range"]["start"]["line"], first["line"].as_u64().expect("a line") - 1, "{wrong}");
+        assert_eq!(shown[0]["range"]["start"]["line"], first["line"].as_u64().unwrap() - 1, "{wrong}");
     }
 }
 
@@ -105,11 +105,11 @@ fn keys_units_choices_and_files_are_offered_and_explained() {
     let requests = words.iter().zip(1..).map(|((method, words), id)| request(&folder, id, method, &text, words));
     messages.extend(requests);
     let answers = session(&folder, &messages);
-    let hover = answer(&answers, 1)["contents"]["value"].as_str().expect("Markdown");
+    let hover = answer(&answers, 1)["contents"]["value"].as_str().unwrap();
     assert!(hover.starts_with("`actuator.stroke`") && hover.contains("Free stroke of a leg"), "{hover}");
     let labels = |id: u32| -> Vec<String> {
-        let items = answer(&answers, id).as_array().expect("a list");
-        items.iter().map(|item| item["label"].as_str().expect("a label").to_owned()).collect()
+        let items = answer(&answers, id).as_array().unwrap();
+        items.iter().map(|item| item["label"].as_str().unwrap().to_owned()).collect()
     };
     assert_eq!(labels(2), ["m", "mm", "um", "nm"]);
     assert_eq!(labels(3), ["invhys", "ewma", "pcc"]);
@@ -155,11 +155,11 @@ fn neovim_shows_a_slip_and_applies_its_fix() {
     folder.write("script.lua", SCRIPT);
     let mut nvim = folder.command();
     let program = std::mem::replace(&mut nvim, Command::new("nvim"));
-    nvim.current_dir(program.get_current_dir().expect("set")).env("SPECGEN", BINARY);
+    nvim.current_dir(program.get_current_dir().unwrap()).env("SPECGEN", BINARY);
     nvim.args(["--headless", "-u", "NONE", "-n", "-c", "luafile script.lua"]);
     let run = Run::of(&mut nvim);
     let out = folder.read("out.txt");
-    let line = good.lines().position(|line| line.starts_with("height")).expect("there") + 1;
+    let line = good.lines().position(|line| line.starts_with("height")).unwrap() + 1;
     let expected = format!("1 E0202 line {line}\nReplace by height\n0 left\n`geometry.height`, P_z in the paper\n");
     assert_eq!(out, expected, "{}", run.stderr);
     assert_eq!(folder.read("open.toml"), good);

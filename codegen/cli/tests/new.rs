@@ -11,7 +11,7 @@ use crate::support::{Folder, Run, repository};
 fn plausible(rng: &mut ChaCha8Rng) -> Vec<String> {
     let mut within = |low: f64, high: f64| {
         let share = rng.next_u64() as f64 / u64::MAX as f64;
-        low * (high / low).powf(share)
+        low + (high - low) * share * share
     };
     let platform = within(30.0, 250.0);
     let base = platform * within(1.0, 1.8);
@@ -106,7 +106,7 @@ fn plausible_platforms_pass_check_in_the_first_round() {
 /// `specgen new NAME` with these answers on standard input.
 fn asked(folder: &Folder, name: &str, answers: &str) -> Run {
     folder.write("answers.txt", answers);
-    let input = fs::File::open(folder.path("answers.txt")).expect("written");
+    let input = fs::File::open(folder.path("answers.txt")).unwrap();
     Run::of(folder.command().args(["new", name]).stdin(input))
 }
 
@@ -146,8 +146,8 @@ fn what_cannot_be_is_refused_by_its_option_and_nothing_of_the_users_is_touched()
     }
     assert!(!folder.path("mine").exists());
     assert_eq!(folder.run(&["new", "9 lives", "--like", "legs"]).code, 2);
-    fs::create_dir(folder.path("full")).expect("made");
-    fs::write(folder.path("full/notes.txt"), "mine").expect("written");
+    fs::create_dir(folder.path("full")).unwrap();
+    fs::write(folder.path("full/notes.txt"), "mine").unwrap();
     assert_eq!(folder.run(&["new", "full", "--like", "legs"]).code, 2);
     assert_eq!(folder.read("full/notes.txt"), "mine");
     // Answers that only together make no sense are kept in the spec that is refused.
@@ -160,7 +160,7 @@ fn what_cannot_be_is_refused_by_its_option_and_nothing_of_the_users_is_touched()
 #[test]
 fn a_record_of_a_leg_of_a_spec_has_its_stroke_its_voltages_and_its_noise() {
     let folder = Folder::new();
-    let text = fs::read_to_string(repository().join("specs/minimal.toml")).expect("there");
+    let text = fs::read_to_string(repository().join("specs/minimal.toml")).unwrap();
     let text = text
         .replace("[\"0 V\", \"100 V\"]", "[\"-20 V\", \"130 V\"]")
         .replace("[\"0 V\", \"150 V\"]", "[\"-20 V\", \"130 V\"]");
@@ -173,8 +173,8 @@ fn a_record_of_a_leg_of_a_spec_has_its_stroke_its_voltages_and_its_noise() {
         .lines()
         .skip(1)
         .map(|line| {
-            let mut cells = line.split(',').map(|cell| cell.parse().expect("a number"));
-            std::array::from_fn(|_| cells.next().expect("three columns"))
+            let mut cells = line.split(',').map(|cell| cell.parse().unwrap());
+            std::array::from_fn(|_| cells.next().unwrap())
         })
         .collect();
     let largest = |column: usize| rows.iter().map(|row| row[column]).fold(f64::MIN, f64::max);

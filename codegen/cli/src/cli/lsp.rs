@@ -197,6 +197,7 @@ impl Server<'_> {
     }
 
     /// The fixes that are as simple as another text in the place of a finding.
+    #[expect(clippy::mutable_key_type, reason = "the protocol's types: its URIs keep what they have parsed")]
     fn actions(&self, params: &CodeActionParams) -> Option<Vec<CodeActionOrCommand>> {
         let open = self.spec(&params.text_document.uri)?;
         let lines = Lines::new(&open.text);

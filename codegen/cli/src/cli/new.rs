@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches, ValueEnum};
 use serde::Serialize;
 use specgen_compiler::compile::{self, Compiled, Refused};
-use specgen_compiler::reach::{self, Reach};
 use specgen_compiler::lower;
+use specgen_compiler::reach::{self, Reach};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt::Scratch;
 use specgen_language::spec::quantity;
@@ -330,10 +330,12 @@ fn rounded(value: f64, digits: i32, to_whole: impl Fn(f64) -> f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    let exponent = value.abs().log10().floor() as i32 + 1 - digits;
-    let text = format!("{}e{exponent}", to_whole(value / 10.0_f64.powi(exponent)));
-    // Back through the parser: the shortest decimal of the value.
-    let value: f64 = text.parse().unwrap_or(value);
+    // Powers of ten by the parser, so that the shortest decimal comes out.
+    let read = |text: String| text.parse::<f64>().unwrap_or(value);
+    let shown = format!("{value:e}");
+    let power: i32 = shown.rsplit('e').next().and_then(|text| text.parse().ok()).unwrap_or(0);
+    let exponent = power + 1 - digits;
+    let value = read(format!("{}e{exponent}", to_whole(value / read(format!("1e{exponent}")))));
     if (1e-4..1e6).contains(&value.abs()) { format!("{value}") } else { format!("{value:e}") }
 }
 
@@ -356,7 +358,7 @@ fn fit_workspace(draft: &mut Draft, name: &str, place: &Path) {
     if model.task_space.is_some() {
         // What a gauge sees of one axis alone is to stay in its range, with a little room.
         let joint = model.geometry.platform_joints[0];
-        let radius = GAUGE_RADIUS * joint[0].hypot(joint[1]);
+        let radius = GAUGE_RADIUS * (joint[0] * joint[0] + joint[1] * joint[1]).sqrt();
         let lever = [1.0, 1.0, 1.0, radius, radius, radius];
         if draft.is_given("sensor.range") {
             let [low, high] = model.sensor.range;
