@@ -186,6 +186,15 @@ impl Words for Digest {
     fn put(&mut self, word: u64) {
         self.word(word);
     }
+
+    // A loop of its own: written out for every array of a state it would take kilobytes of flash.
+    #[inline(never)]
+    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
+        for value in values.iter().take(count) {
+            self.word(value.to_word());
+        }
+        Ok(())
+    }
 }
 
 impl Words for Writer<'_> {
