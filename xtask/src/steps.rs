@@ -194,7 +194,11 @@ fn law_files(law: &Path) -> std::io::Result<Vec<String>> {
     let mut files = Vec::new();
     for folder in std::fs::read_dir(law)? {
         for file in std::fs::read_dir(folder?.path())? {
-            files.push(file?.path().display().to_string());
+            let path = file?.path();
+            // The page of a crate lies beside them.
+            if path.extension().is_some_and(|extension| extension == "rs") {
+                files.push(path.display().to_string());
+            }
         }
     }
     files.sort();

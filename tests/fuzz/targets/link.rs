@@ -62,7 +62,7 @@ fn header(kind: u8, session: u16, sequence: u16) -> [u8; 6] {
     [VERSION, kind, session_low, session_high, sequence_low, sequence_high]
 }
 
-/// Converters: codes of the gauges, and what the amplifiers were told last.
+/// Converters: codes of the gauges, and what was last sent to the amplifiers.
 #[derive(Clone, Default)]
 struct Parts(Rc<RefCell<State>>);
 

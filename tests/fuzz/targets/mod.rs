@@ -58,28 +58,28 @@ pub fn assert_sound(finding: &Diagnostic, text: &str) {
 /// A table of numbers is read by everything that reads such tables.
 fn csv(input: &[u8]) {
     let text = String::from_utf8_lossy(input);
-    if let Some(record) = told(parse_record(&text, FILE)) {
+    if let Some(record) = accepted(parse_record(&text, FILE)) {
         let columns = [&record.time, &record.drive, &record.displacement];
         assert!(columns.iter().all(|column| column.len() >= 100 && column.iter().all(|value| value.is_finite())));
         assert!(record.time.is_sorted_by(|a, b| a < b));
     }
-    if let Some(table) = told(waveform::parse(&text, FILE, 1e-4)) {
+    if let Some(table) = accepted(waveform::parse(&text, FILE, 1e-4)) {
         assert!(table.rows.len() >= 2 && table.rows.as_flattened().iter().all(|value| value.is_finite()));
     }
-    if let Some(table) = told(read_table_csv(&text, FILE)) {
-        let again = told(read_table_csv(&write_table_csv(&table), FILE));
+    if let Some(table) = accepted(read_table_csv(&text, FILE)) {
+        let again = accepted(read_table_csv(&write_table_csv(&table), FILE));
         assert_eq!(again.map(|again| again.grid), Some(table.grid));
     }
-    let _ = told(gauge::calibrate_text(&text, FILE, None));
-    let _ = told(stiffness::measure_text(&text, FILE));
-    let _ = told(response::respond_text(&text, FILE, None));
+    let _ = accepted(gauge::calibrate_text(&text, FILE, None));
+    let _ = accepted(stiffness::measure_text(&text, FILE));
+    let _ = accepted(response::respond_text(&text, FILE, None));
 }
 
 /// Name of a file of numbers.
 const FILE: &str = "fuzz.csv";
 
 /// What came out; what is refused comes with an error, and each finding with words and with the file.
-fn told<T>(outcome: Result<T, Vec<Diagnostic>>) -> Option<T> {
+fn accepted<T>(outcome: Result<T, Vec<Diagnostic>>) -> Option<T> {
     let findings = match outcome {
         Ok(value) => return Some(value),
         Err(findings) => findings,

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use lsp_server::{Connection, ErrorCode, Message, Notification, Request, Response};
-use lsp_types::notification::{self as told, Notification as _};
-use lsp_types::request::{self as asked, Request as _};
+use lsp_types::notification::{self, Notification as _};
+use lsp_types::request::{self, Request as _};
 use lsp_types::{
     CodeAction, CodeActionKind, CodeActionOrCommand, CodeActionParams, CodeActionProviderCapability, CompletionOptions,
     CompletionParams, CompletionResponse, Diagnostic as Shown, DiagnosticSeverity, DidChangeTextDocumentParams,
@@ -108,22 +108,22 @@ impl Server<'_> {
         Ok(false)
     }
 
-    fn note(&mut self, notification: Notification) -> Served {
-        match notification.method.as_str() {
-            told::DidOpenTextDocument::METHOD => {
-                let DidOpenTextDocumentParams { text_document } = serde_json::from_value(notification.params)?;
+    fn note(&mut self, Notification { method, params }: Notification) -> Served {
+        match method.as_str() {
+            notification::DidOpenTextDocument::METHOD => {
+                let DidOpenTextDocumentParams { text_document } = serde_json::from_value(params)?;
                 self.put(text_document.uri, text_document.text);
             }
-            told::DidChangeTextDocument::METHOD => {
-                let params: DidChangeTextDocumentParams = serde_json::from_value(notification.params)?;
-                if let Some(last) = params.content_changes.into_iter().next_back() {
-                    self.put(params.text_document.uri, last.text);
+            notification::DidChangeTextDocument::METHOD => {
+                let changed: DidChangeTextDocumentParams = serde_json::from_value(params)?;
+                if let Some(last) = changed.content_changes.into_iter().next_back() {
+                    self.put(changed.text_document.uri, last.text);
                 }
             }
             // The records of a spec may have changed, too.
-            told::DidSaveTextDocument::METHOD => self.open.values_mut().for_each(|open| open.changed = true),
-            told::DidCloseTextDocument::METHOD => {
-                let DidCloseTextDocumentParams { text_document } = serde_json::from_value(notification.params)?;
+            notification::DidSaveTextDocument::METHOD => self.open.values_mut().for_each(|open| open.changed = true),
+            notification::DidCloseTextDocument::METHOD => {
+                let DidCloseTextDocumentParams { text_document } = serde_json::from_value(params)?;
                 self.open.remove(text_document.uri.as_str());
                 self.publish(text_document.uri, Vec::new())?;
             }
@@ -150,16 +150,16 @@ impl Server<'_> {
 
     fn publish(&self, uri: Uri, diagnostics: Vec<Shown>) -> Served {
         let params = PublishDiagnosticsParams { uri, diagnostics, version: None };
-        let notification = Notification::new(told::PublishDiagnostics::METHOD.to_owned(), params);
-        Ok(self.connection.sender.send(Message::Notification(notification))?)
+        let shown = Notification::new(notification::PublishDiagnostics::METHOD.to_owned(), params);
+        Ok(self.connection.sender.send(Message::Notification(shown))?)
     }
 
     fn answer(&self, request: Request) -> Response {
         let Request { id, method, params } = request;
         let result = match method.as_str() {
-            asked::HoverRequest::METHOD => reply(params, |params| self.hover(&params)),
-            asked::Completion::METHOD => reply(params, |params| self.completions(&params)),
-            asked::CodeActionRequest::METHOD => reply(params, |params| self.actions(&params)),
+            request::HoverRequest::METHOD => reply(params, |params| self.hover(&params)),
+            request::Completion::METHOD => reply(params, |params| self.completions(&params)),
+            request::CodeActionRequest::METHOD => reply(params, |params| self.actions(&params)),
             _ => {
                 let message = format!("`{method}` is not offered");
                 return Response::new_err(id, ErrorCode::MethodNotFound as i32, message);
