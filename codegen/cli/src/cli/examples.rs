@@ -28,7 +28,10 @@ Examples:
 Without --like it asks; an empty line takes the value in brackets. The paper's symbols are options, too: --r_B, --r_P, --alpha_B, --alpha_P, --m, --k_a, --T_s.";
 
 pub const LSP: &str = "\
-An editor starts it: docs/editors.md has the lines for VS Code, Helix and Neovim.";
+Examples:
+  specgen lsp                                              # (board) an editor starts it, and talks to it
+
+docs/editors.md has the lines for VS Code, Helix and Neovim.";
 
 pub const CHECK: &str = "\
 Examples:
