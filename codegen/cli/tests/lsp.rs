@@ -61,7 +61,7 @@ fn request(folder: &Folder, id: u32, method: &str, text: &str, words: &str) -> V
     let place = json!({ "line": line, "character": column });
     json!({ "jsonrpc": "2.0", "id": id, "method": method, "params": {
         "textDocument": { "uri": uri }, "position": place, "range": { "start": place, "end": place },
-        "context": { "diagnostics": [] } } })
+        "context": { "diagnostics": [], "triggerKind": 1 } } })
 }
 
 fn answer(answers: &[Value], id: u32) -> &Value {
@@ -72,13 +72,16 @@ fn answer(answers: &[Value], id: u32) -> &Value {
 fn findings_are_those_of_check_and_their_fixes_are_accepted() {
     let folder = Folder::new();
     let good = folder.read("minimal.toml");
-    let slips = [("height ", "heigth "), ("\"180 mm\"", "\"180 Mm\""), ("\"1.195 kg\"", "1.195kg")];
+    let slips = [("height ", "heigth "), ("\"180 mm\"", "\"180 MM\""), ("\"1.195 kg\"", "1.195kg")];
     for (right, wrong) in slips {
         let text = good.replacen(right, wrong, 1);
         folder.write("open.toml", &text);
         let answers = session(
             &folder,
-            &[open(&folder, &text), request(&folder, 1, "textDocument/codeAction", &text, wrong.trim_end_matches('"'))],
+            &[
+                open(&folder, &text),
+                request(&folder, 1, "textDocument/codeAction", &text, wrong.trim_end_matches(['"', ' '])),
+            ],
         );
         let shown = answers.iter().rfind(|answer| answer["method"] == "textDocument/publishDiagnostics");
         let shown = shown.unwrap()["params"]["diagnostics"].as_array().unwrap().clone();
@@ -87,6 +90,16 @@ fn findings_are_those_of_check_and_their_fixes_are_accepted() {
         assert_eq!(codes(&shown), codes(check.findings()), "{wrong}");
         let first = &check.findings()[0];
         assert_eq!(shown[0]["range"]["start"]["line"], first["line"].as_u64().unwrap() - 1, "{wrong}");
+        let edits = answer(&answers, 1)[0]["edit"]["changes"].as_object().unwrap();
+        let edit = &edits.values().next().unwrap()[0];
+        let place = |end: &str| {
+            let number = |what: &str| edit["range"][end][what].as_u64().unwrap() as usize;
+            let start: usize = text.split_inclusive('\n').take(number("line")).map(str::len).sum();
+            start + number("character")
+        };
+        let fixed = [&text[..place("start")], edit["newText"].as_str().unwrap(), &text[place("end")..]].concat();
+        folder.write("open.toml", &fixed);
+        assert_eq!(folder.run(&["check", "open.toml"]).code, 0, "{wrong}: {fixed}");
     }
 }
 

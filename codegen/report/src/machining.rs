@@ -17,7 +17,7 @@ use specgen_studies::reproduce::platform::{MACHINING_FREQUENCY, parts, table_9};
 /// Both work parts.
 ///
 /// # Errors
-/// As [`PlatformScenario::machine`].
+/// As [`PlatformScenario::against`].
 pub fn section(
     machine: &PlatformScenario,
     controller: &mut dyn TickController,

@@ -96,6 +96,8 @@ impl Server<'_> {
     fn take(&mut self, message: Message) -> Result<bool, Box<dyn std::error::Error + Sync + Send>> {
         match message {
             Message::Request(request) => {
+                // What is answered is of the text as it is now.
+                self.check()?;
                 if self.connection.handle_shutdown(&request)? {
                     return Ok(true);
                 }

@@ -94,7 +94,7 @@ pub fn tables(runs: &PoseTable, case: &str) -> [Table; 2] {
 /// One work part in both modes, into `table`.
 ///
 /// # Errors
-/// As [`PlatformScenario::machine`].
+/// As [`PlatformScenario::against`].
 pub fn machining(
     scenario: &PlatformScenario,
     controller: &mut dyn TickController,

@@ -106,9 +106,10 @@ impl Spot {
             let count = |bracket: char| code.matches(bracket).count() as i32;
             let open = depth > 0;
             depth = (depth + count('[') - count(']')).max(0);
-            spot.in_value = open || (spot.key.is_some() && code.contains('='));
+            // Of the last line, the part before the place decides.
+            spot.in_value = open || (spot.key.is_some() && spot.before.contains('='));
         }
-        spot.in_value &= !spot.is_header && (spot.before.contains('=') || !spot.before.contains(char::is_alphabetic));
+        spot.in_value &= !spot.is_header;
         spot
     }
 
