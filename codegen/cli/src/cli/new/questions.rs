@@ -17,52 +17,47 @@ pub struct Question {
     pub text: &'static str,
 }
 
-const fn ask(
-    option: &'static str,
-    aliases: &'static [&'static str],
-    key: &'static str,
-    text: &'static str,
-) -> Question {
-    Question { option, aliases, key, asked: true, text }
-}
+const ASKED: bool = true;
+const OPTION: bool = false;
 
-const fn option(
+const fn row(
+    asked: bool,
     option: &'static str,
     aliases: &'static [&'static str],
     key: &'static str,
     text: &'static str,
 ) -> Question {
-    Question { option, aliases, key, asked: false, text }
+    Question { option, aliases, key, asked, text }
 }
 
 /// In the order in which they are asked.
 // One question a line: this is a table.
 #[rustfmt::skip]
 pub const QUESTIONS: &[Question] = &[
-    ask("base-radius", &["r_B"], "geometry.base_radius", "Radius of the circle through the base joints, r_B"),
-    ask("platform-radius", &["r_P"], "geometry.platform_radius", "Radius of the circle through the platform joints, r_P"),
-    ask("base-angle", &["alpha_B"], "geometry.base_angle", "Angle between the two base joints of a pair, alpha_B"),
-    ask("platform-angle", &["alpha_P"], "geometry.platform_angle", "Angle between the two platform joints of a pair, alpha_P"),
-    ask("height", &["P_z"], "geometry.height", "Height of the platform joints above the base joints"),
-    ask("mass", &["m", "payload"], "platform.mass", "Moving mass, with everything mounted on it"),
-    ask("inertia", &["I"], "platform.inertia", "Moments of inertia I_xx, I_yy, I_zz about the centre of mass"),
-    ask("stroke", &["travel"], "actuator.stroke", "Free stroke of a leg"),
-    ask("voltage", &["drive"], "actuator.voltage", "Lowest and highest voltage of a leg"),
-    ask("stiffness", &["k_a", "axial-stiffness"], "actuator.axial_stiffness", "Axial stiffness of a leg, k_a"),
-    ask("resonance", &["f_0"], "actuator.resonance", "First axial resonance of a leg as mounted"),
-    ask("slew-rate", &["slew"], "actuator.slew_rate", "Fastest change of voltage that amplifier and stack stand"),
-    ask("gauge-noise", &["sensor-noise"], "sensor.noise", "Noise of a gauge, rms"),
-    ask("rate", &["period", "T_s"], "timing.period", "Control rate or period"),
-    option("gauge-range", &["sensor-range"], "sensor.range", "Smallest and largest displacement that a gauge can report"),
-    option("gauge-bits", &["sensor-bits"], "sensor.bits", "Resolution of the gauges' converter, bits"),
-    option("dac-bits", &[], "dac.bits", "Resolution of the output converter, bits"),
-    option("dac-range", &[], "dac.range", "Volts at the stack at code 0 and at full scale"),
-    option("amplifier-lag", &["lag"], "amplifier.lag", "Time constant of the amplifiers"),
-    option("amplifier-noise", &[], "amplifier.noise", "Noise of the amplifiers, rms"),
-    option("modal-damping", &["zeta"], "control.modal_damping", "Damping ratio of the lowest mode of the platform"),
-    option("translation", &[], "workspace.translation", "Bounds on x, y and z from rest; what the legs reach if not given"),
-    option("rotation", &[], "workspace.rotation", "Bounds on the three angles; what the legs reach if not given"),
-    option("mcu", &[], "target.mcu", "Microcontroller"),
+    row(ASKED, "base-radius", &["r_B"], "geometry.base_radius", "Radius of the circle through the base joints, r_B"),
+    row(ASKED, "platform-radius", &["r_P"], "geometry.platform_radius", "Radius of the circle through the platform joints, r_P"),
+    row(ASKED, "base-angle", &["alpha_B"], "geometry.base_angle", "Angle between the two base joints of a pair, alpha_B"),
+    row(ASKED, "platform-angle", &["alpha_P"], "geometry.platform_angle", "Angle between the two platform joints of a pair, alpha_P"),
+    row(ASKED, "height", &["P_z"], "geometry.height", "Height of the platform joints above the base joints"),
+    row(ASKED, "mass", &["m", "payload"], "platform.mass", "Moving mass, with everything mounted on it"),
+    row(ASKED, "inertia", &["I"], "platform.inertia", "Moments of inertia I_xx, I_yy, I_zz about the centre of mass"),
+    row(ASKED, "stroke", &["travel"], "actuator.stroke", "Free stroke of a leg"),
+    row(ASKED, "voltage", &["drive"], "actuator.voltage", "Lowest and highest voltage of a leg"),
+    row(ASKED, "stiffness", &["k_a", "axial-stiffness"], "actuator.axial_stiffness", "Axial stiffness of a leg, k_a"),
+    row(ASKED, "resonance", &["f_0"], "actuator.resonance", "First axial resonance of a leg as mounted"),
+    row(ASKED, "slew-rate", &["slew"], "actuator.slew_rate", "Fastest change of voltage that amplifier and stack stand"),
+    row(ASKED, "gauge-noise", &["sensor-noise"], "sensor.noise", "Noise of a gauge, rms"),
+    row(ASKED, "rate", &["period", "T_s"], "timing.period", "Control rate or period"),
+    row(OPTION, "gauge-range", &["sensor-range"], "sensor.range", "Smallest and largest displacement that a gauge can report"),
+    row(OPTION, "gauge-bits", &["sensor-bits"], "sensor.bits", "Resolution of the gauges' converter, bits"),
+    row(OPTION, "dac-bits", &[], "dac.bits", "Resolution of the output converter, bits"),
+    row(OPTION, "dac-range", &[], "dac.range", "Volts at the stack at code 0 and at full scale"),
+    row(OPTION, "amplifier-lag", &["lag"], "amplifier.lag", "Time constant of the amplifiers"),
+    row(OPTION, "amplifier-noise", &[], "amplifier.noise", "Noise of the amplifiers, rms"),
+    row(OPTION, "modal-damping", &["zeta"], "control.modal_damping", "Damping ratio of the lowest mode of the platform"),
+    row(OPTION, "translation", &[], "workspace.translation", "Bounds on x, y and z from rest; what the legs reach if not given"),
+    row(OPTION, "rotation", &[], "workspace.rotation", "Bounds on the three angles; what the legs reach if not given"),
+    row(OPTION, "mcu", &[], "target.mcu", "Microcontroller"),
 ];
 
 impl Question {
@@ -95,10 +90,7 @@ pub fn literal(question: &Question, answer: &str) -> String {
         }
     };
     let inner = answer.trim().trim_start_matches('[').trim_end_matches(']').replace('"', "");
-    match (list, inner.split(',').map(one).collect::<Vec<_>>()) {
-        (true, items) => format!("[{}]", items.join(", ")),
-        (false, _) => one(&inner),
-    }
+    if list { format!("[{}]", inner.split(',').map(one).collect::<Vec<_>>().join(", ")) } else { one(&inner) }
 }
 
 fn quoted(text: &str) -> String {
