@@ -3,28 +3,19 @@
 use std::collections::BTreeSet;
 use std::fs;
 
+use crate::support::commands::shell;
 use crate::support::{Folder, repository};
 
-const DOCUMENTS: [&str; 18] = [
-    "README.md",
-    "ARCHITECTURE.md",
-    "CONTRIBUTING.md",
-    "docs/bring-up.md",
-    "docs/control-law.md",
-    "docs/errata.md",
-    "docs/guide.md",
-    "docs/hysteresis.md",
-    "docs/identification.md",
-    "docs/images.md",
-    "docs/tuning.md",
-    "docs/robustness.md",
-    "docs/report.md",
-    "docs/pil.md",
-    "docs/supervisor.md",
-    "docs/recorder.md",
-    "docs/rt-pc.md",
-    "docs/spec-reference.md",
-];
+/// Names of the documents, from the root.
+fn documents() -> Vec<String> {
+    let pages = fs::read_dir(repository().join("docs")).unwrap().map(|entry| entry.unwrap().file_name());
+    let mut pages: Vec<String> = pages
+        .filter_map(|name| name.to_str().filter(|name| name.ends_with(".md")).map(|name| format!("docs/{name}")))
+        .collect();
+    pages.sort();
+    let root = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"].map(str::to_owned);
+    root.into_iter().chain(pages).collect()
+}
 
 fn read(name: &str) -> String {
     fs::read_to_string(repository().join(name)).unwrap()
@@ -39,9 +30,9 @@ fn quoted(text: &str) -> Vec<String> {
 #[test]
 fn links_lead_somewhere() {
     let mut links = 0;
-    for name in DOCUMENTS {
-        let folder = repository().join(name).parent().unwrap().to_owned();
-        let text = read(name);
+    for name in documents() {
+        let folder = repository().join(&name).parent().unwrap().to_owned();
+        let text = read(&name);
         for part in text.split("](").skip(1) {
             let target = part.split(')').next().unwrap();
             if !target.contains("://") {
@@ -62,8 +53,8 @@ fn links_lead_somewhere() {
 #[test]
 fn files_and_folders_that_are_named_exist() {
     let mut found = 0;
-    for name in DOCUMENTS {
-        for word in quoted(&read(name)) {
+    for name in documents() {
+        for word in quoted(&read(&name)) {
             let tops = ["codegen/", "firmware/", "host-sim/", "specs/", "tests/", "xtask/", "docs/"];
             let is_path = tops.iter().any(|top| word.starts_with(top)) && !word.contains(['*', ' ']);
             if is_path {
@@ -99,7 +90,7 @@ fn a_typical_change_touches_at_most_three_files() {
 fn tests_that_figures_come_from_exist() {
     let folders = ["tests/tests", "codegen/cli/tests"];
     let mut names = BTreeSet::new();
-    for call in quoted(&read("README.md")) {
+    for call in quoted(&read("docs/figures.md")) {
         let Some(words) = call.strip_prefix("… ").or_else(|| call.strip_prefix("cargo test --release -p ")) else {
             continue;
         };
@@ -113,34 +104,69 @@ fn tests_that_figures_come_from_exist() {
         let files = [format!("{name}.rs"), format!("{name}/mod.rs")];
         let exists =
             folders.iter().any(|folder| files.iter().any(|file| repository().join(folder).join(file).is_file()));
-        assert!(exists, "README names the test {name}");
+        assert!(exists, "docs/figures.md names the test {name}");
     }
 }
 
 /// Each `specgen …` in the text is a command that there is, with options that its help explains, or the main job on a spec.
 #[test]
-fn commands_and_options_of_the_readme_are_those_of_the_program() {
+fn commands_and_options_of_the_documents_are_those_of_the_program() {
     let folder = Folder::new();
     let main = folder.run(&["--help"]).stdout;
     let mut commands = 0;
-    for line in quoted(&read("README.md")).iter().filter_map(|word| word.strip_prefix("specgen ")) {
+    for (name, line) in
+        documents().iter().flat_map(|name| quoted(&read(name)).into_iter().map(move |line| (name, line)))
+    {
+        let Some(line) = line.strip_prefix("specgen ") else { continue };
         let words: Vec<&str> = line.split_whitespace().collect();
-        let help = if words[0].ends_with(".toml") {
-            assert!(words[0] == "platform.toml" || repository().join(words[0]).is_file(), "{line}");
+        let help = if words[0].ends_with(".toml") || words[0] == "SPEC" {
+            let is_there = ["platform.toml", "SPEC"].contains(&words[0]) || repository().join(words[0]).is_file();
+            assert!(is_there, "{name}: {line}");
             main.clone()
         } else {
-            let run = folder.run(&[words[0], "--help"]);
-            assert_eq!(run.code, 0, "README names the command {line}");
+            let below: &[&str] = match words[0] {
+                "identify" => &words[..words.len().min(2)],
+                _ => &words[..1],
+            };
+            let is_command =
+                |word: &&str| word.chars().all(|c| c.is_ascii_lowercase() || c == '-') && !word.starts_with('-');
+            let path: Vec<&str> = below.iter().copied().filter(is_command).chain(["--help"]).collect();
+            let run = folder.run(&path);
+            assert_eq!(run.code, 0, "{name} names the command {line}");
             run.stdout
         };
         for option in
-            words.iter().map(|word| word.trim_matches(['[', ']', ',', ';'])).filter(|word| word.starts_with('-'))
+            words.iter().map(|word| word.trim_matches(['[', ']', ',', ';'])).filter(|word| word.starts_with("--"))
         {
-            assert!(help.contains(option), "README: `specgen {line}` has no {option}");
+            let option = option.split('=').next().unwrap();
+            assert!(help.contains(option), "{name}: `specgen {line}` has no {option}");
         }
         commands += 1;
     }
-    assert!(commands >= 6, "{commands}");
+    assert!(commands >= 40, "{commands}");
+}
+
+/// The program of the page is compiled against the library of the reference spec, and moves the legs.
+#[test]
+#[cfg(target_os = "linux")]
+fn the_example_in_c_runs() {
+    let folder = Folder::new();
+    let page = read("docs/from-simulink.md");
+    let program = page.split("```c\n").nth(1).unwrap().split("```").next().unwrap();
+    folder.write("example.c", program);
+    folder.run(&["build", "reference.toml", "--target", "host", "-o", "host"]).says(0, &[]);
+    let line = page.lines().find_map(|line| line.strip_prefix('`')?.split('`').next()?.strip_prefix("cc ")).unwrap();
+    let run = shell(
+        &folder.path(""),
+        &format!("cc {line} -Wall -Werror -Wl,-rpath,$PWD/host/target/host/release && ./example"),
+    );
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let volts: Vec<f64> = run
+        .stdout
+        .lines()
+        .map(|line| line.split_whitespace().nth(2).and_then(|volts| volts.parse().ok()).unwrap())
+        .collect();
+    assert!(volts.len() == 6 && volts.iter().all(|volts| (1.0..=100.0).contains(volts)), "{}", run.stdout);
 }
 
 /// The status bits of the page are those of the emitted controller.

@@ -168,11 +168,15 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
         .spawn()
         .unwrap();
     let mut input = lines.stdin.take().unwrap();
-    input.write_all(b"go\nset setpoint[0]=x\nwait arming 0.1\nstatus\n").unwrap();
+    input.write_all(b"go\nset setpoint[0]=x\nset command=mov\nset command=move\nwait arming 0.1\nstatus\n").unwrap();
     drop(input);
     let output = lines.wait_with_output().unwrap();
     let printed = String::from_utf8_lossy(&output.stdout);
-    for text in ["`go` is none of", "expected a finite number, found `x`"] {
+    for text in [
+        "`go` is none of",
+        "expected a finite number, found `x`",
+        "expected hold, stream, move, trajectory, found `mov`",
+    ] {
         assert!(printed.contains(text), "{printed}");
     }
     let script = ["reference.toml", "arm", "wait arming 20", "run", "wait running 20", "wait 30"];

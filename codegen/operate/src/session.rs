@@ -12,6 +12,9 @@ use crate::pil::{self, OpenError, Opened};
 /// How often a device gets a request, at least: five times before it takes the link for lost.
 pub const ALIVE: Duration = Duration::from_millis(20);
 
+/// Names of the word `command` of a platform, by its value.
+const COMMANDS: [&str; 4] = ["hold", "stream", "move", "trajectory"];
+
 /// An open session.
 pub struct Session<P> {
     client: Client<P>,
@@ -141,8 +144,13 @@ impl<P: Port> Session<P> {
             let slot = place
                 .and_then(|place| words.get_mut(place))
                 .ok_or_else(|| format!("`{name}` cannot be set; these can: {}", self.free_names().join(", ")))?;
-            let number = value.parse().ok().filter(|number: &f64| number.is_finite());
-            let number = number.ok_or_else(|| format!("`{name}`: expected a finite number, found `{value}`"))?;
+            let known = COMMANDS.iter().position(|known| name == "command" && known == value);
+            let number =
+                known.map(|place| place as f64).or_else(|| value.parse().ok()).filter(|number| number.is_finite());
+            let number = number.ok_or_else(|| match name.as_str() {
+                "command" => format!("`command`: expected {}, found `{value}`", COMMANDS.join(", ")),
+                _ => format!("`{name}`: expected a finite number, found `{value}`"),
+            })?;
             *slot = self.description.encode(name, number).map_err(|error| error.to_string())?;
         }
         Ok(words)

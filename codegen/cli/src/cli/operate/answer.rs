@@ -58,6 +58,7 @@ pub struct MachineStatus {
     pub stands: String,
     pub amplifiers_on: bool,
     pub status: u32,
+    pub status_in_words: String,
     pub events: u32,
     pub late: u32,
     pub link_errors: u32,
@@ -71,11 +72,12 @@ impl Outcome for MachineStatus {
     fn text(&self) -> String {
         let on = if self.amplifiers_on { "on" } else { "off" };
         format!(
-            "tick {}, {:.4} s: {}, amplifiers {on}, status {:#x}; events {:#x}, {} late ticks, {} damaged frames\n",
+            "tick {}, {:.4} s: {}, amplifiers {on}; status {:#x}: {}\n  events {:#x}, {} late ticks, {} damaged frames\n",
             self.tick,
             self.tick as f64 * self.period,
             self.stands,
             self.status,
+            self.status_in_words,
             self.events,
             self.late,
             self.link_errors + self.damaged_frames

@@ -78,6 +78,7 @@ impl<P: Port> Operator<P> {
             stands: self.stands(),
             amplifiers_on: status.amplifier_on,
             status: status.status,
+            status_in_words: host_sim::status::in_words(status.status),
             events: status.events,
             late: status.late,
             link_errors: status.link.errors(),
