@@ -139,7 +139,11 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     run.says(2, &["`gauge[0]` cannot be set; these can: command, selector"]);
     // A mistake in the last line is found before the first is carried out.
     for (last, code, text) in [
-        ("set command=x", 2, "`command`: expected a finite number, found `x`; nothing was asked of the machine"),
+        (
+            "set command=x",
+            2,
+            "`command`: expected hold, stream, move, trajectory, found `x`; nothing was asked of the machine",
+        ),
         ("wave none.toml", 2, "could not read `none.toml`"),
         ("config write none.toml", 1, "none.toml is refused"),
         ("record download no-folder/x.rec", 3, "there is no folder `no-folder`"),
