@@ -233,15 +233,17 @@ fn prompt(text: &str) {
 /// A line of standard input; where it has ended, an error that names what is `open`.
 fn line(open: &[&Question]) -> Result<String, Failure> {
     let mut line = String::new();
-    if io::stdin().read_line(&mut line).map_err(environment)? == 0 {
+    let read = io::stdin().read_line(&mut line).map_err(environment)?;
+    // Nobody pressed the key that would end the line of the question.
+    if read == 0 || !io::stdin().is_terminal() {
+        prompt("\n");
+    }
+    if read == 0 {
         let names: Vec<String> = open.iter().map(|one| format!("--{}", one.option)).collect();
         return Err(Failure::Usage(format!(
             "standard input ended before all was answered; give {}, or take the rest from a spec by --like reference",
             names.join(", ")
         )));
-    }
-    if !io::stdin().is_terminal() {
-        prompt("\n");
     }
     Ok(line.trim().to_owned())
 }
