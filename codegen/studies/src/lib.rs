@@ -5,4 +5,5 @@ pub mod paper;
 pub mod reproduce;
 pub mod robust;
 pub mod tuning;
+pub mod verdict;
 pub mod verify;

@@ -28,35 +28,61 @@ pub struct Used {
     pub instructions_by: Vec<(String, u64)>,
 }
 
+/// A figure, and what holds it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Held {
+    /// `flash`, `RAM`, `stack` or `instructions`.
+    pub what: &'static str,
+    /// Bytes; mean instructions of a tick.
+    pub used: u64,
+    /// At most this, and who says so: a key of the spec, or the part. None: nobody.
+    pub most: Option<(u64, String)>,
+}
+
+/// Every figure with its limit; a stack without a bound and instructions that were not counted are left out.
+#[must_use]
+pub fn held(target: &Target, used: &Used) -> Vec<Held> {
+    let (part, budget) = (target.mcu.part(), &target.budget);
+    let limit = |declared: Option<u64>, key: &str, has: u64| match declared {
+        Some(bytes) => (bytes, format!("target.budget.{key}")),
+        None => (has, part.name.to_owned()),
+    };
+    let mut held = vec![
+        Held { what: "flash", used: used.flash, most: Some(limit(budget.flash, "flash", part.flash)) },
+        Held { what: "RAM", used: used.ram, most: Some(limit(budget.ram, "ram", part.ram)) },
+    ];
+    if let Some(stack) = used.stack {
+        held.push(Held { what: "stack", used: stack, most: Some(limit(budget.stack, "stack", part.ram)) });
+    }
+    if let Some(instructions) = used.instructions {
+        let most = budget.instructions.map(|most| (most, "target.budget.instructions".to_owned()));
+        held.push(Held { what: "instructions", used: instructions, most });
+    }
+    held
+}
+
 /// What is over budget, in words; nothing if all is within.
 #[must_use]
 pub fn over(target: &Target, used: &Used) -> Vec<String> {
-    let (part, budget) = (target.mcu.part(), &target.budget);
-    let limit = |declared: Option<u64>, key: &str, has: u64| match declared {
-        Some(bytes) => (bytes, format!("target.budget.{key} allows {}", group(bytes))),
-        None => (has, format!("{} has {}", part.name, group(has))),
-    };
     let mut over = Vec::new();
-    let mut check = |what: &str, unit: &str, used: u64, (most, words): (u64, String), by: &[(String, u64)]| {
-        if used > most {
-            let shrink = group(used - most);
-            over.push(format!(
-                "{what} takes {} {unit}, {words}: shrink it by {shrink}{}",
-                group(used),
-                users(by, used)
-            ));
-        }
-    };
-    check("flash", "bytes", used.flash, limit(budget.flash, "flash", part.flash), &used.flash_by);
-    check("ram", "bytes", used.ram, limit(budget.ram, "ram", part.ram), &used.ram_by);
-    if let Some(stack) = used.stack {
-        check("stack", "bytes", stack, limit(budget.stack, "stack", part.ram), &used.stack_by);
+    for Held { what, used: amount, most } in held(target, used) {
+        let Some((most, from)) = most.filter(|(most, _)| amount > *most) else { continue };
+        let (unit, by) = match what {
+            "flash" => ("bytes", &used.flash_by),
+            "RAM" => ("bytes", &used.ram_by),
+            "stack" => ("bytes", &used.stack_by),
+            _ => ("per tick", &used.instructions_by),
+        };
+        let verb = if from.contains('.') { "allows" } else { "has" };
+        over.push(format!(
+            "{what} takes {} {unit}, {from} {verb} {}: shrink it by {}{}",
+            group(amount),
+            group(most),
+            group(amount - most),
+            users(by, amount)
+        ));
     }
-    if let (Some(instructions), Some(most)) = (used.instructions, budget.instructions) {
-        let words = format!("target.budget.instructions allows {}", group(most));
-        check("instructions", "per tick", instructions, (most, words), &used.instructions_by);
-    }
-    if budget.stack.is_some() && used.stack.is_none() {
+    if target.budget.stack.is_some() && used.stack.is_none() {
         over.push("the stack of a tick cannot be bounded".to_owned());
     }
     over
