@@ -156,13 +156,20 @@ fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
     let digest = made["digest"].as_str().unwrap();
     assert!(folder.read("out/README.md").contains(digest));
     let text = folder.run(&["legs.toml", "-o", "out", "--no-build"]);
-    assert!(text.stdout.starts_with(&format!("legs → out (f64, digest {}", &digest[..16])), "{}", text.stdout);
+    is_a_verdict(&text.stdout, "legs is good so far: ");
+    let all = folder.run(&["legs.toml", "-o", "out", "--no-build", "--details"]).stdout;
+    let (verdict, details) = all.split_once("\n\n").unwrap();
+    assert_eq!(format!("{verdict}\n"), text.stdout);
+    assert!(details.starts_with(&format!("legs → out (f64, digest {}", &digest[..16])), "{details}");
 
     let check = folder.json(&["check", "legs.toml"]);
     assert_eq!((check.code, &check.value["result"]["digest"]), (0, &digest.into()));
     assert_eq!(check.value["result"]["records"][0]["grid"], 32);
     let text = folder.run(&["check", "legs.toml"]);
-    assert!(text.code == 0 && text.stdout.starts_with("legs.toml is good\n"), "{text:#?}");
+    is_a_verdict(&text.stdout, "legs is good so far: ");
+    assert_eq!((text.code, &check.value["result"]["verdict"]["answer"]), (0, &"not-measured".into()));
+    let details = folder.run(&["check", "legs.toml", "--details"]).stdout;
+    assert!(details.starts_with(&text.stdout) && details.contains("\n  record records/"), "{details}");
     // What a check cannot measure is a note, and so is where legs and gauges end; nothing else is said.
     assert!(text.stderr.starts_with("note[N0872]") && text.stderr.ends_with("0 errors, 0 warnings\n"), "{text:#?}");
 
@@ -171,6 +178,12 @@ fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
     assert_eq!((ir.code, &ir.value["result"]), (0, &plain));
     assert_eq!(plain, serde_json::from_str::<serde_json::Value>(&folder.read("out/ir.json")).unwrap());
     assert_eq!(plain["digest"], digest);
+}
+
+/// What is said first is short: ten lines of eighty letters.
+fn is_a_verdict(text: &str, start: &str) {
+    assert!(text.starts_with(start), "{text}");
+    assert!(text.lines().count() <= 10 && text.lines().all(|line| line.chars().count() <= 80), "{text}");
 }
 
 #[test]

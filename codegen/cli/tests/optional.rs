@@ -29,12 +29,15 @@ fn without_tools_everything_else_is_done_and_one_line_says_what_was_left_out() {
     let nothing = tempfile::tempdir().unwrap();
     let run = Run::of(&mut main_job(&folder, nothing.path(), &[]));
     run.says(0, &[]);
-    let lines: Vec<&str> = run.stdout.lines().filter(|line| line.contains("left out:")).collect();
-    assert_eq!(lines.len(), 1, "{}", run.stdout);
+    let lines: Vec<&str> = run.stderr.lines().filter(|line| line.contains("left out:")).collect();
+    assert_eq!(lines.len(), 1, "{}", run.stderr);
+    let verdict =
+        ["legs is good so far: ", "  left out the image for the microcontroller (time, memory, bits)\n", " --setup\n"];
+    assert!(verdict.iter().all(|words| run.stdout.contains(words)), "{}", run.stdout);
     for words in ["the image for the microcontroller", "thumbv7em-none-eabihf", "specgen SPEC --setup"] {
         assert!(lines[0].contains(words), "no `{words}` in: {}", lines[0]);
     }
-    assert!(run.stdout.contains("host library: "), "{}", run.stdout);
+    assert!(run.stderr.contains("host library: "), "{}", run.stderr);
     for file in ["controller/src/step.rs", "host/Cargo.toml", "qemu/Cargo.toml", "runtime/Cargo.toml"] {
         assert!(folder.path("out").join(file).is_file(), "{file}");
     }
@@ -42,7 +45,7 @@ fn without_tools_everything_else_is_done_and_one_line_says_what_was_left_out() {
     // Required, it is exit code 3 with the same result.
     let run = Run::of(&mut main_job(&folder, nothing.path(), &["--require-target"]));
     run.says(3, &["error: left out: the image for the microcontroller"]);
-    assert!(run.stdout.contains("host library: "), "{}", run.stdout);
+    assert!(run.stderr.contains("host library: "), "{}", run.stderr);
     for (more, code) in [(&["--json"][..], 0), (&["--json", "--require-target"], 3)] {
         let run = Run::of(&mut main_job(&folder, nothing.path(), more));
         let document = json(&run);
@@ -59,8 +62,8 @@ fn set_up_that_fails_says_what_was_tried_and_the_job_goes_on() {
     let nothing = tempfile::tempdir().unwrap();
     let run = Run::of(&mut main_job(&folder, nothing.path(), &["--setup"]));
     run.says(0, &["there is no rustup", "there is no apt-get", "going on without"]);
-    assert!(run.stdout.contains("left out: the image for the microcontroller"), "{}", run.stdout);
-    assert!(run.stdout.contains("could not be set up: rustup target add: there is no rustup"), "{}", run.stdout);
+    assert!(run.stderr.contains("left out: the image for the microcontroller"), "{}", run.stderr);
+    assert!(run.stderr.contains("could not be set up: rustup target add: there is no rustup"), "{}", run.stderr);
     assert!(folder.path("out/controller/src/step.rs").is_file());
     Run::of(&mut main_job(&folder, nothing.path(), &["--setup", "--require-target"])).says(3, &["could not be set up"]);
 }

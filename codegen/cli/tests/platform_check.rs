@@ -15,7 +15,7 @@ fn folder(name: &str) -> (Folder, String) {
 fn modes_margins_and_reach_are_reported() {
     let (folder, text) = folder("reference.toml");
     folder.write("platform.toml", text);
-    let run = folder.run(&["check", "platform.toml"]);
+    let run = folder.run(&["check", "platform.toml", "--details"]);
     assert_eq!(run.code, 0, "{run:?}");
     for words in ["platform modes: 360.5, 360.5, 428.1, 428.1, 614.9, 794.9 Hz", "P/F pcc", "condition of J", "θz"] {
         assert!(run.stdout.contains(words), "no `{words}` in:\n{}", run.stdout);

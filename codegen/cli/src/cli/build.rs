@@ -12,6 +12,7 @@ use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Compiled};
 use specgen_compiler::workspace;
 use specgen_language::model;
+use specgen_studies::verdict::Verdict;
 use specgen_studies::verify::{self, Inspection, Measurement};
 use specgen_toolchain as target;
 use specgen_toolchain::budget::{self, group};
@@ -35,6 +36,9 @@ pub struct Arguments {
     /// cache. Where that fails, the job goes on without.
     #[arg(long, conflicts_with = "no_build")]
     setup: bool,
+    /// Everything that was found and measured, below the verdict.
+    #[arg(long)]
+    details: bool,
     /// Exit with code 3 where what needs a missing cross compiler or emulator is left out.
     #[arg(long, conflicts_with = "no_build")]
     require_target: bool,
@@ -55,6 +59,9 @@ struct Summary {
     /// What was left out, why, and what brings it.
     missing: Option<String>,
     over_budget: Vec<String>,
+    verdict: Verdict,
+    #[serde(skip)]
+    details: bool,
     /// Of the controller's scalar.
     #[serde(skip)]
     bits: u32,
@@ -84,10 +91,11 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let _hold = workspace::write(&output, &compiled.files)?;
     ui.progress(&format!("wrote {} files to {}", compiled.files.len(), output.display()));
 
-    let mut summary = Summary::of(&compiled, &output);
+    let mut summary = Summary::of(&compiled, &output, arguments.details);
     // What was written is whole, whatever follows.
     let built = if arguments.no_build {
         summary.missing = Some("not built: --no-build".to_owned());
+        summary.verdict.unmeasured = Some("time, memory, bits: --no-build".to_owned());
         Ok(())
     } else {
         build(&compiled, &output, &mut summary, ui)
@@ -96,15 +104,26 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Ok(()) => None,
         Err(Failure::Target(error)) if error.is_of_a_tool() => {
             // Set-up knows more of the same tool: what was tried.
-            let missing = format!("left out: {}: {}", summary.undone(), set_up.unwrap_or(error));
+            let undone = summary.undone();
+            let missing = format!("left out: {undone}: {}", set_up.unwrap_or(error));
+            summary.verdict.unmeasured = Some(undone.to_owned());
             summary.missing = Some(missing.clone());
+            if !arguments.require_target {
+                ui.progress(&missing);
+            }
             arguments.require_target.then_some(missing)
         }
         Err(Failure::Target(error)) => Some(error.to_string()),
         Err(failure) => return Err(failure),
     };
     summary.over_budget = over_budget(&compiled, &summary);
-    match (summary.verdict(), refused) {
+    match (&summary.measurement, &summary.image) {
+        (Some(measurement), _) => summary.verdict.measured(&compiled, measurement),
+        (None, Some(image)) => summary.verdict.inspected(&compiled, image),
+        (None, None) => {}
+    }
+    summary.verdict.next = next(spec, &output, &summary, compiled.model.target.mcu);
+    match (summary.fault(), refused) {
         (None, Some(message)) => Err(Failure::Incomplete { message, result: ui.shown(&summary) }),
         (failed, _) => ui.judged(&summary, failed),
     }
@@ -116,6 +135,7 @@ fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> 
     ui.progress("building the host library");
     let library = target::host::build_library(output, &target_dir)?;
     summary.host_library = Some(library.display().to_string());
+    ui.progress(&format!("host library: {}", library.display()));
     let sim = |error: host_sim::controller::ControllerError| Failure::Environment(error.to_string());
     let mut controller = Controller::load(&library).map_err(sim)?;
     let host = verify::exercise(&mut controller, &compiled.model, &compiled.ir, TICKS)
@@ -136,7 +156,7 @@ fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> 
 }
 
 impl Summary {
-    fn of(compiled: &Compiled, output: &Path) -> Self {
+    fn of(compiled: &Compiled, output: &Path, details: bool) -> Self {
         let hysteresis = &compiled.ir.hysteresis;
         let nodes: usize = hysteresis.tables.iter().map(Vec::len).sum();
         Self {
@@ -151,6 +171,8 @@ impl Summary {
             image: None,
             missing: None,
             over_budget: Vec::new(),
+            verdict: Verdict::of(compiled, ""),
+            details,
             bits: compiled.ir.scalar.bits(),
             grid: hysteresis.grid,
             found: describe(compiled),
@@ -162,13 +184,13 @@ impl Summary {
     fn undone(&self) -> &'static str {
         match (&self.host_library, &self.image) {
             (None, _) => "building",
-            (_, None) => "the image for the microcontroller (memory, stack, instructions, comparison of bits)",
-            (_, Some(_)) => "running the image (instructions, stack seen, comparison of bits)",
+            (_, None) => "the image for the microcontroller (time, memory, bits)",
+            (_, Some(_)) => "running the image (time, bits)",
         }
     }
 
     /// Why what was made must not be used, if so.
-    fn verdict(&self) -> Option<String> {
+    fn fault(&self) -> Option<String> {
         if let Some(difference) = self.measurement.as_ref().and_then(|m| m.first_difference.as_ref()) {
             return Some(format!(
                 "the emulated machine computes other bits than the host: {difference}; report this as a defect of specgen with the spec"
@@ -180,6 +202,18 @@ impl Summary {
 
 impl Outcome for Summary {
     fn text(&self) -> String {
+        let mut verdict = self.verdict.text();
+        if self.details {
+            verdict.push('\n');
+            verdict += &self.details();
+        }
+        verdict
+    }
+}
+
+impl Summary {
+    /// Everything that was found and measured.
+    fn details(&self) -> String {
         let mut out = String::new();
         let budget = &self.limits.budget;
         // Writing to a String cannot fail.
@@ -222,8 +256,8 @@ impl Outcome for Summary {
             flash(&mut out, [m.flash, m.code, m.constants, m.tick_code]);
             let _ = writeln!(
                 out,
-                "    RAM           {}{} bytes, of which State {}",
-                group(m.ram),
+                "    RAM           {}{} bytes with the stack of a tick, of which State {}",
+                group(m.used.ram),
                 of(budget.ram),
                 group(m.state)
             );
@@ -256,6 +290,21 @@ impl Outcome for Summary {
         }
         out
     }
+}
+
+/// Commands that come next.
+fn next(spec: &Path, output: &Path, summary: &Summary, mcu: model::Mcu) -> Vec<String> {
+    let (spec, output) = (spec.display(), output.display());
+    if !summary.over_budget.is_empty() {
+        return vec![format!("specgen size {spec}")];
+    }
+    if summary.measurement.is_none() {
+        let set_up = if summary.host_library.is_some() { " --setup" } else { "" };
+        return vec![format!("specgen {spec} -o {output}{set_up}")];
+    }
+    let mut next = vec![format!("specgen sim {spec}"), format!("specgen report {spec}")];
+    next.extend(mcu.part().chip.is_some().then(|| format!("specgen flash {spec}")));
+    next
 }
 
 /// What exceeds the spec's `[target.budget]` or the part, and what the image must not do, in words.

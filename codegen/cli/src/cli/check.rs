@@ -17,6 +17,7 @@ use specgen_compiler::reach::Reach;
 use specgen_compiler::stability::Margins;
 use specgen_compiler::stability::platform::Design;
 use specgen_identify::Report;
+use specgen_studies::verdict::Verdict;
 
 /// Arguments of `check`.
 #[derive(Args, Debug)]
@@ -24,6 +25,9 @@ use specgen_identify::Report;
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,
+    /// Everything that was found, below the verdict.
+    #[arg(long)]
+    details: bool,
 }
 
 /// A good spec and what is known of it.
@@ -31,6 +35,7 @@ pub struct Arguments {
 struct Checked<'a> {
     name: &'a str,
     digest: &'a str,
+    verdict: Verdict,
     margins: &'a Option<Margins>,
     design: &'a Option<Design>,
     reach: &'a Option<Reach>,
@@ -42,6 +47,8 @@ struct Checked<'a> {
     precision_ratio: Ratio,
     #[serde(skip)]
     compiled: &'a Compiled,
+    #[serde(skip)]
+    details: bool,
 }
 
 /// Bounds of rounding errors over the largest ones found.
@@ -66,9 +73,13 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         commanded: precision.commanded.ratio(),
         measured: precision.measured.map(|figures| figures.ratio()),
     };
+    let shown = arguments.spec.display();
+    let mut verdict = Verdict::of(&compiled, "time, memory, bits: the next command measures them");
+    verdict.next = vec![format!("specgen {shown} -o DIR"), format!("specgen sim {shown}")];
     ui.result(&Checked {
         name: &compiled.ir.name,
         digest: &compiled.ir.digest,
+        verdict,
         margins: &compiled.margins,
         design: &compiled.design,
         reach: &compiled.reach,
@@ -79,14 +90,19 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         precision: &precision,
         precision_ratio: ratio,
         compiled: &compiled,
+        details: arguments.details,
     });
     Ok(())
 }
 
 impl Outcome for Checked<'_> {
     fn text(&self) -> String {
+        let verdict = self.verdict.text();
+        if !self.details {
+            return verdict;
+        }
         let precision = precision::describe(self.precision, self.compiled.ir.scalar);
-        format!("{} is good\n{}{precision}", self.compiled.source.display_name, describe(self.compiled))
+        format!("{verdict}\n{}{precision}", describe(self.compiled))
     }
 }
 
