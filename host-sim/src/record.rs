@@ -18,7 +18,7 @@ use specgen_runtime::record::{
 
 use crate::description::{Description, DescriptionError, fields};
 
-pub use csv::write_csv;
+pub use csv::{Again, write_csv};
 pub use recorded::{Ended, Recorded};
 pub use replay::{Divergence, PhaseChange, Replay, ReplayError, replay};
 pub use writer::{Taker, Writer};

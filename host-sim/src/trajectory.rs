@@ -94,6 +94,29 @@ impl LegTrajectory for PaperLeg {
     }
 }
 
+/// Six legs from the lower to the upper end of a range and back, without a corner; they begin and end at the lower end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LegSweep {
+    /// Lowest and highest displacement, m.
+    pub range: [f64; 2],
+    /// Hz.
+    pub frequency: f64,
+    /// How often.
+    pub periods: f64,
+}
+
+impl LegTrajectory for LegSweep {
+    fn duration(&self) -> f64 {
+        self.periods / self.frequency
+    }
+
+    fn displacements(&self, time: f64) -> [f64; 6] {
+        let [low, high] = self.range;
+        let phase = core::f64::consts::TAU * self.frequency * time;
+        [low + (high - low) * 0.5 * (1.0 - libm::cos(phase)); 6]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,6 +142,14 @@ mod tests {
             assert!(leg.displacement(100.0 * period) < 3.91e-6);
             assert!(leg.displacement(101.0 * period) > 4.01e-6);
         }
+    }
+
+    #[test]
+    fn a_sweep_goes_over_its_range_and_comes_back() {
+        let sweep = LegSweep { range: [5e-6, 45e-6], frequency: 2.0, periods: 3.0 };
+        let at = |time: f64| sweep.displacements(time)[5] * 1e6;
+        assert_eq!((sweep.duration(), at(0.0)), (1.5, 5.0));
+        assert!((at(0.25) - 45.0).abs() < 1e-9 && (at(0.125) - 25.0).abs() < 1e-9 && (at(1.5) - 5.0).abs() < 1e-9);
     }
 
     #[test]

@@ -109,9 +109,36 @@ impl WordKind {
     }
 }
 
+/// A status word as its bits say it, joined by `+`; empty where none is set. Both kinds of controller have the same bits.
+#[must_use]
+pub fn status_words(status: u32) -> String {
+    let mut words = Vec::new();
+    let mut legs = |first: u32, what: &str, then: &str| {
+        words.extend(
+            (0..6).filter(|leg| status >> (first + leg) & 1 == 1).map(|leg| format!("{what} {}{then}", leg + 1)),
+        );
+    };
+    legs(0, "leg", " limited");
+    legs(8, "gauge", " fault");
+    legs(24, "leg", " inverse static");
+    for (bit, what) in
+        [(16, "set-point refused"), (17, "set-point stale"), (18, "moving by itself"), (19, "wrench fault")]
+    {
+        words.extend((status >> bit & 1 == 1).then(|| what.to_owned()));
+    }
+    words.join("+")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_status_is_said_bit_by_bit() {
+        assert_eq!(status_words(0), "");
+        assert_eq!(status_words(0x1), "leg 1 limited");
+        assert_eq!(status_words(0x2_2000), "gauge 6 fault+set-point stale");
+    }
 
     #[test]
     fn words_round_trip_in_both_types() {

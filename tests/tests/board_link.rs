@@ -27,7 +27,7 @@ fn record(client: &mut Client<Line>, action: RecorderAction) -> RecorderStatus {
 
 fn again(bytes: &[u8], machine: &mut Supervised) -> Replay {
     let mut reader = Reader::new(Cursor::new(bytes)).unwrap();
-    replay(&mut reader, machine, |_, _| ()).unwrap_or_else(|error| panic!("{error}"))
+    replay(&mut reader, machine, |_, _, _| ()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn download(client: &mut Client<Line>) -> Vec<u8> {

@@ -92,7 +92,7 @@ fn closed_loop(emitted: &Emitted) -> Vec<u8> {
 
 fn run(bytes: &[u8], machine: &mut Supervised) -> Replay {
     let mut reader = Reader::new(Cursor::new(bytes)).unwrap();
-    replay(&mut reader, machine, |_, _| ()).unwrap_or_else(|error| panic!("{error}"))
+    replay(&mut reader, machine, |_, _, _| ()).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Places of the blocks in a file: first byte, words.

@@ -19,11 +19,13 @@ mod new;
 mod operate;
 mod pil;
 mod plant;
+mod plot;
 mod replay;
 mod report;
 mod reproduce;
 mod robust;
 mod sim;
+mod spec;
 mod table;
 mod tune;
 mod ui;
@@ -46,7 +48,7 @@ use ui::{Failure, Outcome, Ui};
     version,
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    max_term_width = 120,
+    max_term_width = 80,
     override_usage = "specgen [OPTIONS] <SPEC>\n       specgen <COMMAND>",
     after_help = examples::MAIN
 )]
@@ -82,7 +84,7 @@ enum Command {
     Size(firmware::SizeArguments),
     /// Build, check, and write the image to a board by probe-rs.
     Flash(firmware::FlashArguments),
-    /// Run the paper's experiments with the emitted controller against a simulated machine.
+    /// Run the emitted controller against the simulated machine of a spec; with --paper the paper's experiments.
     Sim(sim::Arguments),
     /// Tune gains and weights on the simulated loop with the emitted controller.
     Tune(tune::Arguments),
@@ -212,9 +214,8 @@ impl Outcome for Constants<'_> {
     }
 }
 
-fn dump_ir(spec: &std::path::Path, ui: &mut Ui) -> Result<(), Failure> {
-    let compiled = specgen_compiler::compile::compile(spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+fn dump_ir(path: &std::path::Path, ui: &mut Ui) -> Result<(), Failure> {
+    let compiled = spec::compiled(path, ui)?;
     ui.result(&Constants(&compiled.ir));
     Ok(())
 }

@@ -55,6 +55,8 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["sim", "legs.toml", "--latency", "-1"], "--latency"),
         (&["sim", "legs.toml", "--frequency", "0"], "expected a frequency from 0.001 to 1000 Hz, found `0`"),
         (&["sim", "legs.toml", "--trajectory", "case-1"], "this spec has no [control]"),
+        (&["sim", "legs.toml", "--traces"], "--output"),
+        (&["sim", "reference.toml", "--trajectory", "cas-1"], "did you mean `case-1`?"),
         (&["sim", "reference.toml", "--samples", "100"], "runs at its timing.period"),
         (
             &["sim", "reference.toml", "--trajectory", "case-3"],
@@ -62,7 +64,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         ),
         (
             &["sim", "reference.toml", "--trajectory", "case-1", "--frequency", "2"],
-            "--frequency is for the paper's cases",
+            "--frequency is for waves and the paper's cases",
         ),
         (&["tune"], "<SPEC>"),
         (&["tune", "legs.toml", "--bounds", "level"], "expected GROUP=LOW:HIGH such as ki=10:1000, found `level`"),
@@ -147,6 +149,22 @@ fn every_command_explains_itself() {
 }
 
 #[test]
+fn no_help_is_wider_than_a_terminal() {
+    fn walk(path: &[&str], command: &clap::Command, folder: &Folder, wide: &mut Vec<String>) {
+        let help = folder.run(&[path, &["--help"]].concat());
+        assert_eq!(help.code, 0, "{path:?}");
+        let lines = help.stdout.lines().filter(|line| line.chars().count() > 80);
+        wide.extend(lines.map(|line| format!("{}: {line}", path.join(" "))));
+        for below in command.get_subcommands() {
+            walk(&[path, &[below.get_name()]].concat(), below, folder, wide);
+        }
+    }
+    let mut wide = Vec::new();
+    walk(&[], &specgen::cli::command(), &Folder::new(), &mut wide);
+    assert!(wide.is_empty(), "{}", wide.join("\n"));
+}
+
+#[test]
 fn a_good_spec_gives_one_document_and_its_text_the_same_facts() {
     let folder = Folder::new();
     let document = folder.json(&["legs.toml", "-o", "out", "--no-build"]);
@@ -197,7 +215,10 @@ fn the_output_folder_is_named_after_the_platform_if_not_given() {
 #[test]
 fn sim_gives_one_document_and_its_files_hold_the_same_table() {
     let folder = Folder::new();
-    let document = folder.json(&["sim", "legs.toml", "--samples", "40", "--no-noise", "-o", "out/sim"]);
+    let paper = ["sim", "legs.toml", "--paper", "--samples", "40", "--no-noise", "-o", "out/sim"];
+    assert_eq!(folder.json(&paper).code, 0);
+    assert!(!folder.path("out/sim/trace-pcc-1hz.csv").exists(), "traces are written where they are asked for");
+    let document = folder.json(&[&paper[..], &["--traces"]].concat());
     assert_eq!(document.code, 0, "{:#}", document.value);
     let result = &document.value["result"];
     let tables: serde_json::Value = serde_json::from_str(&folder.read("out/sim/tables.json")).unwrap();
@@ -206,6 +227,13 @@ fn sim_gives_one_document_and_its_files_hold_the_same_table() {
         let trace = folder.read(&format!("out/sim/trace-{mode}-1hz.csv"));
         assert!(trace.lines().count() > 40, "{mode}");
     }
+    // Of its own legs there is no word about the paper.
+    let own = folder.run(&["sim", "legs.toml", "--frequency", "10", "--plot", "plots/own.svg"]);
+    assert!(own.code == 0 && !own.stdout.contains("paper") && own.stdout.contains("pcc"), "{own:?}");
+    assert!(own.stdout.lines().all(|line| line.chars().count() <= 80), "{}", own.stdout);
+    assert!(folder.read("plots/own.svg").starts_with("<svg "));
+    // Another interval is judged as the period of the spec is.
+    folder.run(&["sim", "legs.toml", "--frequency", "10", "--samples", "2000"]).says(1, &["50.0 µs", "timing.period"]);
     folder.json(&["sim", "nothing.toml"]).finding("E0101");
     let refused = folder.json(&["sim", "legs.toml", "--plant", "legs.toml"]);
     assert!(refused.code == 1 && refused.error().contains("legs.toml"), "{}", refused.error());
@@ -214,7 +242,8 @@ fn sim_gives_one_document_and_its_files_hold_the_same_table() {
 #[test]
 fn a_simulated_record_can_be_identified() {
     let folder = Folder::new();
-    let forc = folder.json(&["forc", "-o", "record.csv", "--grid", "8"]);
+    let forc = folder.json(&["forc", "-o", "record.csv", "--grid", "8", "--plot", "record.html"]);
+    assert!(folder.read("record.html").contains("<svg "));
     let rows = folder.read("record.csv").lines().filter(|line| !line.starts_with('#')).count() - 1;
     assert_eq!((forc.code, &forc.value["result"]["rows"]), (0, &rows.into()));
     let arguments = ["identify", "record.csv", "--drive", "0:100", "--grid", "8", "-o", "table.csv"];
@@ -369,7 +398,9 @@ fn a_written_file_has_usual_permissions_and_a_link_or_device_stays_one() {
 fn a_file_that_cannot_be_written_is_named() {
     let folder = Folder::new();
     let before = folder.listing();
-    for (output, word) in [("none/table.csv", "there is no folder"), ("records", "it is a folder")] {
+    for (output, word) in
+        [("legs.toml/a.csv", "could not create the folder `legs.toml`"), ("records", "it is a folder")]
+    {
         let table = ["identify", "records/leg1.csv", "--drive", "0:100", "--grid", "8", "-o", output];
         for arguments in [&table[..], &["forc", "--grid", "4", "-o", output]] {
             folder.run(arguments).says(3, &[&format!("could not write `{output}`"), word, "nothing was changed"]);
@@ -377,6 +408,9 @@ fn a_file_that_cannot_be_written_is_named() {
         }
     }
     assert_eq!(folder.listing(), before);
+    // What is missing above a file is made.
+    assert_eq!(folder.run(&["forc", "--grid", "4", "-o", "new/below/record.csv"]).code, 0);
+    assert!(folder.path("new/below/record.csv").is_file());
 }
 
 /// `specgen … | head` closes the pipe early.

@@ -70,12 +70,13 @@ fn bad_states_are_refused_in_words() {
         ("broken.json", "[{", "not JSON"),
         ("short.json", r#"[{"h": [0, 0], "hd": [], "hdd": []}]"#, "`h` must be six numbers"),
         ("object.json", r#"{"states": []}"#, "`vectors`"),
-        ("short.csv", "1,2,3\n", "line 1: expected 18 finite numbers"),
-        ("nan.csv", "0,0,NaN,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "line 1: expected 18 finite numbers"),
-        ("tilted.csv", "0,0,0.18,0,0.8,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "beyond"),
-        ("far.csv", "0,0,0.5,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "beyond"),
+        ("short.csv", "x,y,z\n1,2,3\n", "there are 3 columns, expected 18"),
+        ("unnamed.csv", "0,0,0.18,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "names the columns, but `0` is a number"),
+        ("nan.csv", "NAMES\n0,0,NaN,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "`z` is `NaN`, not a finite number"),
+        ("tilted.csv", "NAMES\n0,0,0.18,0,0.8,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "beyond"),
+        ("far.csv", "NAMES\n0,0,0.5,0,0,0,0,0,0,0,0,0,0,0,0,0,0,0\n", "beyond"),
     ] {
-        folder.write(name, content);
+        folder.write(name, content.replace("NAMES", "x,y,z,a,b,c,vx,vy,vz,va,vb,vc,ax,ay,az,aa,ab,ac"));
         folder.run(&["dynamics", "reference.toml", "--states", name]).says(1, &[words, name]);
     }
     folder.run(&["dynamics", "reference.toml", "--states", "none.csv"]).says(1, &["none.csv", "cannot be read"]);

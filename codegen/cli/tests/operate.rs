@@ -146,13 +146,13 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
         ),
         ("wave none.toml", 2, "could not read `none.toml`"),
         ("config write none.toml", 1, "none.toml is refused"),
-        ("record download no-folder/x.rec", 3, "there is no folder `no-folder`"),
+        ("record download legs.toml/x.rec", 3, "could not create the folder `legs.toml`"),
     ] {
         let run = Run::of(&mut board.operate(&folder, &["reference.toml", "arm", "wait arming 20", last]));
         run.says(code, &[text]);
         assert!(board.is(Phase::Disarmed), "{last}");
     }
-    let run = Run::of(&mut board.operate(&folder, &["record download no-folder/x.rec"]));
+    let run = Run::of(&mut board.operate(&folder, &["record download legs.toml/x.rec"]));
     assert_eq!(run.code, 3, "{run:?}");
     // Another controller is not operated.
     let run = Run::of(&mut board.operate(&folder, &["legs.toml", "arm"]));

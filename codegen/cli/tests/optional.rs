@@ -100,3 +100,28 @@ fn without_the_emulator_alone_the_image_is_built_and_looked_at() {
     assert!(missing.contains("apt-get install qemu-system-arm"), "{missing}");
     assert_eq!(missing.lines().count(), 1);
 }
+
+/// At most ten lines of at most eighty letters, built and measured; and why not, where it is not ready.
+#[test]
+fn the_main_job_answers_in_ten_lines() {
+    if let Err(missing) = target::available() {
+        assert!(std::env::var_os(ALLOW_MISSING).is_some_and(|value| value == "1"), "{missing}");
+        crate::support::skipped(&missing.to_string());
+        return;
+    }
+    let folder = Folder::new();
+    folder.spec("small.toml", &[("instructions = 3000", "instructions = 300")]);
+    for (spec, code, words) in [
+        ("reference.toml", 0, ["reference is ready: ", "agree in every bit over 20,000 ticks", "≤ 4,500"]),
+        ("small.toml", 1, ["legs is NOT ready: instructions 2,", "> 300", "  next     specgen size small.toml"]),
+    ] {
+        let run = folder.run(&[spec, "-o", "out/made"]);
+        assert_eq!(run.code, code, "{run:?}");
+        let lines: Vec<&str> = run.stdout.lines().collect();
+        assert!(lines.len() <= 10 && lines.iter().all(|line| line.chars().count() <= 80), "{}", run.stdout);
+        assert!(words.iter().all(|words| run.stdout.contains(words)), "{}", run.stdout);
+        for subject in ["reach", "noise", "record", "margins", "time", "memory", "bits", "next"] {
+            assert!(lines.iter().any(|line| line.starts_with(&format!("  {subject:<9}"))), "{subject}: {}", run.stdout);
+        }
+    }
+}

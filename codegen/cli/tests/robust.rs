@@ -119,7 +119,8 @@ fn the_gate_of_options_or_spec_fails_a_build_with_the_reason_and_the_figures() {
     let with = |more: &[&str]| folder.run(&[&few, more].concat());
     with(&["--max-error", "1 nm"]).says(1, &["not robust: largest rms error is", "above 1.00 nm"]);
     with(&["--max-error", "1 nm", "--quantile", "95"]).says(1, &["95 % quantile of the rms error is"]);
-    let passed = with(&["--max-error", "1 um"]);
+    let passed = with(&["--max-error", "1 um", "--plot", "robust.svg"]);
+    assert!(folder.read("robust.svg").contains(">corners<"));
     assert_eq!(passed.code, 0, "{passed:#?}");
     assert!(passed.stdout.contains("gate: passed (none diverged, largest rms error at most 1000.00 nm)"));
 

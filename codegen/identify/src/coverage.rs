@@ -9,7 +9,7 @@ use super::findings::Findings;
 use super::record::Record;
 use super::regressor::Plane;
 use super::sanity::PLAUSIBLE_RANGE;
-use super::statistics::extent;
+use super::statistics::{extent, micrometres};
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::codes;
 use specgen_language::model::MAX_GRID;
@@ -106,9 +106,9 @@ fn check_displacement_unit(record: &Record, findings: &mut Findings) {
     let unit = if range > PLAUSIBLE_RANGE[1] { "nm" } else { "mm or m" };
     let message = format!(
         "the displacement goes from {} um (at {} s) to {} um (at {} s), which no piezo actuator does: is it in {unit}?",
-        low * 1e6,
+        micrometres(low),
         at(low),
-        high * 1e6,
+        micrometres(high),
         at(high)
     );
     findings.add(codes::DISPLACEMENT_UNIT, None, message, "convert the column to micrometres");

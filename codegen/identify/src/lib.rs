@@ -36,6 +36,7 @@ mod sanity;
 mod selection;
 mod signals;
 mod staircase;
+pub mod states;
 mod statistics;
 pub mod stiffness;
 mod sweep;

@@ -2,7 +2,7 @@
 
 use super::findings::Findings;
 use super::limits;
-use super::statistics::{extent, median};
+use super::statistics::{extent, median, micrometres};
 use specgen_language::diagnostic::codes;
 
 /// Fewer samples are no record.
@@ -99,7 +99,7 @@ fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64
         let run = displacement[first..].iter().take_while(|y| **y == value).count();
         let (run_low, run_high) = extent(&drive[first..first + run]);
         if run_high - run_low > STUCK_TRAVEL * (high - low) {
-            let um = value * 1e6;
+            let um = micrometres(value);
             if swapped {
                 let message = format!(
                     "from {} s to {} s `displacement_um` stands at {um:.4} while `drive_V` goes through {run_low} to {run_high} with noise on it",

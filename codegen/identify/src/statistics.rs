@@ -7,6 +7,11 @@ pub fn extent(values: &[f64]) -> (f64, f64) {
     })
 }
 
+/// A length (m) in µm as a record has it: 1.03, not 1.0299999999999998.
+pub(crate) fn micrometres(metres: f64) -> f64 {
+    libm::round(metres * 1e12) / 1e6
+}
+
 /// Middle value (upper middle of an even count); 0 for an empty slice. Reorders the slice.
 pub(crate) fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {

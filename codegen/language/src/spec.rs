@@ -30,6 +30,7 @@ pub use crate::quantity;
 pub use reference::{key_markdown, reference_markdown};
 pub use schema::json_schema;
 pub use source::MAX_BYTES;
+pub use text::nearest;
 
 /// Errors that leave every value that the model needs as it stands in the file. A gain without a unit counts: gains may be
 /// left out.

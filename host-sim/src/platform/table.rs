@@ -169,16 +169,27 @@ impl PoseTable {
     /// Text, one line per run: rms errors, and the paper's where it has the run.
     #[must_use]
     pub fn to_text(&self) -> String {
-        let mut out = String::from("rms error   Hz   mode            x nm    y nm    z nm  rx nrad ry nrad rz nrad\n");
+        self.text(true)
+    }
+
+    /// The same without the paper's.
+    #[must_use]
+    pub fn ours_to_text(&self) -> String {
+        self.text(false)
+    }
+
+    fn text(&self, beside_paper: bool) -> String {
+        let mut out = String::from("rms error  Hz mode        x nm    y nm    z nm norm nm rx nrad ry nrad rz nrad\n");
         for row in &self.rows {
-            let _ = write!(out, "{:<9}{:>5}   {:<12}", row.trajectory, row.frequency_hz, row.mode);
-            for value in row.rms_nano {
+            let _ = write!(out, "{:<8}{:>5} {:<10}", row.trajectory, row.frequency_hz, row.mode);
+            for value in with_norm(row.rms_nano) {
                 let _ = write!(out, "{value:>8.1}");
             }
             out.push('\n');
-            if let Some(paper) = paper_rms(&row.trajectory, &row.mode, row.frequency_hz) {
-                let _ = write!(out, "{:<29}", "         paper");
-                for value in paper {
+            let paper = beside_paper.then(|| paper_rms(&row.trajectory, &row.mode, row.frequency_hz)).flatten();
+            if let Some(paper) = paper {
+                let _ = write!(out, "{:<24}", "         paper");
+                for value in with_norm(paper) {
                     let _ = write!(out, "{value:>8.0}");
                 }
                 out.push('\n');
@@ -186,6 +197,12 @@ impl PoseTable {
         }
         out
     }
+}
+
+/// The first three, their norm, the others.
+fn with_norm(rms: Six) -> [f64; 7] {
+    let [x, y, z, a, b, c] = rms;
+    [x, y, z, norms(rms)[0], a, b, c]
 }
 
 /// The paper's tables in nm and nrad: columns 0.1, 1 and 10 Hz for each of x, y, z (5, 7) and θx, θy, θz (6, 8).
@@ -327,14 +344,26 @@ impl MachiningTable {
     /// what its own gauges can see (2.2 nm on ±80 mm is 20 nrad).
     #[must_use]
     pub fn to_text(&self) -> String {
-        let mut out = String::from("mean error norm            nm      nrad   paper nm      nrad\n");
+        self.text(true)
+    }
+
+    /// The same without the paper's.
+    #[must_use]
+    pub fn ours_to_text(&self) -> String {
+        self.text(false)
+    }
+
+    fn text(&self, beside_paper: bool) -> String {
+        let mut out = String::from("mean error norm            nm      nrad");
+        out.push_str(if beside_paper { "   paper nm      nrad\n" } else { "\n" });
         for row in &self.rows {
             let _ = write!(
                 out,
                 "{:<11}{:<10}{:>8.2}{:>10.1}",
                 row.part, row.mode, row.translation_nm, row.orientation_nrad
             );
-            if let Some([nm, nrad]) = paper_machining(&row.part, &row.mode) {
+            let paper = beside_paper.then(|| paper_machining(&row.part, &row.mode)).flatten();
+            if let Some([nm, nrad]) = paper {
                 let _ = write!(out, "{nm:>11.0}{nrad:>10.1}");
             }
             out.push('\n');
@@ -377,6 +406,7 @@ mod tests {
         let text = table.to_text();
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 4, "{text}");
+        assert!(!table.ours_to_text().contains("paper"));
         assert!(lines[2].contains("paper") && lines[2].contains("631") && lines[2].ends_with("325"), "{text}");
         assert!(table.to_csv().lines().nth(1).unwrap().starts_with("case-1,pf-pcc,10,2.4495,0.0000,3.2660,"));
         assert!(table.row("case-1", "pf-pcc", 1.0).is_none());

@@ -1,45 +1,136 @@
-//! A record as CSV: time, inputs, what came out. Numbers as the shortest decimals that give the same bits; units in the names.
+//! A record as CSV: time, inputs, what came out, and where it was run again also volts, pose, target and error. Numbers as the
+//! shortest decimals that give the same bits; units in the names.
 
 use std::io::{self, Write};
 
 use super::{Block, Header};
-use crate::word::WordKind;
+use crate::controller::MachineWord;
+use crate::word::{Scalar, WordKind, status_words};
 
 /// Names of what came out.
-const OUTPUTS: &str =
-    "dac_code[0],dac_code[1],dac_code[2],dac_code[3],dac_code[4],dac_code[5],status,phase,cause,amplifiers_on";
+const OUTPUTS: &str = "dac_code[0],dac_code[1],dac_code[2],dac_code[3],dac_code[4],dac_code[5],status,phase,cause,\
+                       amplifiers_on,supervisor_text,status_text";
 
-/// The rows of a block; with the line of names before them for the `first` block.
+/// What a controller that runs a block again gives at each of its rows.
+#[derive(Debug, Clone, Copy)]
+pub struct Again<'a> {
+    /// Names of its output words.
+    pub names: &'a [String],
+    /// Its output words, row by row; fewer rows than the block has where it was not run to the end.
+    pub rows: &'a [Vec<u64>],
+}
+
+/// The rows of a block; with the line of names before them for the `first` block. All blocks of a file have `again`, or none.
 ///
 /// # Errors
 /// The sink does not take them.
-pub fn write_csv(sink: &mut impl Write, header: &Header, block: &Block, first: bool) -> io::Result<()> {
+pub fn write_csv(
+    sink: &mut impl Write,
+    header: &Header,
+    block: &Block,
+    again: Option<Again>,
+    first: bool,
+) -> io::Result<()> {
     let names = header.input_names();
+    let scalar = header.description.scalar;
+    let more = again.map_or_else(Vec::new, |again| Column::all(&names, again.names));
     if first {
         write!(sink, "tick,time_s")?;
         for name in &names {
             write!(sink, ",{}", title(name))?;
         }
-        writeln!(sink, ",{OUTPUTS}")?;
+        write!(sink, ",{OUTPUTS}")?;
+        for column in &more {
+            write!(sink, ",{}", column.title)?;
+        }
+        writeln!(sink)?;
     }
-    let single = header.description.scalar.bits() == 32;
     let kinds: Vec<WordKind> = names.iter().map(|name| WordKind::of(name)).collect();
-    for row in &block.rows {
+    for (index, row) in block.rows.iter().enumerate() {
         write!(sink, "{},{:.9}", row.tick, row.tick as f64 * header.period)?;
         for (word, kind) in row.input.iter().zip(&kinds) {
             match kind {
                 WordKind::Integer => write!(sink, ",{word}")?,
-                WordKind::Real if single => write!(sink, ",{:?}", f32::from_bits(*word as u32))?,
-                WordKind::Real => write!(sink, ",{:?}", f64::from_bits(*word))?,
+                WordKind::Real => real(sink, scalar, *word)?,
             }
         }
         for code in row.codes {
             write!(sink, ",{code}")?;
         }
         let [phase, cause, on, _] = row.supervisor.to_le_bytes();
-        writeln!(sink, ",{},{phase},{cause},{on}", row.status)?;
+        let supervisor = MachineWord::of(u64::from(row.supervisor));
+        write!(sink, ",{},{phase},{cause},{on},{supervisor},{}", row.status, status_words(row.status))?;
+        let given = again.and_then(|again| again.rows.get(index));
+        for column in &more {
+            match (given, &column.of) {
+                (None, _) => write!(sink, ",")?,
+                (Some(given), Of::Output(place)) => real(sink, scalar, given[*place])?,
+                (Some(given), Of::Difference(target, place)) => {
+                    write!(sink, ",{:.6e}", scalar.decode(given[*target]) - scalar.decode(given[*place]))?;
+                }
+                (Some(given), Of::FromInput(target, place)) => {
+                    write!(sink, ",{:.6e}", scalar.decode(given[*target]) - scalar.decode(row.input[*place]))?;
+                }
+            }
+        }
+        writeln!(sink)?;
     }
     Ok(())
+}
+
+fn real(sink: &mut impl Write, scalar: Scalar, word: u64) -> io::Result<()> {
+    if scalar.bits() == 32 {
+        write!(sink, ",{:?}", f32::from_bits(word as u32))
+    } else {
+        write!(sink, ",{:?}", f64::from_bits(word))
+    }
+}
+
+/// A column of what was run again.
+struct Column {
+    title: String,
+    of: Of,
+}
+
+enum Of {
+    /// An output word.
+    Output(usize),
+    /// An output word less another: target less pose.
+    Difference(usize, usize),
+    /// An output word less an input word: demand of a leg less its gauge.
+    FromInput(usize, usize),
+}
+
+impl Column {
+    /// Volts, then for a platform pose, target and error, for legs demand and error.
+    fn all(inputs: &[String], outputs: &[String]) -> Vec<Self> {
+        let place =
+            |names: &[String], stem: &str, k: usize| names.iter().position(|name| *name == format!("{stem}[{k}]"));
+        let mut columns = Vec::new();
+        for (stem, units) in
+            [("voltage", ["V", "V"]), ("pose", ["m", "rad"]), ("target", ["m", "rad"]), ("demand", ["m", "m"])]
+        {
+            // The target of a platform says what its legs are asked for.
+            if stem == "demand" && place(outputs, "target", 0).is_some() {
+                continue;
+            }
+            columns.extend((0..6).filter_map(|k| {
+                let of = Of::Output(place(outputs, stem, k)?);
+                Some(Self { title: format!("{stem}[{k}]_{}", units[k / 3]), of })
+            }));
+        }
+        for k in 0..6 {
+            let platform = place(outputs, "target", k).zip(place(outputs, "pose", k));
+            let leg = place(outputs, "demand", k).zip(place(inputs, "displacement", k));
+            let (of, unit) = match (platform, leg) {
+                (Some((target, pose)), _) => (Of::Difference(target, pose), ["m", "rad"][k / 3]),
+                (None, Some((demand, gauge))) => (Of::FromInput(demand, gauge), "m"),
+                (None, None) => continue,
+            };
+            columns.push(Self { title: format!("error[{k}]_{unit}"), of });
+        }
+        columns
+    }
 }
 
 /// A name with its unit, where it is one and the same: a set-point is a pose (m, rad) or a displacement, a gauge gives m or V.

@@ -120,7 +120,7 @@ impl From<RecordError> for ReplayError {
     }
 }
 
-/// Runs a record again on `machine` and calls `each` with every block.
+/// Runs a record again on `machine` and calls `each` with every block and the output words of the rows that were run.
 ///
 /// After a difference the rest is only read, not run. Where a block follows the one before it without a gap, the machine goes on as
 /// it is, and must then be what the block says it was.
@@ -130,13 +130,14 @@ impl From<RecordError> for ReplayError {
 pub fn replay<R: Read>(
     reader: &mut Reader<R>,
     machine: &mut Supervised,
-    mut each: impl FnMut(&Header, &Block),
+    mut each: impl FnMut(&Header, &Block, &[Vec<u64>]),
 ) -> Result<Replay, ReplayError> {
     same_controller(reader.header(), machine)?;
     let mut run = Run {
         input: machine.input_names().len(),
         output: vec![0; machine.output_names().len()],
         machine,
+        given: Vec::new(),
         found: Replay::default(),
         next: None,
         config: Vec::new(),
@@ -145,8 +146,9 @@ pub fn replay<R: Read>(
     while let Some(piece) = reader.next_piece()? {
         match piece {
             Piece::Block(block) => {
-                each(&header, &block);
+                run.given.clear();
                 run.block(&block)?;
+                each(&header, &block, &run.given);
             }
             Piece::Damaged { block, reason } => {
                 run.found.damaged.push((block, reason));
@@ -178,6 +180,8 @@ struct Run<'a> {
     machine: &'a mut Supervised,
     input: usize,
     output: Vec<u64>,
+    /// Output words of the rows of this block.
+    given: Vec<Vec<u64>>,
     found: Replay,
     /// Tick that follows the last one.
     next: Option<u64>,
@@ -255,6 +259,7 @@ impl Run<'_> {
     fn tick(&mut self, row: &Row) -> Option<Divergence> {
         debug_assert_eq!(row.input.len(), self.input);
         self.machine.step(&row.input, &mut self.output);
+        self.given.push(self.output.clone());
         self.found.ticks += 1;
         let description = crate::controller::TickController::description(self.machine.controller());
         let word = |name: &str| description.output(name).ok().and_then(|place| self.output.get(place)).copied();

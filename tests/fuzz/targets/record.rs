@@ -27,7 +27,7 @@ fn read(file: &[u8]) {
         match piece {
             Piece::Block(block) => {
                 assert!(block.rows.iter().all(|row| row.input.len() == header.input_names().len()));
-                write_csv(&mut Vec::new(), &header, &block, true).unwrap();
+                write_csv(&mut Vec::new(), &header, &block, None, true).unwrap();
             }
             Piece::Damaged { reason, .. } => assert!(!reason.is_empty()),
             Piece::Cut { bytes } => assert!(bytes < file.len()),

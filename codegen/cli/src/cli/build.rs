@@ -8,8 +8,9 @@ use host_sim::controller::{Controller, TickController};
 use serde::Serialize;
 
 use super::check::describe;
+use super::spec;
 use super::ui::{Failure, Outcome, Ui};
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
 use specgen_language::model;
 use specgen_studies::verdict::Verdict;
@@ -85,8 +86,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     if let Some(error) = &set_up {
         ui.progress(&format!("{error}; going on without"));
     }
-    let compiled = compile::compile(spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    let compiled = spec::compiled(spec, ui)?;
     let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
     let _hold = workspace::write(&output, &compiled.files)?;
     ui.progress(&format!("wrote {} files to {}", compiled.files.len(), output.display()));

@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use crate::{lint, precision, reach, stability};
-use specgen_compiler::compile::{self, Compiled, Refused};
+use specgen_compiler::compile::{Compiled, Refused};
 use specgen_compiler::lint::paths::PathDemand;
 use specgen_compiler::lower::PoseNoise;
 use specgen_compiler::lower::setpoint::{self, Stopping};
@@ -60,7 +61,7 @@ struct Ratio {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let compiled = compile::compile(&arguments.spec)?;
+    let compiled = spec::quietly(&arguments.spec, ui)?;
     let precision = precision::of(&compiled.model, &compiled.ir)
         .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
     let mut findings = compiled.findings.clone();

@@ -8,8 +8,8 @@ use serde::Serialize;
 use specgen_rt::histogram::{Histogram, time_text};
 
 use super::sim::environment;
+use super::spec;
 use super::ui::{Failure, Outcome, Ui};
-use specgen_compiler::compile;
 use specgen_operate::doctor::latency::{self, Figures, Measured};
 use specgen_operate::doctor::{Files, Finding, Grade, equipment, system};
 
@@ -38,8 +38,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let mut period = PERIOD;
     if let Some(spec) = &arguments.spec {
-        let compiled = compile::compile(spec)?;
-        ui.findings_in_brief(&compiled.source, &compiled.findings);
+        let compiled = spec::looked_up(spec, ui)?;
         period = (compiled.model.timing.period * 1e9) as u64;
     }
     ui.progress(&format!("measuring wake-ups every {} for {} s", time_text(period), arguments.seconds));

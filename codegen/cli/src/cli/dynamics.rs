@@ -12,10 +12,12 @@ use serde_json::{Value, json};
 use specgen_runtime::Motion;
 
 use super::file::write_file;
+use super::spec;
 use super::ui::{Failure, Outcome, Ui};
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::{Compiled, Refused};
 use specgen_compiler::lower;
 use specgen_compiler::workspace;
+use specgen_identify::states;
 use specgen_language::interrupt::Scratch;
 use specgen_language::model::Model;
 use specgen_toolchain as target;
@@ -31,8 +33,8 @@ const LARGEST: u64 = 64 << 20;
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,
-    /// States: JSON (a list, or an object with a list `vectors`, of objects with `h`, `hd`, `hdd`), or CSV with 18 columns (pose,
-    /// rate, acceleration). m, rad, s.
+    /// States: JSON (a list, or an object with a list `vectors`, of objects with `h`, `hd`, `hdd`), or CSV with a line of
+    /// names and 18 columns (pose, rate, acceleration). m, rad, s.
     #[arg(long, value_name = "FILE")]
     states: PathBuf,
     /// Poses are from rest; without it their z counts from the base frame.
@@ -54,10 +56,9 @@ struct State {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let states = read_states(&arguments.states)?;
-    let compiled = compile::compile(&arguments.spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    let compiled = spec::compiled(&arguments.spec, ui)?;
     let platform = lower::platform(&compiled.model)
-        .map_err(|findings| compile::Refused { source: Some(compiled.source.clone()), findings })?;
+        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
     let generated = if arguments.generated { Some(Generated::build(&compiled, ui)?) } else { None };
     let height = if arguments.from_rest { 0.0 } else { compiled.model.geometry.height };
     let mut vectors = Vec::with_capacity(states.len());
@@ -194,8 +195,12 @@ fn read_states(path: &Path) -> Result<Vec<State>, Failure> {
         return Err(refuse(format!("{size} bytes; at most {LARGEST} are read")));
     }
     let text = fs::read_to_string(path).map_err(|error| refuse(format!("cannot be read: {error}")))?;
-    let states = if text.trim_start().starts_with(['{', '[']) { from_json(&text) } else { from_csv(&text) };
-    let states = states.map_err(refuse)?;
+    let states = if text.trim_start().starts_with(['{', '[']) {
+        from_json(&text).map_err(refuse)?
+    } else {
+        let given = states::parse(&text, &shown.to_string()).map_err(|findings| Refused { source: None, findings })?;
+        given.into_iter().enumerate().map(|(k, given)| State { id: k.to_string(), given }).collect()
+    };
     if states.is_empty() {
         return Err(refuse("no states in it".to_owned()));
     }
@@ -217,26 +222,4 @@ fn from_json(text: &str) -> Result<Vec<State>, String> {
         Ok(State { given: [six("h")?, six("hd")?, six("hdd")?], id })
     };
     list.iter().enumerate().map(state).collect()
-}
-
-fn from_csv(text: &str) -> Result<Vec<State>, String> {
-    let mut states = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        let line = line.trim();
-        // A line of names may come first.
-        let is_header = index == 0 && line.starts_with(|c: char| c.is_ascii_alphabetic());
-        if line.is_empty() || line.starts_with('#') || is_header {
-            continue;
-        }
-        let numbers: Option<Vec<f64>> =
-            line.split(',').map(|cell| cell.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect();
-        match numbers.as_deref() {
-            Some([a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r]) => {
-                let given = [[*a, *b, *c, *d, *e, *f], [*g, *h, *i, *j, *k, *l], [*m, *n, *o, *p, *q, *r]];
-                states.push(State { id: states.len().to_string(), given });
-            }
-            _ => return Err(format!("line {}: expected 18 finite numbers: pose, rate, acceleration", index + 1)),
-        }
-    }
-    Ok(states)
 }

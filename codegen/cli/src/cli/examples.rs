@@ -1,179 +1,222 @@
 //! Examples below the help of each command.
 //!
-//! Each line is a command as typed and, behind `#`, what it does. `codegen/cli/tests/examples.rs` runs them as they stand here, in a
+//! Each line is a command as typed and, behind `#` or in a line below, what it does. No line is longer than 80 letters. `codegen/cli/tests/examples.rs` runs them as they stand here, in a
 //! folder that has the files they name; lines with one of the marks that [`MAIN`] explains are only parsed.
 
 pub const MAIN: &str = "\
 Examples:
-  specgen platform.toml --no-build         # compile, write a workspace of Rust source
-  specgen platform.toml -o controller      # (minutes) the same, built, measured, compared with the host bit by bit
-  specgen platform.toml --setup            # (minutes) the same, after bringing cross compiler and emulator
+  specgen platform.toml --no-build         # compile, write Rust source
+  specgen platform.toml -o controller  # (minutes)
+      built, measured, bits compared
+  specgen platform.toml --setup            # (minutes) brings the tools first
   specgen check platform.toml              # every finding, nothing written
-  specgen sim platform.toml --frequency 10 # the paper's experiments with the emitted controller
-  specgen tune platform.toml --write       # (minutes) gains from the simulated loop, into the spec
+  specgen sim platform.toml --frequency 10
+      the emitted controller on its machine
+  specgen tune platform.toml --write  # (minutes)
+      gains from the simulated loop, into the spec
   specgen identify record.csv --drive 0:100
-  specgen flash platform.toml              # (board) build, check, write to the board
+  specgen flash platform.toml         # (board) build, check, write to the board
 
-docs/guide.md leads from the bench to running firmware. Every command has examples of its own: `specgen check --help`.
-(minutes) takes some; (board) wants a board, a second program, or a computer at rest.
+docs/guide.md leads from the bench to running firmware. Every command has
+examples of its own: `specgen check --help`. (minutes) takes some; (board) wants
+a board, a second program, or a computer at rest.
 
-Exit codes: 0 good, 1 spec, record or budget refused, 2 usage, 3 environment, 130 interrupted.";
+Exit codes: 0 good; 1 spec, record or budget refused; 2 usage; 3 environment;
+130 interrupted.";
 
 pub const NEW: &str = "\
 Examples:
-  specgen new bench --like reference                       # asks nothing: a platform as the paper's
-  specgen new mine --like reference --r_B \"200 mm\" --stroke \"100 um\" --rate \"20 kHz\"
-  specgen new six --like legs --stroke \"30 um\"             # six legs with gauges of their own
+  specgen new bench --like reference   # asks nothing: a platform as the paper's
+  specgen new mine --like reference --r_B \"200 mm\" --stroke \"100 um\"
+  specgen new six --like legs --stroke \"30 um\"
+      six legs with gauges of their own
 
-Without --like it asks; an empty line takes the value in brackets. The paper's symbols are options, too: --r_B, --r_P, --alpha_B, --alpha_P, --m, --k_a, --T_s.";
+Without --like it asks; an empty line takes the value in brackets. The paper's
+symbols are options, too: --r_B, --r_P, --alpha_B, --alpha_P, --m, --k_a, --T_s.";
 
 pub const LSP: &str = "\
 Examples:
-  specgen lsp                                              # (board) an editor starts it, and talks to it
+  specgen lsp                     # (board) an editor starts it, and talks to it
 
 docs/editors.md has the lines for VS Code, Helix and Neovim.";
 
 pub const CHECK: &str = "\
 Examples:
-  specgen check platform.toml              # every finding with line, column and fix
-  specgen check platform.toml --json       # the same, with margins, reach and precision, for programs";
+  specgen check platform.toml          # every finding with line, column and fix
+  specgen check platform.toml --json
+      the same, with margins, reach and precision, for programs";
 
 pub const BUILD: &str = "\
 Examples:
-  specgen build legs.toml --target host -o legs-host                   # a shared library for this computer
-  specgen build platform.toml --target stm32h743 -o controller         # (minutes) an image of the NUCLEO-H743ZI2
-  specgen build platform.toml --target rt-pc -o controller             # (minutes) the program of a real-time PC
-  specgen build platform.toml --target qemu --no-measure               # (minutes) emulated Cortex-M, nothing counted";
+  specgen build legs.toml --target host -o legs-host
+      a shared library for this computer
+  specgen build platform.toml --target stm32h743 -o controller  # (minutes)
+      an image of the NUCLEO-H743ZI2
+  specgen build platform.toml --target rt-pc -o controller  # (minutes)
+      the program of a real-time PC
+  specgen build platform.toml --target qemu --no-measure  # (minutes)
+      emulated Cortex-M, nothing counted";
 
 pub const SIZE: &str = "\
 Examples:
-  specgen size platform.toml                               # (minutes) builds for the spec's target.mcu
+  specgen size platform.toml        # (minutes) builds for the spec's target.mcu
   specgen size platform.toml --target stm32h743 --no-measure  # (minutes)
-  specgen size controller/target/stm32h743.elf             # (minutes) what `build` left there";
+  specgen size controller/target/stm32h743.elf  # (minutes)
+      what `build` left there";
 
 pub const FLASH: &str = "\
 Examples:
-  specgen flash platform.toml                              # (board) build, check, write by probe-rs
-  specgen flash controller/target/stm32h743.elf            # (board) an image that is there";
+  specgen flash platform.toml          # (board) build, check, write by probe-rs
+  specgen flash controller/target/stm32h743.elf  # (board)
+      an image that is there";
 
 pub const SIM: &str = "\
 Examples:
-  specgen sim legs.toml -o traces                          # Tables 1 and 2, every tick as CSV in traces
-  specgen sim platform.toml --frequency 10                 # Tables 5 to 9
-  specgen sim platform.toml --trajectory case-2            # one of the spec's own, played on board
-  specgen sim platform.toml --record run.rec --seconds 0.5 # a record for `specgen replay`";
+  specgen sim legs.toml                       # a sweep of its legs, every law
+  specgen sim platform.toml --frequency 10   # at rest, a wave, its trajectories
+  specgen sim platform.toml --trajectory case-2 --plot case-2.svg
+  specgen sim legs.toml --paper -o tables   # Tables 1 and 2, beside the paper's
+  specgen sim platform.toml --record run.rec --seconds 0.5   # for `replay`";
 
 pub const TUNE: &str = "\
 Examples:
-  specgen tune legs.toml --evaluations 100 -o tuning       # weights as a patch; front, history and plot in tuning
-  specgen tune platform.toml --write                       # (minutes) gains and bandwidths into the spec
+  specgen tune legs.toml --evaluations 100 -o tuning
+      weights as a patch; front, history and plot in tuning
+  specgen tune platform.toml --write  # (minutes)
+      gains and bandwidths into the spec
   specgen tune platform.toml --what gains --bounds ki=10:1000  # (minutes)";
 
 pub const ROBUST: &str = "\
 Examples:
-  specgen robust legs.toml --draws 10                      # ten random machines and the corners
-  specgen robust legs.toml --replay gain-low               # one of them alone, to the bit
-  specgen robust platform.toml --max-error \"60 nm\" --max-orientation \"300 nrad\"  # (minutes) a gate for builds";
+  specgen robust legs.toml --draws 10      # ten random machines and the corners
+  specgen robust legs.toml --replay gain-low     # one of them alone, to the bit
+  specgen robust platform.toml --max-error \"60 nm\"  # (minutes)
+      a gate for builds";
 
 pub const REPORT: &str = "\
 Examples:
-  specgen report legs.toml -o legs.html --generations 0 --no-target    # quick: simulated runs and findings
-  specgen report platform.toml                             # (minutes) everything, platform-report.html";
+  specgen report legs.toml -o legs.html --generations 0 --no-target
+      quick: simulated runs and findings
+  specgen report platform.toml      # (minutes) everything, platform-report.html";
 
 pub const REPRODUCE: &str = "\
 Examples:
-  specgen reproduce                                        # (minutes) everything, into reproduction
-  specgen reproduce --generations 1 -o quick               # (minutes) with hardly any genetic algorithm";
+  specgen reproduce                    # (minutes) everything, into reproduction
+  specgen reproduce --generations 1 -o quick  # (minutes)
+      with hardly any genetic algorithm";
 
 pub const PIL: &str = "\
 Examples:
-  specgen pil legs.toml --seconds 0.05                     # (minutes) the image in QEMU against the host
+  specgen pil legs.toml --seconds 0.05  # (minutes)
+      the image in QEMU against the host
   specgen pil platform.toml --mode pf-pcc                  # (minutes)
-  specgen pil platform.toml --port /dev/ttyACM0            # (board) a board instead of QEMU";
+  specgen pil platform.toml --port /dev/ttyACM0  # (board)
+      a board instead of QEMU";
 
 pub const OPERATE: &str = "\
 Examples:
-  specgen operate --port /dev/ttyACM0 platform.toml status     # (board) phase, cause, late ticks
-  specgen operate --port /dev/ttyACM0 platform.toml            # (board) line by line from the keyboard
-  specgen operate --port /dev/ttyACM0 platform.toml acknowledge arm \"wait arming\" run \"wait running 20\"  # (board)
-  specgen operate --socket rt.sock platform.toml --script run.txt  # (board) a real-time PC, from a file
+  specgen operate --port /dev/ttyACM0 platform.toml status  # (board)
+      phase, cause, late ticks
+  specgen operate --port /dev/ttyACM0 platform.toml  # (board)
+      line by line from the keyboard
+  specgen operate --port /dev/ttyACM0 arm \"wait arming\" run  # (board)
+  specgen operate --socket rt.sock platform.toml --script run.txt  # (board)
+      a real-time PC, from a file
 
-Commands: status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, wait PHASE|SECONDS [TIMEOUT], config,
-  config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
+Commands: status, arm, run, hold, ramp-down, acknowledge, none,
+  set NAME=VALUE…, wait PHASE|SECONDS [TIMEOUT], config, config write SPEC,
+  record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
   stop (ends the program at a socket)
 
-The link lives as long as this command does; without it the machine holds after 0.1 s. Ctrl-C ramps down first.";
+The link lives as long as this command does; without it the machine holds after
+0.1 s. Ctrl-C ramps down first.";
 
 pub const REPLAY: &str = "\
 Examples:
-  specgen replay run.rec --spec platform.toml              # bit-equal, or the first tick that differs
-  specgen replay run.rec --csv run.csv                     # time, inputs with units, what came out";
+  specgen replay run.rec --spec platform.toml
+      bit-equal, or the first tick that differs
+  specgen replay run.rec --csv run.csv  # time, inputs with units, what came out";
 
 pub const DYNAMICS: &str = "\
 Examples:
-  specgen dynamics platform.toml --states states.json      # M, C, G, J and leg forces, as JSON
-  specgen dynamics platform.toml --states states.json -o forces.json      # into a file";
+  specgen dynamics platform.toml --states states.json
+      M, C, G, J and leg forces, as JSON
+  specgen dynamics platform.toml --states states.json -o forces.json
+      into a file";
 
 pub const IDENTIFY: &str = "\
 Examples:
-  specgen identify record.csv --drive 0:100                # grid by cross-validation; fit, noise, drift
-  specgen identify record.csv --drive 0:100 --grid 16 -o table.csv --plot table.svg
-  specgen identify linear 1hz.csv 10hz.csv                 # records of one frequency each";
+  specgen identify record.csv --drive 0:100
+      grid by cross-validation; fit, noise, drift
+  specgen identify record.csv --drive 0:100 --grid 16 --plot table.svg
+  specgen identify record.csv --drive 0:100 --grid 16 -o table.csv
+  specgen identify linear 1hz.csv 10hz.csv       # records of one frequency each";
 
 pub const LINEAR: &str = "\
 Examples:
-  specgen identify linear 1hz.csv 10hz.csv                 # gain, λ, and the weights that are stable over it
+  specgen identify linear 1hz.csv 10hz.csv
+      gain, λ, and the weights that are stable over it
   specgen identify linear 1hz.csv 10hz.csv --frequency 1,10 --spec platform.toml";
 
 pub const RESPONSE: &str = "\
 Examples:
-  specgen identify response sweep.csv --plot response.svg  # resonance, damping, lag, dead time";
+  specgen identify response sweep.csv --plot response.svg
+      resonance, damping, lag, dead time";
 
 pub const GAUGE: &str = "\
 Examples:
-  specgen identify gauge gauge.csv                         # a polynomial for [sensor] or [[gauge]]";
+  specgen identify gauge gauge.csv      # a polynomial for [sensor] or [[gauge]]";
 
 pub const STIFFNESS: &str = "\
 Examples:
-  specgen identify stiffness force.csv                     # actuator.axial_stiffness";
+  specgen identify stiffness force.csv                # actuator.axial_stiffness";
 
 pub const RATE: &str = "\
 Examples:
-  specgen identify rate record.csv fast.csv --drive 0:100 --grid 16 -o leg   # leg.toml has the lines for [hysteresis]";
+  specgen identify rate record.csv fast.csv --drive 0:100 --grid 16 -o leg
+      leg.toml has the lines for [hysteresis]";
 
 pub const FORC: &str = "\
 Examples:
-  specgen forc -o record.csv                               # the reference leg, 32 curves at 20 V/s
+  specgen forc -o record.csv            # the reference leg, 32 curves at 20 V/s
   specgen forc platform.toml -o leg.csv                    # a leg of this spec
-  specgen forc -o fast.csv --rate 2000 --grid 16           # a second rate, for `identify rate`";
+  specgen forc -o fast.csv --rate 2000 --grid 16
+      a second rate, for `identify rate`";
 
 pub const PLANT: &str = "\
 Examples:
-  specgen plant platform.toml                              # (board) until Ctrl-C; rt-pc --sim plant joins in
-  specgen plant platform.toml --name bench --cpu 1 &       # (board) beside the controller's processor";
+  specgen plant platform.toml  # (board)
+      until Ctrl-C; rt-pc --sim plant joins in
+  specgen plant platform.toml --name bench --cpu 1 &  # (board)
+      beside the controller's processor";
 
 pub const DOCTOR: &str = "\
 Examples:
-  specgen doctor --seconds 0.5                             # wake-ups every 100 us, what to change
-  specgen doctor platform.toml --cpu 1                     # (board) exit code 1 if the spec's period is not kept";
+  specgen doctor --seconds 0.5           # wake-ups every 100 us, what to change
+  specgen doctor platform.toml --cpu 1  # (board)
+      exit code 1 if the spec's period is not kept";
 
 pub const DUMP_IR: &str = "\
 Examples:
-  specgen dump-ir platform.toml > constants.json           # every constant of the controller";
+  specgen dump-ir platform.toml > constants.json
+      every constant of the controller";
 
 pub const CACHE: &str = "\
 Examples:
-  specgen cache                                            # its folder, how many builds, how large
+  specgen cache                         # its folder, how many builds, how large
 
-With --clear it is emptied, which is safe at any time. SPECGEN_CACHE=DIR names another folder, SPECGEN_CACHE= keeps nothing;
---no-cache does neither take nor keep for one command.";
+With --clear it is emptied, which is safe at any time. SPECGEN_CACHE=DIR names
+another folder, SPECGEN_CACHE= keeps nothing; --no-cache does neither take nor
+keep for one command.";
 
 pub const COMPLETIONS: &str = "\
 Examples:
-  specgen completions bash > specgen.bash                  # for one session: source specgen.bash
+  specgen completions bash > specgen.bash
+      for one session: source specgen.bash
 
-Install, once:
-  bash        specgen completions bash > ~/.local/share/bash-completion/completions/specgen
-  zsh         specgen completions zsh > ~/.zfunc/_specgen; ~/.zshrc: fpath+=~/.zfunc; autoload -U compinit; compinit
-  fish        specgen completions fish > ~/.config/fish/completions/specgen.fish
-  PowerShell  specgen completions powershell >> $PROFILE";
+Install, once, into the file that your shell reads:
+  bash        ~/.local/share/bash-completion/completions/specgen
+  zsh         ~/.zfunc/_specgen, and in ~/.zshrc:
+              fpath+=~/.zfunc; autoload -U compinit; compinit
+  fish        ~/.config/fish/completions/specgen.fish
+  PowerShell  behind what $PROFILE has";

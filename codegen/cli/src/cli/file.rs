@@ -67,6 +67,8 @@ enum Place {
         file: NamedTempFile,
         // After the file: it is kept in mind until it is gone.
         _guard: Guard,
+        // After both: folders that were made for the file go again if it does not come.
+        _claimed: Claimed,
     },
     /// A device or a pipe takes what comes.
     Device(fs::File),
@@ -86,12 +88,12 @@ impl PendingFile {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        if !folder.is_dir() {
-            return Err(unwritten(path, &format_args!("there is no folder `{}`", folder.display())));
-        }
+        let claimed = Claimed::new(folder).map_err(|error| {
+            unwritten(path, &format_args!("could not create the folder `{}`: {error}", folder.display()))
+        })?;
         let (file, guard) = Guard::file(|| temporary_beside(&target, folder), |file| file.path().to_owned())
             .map_err(|error| unwritten(path, &plain(&error)))?;
-        Ok(Self { place: Place::Beside { file, _guard: guard }, target })
+        Ok(Self { place: Place::Beside { file, _guard: guard, _claimed: claimed }, target })
     }
 
     /// A file that needs only to be kept.
@@ -111,7 +113,7 @@ impl PendingFile {
         let Self { place, target } = self;
         match place {
             Place::Device(_) => Ok(()),
-            Place::Beside { file, _guard } => {
+            Place::Beside { file, _guard, _claimed } => {
                 // On the disk before it takes the place of what was there.
                 workspace::sync(file.path()).map_err(|error| unwritten(&target, &error))?;
                 file.persist(&target).map_err(|error| unwritten(&target, &error.error))?;

@@ -13,9 +13,10 @@ use host_sim::controller::{Controller, TickController};
 use serde::Serialize;
 
 use super::build::TICKS;
+use super::spec;
 use super::ui::{Failure, Ui};
 use crate::{emit, workspace};
-use specgen_compiler::compile::{self, Compiled, Refused};
+use specgen_compiler::compile::{Compiled, Refused};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{self, Mcu};
 use specgen_studies::verify::{self, Measurement};
@@ -124,8 +125,7 @@ fn any(_: Target) -> Result<(), Failure> {
 
 /// Compiles, writes, builds, checks, measures. A target that the command does not `accept` is refused before anything is written.
 fn make(spec: &Path, common: &Common, accept: fn(Target) -> Result<(), Failure>, ui: &mut Ui) -> Result<Made, Failure> {
-    let compiled = compile::compile(spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    let compiled = spec::compiled(spec, ui)?;
     let declared = compiled.model.target.mcu;
     // clap lets only known names through.
     let target = common.target.as_deref().and_then(Target::named).unwrap_or_else(|| Target::of(declared));

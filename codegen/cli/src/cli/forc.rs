@@ -7,13 +7,14 @@ use host_sim::forc::{ReversalExperiment, ReversalRecord};
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
 use serde::Serialize;
-use specgen_compiler::compile::Refused;
 use specgen_language::model::Model;
-use specgen_language::spec::{self, SpecSource};
+use specgen_report::chart::{Axis, Chart, LINE};
 use specgen_studies::machine;
 
 use super::file::write_file;
+use super::plot::Plot;
 use super::sim::PlantArguments;
+use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 
 /// Curves where nothing else is said.
@@ -39,6 +40,8 @@ pub struct Arguments {
     #[arg(long, value_name = "V/S", allow_negative_numbers = true, value_parser = slope)]
     rate: Option<f64>,
     #[command(flatten)]
+    plot: Plot,
+    #[command(flatten)]
     plant: PlantArguments,
 }
 
@@ -53,11 +56,21 @@ fn slope(text: &str) -> Result<f64, String> {
 struct Curves {
     rows: usize,
     file: String,
+    /// The line about it.
+    #[serde(skip)]
+    plot: Option<String>,
+}
+
+/// The loops of a record.
+fn chart(record: &ReversalRecord) -> Chart {
+    let points = record.rows.iter().map(|row| [row.drive, row.displacement * 1e6]).collect();
+    Chart::new("", "hysteresis", Axis::linear("drive", "V"), Axis::linear("displacement", "µm")).with("", LINE, points)
 }
 
 impl Outcome for Curves {
     fn text(&self) -> String {
-        format!("wrote {} rows to {}\n", self.rows, self.file)
+        let plot = self.plot.as_deref().unwrap_or_default();
+        format!("wrote {} rows to {}\n{plot}", self.rows, self.file)
     }
 }
 
@@ -70,19 +83,13 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         shape: arguments.plant.leg()?,
     };
     let record = match &arguments.spec {
-        Some(path) => {
-            let source = SpecSource::read(path).map_err(|finding| Refused { source: None, findings: vec![finding] })?;
-            let (model, findings) = spec::load_as_far(&source);
-            let Some(model) = model else {
-                return Err(Refused { source: Some(source), findings }.into());
-            };
-            simulate(&model, &experiment)
-        }
+        Some(path) => simulate(&spec::model(path)?, &experiment),
         None => experiment.run(&experiment.shape, CURVES, 0.0),
     };
     let rows = record.rows.len();
     write_file(&arguments.output, record.to_csv().as_bytes())?;
-    ui.result(&Curves { rows, file: arguments.output.display().to_string() });
+    let plot = arguments.plot.charts("reversal curves", "displacement over drive", &[chart(&record)])?;
+    ui.result(&Curves { rows, file: arguments.output.display().to_string(), plot });
     Ok(())
 }
 

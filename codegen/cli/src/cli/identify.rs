@@ -6,7 +6,6 @@
 mod everett;
 mod gauge;
 mod linear;
-mod plot;
 mod rate;
 mod response;
 mod stiffness;

@@ -10,6 +10,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use clap::{ArgGroup, Args};
 use specgen_link::client::{Port, Timeout};
 
+use super::spec;
 use super::ui::{Failure, Ui};
 use answer::{Mistake, Report};
 use operator::{Ended, Operator};
@@ -22,6 +23,7 @@ use specgen_operate::{ALIVE, Order, Session, SocketLine};
 #[derive(Args, Debug)]
 #[command(
     group(ArgGroup::new("line").required(true).args(["port", "socket"])),
+    override_usage = "specgen operate [OPTIONS] --port <DEVICE> [SPEC] [COMMAND]...\n       specgen operate [OPTIONS] --socket <PATH> [SPEC] [COMMAND]...",
     after_help = super::examples::OPERATE
 )]
 pub struct Arguments {
@@ -57,11 +59,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let commands = arguments.words.get(usize::from(spec.is_some())..).unwrap_or_default();
     let source = source(arguments, commands)?;
     let compiled = match spec {
-        Some(spec) => {
-            let compiled = compile::compile(spec.as_ref())?;
-            ui.findings_in_brief(&compiled.source, &compiled.findings);
-            Some(compiled)
-        }
+        Some(spec) => Some(spec::looked_up(spec.as_ref(), ui)?),
         None => None,
     };
     if let Source::List(orders) = &source {

@@ -15,9 +15,10 @@ use specgen_link::Counted;
 use specgen_link::client::{Port, Timeout};
 
 use super::sim::{PlantArguments, environment, frequency};
+use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use report::Report;
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::Compiled;
 use specgen_compiler::workspace;
 use specgen_language::interrupt;
 use specgen_operate::pil::{BAUD, Lockstep, OpenError, Pipes, SerialLine, Stop};
@@ -73,8 +74,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // What is wrong with the arguments, or missing on the machine, is reported before the minutes of the rest.
     arguments.plant.leg()?;
-    let compiled = compile::compile(&arguments.spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    let compiled = spec::compiled(&arguments.spec, ui)?;
     let plan = scenario::Plan::of(arguments, &compiled)?;
     let line = match &arguments.port {
         Some(path) => Some(SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?),

@@ -12,8 +12,9 @@ use specgen_rt::histogram::{Histogram, time_text};
 use specgen_rt::scheduling;
 
 use super::sim::{PlantArguments, environment};
+use super::spec;
 use super::ui::{Failure, Outcome, Ui};
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
 use specgen_operate::served::{Plant, Served};
 use specgen_studies::machine;
@@ -82,8 +83,7 @@ impl Outcome for Summary {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let path = exchange::path_of(&arguments.name).map_err(|error| Failure::Usage(format!("--name: {error}")))?;
-    let compiled = compile::compile(&arguments.spec)?;
-    ui.findings_in_brief(&compiled.source, &compiled.findings);
+    let compiled = spec::looked_up(&arguments.spec, ui)?;
     let plant = prepared(arguments, &compiled, ui)?;
     let mut served = Served::new(plant, &compiled.model, &compiled.ir);
     for refused in

@@ -8,14 +8,17 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::controller::{MachineWord, Supervised};
 use host_sim::description::Description;
-use host_sim::record::{self, Block, Header, PhaseChange, Piece, Reader, Replay, ReplayError};
+use host_sim::record::{self, Again, Block, Header, PhaseChange, Piece, Reader, Replay, ReplayError};
 use serde::Serialize;
 
 use super::file::{PendingFile, unwritten};
+use super::plot::Plot;
 use super::sim;
+use super::spec;
 use super::table::{left, right, row};
 use super::ui::{Failure, Outcome, Ui};
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::Compiled;
+use specgen_report::chart::{Axis, Chart, LINE};
 
 /// Changes of the phase that are shown.
 const SHOWN: usize = 20;
@@ -28,9 +31,12 @@ pub struct Arguments {
     /// The spec that the target was built from. Without it the record can only be exported.
     #[arg(long, value_name = "SPEC", required_unless_present = "csv")]
     spec: Option<PathBuf>,
-    /// Write the record as CSV, with time and units.
+    /// Write the record as CSV, with time and units; with --spec also volts, and of a platform pose, target and error.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// With --spec: target less pose, or demand less gauge of the legs.
+    #[command(flatten)]
+    plot: Plot,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
@@ -38,6 +44,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
     let mut reader = open(&arguments.record)?;
     let mut csv = arguments.csv.as_deref().map(Csv::new).transpose()?;
+    let drawn = arguments.plot.wanted()?;
+    if drawn && arguments.spec.is_none() {
+        return Err(Failure::Usage("--plot is for a record that is run again: name its --spec".to_owned()));
+    }
     let Some(spec) = &arguments.spec else {
         let found = export(&mut reader, csv.as_mut(), &refuse)?;
         let rows = csv.map(Csv::finish).transpose()?.unwrap_or_default();
@@ -47,19 +57,23 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         let exported = Exported { file: shown.to_string(), rows, ..found };
         return ui.judged(&exported, failed);
     };
-    let compiled = compile::compile(spec)?;
-    ui.findings_in_brief(&compiled.source, &compiled.findings);
+    let compiled = spec::looked_up(spec, ui)?;
     // Before the library is built: a wrong spec is refused at once.
     same_build(arguments, &reader.header().description, &compiled)?;
     let controller = sim::emitted(&compiled, ui)?;
     let mut machine = Supervised::new(controller).map_err(sim::environment)?;
     ui.progress("running the record again");
+    let names = machine.output_names();
+    let mut errors = Errors::default();
     let mut trouble = None;
-    let found = record::replay(&mut reader, &mut machine, |header, block| {
+    let found = record::replay(&mut reader, &mut machine, |header, block, rows| {
+        if drawn {
+            errors.add(header, block, &names, rows);
+        }
         if let Some(csv) = &mut csv
             && trouble.is_none()
         {
-            trouble = csv.add(header, block).err();
+            trouble = csv.add(header, block, Some(Again { names: &names, rows })).err();
         }
     });
     let found = match found {
@@ -71,6 +85,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     }
     if let Some(csv) = csv {
         csv.finish()?;
+    }
+    let plot = arguments.plot.charts(&compiled.ir.name, &shown.to_string(), &[errors.chart()])?;
+    if let Some(line) = plot {
+        ui.progress(line.trim_end());
     }
     let failed = verdict(&found).map(|message| format!("{shown}: {message}"));
     ui.judged(&Report::of(format!("{shown}: {}", compiled.ir.name), found, reader.header().period), failed)
@@ -258,7 +276,7 @@ fn export(
         match piece {
             Piece::Block(block) => {
                 if let Some(csv) = csv.as_deref_mut() {
-                    csv.add(&header, &block)?;
+                    csv.add(&header, &block, None)?;
                 }
             }
             Piece::Damaged { block, reason } => found.damaged.push((block, reason)),
@@ -266,6 +284,47 @@ fn export(
         }
     }
     Ok(found)
+}
+
+/// Errors of the first three coordinates of a platform, or of the legs, over time.
+#[derive(Default)]
+struct Errors {
+    /// s, nm.
+    points: [Vec<[f64; 2]>; 6],
+    platform: bool,
+}
+
+impl Errors {
+    fn add(&mut self, header: &Header, block: &Block, names: &[String], rows: &[Vec<u64>]) {
+        let scalar = header.description.scalar;
+        let place = |names: &[String], stem: &str| names.iter().position(|name| *name == format!("{stem}[0]"));
+        let inputs = header.input_names();
+        let pose = place(names, "target").zip(place(names, "pose"));
+        let legs = place(names, "demand").zip(place(&inputs, "displacement"));
+        self.platform = pose.is_some();
+        for (row, given) in block.rows.iter().zip(rows) {
+            let time = row.tick as f64 * header.period;
+            let mut push = |k: usize, error: f64| self.points[k].push([time, 1e9 * error]);
+            match (pose, legs) {
+                (Some((target, pose)), _) => {
+                    (0..3).for_each(|k| push(k, scalar.decode(given[target + k]) - scalar.decode(given[pose + k])));
+                }
+                (None, Some((demand, gauge))) => {
+                    (0..6)
+                        .for_each(|k| push(k, scalar.decode(given[demand + k]) - scalar.decode(row.input[gauge + k])));
+                }
+                (None, None) => {}
+            }
+        }
+    }
+
+    fn chart(self) -> Chart {
+        let title = if self.platform { "target less measured pose" } else { "demand less gauge" };
+        let chart = Chart::new("", title, Axis::linear("time", "s"), Axis::linear("error", "nm"));
+        let name = |k: usize| if self.platform { ["x", "y", "z"][k].to_owned() } else { format!("leg {}", k + 1) };
+        let lines = self.points.iter().enumerate().filter(|(_, points)| !points.is_empty());
+        lines.fold(chart, |chart, (k, points)| chart.with(&name(k), LINE, points.clone()))
+    }
 }
 
 /// A CSV file on its way.
@@ -281,8 +340,8 @@ impl Csv {
         Ok(Self { file: BufWriter::new(PendingFile::create(path)?), path: path.to_owned(), rows: 0 })
     }
 
-    fn add(&mut self, header: &Header, block: &Block) -> Result<(), Failure> {
-        record::write_csv(&mut self.file, header, block, self.rows == 0)
+    fn add(&mut self, header: &Header, block: &Block, again: Option<Again>) -> Result<(), Failure> {
+        record::write_csv(&mut self.file, header, block, again, self.rows == 0)
             .map_err(|error| unwritten(&self.path, &error))?;
         self.rows += block.rows.len() as u64;
         Ok(())

@@ -11,6 +11,7 @@ use host_sim::platform::rig::Noise;
 use host_sim::platform::table::{MachiningTable, PoseTable};
 
 use super::file::{claim, write_folder};
+use super::plot::Plot;
 use super::sim::{emitted, environment};
 use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::{self, Compiled};
@@ -41,6 +42,9 @@ pub struct Arguments {
     /// Generations of the genetic algorithm of Table 3, 100 strings each.
     #[arg(long, default_value_t = 50, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     generations: u32,
+    /// The genetic algorithm: cost by generation.
+    #[command(flatten)]
+    plot: Plot,
 }
 
 impl Outcome for Results {
@@ -76,6 +80,7 @@ impl Steps<'_> {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // A folder that cannot be written is refused before the minutes of the rest.
     let _claimed = claim(&arguments.output)?;
+    arguments.plot.wanted()?;
     let scratch = Scratch::new().map_err(environment)?;
     let specs = [("legs", embedded::LEGS), ("reference", embedded::PLATFORM)];
     let [legs, reference] = specs.map(|(name, text)| {
@@ -106,6 +111,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         arguments.output.display(),
         steps.begun.elapsed().as_secs_f64()
     ));
+    let chart = specgen_report::convergence::chart(&results.convergence);
+    if let Some(line) = arguments.plot.charts("Table 3", "the genetic algorithm", &[chart])? {
+        ui.progress(line.trim_end());
+    }
     ui.result(&results);
     Ok(())
 }

@@ -10,9 +10,11 @@ use clap::Args;
 use serde_json::json;
 
 use super::file::{claim, write_folder};
+use super::plot::Plot;
 use super::sim::{PlantArguments, emitted, environment, frequency};
+use super::spec;
 use super::ui::{Failure, Ui};
-use specgen_compiler::compile::{self, Compiled};
+use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
 use specgen_language::spec::quantity::{self, Dimension};
 use specgen_studies::robust::factors::Given;
@@ -66,6 +68,8 @@ pub struct Arguments {
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     #[command(flatten)]
+    plot: Plot,
+    #[command(flatten)]
     plant: PlantArguments,
 }
 
@@ -92,8 +96,7 @@ fn percent(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let begun = Instant::now();
     let leg = arguments.plant.leg()?;
-    let compiled = compile::compile(&arguments.spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    let compiled = spec::compiled(&arguments.spec, ui)?;
     let followed = trajectory::chosen(arguments, &compiled)?;
     let gate = gate(arguments, &compiled)?;
     let factors = Factors::of(&compiled.model, &arguments.vary);
@@ -107,6 +110,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         |threads| threads as usize,
     );
     let _claimed = arguments.output.as_deref().map(claim).transpose()?;
+    arguments.plot.wanted()?;
     let controller = emitted(&compiled, ui)?;
     let study = Study {
         compiled: &compiled,
@@ -147,6 +151,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         runs: &runs,
     };
     let report = found.report();
+    let below = "rms error by share of the machines";
+    if let Some(line) = arguments.plot.charts(&compiled.ir.name, below, &[found.chart()])? {
+        ui.progress(line.trim_end());
+    }
     if let Some(folder) = &arguments.output {
         let files = [
             ("runs.csv".to_owned(), found.csv().into_bytes()),

@@ -1,4 +1,5 @@
-//! `specgen sim`: the paper's experiments with the emitted controller, on simulated machines that are not of its model class.
+//! `specgen sim`: the emitted controller on simulated machines that are not of its model class: the motions of the user's own
+//! platform, or the paper's experiments.
 
 pub(super) mod legs;
 pub(super) mod platform;
@@ -11,7 +12,9 @@ use clap::Args;
 use host_sim::controller::Controller;
 use host_sim::plant::{LegParameters, NoiseParameters};
 
-use super::file::{check_place, claim};
+use super::file::{check_place, claim, write_folder};
+use super::plot::Plot;
+use super::spec;
 use super::ui::{Failure, Ui};
 use specgen_compiler::compile;
 use specgen_compiler::workspace;
@@ -24,31 +27,66 @@ use specgen_toolchain as target;
 pub struct Arguments {
     /// The spec file.
     spec: PathBuf,
-    /// Write traces and tables here; only print without it.
+    /// Write tables here; only print without it.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
+    /// Write every tick of every run there, too; their size is said first.
+    #[arg(long, requires = "output")]
+    traces: bool,
+    #[command(flatten)]
+    plot: Plot,
+    /// The paper's experiments, ours beside the paper's, instead of the platform's own motions.
+    #[arg(long)]
+    paper: bool,
     #[command(flatten)]
     plant: PlantArguments,
-    /// Without [control]: control ticks per period of the trajectory, 500 if not given.
+    /// Without [control]: control ticks per period of the motion. The spec's period if not given, with --paper 500. The law is
+    /// held against the stability check at the interval that this gives.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     samples: Option<u32>,
-    /// With [control]: operating frequencies of cases 1 and 2, Hz; 1 and 10 if not given. 0.1 takes ten times as long as 1.
+    /// Frequencies of the motions, with --paper of cases 1 and 2, Hz; 1 and 10 if not given. 0.1 takes ten times as long as 1.
     #[arg(long, value_name = "HZ", value_delimiter = ',', value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<Vec<f64>>,
-    /// With [control]: play this trajectory of the spec on board, instead of the paper's experiments.
-    #[arg(long, value_name = "NAME")]
+    /// With [control]: play this trajectory of the spec on board, and nothing else.
+    #[arg(long, value_name = "NAME", conflicts_with = "paper")]
     trajectory: Option<String>,
     /// With [control]: control intervals by which voltages reach the amplifiers late.
     #[arg(long, default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=100))]
     latency: u32,
     /// Instead of the experiments: a wave on all axes under the supervisor, every tick of it recorded in this file for
     /// `specgen replay`.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "samples", "frequency", "trajectory"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "plot", "paper", "samples", "frequency", "trajectory"])]
     record: Option<PathBuf>,
     /// Length of that wave, s.
     #[arg(long, value_name = "S", default_value_t = 1.0, requires = "record", allow_negative_numbers = true)]
     seconds: f64,
 }
+
+/// Frequencies of motions, Hz, unless asked otherwise.
+const FREQUENCIES: [f64; 2] = [1.0, 10.0];
+
+impl Arguments {
+    fn frequencies(&self) -> &[f64] {
+        self.frequency.as_deref().unwrap_or(&FREQUENCIES)
+    }
+}
+
+/// Writes tables, and traces if they are asked for, whose size is said before.
+fn write_files(arguments: &Arguments, tables: Vec<File>, traces: Vec<File>, ui: &Ui) -> Result<(), Failure> {
+    let Some(folder) = &arguments.output else { return Ok(()) };
+    let mut files = tables;
+    if arguments.traces {
+        let megabytes = traces.iter().map(|(_, bytes)| bytes.len()).sum::<usize>() as f64 / 1e6;
+        ui.progress(&format!("writing {} traces, {megabytes:.1} MB, to {}", traces.len(), folder.display()));
+        files.extend(traces);
+    }
+    write_folder(folder, &files)?;
+    ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
+    Ok(())
+}
+
+/// Name and bytes.
+type File = (String, Vec<u8>);
 
 /// A frequency at which a trajectory has a sensible length.
 pub(super) fn frequency(text: &str) -> Result<f64, String> {
@@ -60,8 +98,8 @@ pub(super) fn frequency(text: &str) -> Result<f64, String> {
 /// Which leg is simulated.
 #[derive(Args, Debug)]
 pub struct PlantArguments {
-    /// Leg parameters (JSON); the reference leg if not given. With [control]: the shape of the legs' hysteresis, scaled to
-    /// what the spec says of them.
+    /// Leg parameters (JSON), of which the shape of the hysteresis is taken and scaled to the legs of the spec; the reference
+    /// leg's if not given. The paper's experiments with six legs take them as they are.
     #[arg(long, value_name = "FILE")]
     pub(super) plant: Option<PathBuf>,
     /// Without noise and quantisation of gauge and amplifier.
@@ -94,13 +132,13 @@ pub(super) fn environment(error: impl Display) -> Failure {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // A bad plant file is refused before the minutes of the rest.
     arguments.plant.read()?;
-    let compiled = compile::compile(&arguments.spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    let compiled = spec::compiled(&arguments.spec, ui)?;
     let task = compiled.model.task_space.as_ref();
     match task {
         Some(task) => platform::check(arguments, task)?,
-        None => legs::check(arguments)?,
+        None => legs::check(arguments, &compiled)?,
     }
+    arguments.plot.wanted()?;
     // A place that cannot be is refused before the minutes of the rest, too.
     let _claimed = arguments.output.as_deref().map(claim).transpose()?;
     arguments.record.as_deref().map_or(Ok(()), check_place)?;

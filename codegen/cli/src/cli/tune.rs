@@ -13,7 +13,9 @@ use host_sim::trajectory::PaperPath;
 use serde_json::json;
 
 use super::file::{claim, write_file, write_folder};
+use super::plot::Plot;
 use super::sim::{PlantArguments, emitted, environment, frequency};
+use super::spec;
 use super::ui::{Failure, Ui};
 use specgen_compiler::compile::{self, Compiled, Refused};
 use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
@@ -81,6 +83,8 @@ pub struct Arguments {
     /// Write the result into the spec; without it the change is printed as a patch.
     #[arg(long)]
     write: bool,
+    #[command(flatten)]
+    plot: Plot,
     #[command(flatten)]
     plant: PlantArguments,
 }
@@ -155,8 +159,7 @@ struct Job<'a> {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let leg = arguments.plant.leg()?;
-    let compiled = compile::compile(&arguments.spec)?;
-    ui.findings(Some(&compiled.source), &compiled.findings);
+    let compiled = spec::compiled(&arguments.spec, ui)?;
     check(arguments, &compiled)?;
     let what = match arguments.what {
         WhatArgument::Gains => What::Gains,
@@ -171,6 +174,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         |threads| threads as usize,
     );
     let _claimed = arguments.output.as_deref().map(claim).transpose()?;
+    arguments.plot.wanted()?;
     let controller = emitted(&compiled, ui)?;
     let job = Job { arguments, compiled, controller, leg, space, feasibility, threads };
     job.run(ui)
@@ -224,9 +228,13 @@ impl Job<'_> {
         let other = self.case(&own, &self.scored_on())?;
         let mut report = report::Report::of(self, &case, &other, &rows, &starts, &searches, &tuned, &patch)?;
         let all: Vec<Candidate> = searches.iter().flat_map(|(_, search)| search.scored.clone()).collect();
+        let marks: Vec<(&str, Score)> = report.marks();
+        let title = format!("{}: {} candidates, front of error against effort", self.compiled.ir.name, all.len());
+        if let Some(line) = self.arguments.plot.write(&title, || self.front(&title, &all, &marks))? {
+            ui.progress(line.trim_end());
+        }
         if let Some(folder) = &self.arguments.output {
-            let marks: Vec<(&str, Score)> = report.marks();
-            let files = self.files(&searches, &all, &marks, &json!(report));
+            let files = self.files(&searches, &all, self.front(&title, &all, &marks), &json!(report));
             write_folder(folder, &files)?;
             ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
         }
@@ -369,23 +377,27 @@ impl Job<'_> {
         )
     }
 
-    fn files(
-        &self,
-        searches: &[(&'static str, Search)],
-        all: &[Candidate],
-        marks: &[(&str, Score)],
-        value: &serde_json::Value,
-    ) -> Vec<(String, Vec<u8>)> {
-        let best = front::front(all);
+    /// The front as a picture.
+    fn front(&self, title: &str, all: &[Candidate], marks: &[(&str, Score)]) -> String {
         let axes = if self.compiled.model.task_space.is_some() {
             ["effort: motion asked for by feedback", "pose error, angles at the joints' radius"]
         } else {
             ["effort: change of the estimates per tick", "leg error"]
         };
-        let title = format!("{}: {} candidates, front of error against effort", self.compiled.ir.name, all.len());
+        specgen_report::front::svg(title, axes, all, &front::front(all), marks)
+    }
+
+    fn files(
+        &self,
+        searches: &[(&'static str, Search)],
+        all: &[Candidate],
+        drawn: String,
+        value: &serde_json::Value,
+    ) -> Vec<(String, Vec<u8>)> {
+        let best = front::front(all);
         let mut files = vec![
             ("front.csv".to_owned(), front::to_csv(&best, &self.space).into_bytes()),
-            ("front.svg".to_owned(), specgen_report::front::svg(&title, axes, all, &best, marks).into_bytes()),
+            ("front.svg".to_owned(), drawn.into_bytes()),
             ("front.json".to_owned(), format!("{:#}\n", json!(best)).into_bytes()),
             ("report.json".to_owned(), format!("{value:#}\n").into_bytes()),
         ];

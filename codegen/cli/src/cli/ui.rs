@@ -3,6 +3,8 @@
 use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -13,6 +15,8 @@ use specgen_language::diagnostic::{self, Diagnostic, Place, Severity};
 use specgen_language::spec::SpecSource;
 use specgen_toolchain::TargetError;
 
+/// Whatever takes longer than this is said to be under way.
+const GLANCE: Duration = Duration::from_millis(800);
 /// Exit code where the machine is to blame: a tool, a disk.
 const ENVIRONMENT: u8 = 3;
 /// Exit code of a command that was ended by Ctrl-C, as shells have it.
@@ -111,6 +115,30 @@ impl Ui {
         if !self.json {
             say!("{line}\n");
         }
+    }
+
+    /// Does `work`; at a terminal a line says what it is and for how long, once it takes longer than a glance.
+    pub fn during<T>(&self, what: &str, work: impl FnOnce() -> T) -> T {
+        if self.json || !self.is_terminal() {
+            return work();
+        }
+        let (done, waits) = mpsc::channel::<()>();
+        std::thread::scope(|scope| {
+            scope.spawn(move || {
+                let begun = Instant::now();
+                let mut shown = false;
+                while let Err(RecvTimeoutError::Timeout) = waits.recv_timeout(GLANCE) {
+                    shown = true;
+                    say!("\r\x1b[2K{what}: {:.0} s", begun.elapsed().as_secs_f64());
+                }
+                if shown {
+                    say!("\r\x1b[2K");
+                }
+            });
+            let made = work();
+            drop(done);
+            made
+        })
     }
 
     /// Shows findings now (text) or keeps them for the document (JSON).

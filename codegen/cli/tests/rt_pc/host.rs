@@ -138,7 +138,7 @@ impl Record {
     /// Runs it again.
     pub fn replay(&self, machine: &mut Supervised) -> Replay {
         let mut reader = Reader::new(&self.bytes[..]).unwrap();
-        replay(&mut reader, machine, |_, _| ()).unwrap_or_else(|error| panic!("{error}"))
+        replay(&mut reader, machine, |_, _, _| ()).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// The same with one bit of the first code of the last tick flipped, under a checksum that fits.

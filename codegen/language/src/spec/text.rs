@@ -74,8 +74,10 @@ pub(super) fn alternatives(words: &[&str]) -> String {
     }
 }
 
-/// The candidate that `name` is probably a slip of.
-pub(super) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+/// The candidate, in lower case, that `name` is probably a slip of, such as a key or the name of a trajectory; none if it is
+/// like none of them.
+#[must_use]
+pub fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     // Nothing that long is a slip of a key, and the distance costs the product of the lengths.
     if name.len() > 64 {
         return None;

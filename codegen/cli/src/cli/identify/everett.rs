@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::plot::{Plot, wrote};
 use super::refused;
 use crate::cli::file::write_file;
+use crate::cli::plot::{Plot, wrote};
 use crate::cli::table::{right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_identify::{self as identify, Cause, DeadTime, GridChoice, Options, Report, Validation};

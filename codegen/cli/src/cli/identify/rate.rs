@@ -7,8 +7,8 @@ use clap::Args;
 
 use super::Identified;
 use super::everett::{grid, range};
-use super::plot::wrote;
 use crate::cli::file::write_file;
+use crate::cli::plot::wrote;
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Refused;

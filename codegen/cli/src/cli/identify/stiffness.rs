@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::plot::Plot;
 use super::{Identified, refused};
+use crate::cli::plot::Plot;
 use crate::cli::ui::{Failure, Outcome, Ui};
 
 use specgen_identify::stiffness::{self, StiffnessReport};

@@ -80,13 +80,13 @@ impl Report {
 
     /// Puts the table of free motion before what else is said of errors.
     pub fn write_free_motion(&mut self) {
-        let text = format!("Tables 5 to 8, beside the paper's\n{}", self.free_motion.to_text());
+        let text = self.free_motion.ours_to_text();
         self.errors.insert_str(0, &text);
     }
 
     /// The same of work parts.
     pub fn write_machining(&mut self, table: &MachiningTable) {
-        self.errors.insert_str(0, &format!("Table 9\n{}", table.to_text()));
+        self.errors.insert_str(0, &table.ours_to_text());
         self.machining = serde_json::json!(table);
     }
 

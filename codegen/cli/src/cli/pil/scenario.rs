@@ -73,6 +73,7 @@ impl Plan {
             None => sim::legs::modes(&compiled.model.adaptation),
         };
         let frequency = arguments.frequency.unwrap_or(FREQUENCY);
+        sim::legs::judge(compiled, frequency, arguments.samples)?;
         Ok(Self::Legs { modes, frequency, samples: arguments.samples.unwrap_or(SAMPLES) })
     }
 

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use serde::Serialize;
+use specgen_report::chart::{Axis, Chart, DOTS};
 
 use super::Arguments;
 use super::trajectory::Followed;
@@ -139,6 +140,20 @@ impl<'a> Found<'a> {
             runs: self.runs.iter().map(|(member, outcome)| Run { member, outcome }).collect(),
             found: self,
         }
+    }
+
+    /// Errors of the draws in their order, and of the corners; diverged ones are left out.
+    pub(super) fn chart(&self) -> Chart {
+        let errors = |drawn: bool| {
+            let chosen = self.runs.iter().filter(|(member, _)| member.drawn == drawn);
+            let mut errors: Vec<f64> = chosen.filter_map(|(_, outcome)| Some(outcome.figures()?.error_nm)).collect();
+            errors.sort_by(f64::total_cmp);
+            let count = errors.len() as f64;
+            errors.into_iter().enumerate().map(|(k, nm)| [100.0 * (k as f64 + 0.5) / count, nm]).collect()
+        };
+        Chart::new("", "error of each machine", Axis::linear("share", "%"), Axis::linear("error", "nm rms"))
+            .with("drawn", DOTS, errors(true))
+            .with("corners", DOTS, errors(false))
     }
 
     fn rows(&self) -> impl Iterator<Item = &'static Row> + use<> {

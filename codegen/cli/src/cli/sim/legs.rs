@@ -1,33 +1,157 @@
-//! `specgen sim` of a spec without `[control]`: the paper's leg experiment, Tables 1 and 2.
+//! `specgen sim` of a spec without `[control]`: a sweep of its own legs with every law that it gives weights for, or the
+//! paper's leg experiment, Tables 1 and 2.
 
 use std::fmt::Write as _;
 
-use host_sim::controller::Controller;
+use host_sim::closed_loop::Tracking;
+use host_sim::controller::{Controller, TickController};
+use host_sim::plant::NoiseParameters;
 use host_sim::scenario::{LINEARITY_FREQUENCIES, MODES, TRACKING_FREQUENCIES, select};
-use host_sim::table::{LinearityTable, TrackingTable};
+use host_sim::table::{LinearityTable, TrackingRow, TrackingTable};
+use host_sim::trajectory::LegSweep;
 use serde::Serialize;
 use serde_json::json;
 
-use super::{Arguments, environment};
-use crate::cli::file::write_folder;
+use super::{Arguments, environment, write_files};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
-use specgen_language::model::Adaptation;
+use specgen_compiler::stability;
+use specgen_language::model::{Adaptation, Model};
+use specgen_report::chart::{Axis, Chart, DASHED, LINE};
 use specgen_studies::machine;
 use specgen_studies::paper::printed;
 
-/// Control ticks per period of the trajectory, unless asked otherwise.
+/// Control ticks per period of the paper's trajectory, unless asked otherwise.
 const SAMPLES: u32 = 500;
+/// Part of the range of a leg that a sweep leaves free at either end.
+const ROOM: f64 = 0.1;
+/// Periods of a sweep; the first is not scored.
+const PERIODS: f64 = 3.0;
+/// An error of this part of the range is no tracking any more.
+const LOST: f64 = 0.1;
 
-/// Refuses arguments that are for a platform alone.
-pub(super) fn check(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.frequency.is_some() || arguments.trajectory.is_some() || arguments.latency != 0 {
+/// Refuses arguments that are for a platform alone, and an interval at which the laws are unstable.
+pub(super) fn check(arguments: &Arguments, compiled: &Compiled) -> Result<(), Failure> {
+    if arguments.trajectory.is_some() || arguments.latency != 0 || (arguments.paper && arguments.frequency.is_some()) {
         return Err(Failure::Usage(
-            "--frequency, --trajectory and --latency are for a platform that six gauges see; this spec has no [control]".to_owned(),
+            "--trajectory, --latency and the paper's --frequency are for a platform that six gauges see; this spec has no [control]".to_owned(),
         ));
     }
+    if arguments.record.is_some() {
+        return Ok(());
+    }
+    let frequencies = if arguments.paper { &TRACKING_FREQUENCIES[..] } else { arguments.frequencies() };
+    frequencies.iter().try_for_each(|hertz| judge(compiled, *hertz, arguments.samples))
+}
+
+/// Refuses `samples` ticks a period at `hertz` if a law of the spec is unstable at that interval: the check of the spec is for
+/// its own period. A longer one is slower by as much, and as stable.
+pub(in crate::cli) fn judge(compiled: &Compiled, hertz: f64, samples: Option<u32>) -> Result<(), Failure> {
+    let Some(samples) = samples else { return Ok(()) };
+    let period = compiled.model.timing.period;
+    let mut model = compiled.model.clone();
+    model.timing.period = 1.0 / hertz / f64::from(samples);
+    let Err(findings) = stability::check(&model) else { return Ok(()) };
+    let why = findings.first().map_or("", |finding| finding.message.as_str());
+    Err(Failure::Gate(format!(
+        "--samples {samples} at {hertz} Hz is an interval of {:.1} µs, not the {:.1} µs of timing.period: there {why}. Take {:.0} \
+         samples, which are timing.period, or fewer",
+        model.timing.period * 1e6,
+        period * 1e6,
+        1.0 / hertz / period
+    )))
+}
+
+/// What a sweep goes over: nearly all that the stack moves and the gauge sees, m.
+fn range(model: &Model) -> [f64; 2] {
+    let [sees_low, sees_high] = model.sensor.range;
+    let low = if sees_low > 0.0 { sees_low } else { 0.0 };
+    let high = if sees_high < model.actuator.stroke { sees_high } else { model.actuator.stroke };
+    let room = ROOM * (high - low);
+    [low + room, high - room]
+}
+
+/// Tracking of the spec's own legs: the shape of their hysteresis is that of the plant file, all else the spec's.
+fn own(arguments: &Arguments, compiled: &Compiled, controller: &mut Controller, ui: &mut Ui) -> Result<(), Failure> {
+    let model = &compiled.model;
+    let leg = machine::leg(model, &arguments.plant.leg()?);
+    let noise = if arguments.plant.no_noise { NoiseParameters::NONE } else { leg.noise };
+    ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
+    let legs = std::array::from_fn(|_| leg.clone());
+    let scenario = machine::legs(model, &legs, &noise, arguments.plant.seed, 1);
+    let own_law = controller.default_config().first().copied().unwrap_or_default();
+    let (mut table, mut charts, mut traces) = (TrackingTable::default(), Vec::new(), Vec::new());
+    for (mode, word) in modes(&model.adaptation) {
+        select(controller, word).map_err(environment)?;
+        for &frequency in arguments.frequencies() {
+            ui.progress(&format!("{mode} at {frequency} Hz"));
+            let interval =
+                arguments.samples.map_or(model.timing.period, |samples| 1.0 / frequency / f64::from(samples));
+            let sweep = LegSweep { range: range(model), frequency, periods: PERIODS };
+            let mut run = scenario.rig().clone().run(controller, &sweep, interval).map_err(environment)?;
+            let first = run.tracking.samples.iter().take_while(|sample| sample.time < 1.0 / frequency).count();
+            if own_law == u64::from(word) {
+                charts.push(chart(&run.tracking, &format!("{mode} at {frequency} Hz")));
+            }
+            if arguments.traces {
+                traces.push((format!("trace-{mode}-{frequency}hz.csv"), run.trace.to_csv().into_bytes()));
+            }
+            run.tracking.samples.drain(..first);
+            table.rows.push(TrackingRow::of(mode, frequency, &run.tracking));
+        }
+    }
+    let files = vec![
+        ("tracking.csv".to_owned(), table.to_csv().into_bytes()),
+        ("tables.json".to_owned(), format!("{:#}\n", json!({ "tracking": table })).into_bytes()),
+    ];
+    write_files(arguments, files, traces, ui)?;
+    let range = range(model);
+    let below = format!("a sweep from {:.1} to {:.1} µm, target less gauge", range[0] * 1e6, range[1] * 1e6);
+    let plot = arguments.plot.charts(&compiled.ir.name, &below, &charts)?;
+    ui.result(&Own { name: &compiled.ir.name, digest: &compiled.ir.digest, range, tracking: table, plot });
     Ok(())
+}
+
+/// Errors of the legs over time, nm.
+fn chart(tracking: &Tracking, title: &str) -> Chart {
+    let mut chart = Chart::new("", title, Axis::linear("time", "s"), Axis::linear("error", "nm"));
+    for leg in 0..6 {
+        let errors: Vec<f64> =
+            tracking.samples.iter().map(|sample| 1e9 * (sample.target[leg] - sample.measured[leg])).collect();
+        chart = chart.over_time(&format!("leg {}", leg + 1), LINE, [tracking.interval; 2], &errors);
+    }
+    chart
+}
+
+/// Tracking errors of the spec's own legs.
+#[derive(Serialize)]
+struct Own<'a> {
+    #[serde(skip)]
+    name: &'a str,
+    digest: &'a str,
+    /// Of the sweep, m.
+    range: [f64; 2],
+    tracking: TrackingTable,
+    /// The line about it.
+    #[serde(skip)]
+    plot: Option<String>,
+}
+
+impl Outcome for Own<'_> {
+    fn text(&self) -> String {
+        let [low, high] = self.range.map(|metres| metres * 1e6);
+        let name = self.name;
+        let mut out = format!("{name}: six legs of the spec, swept from {low:.1} to {high:.1} µm, target less gauge\n");
+        out += &self.tracking.to_text();
+        for row in &self.tracking.rows {
+            if row.rmse_nm > LOST * 1e3 * (high - low) {
+                let (mode, hertz) = (&row.mode, row.frequency_hz);
+                out += &format!("{mode} at {hertz} Hz does not follow: {:.1} µm rms\n", row.rmse_nm / 1e3);
+            }
+        }
+        out + self.plot.as_deref().unwrap_or_default()
+    }
 }
 
 pub(super) fn run(
@@ -36,6 +160,9 @@ pub(super) fn run(
     controller: &mut Controller,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
+    if !arguments.paper {
+        return own(arguments, compiled, controller, ui);
+    }
     let (parameters, noise) = arguments.plant.read()?;
     ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
     let legs = std::array::from_fn(|_| parameters.clone());
@@ -47,29 +174,43 @@ pub(super) fn run(
     ui.progress("Table 1: inverse model alone at six frequencies");
     let linearity = scenario.linearity(controller, &LINEARITY_FREQUENCIES).map_err(environment)?;
 
-    if let Some(output) = &arguments.output {
-        let mut files = vec![
-            ("tracking.csv".to_owned(), tracking.to_csv().into_bytes()),
-            ("linearity.csv".to_owned(), linearity.to_csv().into_bytes()),
-            (
-                "tables.json".to_owned(),
-                format!("{:#}\n", json!({ "tracking": tracking, "linearity": linearity })).into_bytes(),
-            ),
-        ];
+    let mut traces = Vec::new();
+    if arguments.traces {
         for &(mode, word) in &modes {
             select(controller, word).map_err(environment)?;
             for frequency in TRACKING_FREQUENCIES {
                 let run = scenario.run(controller, frequency).map_err(environment)?;
                 let stem = format!("trace-{mode}-{frequency}hz");
-                files.push((format!("{stem}.csv"), run.trace.to_csv().into_bytes()));
-                files.push((format!("{stem}.trace"), run.trace.to_bytes()));
+                traces.push((format!("{stem}.csv"), run.trace.to_csv().into_bytes()));
+                traces.push((format!("{stem}.trace"), run.trace.to_bytes()));
             }
         }
-        write_folder(output, &files)?;
-        ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
     }
-    ui.result(&Tables { name: &compiled.ir.name, digest: &compiled.ir.digest, tracking, linearity });
+    let files = vec![
+        ("tracking.csv".to_owned(), tracking.to_csv().into_bytes()),
+        ("linearity.csv".to_owned(), linearity.to_csv().into_bytes()),
+        (
+            "tables.json".to_owned(),
+            format!("{:#}\n", json!({ "tracking": tracking, "linearity": linearity })).into_bytes(),
+        ),
+    ];
+    write_files(arguments, files, traces, ui)?;
+    let below = "tracking error of the leg trajectory, nm rms";
+    let plot = arguments.plot.charts(&compiled.ir.name, below, &[paper_chart(&tracking)])?;
+    ui.result(&Tables { name: &compiled.ir.name, digest: &compiled.ir.digest, tracking, linearity, plot });
     Ok(())
+}
+
+/// Errors over the frequency, ours and the paper's.
+fn paper_chart(tracking: &TrackingTable) -> Chart {
+    let mut chart = Chart::new("", "Table 2", Axis::log("frequency", "Hz"), Axis::log("error", "nm rms"));
+    for (color, (mode, paper)) in printed::TABLE_2.into_iter().enumerate() {
+        let ours = TRACKING_FREQUENCIES.map(|hertz| [hertz, tracking.rmse_nm(mode, hertz).unwrap_or(f64::NAN)]);
+        chart = chart.with(mode, LINE, ours.to_vec()).colored(color);
+        let paper = TRACKING_FREQUENCIES.into_iter().zip(paper).map(|(hertz, nm)| [hertz, nm]).collect();
+        chart = chart.with(&format!("{mode}, paper"), DASHED, paper).colored(color);
+    }
+    chart
 }
 
 /// The laws that the spec gives weights for: with a weight of zero a law adapts nothing, and its row would say nothing.
@@ -90,12 +231,15 @@ struct Tables<'a> {
     digest: &'a str,
     tracking: TrackingTable,
     linearity: LinearityTable,
+    /// The line about it.
+    #[serde(skip)]
+    plot: Option<String>,
 }
 
 impl Outcome for Tables<'_> {
     fn text(&self) -> String {
         let name = self.name;
-        let mut out = format!("{name}: tracking error of the leg trajectory, nm rms of T − Y (paper's Table 2)\n");
+        let mut out = format!("{name}: the paper's legs; tracking error, nm rms of T − Y (Table 2, paper)\n");
         let columns = [left(8).behind("  "), right(22), right(22), right(22)];
         row(&mut out, &columns, &[&"", &"0.1 Hz", &"1 Hz", &"10 Hz"]);
         for (mode, paper) in printed::TABLE_2 {
@@ -118,6 +262,6 @@ impl Outcome for Tables<'_> {
                 row.relative_slope
             );
         }
-        out
+        out + self.plot.as_deref().unwrap_or_default()
     }
 }

@@ -1,9 +1,10 @@
-//! `specgen sim` of a spec with `[control]`: the paper's Tables 5 to 9 on the machine that the spec describes, or one of
-//! the spec's own trajectories played on board.
+//! `specgen sim` of a spec with `[control]`, on the machine that it describes: at rest, waves of all axes, the spec's own
+//! trajectories played on board; or the paper's Tables 5 to 9.
 //!
 //! The machine's legs are out of tolerance, each in its own way; the controller has the records that the spec names. With
 //! one nominal record for six legs the inverse model is then off by as much as the legs, and adaptation takes it up.
 
+use std::cell::RefCell;
 use std::fmt::Write as _;
 
 use host_sim::closed_loop::RunError;
@@ -12,26 +13,37 @@ use host_sim::platform::rig::{Noise, PlatformRun, Record};
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select};
 use host_sim::platform::table::{AXES, MachiningRow, MachiningTable, PoseRow, PoseTable};
 use host_sim::platform::{PlatformScenario, WorkPart};
-use host_sim::trajectory::{PaperPath, PaperPose, Reading};
+use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory, Reading};
+use host_sim::word::status_words;
 use serde::Serialize;
 use serde_json::json;
 
-use super::{Arguments, environment};
-use crate::cli::file::write_folder;
+use super::{Arguments, File, environment, record, write_files};
+use crate::cli::table::{left, right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
-use specgen_language::model::TaskSpace;
+use specgen_language::model::{AdaptationMode, ControlMode, TaskSpace};
+use specgen_language::spec::nearest;
+use specgen_report::chart::{Axis, Chart, LINE};
 use specgen_runtime::setpoint::{REFUSED, STALE};
+use specgen_runtime::wave::Wave;
 use specgen_studies::machine;
 
-/// Operating frequencies, Hz, unless asked otherwise.
-const FREQUENCIES: [f64; 2] = [1.0, 10.0];
+/// How long the platform is looked at while it rests, s.
+const REST: f64 = 1.0;
+/// Periods of a wave, start and end included; no wave is shorter than so many seconds.
+const PERIODS: f64 = 4.0;
+const SHORTEST: f64 = 0.2;
+/// Part of what all axes reach at once that a wave takes.
+const WAVE: f64 = 0.9;
 /// The paper's free motions.
 const CASES: [(&str, PaperPath); 2] = [("case-1", PaperPath::Case1), ("case-2", PaperPath::Case2)];
 /// P, F and P/F of Table 9.
 const MACHINING: [(&str, u32); 3] = [PLATFORM_MODES[0], PLATFORM_MODES[3], PLATFORM_MODES[6]];
 /// Frequency of the machining path, Hz.
 const MACHINING_FREQUENCY: f64 = 1.0;
+/// Bits of the status that say that a leg was limited.
+const LEG_LIMITED: u32 = 0x3f;
 /// A trajectory on board that does not end is followed for this long, s.
 pub(in crate::cli) const PLAYED: f64 = 60.0;
 
@@ -45,7 +57,8 @@ pub(super) fn check(arguments: &Arguments, task: &TaskSpace) -> Result<(), Failu
     let Some(name) = &arguments.trajectory else { return Ok(()) };
     if arguments.frequency.is_some() {
         return Err(Failure::Usage(
-            "--frequency is for the paper's cases; the spec gives the frequency of its own trajectories".to_owned(),
+            "--frequency is for waves and the paper's cases; the spec gives the frequency of its own trajectories"
+                .to_owned(),
         ));
     }
     selector(task, name).map(|_| ())
@@ -56,8 +69,13 @@ pub(in crate::cli) fn selector(task: &TaskSpace, name: &str) -> Result<u32, Fail
     let names: Vec<&str> = task.trajectories.iter().map(|trajectory| trajectory.name.as_str()).collect();
     let place = names.iter().position(|known| *known == name);
     place.and_then(|place| u32::try_from(place).ok()).ok_or_else(|| {
-        let known = if names.is_empty() { "no trajectory".to_owned() } else { names.join(", ") };
-        Failure::Usage(format!("the spec has {known}, but not `{name}`; name one of its [[trajectory]] tables"))
+        let meant =
+            nearest(name, names.iter().copied()).map_or_else(String::new, |meant| format!("; did you mean `{meant}`?"));
+        Failure::Usage(if names.is_empty() {
+            format!("the spec has no trajectory, so no `{name}`: add a [[trajectory]], or leave --trajectory out")
+        } else {
+            format!("the spec has {}, but not `{name}`{meant}", names.join(", "))
+        })
     })
 }
 
@@ -74,17 +92,33 @@ pub(super) fn run(
     ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
     let mut scenario = machine::scenario(&compiled.model, task, &specimen, &noise, seed);
     scenario.options.latency = arguments.latency as usize;
-    if arguments.output.is_some() {
+    let drawn = arguments.plot.wanted()?;
+    if arguments.traces || drawn {
         scenario.options.record = Record::Samples;
     }
-    let mut experiment = Experiment { scenario, controller, ui, files: Vec::new(), refused: Vec::new() };
+    let mut experiment = Experiment {
+        scenario,
+        controller,
+        ui,
+        traced: arguments.traces,
+        drawn,
+        tables: Vec::new(),
+        traces: Vec::new(),
+        charts: Vec::new(),
+        refused: Vec::new(),
+        limited: Vec::new(),
+    };
     let found = match &arguments.trajectory {
         Some(name) => experiment.own(name, selector(task, name)?)?,
-        None => experiment.tables(arguments.frequency.as_deref().unwrap_or(&FREQUENCIES))?,
+        None if arguments.paper => experiment.tables(arguments.frequencies())?,
+        None => experiment.motions(compiled, task, arguments.frequencies())?,
     };
-    let Experiment { mut files, refused, .. } = experiment;
+    let Experiment { mut tables, traces, charts, refused, limited, .. } = experiment;
+    let plot = arguments.plot.charts(&compiled.ir.name, "target less true pose", &charts)?;
     let report = Report {
         name: &compiled.ir.name,
+        mode: mode_name(task, compiled.model.adaptation.mode),
+        plot,
         digest: &compiled.ir.digest,
         seed,
         noise: !arguments.plant.no_noise,
@@ -93,13 +127,11 @@ pub(super) fn run(
         axial_stiffness: specimen.stiffness,
         leg_gain: specimen.legs.each_ref().map(|leg| leg.gain_um_per_v),
         refused,
+        limited,
         found,
     };
-    if let Some(output) = &arguments.output {
-        files.push(("tables.json".to_owned(), format!("{:#}\n", json!(report)).into_bytes()));
-        write_folder(output, &files)?;
-        ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
-    }
+    tables.push(("tables.json".to_owned(), format!("{:#}\n", json!(report)).into_bytes()));
+    write_files(arguments, tables, traces, ui)?;
     ui.result(&report);
     Ok(())
 }
@@ -109,6 +141,12 @@ pub(super) fn run(
 struct Report<'a> {
     #[serde(skip)]
     name: &'a str,
+    /// Of the spec, in words.
+    #[serde(skip)]
+    mode: String,
+    /// The line about it.
+    #[serde(skip)]
+    plot: Option<String>,
     digest: &'a str,
     seed: u64,
     noise: bool,
@@ -121,6 +159,8 @@ struct Report<'a> {
     leg_gain: [f64; 6],
     /// Runs whose set-points the controller refused, in words.
     refused: Vec<String>,
+    /// Runs in which a leg came to a limit, in words.
+    limited: Vec<String>,
     #[serde(flatten)]
     found: Found,
 }
@@ -134,10 +174,27 @@ enum Found {
         #[serde(skip)]
         text: String,
     },
+    /// The true pose against the target, a row a motion.
+    Motions { motions: Vec<Motion> },
     /// The true pose against the controller's target, axis by axis.
-    Trajectory { trajectory: String, seconds: f64, rms_nano: [f64; 6], peak_nano: [f64; 6] },
+    Trajectory { trajectory: String, seconds: f64, rms_nano: [f64; 6], peak_nano: [f64; 6], translation_nm: f64 },
     /// The only run was refused.
     Nothing {},
+}
+
+/// A run of the platform's own motions.
+#[derive(Serialize)]
+struct Motion {
+    name: String,
+    seconds: f64,
+    /// Root mean square error of x, y, z (nm) and of the angles (nrad).
+    rms_nano: [f64; 6],
+    /// Norm of those of x, y and z, nm.
+    translation_nm: f64,
+    /// Largest error of P_C, nm.
+    peak_nm: f64,
+    /// Of z in a wave, m.
+    amplitude: Option<f64>,
 }
 
 impl Outcome for Report<'_> {
@@ -146,30 +203,102 @@ impl Outcome for Report<'_> {
             1 => "one hysteresis record for all legs".to_owned(),
             many => format!("{many} hysteresis records"),
         };
-        let mut out = format!(
-            "{}: a machine with legs within ±10 %, stiffness within ±5 % (seed {}); {records} of the controller\n",
-            self.name, self.seed
-        );
+        let Self { name, mode, seed, .. } = self;
+        let mut out = format!("{name}, {mode}: a machine with legs ±10 %, stiffness ±5 % off (seed {seed});\n");
+        let _ = writeln!(out, "the controller has {records}");
         match &self.found {
             Found::Tables { text, .. } => out += text,
-            Found::Trajectory { trajectory, seconds, rms_nano, peak_nano } => {
+            Found::Motions { motions } => out += &table(motions),
+            Found::Trajectory { trajectory, seconds, rms_nano, peak_nano, translation_nm } => {
                 out += &format!("{trajectory}, on board, {seconds:.3} s: true pose against the controller's target\n");
                 for (axis, name) in AXES.iter().enumerate() {
                     let unit = if axis < 3 { "nm" } else { "nrad" };
-                    // Writing to a String cannot fail, here and below.
                     let _ = writeln!(
                         out,
-                        "  {name:<3}{:>10.2} {unit} rms{:>10.2} {unit} peak",
+                        "  {name:<5}{:>10.2} {unit} rms{:>10.2} {unit} peak",
                         rms_nano[axis], peak_nano[axis]
                     );
                 }
+                let _ = writeln!(out, "  x,y,z{translation_nm:>10.2} nm rms, norm of the three");
             }
             Found::Nothing {} => {}
         }
-        for line in &self.refused {
+        for line in self.refused.iter().chain(&self.limited) {
             let _ = writeln!(out, "{line}");
         }
-        out
+        out + self.plot.as_deref().unwrap_or_default()
+    }
+}
+
+/// A row a motion.
+fn table(motions: &[Motion]) -> String {
+    let mut out = "rms of target less true pose, nm and nrad; norm and peak of x, y, z\n".to_owned();
+    let mut columns = vec![left(16)];
+    columns.resize(9, right(8));
+    row(&mut out, &columns, &[&"", &"x", &"y", &"z", &"norm", &"peak", &"θx", &"θy", &"θz"]);
+    for Motion { name, rms_nano, translation_nm, peak_nm, .. } in motions {
+        let [x, y, z, a, b, c] = rms_nano.map(short);
+        row(&mut out, &columns, &[name, &x, &y, &z, &short(*translation_nm), &short(*peak_nm), &a, &b, &c]);
+    }
+    let waves: Vec<String> = motions
+        .iter()
+        .filter_map(|motion| Some(format!("{}: z ±{:.1} µm", motion.name, motion.amplitude? * 1e6)))
+        .collect();
+    if !waves.is_empty() {
+        let _ = writeln!(out, "waves move all axes at once ({})", waves.join(", "));
+    }
+    out
+}
+
+/// At most seven letters up to a metre.
+fn short(nano: f64) -> String {
+    if nano < 999.0 { format!("{nano:.2}") } else { format!("{nano:.0}") }
+}
+
+/// The mode of the spec, such as `P/F pcc`.
+fn mode_name(task: &TaskSpace, adaptation: AdaptationMode) -> String {
+    let adaptation = match adaptation {
+        AdaptationMode::Invhys => "invhys",
+        AdaptationMode::Ewma => "ewma",
+        AdaptationMode::Pcc => "pcc",
+    };
+    match task.mode {
+        ControlMode::P => "P".to_owned(),
+        ControlMode::F => format!("F {adaptation}"),
+        ControlMode::PF => format!("P/F {adaptation}"),
+    }
+}
+
+/// The platform at its zero.
+struct Rest;
+
+impl PoseTrajectory for Rest {
+    fn duration(&self) -> f64 {
+        REST
+    }
+
+    fn target(&self, _time: f64) -> PoseTarget {
+        PoseTarget::default()
+    }
+}
+
+/// A wave as a trajectory that is asked once a tick.
+struct PoseWave {
+    wave: RefCell<Wave<f64>>,
+    seconds: f64,
+}
+
+impl PoseTrajectory for PoseWave {
+    fn duration(&self) -> f64 {
+        self.seconds
+    }
+
+    fn target(&self, _time: f64) -> PoseTarget {
+        self.wave.borrow_mut().advance().map_or_else(PoseTarget::default, |motion| PoseTarget {
+            pose: motion.pose,
+            rate: motion.rate,
+            acceleration: motion.acceleration,
+        })
     }
 }
 
@@ -177,8 +306,13 @@ struct Experiment<'a> {
     scenario: PlatformScenario,
     controller: &'a mut Controller,
     ui: &'a Ui,
-    files: Vec<(String, Vec<u8>)>,
+    traced: bool,
+    drawn: bool,
+    tables: Vec<File>,
+    traces: Vec<File>,
+    charts: Vec<Chart>,
     refused: Vec<String>,
+    limited: Vec<String>,
 }
 
 impl Experiment<'_> {
@@ -210,14 +344,61 @@ impl Experiment<'_> {
                 }
             }
         }
-        self.files.push(("free-motion.csv".to_owned(), free.to_csv().into_bytes()));
-        self.files.push(("machining.csv".to_owned(), machining.to_csv().into_bytes()));
+        self.tables.push(("free-motion.csv".to_owned(), free.to_csv().into_bytes()));
+        self.tables.push(("machining.csv".to_owned(), machining.to_csv().into_bytes()));
         let text = format!(
             "Tables 5 to 8, beside the paper's (its angles read as µrad)\n{}Table 9, machining at {MACHINING_FREQUENCY} Hz\n{}",
             free.to_text(),
             machining.to_text()
         );
         Ok(Found::Tables { free_motion: free.rows, machining: machining.rows, text })
+    }
+
+    /// At rest, waves at `frequencies` (Hz), every trajectory of the spec; in the mode of the spec.
+    fn motions(&mut self, compiled: &Compiled, task: &TaskSpace, frequencies: &[f64]) -> Result<Found, Failure> {
+        let mut motions = Vec::new();
+        self.ui.progress("at rest");
+        let run = self.scenario.run(self.controller, &Rest);
+        motions.extend(self.keep("at rest", run)?.map(|run| self.motion("at rest", &run, None)));
+        let period = compiled.model.timing.period;
+        // All axes at once, and every leg within its stroke.
+        let share = WAVE * compiled.reach.as_ref().map_or(0.0, |reach| reach.share);
+        for &frequency in frequencies {
+            let name = format!("wave {frequency} Hz");
+            self.ui.progress(&name);
+            let long = PERIODS / frequency;
+            let seconds = if long > SHORTEST { long } else { SHORTEST };
+            let (wave, amplitude) = match record::wave(compiled, (seconds / period) as i32, [frequency; 6], [share; 2])
+            {
+                Ok(found) => found,
+                Err(Failure::Gate(why)) => {
+                    self.refused.push(format!("{name}: {why}"));
+                    continue;
+                }
+                Err(failure) => return Err(failure),
+            };
+            let run = self.scenario.run(self.controller, &PoseWave { wave: RefCell::new(wave), seconds });
+            motions.extend(self.keep(&name, run)?.map(|run| self.motion(&name, &run, Some(amplitude))));
+        }
+        for (place, trajectory) in task.trajectories.iter().enumerate() {
+            let name = &trajectory.name;
+            self.ui.progress(&format!("playing {name} on board"));
+            let run = self.scenario.play(self.controller, place as u32, PLAYED);
+            motions.extend(self.keep(name, run)?.map(|run| self.motion(name, &run, None)));
+        }
+        self.tables.push(("motions.csv".to_owned(), csv(&motions).into_bytes()));
+        Ok(Found::Motions { motions })
+    }
+
+    fn motion(&self, name: &str, run: &PlatformRun, amplitude: Option<f64>) -> Motion {
+        Motion {
+            name: name.to_owned(),
+            seconds: run.errors.count() as f64 * self.scenario.options.interval,
+            rms_nano: run.errors.rms_nano(),
+            translation_nm: run.errors.rms_translation_nm(),
+            peak_nm: run.errors.peak_translation_nm(),
+            amplitude,
+        }
     }
 
     /// A trajectory of the spec, in the mode of the spec.
@@ -230,23 +411,54 @@ impl Experiment<'_> {
             seconds: run.errors.count() as f64 * self.scenario.options.interval,
             rms_nano: run.errors.rms_nano(),
             peak_nano: run.errors.peak_nano(),
+            translation_nm: run.errors.rms_translation_nm(),
         })
     }
 
     /// Samples of a run for its file; none, and a line about it, if the controller held instead of following.
     fn keep(&mut self, name: &str, run: Result<PlatformRun, RunError>) -> Result<Option<PlatformRun>, Failure> {
         let run = run.map_err(environment)?;
-        if !run.samples.is_empty() {
-            self.files.push((format!("{name}.csv"), run.to_csv().into_bytes()));
+        if self.traced {
+            self.traces.push((format!("{}.csv", name.replace(' ', "-")), run.to_csv().into_bytes()));
         }
+        if self.drawn {
+            self.charts.push(chart(name, self.scenario.options.interval, &run));
+        }
+        let seen = status_words(run.status);
         if run.status & (REFUSED | STALE) == 0 {
+            if run.status & LEG_LIMITED != 0 {
+                self.limited.push(format!("{name}: {seen}: at an end of stroke, voltage or slew rate"));
+            }
             return Ok(Some(run));
         }
-        let line = format!(
-            "{name}: not scored, the controller refused set-points (status {:#x}); the path leaves the workspace, or moves faster than control.setpoint.stream_speed",
-            run.status
-        );
-        self.refused.push(line);
+        self.refused.push(format!(
+            "{name}: not scored: {seen}; the path leaves the workspace,\n  or moves faster than control.setpoint.stream_speed"
+        ));
         Ok(None)
     }
+}
+
+/// Errors of x, y and z over time, nm.
+fn chart(name: &str, interval: f64, run: &PlatformRun) -> Chart {
+    let mut chart = Chart::new("", name, Axis::linear("time", "s"), Axis::linear("error", "nm"));
+    for (axis, name) in AXES.iter().enumerate().take(3) {
+        let errors: Vec<f64> =
+            run.samples.iter().map(|sample| 1e9 * (sample.target[axis] - sample.tick.pose[axis])).collect();
+        chart = chart.over_time(name, LINE, [interval; 2], &errors);
+    }
+    chart
+}
+
+/// A line a motion.
+fn csv(motions: &[Motion]) -> String {
+    let mut out = String::from("motion,seconds,x_nm,y_nm,z_nm,rx_nrad,ry_nrad,rz_nrad,norm_nm,peak_nm\n");
+    for Motion { name, seconds, rms_nano, translation_nm, peak_nm, .. } in motions {
+        // Writing to a String cannot fail, here and below.
+        let _ = write!(out, "{name},{seconds:.6}");
+        for value in rms_nano {
+            let _ = write!(out, ",{value:.4}");
+        }
+        let _ = writeln!(out, ",{translation_nm:.4},{peak_nm:.4}");
+    }
+    out
 }

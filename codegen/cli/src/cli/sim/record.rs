@@ -90,7 +90,7 @@ pub(super) fn run(
     let mut recorded = Recorded::new(machine, &mut recorder, &mut writer).map_err(environment)?;
     recorded.reset();
     ui.progress(&format!("recording {seconds} s of a wave on all axes under the supervisor"));
-    let wave = wave(compiled, ticks as i32)?;
+    let (wave, _) = wave(compiled, ticks as i32, FREQUENCIES, SHARES)?;
     let ran = match &compiled.model.task_space {
         Some(task) => platform(arguments, compiled, task, &mut recorded, wave, ticks as u64),
         None => legs(arguments, compiled, &mut recorded, wave, seconds),
@@ -116,8 +116,14 @@ pub(super) fn run(
     Ok(())
 }
 
-/// A wave of all axes within the limits of the spec; smaller where it would be too fast.
-fn wave(compiled: &Compiled, ticks: i32) -> Result<Wave<f64>, Failure> {
+/// A wave of all axes, each at its frequency (Hz), within the limits of the spec; smaller where it would be too fast. `shares`:
+/// of the room, of the third axis and of the others. With the amplitude of the third axis, m.
+pub(super) fn wave(
+    compiled: &Compiled,
+    ticks: i32,
+    frequencies: [f64; 6],
+    shares: [f64; 2],
+) -> Result<(Wave<f64>, f64), Failure> {
     let (ir, period) = (&compiled.ir, compiled.model.timing.period);
     let mut settings = Settings::still();
     let limits = match &ir.task_space {
@@ -151,21 +157,24 @@ fn wave(compiled: &Compiled, ticks: i32) -> Result<Wave<f64>, Failure> {
     settings.ticks = ticks;
     settings.ramp_ticks = if ticks < 20 { 1 } else { ticks / 10 };
     let on_legs = ir.task_space.is_none();
-    let mut share = 1.0;
+    let (mut share, mut third) = (1.0, 0.0);
     for _ in 0..20 {
         for axis in 0..6 {
             let room = limits.high[axis] - settings.center[axis];
             let below = settings.center[axis] - limits.low[axis];
             let room = if on_legs || room < below { room } else { below };
-            let amplitude = share * SHARES[usize::from(axis != 2 && !on_legs)] * room;
-            let tone = Tone { amplitude, phase: 0, step: step_of(FREQUENCIES[axis], period) };
+            let amplitude = share * shares[usize::from(axis != 2 && !on_legs)] * room;
+            if axis == 2 {
+                third = amplitude;
+            }
+            let tone = Tone { amplitude, phase: 0, step: step_of(frequencies[axis], period) };
             let offset = if on_legs { 0.4 * room } else { 0.0 };
             settings.axes[axis] = AxisWave { offset, shape: Shape::Sine { tone } };
         }
         let mut wave = Wave::new(limits);
         if wave.set(&settings).is_ok() {
             wave.start();
-            return Ok(wave);
+            return Ok((wave, third));
         }
         share /= 2.0;
     }

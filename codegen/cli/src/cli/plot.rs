@@ -1,16 +1,17 @@
-//! `--plot FILE`.
+//! `--plot FILE`: what a command found, as a picture.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::cli::file::write_file;
-use crate::cli::ui::Failure;
-use specgen_report::plot::html;
+use super::file::{check_place, write_file};
+use super::ui::Failure;
+use specgen_report::chart::Chart;
+use specgen_report::plot::{figure, html};
 
 #[derive(Args, Debug)]
 pub struct Plot {
-    /// Draw measurement, model and residual here: .svg, or .html for a page.
+    /// Draw the result here: .svg, or .html for a page.
     #[arg(long, value_name = "FILE", value_parser = drawable)]
     plot: Option<PathBuf>,
 }
@@ -35,6 +36,17 @@ fn kind(path: &Path) -> Option<bool> {
 }
 
 impl Plot {
+    /// Whether there is something to draw for; a place that cannot be is refused before the minutes that the rest takes.
+    pub fn wanted(&self) -> Result<bool, Failure> {
+        self.plot.as_deref().map_or(Ok(()), check_place)?;
+        Ok(self.plot.is_some())
+    }
+
+    /// Writes charts in two columns, one that is alone in one, if a plot is wanted; then a line about it.
+    pub fn charts(&self, title: &str, below: &str, charts: &[Chart]) -> Result<Option<String>, Failure> {
+        self.write(title, || figure(title, below, charts, charts.len().clamp(1, 2)))
+    }
+
     /// Writes what `draw` draws, if a plot is wanted; then a line about it.
     pub fn write(&self, title: &str, draw: impl FnOnce() -> String) -> Result<Option<String>, Failure> {
         let Some(path) = &self.plot else { return Ok(None) };
@@ -46,6 +58,6 @@ impl Plot {
 }
 
 /// The line that says so.
-pub(in crate::cli) fn wrote(path: &Path) -> String {
+pub fn wrote(path: &Path) -> String {
     format!("wrote {}\n", path.display())
 }
