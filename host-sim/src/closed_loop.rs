@@ -4,7 +4,7 @@
 //! readings Y_n; its voltages are held until t_{n+1}, where Y_{n+1} is read.
 
 use std::collections::VecDeque;
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::ops::ControlFlow;
 
 use crate::controller::{ControllerError, TickController};
@@ -13,6 +13,7 @@ use crate::noise::{Gauge, Gaussian, amplifier};
 use crate::plant::{LegParameters, NoiseParameters, Plant};
 use crate::trace::Trace;
 use crate::trajectory::LegTrajectory;
+use crate::word::status_words;
 
 /// Legs of a platform.
 pub const LEGS: usize = 6;
@@ -174,6 +175,35 @@ impl From<ControllerError> for RunError {
 impl From<DescriptionError> for RunError {
     fn from(error: DescriptionError) -> Self {
         Self::Controller(error.into())
+    }
+}
+
+impl Run {
+    /// CSV: the words of the trace, then time, what was wanted of each leg, target less reading, and the status in words.
+    #[must_use]
+    pub fn to_csv(&self) -> String {
+        let status = self.trace.description().output("status").ok();
+        let inputs = self.trace.description().input_names.len();
+        let trace = self.trace.to_csv();
+        let mut lines = trace.lines();
+        let mut out = format!("{},time_s", lines.next().unwrap_or_default());
+        for stem in ["target", "error"] {
+            (0..LEGS).for_each(|leg| out.push_str(&format!(",{stem}[{leg}]_m")));
+        }
+        out.push_str(",status_text\n");
+        for ((line, row), sample) in lines.zip(self.trace.rows()).zip(&self.tracking.samples) {
+            // Writing to a String cannot fail, here and below.
+            let _ = write!(out, "{line},{:.9}", sample.time);
+            for target in sample.target {
+                let _ = write!(out, ",{target:.6e}");
+            }
+            for (target, measured) in sample.target.iter().zip(sample.measured) {
+                let _ = write!(out, ",{:.6e}", target - measured);
+            }
+            let word = status.and_then(|place| row.get(inputs + place)).copied().unwrap_or_default();
+            let _ = writeln!(out, ",{}", status_words(word as u32));
+        }
+        out
     }
 }
 

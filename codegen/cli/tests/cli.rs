@@ -228,10 +228,18 @@ fn sim_gives_one_document_and_its_files_hold_the_same_table() {
         assert!(trace.lines().count() > 40, "{mode}");
     }
     // Of its own legs there is no word about the paper.
-    let own = folder.run(&["sim", "legs.toml", "--frequency", "10", "--plot", "plots/own.svg"]);
+    let own = ["sim", "legs.toml", "--frequency", "10", "--plot", "plots/own.svg", "-o", "own", "--traces"];
+    let own = folder.run(&own);
     assert!(own.code == 0 && !own.stdout.contains("paper") && own.stdout.contains("pcc"), "{own:?}");
     assert!(own.stdout.lines().all(|line| line.chars().count() <= 80), "{}", own.stdout);
     assert!(folder.read("plots/own.svg").starts_with("<svg "));
+    assert!(own.stderr.contains(" MB, to own"), "{}", own.stderr);
+    let trace = folder.read("own/trace-pcc-10hz.csv");
+    for name in
+        ["time_s", "dac_code[0]", "voltage[5]_V", "displacement[0]_m", "target[5]_m", "error[5]_m", "status_text"]
+    {
+        assert!(trace.lines().next().unwrap().split(',').any(|column| column == name), "{name}");
+    }
     // Another interval is judged as the period of the spec is.
     folder.run(&["sim", "legs.toml", "--frequency", "10", "--samples", "2000"]).says(1, &["50.0 µs", "timing.period"]);
     folder.json(&["sim", "nothing.toml"]).finding("E0101");

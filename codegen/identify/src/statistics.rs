@@ -27,3 +27,15 @@ pub(crate) fn noise_floor(y: &[f64]) -> f64 {
     // The median of |N(0, s)| is 0.6745 s; second differences of white noise have the variance 6 σ².
     median(&mut second) / (0.674_489_75 * 6f64.sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn micrometres_are_those_of_the_record() {
+        for um in [1.03, 0.00228, 69.15164, -3.0] {
+            assert_eq!(micrometres(um * 1e-6).to_string(), um.to_string());
+        }
+    }
+}

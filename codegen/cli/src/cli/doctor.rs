@@ -7,11 +7,13 @@ use clap::Args;
 use serde::Serialize;
 use specgen_rt::histogram::{Histogram, time_text};
 
+use super::plot::Plot;
 use super::sim::environment;
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use specgen_operate::doctor::latency::{self, Figures, Measured};
 use specgen_operate::doctor::{Files, Finding, Grade, equipment, system};
+use specgen_report::chart::{Axis, Chart, LINE};
 
 /// Period of the measurement without a spec, ns: 10 kHz.
 const PERIOD: u64 = 100_000;
@@ -28,6 +30,8 @@ pub struct Arguments {
     /// Measure on this processor.
     #[arg(long, value_name = "N")]
     cpu: Option<usize>,
+    #[command(flatten)]
+    plot: Plot,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -62,6 +66,16 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         verdict: Verdict { grade, text: verdict },
         delays: measured.delays,
     };
+    let counts = report.latency.below_ns.iter().filter(|(_, count)| *count > 0);
+    let chart =
+        Chart::new("", "late wake-ups", Axis::log("later than planned, below", "µs"), Axis::log("how many", "")).with(
+            "",
+            LINE,
+            counts.map(|(below, count)| [*below as f64 / 1e3, *count as f64]).collect(),
+        );
+    if let Some(line) = arguments.plot.charts("wake-ups of this computer", &report.verdict.text, &[chart])? {
+        ui.progress(line.trim_end());
+    }
     // Without a spec nothing is asked for that could be refused.
     let failed = (grade == Grade::Bad && arguments.spec.is_some()).then(|| report.verdict.text.clone());
     ui.judged(&report, failed)

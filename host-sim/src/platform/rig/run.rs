@@ -12,6 +12,7 @@ use crate::platform::study::pose_of;
 use crate::platform::table::PoseErrors;
 use crate::trace::Trace;
 use crate::trajectory::PoseTrajectory;
+use crate::word::status_words;
 
 /// What a run keeps besides its errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -186,25 +187,27 @@ impl PlatformRig {
 }
 
 impl PlatformRun {
-    /// CSV, one line per tick that was kept: what was wanted, where it was, what the controller saw and did. SI units.
+    /// CSV, one line per tick that was kept: what was wanted, where it was and by how much that is off, what the controller saw,
+    /// did and said. SI units.
     #[must_use]
     pub fn to_csv(&self) -> String {
         let six = |stem: &str| (0..6).map(|k| format!(",{stem}[{k}]")).collect::<String>();
         let mut out = String::from("time_s");
-        for stem in ["target", "pose", "measured", "voltage"] {
+        for stem in ["target", "pose", "error", "measured", "voltage"] {
             out.push_str(&six(stem));
         }
-        out.push_str(",status\n");
+        out.push_str(",status,status_text\n");
         for PoseSample { time, target, tick } in &self.samples {
             // Writing to a String cannot fail, here and below.
             let _ = write!(out, "{time:.6}");
-            for value in [target, &tick.pose, &tick.measured].into_iter().flatten() {
+            let error: Six = std::array::from_fn(|k| target[k] - tick.pose[k]);
+            for value in [target, &tick.pose, &error, &tick.measured].into_iter().flatten() {
                 let _ = write!(out, ",{value:.4e}");
             }
             for value in tick.voltage {
                 let _ = write!(out, ",{value:.4}");
             }
-            let _ = writeln!(out, ",{}", tick.status);
+            let _ = writeln!(out, ",{},{}", tick.status, status_words(tick.status));
         }
         out
     }

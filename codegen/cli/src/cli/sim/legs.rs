@@ -95,7 +95,7 @@ fn own(arguments: &Arguments, compiled: &Compiled, controller: &mut Controller, 
                 charts.push(chart(&run.tracking, &format!("{mode} at {frequency} Hz")));
             }
             if arguments.traces {
-                traces.push((format!("trace-{mode}-{frequency}hz.csv"), run.trace.to_csv().into_bytes()));
+                traces.push((format!("trace-{mode}-{frequency}hz.csv"), run.to_csv().into_bytes()));
             }
             run.tracking.samples.drain(..first);
             table.rows.push(TrackingRow::of(mode, frequency, &run.tracking));
