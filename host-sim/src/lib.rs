@@ -20,7 +20,6 @@ pub mod platform;
 pub mod record;
 pub mod replay;
 pub mod scenario;
-pub mod status;
 pub mod stimulus;
 pub mod table;
 pub mod trace;

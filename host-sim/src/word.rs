@@ -109,23 +109,26 @@ impl WordKind {
     }
 }
 
-/// A status word as its bits say it, joined by `+`; empty where none is set. Both kinds of controller have the same bits.
+/// A status word as its bits say it, joined by `+`; empty where none is set. Both kinds of controller have the same bits; legs and
+/// gauges count from 0, as words do. A bit without a meaning is named by its number: a word of another version is not read as good.
 #[must_use]
 pub fn status_words(status: u32) -> String {
     let mut words = Vec::new();
     let mut legs = |first: u32, what: &str, then: &str| {
         words.extend(
-            (0..6).filter(|leg| status >> (first + leg) & 1 == 1).map(|leg| format!("{what} {}{then}", leg + 1)),
+            (0..6).filter(|leg| status >> (first + leg) & 1 == 1).map(|leg| format!("{what} {leg}{then}")),
         );
     };
     legs(0, "leg", " limited");
     legs(8, "gauge", " fault");
     legs(24, "leg", " inverse static");
     for (bit, what) in
-        [(16, "set-point refused"), (17, "set-point stale"), (18, "moving by itself"), (19, "wrench fault")]
+        [(16, "set-point refused"), (17, "set-point stale"), (18, "moving"), (19, "wrench fault")]
     {
         words.extend((status >> bit & 1 == 1).then(|| what.to_owned()));
     }
+    let known = 0x3f | 0x3f << 8 | 0xf << 16 | 0x3f << 24;
+    words.extend((0..u32::BITS).filter(|bit| status & !known & 1 << bit != 0).map(|bit| format!("bit {bit}")));
     words.join("+")
 }
 
@@ -136,8 +139,11 @@ mod tests {
     #[test]
     fn a_status_is_said_bit_by_bit() {
         assert_eq!(status_words(0), "");
-        assert_eq!(status_words(0x1), "leg 1 limited");
-        assert_eq!(status_words(0x2_2000), "gauge 6 fault+set-point stale");
+        assert_eq!(status_words(0x1), "leg 0 limited");
+        assert_eq!(status_words(0x2_2000), "gauge 5 fault+set-point stale");
+        let texts: std::collections::BTreeSet<String> = (0..32).map(|bit| status_words(1 << bit)).collect();
+        let unknown = texts.iter().filter(|text| text.starts_with("bit ")).count();
+        assert_eq!((texts.len(), unknown), (32, 10), "each bit has a text of its own");
     }
 
     #[test]

@@ -136,9 +136,8 @@ fn within_range(model: &Model, pose: &[f64; 6]) -> Result<(), String> {
         let ratio = (Vector3::new(x, y, geometry.height + z) + turn * joint - base).norm() / rest;
         if !LENGTH_RATIOS.contains(&ratio) {
             return Err(format!(
-                "leg {} has {ratio:.3} of its length at rest, beyond {} to {}, for which the dynamics are made; is the pose absolute or \
+                "leg {leg} has {ratio:.3} of its length at rest, beyond {} to {}, for which the dynamics are made; is the pose absolute or \
                  from rest (--from-rest)?",
-                leg + 1,
                 LENGTH_RATIOS.start(),
                 LENGTH_RATIOS.end()
             ));

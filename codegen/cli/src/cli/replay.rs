@@ -321,7 +321,7 @@ impl Errors {
     fn chart(self) -> Chart {
         let title = if self.platform { "target less measured pose" } else { "demand less gauge" };
         let chart = Chart::new("", title, Axis::linear("time", "s"), Axis::linear("error", "nm"));
-        let name = |k: usize| if self.platform { ["x", "y", "z"][k].to_owned() } else { format!("leg {}", k + 1) };
+        let name = |k: usize| if self.platform { ["x", "y", "z"][k].to_owned() } else { format!("leg {k}") };
         let lines = self.points.iter().enumerate().filter(|(_, points)| !points.is_empty());
         lines.fold(chart, |chart, (k, points)| chart.with(&name(k), LINE, points.clone()))
     }

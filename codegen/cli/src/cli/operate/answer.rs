@@ -77,7 +77,7 @@ impl Outcome for MachineStatus {
             self.tick as f64 * self.period,
             self.stands,
             self.status,
-            self.status_in_words,
+            if self.status_in_words.is_empty() { "-" } else { &self.status_in_words },
             self.events,
             self.late,
             self.link_errors + self.damaged_frames

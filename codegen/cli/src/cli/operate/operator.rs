@@ -78,7 +78,7 @@ impl<P: Port> Operator<P> {
             stands: self.stands(),
             amplifiers_on: status.amplifier_on,
             status: status.status,
-            status_in_words: host_sim::status::in_words(status.status),
+            status_in_words: host_sim::word::status_words(status.status).replace('+', ", "),
             events: status.events,
             late: status.late,
             link_errors: status.link.errors(),

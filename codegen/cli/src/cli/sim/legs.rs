@@ -119,7 +119,7 @@ fn chart(tracking: &Tracking, title: &str) -> Chart {
     for leg in 0..6 {
         let errors: Vec<f64> =
             tracking.samples.iter().map(|sample| 1e9 * (sample.target[leg] - sample.measured[leg])).collect();
-        chart = chart.over_time(&format!("leg {}", leg + 1), LINE, [tracking.interval; 2], &errors);
+        chart = chart.over_time(&format!("leg {leg}"), LINE, [tracking.interval; 2], &errors);
     }
     chart
 }
