@@ -10,6 +10,7 @@ mod completions;
 mod doctor;
 mod dynamics;
 mod examples;
+mod explain;
 mod file;
 mod firmware;
 mod forc;
@@ -78,6 +79,8 @@ enum Command {
     New(new::Arguments),
     /// Report every finding about a spec; write nothing.
     Check(check::Arguments),
+    /// Explain a finding by its code: what is checked, why it matters, a spec that shows it, the fix.
+    Explain(explain::Arguments),
     /// Build for one target, check the image, hold it against the budget.
     Build(firmware::Arguments),
     /// Say who takes the memory of an image, and what its tick reaches.
@@ -146,6 +149,7 @@ pub fn run() -> ExitCode {
         None => build::run(&cli.build, &mut ui),
         Some(Command::New(arguments)) => new::run(arguments, &mut ui),
         Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
+        Some(Command::Explain(arguments)) => explain::run(arguments, &ui),
         Some(Command::Build(arguments)) => firmware::run(arguments, &mut ui),
         Some(Command::Size(arguments)) => firmware::run_size(arguments, &mut ui),
         Some(Command::Flash(arguments)) => firmware::run_flash(arguments, &mut ui),

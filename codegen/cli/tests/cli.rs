@@ -45,7 +45,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
         (
             &["chek", "legs.toml"],
-            "new, check, build, size, flash, sim, tune, robust, report, reproduce, pil, operate, replay, dynamics, identify, forc, plant, doctor, lsp, dump-ir, cache, completions",
+            "new, check, explain, build, size, flash, sim, tune, robust, report, reproduce, pil, operate, replay, dynamics, identify, forc, plant, doctor, lsp, dump-ir, cache, completions",
         ),
         (&["check"], "<SPEC>"),
         (&["dump-ir"], "<SPEC>"),

@@ -6,7 +6,6 @@ mod position;
 mod render;
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::ops::Range;
 
 pub use codes::Code;
@@ -97,21 +96,33 @@ impl Diagnostic {
 }
 
 const MARKDOWN_HEAD: &str = "\
-<!-- Generated from the registry in codegen/language/src/diagnostic/codes.rs; do not edit. -->
+<!-- Generated from the pages in codegen/language/findings; do not edit. -->
 
 # Findings
 
 Every finding has a code that keeps its meaning. E: refused, nothing is written. W: pointed out, nothing is refused. N: worth
-knowing.
+knowing. Numbers: 01 file and syntax, 02 keys and values, 03 ranges and consistency, 04 stability, reach, set-points, gauges and
+supervisor, 05 records, 06 identification, 07 tuning, 08 values that do not fit together. `specgen explain CODE` prints one of
+these pages. An example is a change of a spec of the repository, or commands; a test runs it, with and without its fix, unless it
+is marked (minutes) or stands in a block `text`.
 ";
 
-/// The registry of codes as Markdown; `docs/diagnostics.md` is this text.
+/// The pages of all codes as one Markdown text; `docs/diagnostics.md` is this text.
 #[must_use]
 pub fn reference_markdown() -> String {
     let mut text = MARKDOWN_HEAD.to_owned();
     for code in codes::REGISTRY {
-        // Writing to a String cannot fail.
-        let _ = write!(text, "\n## {}: {}\n\n{}\n", code.id, code.title, code.explanation);
+        text.push('\n');
+        let mut is_code = false;
+        for line in code.page.lines() {
+            is_code ^= line.starts_with("```");
+            // One level below the heading of the document.
+            if line.starts_with('#') && !is_code {
+                text.push('#');
+            }
+            text += line;
+            text.push('\n');
+        }
     }
     text
 }

@@ -46,6 +46,12 @@ Examples:
   specgen check platform.toml --json
       the same, with margins, reach and precision, for programs";
 
+pub const EXPLAIN: &str = "\
+Examples:
+  specgen explain E0441                    # a code that `specgen check` printed: why it matters, an example, the fix
+
+docs/diagnostics.md has the pages of all codes.";
+
 pub const BUILD: &str = "\
 Examples:
   specgen build legs.toml --target host -o legs-host
