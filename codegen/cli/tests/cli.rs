@@ -48,6 +48,8 @@ fn arguments_that_make_no_sense_are_usage_errors() {
             "new, check, explain, build, size, flash, sim, tune, robust, report, reproduce, pil, operate, replay, dynamics, identify, forc, plant, doctor, lsp, dump-ir, cache, completions",
         ),
         (&["check"], "<SPEC>"),
+        (&["explain", "w0441"], "did you mean E0441, workspace bound that no pose reaches?"),
+        (&["explain", "X9999"], "docs/diagnostics.md lists them"),
         (&["dump-ir"], "<SPEC>"),
         (&["sim"], "<SPEC>"),
         (&["sim", "legs.toml", "--samples", "0"], "--samples"),

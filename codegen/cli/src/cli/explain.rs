@@ -26,7 +26,7 @@ struct Explained {
 pub fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
     let asked = arguments.code.to_uppercase();
     let Some(code) = codes::find(&asked) else {
-        // A number has one letter only.
+        // The letter may be mistaken, or left out.
         let same = codes::REGISTRY.iter().find(|code| asked.get(1..) == code.id.get(1..) || asked == code.id[1..]);
         let help = same.map_or_else(
             || "docs/diagnostics.md lists them".to_owned(),
