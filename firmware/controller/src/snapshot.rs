@@ -7,7 +7,8 @@
 pub use specgen_runtime::recorder;
 pub use specgen_runtime::snapshot::Invalid;
 
-use crate::supervised::{MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, Supervisor, supervise};
+use crate::machine::{MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, Supervisor};
+use crate::supervised::supervise;
 use crate::{CONFIG_WORDS, Config, State, permitted};
 use specgen_runtime::record::Layout;
 use specgen_runtime::recorder::{Recorder, Row};

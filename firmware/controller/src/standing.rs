@@ -2,13 +2,15 @@
 
 //! How the law begins, works and stands still under the supervisor.
 
+use crate::machine::{Supervisor, compares, move_codes};
 use crate::setpoint::SETPOINTS;
-use crate::step::{GAUGE_FAULT, advance, sense};
-use crate::supervised::{Phase, Supervisor, compares, component, move_codes};
+use crate::step::{advance, sense};
 use crate::supervision::{READINGS_PER_LEG, SUPERVISION};
+use crate::tick::GAUGE_FAULT;
 use crate::{Config, LEGS, Real, State, TickInput, kinematics, sensing};
+use specgen_runtime::linear::component;
 use specgen_runtime::setpoint::{CommandKind, Generator};
-use specgen_runtime::supervisor::Sample;
+use specgen_runtime::supervisor::{Phase, Sample};
 use specgen_runtime::{Estimate, Integral, NotchState, Transfer};
 
 /// The gauges' words.

@@ -5,9 +5,9 @@
 use crate::config::Environment;
 use crate::hysteresis::{GRID, Memory};
 use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
-use crate::{LEGS, Real, TickInput, limits};
-use specgen_runtime::setpoint::{CommandKind, Generator};
-use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Sizes, Snapshot, Writer};
+use crate::{LEGS, Real, limits};
+use specgen_runtime::setpoint::Generator;
+use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Sizes, Snapshot};
 use specgen_runtime::{ControlMode, Digest, Estimate, Integral, Interaction, NotchState, Rate, Transfer};
 
 /// State of one leg.
@@ -83,7 +83,14 @@ impl State {
     #[must_use]
     pub const fn new() -> Self {
         Self {
-            legs: LegState::all_at_rest(),
+            legs: [
+                LegState::at_rest(0),
+                LegState::at_rest(1),
+                LegState::at_rest(2),
+                LegState::at_rest(3),
+                LegState::at_rest(4),
+                LegState::at_rest(5),
+            ],
             pose: [0.0; 6],
             rate: Rate::new(),
             generator: Generator::new(),
@@ -164,25 +171,5 @@ specgen_runtime::state! {
         words.set(limited)?;
         words.choice(mode)?;
         words.choice(interaction)?;
-    }
-}
-
-impl TickInput {
-    /// As words in the order of `INPUT_NAMES`.
-    pub(crate) fn save(&self, words: &mut Writer<'_>) {
-        words.word(match self.command.kind {
-            CommandKind::Hold => 0,
-            CommandKind::Stream => 1,
-            CommandKind::Move => 2,
-            CommandKind::Trajectory => 3,
-            CommandKind::Unknown => 4,
-        });
-        words.word(self.command.selector as u64);
-        words.word(self.command.sequence as u64);
-        words.reals(&self.command.target.pose);
-        words.reals(&self.command.target.rate);
-        words.reals(&self.command.target.acceleration);
-        words.reals(&self.gauge);
-        words.reals(&self.wrench);
     }
 }

@@ -34,55 +34,12 @@ use crate::task_space::{
     CELLS_PER_METRE, COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS,
     PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
 };
-use crate::{Config, LEGS, LegState, Real, State, dynamics, sensing};
+use crate::tick::WRENCH_FAULT;
+use crate::{Config, LEGS, LegState, Real, State, TickInput, TickOutput, dynamics, sensing};
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, transform};
-use specgen_runtime::setpoint::{Command, CommandKind};
+use specgen_runtime::setpoint::CommandKind;
 use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState};
-
-/// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
-pub const LEG_LIMITED: u32 = 0x3f;
-
-/// Bits 8 to 13: gauge not finite or out of range. The pose, the integral and the estimates were held.
-pub const GAUGE_FAULT: u32 = 0x3f00;
-
-/// Bit 16: set-point not finite, out of the workspace or a jump; the last one was held.
-pub const SETPOINT_FAULT: u32 = 0x1_0000;
-
-/// Bit 17: the stream of set-points is stale; brought to rest.
-pub const SETPOINT_STALE: u32 = 0x2_0000;
-
-/// Bit 18: bias, move or trajectory under way.
-pub const GENERATOR_BUSY: u32 = 0x4_0000;
-
-/// Bit 19: measured wrench not finite or out of range; the last one believed was kept.
-pub const WRENCH_FAULT: u32 = 0x8_0000;
-
-/// Bits 24 to 29: the rate-dependent inverse of the leg was not safe to use; the static one stood in for it. Never set by models
-/// with one inverse.
-pub const STATIC_INVERSE: u32 = 0x3f00_0000;
-
-/// What a tick reads.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TickInput {
-    /// What the platform is to do.
-    pub command: Command<Real>,
-    /// Reading of each gauge: V if the spec gives a calibration, else m from rest.
-    pub gauge: [Real; 6],
-    /// Measured force (N) and torque (N m) of the work piece ON the platform, about P_C, base axes.
-    pub wrench: [Real; 6],
-}
-
-/// What a tick yields. Every number is finite. What else there is to know stands in the [`State`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TickOutput {
-    /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
-    pub voltage: [Real; LEGS],
-    /// Converter code of each leg.
-    pub dac_code: [i32; LEGS],
-    /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`], [`SETPOINT_STALE`], [`GENERATOR_BUSY`], [`WRENCH_FAULT`].
-    pub status: u32,
-}
 
 /// One control tick. See the module for the timing.
 pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {

@@ -54,9 +54,6 @@ pub const READINGS_PER_LEG: [[Real; 6]; 6] = [
     ],
 ];
 
-/// All legs stand alike at reset.
-pub(crate) const ALIKE_AT_REST: bool = true;
-
 /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.
 pub(crate) const fn memory_at_rest(_leg: usize) -> Memory {
     Memory::new()

@@ -23,6 +23,26 @@ pub enum Law {
     Pcc,
 }
 
+impl Law {
+    /// 0 none, 1 EWMA, 2 PCC.
+    #[inline]
+    #[must_use]
+    pub const fn word(self) -> u64 {
+        self as u64
+    }
+
+    /// The inverse of [`Law::word`]; none for any other number.
+    #[must_use]
+    pub const fn from_word(word: u64) -> Option<Self> {
+        Some(match word {
+            0 => Self::Invhys,
+            1 => Self::Ewma,
+            2 => Self::Pcc,
+            _ => return None,
+        })
+    }
+}
+
 /// Estimates of one leg, m. Zero at reset.
 #[derive(Debug, Clone, Copy)]
 pub struct Estimate<T> {

@@ -79,7 +79,7 @@ pub use everett::Everett;
 pub use feedback::{Gains, Integral};
 pub use kinematics::Legs;
 pub use memory::ReversalMemory;
-pub use mode::{ControlMode, Interaction};
+pub use mode::{ControlMode, Interaction, SetpointKind};
 pub use motion::Motion;
 pub use notch::{Notch, NotchState, Section};
 pub use permitted::Permitted;

@@ -32,3 +32,13 @@ fn plus<T: Real>(sum: T, factor: T, value: T) -> T {
 pub fn difference<T: Real>(left: &[T; 6], right: &[T; 6]) -> [T; 6] {
     each(|axis| left[axis] - right[axis])
 }
+
+/// An entry, zero where there is none.
+#[inline]
+#[must_use]
+pub fn component<T: Real>(vector: &[T; 6], index: usize) -> T {
+    match vector.get(index) {
+        Some(value) => *value,
+        None => T::ZERO,
+    }
+}

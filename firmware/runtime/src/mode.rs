@@ -43,15 +43,10 @@ impl ControlMode {
     #[inline]
     #[must_use]
     pub const fn word(self) -> u64 {
-        let law = match self.law() {
-            Law::Invhys => 0,
-            Law::Ewma => 1,
-            Law::Pcc => 2,
-        };
         match self {
             Self::P => 0,
-            Self::F(_) => 1 + law,
-            Self::PF(_) => 4 + law,
+            Self::F(law) => 1 + law.word(),
+            Self::PF(law) => 4 + law.word(),
         }
     }
 
@@ -106,6 +101,34 @@ impl Interaction {
     }
 }
 
+/// What the six numbers of a leg controller's set-point are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SetpointKind {
+    /// Pose from rest: m, rad.
+    Pose,
+    /// Leg displacements, m.
+    Leg,
+}
+
+impl SetpointKind {
+    /// 0 pose, 1 leg.
+    #[inline]
+    #[must_use]
+    pub const fn word(self) -> u64 {
+        self as u64
+    }
+
+    /// The inverse of [`SetpointKind::word`]; none for any other number.
+    #[must_use]
+    pub const fn from_word(word: u64) -> Option<Self> {
+        Some(match word {
+            0 => Self::Pose,
+            1 => Self::Leg,
+            _ => return None,
+        })
+    }
+}
+
 /// 0 before the first tick.
 impl Choice for Option<ControlMode> {
     fn to_word(&self) -> u64 {
@@ -144,5 +167,13 @@ mod tests {
             assert_eq!(Interaction::from_word(word).map(Interaction::word), Some(word));
         }
         assert_eq!(Interaction::from_word(u64::MAX), None);
+        for word in 0..2 {
+            assert_eq!(SetpointKind::from_word(word).map(SetpointKind::word), Some(word));
+        }
+        assert_eq!(SetpointKind::from_word(2), None);
+        for word in 0..3 {
+            assert_eq!(Law::from_word(word).map(Law::word), Some(word));
+        }
+        assert_eq!(Law::from_word(3), None);
     }
 }

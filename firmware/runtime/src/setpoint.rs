@@ -55,6 +55,13 @@ impl CommandKind {
             _ => Self::Unknown,
         }
     }
+
+    /// The same word; 4 for what is none of these.
+    #[inline]
+    #[must_use]
+    pub const fn word(self) -> u64 {
+        self as u64
+    }
 }
 
 /// A command; it holds for as long as it is given.

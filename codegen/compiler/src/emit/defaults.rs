@@ -62,7 +62,7 @@ fn legs(ir: &Ir) -> (TokenStream, TokenStream) {
         /// Ticks of a run; from `adaptation.run_interval`.
         pub(crate) const RUN_INTERVAL: u32 = #run_interval;
     };
-    (quote! { use specgen_runtime::Law; use crate::SetpointKind; }, constants)
+    (quote! { use specgen_runtime::{Law, SetpointKind}; }, constants)
 }
 
 fn platform(ir: &Ir, d: &PlatformDefaults) -> (TokenStream, TokenStream) {

@@ -17,8 +17,8 @@ macro_rules! files {
 
 /// Of six legs with their own gauges.
 pub const LEGS: &[File] = files! {
-    "common": "dynamics", "integrity", "kinematics", "machine_words", "names", "rest", "snapshot", "stage", "supervised";
-    "legs": "api", "config", "sensing", "stages", "standing", "state", "step", "waves", "words";
+    "common": "description", "dynamics", "integrity", "kinematics", "machine", "snapshot", "stage", "supervised", "words";
+    "legs": "api", "config", "sensing", "stages", "standing", "state", "step", "tick", "waves";
 };
 
 /// Documentation of their crate.
@@ -26,8 +26,8 @@ pub const LEGS_PAGE: &str = include_str!("../../../../firmware/controller/law/le
 
 /// Of a platform.
 pub const PLATFORM: &[File] = files! {
-    "common": "dynamics", "integrity", "kinematics", "machine_words", "names", "rest", "snapshot", "stage", "supervised";
-    "platform": "api", "config", "notch", "sensing", "stages", "standing", "state", "step", "waves", "words";
+    "common": "description", "dynamics", "integrity", "kinematics", "machine", "snapshot", "stage", "supervised", "words";
+    "platform": "api", "config", "notch", "sensing", "stages", "standing", "state", "step", "tick", "waves";
 };
 
 /// Documentation of its crate.

@@ -19,6 +19,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         .collect();
     let count = literal::count(rows.len());
     let names = table.names();
+    let words = literal::count(ranges.len());
     let [request, reading, stiffness] =
         [table.state.request, table.state.reading, table.state.stiffness].map(|most| literal::real(Scalar::F64, most));
     quote! {
@@ -27,10 +28,12 @@ pub fn emit(ir: &Ir) -> TokenStream {
         use specgen_runtime::Permitted;
         use specgen_runtime::snapshot::Sizes;
 
-        use crate::{CONFIG_WORDS, Real};
+        use crate::Real;
 
-        /// Names of the words of the settings.
-        pub(crate) const NAMES: [&str; CONFIG_WORDS] = [#(#names),*];
+        /// Words of the settings.
+        pub(crate) const WORDS: usize = #words;
+        /// Their names.
+        pub(crate) const NAMES: [&str; WORDS] = [#(#names),*];
         /// Ranges of the words of [`crate::CONFIG_NAMES`] in their order, both ends included, each for so many words; `code_min` is at
         /// most `code_max`.
         pub const SETTINGS: [(Permitted<Real>, usize); #count] = [#(#rows),*];

@@ -110,8 +110,6 @@ fn at_rest(ir: &Ir) -> TokenStream {
         }
     });
     quote! {
-        /// All legs stand alike at reset.
-        pub(crate) const ALIKE_AT_REST: bool = #alike;
         #[doc = #doc]
         pub(crate) const fn memory_at_rest(#leg: usize) -> Memory {
             #memory

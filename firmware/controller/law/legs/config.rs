@@ -1,23 +1,22 @@
 //! What may change while running. Its defaults are the spec's; another tuning is another `Config`, never another build.
 
 use crate::defaults::{DRIFT_WEIGHT, LAW, LEVEL_WEIGHT, MAX_STEP, RUN_INTERVAL, SETPOINT};
-use crate::words::{CONFIG_CODES, CONFIG_WORDS};
 use crate::{Real, limits, permitted};
-use specgen_runtime::{CodeLimits, Law, Permitted};
+use specgen_runtime::{CodeLimits, Law, Permitted, Real as _, SetpointKind};
 
-/// What the six set-point numbers are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SetpointKind {
-    /// Pose from rest: m, rad.
-    Pose,
-    /// Leg displacements, m.
-    Leg,
-}
+/// Words of the settings.
+pub const CONFIG_WORDS: usize = permitted::WORDS;
+
+/// Names of the settings. `mode` is 0 invhys, 1 ewma, 2 pcc; `setpoint_kind` is 0 pose, 1 leg.
+pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = permitted::NAMES;
+
+/// First word of the code limits in [`CONFIG_NAMES`].
+const CONFIG_CODES: usize = 5;
 
 /// A value that a [`Config`] cannot hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConfigError {
-    /// The word of [`crate::CONFIG_NAMES`] that is out of range.
+    /// The word of [`CONFIG_NAMES`] that is out of range.
     pub word: usize,
 }
 
@@ -131,6 +130,47 @@ impl Config {
         Self { code_limits, ..self }.checked()
     }
 
+    /// From words in the order of [`CONFIG_NAMES`].
+    ///
+    /// # Errors
+    /// The first word that is out of range.
+    pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
+        Self::check(words)?;
+        let Some(law) = Law::from_word(words[0]) else {
+            return Err(ConfigError { word: 0 });
+        };
+        let Some(setpoint) = SetpointKind::from_word(words[1]) else {
+            return Err(ConfigError { word: 1 });
+        };
+        let limits = CodeLimits {
+            max_step: words[CONFIG_CODES] as i32,
+            min: words[CONFIG_CODES + 1] as i32,
+            max: words[CONFIG_CODES + 2] as i32,
+        };
+        Self::new()
+            .with_law(law)
+            .with_setpoint(setpoint)
+            .with_weights(Real::from_word(words[2]), Real::from_word(words[3]))?
+            .with_run_interval(words[4] as u32)?
+            .with_code_limits(limits)
+    }
+
+    /// Words in the order of [`CONFIG_NAMES`].
+    #[must_use]
+    pub fn to_words(&self) -> [u64; CONFIG_WORDS] {
+        let CodeLimits { max_step, min, max } = self.code_limits;
+        [
+            self.law.word(),
+            self.setpoint.word(),
+            self.level_weight.to_word(),
+            self.drift_weight.to_word(),
+            self.run_interval as u64,
+            max_step as u32 as u64,
+            min as u32 as u64,
+            max as u32 as u64,
+        ]
+    }
+
     /// These settings, if each is within its range.
     #[inline(never)]
     fn checked(self) -> Result<Self, ConfigError> {
@@ -140,7 +180,7 @@ impl Config {
 
     /// Every word is within its range, or the first that is not.
     #[inline(never)]
-    pub(crate) fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
+    fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
         for (word, value) in words.iter().enumerate() {
             match Permitted::of(&permitted::SETTINGS, word) {
                 Some(permitted) if permitted.takes(*value) => {}

@@ -1,11 +1,12 @@
 //! How the law begins, works and stands still under the supervisor.
 
 use crate::hysteresis::LED;
+use crate::machine::{Supervisor, compares, move_codes};
 use crate::sensing::{gauge_is_accepted, leg_setpoint_is_accepted};
 use crate::step::advance;
-use crate::supervised::{Supervisor, compares, component, move_codes};
 use crate::supervision::{APPROACH_KEEP, APPROACH_NEGLIGIBLE, SUPERVISION};
 use crate::{Config, LEGS, Real, SetpointKind, State, TickInput, kinematics};
+use specgen_runtime::linear::component;
 use specgen_runtime::supervisor::Sample;
 use specgen_runtime::{Estimate, Law};
 

@@ -2,8 +2,8 @@
 
 use crate::hysteresis::{GRID, LED, Memory};
 use crate::supervision::{code_at_rest, memory_at_rest};
-use crate::{LEGS, Real, TickInput, limits};
-use specgen_runtime::snapshot::{LARGEST_PLACE, Snapshot, Writer};
+use crate::{LEGS, Real, limits};
+use specgen_runtime::snapshot::{LARGEST_PLACE, Snapshot};
 use specgen_runtime::{Digest, Estimate};
 
 /// State of one leg.
@@ -47,7 +47,18 @@ impl State {
     /// Reset: at rest, as `memory_at_rest` of `supervision.rs` says, no correction.
     #[must_use]
     pub const fn new() -> Self {
-        Self { legs: LegState::all_at_rest(), demand: [0.0; LEGS], ticks_in_run: 0 }
+        Self {
+            legs: [
+                LegState::at_rest(0),
+                LegState::at_rest(1),
+                LegState::at_rest(2),
+                LegState::at_rest(3),
+                LegState::at_rest(4),
+                LegState::at_rest(5),
+            ],
+            demand: [0.0; LEGS],
+            ticks_in_run: 0,
+        }
     }
 
     /// Fingerprint of everything that later ticks depend on, for comparing two machines bit for bit.
@@ -80,13 +91,5 @@ specgen_runtime::state! {
         }
         words.numbers(demand, LARGEST_PLACE)?;
         words.tally(ticks_in_run)?;
-    }
-}
-
-impl TickInput {
-    /// As words in the order of `INPUT_NAMES`.
-    pub(crate) fn save(&self, words: &mut Writer<'_>) {
-        words.reals(&self.setpoint);
-        words.reals(&self.displacement);
     }
 }

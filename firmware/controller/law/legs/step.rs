@@ -6,52 +6,11 @@
 use crate::hysteresis::{LEAD, LEAD_LIMIT, LED, TABLES, Table};
 use crate::limits::DAC;
 use crate::sensing::{gauge_is_accepted, leg_setpoint_is_accepted};
-use crate::{Config, LEGS, LegState, Real, SetpointKind, State, kinematics};
+use crate::tick::SETPOINT_FAULT;
+use crate::{Config, LegState, Real, SetpointKind, State, TickInput, TickOutput, kinematics};
 use specgen_runtime::Law;
 use specgen_runtime::linear::each;
 use specgen_runtime::real::saturate;
-
-/// Bits 0 to 5 of the status: leg held back by table, voltage or slew limit.
-pub const LEG_LIMITED: u32 = 0x3f;
-
-/// Bits 8 to 13: gauge not finite or out of range; the leg's estimates were held.
-pub const GAUGE_FAULT: u32 = 0x3f00;
-
-/// Bit 16: set-point not finite or out of bounds; the last accepted one was held.
-pub const SETPOINT_FAULT: u32 = 0x1_0000;
-
-/// Bits 24 to 29: the rate-dependent inverse of the leg was not safe to use; the static one stood in for it. Never set by models
-/// with one inverse.
-pub const STATIC_INVERSE: u32 = 0x3f00_0000;
-
-/// What a tick reads.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TickInput {
-    /// Set-point for the end of the coming interval: pose from rest (m, rad) or leg displacements (m), as
-    /// [`Config::setpoint`] says.
-    pub setpoint: [Real; 6],
-    /// Gauge reading Y of each leg, m, zero at rest.
-    pub displacement: [Real; LEGS],
-}
-
-/// What a tick yields. Every number is finite.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TickOutput {
-    /// Voltage of each leg for the coming interval, V: exactly that of [`TickOutput::dac_code`].
-    pub voltage: [Real; LEGS],
-    /// q̂ = ρ̂X: displacement really requested of each leg, after all limits, m.
-    pub requested: [Real; LEGS],
-    /// T: displacement demanded of each leg, m.
-    pub demand: [Real; LEGS],
-    /// δ̂ of each leg, m.
-    pub level: [Real; LEGS],
-    /// φ̂ of each leg, m.
-    pub drift: [Real; LEGS],
-    /// Converter code of each leg.
-    pub dac_code: [i32; LEGS],
-    /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`].
-    pub status: u32,
-}
 
 /// One control tick. See the module for the timing.
 pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {

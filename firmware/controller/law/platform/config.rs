@@ -4,14 +4,27 @@ use crate::defaults::{
     DRIFT_WEIGHT, ENVIRONMENT_REST, ENVIRONMENT_STIFFNESS, GAINS, INTERACTION, LEVEL_WEIGHT, MAX_STEP, MODE,
     POSITION_GAINS,
 };
-use crate::words::{CONFIG_CODES, CONFIG_WORDS};
+use crate::words::six;
 use crate::{Real, limits, permitted};
-use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Permitted};
+use specgen_runtime::snapshot::Writer;
+use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Permitted, Real as _};
+
+/// Words of the settings.
+pub const CONFIG_WORDS: usize = permitted::WORDS;
+
+/// Names of the settings. `mode` is 0 P; 1, 2, 3 F with Invhys, EWMA, PCC; 4, 5, 6 P/F with the same. `interaction` is 0
+/// neglected, 1 modelled, 2 measured. `kp`, `ki`, `kv` are the gains of P/F, `position_…` those of P.
+pub const CONFIG_NAMES: [&str; CONFIG_WORDS] = permitted::NAMES;
+
+/// First word of the weights, of the code limits and of the gains in [`CONFIG_NAMES`].
+const CONFIG_WEIGHTS: usize = 2;
+const CONFIG_CODES: usize = 4;
+const CONFIG_GAINS: usize = 7;
 
 /// A value that a [`Config`] cannot hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ConfigError {
-    /// The word of [`crate::CONFIG_NAMES`] that is out of range.
+    /// The word of [`CONFIG_NAMES`] that is out of range.
     pub word: usize,
 }
 
@@ -27,15 +40,15 @@ pub struct Environment {
 /// Checked settings. Every value it holds keeps the tick within its promises.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    pub(crate) mode: ControlMode,
-    pub(crate) interaction: Interaction,
-    pub(crate) level_weight: Real,
-    pub(crate) drift_weight: Real,
-    pub(crate) code_limits: CodeLimits,
-    pub(crate) gains: Gains<Real>,
-    pub(crate) position_gains: Gains<Real>,
-    pub(crate) environment: Environment,
-    pub(crate) damps: [bool; 2],
+    mode: ControlMode,
+    interaction: Interaction,
+    level_weight: Real,
+    drift_weight: Real,
+    code_limits: CodeLimits,
+    gains: Gains<Real>,
+    position_gains: Gains<Real>,
+    environment: Environment,
+    damps: [bool; 2],
 }
 
 impl Default for Config {
@@ -185,6 +198,64 @@ impl Config {
         Self { code_limits, ..self }.checked()
     }
 
+    /// From words in the order of [`CONFIG_NAMES`].
+    ///
+    /// # Errors
+    /// The first word that is out of range.
+    pub fn from_words(words: &[u64; CONFIG_WORDS]) -> Result<Self, ConfigError> {
+        Self::check(words)?;
+        let Some(mode) = ControlMode::from_word(words[0]) else {
+            return Err(ConfigError { word: 0 });
+        };
+        let Some(interaction) = Interaction::from_word(words[1]) else {
+            return Err(ConfigError { word: 1 });
+        };
+        let set = |first: usize| Gains {
+            proportional: six(words, first),
+            integral: six(words, first + 6),
+            derivative: six(words, first + 12),
+        };
+        let (gains, position_gains) = (set(CONFIG_GAINS), set(CONFIG_GAINS + 18));
+        Ok(Self {
+            mode,
+            interaction,
+            level_weight: Real::from_word(words[CONFIG_WEIGHTS]),
+            drift_weight: Real::from_word(words[CONFIG_WEIGHTS + 1]),
+            code_limits: CodeLimits {
+                max_step: words[CONFIG_CODES] as i32,
+                min: words[CONFIG_CODES + 1] as i32,
+                max: words[CONFIG_CODES + 2] as i32,
+            },
+            damps: [damps(&gains), damps(&position_gains)],
+            gains,
+            position_gains,
+            environment: Environment { stiffness: six(words, CONFIG_GAINS + 36), rest: six(words, CONFIG_GAINS + 42) },
+        })
+    }
+
+    /// Words in the order of [`CONFIG_NAMES`].
+    #[must_use]
+    pub fn to_words(&self) -> [u64; CONFIG_WORDS] {
+        let mut all = [0; CONFIG_WORDS];
+        let mut words = Writer::new(&mut all);
+        words.word(self.mode.word());
+        words.word(self.interaction.word());
+        words.real(self.level_weight);
+        words.real(self.drift_weight);
+        let CodeLimits { max_step, min, max } = self.code_limits;
+        for code in [max_step, min, max] {
+            words.word(code as u32 as u64);
+        }
+        for gains in [&self.gains, &self.position_gains] {
+            words.reals(&gains.proportional);
+            words.reals(&gains.integral);
+            words.reals(&gains.derivative);
+        }
+        words.reals(&self.environment.stiffness);
+        words.reals(&self.environment.rest);
+        all
+    }
+
     /// These settings, if each is within its range.
     #[inline(never)]
     fn checked(self) -> Result<Self, ConfigError> {
@@ -194,7 +265,7 @@ impl Config {
 
     /// Every word is within its range, or the first that is not.
     #[inline(never)]
-    pub(crate) fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
+    fn check(words: &[u64; CONFIG_WORDS]) -> Result<(), ConfigError> {
         for (word, value) in words.iter().enumerate() {
             match Permitted::of(&permitted::SETTINGS, word) {
                 Some(permitted) if permitted.takes(*value) => {}
@@ -209,7 +280,7 @@ impl Config {
 }
 
 /// Whether any k_v is other than zero.
-pub(crate) const fn damps(gains: &Gains<Real>) -> bool {
+const fn damps(gains: &Gains<Real>) -> bool {
     let [x, y, z, tilt_x, tilt_y, tilt_z] = gains.derivative;
     x != 0.0 || y != 0.0 || z != 0.0 || tilt_x != 0.0 || tilt_y != 0.0 || tilt_z != 0.0
 }

@@ -3,8 +3,7 @@
 
 //! The spec's settings: what `Config::new` holds.
 
-use specgen_runtime::Law;
-use crate::SetpointKind;
+use specgen_runtime::{Law, SetpointKind};
 use crate::Real;
 
 /// ρ̂ of a leg, m/V; from `actuator`. X = q̂/ρ̂ is the virtual drive of (AII.1); mode P takes the leg as linear: u = q/ρ̂.

@@ -5,10 +5,13 @@
 
 use specgen_runtime::Permitted;
 use specgen_runtime::snapshot::Sizes;
-use crate::{CONFIG_WORDS, Real};
+use crate::Real;
 
-/// Names of the words of the settings.
-pub(crate) const NAMES: [&str; CONFIG_WORDS] = [
+/// Words of the settings.
+pub(crate) const WORDS: usize = 8;
+
+/// Their names.
+pub(crate) const NAMES: [&str; WORDS] = [
     "mode",
     "setpoint_kind",
     "level_weight",

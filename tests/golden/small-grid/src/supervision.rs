@@ -32,9 +32,6 @@ pub const APPROACH_KEEP: Real = 0.9980019986673331;
 /// A way this short, m and rad, is none.
 pub const APPROACH_NEGLIGIBLE: Real = 1e-13;
 
-/// All legs stand alike at reset.
-pub(crate) const ALIKE_AT_REST: bool = true;
-
 /// Reset: lowest voltage after a sweep to the highest and back, gauges zeroed there.
 pub(crate) const fn memory_at_rest(_leg: usize) -> Memory {
     Memory::new()

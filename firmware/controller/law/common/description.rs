@@ -1,28 +1,7 @@
-// Carried over by specgen 0.1.0: the same for every spec. Its constants are in the generated files beside it.
-
-//! Names of words, and what a controller says of itself with them.
+//! What a controller says of itself.
 
 use crate::identity::{ABOUT, BIAS};
-use crate::words::{CONFIG_NAMES, INPUT_NAMES, OUTPUT_NAMES};
-
-/// Names of single words, of vectors (`name[0]` to `name[5]` each), and of single words again.
-macro_rules! names {
-    ($($first:literal),*; $($vector:literal),*; $($last:literal),*) => {
-        [
-            $($first,)*
-            $(
-                concat!($vector, "[0]"),
-                concat!($vector, "[1]"),
-                concat!($vector, "[2]"),
-                concat!($vector, "[3]"),
-                concat!($vector, "[4]"),
-                concat!($vector, "[5]"),
-            )*
-            $($last,)*
-        ]
-    };
-}
-pub(crate) use names;
+use crate::{CONFIG_NAMES, INPUT_NAMES, OUTPUT_NAMES};
 
 /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
 pub const DESCRIPTION: &str = match core::str::from_utf8(&TEXT) {
