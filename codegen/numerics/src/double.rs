@@ -6,6 +6,7 @@ use core::cmp::Ordering;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use specgen_runtime::Real;
+use specgen_runtime::snapshot::Field;
 
 /// high + low, |low| ≤ half the last bit of high.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,6 +116,10 @@ impl PartialOrd for Double {
             order => order,
         }
     }
+}
+
+impl Field for Double {
+    const WORDS: usize = 1;
 }
 
 impl Real for Double {

@@ -12,6 +12,7 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 use std::cell::RefCell;
 
 use specgen_runtime::Real;
+use specgen_runtime::snapshot::Field;
 
 use super::form::{Form, magnitude, times};
 
@@ -289,6 +290,10 @@ impl<const SINGLE: bool> PartialOrd for Traced<SINGLE> {
             None
         }
     }
+}
+
+impl<const SINGLE: bool> Field for Traced<SINGLE> {
+    const WORDS: usize = 1;
 }
 
 impl<const SINGLE: bool> Real for Traced<SINGLE> {

@@ -8,7 +8,7 @@ use crate::defaults::{
 };
 use crate::words::six;
 use crate::{Real, limits, permitted};
-use specgen_runtime::snapshot::Writer;
+use specgen_runtime::snapshot::{LARGEST_PLACE, Writer};
 use specgen_runtime::{CodeLimits, ControlMode, Gains, Interaction, Permitted, Real as _};
 
 /// Words of the settings.
@@ -30,13 +30,15 @@ pub struct ConfigError {
     pub word: usize,
 }
 
-/// K_e (h − h_e): a linear model of what the platform presses on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Environment {
-    /// K_e, N/m and N m/rad, x y z θx θy θz.
-    pub stiffness: [Real; 6],
-    /// h_e: pose from rest at which it is unloaded, m and rad.
-    pub rest: [Real; 6],
+specgen_runtime::state! { |words|
+    /// K_e (h − h_e): a linear model of what the platform presses on.
+    #[derive(PartialEq)]
+    pub struct Environment {
+        /// K_e, N/m and N m/rad, x y z θx θy θz.
+        pub stiffness: [Real; 6] = [0.0; 6], numbers(words.sizes().stiffness);
+        /// h_e: pose from rest at which it is unloaded, m and rad.
+        pub rest: [Real; 6] = [0.0; 6], numbers(LARGEST_PLACE);
+    }
 }
 
 /// Checked settings. Every value it holds keeps the tick within its promises.

@@ -7,15 +7,15 @@
 pub use specgen_runtime::recorder;
 pub use specgen_runtime::snapshot::Invalid;
 
-use crate::machine::{MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput, Supervisor};
+use crate::machine::{MACHINE_INPUT_WORDS, Machine, MachineInput, MachineOutput};
 use crate::supervised::supervise;
-use crate::{CONFIG_WORDS, Config, State, permitted};
+use crate::{CONFIG_WORDS, Config, permitted};
 use specgen_runtime::record::Layout;
 use specgen_runtime::recorder::{Recorder, Row};
-use specgen_runtime::snapshot::{Reader, Snapshot, Writer};
+use specgen_runtime::snapshot::{Field, Reader, Snapshot, Writer};
 
 /// Words of a [`Machine`].
-pub const MACHINE_STATE_WORDS: usize = <State as Snapshot>::WORDS + <Supervisor as Snapshot>::WORDS;
+pub const MACHINE_STATE_WORDS: usize = Machine::WORDS;
 /// Words of this controller's records.
 pub const RECORD_LAYOUT: Layout =
     Layout { config: CONFIG_WORDS, input: MACHINE_INPUT_WORDS, state: MACHINE_STATE_WORDS };
@@ -28,9 +28,7 @@ impl Machine {
 
     /// The same into a slice of that length.
     pub fn save_into(&self, words: &mut [u64]) {
-        let mut writer = Writer::new(words);
-        self.state.save(&mut writer);
-        self.supervisor.save(&mut writer);
+        Snapshot::save(self, &mut Writer::new(words));
     }
 
     /// The machine that [`Machine::save`] wrote.
@@ -40,8 +38,7 @@ impl Machine {
     pub fn load(words: &[u64; MACHINE_STATE_WORDS]) -> Result<Self, Invalid> {
         let mut reader = Reader::new(words).within(permitted::STATE);
         let mut machine = Self::new();
-        machine.state.restore(&mut reader)?;
-        machine.supervisor.restore(&mut reader)?;
+        machine.restore(&mut reader)?;
         Ok(machine)
     }
 }

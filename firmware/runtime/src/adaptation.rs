@@ -43,28 +43,17 @@ impl Law {
     }
 }
 
-/// Estimates of one leg, m. Zero at reset.
-#[derive(Debug, Clone, Copy)]
-pub struct Estimate<T> {
-    /// δ̂: offset between the leg and its model.
-    pub level: T,
-    /// φ̂: what δ̂ lags behind when the offset drifts; zero under EWMA.
-    pub drift: T,
-}
-
-impl<T: Real> Default for Estimate<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// Estimates of one leg, m. Zero at reset.
+    pub struct Estimate<T>[T: Real] {
+        /// δ̂: offset between the leg and its model.
+        pub level: T = T::ZERO, number(words.sizes().request);
+        /// φ̂: what δ̂ lags behind when the offset drifts; zero under EWMA.
+        pub drift: T = T::ZERO, number(words.sizes().request);
     }
 }
 
 impl<T: Real> Estimate<T> {
-    /// No correction.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { level: T::ZERO, drift: T::ZERO }
-    }
-
     /// Displacement to take off the demand before the inverse, δ̂ + φ̂, m.
     #[inline]
     #[must_use]
@@ -135,12 +124,5 @@ fn bounded<T: Real>(estimate: T) -> T {
         T::ONE
     } else {
         -T::ONE
-    }
-}
-
-crate::state! {
-    impl[T: Real] Estimate<T>, 2, |words| { level, drift } {
-        words.number(level, words.sizes().request)?;
-        words.number(drift, words.sizes().request)?;
     }
 }

@@ -49,29 +49,18 @@ pub struct CreepEverett<T: 'static, const N: usize, const NODES: usize, const K:
     pub creep: &'static Creep<T, K>,
 }
 
-/// Reversal memory and creep states of one leg. Resets to rest: drive 0 after negative saturation, nothing left to creep.
-#[derive(Debug, Clone, Copy)]
-pub struct CreepMemory<T, const CAP: usize, const K: usize> {
-    memory: ReversalMemory<T, CAP>,
-    /// x_j, m.
-    states: [T; K],
-    /// y at the end of the tick, m.
-    displacement: T,
-}
-
-impl<T: Real, const CAP: usize, const K: usize> Default for CreepMemory<T, CAP, K> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// Reversal memory and creep states of one leg. Resets to rest: drive 0 after negative saturation, nothing left to creep.
+    pub struct CreepMemory<T, CAP, K>[T: Real, const CAP: usize, const K: usize] {
+        memory: ReversalMemory<T, CAP> = ReversalMemory::new(), part;
+        /// x_j, m.
+        states: [T; K] = [T::ZERO; K], numbers(LARGEST_PLACE);
+        /// y at the end of the tick, m.
+        displacement: T = T::ZERO, number(LARGEST_PLACE);
     }
 }
 
 impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
-    /// At rest.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { memory: ReversalMemory::new(), states: [T::ZERO; K], displacement: T::ZERO }
-    }
-
     /// Just risen to a drive, see [`ReversalMemory::risen`]: the creep of it is to come.
     #[must_use]
     pub const fn risen(drive: T, displacement: T) -> Self {
@@ -177,14 +166,5 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
             rest = rest - *carried * *state;
         }
         rest / table.creep.direct
-    }
-}
-
-crate::state! {
-    impl[T: Real, const CAP: usize, const K: usize] CreepMemory<T, CAP, K>, ReversalMemory::<T, CAP>::WORDS + K + 1,
-    |words| { memory, states, displacement } {
-        words.part(memory)?;
-        words.numbers(states, LARGEST_PLACE)?;
-        words.number(displacement, LARGEST_PLACE)?;
     }
 }

@@ -29,18 +29,19 @@ pub struct DynamicEverett<T: 'static, const N: usize, const NODES: usize> {
     pub tolerance: T,
 }
 
-/// Reversal memory of one leg, with Γ₁ along it. Resets to rest at drive 0 after negative saturation.
-#[derive(Debug, Clone, Copy)]
-pub struct DynamicMemory<T, const CAP: usize> {
-    memory: ReversalMemory<T, CAP>,
-    /// Γ₁ at each extremum of the memory, m per cell a tick.
-    rate_at: [T; CAP],
-    /// Γ₁ at the present drive.
-    rate: T,
-    /// h of the last tick, m.
-    displacement: T,
-    /// The last inverse was the static one.
-    fell_back: bool,
+crate::state! { |words|
+    /// Reversal memory of one leg, with Γ₁ along it. Resets to rest at drive 0 after negative saturation.
+    pub struct DynamicMemory<T, CAP>[T: Real, const CAP: usize] {
+        memory: ReversalMemory<T, CAP> = ReversalMemory::new(), part;
+        /// Γ₁ at each extremum of the memory, m per cell a tick.
+        rate_at: [T; CAP] = [T::ZERO; CAP], stored(memory.depth(), LARGEST_PLACE);
+        /// Γ₁ at the present drive.
+        rate: T = T::ZERO, number(LARGEST_PLACE);
+        /// h of the last tick, m.
+        displacement: T = T::ZERO, number(LARGEST_PLACE);
+        /// The last inverse was the static one.
+        fell_back: bool = false, set;
+    }
 }
 
 /// h and its parts at a drive.
@@ -53,27 +54,9 @@ struct Point<T> {
     rate_term: T,
 }
 
-impl<T: Real, const CAP: usize> Default for DynamicMemory<T, CAP> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     /// Most evaluations of h within the bounds.
     pub const ITERATIONS: u32 = 12;
-
-    /// At rest.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            memory: ReversalMemory::new(),
-            rate_at: [T::ZERO; CAP],
-            rate: T::ZERO,
-            displacement: T::ZERO,
-            fell_back: false,
-        }
-    }
 
     /// At rest at a drive that was risen to, see [`ReversalMemory::risen`], with Γ₁ = `rate` there, m per cell a tick.
     #[must_use]
@@ -297,15 +280,4 @@ fn along<T: Real, const N: usize, const NODES: usize>(
     drive: T,
 ) -> T {
     if drive > start { at_start + table.value(drive, start) } else { at_start - table.value(start, drive) }
-}
-
-crate::state! {
-    impl[T: Real, const CAP: usize] DynamicMemory<T, CAP>, ReversalMemory::<T, CAP>::WORDS + CAP + 3,
-    |words| { memory, rate_at, rate, displacement, fell_back } {
-        words.part(memory)?;
-        words.stored(rate_at, memory.depth(), LARGEST_PLACE)?;
-        words.number(rate, LARGEST_PLACE)?;
-        words.number(displacement, LARGEST_PLACE)?;
-        words.set(fell_back)?;
-    }
 }

@@ -27,26 +27,15 @@ pub fn force_of<T: Real>(gain: &[T; 6], error: &[T; 6]) -> [T; 6] {
     force
 }
 
-/// The integral part of (7), as a generalised force. Zero at reset.
-#[derive(Debug, Clone, Copy)]
-pub struct Integral<T> {
-    /// k_I ∫e, N and N m.
-    pub force: [T; 6],
-}
-
-impl<T: Real> Default for Integral<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// The integral part of (7), as a generalised force. Zero at reset.
+    pub struct Integral<T>[T: Real] {
+        /// k_I ∫e, N and N m.
+        pub force: [T; 6] = [T::ZERO; 6], numbers(LARGEST);
     }
 }
 
 impl<T: Real> Integral<T> {
-    /// No force.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { force: [T::ZERO; 6] }
-    }
-
     /// One tick's growth T_s k_I e.
     #[inline]
     #[must_use]
@@ -95,10 +84,4 @@ pub fn winds_up<T: Real>(excess: &[T; 6], push: &[T; 6]) -> bool {
         outward |= (*excess > T::ZERO && *push > T::ZERO) || (*excess < T::ZERO && *push < T::ZERO);
     }
     outward
-}
-
-crate::state! {
-    impl[T: Real] Integral<T>, 6, |words| { force } {
-        words.numbers(force, LARGEST)?;
-    }
 }

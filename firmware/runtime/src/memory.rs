@@ -12,25 +12,38 @@
 
 use crate::everett::{Everett, Line};
 use crate::real::{Real, saturate};
+use crate::snapshot::{LARGEST, LARGEST_PLACE};
 
-mod snapshot;
+crate::state! { |words|
+    /// Staircase of at most `CAP` ≥ 4 extrema. Drives in cells of the Everett grid, displacements in m.
+    ///
+    /// Reset state: drive 0 after negative saturation, displacement 0; a real leg reaches it by a sweep to the
+    /// upper voltage limit and back.
+    pub struct ReversalMemory<T, CAP>[T: Real, const CAP: usize] {
+        /// Stored extrema, 1..=CAP. Only they count: the room behind them is zero in the words of a state.
+        len: usize = { let () = Self::FITS; 1 }, place(CAP) if *len > 0;
+        /// Pairs dropped because the memory was full.
+        dropped: u32 = 0, tally;
+        drive: T = T::ZERO, number(LARGEST);
+        displacement: T = T::ZERO, number(LARGEST_PLACE);
+        /// p_k; even k are minima, odd k maxima; p₀ = 0.
+        extrema: [T; CAP] = [T::ZERO; CAP], stored(*len, LARGEST)
+            if is_staircase(extrema.get(..*len).unwrap_or_default(), *drive);
+        /// f_k.
+        displacements: [T; CAP] = [T::ZERO; CAP], stored(*len, LARGEST_PLACE);
+    }
+}
 
-/// Staircase of at most `CAP` ≥ 4 extrema. Drives in cells of the Everett grid, displacements in m.
-///
-/// Reset state: drive 0 after negative saturation, displacement 0; a real leg reaches it by a sweep to the
-/// upper voltage limit and back.
-#[derive(Debug, Clone, Copy)]
-pub struct ReversalMemory<T, const CAP: usize> {
-    /// p_k; even k are minima, odd k maxima; p₀ = 0. Only the first `len` count.
-    extrema: [T; CAP],
-    /// f_k.
-    displacements: [T; CAP],
-    /// Stored extrema, 1..=CAP.
-    len: usize,
-    drive: T,
-    displacement: T,
-    /// Pairs dropped because the memory was full.
-    dropped: u32,
+/// Minima rise, maxima fall, all of them nested, the first at negative saturation, the drive within the innermost.
+fn is_staircase<T: Real>(extrema: &[T], drive: T) -> bool {
+    let mut low = T::ZERO;
+    let mut high = T::from_f64(LARGEST);
+    let mut nested = extrema.first() == Some(&T::ZERO);
+    for (k, extremum) in extrema.iter().enumerate() {
+        nested &= low <= *extremum && *extremum <= high;
+        if k % 2 == 0 { low = *extremum } else { high = *extremum }
+    }
+    nested && low <= drive && drive <= high
 }
 
 /// Where a branch starts.
@@ -54,28 +67,8 @@ struct Branch<T> {
     line: Line<T>,
 }
 
-impl<T: Real, const CAP: usize> Default for ReversalMemory<T, CAP> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     const FITS: () = assert!(CAP >= 4, "a reversal memory needs room for a loop within a loop");
-
-    /// Negative saturation: drive 0, displacement 0.
-    #[must_use]
-    pub const fn new() -> Self {
-        let () = Self::FITS;
-        Self {
-            extrema: [T::ZERO; CAP],
-            displacements: [T::ZERO; CAP],
-            len: 1,
-            drive: T::ZERO,
-            displacement: T::ZERO,
-            dropped: 0,
-        }
-    }
 
     /// Risen from negative saturation to `drive` (cells, 0..=N), where the model gives `displacement` = E(`drive`, 0), m.
     #[must_use]
@@ -110,6 +103,13 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     #[must_use]
     pub fn dropped(&self) -> u32 {
         self.dropped
+    }
+
+    /// The highest drive in memory, cells.
+    #[must_use]
+    pub fn highest(&self) -> T {
+        // Maxima fall, and the drive is below the last of them.
+        if self.len >= 2 { self.extremum(1) } else { self.drive }
     }
 
     /// Γ: applies `drive` (cells, held within 0..=N) and returns the displacement, m.

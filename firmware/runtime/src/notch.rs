@@ -31,25 +31,14 @@ pub struct Notch<T> {
     pub modes_to_pose: [[T; 6]; 6],
 }
 
-/// What the six sections remember. Zero at reset.
-#[derive(Debug, Clone, Copy)]
-pub struct NotchState<T> {
-    delays: [[T; 2]; 6],
-}
-
-impl<T: Real> Default for NotchState<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// What the six sections remember. Zero at reset.
+    pub struct NotchState<T>[T: Real] {
+        delays: [[T; 2]; 6] = [[T::ZERO; 2]; 6], rows(words.sizes().request);
     }
 }
 
 impl<T: Real> NotchState<T> {
-    /// At rest at zero.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { delays: [[T::ZERO; 2]; 6] }
-    }
-
     /// One tick of a signal in modal coordinates.
     #[inline]
     #[must_use]
@@ -64,13 +53,5 @@ impl<T: Real> NotchState<T> {
             *second = -driven - section.a[1] * resonant;
         }
         filtered
-    }
-}
-
-crate::state! {
-    impl[T: Real] NotchState<T>, 12, |words| { delays } {
-        for section in delays {
-            words.numbers(section, words.sizes().request)?;
-        }
     }
 }

@@ -2,6 +2,8 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
+use crate::snapshot::Field;
+
 /// `f32` or `f64`: what the kernels need of a floating-point number, and no more.
 ///
 /// Every operation is an IEEE 754 basic operation or a comparison, so that the same inputs give the same bits on
@@ -15,6 +17,7 @@ pub trait Real:
     + Mul<Output = Self>
     + Div<Output = Self>
     + Neg<Output = Self>
+    + Field
     + 'static
 {
     /// 0.

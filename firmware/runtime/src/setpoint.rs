@@ -66,7 +66,7 @@ impl CommandKind {
 
 /// A command; it holds for as long as it is given.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Command<T> {
+pub struct Command<T: Real> {
     /// What.
     pub kind: CommandKind,
     /// Index of the trajectory.

@@ -9,6 +9,10 @@ use core::convert::Infallible;
 use crate::digest::Digest;
 use crate::real::Real;
 
+mod walk;
+
+pub use walk::Words;
+
 /// Largest |place| that is loaded, m and rad: poses, set-points, displacements.
 pub const LARGEST_PLACE: f64 = 16.0;
 /// Largest |rate|, |acceleration| or |force| that is loaded, in SI units.
@@ -26,11 +30,31 @@ pub struct Sizes {
     pub stiffness: f64,
 }
 
-/// Something that later ticks depend on. [`state!`](crate::state) writes both methods from one walk over the fields.
-pub trait Snapshot {
-    /// Words that [`Snapshot::save`] writes.
+/// What a state is made of: numbers, flags, choices, arrays of them, and other states.
+pub trait Field {
+    /// Words that it takes.
     const WORDS: usize;
+}
 
+macro_rules! one_word {
+    ($($type:ty),+) => {
+        $(impl Field for $type {
+            const WORDS: usize = 1;
+        })+
+    };
+}
+one_word!(f64, f32, usize, i32, u32, bool);
+
+impl<C: Choice> Field for C {
+    const WORDS: usize = 1;
+}
+
+impl<F: Field, const N: usize> Field for [F; N] {
+    const WORDS: usize = N * F::WORDS;
+}
+
+/// Something that later ticks depend on. [`state!`](crate::state) declares it: its fields, what they are at reset, and the walk over them.
+pub trait Snapshot: Field {
     /// Shows every word in order.
     ///
     /// # Errors
@@ -57,269 +81,12 @@ pub trait Snapshot {
     }
 }
 
-/// Implements [`Snapshot`] for a type: its number of words, all of its fields, and one walk over them. The walk calls the methods of
-/// [`Words`], which [`Reader`] has under the same names; in it a field is a reference, to be shown or to be restored.
-#[macro_export]
-macro_rules! state {
-    (impl[$($generics:tt)*] $type:ty, $count:expr, |$words:ident| { $($field:ident),+ $(,)? } $walk:block) => {
-        impl<$($generics)*> $crate::Snapshot for $type {
-            const WORDS: usize = $count;
-
-            fn show(&self, $words: &mut impl $crate::snapshot::Words) -> Result<(), ::core::convert::Infallible> {
-                // By name and all of them, so that a field that is added is not forgotten.
-                let Self { $($field),+ } = self;
-                $walk
-                Ok(())
-            }
-
-            fn restore(
-                &mut self,
-                $words: &mut $crate::snapshot::Reader<'_>,
-            ) -> Result<(), $crate::snapshot::Invalid> {
-                let Self { $($field),+ } = self;
-                $walk
-                Ok(())
-            }
-        }
-    };
-}
-
 /// A choice that is one word.
 pub trait Choice: Sized {
     /// Its word.
     fn to_word(&self) -> u64;
     /// The inverse; none of a word that is no choice.
     fn of_word(word: u64) -> Option<Self>;
-}
-
-/// What a state is shown to, word by word: a writer or a digest. No method fails; they return what the methods of [`Reader`] do, so
-/// that a walk does for both.
-pub trait Words: Sized {
-    /// A word.
-    fn put(&mut self, word: u64);
-
-    /// No matter: what is shown has its size.
-    #[inline]
-    fn sizes(&self) -> Sizes {
-        Sizes { request: LARGEST, reading: LARGEST, stiffness: LARGEST }
-    }
-
-    /// A number within ±`largest`.
-    #[inline]
-    fn number<T: Real>(&mut self, value: &T, _largest: f64) -> Result<(), Infallible> {
-        self.put(value.to_word());
-        Ok(())
-    }
-
-    /// Numbers within ±`largest`.
-    #[inline]
-    fn numbers<T: Real>(&mut self, values: &[T], _largest: f64) -> Result<(), Infallible> {
-        self.stored(values, values.len(), LARGEST)
-    }
-
-    /// Numbers within ±`largest`, of which the first `count` are stored; the others are zeros, which a digest leaves out.
-    #[inline]
-    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
-        for value in values.iter().take(count) {
-            self.put(value.to_word());
-        }
-        Ok(())
-    }
-
-    /// A number of ticks or the like, from 0 to `largest`.
-    #[inline]
-    fn ticks(&mut self, value: &i32, _largest: i32) -> Result<(), Infallible> {
-        self.put(u64::from(*value as u32));
-        Ok(())
-    }
-
-    /// A place from 0 to `largest`.
-    #[inline]
-    fn place(&mut self, value: &usize, _largest: usize) -> Result<(), Infallible> {
-        self.put(*value as u64);
-        Ok(())
-    }
-
-    /// A counter.
-    #[inline]
-    fn tally(&mut self, value: &u32) -> Result<(), Infallible> {
-        self.put(u64::from(*value));
-        Ok(())
-    }
-
-    /// A flag.
-    #[inline]
-    fn set(&mut self, value: &bool) -> Result<(), Infallible> {
-        self.put(u64::from(*value));
-        Ok(())
-    }
-
-    /// A choice.
-    #[inline]
-    fn choice(&mut self, value: &impl Choice) -> Result<(), Infallible> {
-        self.put(value.to_word());
-        Ok(())
-    }
-
-    /// A counter that this state has none of.
-    #[inline]
-    fn blank(&mut self) -> Result<(), Infallible> {
-        self.put(0);
-        Ok(())
-    }
-
-    /// A state within this one.
-    #[inline]
-    fn part(&mut self, part: &impl Snapshot) -> Result<(), Infallible> {
-        part.show(self)
-    }
-
-    /// Whether what was restored so far fits together.
-    #[inline]
-    fn check(&self, _fits: impl FnOnce() -> bool) -> Result<(), Infallible> {
-        Ok(())
-    }
-}
-
-impl Words for Digest {
-    #[inline]
-    fn put(&mut self, word: u64) {
-        self.word(word);
-    }
-
-    // A loop of its own: written out for every array of a state it would take kilobytes of flash.
-    #[inline(never)]
-    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
-        for value in values.iter().take(count) {
-            self.word(value.to_word());
-        }
-        Ok(())
-    }
-}
-
-impl Words for Writer<'_> {
-    #[inline]
-    fn put(&mut self, word: u64) {
-        self.word(word);
-    }
-
-    #[inline]
-    fn numbers<T: Real>(&mut self, values: &[T], _largest: f64) -> Result<(), Infallible> {
-        self.reals(values);
-        Ok(())
-    }
-
-    #[inline]
-    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
-        self.first_reals(values, count);
-        Ok(())
-    }
-}
-
-/// The methods of [`Words`], for a state that is restored.
-impl Reader<'_> {
-    /// [`Words::number`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    #[inline]
-    pub fn number<T: Real>(&mut self, value: &mut T, largest: f64) -> Result<(), Invalid> {
-        *value = self.real(largest)?;
-        Ok(())
-    }
-
-    /// [`Words::numbers`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    pub fn numbers<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), Invalid> {
-        self.reals(values, largest)
-    }
-
-    /// [`Words::stored`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    pub fn stored<T: Real>(&mut self, values: &mut [T], _count: usize, largest: f64) -> Result<(), Invalid> {
-        self.reals(values, largest)
-    }
-
-    /// [`Words::ticks`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    #[inline]
-    pub fn ticks(&mut self, value: &mut i32, largest: i32) -> Result<(), Invalid> {
-        *value = self.count_to(largest)?;
-        Ok(())
-    }
-
-    /// [`Words::place`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    #[inline]
-    pub fn place(&mut self, value: &mut usize, largest: usize) -> Result<(), Invalid> {
-        *value = self.word(largest as u64)? as usize;
-        Ok(())
-    }
-
-    /// [`Words::tally`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    #[inline]
-    pub fn tally(&mut self, value: &mut u32) -> Result<(), Invalid> {
-        *value = self.counter()?;
-        Ok(())
-    }
-
-    /// [`Words::set`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    #[inline]
-    pub fn set(&mut self, value: &mut bool) -> Result<(), Invalid> {
-        *value = self.flag()?;
-        Ok(())
-    }
-
-    /// [`Words::choice`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    #[inline]
-    pub fn choice<C: Choice>(&mut self, value: &mut C) -> Result<(), Invalid> {
-        *value = C::of_word(self.word(u64::MAX)?).ok_or(self.refused())?;
-        Ok(())
-    }
-
-    /// [`Words::blank`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    #[inline]
-    pub fn blank(&mut self) -> Result<(), Invalid> {
-        self.counter().map(|_| ())
-    }
-
-    /// [`Words::part`], restored.
-    ///
-    /// # Errors
-    /// No state holds the word.
-    #[inline]
-    pub fn part(&mut self, part: &mut impl Snapshot) -> Result<(), Invalid> {
-        part.restore(self)
-    }
-
-    /// [`Words::check`], restored.
-    ///
-    /// # Errors
-    /// It does not.
-    #[inline]
-    pub fn check(&self, fits: impl FnOnce() -> bool) -> Result<(), Invalid> {
-        if fits() { Ok(()) } else { Err(self.refused()) }
-    }
 }
 
 /// A word that no state holds.

@@ -2,28 +2,17 @@
 
 use crate::real::Real;
 
-/// An offset on each leg's request that fades exponentially, m. Zero at reset.
-#[derive(Debug, Clone, Copy)]
-pub struct Transfer<T> {
-    /// Offset of each leg, m.
-    offset: [T; 6],
-    /// Any of them is left.
-    active: bool,
-}
-
-impl<T: Real> Default for Transfer<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// An offset on each leg's request that fades exponentially, m. Zero at reset.
+    pub struct Transfer<T>[T: Real] {
+        /// Offset of each leg, m.
+        offset: [T; 6] = [T::ZERO; 6], numbers(words.sizes().request);
+        /// Any of them is left.
+        active: bool = false, set;
     }
 }
 
 impl<T: Real> Transfer<T> {
-    /// Nothing to fade.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { offset: [T::ZERO; 6], active: false }
-    }
-
     /// Begins to fade `offset` (m).
     #[inline]
     pub fn begin(&mut self, offset: [T; 6]) {
@@ -59,12 +48,5 @@ impl<T: Real> Transfer<T> {
             *offset = if left { faded } else { T::ZERO };
             self.active |= left;
         }
-    }
-}
-
-crate::state! {
-    impl[T: Real] Transfer<T>, 7, |words| { offset, active } {
-        words.numbers(offset, words.sizes().request)?;
-        words.set(active)?;
     }
 }

@@ -20,30 +20,19 @@ pub struct RateFilter<T> {
     pub gain: T,
 }
 
-/// Rates of six coordinates: what is remembered. Zero at reset.
-#[derive(Debug, Clone, Copy)]
-pub struct Rate<T> {
-    /// Last pose, m and rad.
-    previous: [T; 6],
-    /// Last rate, per s.
-    value: [T; 6],
-    /// There is a last pose to take a difference from.
-    primed: bool,
-}
-
-impl<T: Real> Default for Rate<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// Rates of six coordinates: what is remembered. At rest and without a last pose at reset.
+    pub struct Rate<T>[T: Real] {
+        /// Last pose, m and rad.
+        previous: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        /// Last rate, per s.
+        value: [T; 6] = [T::ZERO; 6], numbers(LARGEST);
+        /// There is a last pose to take a difference from.
+        primed: bool = false, set;
     }
 }
 
 impl<T: Real> Rate<T> {
-    /// At rest, without a last pose.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { previous: [T::ZERO; 6], value: [T::ZERO; 6], primed: false }
-    }
-
     /// The estimate, m/s and rad/s (rates of the three angles, not angular velocity).
     #[inline]
     #[must_use]
@@ -78,13 +67,5 @@ impl<T: Real> Rate<T> {
         if self.primed {
             *self = Self::new();
         }
-    }
-}
-
-crate::state! {
-    impl[T: Real] Rate<T>, 13, |words| { previous, value, primed } {
-        words.numbers(previous, LARGEST_PLACE)?;
-        words.numbers(value, LARGEST)?;
-        words.set(primed)?;
     }
 }

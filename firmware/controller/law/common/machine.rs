@@ -25,28 +25,17 @@ pub const MACHINE_OUTPUT_NAMES: [&str; MACHINE_OUTPUT_WORDS] = followed(&OUTPUT_
 /// State of the supervisor in this controller's arithmetic.
 pub type Supervisor = supervisor::Supervisor<Real>;
 
-/// Everything that is remembered from tick to tick. No NaN or infinity is ever stored here.
-#[derive(Debug, Clone, Copy)]
-pub struct Machine {
-    /// State of the control law.
-    pub state: State,
-    /// Phase, cause and what the supervisor watches.
-    pub supervisor: Supervisor,
-}
-
-impl Default for Machine {
-    fn default() -> Self {
-        Self::new()
+specgen_runtime::state! { |words|
+    /// Everything that is remembered from tick to tick. No NaN or infinity is ever stored here. Reset: disarmed, and [`State::new`].
+    pub struct Machine {
+        /// State of the control law.
+        pub state: State = State::new(), part;
+        /// Phase, cause and what the supervisor watches.
+        pub supervisor: Supervisor = Supervisor::new(), part;
     }
 }
 
 impl Machine {
-    /// Reset: disarmed, and [`State::new`].
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { state: State::new(), supervisor: Supervisor::new() }
-    }
-
     /// Fingerprint of everything that later ticks depend on.
     #[must_use]
     pub fn digest(&self) -> u64 {

@@ -53,9 +53,7 @@ pub(crate) fn begin(config: &Config, state: &mut State, supervisor: &mut Supervi
         let adapts = config.law() != Law::Invhys && gauge_is_accepted(*reading);
         *demand = if adapts { *reading } else { modelled };
         leg.estimate = Estimate { level: *demand - modelled, drift: 0.0 };
-        if LED {
-            leg.lead = 0.0;
-        }
+        leg.lead = [0.0; LED as usize];
     }
     supervisor.fresh = false;
     supervisor.approach.begin(match config.setpoint() {
@@ -107,10 +105,8 @@ pub(crate) fn stand(
     for (index, reading) in input.displacement.iter().enumerate() {
         faults |= (!gauge_is_accepted(*reading) as u32) << index;
     }
-    if LED {
-        for leg in &mut state.legs {
-            leg.lead = 0.0;
-        }
+    for leg in &mut state.legs {
+        leg.lead = [0.0; LED as usize];
     }
     if faults == 0 && compares(supervisor.phase) {
         let reading = component(&input.displacement, channel);

@@ -3,7 +3,7 @@
 //! At time t_n the interval that voltage u_n was held over has just ended and Y_n is read; the set-point is that of the
 //! END of the interval that begins now, T_{n+1}, and the voltages that come out are held over it.
 
-use crate::hysteresis::{LEAD, LEAD_LIMIT, LED, TABLES, Table};
+use crate::hysteresis::{LEAD, LEAD_LIMIT, TABLES, Table};
 use crate::limits::DAC;
 use crate::sensing::{gauge_is_accepted, leg_setpoint_is_accepted};
 use crate::tick::SETPOINT_FAULT;
@@ -30,8 +30,8 @@ pub(crate) fn advance(config: &Config, state: &mut State, input: &TickInput) -> 
         if config.law() == Law::Invhys || (run_ends && gauge_good) {
             adapt(config, leg, gauge);
         }
-        if LED {
-            leg.lead = saturate((state.demand[index] - demand_before[index]) * LEAD, -LEAD_LIMIT, LEAD_LIMIT);
+        for lead in &mut leg.lead {
+            *lead = saturate((state.demand[index] - demand_before[index]) * LEAD, -LEAD_LIMIT, LEAD_LIMIT);
         }
         let limited = actuate(config, leg, table, state.demand[index]);
         status |= (limited as u32) << index
@@ -84,7 +84,10 @@ fn count_run(config: &Config, state: &mut State) -> bool {
 /// ρ̂X, m: what the leg is to show. The lead is no part of it: the leg is asked for it so that it arrives in time.
 #[inline]
 fn shown(leg: &LegState) -> Real {
-    if LED { leg.memory.displacement() - leg.lead } else { leg.memory.displacement() }
+    match leg.lead.first() {
+        Some(lead) => leg.memory.displacement() - *lead,
+        None => leg.memory.displacement(),
+    }
 }
 
 /// m = Y − ρ̂X, then (AII.3) or (AII.5), (AII.6).
@@ -98,7 +101,10 @@ fn adapt(config: &Config, leg: &mut LegState, gauge: Real) {
 /// limit of table, voltage or slew rate held the leg back.
 #[inline]
 pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, demand: Real) -> bool {
-    let led = if LED { demand + leg.lead } else { demand };
+    let led = match leg.lead.first() {
+        Some(lead) => demand + *lead,
+        None => demand,
+    };
     let request = led - leg.estimate.correction();
     let out_of_reach = !leg.memory.reaches(table, request);
     let drive = leg.memory.solve(table, request);

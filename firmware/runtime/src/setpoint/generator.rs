@@ -23,9 +23,10 @@
 
 use super::profile::Profile;
 use super::stop::Stop;
-use super::trajectory::Cursor;
+use super::trajectory::{Cursor, MOST};
 use super::{Command, CommandKind, Frames, Setpoints, Target};
 use crate::real::{Real, saturate};
+use crate::snapshot::{LARGEST, LARGEST_PLACE};
 
 mod snapshot;
 
@@ -48,58 +49,32 @@ enum Phase {
     Stop,
 }
 
-/// Set-points of one platform.
-#[derive(Debug, Clone, Copy)]
-pub struct Generator<T> {
-    phase: Phase,
-    /// Where it is in the user's frames, and how it moves; where the bias leads, until it is reached.
-    place: [T; 6],
-    rate: [T; 6],
-    /// What was given out last.
-    target: Target<T>,
-    /// Straight motion under way: start, end, end − start, course, tick.
-    start: [T; 6],
-    goal: [T; 6],
-    way: [T; 6],
-    profile: Profile<T>,
-    tick: i32,
-    stop: Stop<T>,
-    cursor: Cursor,
-    /// Trajectory that was played to its end under the present command.
-    finished: Option<u32>,
-    /// Last counter of the stream, and ticks without a believed set-point under the command to stream.
-    sequence: u32,
-    age: u32,
-}
-
-impl<T: Real> Default for Generator<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// Set-points of one platform. At reset at rest, bias not yet approached.
+    pub struct Generator<T>[T: Real] {
+        phase: Phase = Phase::Reset, part;
+        /// Where it is in the user's frames, and how it moves; where the bias leads, until it is reached.
+        place: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        rate: [T; 6] = [T::ZERO; 6], numbers(LARGEST);
+        /// Straight motion under way: start, end, end − start; its course and tick below.
+        start: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        goal: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        way: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        /// What was given out last.
+        target: Target<T> = Target::new(), part;
+        profile: Profile<T> = Profile::new(), part;
+        tick: i32 = 0, ticks(MOST);
+        stop: Stop<T> = Stop::new(), part;
+        cursor: Cursor = Cursor::new(), part;
+        /// Trajectory that was played to its end under the present command.
+        finished: Option<u32> = None, choice;
+        /// Last counter of the stream, and ticks without a believed set-point under the command to stream.
+        sequence: u32 = 0, tally;
+        age: u32 = 0, tally;
     }
 }
 
 impl<T: Real> Generator<T> {
-    /// At rest, bias not yet approached.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            phase: Phase::Reset,
-            place: [T::ZERO; 6],
-            rate: [T::ZERO; 6],
-            target: Target::new(),
-            start: [T::ZERO; 6],
-            goal: [T::ZERO; 6],
-            way: [T::ZERO; 6],
-            profile: Profile::new(),
-            tick: 0,
-            stop: Stop::new(),
-            cursor: Cursor::new(),
-            finished: None,
-            sequence: 0,
-            age: 0,
-        }
-    }
-
     /// At rest at a pose of the platform (finite, brought within the workspace); the bias is approached from there.
     #[must_use]
     pub fn starting_at<F>(setpoints: &Setpoints<T, F>, pose: &[T; 6]) -> Self {

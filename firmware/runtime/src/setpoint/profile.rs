@@ -29,21 +29,23 @@ pub struct MoveLimits<T> {
     pub jerk: [T; 6],
 }
 
-/// A course from 0 to 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Profile<T> {
-    /// n.
-    jerk_ticks: i32,
-    /// m.
-    rise_ticks: i32,
-    /// L + m + n.
-    ticks: i32,
-    /// j, per tick³.
-    jerk: T,
-    /// Peak acceleration, per tick².
-    acceleration: T,
-    /// Peak speed, per tick.
-    speed: T,
+crate::state! { |words|
+    /// A course from 0 to 1. No way to go at reset.
+    #[derive(PartialEq)]
+    pub struct Profile<T>[T: Real] {
+        /// n.
+        jerk_ticks: i32 = 0, ticks(LONGEST);
+        /// m.
+        rise_ticks: i32 = 0, ticks(LONGEST);
+        /// L + m + n.
+        ticks: i32 = 0, ticks(3 * LONGEST);
+        /// j, per tick³. It and what follows are shares of the way, per tick at the least.
+        jerk: T = T::ZERO, number(1.0);
+        /// Peak acceleration, per tick².
+        acceleration: T = T::ZERO, number(1.0);
+        /// Peak speed, per tick.
+        speed: T = T::ZERO, number(1.0);
+    }
 }
 
 /// Progress at a tick: s, ṡ per tick, s̈ per tick².
@@ -77,19 +79,7 @@ pub(super) fn least<T: Real>(enough: impl Fn(T) -> bool) -> Option<i32> {
     (too_few < LONGEST).then_some(too_few + 1)
 }
 
-impl<T: Real> Default for Profile<T> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl<T: Real> Profile<T> {
-    /// No way to go.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { jerk_ticks: 0, rise_ticks: 0, ticks: 0, jerk: T::ZERO, acceleration: T::ZERO, speed: T::ZERO }
-    }
-
     /// The course for a way of `delta` (m and rad, finite); none if it would take longer than [`LONGEST`].
     #[must_use]
     pub fn plan(delta: &[T; 6], limits: &MoveLimits<T>) -> Option<Self> {
@@ -163,18 +153,6 @@ impl<T: Real> Profile<T> {
         } else {
             let t = T::from_i32(tick) - T::from_i32(both) * T::HALF;
             Progress { place: self.speed * t, rate: self.speed, acceleration: T::ZERO }
-        }
-    }
-}
-
-crate::state! {
-    impl[T: Real] Profile<T>, 6, |words| { jerk_ticks, rise_ticks, ticks, jerk, acceleration, speed } {
-        words.ticks(jerk_ticks, LONGEST)?;
-        words.ticks(rise_ticks, LONGEST)?;
-        words.ticks(ticks, 3 * LONGEST)?;
-        // Shares of the way, per tick at the least.
-        for share in [jerk, acceleration, speed] {
-            words.number(share, 1.0)?;
         }
     }
 }

@@ -38,32 +38,22 @@ impl<T: Real> StopLimits<T> {
     }
 }
 
-/// A stop under way.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stop<T> {
-    /// Where it began, in the user's frames, m and rad.
-    start: [T; 6],
-    /// Rate there, m and rad per tick.
-    rate: [T; 6],
-    /// D.
-    ticks: i32,
-    /// k.
-    tick: i32,
-}
-
-impl<T: Real> Default for Stop<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// A stop under way. Nothing to stop at reset.
+    #[derive(PartialEq)]
+    pub struct Stop<T>[T: Real] {
+        /// Where it began, in the user's frames, m and rad.
+        start: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        /// Rate there, m and rad per tick.
+        rate: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
+        /// D.
+        ticks: i32 = 1, ticks(LONGEST) if *ticks != 0;
+        /// k.
+        tick: i32 = 0, ticks(LONGEST);
     }
 }
 
 impl<T: Real> Stop<T> {
-    /// Nothing to stop.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { start: [T::ZERO; 6], rate: [T::ZERO; 6], ticks: 1, tick: 0 }
-    }
-
     /// The stop from `pose` (m, rad) at `rate` (per s), in the user's frames.
     #[must_use]
     pub fn plan<F: Frames<T>>(setpoints: &Setpoints<T, F>, pose: &[T; 6], rate: &[T; 6]) -> Self {
@@ -113,15 +103,5 @@ impl<T: Real> Stop<T> {
             target.acceleration[axis] = v * acceleration;
         }
         (target, false)
-    }
-}
-
-crate::state! {
-    impl[T: Real] Stop<T>, 14, |words| { start, rate, ticks, tick } {
-        words.numbers(start, LARGEST_PLACE)?;
-        words.numbers(rate, LARGEST_PLACE)?;
-        words.ticks(ticks, LONGEST)?;
-        words.check(|| *ticks != 0)?;
-        words.ticks(tick, LONGEST)?;
     }
 }

@@ -5,6 +5,9 @@ use crate::crc::Crc32;
 use crate::real::Real;
 use crate::trig::sine_cosine_turns;
 
+/// Most ticks that a count may hold, so that none overflows for a day.
+pub(super) const MOST: i32 = 1 << 30;
+
 /// A prepared motion, in the user's frames.
 #[derive(Debug, Clone, Copy)]
 pub enum Trajectory<T: Real> {
@@ -109,18 +112,14 @@ pub struct Row<T> {
     pub bend: [T; 6],
 }
 
-/// Place within a trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Cursor {
-    /// Segment or row.
-    pub part: usize,
-    /// Ticks since the start (segments) or since the row.
-    pub tick: i32,
-}
-
-impl Cursor {
-    pub const fn new() -> Self {
-        Self { part: 0, tick: 0 }
+crate::state! { |words|
+    /// Place within a trajectory.
+    #[derive(PartialEq, Eq)]
+    pub(super) struct Cursor {
+        /// Segment or row.
+        pub part: usize = 0, place(MOST as usize);
+        /// Ticks since the start (segments) or since the row.
+        pub tick: i32 = 0, ticks(MOST);
     }
 }
 

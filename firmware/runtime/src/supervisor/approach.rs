@@ -12,27 +12,17 @@ enum Stage {
     Fading,
 }
 
-/// An offset on the set-point that fades: at first it is where the legs are, in the end where they are asked for.
-#[derive(Debug, Clone, Copy)]
-pub struct Approach<T> {
-    stage: Stage,
-    /// Where it starts, then what is left of the way; in the coordinates of the set-point.
-    offset: [T; 6],
-}
-
-impl<T: Real> Default for Approach<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// An offset on the set-point that fades: at first it is where the legs are, in the end where they are asked for. At reset
+    /// set-points go through as they are.
+    pub struct Approach<T>[T: Real] {
+        stage: Stage = Stage::Done, choice;
+        /// Where it starts, then what is left of the way; in the coordinates of the set-point.
+        offset: [T; 6] = [T::ZERO; 6], numbers(LARGEST_PLACE);
     }
 }
 
 impl<T: Real> Approach<T> {
-    /// Set-points as they are.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { stage: Stage::Done, offset: [T::ZERO; 6] }
-    }
-
     /// Begins where the legs are (finite).
     #[inline]
     pub fn begin(&mut self, from: [T; 6]) {
@@ -91,12 +81,5 @@ impl Choice for Stage {
 
     fn of_word(word: u64) -> Option<Self> {
         [Self::Done, Self::Waiting, Self::Fading].into_iter().find(|stage| stage.to_word() == word)
-    }
-}
-
-crate::state! {
-    impl[T: Real] Approach<T>, 7, |words| { stage, offset } {
-        words.choice(stage)?;
-        words.numbers(offset, LARGEST_PLACE)?;
     }
 }

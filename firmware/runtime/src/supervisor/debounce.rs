@@ -15,26 +15,16 @@ const fn condition(cause: Cause) -> u32 {
     }
 }
 
-/// Leaky counts: a condition that comes and goes counts, too, if it is there more often than not.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Debounce {
-    /// Of each of [`TIMED`].
-    pub counts: [u32; TIMERS],
-}
-
-impl Default for Debounce {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// Leaky counts: a condition that comes and goes counts, too, if it is there more often than not.
+    #[derive(PartialEq, Eq)]
+    pub struct Debounce {
+        /// Of each of [`TIMED`].
+        pub counts: [u32; TIMERS] = [0; TIMERS], tallies;
     }
 }
 
 impl Debounce {
-    /// Nothing counted.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self { counts: [0; TIMERS] }
-    }
-
     /// Counts the conditions that are `present` (bits of causes) and returns the causes that have lasted.
     ///
     /// Mostly nothing is, and nothing was: `busy` is what the last call left there, any count above zero.

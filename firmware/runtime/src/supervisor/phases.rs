@@ -13,61 +13,37 @@ const EVENTS: u32 = 0x1f;
 /// Conditions name the gauges or legs that they are about from this bit on.
 const FIRST_CHANNEL: u32 = 16;
 
-/// State of the supervisor.
-#[derive(Debug, Clone, Copy)]
-pub struct Supervisor<T> {
-    /// What the machine is doing.
-    pub phase: Phase,
-    /// Why, if it was forced upon it.
-    pub cause: Cause,
-    /// The request of the last tick.
-    pub request: Request,
-    /// Armed since it last ran: the law begins anew.
-    pub fresh: bool,
-    /// A request to arm that began to be given and could not be followed yet.
-    pub wants_arming: bool,
-    /// What the last tick showed of gauges and limits: bits of causes, and of channels.
-    pub seen: u32,
-    /// Conditions of the present tick: bits of causes, and from bit 16 on the gauges or legs that they are about.
-    pub conditions: u32,
-    /// How long conditions have lasted.
-    pub debounce: Debounce,
-    /// Some of them are being counted.
-    pub busy: bool,
-    /// Ticks without a condition while arming; ticks of a ramp.
-    pub ticks: u32,
-    /// What the gauges show against what was sent.
-    pub watch: Watch<T>,
-    /// Way to the set-point that is asked for, where the law has no generator.
-    pub approach: Approach<T>,
-}
-
-impl<T: Real> Default for Supervisor<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// State of the supervisor. Disarmed at reset, nothing seen.
+    pub struct Supervisor<T>[T: Real] {
+        /// What the machine is doing.
+        pub phase: Phase = Phase::Disarmed, choice;
+        /// Why, if it was forced upon it.
+        pub cause: Cause = Cause::None, choice;
+        /// The request of the last tick.
+        pub request: Request = Request::None, choice;
+        /// Armed since it last ran: the law begins anew.
+        pub fresh: bool = true, set;
+        /// A request to arm that began to be given and could not be followed yet.
+        pub wants_arming: bool = false, set;
+        /// Some conditions are being counted.
+        pub busy: bool = false, set;
+        /// What the last tick showed of gauges and limits: bits of causes, and of channels.
+        pub seen: u32 = 0, tally;
+        /// Conditions of the present tick: bits of causes, and from bit 16 on the gauges or legs that they are about.
+        pub conditions: u32 = 0, tally;
+        /// Ticks without a condition while arming; ticks of a ramp.
+        pub ticks: u32 = 0, tally;
+        /// How long conditions have lasted.
+        pub debounce: Debounce = Debounce::new(), part;
+        /// What the gauges show against what was sent.
+        pub watch: Watch<T> = Watch::new(), part;
+        /// Way to the set-point that is asked for, where the law has no generator.
+        pub approach: Approach<T> = Approach::new(), part;
     }
 }
 
 impl<T: Real> Supervisor<T> {
-    /// Reset: disarmed, nothing seen.
-    #[must_use]
-    pub const fn new() -> Self {
-        Self {
-            phase: Phase::Disarmed,
-            cause: Cause::None,
-            request: Request::None,
-            fresh: true,
-            wants_arming: false,
-            seen: 0,
-            conditions: 0,
-            debounce: Debounce::new(),
-            busy: false,
-            ticks: 0,
-            watch: Watch::new(),
-            approach: Approach::new(),
-        }
-    }
-
     /// Brings the machine into the phase of the coming interval; returns whether it begins to run with it.
     ///
     /// `events` are what the target noticed since the last tick, `at_rest` whether every code is at rest (not asked while

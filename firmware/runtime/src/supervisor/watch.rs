@@ -18,53 +18,42 @@ pub struct Sample<T> {
     pub error: Option<T>,
 }
 
-/// What is remembered of one gauge and one axis.
-#[derive(Debug, Clone, Copy)]
-pub struct Channel<T> {
-    /// Last word of the gauge.
-    pub word: T,
-    /// There is one.
-    pub known: bool,
-    /// Least and most that was expected since that word came, m.
-    pub expected: [T; 2],
-    /// Samples since these lie apart by more than the gauge could have missed.
-    pub stuck: u32,
-    /// Samples, less those without, in which reading and model disagreed.
-    pub disagreed: u32,
-    /// Samples, less those without, in which the axis was too far from its set-point.
-    pub astray: u32,
+crate::state! { |words|
+    /// What is remembered of one gauge and one axis.
+    pub struct Channel<T>[T: Real] {
+        /// Last word of the gauge.
+        pub word: T = T::ZERO, number(words.sizes().reading);
+        /// There is one.
+        pub known: bool = false, set;
+        /// Least and most that was expected since that word came, m: displacement less the known load, which a gain may have made
+        /// large.
+        pub expected: [T; 2] = [T::ZERO; 2], numbers(words.sizes().request);
+        /// Samples since these lie apart by more than the gauge could have missed.
+        pub stuck: u32 = 0, tally;
+        /// Samples, less those without, in which reading and model disagreed.
+        pub disagreed: u32 = 0, tally;
+        /// Samples, less those without, in which the axis was too far from its set-point.
+        pub astray: u32 = 0, tally;
+    }
 }
 
-/// All of them, and whose turn it is.
-#[derive(Debug, Clone, Copy)]
-pub struct Watch<T> {
-    /// Channels 0 to 5.
-    pub channels: [Channel<T>; 6],
-    /// The next one to be looked at.
-    pub turn: usize,
-    /// Channels that are stuck, disagree, are astray: three sets of bits.
-    pub suspects: [u32; 3],
-    /// Their causes, present but not yet lasting.
-    pub present: u32,
-    /// Causes that have lasted, found in the last sample.
-    pub lasted: u32,
-}
-
-impl<T: Real> Default for Watch<T> {
-    fn default() -> Self {
-        Self::new()
+crate::state! { |words|
+    /// All of them, and whose turn it is.
+    pub struct Watch<T>[T: Real] {
+        /// Channels 0 to 5.
+        pub channels: [Channel<T>; 6] = [Channel::new(); 6], parts;
+        /// The next one to be looked at.
+        pub turn: usize = 0, place(6);
+        /// Channels that are stuck, disagree, are astray: three sets of bits.
+        pub suspects: [u32; 3] = [0; 3], tallies;
+        /// Their causes, present but not yet lasting.
+        pub present: u32 = 0, tally;
+        /// Causes that have lasted, found in the last sample.
+        pub lasted: u32 = 0, tally;
     }
 }
 
 impl<T: Real> Watch<T> {
-    /// Nothing seen.
-    #[must_use]
-    pub const fn new() -> Self {
-        let channel =
-            Channel { word: T::ZERO, known: false, expected: [T::ZERO; 2], stuck: 0, disagreed: 0, astray: 0 };
-        Self { channels: [channel; 6], turn: 0, suspects: [0; 3], present: 0, lasted: 0 }
-    }
-
     /// Forgets what was seen, but not whose turn it is.
     #[inline(never)]
     pub fn forgive(&mut self) {

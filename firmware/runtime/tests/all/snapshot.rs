@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 
 use specgen_runtime::setpoint::{Generator, LONGEST, Profile, Stop};
-use specgen_runtime::snapshot::{Invalid, LARGEST, LARGEST_PLACE, Reader, Sizes, Snapshot, Writer};
+use specgen_runtime::snapshot::{Field, Invalid, LARGEST, LARGEST_PLACE, Reader, Sizes, Snapshot, Writer};
 use specgen_runtime::supervisor::{Approach, Supervisor, TIMERS};
 use specgen_runtime::{
     CreepMemory, Digest, DynamicMemory, Estimate, Integral, Motion, NotchState, Rate, ReversalMemory, Transfer,

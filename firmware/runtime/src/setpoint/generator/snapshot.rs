@@ -1,47 +1,12 @@
-//! The state machine of set-points as words.
+//! The phase of the generator as words: its number, and the index of a trajectory.
 
-use super::{Generator, Phase};
-use crate::motion::Motion;
-use crate::real::Real;
-use crate::setpoint::profile::Profile;
-use crate::setpoint::stop::Stop;
-use crate::setpoint::trajectory::Cursor;
-use crate::snapshot::{Choice, LARGEST, LARGEST_PLACE};
+use core::convert::Infallible;
 
-/// Most ticks that a count may hold, so that none overflows for a day.
-const MOST: i32 = 1 << 30;
+use super::Phase;
+use crate::snapshot::{Field, Invalid, Reader, Snapshot, Words};
 
-crate::state! {
-    impl[T: Real] Generator<T>, 2 + 5 * 6 + Motion::<T>::WORDS + Profile::<T>::WORDS + 1 + Stop::<T>::WORDS + 2 + 3,
-    |words| {
-        phase, place, rate, target, start, goal, way, profile, tick, stop, cursor, finished, sequence, age
-    } {
-        words.choice(phase)?;
-        match phase {
-            Phase::Approach(index) | Phase::Play(index) => words.tally(index)?,
-            _ => words.blank()?,
-        }
-        words.numbers(place, LARGEST_PLACE)?;
-        words.numbers(rate, LARGEST)?;
-        for pose in [start, goal, way] {
-            words.numbers(pose, LARGEST_PLACE)?;
-        }
-        words.part(target)?;
-        words.part(profile)?;
-        words.ticks(tick, MOST)?;
-        words.part(stop)?;
-        let Cursor { part, tick } = cursor;
-        words.place(part, MOST as usize)?;
-        words.ticks(tick, MOST)?;
-        words.choice(finished)?;
-        words.tally(sequence)?;
-        words.tally(age)?;
-    }
-}
-
-/// The index of a trajectory is a word of its own.
-impl Choice for Phase {
-    fn to_word(&self) -> u64 {
+impl Phase {
+    fn number(self) -> u64 {
         match self {
             Self::Reset => 0,
             Self::Bias => 1,
@@ -53,8 +18,23 @@ impl Choice for Phase {
             Self::Stop => 7,
         }
     }
+}
 
-    fn of_word(word: u64) -> Option<Self> {
+impl Field for Phase {
+    const WORDS: usize = 2;
+}
+
+impl Snapshot for Phase {
+    fn show(&self, words: &mut impl Words) -> Result<(), Infallible> {
+        words.put(self.number());
+        match self {
+            Self::Approach(index) | Self::Play(index) => words.tally(index),
+            _ => words.blank(),
+        }
+    }
+
+    fn restore(&mut self, words: &mut Reader<'_>) -> Result<(), Invalid> {
+        let number = words.word(u64::MAX)?;
         let all = [
             Self::Reset,
             Self::Bias,
@@ -65,6 +45,10 @@ impl Choice for Phase {
             Self::Play(0),
             Self::Stop,
         ];
-        all.into_iter().find(|phase| phase.to_word() == word)
+        *self = all.into_iter().find(|phase| phase.number() == number).ok_or(words.refused())?;
+        match self {
+            Self::Approach(index) | Self::Play(index) => words.tally(index),
+            _ => words.blank(),
+        }
     }
 }

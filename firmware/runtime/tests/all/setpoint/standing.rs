@@ -3,7 +3,7 @@
 use specgen_runtime::setpoint::{
     BUSY, Command, CommandKind, Frames, Generator, LONGEST, MoveLimits, Parallel, Profile, Target, Tool,
 };
-use specgen_runtime::snapshot::{Reader, Snapshot, Writer};
+use specgen_runtime::snapshot::{Field, Reader, Snapshot, Writer};
 
 use super::support::*;
 use super::{Setpoints64, biased, plan64};

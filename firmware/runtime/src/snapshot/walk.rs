@@ -1,0 +1,354 @@
+//! The walk over a state: one list of its fields declares it, starts it, saves, restores and digests it.
+
+use core::convert::Infallible;
+
+use super::{Choice, Invalid, LARGEST, Reader, Sizes, Snapshot, Writer};
+use crate::digest::Digest;
+use crate::real::Real;
+
+/// Declares a state in one list. Each field has its type, its value at reset, and how its word or words are walked over: a method of
+/// [`Words`], which [`Reader`] has under the same name, with its bounds. Behind `if` stands what must hold of the fields restored so
+/// far, which are references there.
+///
+/// From it come the struct, `new`, and [`Snapshot`], whose words are in the order of the fields. The name between bars is what bounds
+/// call the walk, for [`Words::sizes`]. Generic parameters are named behind the state, and declared in brackets.
+#[macro_export]
+macro_rules! state {
+    (
+        |$words:ident|
+        $(#[$about:meta])*
+        $visible:vis struct $name:ident $(<$($generic:ident),+>[$($declared:tt)+])? $(($($arg:ident: $of_arg:ty),+))? {
+            $(
+                $(#[$of_field:meta])*
+                $seen:vis $field:ident: $type:ty = $start:expr, $walk:ident $(($($bound:expr),+))? $(if $fits:expr)?;
+            )+
+        }
+    ) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy)]
+        $visible struct $name $(<$($declared)+>)? {
+            $($(#[$of_field])* $seen $field: $type,)+
+        }
+
+        impl $(<$($declared)+>)? $name $(<$($generic),+>)? {
+            /// At reset.
+            #[must_use]
+            pub const fn new($($($arg: $of_arg),+)?) -> Self {
+                Self { $($field: $start),+ }
+            }
+        }
+
+        $crate::state!(@default [$($($declared)+)?] $name $(<$($generic),+>)? $(($($arg)+))?);
+
+        impl $(<$($declared)+>)? $crate::snapshot::Field for $name $(<$($generic),+>)? {
+            const WORDS: usize = 0 $(+ <$type as $crate::snapshot::Field>::WORDS)+;
+        }
+
+        impl $(<$($declared)+>)? $crate::Snapshot for $name $(<$($generic),+>)? {
+            fn show(&self, $words: &mut impl $crate::snapshot::Words) -> Result<(), ::core::convert::Infallible> {
+                let Self { $($field),+ } = self;
+                $(
+                    $words.$walk($field $($(, $bound)+)?)?;
+                    $($words.check(|| $fits)?;)?
+                )+
+                Ok(())
+            }
+
+            fn restore(
+                &mut self,
+                $words: &mut $crate::snapshot::Reader<'_>,
+            ) -> Result<(), $crate::snapshot::Invalid> {
+                let Self { $($field),+ } = self;
+                $(
+                    $words.$walk($field $($(, $bound)+)?)?;
+                    $($words.check(|| $fits)?;)?
+                )+
+                Ok(())
+            }
+        }
+    };
+    // What `new` makes of an argument has no default.
+    (@default [$($declared:tt)*] $name:ident $(<$($generic:ident),+>)? ($($arg:ident)+)) => {};
+    (@default [$($declared:tt)*] $type:ty) => {
+        impl<$($declared)*> Default for $type {
+            fn default() -> Self {
+                Self::new()
+            }
+        }
+    };
+}
+
+/// What a state is shown to, word by word: a writer or a digest. No method fails; they return what the methods of [`Reader`] do, so
+/// that a walk does for both.
+pub trait Words: Sized {
+    /// A word.
+    fn put(&mut self, word: u64);
+
+    /// No matter: what is shown has its size.
+    #[inline]
+    fn sizes(&self) -> Sizes {
+        Sizes { request: LARGEST, reading: LARGEST, stiffness: LARGEST }
+    }
+
+    /// A number within ±`largest`.
+    #[inline]
+    fn number<T: Real>(&mut self, value: &T, _largest: f64) -> Result<(), Infallible> {
+        self.put(value.to_word());
+        Ok(())
+    }
+
+    /// Numbers within ±`largest`.
+    #[inline]
+    fn numbers<T: Real>(&mut self, values: &[T], _largest: f64) -> Result<(), Infallible> {
+        self.stored(values, values.len(), LARGEST)
+    }
+
+    /// Rows of such numbers.
+    #[inline]
+    fn rows<T: Real, const N: usize>(&mut self, rows: &[[T; N]], largest: f64) -> Result<(), Infallible> {
+        rows.iter().try_for_each(|row| self.numbers(row, largest))
+    }
+
+    /// Numbers within ±`largest`, of which the first `count` are stored; the others are zeros, which a digest leaves out.
+    #[inline]
+    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
+        for value in values.iter().take(count) {
+            self.put(value.to_word());
+        }
+        Ok(())
+    }
+
+    /// A number of ticks or the like, from 0 to `largest`.
+    #[inline]
+    fn ticks(&mut self, value: &i32, _largest: i32) -> Result<(), Infallible> {
+        self.put(u64::from(*value as u32));
+        Ok(())
+    }
+
+    /// A place from 0 to `largest`.
+    #[inline]
+    fn place(&mut self, value: &usize, _largest: usize) -> Result<(), Infallible> {
+        self.put(*value as u64);
+        Ok(())
+    }
+
+    /// A counter.
+    #[inline]
+    fn tally(&mut self, value: &u32) -> Result<(), Infallible> {
+        self.put(u64::from(*value));
+        Ok(())
+    }
+
+    /// Counters.
+    #[inline]
+    fn tallies(&mut self, values: &[u32]) -> Result<(), Infallible> {
+        values.iter().try_for_each(|value| self.tally(value))
+    }
+
+    /// A flag.
+    #[inline]
+    fn set(&mut self, value: &bool) -> Result<(), Infallible> {
+        self.put(u64::from(*value));
+        Ok(())
+    }
+
+    /// A choice.
+    #[inline]
+    fn choice(&mut self, value: &impl Choice) -> Result<(), Infallible> {
+        self.put(value.to_word());
+        Ok(())
+    }
+
+    /// A counter that this state has none of.
+    #[inline]
+    fn blank(&mut self) -> Result<(), Infallible> {
+        self.put(0);
+        Ok(())
+    }
+
+    /// A state within this one.
+    #[inline]
+    fn part(&mut self, part: &impl Snapshot) -> Result<(), Infallible> {
+        part.show(self)
+    }
+
+    /// States within this one.
+    #[inline]
+    fn parts(&mut self, parts: &[impl Snapshot]) -> Result<(), Infallible> {
+        parts.iter().try_for_each(|part| self.part(part))
+    }
+
+    /// Whether what was restored so far fits together.
+    #[inline]
+    fn check(&self, _fits: impl FnOnce() -> bool) -> Result<(), Infallible> {
+        Ok(())
+    }
+}
+
+impl Words for Digest {
+    #[inline]
+    fn put(&mut self, word: u64) {
+        self.word(word);
+    }
+
+    // A loop of its own: written out for every array of a state it would take kilobytes of flash.
+    #[inline(never)]
+    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
+        for value in values.iter().take(count) {
+            self.word(value.to_word());
+        }
+        Ok(())
+    }
+}
+
+impl Words for Writer<'_> {
+    #[inline]
+    fn put(&mut self, word: u64) {
+        self.word(word);
+    }
+
+    #[inline]
+    fn numbers<T: Real>(&mut self, values: &[T], _largest: f64) -> Result<(), Infallible> {
+        self.reals(values);
+        Ok(())
+    }
+
+    #[inline]
+    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
+        self.first_reals(values, count);
+        Ok(())
+    }
+}
+
+/// The methods of [`Words`], for a state that is restored.
+impl Reader<'_> {
+    /// [`Words::number`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn number<T: Real>(&mut self, value: &mut T, largest: f64) -> Result<(), Invalid> {
+        *value = self.real(largest)?;
+        Ok(())
+    }
+
+    /// [`Words::numbers`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    pub fn numbers<T: Real>(&mut self, values: &mut [T], largest: f64) -> Result<(), Invalid> {
+        self.reals(values, largest)
+    }
+
+    /// [`Words::rows`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn rows<T: Real, const N: usize>(&mut self, rows: &mut [[T; N]], largest: f64) -> Result<(), Invalid> {
+        rows.iter_mut().try_for_each(|row| self.numbers(row, largest))
+    }
+
+    /// [`Words::stored`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    pub fn stored<T: Real>(&mut self, values: &mut [T], _count: usize, largest: f64) -> Result<(), Invalid> {
+        self.reals(values, largest)
+    }
+
+    /// [`Words::ticks`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn ticks(&mut self, value: &mut i32, largest: i32) -> Result<(), Invalid> {
+        *value = self.count_to(largest)?;
+        Ok(())
+    }
+
+    /// [`Words::place`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn place(&mut self, value: &mut usize, largest: usize) -> Result<(), Invalid> {
+        *value = self.word(largest as u64)? as usize;
+        Ok(())
+    }
+
+    /// [`Words::tally`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn tally(&mut self, value: &mut u32) -> Result<(), Invalid> {
+        *value = self.counter()?;
+        Ok(())
+    }
+
+    /// [`Words::tallies`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn tallies(&mut self, values: &mut [u32]) -> Result<(), Invalid> {
+        values.iter_mut().try_for_each(|value| self.tally(value))
+    }
+
+    /// [`Words::set`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn set(&mut self, value: &mut bool) -> Result<(), Invalid> {
+        *value = self.flag()?;
+        Ok(())
+    }
+
+    /// [`Words::choice`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn choice<C: Choice>(&mut self, value: &mut C) -> Result<(), Invalid> {
+        *value = C::of_word(self.word(u64::MAX)?).ok_or(self.refused())?;
+        Ok(())
+    }
+
+    /// [`Words::blank`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn blank(&mut self) -> Result<(), Invalid> {
+        self.counter().map(|_| ())
+    }
+
+    /// [`Words::part`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn part(&mut self, part: &mut impl Snapshot) -> Result<(), Invalid> {
+        part.restore(self)
+    }
+
+    /// [`Words::parts`], restored.
+    ///
+    /// # Errors
+    /// No state holds the word.
+    #[inline]
+    pub fn parts(&mut self, parts: &mut [impl Snapshot]) -> Result<(), Invalid> {
+        parts.iter_mut().try_for_each(|part| self.part(part))
+    }
+
+    /// [`Words::check`], restored.
+    ///
+    /// # Errors
+    /// It does not.
+    #[inline]
+    pub fn check(&self, fits: impl FnOnce() -> bool) -> Result<(), Invalid> {
+        if fits() { Ok(()) } else { Err(self.refused()) }
+    }
+}
