@@ -171,6 +171,6 @@ fn a_pose_is_sensed_only_where_gauges_see_the_platform() {
     let files = emit(&ir);
     // Codes of the legs' own gauges, and nothing that finds a pose.
     let legs = &files["src/sensing.rs"];
-    assert!(legs.contains("pub fn gauge_reading") && !legs.contains("pose"), "{legs}");
+    assert!(legs.contains("pub use crate::gauges::{CONVERTER, ") && !legs.contains("pose"), "{legs}");
     assert!(!workspace::ir_text(&ir).contains("task_space"));
 }

@@ -101,7 +101,7 @@ enum Command {
     Pil(pil::Arguments),
     /// Operate a machine over the link: arm, run, set-points, settings, waves, records; from a script or line by line.
     Operate(operate::Arguments),
-    /// Run a record of a target again on the host and compare every tick by bits; export it as CSV.
+    /// Run a recording of a target again on the host and compare every tick by bits; export it as CSV.
     Replay(replay::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),

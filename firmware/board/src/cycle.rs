@@ -1,6 +1,6 @@
 //! One control tick on real converters.
 
-use controller::sensing::gauge_reading;
+use controller::sensing;
 use controller::snapshot::recorder::Recorder;
 use controller::snapshot::{record_after, record_before};
 use controller::supervised::{
@@ -122,7 +122,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
             }
         }
         let readings = match self.gauges.read() {
-            Ok(codes) => codes.map(|code| gauge_reading(code >> Self::SPARE_BITS)),
+            Ok(codes) => codes.map(|code| sensing::CONVERTER.reading(code >> Self::SPARE_BITS)),
             Err(fault) => {
                 note(report, fault);
                 events |= CONVERTER;
@@ -207,7 +207,7 @@ fn take<'a>(
     readings: &[Real; CHANNELS],
     events: u32,
 ) -> &'a MachineInput {
-    slot.insert(MachineInput::measured(&orders.command, readings, orders.request, events))
+    slot.insert(MachineInput::measured(&orders.command, readings, &[Real::NAN; CHANNELS], orders.request, events))
 }
 
 /// What the recorder keeps from before a tick. In a frame of its own, as [`take`].

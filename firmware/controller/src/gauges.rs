@@ -80,7 +80,7 @@ pub const RATE: RateFilter<Real> = RateFilter {
     gain: 8504.31380777365,
 };
 
-/// Codes of the gauges' converters; from `sensor`.
+/// What the gauges' converters mean by a code of 0..2^bits, m; a code at either end is a gauge fault. From `sensor`.
 pub const CONVERTER: GaugeConverter<Real> = GaugeConverter {
     at_zero: -5.5e-5,
     per_code: 8.392333984375e-10,

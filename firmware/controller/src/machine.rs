@@ -87,8 +87,14 @@ impl MachineInput {
 
     /// Of what a target was asked for and what it measured, see [`TickInput::measured`].
     #[must_use]
-    pub fn measured(command: &[u64; COMMAND_WORDS], gauge: &[Real; 6], request: Request, events: u32) -> Self {
-        Self { tick: TickInput::measured(command, gauge), request, events }
+    pub fn measured(
+        command: &[u64; COMMAND_WORDS],
+        gauge: &[Real; 6],
+        wrench: &[Real; 6],
+        request: Request,
+        events: u32,
+    ) -> Self {
+        Self { tick: TickInput::measured(command, gauge, wrench), request, events }
     }
 }
 

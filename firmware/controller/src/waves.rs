@@ -8,9 +8,6 @@ use specgen_runtime::setpoint::CommandKind;
 use specgen_runtime::wave::Limits;
 use specgen_runtime::{Motion, Real as _, wave};
 
-/// Word of the command to stream.
-const STREAM: u64 = 1;
-
 /// Those of streams; from `control.setpoint` and `workspace`.
 #[must_use]
 pub fn limits(_config: &Config) -> Limits<Real> {
@@ -31,9 +28,17 @@ pub fn may_begin(status: u32, words: &[u64], _center: &[Real; 6], _limits: &Limi
 /// Writes the set-point into the command's words, as the `sequence`-th of a stream.
 pub fn write(motion: &Motion<Real>, sequence: u32, words: &mut [u64]) {
     let numbers = motion.pose.iter().chain(&motion.rate).chain(&motion.acceleration);
-    let all = [STREAM, 0, sequence as u64].into_iter().chain(numbers.map(|number| number.to_word()));
+    let all =
+        [CommandKind::Stream.word(), 0, sequence as u64].into_iter().chain(numbers.map(|number| number.to_word()));
     for (slot, word) in words.iter_mut().zip(all) {
         *slot = word;
+    }
+}
+
+/// Writes the command to stay where a wave has come to rest: to hold.
+pub fn rest(_center: &[Real; 6], words: &mut [u64]) {
+    if let Some(kind) = words.first_mut() {
+        *kind = CommandKind::Hold.word();
     }
 }
 

@@ -10,7 +10,6 @@ use specgen_runtime::wave::Settings;
 use crate::capture::{CAPACITY, Capture};
 use crate::handover::{Order, Row};
 use crate::operator::{Operator, Said};
-use crate::words::Places;
 
 /// Orders that may wait for room in the ring: the loop takes one a tick.
 const MOST_ORDERS: usize = 64;
@@ -27,7 +26,6 @@ pub struct Console {
     pub operator: Operator,
     pub capture: Capture,
     pub said: Option<Said>,
-    places: Places,
     /// Settings that are in force once all orders are taken.
     config: Config,
     /// Events that were not yet reported over the link.
@@ -41,24 +39,14 @@ pub struct Console {
 
 impl Console {
     /// At the start, with the settings of the run.
-    pub fn new(operator: Operator, capture: Capture, places: Places, config: Config) -> Self {
-        Self {
-            operator,
-            capture,
-            said: None,
-            places,
-            config,
-            events: 0,
-            orders: VecDeque::new(),
-            number: 0,
-            wave: None,
-        }
+    pub fn new(operator: Operator, capture: Capture, config: Config) -> Self {
+        Self { operator, capture, said: None, config, events: 0, orders: VecDeque::new(), number: 0, wave: None }
     }
 
     /// Takes what a tick gave.
     pub fn update(&mut self, row: &Row, said: Said) {
         self.said = Some(said);
-        self.events |= self.places.events(&row.input);
+        self.events |= row.input.events;
         self.capture.update(row.recorded, row.triggered);
         if !said.waving && self.wave.is_some_and(|number| said.orders.wrapping_sub(number).cast_signed() >= 0) {
             self.wave = None;
@@ -94,7 +82,7 @@ impl Console {
         let running = self.said.filter(|said| said.phase == controller::supervised::Phase::Running);
         let Some(said) = running.filter(|_| self.wave.is_none()) else { return Err(No::State) };
         Wave::new(limits).set(settings).map_err(|refused| refused.word().map_or(No::State, No::Word))?;
-        waves::may_begin(said.status, self.operator.words(), &settings.center, &limits).map_err(|_| No::State)?;
+        waves::may_begin(said.status, self.operator.command(), &settings.center, &limits).map_err(|_| No::State)?;
         // What is wanted when it is over goes first.
         self.operator.rest_at(&settings.center);
         self.wish();

@@ -8,18 +8,18 @@ mod setpoints;
 
 use core::sync::atomic::Ordering;
 
+use controller::sensing;
 use controller::snapshot::recorder;
 use controller::supervised::{
     CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, supervise,
 };
-use controller::{Config, LEGS};
+use controller::{Config, LEGS, Real};
 use specgen_rt::account::{Account, Stamps};
 use specgen_rt::clock::{self, Usage};
 use specgen_rt::{allocation, scheduling};
 
 use crate::devices::Device;
 use crate::handover::{Inner, Order, Row, Shared, Tape};
-use crate::words::Places;
 use keeper::Keeper;
 use setpoints::Setpoints;
 
@@ -47,7 +47,6 @@ pub struct Timing {
 pub struct Loop<'a, D> {
     pub device: &'a mut D,
     pub config: Config,
-    pub places: Places,
     /// Event bits that hold for the whole run, such as a failed integrity check.
     pub standing_events: u32,
     pub rings: Inner,
@@ -106,10 +105,11 @@ impl<D: Device> Loop<'_, D> {
             if broken {
                 events |= CONVERTER;
             }
-            let mut words = setpoints.next(phase, &self.config);
-            self.places.put_readings(&mut words, &codes, &self.device.wrench());
-            self.places.put_supervision(&mut words, setpoints.request(), events);
-            let output = supervise(&self.config, &mut machine, &MachineInput::from_words(&words));
+            let command = setpoints.next(phase, &self.config);
+            let (gauge, wrench) =
+                (codes.map(|code| sensing::CONVERTER.reading(code)), self.device.wrench().map(|value| value as Real));
+            let input = MachineInput::measured(&command, &gauge, &wrench, setpoints.request(), events);
+            let output = supervise(&self.config, &mut machine, &input);
             let computed = clock::now();
 
             let mut driven = Ok(());
@@ -132,7 +132,7 @@ impl<D: Device> Loop<'_, D> {
             keeper.keep(Row {
                 tick,
                 count,
-                input: words,
+                input,
                 output: row_of(&output),
                 digest,
                 late: account.late().iter().sum(),

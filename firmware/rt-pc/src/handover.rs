@@ -4,11 +4,12 @@ use core::sync::atomic::{AtomicBool, AtomicU64};
 
 use controller::snapshot::MACHINE_STATE_WORDS;
 use controller::snapshot::recorder::{self, Recorder};
+use controller::supervised::{MachineInput, Request};
 use controller::{Config, Real};
 use rtrb::{Consumer, Producer, RingBuffer};
 use specgen_runtime::wave;
 
-use crate::words::Words;
+use crate::words::Command;
 
 /// Rows between the threads: 0.8 s at 10 kHz.
 const ROWS: usize = 8192;
@@ -29,7 +30,7 @@ pub struct Row {
     pub tick: u64,
     /// Ticks that were run before it.
     pub count: u64,
-    pub input: Words,
+    pub input: MachineInput,
     pub output: recorder::Row,
     /// Digest of the machine after the tick; 0 where nothing records the run.
     pub digest: u64,
@@ -58,10 +59,8 @@ pub struct Snapshot {
 /// What the operator wants from the next tick on: the words that are his, and the request.
 #[derive(Debug, Clone, Copy)]
 pub struct Wish {
-    /// Input words; those that are measured are left out of account.
-    pub words: Words,
-    /// Number of the request.
-    pub request: u64,
+    pub command: Command,
+    pub request: Request,
 }
 
 /// Something for the loop to do between two ticks.

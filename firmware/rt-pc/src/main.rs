@@ -44,7 +44,6 @@ use operator::{Operator, Timeout};
 use options::{Asked, Options};
 use service::{Link, Service};
 use summary::Summary;
-use words::Places;
 
 /// Notices if the real-time thread allocates.
 #[global_allocator]
@@ -118,11 +117,10 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
         silence: options.link_silence.map_or(u64::from(HOST_TICKS), |silence| silence.div_ceil(period)),
         elastic: options.elastic,
     };
-    let places = Places::find().map_err(|error| environment(error.to_string()))?;
     // A host or a time ends it, not a fault.
     let attended = options.link.is_some() || options.duration.is_some();
     let timeout = Timeout { silence: timing.silence * period, idle: options.link_idle };
-    let mut operator = Operator::new(places.clone(), attended, timeout);
+    let mut operator = Operator::new(attended, timeout);
     if options.arm {
         operator.plan(&options.set, clock::now()).map_err(|error| usage(format!("--set: {error}")))?;
     }
@@ -141,7 +139,7 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     });
     let record = record.transpose()?;
     let (capture, tape) = Capture::new(options.capture.as_deref()).map_err(environment)?;
-    let console = Console::new(operator, capture, places.clone(), config);
+    let console = Console::new(operator, capture, config);
 
     let (inner, outer) = handover::rings(record.is_some());
     let shared = Shared::default();
@@ -153,7 +151,6 @@ fn run<D: Device + Send>(options: &Options, device: &mut D) -> Result<(), Failur
     let control = Loop {
         device,
         config,
-        places,
         standing_events: control::integrity_event(controller::integrity::intact()),
         rings: inner,
         tape: Some(tape),

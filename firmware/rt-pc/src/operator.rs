@@ -4,11 +4,12 @@
 //! goes on ordering; others may then only slow the machine down. An operator only asks: whether a request is granted is the
 //! supervisor's business, and each step here waits for its answer.
 
-use controller::supervised::{Cause, MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS, Phase, Request};
+use controller::supervised::{Cause, MACHINE_INPUT_NAMES, Phase, Request};
+use controller::{COMMAND_WORDS, Real, waves};
 use specgen_rt::clock::SECOND;
 
 use crate::handover::Wish;
-use crate::words::{Places, Words, place, word_of};
+use crate::words::{Command, place, word_of};
 
 /// How long a step of the plan may take before it is given up, ns.
 const STEP_LIMIT: u64 = 120 * SECOND;
@@ -86,8 +87,7 @@ enum Step {
 
 #[derive(Debug)]
 pub struct Operator {
-    places: Places,
-    words: Words,
+    command: Command,
     request: Request,
     step: Step,
     since: u64,
@@ -108,10 +108,9 @@ pub struct Operator {
 impl Operator {
     /// An operator without a plan. If the plan fails the loop goes on where it is `attended`, else it ends.
     #[must_use]
-    pub fn new(places: Places, attended: bool, timeout: Timeout) -> Self {
+    pub fn new(attended: bool, timeout: Timeout) -> Self {
         Self {
-            places,
-            words: [0; MACHINE_INPUT_WORDS],
+            command: [0; COMMAND_WORDS],
             request: Request::None,
             step: Step::Free,
             since: 0,
@@ -160,7 +159,7 @@ impl Operator {
             }
             (Step::Arming, Phase::Running) | (Step::Starting, Phase::Running) => {
                 for (place, word) in std::mem::take(&mut self.assignments) {
-                    self.words[place] = word;
+                    self.command[place] = word;
                 }
                 self.go(Step::Playing, Request::None, now);
             }
@@ -299,36 +298,26 @@ impl Operator {
 
     /// The words that are no measurements, in their order, from the link; false if `words` are not as many.
     pub fn set_by_link(&mut self, words: specgen_link::Bytes<'_>) -> bool {
-        let places: Vec<usize> = self.places.free().collect();
-        let Some(words) = words.words(places.len()) else { return false };
-        for (place, word) in places.into_iter().zip(words) {
-            self.words[place] = word;
-        }
-        self.changed = true;
-        true
+        let fits = words.read_words(&mut self.command);
+        self.changed |= fits;
+        fits
     }
 
-    /// How many words are no measurements.
+    /// The command as it is wanted.
     #[must_use]
-    pub fn free_words(&self) -> usize {
-        self.places.free().count()
-    }
-
-    /// The words as they are wanted.
-    #[must_use]
-    pub fn words(&self) -> &Words {
-        &self.words
+    pub fn command(&self) -> &Command {
+        &self.command
     }
 
     /// What is wanted once a wave about `center` has come to rest: to stay there.
-    pub fn rest_at(&mut self, center: &[controller::Real; 6]) {
-        self.places.rest_at(center, &mut self.words);
+    pub fn rest_at(&mut self, center: &[Real; 6]) {
+        waves::rest(center, &mut self.command);
         self.changed = true;
     }
 
     /// What is to be sent to the loop, if it changed since the last call.
     pub fn wish(&mut self) -> Option<Wish> {
-        std::mem::take(&mut self.changed).then(|| Wish { words: self.words, request: self.request.word() })
+        std::mem::take(&mut self.changed).then_some(Wish { command: self.command, request: self.request })
     }
 
     fn go(&mut self, step: Step, request: Request, now: u64) {
@@ -350,9 +339,9 @@ impl Operator {
         let (name, value) =
             text.split_once('=').ok_or_else(|| format!("expected NAME=VALUE such as `command=3`, found `{text}`"))?;
         let place = place(name).map_err(|error| error.to_string())?;
-        if !self.places.is_free(place) {
-            let free: Vec<&str> = self.places.free().map(|k| MACHINE_INPUT_NAMES[k]).collect();
-            return Err(format!("`{name}` is measured or has a request of its own; free are {}", free.join(", ")));
+        if place >= COMMAND_WORDS {
+            let free = MACHINE_INPUT_NAMES[..COMMAND_WORDS].join(", ");
+            return Err(format!("`{name}` is measured or has a request of its own; free are {free}"));
         }
         let number: f64 = value.parse().map_err(|_| format!("`{name}`: expected a number, found `{value}`"))?;
         let word = number.is_finite().then(|| word_of(place, number)).flatten();
@@ -375,26 +364,26 @@ mod tests {
     }
 
     fn operator() -> Operator {
-        Operator::new(Places::find().unwrap(), false, Timeout { silence: SILENCE, idle: IDLE })
+        Operator::new(false, Timeout { silence: SILENCE, idle: IDLE })
     }
 
     #[test]
     fn the_plan_arms_runs_plays_and_goes_down() {
         let mut operator = operator();
         operator.plan(&["setpoint[0]=1e-6".to_owned()], 0).unwrap();
-        assert_eq!(operator.wish().unwrap().request, Request::Arm.word());
+        assert_eq!(operator.wish().unwrap().request, Request::Arm);
         operator.update(&said(Phase::Disarmed, false), 1);
         assert!(operator.wish().is_none());
         operator.update(&said(Phase::Arming, true), 1);
-        assert_eq!(operator.wish().unwrap().request, Request::Run.word());
+        assert_eq!(operator.wish().unwrap().request, Request::Run);
         operator.update(&said(Phase::Arming, true), 1);
         assert!(operator.wish().is_none());
         operator.update(&said(Phase::Running, true), 2);
         let wish = operator.wish().unwrap();
         let index = place("setpoint[0]").unwrap();
-        assert_eq!((wish.request, wish.words[index]), (Request::None.word(), word_of(index, 1e-6).unwrap()));
+        assert_eq!((wish.request, wish.command[index]), (Request::None, word_of(index, 1e-6).unwrap()));
         operator.ramp_down(3);
-        assert_eq!(operator.wish().unwrap().request, Request::RampDown.word());
+        assert_eq!(operator.wish().unwrap().request, Request::RampDown);
         operator.update(&said(Phase::RampingDown, true), 4);
         assert!(!operator.is_over());
         operator.update(&said(Phase::Disarmed, false), 5);
@@ -415,7 +404,7 @@ mod tests {
 
     #[test]
     fn an_attended_loop_does_not_end_at_a_fault() {
-        let mut operator = Operator::new(Places::find().unwrap(), true, Timeout { silence: SILENCE, idle: IDLE });
+        let mut operator = Operator::new(true, Timeout { silence: SILENCE, idle: IDLE });
         operator.plan(&[], 0).unwrap();
         operator.update(&said(Phase::Faulted, false), 1);
         operator.update(&said(Phase::Faulted, false), 2);
@@ -437,7 +426,7 @@ mod tests {
             let mut operator = operator();
             let error = operator.plan(&[assignment.to_owned()], 0).unwrap_err();
             assert!(error.contains(expected), "{assignment}: {error}");
-            assert_eq!(operator.wish().unwrap().request, Request::None.word(), "{assignment}: nothing is asked for");
+            assert_eq!(operator.wish().unwrap().request, Request::None, "{assignment}: nothing is asked for");
         }
     }
 
@@ -449,7 +438,7 @@ mod tests {
         assert!(!operator.linked(1) && operator.link_number() == 0, "one that only looks has no orders");
         operator.take_for_host(A, 10).unwrap();
         operator.ask_by_link(Request::Run);
-        assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run.word());
+        assert!(operator.link_number() > 0 && operator.wish().unwrap().request == Request::Run);
         assert_eq!(operator.take_for_host(B, 10 + SILENCE), Err(Denied::Others));
         assert!(operator.linked(20) && !operator.is_evicted(A));
         operator.seen(A, 200);

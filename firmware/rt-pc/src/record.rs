@@ -99,7 +99,7 @@ impl Writer {
             self.recorder.open(&self.config, snapshot.digest, |words| words.copy_from_slice(&snapshot.state));
             self.drain()?;
         }
-        self.recorder.push(&row.input, &row.output, || row.digest);
+        self.recorder.push(&row.input.to_words(), &row.output, || row.digest);
         self.rows += 1;
         Ok(())
     }

@@ -1,10 +1,11 @@
 //! What a run leaves to be read: the book of its ticks, the machine's phases, the record.
 
-use std::fmt::Write as _;
+use std::fmt::{self, Display, Formatter, Write as _};
 
 use controller::supervised::Phase;
 use specgen_rt::account::{Account, Cause as Late};
 use specgen_rt::allocation;
+use specgen_rt::histogram::Histogram;
 
 use crate::service::{Incident, Outcome, Traffic};
 
@@ -57,142 +58,115 @@ impl Summary<'_> {
         outcome.incidents.first().map(words)
     }
 
-    #[must_use]
-    pub fn to_text(&self) -> String {
-        let mut text = format!("{} at {} Hz on {}\n", controller::SPEC_NAME, hertz(self.period), self.device);
-        // Writing to a String cannot fail, here and below.
-        for missing in &self.missing_rights {
-            let _ = writeln!(text, "without {missing}");
-        }
-        text += &self.account.to_text();
-        let _ = writeln!(
-            text,
-            "real-time thread: {} allocations, {} ticks that waited in their work, {} rows lost, {} device faults",
-            allocation::noticed(),
-            self.account.blocked(),
-            self.lost_rows,
-            self.device_faults
-        );
-        for incident in &self.outcome.incidents {
-            let _ = writeln!(text, "{}", words(incident));
-        }
-        for (name, file) in [("record", &self.outcome.record), ("recorder", &self.outcome.capture)] {
-            let _ = match file {
-                Some((path, Ok(rows))) => writeln!(text, "{name}: {rows} ticks in {}", path.display()),
-                Some((path, Err(error))) => writeln!(text, "{name}: {} is not whole: {error}", path.display()),
-                None => Ok(()),
-            };
-        }
-        if let Some(Traffic { hosts, requests, errors, closed }) = &self.outcome.link {
-            let _ = writeln!(
-                text,
-                "link: {requests} requests of {hosts} hosts, {errors} frames not believed, {closed} hosts closed: others took the orders or the room"
-            );
-        }
-        text
-    }
-
-    /// For programs. By hand: a few numbers are no reason for a library.
-    #[must_use]
-    pub fn to_json(&self) -> String {
-        let account = self.account;
-        let mut causes = Vec::new();
-        for cause in Late::ALL {
-            let (late, skipped) = (account.late()[cause as usize], account.skipped()[cause as usize]);
-            if late + skipped > 0 {
-                let longest = account.worst(cause).unwrap_or(0);
-                causes.push(format!(
-                    "    {{ \"cause\": {}, \"late\": {late}, \"skipped\": {skipped}, \"longest_ns\": {longest} }}",
-                    quoted(cause.name())
-                ));
-            }
-        }
-        let times: Vec<String> = account
-            .histograms()
-            .iter()
-            .map(|(name, histogram)| {
-                let [median, high, higher] = [0.5, 0.99, 0.999].map(|share| histogram.quantile(share));
-                let octaves: Vec<String> =
-                    histogram.octaves().iter().map(|(end, count)| format!("[{end}, {count}]")).collect();
-                format!(
-                    "    {}: {{ \"p50_ns\": {median}, \"p99_ns\": {high}, \"p999_ns\": {higher}, \"max_ns\": {}, \"below_ns\": [{}] }}",
-                    quoted(name),
-                    histogram.largest(),
-                    octaves.join(", ")
-                )
-            })
-            .collect();
-        let incidents: Vec<String> = self
-            .outcome
-            .incidents
-            .iter()
-            .map(|Incident { tick, phase, cause }| {
-                let [phase, cause] = [format!("{phase:?}"), format!("{cause:?}")].map(|text| quoted(&text));
-                format!("{{ \"tick\": {tick}, \"phase\": {phase}, \"cause\": {cause} }}")
-            })
-            .collect();
-        let link = self.outcome.link.map_or_else(
-            || "null".to_owned(),
-            |Traffic { hosts, requests, errors, closed }| {
-                format!("{{ \"hosts\": {hosts}, \"requests\": {requests}, \"errors\": {errors}, \"closed_hosts\": {closed} }}")
-            },
-        );
-        let missing: Vec<String> = self.missing_rights.iter().map(|text| quoted(text)).collect();
-        let [record, capture] = [&self.outcome.record, &self.outcome.capture].map(|file| match file {
-            Some((path, Ok(rows))) => {
-                format!("{{ \"file\": {}, \"ticks\": {rows} }}", quoted(&path.display().to_string()))
-            }
-            _ => "null".to_owned(),
-        });
-        let phase = self.outcome.last.map_or_else(|| "null".to_owned(), |said| quoted(&format!("{:?}", said.phase)));
-        format!(
-            "{{
-  \"name\": {},
-  \"digest\": {},
-  \"device\": {},
-  \"period_ns\": {},
-  \"missing_rights\": [{}],
-  \"planned\": {},
-  \"on_time\": {},
-  \"late\": {},
-  \"skipped\": {},
-  \"balances\": {},
-  \"causes\": [{}{}{}],
-  \"times\": {{\n{}\n  }},
-  \"allocations\": {},
-  \"waiting_ticks\": {},
-  \"lost_rows\": {},
-  \"device_faults\": {},
-  \"incidents\": [{}],
-  \"link\": {link},
-  \"last_phase\": {phase},
-  \"record\": {record},
-  \"recorder\": {capture},
-  \"failure\": {}
-}}
-",
-            quoted(controller::SPEC_NAME),
-            quoted(controller::SPEC_DIGEST),
-            quoted(&self.device),
-            self.period,
-            missing.join(", "),
-            account.planned(),
-            account.on_time(),
-            account.late().iter().sum::<u64>(),
-            account.skipped().iter().sum::<u64>(),
-            account.balances(),
-            if causes.is_empty() { "" } else { "\n" },
-            causes.join(",\n"),
-            if causes.is_empty() { "" } else { "\n  " },
-            times.join(",\n"),
+    /// What is said of a run, in order: its name and value for programs, and the lines for people, if any.
+    fn facts(&self) -> Vec<(&'static str, Json, String)> {
+        let (account, outcome) = (self.account, self.outcome);
+        let silent = |name, value| (name, value, String::new());
+        let lines = |lines: Vec<String>| lines.iter().map(|line| format!("{line}\n")).collect::<String>();
+        let of_loop = format!(
+            "real-time thread: {} allocations, {} ticks that waited in their work, {} rows lost, {} device faults\n",
             allocation::noticed(),
             account.blocked(),
             self.lost_rows,
-            self.device_faults,
-            incidents.join(", "),
-            self.failure().map_or_else(|| "null".to_owned(), |text| quoted(&text)),
-        )
+            self.device_faults
+        );
+        let link = outcome.link.map_or((Json::Null, String::new()), |Traffic { hosts, requests, errors, closed }| {
+            let numbers = [("hosts", hosts), ("requests", requests), ("errors", errors), ("closed_hosts", closed)];
+            let numbers = Json::object(numbers.map(|(name, number)| (name, number.into())));
+            let text = format!(
+                "link: {requests} requests of {hosts} hosts, {errors} frames not believed, {closed} hosts closed: others took the orders or the room\n"
+            );
+            (numbers, text)
+        });
+        let [record, capture] =
+            [("record", &outcome.record), ("recorder", &outcome.capture)].map(|(name, file)| match file {
+                Some((path, Ok(rows))) => {
+                    let path = path.display().to_string();
+                    let text = format!("{name}: {rows} ticks in {path}\n");
+                    (name, Json::object([("file", path.into()), ("ticks", (*rows).into())]), text)
+                }
+                Some((path, Err(error))) => {
+                    (name, Json::Null, format!("{name}: {} is not whole: {error}\n", path.display()))
+                }
+                None => silent(name, Json::Null),
+            });
+        let head = format!("{} at {} Hz on {}\n", controller::SPEC_NAME, hertz(self.period), self.device);
+        vec![
+            ("name", controller::SPEC_NAME.into(), head),
+            silent("digest", controller::SPEC_DIGEST.into()),
+            silent("device", self.device.as_str().into()),
+            silent("period_ns", self.period.into()),
+            (
+                "missing_rights",
+                Json::list(&self.missing_rights, |missing| missing.as_str().into()),
+                lines(self.missing_rights.iter().map(|missing| format!("without {missing}")).collect()),
+            ),
+            ("planned", account.planned().into(), account.to_text()),
+            silent("on_time", account.on_time().into()),
+            silent("late", account.late().iter().sum::<u64>().into()),
+            silent("skipped", account.skipped().iter().sum::<u64>().into()),
+            silent("balances", Json::Flag(account.balances())),
+            silent("causes", Json::List(Late::ALL.into_iter().filter_map(|cause| self.cause(cause)).collect())),
+            silent("times", Json::object(account.histograms().map(|(name, times)| (name, quantiles(times))))),
+            ("allocations", allocation::noticed().into(), of_loop),
+            silent("waiting_ticks", account.blocked().into()),
+            silent("lost_rows", self.lost_rows.into()),
+            silent("device_faults", self.device_faults.into()),
+            (
+                "incidents",
+                Json::list(&outcome.incidents, |Incident { tick, phase, cause }| {
+                    let [phase, cause] = [format!("{phase:?}"), format!("{cause:?}")].map(Json::from);
+                    Json::object([("tick", (*tick).into()), ("phase", phase), ("cause", cause)])
+                }),
+                lines(outcome.incidents.iter().map(words).collect()),
+            ),
+            record,
+            capture,
+            ("link", link.0, link.1),
+            silent("last_phase", outcome.last.map_or(Json::Null, |said| format!("{:?}", said.phase).into())),
+            silent("failure", self.failure().map_or(Json::Null, Json::from)),
+        ]
     }
+
+    /// Late and skipped ticks of a cause, if there were any.
+    fn cause(&self, cause: Late) -> Option<Json> {
+        let (late, skipped) = (self.account.late()[cause as usize], self.account.skipped()[cause as usize]);
+        let longest = self.account.worst(cause).unwrap_or(0);
+        (late + skipped > 0).then(|| {
+            let name = cause.name().into();
+            Json::object([
+                ("cause", name),
+                ("late", late.into()),
+                ("skipped", skipped.into()),
+                ("longest_ns", longest.into()),
+            ])
+        })
+    }
+
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        self.facts().into_iter().map(|(.., lines)| lines).collect()
+    }
+
+    /// For programs, a line for each name.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        let lines: Vec<String> =
+            self.facts().into_iter().map(|(name, value, _)| format!("  {}: {value}", Json::from(name))).collect();
+        format!("{{\n{}\n}}\n", lines.join(",\n"))
+    }
+}
+
+fn quantiles(times: &Histogram) -> Json {
+    let [median, high, higher] = [0.5, 0.99, 0.999].map(|share| times.quantile(share));
+    let octaves = Json::list(&times.octaves(), |(end, count)| Json::List(vec![(*end).into(), (*count).into()]));
+    Json::object([
+        ("p50_ns", median.into()),
+        ("p99_ns", high.into()),
+        ("p999_ns", higher.into()),
+        ("max_ns", times.largest().into()),
+        ("below_ns", octaves),
+    ])
 }
 
 fn words(incident: &Incident) -> String {
@@ -205,15 +179,70 @@ fn hertz(period: u64) -> f64 {
     (1e12 / period as f64).round() / 1e3
 }
 
-fn quoted(text: &str) -> String {
-    let mut out = String::from("\"");
-    for c in text.chars() {
-        match c {
-            '"' | '\\' => out.extend(['\\', c]),
-            c if c < ' ' => out += &format!("\\u{:04x}", c as u32),
-            c => out.push(c),
+/// By hand: a few numbers are no reason for a library.
+enum Json {
+    Null,
+    Flag(bool),
+    Number(u64),
+    Text(String),
+    List(Vec<Self>),
+    Object(Vec<(&'static str, Self)>),
+}
+
+impl Json {
+    fn list<T>(items: &[T], of: impl Fn(&T) -> Self) -> Self {
+        Self::List(items.iter().map(of).collect())
+    }
+
+    fn object<const N: usize>(fields: [(&'static str, Self); N]) -> Self {
+        Self::Object(fields.into())
+    }
+}
+
+impl From<u64> for Json {
+    fn from(number: u64) -> Self {
+        Self::Number(number)
+    }
+}
+
+impl From<&str> for Json {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Json {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl Display for Json {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Null => f.write_str("null"),
+            Self::Flag(flag) => flag.fmt(f),
+            Self::Number(number) => number.fmt(f),
+            Self::Text(text) => {
+                f.write_char('"')?;
+                for c in text.chars() {
+                    match c {
+                        '"' | '\\' => write!(f, "\\{c}")?,
+                        c if c < ' ' => write!(f, "\\u{:04x}", c as u32)?,
+                        c => f.write_char(c)?,
+                    }
+                }
+                f.write_char('"')
+            }
+            Self::List(items) => {
+                let items: Vec<String> = items.iter().map(ToString::to_string).collect();
+                write!(f, "[{}]", items.join(", "))
+            }
+            Self::Object(fields) => {
+                let fields: Vec<String> =
+                    fields.iter().map(|(name, value)| format!("{}: {value}", Self::from(*name))).collect();
+                write!(f, "{{ {} }}", fields.join(", "))
+            }
         }
     }
-    out.push('"');
-    out
 }

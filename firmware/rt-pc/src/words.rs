@@ -1,107 +1,20 @@
-//! The input words of the machine: what the operator wants, what the gauges say.
-//!
-//! Places are found by the names that the controller gives its words, so that this is the same for six legs and for platforms.
+//! What an operator may set, by the names that the controller gives its words, so that this is the same for six legs and for platforms.
 
-use controller::Real;
 use controller::permitted;
-use controller::sensing::gauge_reading;
-use controller::supervised::{MACHINE_INPUT_NAMES, MACHINE_INPUT_WORDS};
-use specgen_hal::CHANNELS;
+use controller::supervised::MACHINE_INPUT_NAMES;
+use controller::{COMMAND_WORDS, Real};
 use specgen_runtime::Permitted;
 
-/// Words of one supervised tick.
-pub type Words = [u64; MACHINE_INPUT_WORDS];
+/// Words of a command: what an operator may set, for the others are measured or have a source of their own.
+pub type Command = [u64; COMMAND_WORDS];
 
-/// What gauges are called: on a platform, and on legs with one each.
-const GAUGE_STEMS: [&str; 2] = ["gauge", "displacement"];
-
-/// Where the words lie that a target fills in.
-#[derive(Debug, Clone)]
-pub struct Places {
-    gauge: [usize; CHANNELS],
-    wrench: Option<[usize; CHANNELS]>,
-    request: usize,
-    events: usize,
-    /// The command of a platform; legs have none.
-    command: Option<usize>,
-}
-
-/// Word of the command to hold.
-const HOLD: u64 = 0;
-
-/// Why the words of a controller are not what this target expects.
+/// Why there is no such word.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NoWord(pub String);
 
 impl std::fmt::Display for NoWord {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "the controller has no input word `{}`; it has {}", self.0, MACHINE_INPUT_NAMES.join(", "))
-    }
-}
-
-impl Places {
-    /// Of this controller.
-    ///
-    /// # Errors
-    /// If a word is missing: controller and target are of two versions.
-    pub fn find() -> Result<Self, NoWord> {
-        let gauges = GAUGE_STEMS.iter().find_map(|stem| six(stem).ok());
-        Ok(Self {
-            gauge: gauges.ok_or_else(|| NoWord("gauge[0]".to_owned()))?,
-            wrench: six("wrench").ok(),
-            request: place("request")?,
-            events: place("events")?,
-            command: place("command").ok(),
-        })
-    }
-
-    /// Whether the operator may set a word: measured ones, request and events have sources of their own.
-    #[must_use]
-    pub fn is_free(&self, index: usize) -> bool {
-        let measured = self.gauge.contains(&index) || self.wrench.is_some_and(|wrench| wrench.contains(&index));
-        !measured && index != self.request && index != self.events && index < MACHINE_INPUT_WORDS
-    }
-
-    /// Places of the words that the operator may set, in order.
-    pub fn free(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..MACHINE_INPUT_WORDS).filter(|index| self.is_free(*index))
-    }
-
-    /// A command to stay at a set-point that was reached by a wave about `center`, m and rad: on a platform to hold, for legs the
-    /// set-point itself.
-    pub fn rest_at(&self, center: &[Real; CHANNELS], words: &mut Words) {
-        match self.command {
-            Some(place) => words[place] = HOLD,
-            None => {
-                for (place, value) in self.free().zip(center) {
-                    words[place] = word(*value);
-                }
-            }
-        }
-    }
-
-    /// Puts readings in. `wrench` is in N and N m.
-    pub fn put_readings(&self, words: &mut Words, codes: &[i32; CHANNELS], wrench: &[f64; CHANNELS]) {
-        for (place, code) in self.gauge.iter().zip(codes) {
-            words[*place] = word(gauge_reading(*code));
-        }
-        if let Some(places) = &self.wrench {
-            for (place, value) in places.iter().zip(wrench) {
-                words[*place] = word(*value as Real);
-            }
-        }
-    }
-
-    /// Event bits of a tick's words.
-    #[must_use]
-    pub fn events(&self, words: &Words) -> u32 {
-        words[self.events] as u32
-    }
-
-    /// Puts the request and what happened since the last tick in.
-    pub fn put_supervision(&self, words: &mut Words, request: u64, events: u32) {
-        words[self.request] = request;
-        words[self.events] = u64::from(events);
     }
 }
 
@@ -162,37 +75,25 @@ pub fn period() -> Option<u64> {
     (1e3..1e12).contains(&nanoseconds).then_some(nanoseconds as u64)
 }
 
-fn six(stem: &str) -> Result<[usize; CHANNELS], NoWord> {
-    let mut places = [0; CHANNELS];
-    for (k, slot) in places.iter_mut().enumerate() {
-        *slot = place(&format!("{stem}[{k}]"))?;
-    }
-    Ok(places)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use controller::supervised::{MachineInput, Request};
 
     #[test]
     fn readings_and_requests_go_to_their_words_and_to_no_other() {
-        let places = Places::find().unwrap();
-        let mut words = [7; MACHINE_INPUT_WORDS];
-        places.put_readings(&mut words, &[100, 200, 300, 400, 500, 600], &[1.0; CHANNELS]);
-        places.put_supervision(&mut words, 2, 9);
-        for (index, (name, found)) in MACHINE_INPUT_NAMES.iter().zip(words).enumerate() {
-            let gauge = (0..CHANNELS).find(|k| GAUGE_STEMS.iter().any(|stem| *name == format!("{stem}[{k}]")));
-            let expected = match (gauge, *name) {
-                (Some(k), _) => word(gauge_reading(100 * (k as i32 + 1))),
-                (_, "request") => 2,
-                (_, "events") => 9,
-                (_, name) if name.starts_with("wrench") => word(1.0),
-                _ => 7,
+        let input = MachineInput::measured(&[1; COMMAND_WORDS], &[2.0; 6], &[3.0; 6], Request::Hold, 9);
+        for (index, (name, found)) in MACHINE_INPUT_NAMES.iter().zip(input.to_words()).enumerate() {
+            let (measured, expected) = match *name {
+                "request" => (true, 3),
+                "events" => (true, 9),
+                name if name.starts_with("wrench") => (true, word(3.0)),
+                name if name.starts_with("gauge") || name.starts_with("displacement") => (true, word(2.0)),
+                _ => (false, 1),
             };
             assert_eq!(found, expected, "{name}");
-            assert_eq!(places.is_free(index), expected == 7, "{name}");
+            assert_eq!(index >= COMMAND_WORDS, measured, "{name}");
         }
-        assert!(!places.is_free(MACHINE_INPUT_WORDS));
     }
 
     #[test]

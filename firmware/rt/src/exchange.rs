@@ -51,7 +51,7 @@ pub enum OpenError {
         /// The system's answer.
         cause: io::Error,
     },
-    /// Somebody else can change the file, or what it leads to.
+    /// Another user can change the file, or what it leads to.
     NotOwn {
         /// The file.
         path: PathBuf,

@@ -1,4 +1,4 @@
-//! `specgen replay`: a record run again on the host, tick by tick, by bits.
+//! `specgen replay`: a recording run again on the host, tick by tick, by bits.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -26,12 +26,12 @@ const SHOWN: usize = 20;
 #[derive(Args, Debug)]
 #[command(after_help = super::examples::REPLAY)]
 pub struct Arguments {
-    /// The record: from a target, from `specgen sim --record` or from `rt-pc --record`.
-    record: PathBuf,
-    /// The spec that the target was built from. Without it the record can only be exported.
+    /// The recording: from a target, from `specgen sim --record` or from `rt-pc --record`.
+    recording: PathBuf,
+    /// The spec that the target was built from. Without it the recording can only be exported.
     #[arg(long, value_name = "SPEC", required_unless_present = "csv")]
     spec: Option<PathBuf>,
-    /// Write the record as CSV, with time and units; with --spec also volts, and of a platform pose, target and error.
+    /// Write the recording as CSV, with time and units; with --spec also volts, and of a platform pose, target and error.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// With --spec: target less pose, or demand less gauge of the legs.
@@ -40,13 +40,13 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let shown = arguments.record.display();
+    let shown = arguments.recording.display();
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{shown}: {error}"));
-    let mut reader = open(&arguments.record)?;
+    let mut reader = open(&arguments.recording)?;
     let mut csv = arguments.csv.as_deref().map(Csv::new).transpose()?;
     let drawn = arguments.plot.wanted()?;
     if drawn && arguments.spec.is_none() {
-        return Err(Failure::Usage("--plot is for a record that is run again: name its --spec".to_owned()));
+        return Err(Failure::Usage("--plot is for a recording that is run again: name its --spec".to_owned()));
     }
     let Some(spec) = &arguments.spec else {
         let found = export(&mut reader, csv.as_mut(), &refuse)?;
@@ -103,7 +103,7 @@ fn same_build(arguments: &Arguments, recorded: &Description, compiled: &Compiled
     Err(Failure::Gate(format!(
         "{} is of spec digest {}, specgen {}; {} gives {}, specgen {version}: name the spec that the target was built from, and \
          use the specgen that built it",
-        arguments.record.display(),
+        arguments.recording.display(),
         recorded.digest,
         recorded.version,
         arguments.spec.as_ref().map_or_else(String::new, |spec| spec.display().to_string()),

@@ -13,8 +13,13 @@ pub fn emit(ir: &Ir) -> TokenStream {
         (literal::real(ir.scalar, converter.at_zero), literal::real(ir.scalar, converter.per_code));
     let highest = literal::integer(converter.highest);
     let beyond = literal::reals(ir.scalar, &converter.beyond);
+    let calibrated = ir.task_space.as_ref().is_some_and(|task| task.sensing.calibration.is_some());
+    let doc = format!(
+        " What the gauges' converters mean by a code of 0..2^bits, {}; a code at either end is a gauge fault. From `sensor`.",
+        if calibrated { "V" } else { "m" }
+    );
     quote! {
-        /// Codes of the gauges' converters; from `sensor`.
+        #[doc = #doc]
         pub const CONVERTER: GaugeConverter<Real> = GaugeConverter {
             at_zero: #at_zero,
             per_code: #per_code,

@@ -5,7 +5,7 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use controller::sensing::gauge_reading;
+use controller::sensing;
 use controller::supervised::{
     CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Request, STOP, supervise,
 };
@@ -150,7 +150,7 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
         for (happened, event) in [(gauge_fails, CONVERTER), (missed > 0, MISSED_TICK), (stop, STOP)] {
             events |= if happened { event } else { 0 };
         }
-        let gauge = if gauge_fails { [Real::NAN; 6] } else { codes.map(|code| gauge_reading(code >> 1)) };
+        let gauge = if gauge_fails { [Real::NAN; 6] } else { codes.map(|code| sensing::CONVERTER.reading(code >> 1)) };
         let output = by_hand.tick(&orders.command, gauge, orders.request, events);
         let mut expected = if restarted { vec![Done::Enable(false), Done::Start] } else { Vec::new() };
         if output.amplifier_on {
@@ -184,7 +184,7 @@ fn a_code_taken_with_another_shift_is_seen() {
         let orders = exchange.orders;
         board.tick(&mut exchange, Noticed::default());
         let codes = parts.0.borrow().codes;
-        by_hand.tick(&orders.command, codes.map(|code| gauge_reading((code + 2) >> 1)), orders.request, 0);
+        by_hand.tick(&orders.command, codes.map(|code| sensing::CONVERTER.reading((code + 2) >> 1)), orders.request, 0);
         differs |= board.machine().digest() != by_hand.machine.digest();
     }
     assert!(differs);

@@ -4,13 +4,6 @@ pub use crate::gauges::{CONVERTER, GAUGE, LEG_SETPOINT};
 
 use crate::{LEGS, Real};
 
-/// What a gauge's converter means by a code of 0..2^bits, m; a code at either end is a gauge fault.
-#[inline]
-#[must_use]
-pub fn gauge_reading(code: i32) -> Real {
-    CONVERTER.reading(code)
-}
-
 /// A gauge reading is finite and within [`GAUGE`].
 #[inline]
 #[must_use]

@@ -71,9 +71,9 @@ impl TickInput {
         Self { setpoint: six(words, 0), displacement: six(words, COMMAND_WORDS) }
     }
 
-    /// Of the words of a command, and of readings as a target has them.
+    /// Of the words of a command, and of readings as a target has them. No wrench is asked for.
     #[must_use]
-    pub fn measured(words: &[u64; COMMAND_WORDS], gauge: &[Real; 6]) -> Self {
+    pub fn measured(words: &[u64; COMMAND_WORDS], gauge: &[Real; 6], _wrench: &[Real; 6]) -> Self {
         Self { setpoint: six(words, 0), displacement: *gauge }
     }
 

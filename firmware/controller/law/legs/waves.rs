@@ -60,7 +60,12 @@ pub fn may_begin(_status: u32, words: &[u64], center: &[Real; 6], limits: &Limit
 
 /// Writes the set-point into the words of a tick's input.
 pub fn write(motion: &Motion<Real>, _sequence: u32, words: &mut [u64]) {
-    for (slot, number) in words.iter_mut().zip(motion.pose) {
+    rest(&motion.pose, words);
+}
+
+/// Writes the command to stay where a wave about `center` has come to rest.
+pub fn rest(center: &[Real; 6], words: &mut [u64]) {
+    for (slot, number) in words.iter_mut().zip(center) {
         *slot = number.to_word();
     }
 }

@@ -5,14 +5,6 @@ pub use crate::gauges::{CALIBRATION, CONVERTER, GAUGES, RATE, RAW_LIMITS};
 use crate::Real;
 use specgen_runtime::sensing;
 
-/// What a gauge's converter means by a code of 0..2^bits, V if the spec gives a calibration, else m; a code at either end is a
-/// gauge fault.
-#[inline]
-#[must_use]
-pub fn gauge_reading(code: i32) -> Real {
-    CONVERTER.reading(code)
-}
-
 /// Gauges whose word is not finite or out of [`RAW_LIMITS`]: bit k for gauge k.
 #[inline]
 #[must_use]

@@ -78,10 +78,10 @@ impl TickInput {
         Self { command: command(words), gauge: six(words, COMMAND_WORDS), wrench }
     }
 
-    /// Of the words of a command, and of readings as a target has them; it measures no wrench.
+    /// Of the words of a command, and of readings as a target has them. One that measures no wrench gives NaN for it.
     #[must_use]
-    pub fn measured(words: &[u64; COMMAND_WORDS], gauge: &[Real; 6]) -> Self {
-        Self { command: command(words), gauge: *gauge, wrench: [Real::NAN; 6] }
+    pub fn measured(words: &[u64; COMMAND_WORDS], gauge: &[Real; 6], wrench: &[Real; 6]) -> Self {
+        Self { command: command(words), gauge: *gauge, wrench: *wrench }
     }
 
     /// As words in the order of [`INPUT_NAMES`].

@@ -81,7 +81,7 @@ impl<'a> Keeper<'a> {
     /// Keeps a tick; a recorder that has what it was to record is handed over.
     pub fn keep(&mut self, mut row: Row) {
         if let Some(tape) = &mut self.tape {
-            tape.push(&row.input, &row.output, || row.digest);
+            tape.push(&row.input.to_words(), &row.output, || row.digest);
             row.recorded = Some(tape.rows());
             row.triggered = matches!(tape.activity(), Activity::Triggered(_) | Activity::Complete);
         }
@@ -139,11 +139,12 @@ mod tests {
     use super::*;
     use crate::record::Writer;
     use controller::snapshot::recorder;
+    use controller::supervised::{MACHINE_INPUT_WORDS, MachineInput};
     use rtrb::RingBuffer;
 
     fn row(count: u64, digest: u64) -> Row {
         let output = recorder::Row { codes: [0; 6], status: 0, supervisor: 0 };
-        let input = [count; controller::supervised::MACHINE_INPUT_WORDS];
+        let input = MachineInput::from_words(&[count; MACHINE_INPUT_WORDS]);
         let (opens, waving, triggered) = (false, false, false);
         Row { tick: count, count, input, output, digest, late: 0, orders: 0, opens, waving, recorded: None, triggered }
     }

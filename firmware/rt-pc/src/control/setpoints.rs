@@ -1,14 +1,14 @@
-//! What the operator wants of the tick to come: his words, or those of a wave.
+//! What the operator wants of the tick to come: the command, or set-points of a wave.
 
-use controller::supervised::{MACHINE_INPUT_WORDS, Phase};
+use controller::supervised::{Phase, Request};
 use controller::waves::{self, Wave};
-use controller::{Config, Real};
+use controller::{COMMAND_WORDS, Config, Real};
 use specgen_runtime::wave::{Settings, Stage};
 
 use crate::handover::Wish;
-use crate::words::Words;
+use crate::words::Command;
 
-/// Words and wave of the loop.
+/// Command and wave of the loop.
 pub struct Setpoints {
     wish: Wish,
     wave: Wave,
@@ -19,7 +19,7 @@ pub struct Setpoints {
 
 impl Setpoints {
     pub fn new(config: &Config) -> Self {
-        let wish = Wish { words: [0; MACHINE_INPUT_WORDS], request: 0 };
+        let wish = Wish { command: [0; COMMAND_WORDS], request: Request::None };
         Self { wish, wave: Wave::new(waves::limits(config)), sequence: 0, waving: false }
     }
 
@@ -27,7 +27,7 @@ impl Setpoints {
         self.wish = wish;
     }
 
-    pub fn request(&self) -> u64 {
+    pub fn request(&self) -> Request {
         self.wish.request
     }
 
@@ -45,25 +45,25 @@ impl Setpoints {
         self.wave.stop();
     }
 
-    /// Whether the last words were a wave's.
+    /// Whether the last command was a wave's.
     pub fn waving(&self) -> bool {
         self.waving
     }
 
-    /// Words of the tick to come. A machine that does not run, by its last `phase`, follows no wave: it ends at once, for
+    /// Command of the tick to come. A machine that does not run, by its last `phase`, follows no wave: it ends at once, for
     /// going on with it later would be a jump.
-    pub fn next(&mut self, phase: Phase, config: &Config) -> Words {
-        let mut words = self.wish.words;
+    pub fn next(&mut self, phase: Phase, config: &Config) -> Command {
+        let mut command = self.wish.command;
         self.waving = false;
         if self.wave.stage() != Stage::Idle {
             if phase != Phase::Running {
                 self.wave = Wave::new(waves::limits(config));
             } else if let Some(motion) = self.wave.advance() {
                 self.sequence = self.sequence.wrapping_add(1);
-                waves::write(&motion, self.sequence, &mut words);
+                waves::write(&motion, self.sequence, &mut command);
                 self.waving = true;
             }
         }
-        words
+        command
     }
 }

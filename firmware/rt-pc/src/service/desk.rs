@@ -1,7 +1,7 @@
 //! What is answered over the link.
 
 use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
-use controller::{CONFIG_WORDS, Config, DESCRIPTION, Real};
+use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, Real};
 use specgen_link::{
     Bytes, Counted, Counters, Device, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Status,
     WaveAction, put_words,
@@ -83,7 +83,7 @@ impl<'a> Desk<'a> {
         if self.console.waving() {
             return Err(Refusal::State);
         }
-        let expected = self.console.operator.free_words() as u16;
+        let expected = COMMAND_WORDS as u16;
         if self.console.operator.set_by_link(words) { Ok(()) } else { Err(Refusal::Length { expected }) }
     }
 

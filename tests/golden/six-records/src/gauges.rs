@@ -6,7 +6,7 @@
 use specgen_runtime::GaugeConverter;
 use crate::Real;
 
-/// Codes of the gauges' converters; from `sensor`.
+/// What the gauges' converters mean by a code of 0..2^bits, m; a code at either end is a gauge fault. From `sensor`.
 pub const CONVERTER: GaugeConverter<Real> = GaugeConverter {
     at_zero: -2e-6,
     per_code: 7.6293943e-10,
