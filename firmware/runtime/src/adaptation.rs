@@ -10,36 +10,18 @@
 //! ρ̂ X is the displacement really requested, after every limit: that is the anti-windup. The integrator form
 //! (AII.7)–(AII.13) belongs to another error (Y − Ŷ); it must not be fed with m.
 
+use crate::choice::choice;
 use crate::real::Real;
 
-/// Which estimates are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Law {
-    /// None: inverse Preisach alone.
-    Invhys,
-    /// δ̂ by (AII.3).
-    Ewma,
-    /// δ̂ and φ̂ by (AII.5) and (AII.6).
-    Pcc,
-}
-
-impl Law {
-    /// 0 none, 1 EWMA, 2 PCC.
-    #[inline]
-    #[must_use]
-    pub const fn word(self) -> u64 {
-        self as u64
-    }
-
-    /// The inverse of [`Law::word`]; none for any other number.
-    #[must_use]
-    pub const fn from_word(word: u64) -> Option<Self> {
-        Some(match word {
-            0 => Self::Invhys,
-            1 => Self::Ewma,
-            2 => Self::Pcc,
-            _ => return None,
-        })
+choice! {
+    /// Which estimates are kept.
+    pub enum Law {
+        /// None: inverse Preisach alone.
+        Invhys = 0,
+        /// δ̂ by (AII.3).
+        Ewma = 1,
+        /// δ̂ and φ̂ by (AII.5) and (AII.6).
+        Pcc = 2,
     }
 }
 

@@ -40,6 +40,7 @@
 
 pub mod adaptation;
 pub mod attitude;
+mod choice;
 pub mod crc;
 pub mod creep;
 pub mod dac;
@@ -48,6 +49,7 @@ pub mod dynamic;
 pub mod dynamics;
 pub mod everett;
 pub mod feedback;
+mod field;
 pub mod kinematics;
 pub mod linear;
 pub mod memory;

@@ -1,7 +1,7 @@
 //! Which parts of the control law are at work.
 
 use crate::adaptation::Law;
-use crate::snapshot::Choice;
+use crate::choice::{Choice, choice};
 
 /// Control mode of section 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,66 +66,25 @@ impl ControlMode {
     }
 }
 
-/// Where the force between platform and work piece in (7) comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Interaction {
-    /// There is none, or it is left to the feedback.
-    Neglected,
-    /// K_e (h_d − h_e) with the stiffness in the settings.
-    Modelled,
-    /// The force/torque sensor.
-    Measured,
-}
-
-impl Interaction {
-    /// 0 neglected, 1 modelled, 2 measured.
-    #[inline]
-    #[must_use]
-    pub const fn word(self) -> u64 {
-        match self {
-            Self::Neglected => 0,
-            Self::Modelled => 1,
-            Self::Measured => 2,
-        }
-    }
-
-    /// The inverse of [`Interaction::word`]; none for any other number.
-    #[must_use]
-    pub const fn from_word(word: u64) -> Option<Self> {
-        Some(match word {
-            0 => Self::Neglected,
-            1 => Self::Modelled,
-            2 => Self::Measured,
-            _ => return None,
-        })
+choice! {
+    /// Where the force between platform and work piece in (7) comes from.
+    pub enum Interaction {
+        /// There is none, or it is left to the feedback.
+        Neglected = 0,
+        /// K_e (h_d − h_e) with the stiffness in the settings.
+        Modelled = 1,
+        /// The force/torque sensor.
+        Measured = 2,
     }
 }
 
-/// What the six numbers of a leg controller's set-point are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SetpointKind {
-    /// Pose from rest: m, rad.
-    Pose,
-    /// Leg displacements, m.
-    Leg,
-}
-
-impl SetpointKind {
-    /// 0 pose, 1 leg.
-    #[inline]
-    #[must_use]
-    pub const fn word(self) -> u64 {
-        self as u64
-    }
-
-    /// The inverse of [`SetpointKind::word`]; none for any other number.
-    #[must_use]
-    pub const fn from_word(word: u64) -> Option<Self> {
-        Some(match word {
-            0 => Self::Pose,
-            1 => Self::Leg,
-            _ => return None,
-        })
+choice! {
+    /// What the six numbers of a leg controller's set-point are.
+    pub enum SetpointKind {
+        /// Pose from rest: m, rad.
+        Pose = 0,
+        /// Leg displacements, m.
+        Leg = 1,
     }
 }
 
@@ -140,16 +99,6 @@ impl Choice for Option<ControlMode> {
             None => Some(None),
             Some(mode) => ControlMode::from_word(mode).map(Some),
         }
-    }
-}
-
-impl Choice for Interaction {
-    fn to_word(&self) -> u64 {
-        self.word()
-    }
-
-    fn of_word(word: u64) -> Option<Self> {
-        Self::from_word(word)
     }
 }
 

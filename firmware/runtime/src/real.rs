@@ -2,7 +2,7 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::snapshot::Field;
+use crate::field::Field;
 
 /// `f32` or `f64`: what the kernels need of a floating-point number, and no more.
 ///

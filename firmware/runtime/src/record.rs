@@ -27,6 +27,7 @@
 //! (`key=value` lines: what the controller says of itself), the CRC-32 of all that as a word of 64 bits, then blocks, each
 //! followed by its CRC-32 as a word. A file that is cut off loses no more than its last block.
 
+use crate::choice::choice;
 use crate::crc::Crc32;
 
 /// First bytes of a file.
@@ -46,37 +47,15 @@ pub const HAS_DIGEST: u64 = 1 << 63;
 /// A block without a trigger.
 pub const NO_TRIGGER: u64 = u64::MAX;
 
-/// Why a block begins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reason {
-    /// The recorder was started.
-    Started,
-    /// The block before it was full: no tick lies between them.
-    Continued,
-    /// The settings changed: no tick lies between them.
-    Settings,
-}
-
-impl Reason {
-    /// 0 started, 1 continued, 2 settings.
-    #[must_use]
-    pub const fn word(self) -> u64 {
-        match self {
-            Self::Started => 0,
-            Self::Continued => 1,
-            Self::Settings => 2,
-        }
-    }
-
-    /// The inverse of [`Reason::word`]; none for any other number.
-    #[must_use]
-    pub const fn from_word(word: u64) -> Option<Self> {
-        Some(match word {
-            0 => Self::Started,
-            1 => Self::Continued,
-            2 => Self::Settings,
-            _ => return None,
-        })
+choice! {
+    /// Why a block begins.
+    pub enum Reason {
+        /// The recorder was started.
+        Started = 0,
+        /// The block before it was full: no tick lies between them.
+        Continued = 1,
+        /// The settings changed: no tick lies between them.
+        Settings = 2,
     }
 }
 

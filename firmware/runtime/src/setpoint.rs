@@ -18,6 +18,7 @@ mod profile;
 mod stop;
 mod trajectory;
 
+use crate::choice::choice;
 use crate::real::Real;
 
 pub use crate::motion::Motion as Target;
@@ -27,40 +28,19 @@ pub use profile::{LONGEST, MoveLimits, Profile};
 pub use stop::{Stop, StopLimits};
 pub use trajectory::{Axis, Row, Segment, Table, Trajectory};
 
-/// What the user wants done.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CommandKind {
-    /// Stand still.
-    Hold,
-    /// Follow the streamed set-points.
-    Stream,
-    /// Go to the pose of [`Command::target`].
-    Move,
-    /// Play the trajectory [`Command::selector`].
-    Trajectory,
-    /// None of these: refused, and held.
-    Unknown,
-}
-
-impl CommandKind {
-    /// 0 hold, 1 stream, 2 move, 3 trajectory.
-    #[inline]
-    #[must_use]
-    pub const fn from_word(word: u64) -> Self {
-        match word {
-            0 => Self::Hold,
-            1 => Self::Stream,
-            2 => Self::Move,
-            3 => Self::Trajectory,
-            _ => Self::Unknown,
-        }
-    }
-
-    /// The same word; 4 for what is none of these.
-    #[inline]
-    #[must_use]
-    pub const fn word(self) -> u64 {
-        self as u64
+choice! {
+    /// What the user wants done.
+    pub enum CommandKind or Unknown {
+        /// Stand still.
+        Hold = 0,
+        /// Follow the streamed set-points.
+        Stream = 1,
+        /// Go to the pose of [`Command::target`].
+        Move = 2,
+        /// Play the trajectory [`Command::selector`].
+        Trajectory = 3,
+        /// None of these: refused, and held.
+        Unknown = 4,
     }
 }
 

@@ -11,6 +11,8 @@ use crate::real::Real;
 
 mod walk;
 
+pub use crate::choice::Choice;
+pub use crate::field::Field;
 pub use walk::Words;
 
 /// Largest |place| that is loaded, m and rad: poses, set-points, displacements.
@@ -28,29 +30,6 @@ pub struct Sizes {
     pub reading: f64,
     /// Stiffness of the environment, N/m and N m/rad.
     pub stiffness: f64,
-}
-
-/// What a state is made of: numbers, flags, choices, arrays of them, and other states.
-pub trait Field {
-    /// Words that it takes.
-    const WORDS: usize;
-}
-
-macro_rules! one_word {
-    ($($type:ty),+) => {
-        $(impl Field for $type {
-            const WORDS: usize = 1;
-        })+
-    };
-}
-one_word!(f64, f32, usize, i32, u32, bool);
-
-impl<C: Choice> Field for C {
-    const WORDS: usize = 1;
-}
-
-impl<F: Field, const N: usize> Field for [F; N] {
-    const WORDS: usize = N * F::WORDS;
 }
 
 /// Something that later ticks depend on. [`state!`](crate::state) declares it: its fields, what they are at reset, and the walk over them.
@@ -79,14 +58,6 @@ pub trait Snapshot: Field {
     fn digest(&self, digest: &mut Digest) {
         let Ok(()) = self.show(digest);
     }
-}
-
-/// A choice that is one word.
-pub trait Choice: Sized {
-    /// Its word.
-    fn to_word(&self) -> u64;
-    /// The inverse; none of a word that is no choice.
-    fn of_word(word: u64) -> Option<Self>;
 }
 
 /// A word that no state holds.
@@ -280,20 +251,5 @@ impl<'a> Reader<'a> {
             *value = self.real(largest)?;
         }
         Ok(())
-    }
-}
-
-/// None is all ones.
-impl Choice for Option<u32> {
-    fn to_word(&self) -> u64 {
-        self.map_or(u64::MAX, u64::from)
-    }
-
-    fn of_word(word: u64) -> Option<Self> {
-        match word {
-            u64::MAX => Some(None),
-            word if word <= u64::from(u32::MAX) => Some(Some(word as u32)),
-            _ => None,
-        }
     }
 }

@@ -25,7 +25,6 @@ mod approach;
 mod debounce;
 mod kinds;
 mod phases;
-mod snapshot;
 mod supervision;
 mod watch;
 

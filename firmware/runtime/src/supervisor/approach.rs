@@ -1,15 +1,17 @@
 //! Set-points of a controller without a generator, from where the legs are to where they are asked for.
 
+use crate::choice::choice;
 use crate::real::Real;
-use crate::snapshot::{Choice, LARGEST_PLACE};
+use crate::snapshot::LARGEST_PLACE;
 
-/// How far an approach has come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stage {
-    Done,
-    /// No set-point has been accepted yet.
-    Waiting,
-    Fading,
+choice! {
+    /// How far an approach has come.
+    enum Stage {
+        Done = 0,
+        /// No set-point has been accepted yet.
+        Waiting = 1,
+        Fading = 2,
+    }
 }
 
 crate::state! { |words|
@@ -67,19 +69,5 @@ impl<T: Real> Approach<T> {
             }
         }
         setpoint
-    }
-}
-
-impl Choice for Stage {
-    fn to_word(&self) -> u64 {
-        match self {
-            Self::Done => 0,
-            Self::Waiting => 1,
-            Self::Fading => 2,
-        }
-    }
-
-    fn of_word(word: u64) -> Option<Self> {
-        [Self::Done, Self::Waiting, Self::Fading].into_iter().find(|stage| stage.to_word() == word)
     }
 }

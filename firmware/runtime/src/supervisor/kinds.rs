@@ -1,5 +1,7 @@
 //! Phases, requests, causes and event bits of the supervisor, with their words. The words are part of every link and record.
 
+use crate::choice::choice;
+
 /// Bit of an event word: a tick began too late, or one was left out.
 pub const MISSED_TICK: u32 = 1;
 /// Bit of an event word: nothing was heard over the link for longer than the target permits.
@@ -11,153 +13,87 @@ pub const CONVERTER: u32 = 8;
 /// Bit of an event word: emergency stop.
 pub const STOP: u32 = 16;
 
-/// What the machine is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// Amplifiers off, codes at rest.
-    Disarmed,
-    /// Amplifiers on, codes held, the law put where the machine is.
-    Arming,
-    /// The control law at work.
-    Running,
-    /// Codes held, the law suspended.
-    Holding,
-    /// Codes on their way to rest.
-    RampingDown,
-    /// As disarmed, for a cause that is to be acknowledged.
-    Faulted,
+choice! {
+    /// What the machine is doing.
+    pub enum Phase {
+        /// Amplifiers off, codes at rest.
+        Disarmed = 0 => "disarmed",
+        /// Amplifiers on, codes held, the law put where the machine is.
+        Arming = 1 => "arming",
+        /// The control law at work.
+        Running = 2 => "running",
+        /// Codes held, the law suspended.
+        Holding = 3 => "holding",
+        /// Codes on their way to rest.
+        RampingDown = 4 => "ramping down",
+        /// As disarmed, for a cause that is to be acknowledged.
+        Faulted = 5 => "faulted",
+    }
 }
 
 impl Phase {
-    /// 0 disarmed, 1 arming, 2 running, 3 holding, 4 ramping down, 5 faulted.
-    #[inline]
-    #[must_use]
-    pub const fn word(self) -> u64 {
-        match self {
-            Self::Disarmed => 0,
-            Self::Arming => 1,
-            Self::Running => 2,
-            Self::Holding => 3,
-            Self::RampingDown => 4,
-            Self::Faulted => 5,
-        }
-    }
-
     /// Whether the amplifiers are to be on.
     #[inline]
     #[must_use]
     pub const fn is_powered(self) -> bool {
         !matches!(self, Self::Disarmed | Self::Faulted)
     }
+}
 
-    /// In words for people.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Disarmed => "disarmed",
-            Self::Arming => "arming",
-            Self::Running => "running",
-            Self::Holding => "holding",
-            Self::RampingDown => "ramping down",
-            Self::Faulted => "faulted",
-        }
-    }
-
-    /// The inverse of [`Phase::word`]; none for any other number.
-    #[must_use]
-    pub const fn from_word(word: u64) -> Option<Self> {
-        Some(match word {
-            0 => Self::Disarmed,
-            1 => Self::Arming,
-            2 => Self::Running,
-            3 => Self::Holding,
-            4 => Self::RampingDown,
-            5 => Self::Faulted,
-            _ => return None,
-        })
+choice! {
+    /// What the user wants of the supervisor. It holds for as long as it is given. A word that is none is a hold: what cannot be
+    /// understood must not move anything.
+    pub enum Request or Hold {
+        /// Nothing: the machine stays in its phase.
+        None = 0,
+        /// Amplifiers on. Taken when it begins to be given, not while it stays: a machine never arms itself again.
+        Arm = 1,
+        /// The control law at work.
+        Run = 2,
+        /// Codes held.
+        Hold = 3,
+        /// Codes to rest, then amplifiers off.
+        RampDown = 4,
+        /// The cause of a fault was seen. Taken when it begins to be given.
+        Acknowledge = 5,
     }
 }
 
-/// What the user wants of the supervisor. It holds for as long as it is given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Request {
-    /// Nothing: the machine stays in its phase.
-    None,
-    /// Amplifiers on. Taken when it begins to be given, not while it stays: a machine never arms itself again.
-    Arm,
-    /// The control law at work.
-    Run,
-    /// Codes held.
-    Hold,
-    /// Codes to rest, then amplifiers off.
-    RampDown,
-    /// The cause of a fault was seen. Taken when it begins to be given.
-    Acknowledge,
-}
-
-impl Request {
-    /// 0 none, 1 arm, 2 run, 3 hold, 4 ramp down, 5 acknowledge.
-    #[inline]
-    #[must_use]
-    pub const fn word(self) -> u64 {
-        match self {
-            Self::None => 0,
-            Self::Arm => 1,
-            Self::Run => 2,
-            Self::Hold => 3,
-            Self::RampDown => 4,
-            Self::Acknowledge => 5,
-        }
+choice! {
+    /// Why a phase was forced upon the machine. The name of none is empty.
+    #[derive(PartialOrd, Ord)]
+    pub enum Cause {
+        /// Nothing was.
+        None = 0 => "",
+        /// A gauge's word is no number.
+        GaugeNotFinite = 1 => "gauge not finite",
+        /// A gauge is beyond its range.
+        GaugeRange = 2 => "gauge out of range",
+        /// A gauge gives the same word over and over while the legs move.
+        GaugeStuck = 3 => "gauge stuck",
+        /// A leg is not where its model says, by its gauges.
+        GaugeDisagreement = 4 => "gauges disagree",
+        /// The platform or a leg is too far from its set-point.
+        TrackingError = 5 => "tracking error",
+        /// A leg stayed at a limit of its voltage or table.
+        VoltageSaturation = 6 => "voltage saturation",
+        /// A leg stayed at the limit of its slew rate.
+        SlewSaturation = 7 => "slew saturation",
+        /// [`MISSED_TICK`].
+        MissedTick = 8 => "missed tick",
+        /// [`LINK_LOST`].
+        LinkLost = 9 => "link lost",
+        /// [`INTEGRITY`].
+        Integrity = 10 => "integrity",
+        /// [`CONVERTER`].
+        Converter = 11 => "converter",
+        /// [`STOP`].
+        EmergencyStop = 12 => "emergency stop",
+        /// [`LINK_LOST`] for so long that nobody is waited for any more.
+        HostGone = 13 => "host gone",
+        /// [`CONVERTER`] for so long.
+        ConverterSilent = 14 => "converter silent",
     }
-
-    /// The inverse of [`Request::word`]. Any other number is a hold: what cannot be understood must not move anything.
-    #[inline]
-    #[must_use]
-    pub const fn from_word(word: u64) -> Self {
-        match word {
-            0 => Self::None,
-            1 => Self::Arm,
-            2 => Self::Run,
-            4 => Self::RampDown,
-            5 => Self::Acknowledge,
-            _ => Self::Hold,
-        }
-    }
-}
-
-/// Why a phase was forced upon the machine.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Cause {
-    /// Nothing was.
-    None,
-    /// A gauge's word is no number.
-    GaugeNotFinite,
-    /// A gauge is beyond its range.
-    GaugeRange,
-    /// A gauge gives the same word over and over while the legs move.
-    GaugeStuck,
-    /// A leg is not where its model says, by its gauges.
-    GaugeDisagreement,
-    /// The platform or a leg is too far from its set-point.
-    TrackingError,
-    /// A leg stayed at a limit of its voltage or table.
-    VoltageSaturation,
-    /// A leg stayed at the limit of its slew rate.
-    SlewSaturation,
-    /// [`MISSED_TICK`].
-    MissedTick,
-    /// [`LINK_LOST`].
-    LinkLost,
-    /// [`INTEGRITY`].
-    Integrity,
-    /// [`CONVERTER`].
-    Converter,
-    /// [`STOP`].
-    EmergencyStop,
-    /// [`LINK_LOST`] for so long that nobody is waited for any more.
-    HostGone,
-    /// [`CONVERTER`] for so long.
-    ConverterSilent,
 }
 
 impl Cause {
@@ -179,81 +115,11 @@ impl Cause {
         Self::ConverterSilent,
     ];
 
-    /// 0 none, 1 gauge not finite, 2 gauge range, 3 gauge stuck, 4 gauge disagreement, 5 tracking error, 6 voltage
-    /// saturation, 7 slew saturation, 8 missed tick, 9 link lost, 10 integrity, 11 converter, 12 emergency stop,
-    /// 13 host gone, 14 converter silent.
-    #[inline]
-    #[must_use]
-    pub const fn word(self) -> u64 {
-        match self {
-            Self::None => 0,
-            Self::GaugeNotFinite => 1,
-            Self::GaugeRange => 2,
-            Self::GaugeStuck => 3,
-            Self::GaugeDisagreement => 4,
-            Self::TrackingError => 5,
-            Self::VoltageSaturation => 6,
-            Self::SlewSaturation => 7,
-            Self::MissedTick => 8,
-            Self::LinkLost => 9,
-            Self::Integrity => 10,
-            Self::Converter => 11,
-            Self::EmergencyStop => 12,
-            Self::HostGone => 13,
-            Self::ConverterSilent => 14,
-        }
-    }
-
-    /// In words for people; nothing for [`Cause::None`].
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "",
-            Self::GaugeNotFinite => "gauge not finite",
-            Self::GaugeRange => "gauge out of range",
-            Self::GaugeStuck => "gauge stuck",
-            Self::GaugeDisagreement => "gauges disagree",
-            Self::TrackingError => "tracking error",
-            Self::VoltageSaturation => "voltage saturation",
-            Self::SlewSaturation => "slew saturation",
-            Self::MissedTick => "missed tick",
-            Self::LinkLost => "link lost",
-            Self::Integrity => "integrity",
-            Self::Converter => "converter",
-            Self::EmergencyStop => "emergency stop",
-            Self::HostGone => "host gone",
-            Self::ConverterSilent => "converter silent",
-        }
-    }
-
     /// 1 << word: its bit in conditions.
     #[inline]
     #[must_use]
     pub const fn bit(self) -> u32 {
         1 << self.word()
-    }
-
-    /// The inverse of [`Cause::word`]; none for any other number.
-    #[must_use]
-    pub const fn from_word(word: u64) -> Option<Self> {
-        Some(match word {
-            0 => Self::None,
-            1 => Self::GaugeNotFinite,
-            2 => Self::GaugeRange,
-            3 => Self::GaugeStuck,
-            4 => Self::GaugeDisagreement,
-            5 => Self::TrackingError,
-            6 => Self::VoltageSaturation,
-            7 => Self::SlewSaturation,
-            8 => Self::MissedTick,
-            9 => Self::LinkLost,
-            10 => Self::Integrity,
-            11 => Self::Converter,
-            12 => Self::EmergencyStop,
-            13 => Self::HostGone,
-            14 => Self::ConverterSilent,
-            _ => return None,
-        })
     }
 }
 
