@@ -6,6 +6,8 @@ use host_sim::word::Scalar;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::ir::{Permitted, Range};
+use specgen_runtime::snapshot::Field;
+use specgen_runtime::supervisor::Supervisor;
 use specgen_tests::Emitted;
 
 /// Ticks under one `Config`.
@@ -218,9 +220,10 @@ fn hostile(name: &str, spec: &str, edits: &[(&str, &str)], records: &[(&str, Str
             });
             assert_eq!(bench.machine.digest(), bench.other.digest(), "{name}, tick {tick}");
             met.snapshots += 1;
-            // Of a leg of a platform: memory, code, what is requested, what is held back.
+            // Of a leg of a platform: memory, code, what is requested, what is held back. Legs end the state of the law.
             let leg = 4 + 2 * ir.hysteresis.memory + 3;
-            let excess = words.chunks_exact(leg).take(6).map(|leg| scalar.decode(leg[leg.len() - 1]).abs());
+            let legs = words.len() - Supervisor::<f64>::WORDS - 6 * leg;
+            let excess = words[legs..].chunks_exact(leg).take(6).map(|leg| scalar.decode(leg[leg.len() - 1]).abs());
             met.held_back += u32::from(platform && excess.fold(0.0, f64::max) > 16.0);
             beside = BESIDE;
         }
