@@ -60,7 +60,7 @@ impl Declared {
             table
         } else {
             let options = Options::new(model.hysteresis.grid, model.actuator.voltage);
-            let identified = identify(&parse_record(&text, name)?, &options)?;
+            let identified = identify(&parse_record(&text, name)?, &options).map_err(about_voltage)?;
             if matches!(model.hysteresis.rate, RateDependence::Creep(_)) {
                 self.warnings.push(static_table_with_creep(model, name));
             }
@@ -129,6 +129,17 @@ fn fits_spec(model: &Model, name: &str, table: &EverettTable, code: Code, key: &
 fn about_file(name: &str, code: Code, key: &str, message: String, help: String) -> Diagnostic {
     let place = Place::File { path: name.to_owned(), line: None };
     Diagnostic::new(code, key, place, message, help)
+}
+
+/// Of a record whose drive is not what the spec says: the key that says it.
+fn about_voltage(mut findings: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    for one in &mut findings {
+        if [codes::DRIVE_RANGE, codes::NOT_EXCITED].iter().any(|code| one.code == *code) {
+            one.key = "actuator.voltage".to_owned();
+            one.help = format!("{}; `actuator.voltage` says that range, in volts at the stack", one.help);
+        }
+    }
+    findings
 }
 
 /// The check of the adaptation knows the static inverse only.

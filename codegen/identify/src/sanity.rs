@@ -11,6 +11,8 @@ pub const MIN_SAMPLES: usize = 100;
 const GAP: f64 = 10.0;
 /// The displacement may stay exactly equal while the drive travels this share of its range; longer is a stuck or limited sensor.
 const STUCK_TRAVEL: f64 = 0.05;
+/// A record of reversal curves that goes on for longer, s, is in another unit, or drifts.
+const LONGEST: f64 = 3600.0;
 /// White noise of a command, as a share of its range, is below this (rounding to five digits); of a gauge it is above.
 const COMMANDED_NOISE: f64 = 3e-6;
 /// A displacement range outside these bounds (m) is unusual for a piezo actuator and suggests another unit.
@@ -26,6 +28,7 @@ pub(crate) fn check(lines: &[usize], columns: &[Vec<f64>; 3], findings: &mut Fin
         return;
     }
     check_time(lines, time, findings);
+    check_duration(time, findings);
     let moving = [(drive, "drive_V", 1.0), (displacement, "displacement_um", 1e6)]
         .into_iter()
         .all(|(column, name, unit)| check_not_constant(time, column, name, unit, findings));
@@ -37,6 +40,17 @@ pub(crate) fn check(lines: &[usize], columns: &[Vec<f64>; 3], findings: &mut Fin
     if !findings.any_error() {
         limits::check(lines, time, drive, displacement, findings);
     }
+}
+
+/// Reversal curves take seconds to some minutes; in an hour the temperature moves an actuator more than its hysteresis does.
+fn check_duration(time: &[f64], findings: &mut Findings) {
+    let [first, .., last] = time else { return };
+    let duration = last - first;
+    if duration <= LONGEST {
+        return;
+    }
+    let message = format!("goes on for {:.1} hours, by its column `time_s`", duration / 3600.0);
+    findings.add(codes::RECORD_LONG, None, message, "check that `time_s` is in seconds, not in ms");
 }
 
 pub(crate) fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings) {

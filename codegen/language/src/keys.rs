@@ -17,6 +17,8 @@ pub struct Section {
     pub name: &'static str,
     /// How often it stands in a file.
     pub kind: Kind,
+    /// What else people call it; messages lead from there to the section.
+    pub aliases: &'static [&'static str],
     /// One line for the reference.
     pub doc: &'static str,
     /// Its keys, in the order of the reference.
@@ -50,6 +52,8 @@ pub struct Key {
     pub doc: &'static str,
     /// Symbol of the paper, empty if it has none.
     pub symbol: &'static str,
+    /// What else people call it. Nothing is read under such a name, or under the symbol; messages lead from it to the key.
+    pub aliases: &'static [&'static str],
     /// A TOML literal that is right.
     pub example: &'static str,
 }
@@ -67,6 +71,8 @@ pub enum Shape {
     Leading(usize, &'static [Item]),
     /// An array of one or six file names, relative to the spec.
     Records,
+    /// An array of texts `KEY: REASON`, each about a key of the spec.
+    Reasons,
 }
 
 /// A single value.
@@ -156,7 +162,22 @@ pub enum Presence {
     Rule(&'static str),
 }
 
+impl Key {
+    /// Whether people call it `name`: its symbol or an alias, upper or lower case, with or without what joins words.
+    #[must_use]
+    pub fn is_called(&self, name: &str) -> bool {
+        // "I_xx I_yy I_zz" are the three of one list.
+        self.symbol.split(' ').chain(self.aliases.iter().copied()).any(|other| is_same(other, name))
+    }
+}
+
 impl Section {
+    /// The same of the section.
+    #[must_use]
+    pub fn is_called(&self, name: &str) -> bool {
+        self.aliases.iter().any(|other| is_same(other, name))
+    }
+
     /// Whether a file without this table is refused.
     #[must_use]
     pub fn is_required(&self) -> bool {
@@ -208,6 +229,12 @@ impl Section {
         }
         text
     }
+}
+
+/// Whether two names differ by nothing but case and what joins words; the case of a single letter counts, as in `k` and `K`.
+fn is_same(a: &str, b: &str) -> bool {
+    let plain = |name: &str| name.replace(['_', '-', ' '], "").to_lowercase();
+    !a.is_empty() && (a == b || (a.len() > 1 && plain(a) == plain(b)))
 }
 
 /// Key path of `key` in the table at `table`: `gauge[2].point`, or `name` before the first table.

@@ -23,7 +23,7 @@ pub use hysteresis::{Adaptation, AdaptationMode, Hysteresis, LARGEST_RUN_INTERVA
 pub use mcu::{Mcu, Part};
 pub use mechanics::{Geometry, LARGEST_TRAVEL, LARGEST_TURN, LegBody, RigidBody, Workspace};
 pub use supervisor::{Robust, Supervisor};
-pub use target::{Budget, ControllerOptions, Requirements, Scalar, SetpointKind, Target, Timing};
+pub use target::{Budget, ControllerOptions, Lint, Requirements, Scalar, SetpointKind, Target, Timing};
 pub(crate) use task_space::unit;
 pub use task_space::{
     ControlMode, Environment, Frames, Gains, Interaction, LARGEST_GAIN, PaperPath, Probe, SetpointRules, TaskSpace,
@@ -58,11 +58,13 @@ pub const SECTIONS: &[Section] = &[
     Target::SECTION,
     Budget::SECTION,
     Robust::SECTION,
+    Lint::SECTION,
 ];
 
 const START: Section = Section {
     name: "",
     kind: Kind::Plain,
+    aliases: &[],
     doc: "The keys before the first section.",
     keys: &[
         Key {
@@ -71,6 +73,7 @@ const START: Section = Section {
             presence: Presence::Required,
             doc: "Version of this language.",
             symbol: "",
+            aliases: &[],
             example: "1",
         },
         Key {
@@ -79,6 +82,7 @@ const START: Section = Section {
             presence: Presence::Required,
             doc: "Name of the platform: a letter, then letters, digits, `-` and `_`.",
             symbol: "",
+            aliases: &[],
             example: r#""reference""#,
         },
     ],
@@ -123,6 +127,8 @@ pub struct Model {
     pub supervisor: Supervisor,
     /// What `specgen robust` varies, and its gate; no constant of the controller comes from here.
     pub robust: Robust,
+    /// What the physical lint lets pass, and why.
+    pub lint: Lint,
     /// Where each key stands in the spec file, by key path (`actuator.voltage[1]`), for findings of later phases.
     pub spans: BTreeMap<String, ops::Range<usize>>,
 }
@@ -151,6 +157,7 @@ impl Model {
             requirements: Requirements::read(fields, "requirements")?,
             supervisor: Supervisor::read(fields, "supervisor")?,
             robust: Robust::read(fields, "robust")?,
+            lint: Lint::read(fields, "lint").unwrap_or(Lint { allow: Vec::new() }),
             spans: fields.spans(),
         })
     }

@@ -64,6 +64,62 @@ pub enum Problem {
     Underflow,
 }
 
+/// Units as people write them; any other of the same dimension will do, too.
+const COMMON: &[&str] = &[
+    "m",
+    "mm",
+    "um",
+    "nm",
+    "kg",
+    "g",
+    "rad",
+    "mrad",
+    "urad",
+    "nrad",
+    "deg",
+    "s",
+    "ms",
+    "us",
+    "Hz",
+    "kHz",
+    "V",
+    "mV",
+    "V/ms",
+    "V/s",
+    "um/V",
+    "nm/V",
+    "N/m",
+    "N/um",
+    "N m/rad",
+    "N s/m",
+    "N m s/rad",
+    "N/(m s)",
+    "N m/(rad s)",
+    "kg m^2",
+    "g mm^2",
+    "um/s",
+    "mm/s",
+    "mrad/s",
+    "rad/s",
+    "mm/s^2",
+    "m/s^2",
+    "mrad/s^2",
+    "rad/s^2",
+    "m/s^3",
+    "rad/s^3",
+    "A",
+    "mA",
+    "uF",
+    "nF",
+    "KiB",
+    "MiB",
+];
+
+/// The usual units of a dimension, for helps and editors.
+pub fn common_units(dimension: Dimension) -> impl Iterator<Item = &'static str> {
+    COMMON.iter().copied().filter(move |unit| unit_value(unit).is_some_and(|one| one.dimension == dimension))
+}
+
 /// Reads a quantity. A text without a unit is a quantity without dimension.
 ///
 /// # Errors

@@ -34,11 +34,12 @@ pub use text::nearest;
 
 /// Errors that leave every value that the model needs as it stands in the file. A gain without a unit counts: gains may be
 /// left out.
-const UNPHYSICAL: [Code; 7] = [
+const UNPHYSICAL: [Code; 8] = [
+    codes::BIAS_OUTSIDE,
+    codes::VOLTAGE_OUTSIDE_DAC,
     codes::GYRATION,
     codes::INERTIA_UNPHYSICAL,
     codes::CENTER_OUTSIDE_LEG,
-    codes::WORKSPACE_UNREACHABLE,
     codes::STROKE_IMPOSSIBLE,
     codes::UNIT_MISSING,
     codes::RECORD_UNREADABLE,

@@ -9,9 +9,9 @@ pub(crate) use crate::quantity::Dimension;
 /// ```text
 /// section! {
 ///     /// What the section is: the text of the reference, and of the struct.
-///     "path.of.section", Plain => Struct {
+///     "path.of.section" ["what else people call it"], Plain => Struct {
 ///         /// What the key is: the text of the reference, and of the field.
-///         key: Type = shape, Required, "symbol of the paper, or nothing", "an example as it stands in a spec";
+///         key: Type = shape, Required, "symbol of the paper, or nothing" ["what else people call it"], "an example as it stands in a spec";
 ///         /// A key without a field: what it says goes into one of those below.
 ///         key = shape, Default(as it stands in a spec), "", an example;
 ///     }
@@ -25,9 +25,9 @@ macro_rules! section {
     (
         #[doc = $doc:literal]
         $(#[doc = $more:literal])*
-        $section:literal, $kind:expr => $struct:ident {$(
+        $section:literal $([$($other:literal),*])?, $kind:expr => $struct:ident {$(
             #[doc = $text:literal]
-            $key:ident $(: $type:ty)? = $shape:expr, $presence:ident $(($with:tt))?, $symbol:literal, $example:tt;
+            $key:ident $(: $type:ty)? = $shape:expr, $presence:ident $(($with:tt))?, $symbol:literal $([$($alias:literal),*])?, $example:tt;
         )*}
         $(and |$fields:ident, $table:ident| {$(
             $(#[doc = $field_doc:literal])+
@@ -48,6 +48,7 @@ macro_rules! section {
             pub(crate) const SECTION: Section = Section {
                 name: $section,
                 kind: { use Kind::*; $kind },
+                aliases: &[$($($other),*)?],
                 doc: $doc.trim_ascii_start(),
                 keys: &[$(Key {
                     name: stringify!($key),
@@ -55,6 +56,7 @@ macro_rules! section {
                     presence: section!(@presence $presence $($with)?),
                     doc: $text.trim_ascii_start(),
                     symbol: $symbol,
+                    aliases: &[$($($alias),*)?],
                     example: section!(@toml $example),
                 }),*],
             };

@@ -23,25 +23,25 @@ section! {
     /// The piezo stacks of a leg.
     ///
     /// In SI units: m/V, m, V, V/s, N/m, Hz, F.
-    "actuator", Plain => Actuator {
+    "actuator" ["piezo", "stack", "actuators", "motor"], Plain => Actuator {
         /// Stacks in series in one leg.
-        stacks: u32 = integer(1, 1000), Required, "", 5;
+        stacks: u32 = integer(1, 1000), Required, "" ["n", "number", "count", "number_of_stacks", "n_stacks"], 5;
         /// Displacement per volt of one stack; a leg has `stacks` times that: the gain of (AII.1).
-        stack_gain: f64 = one(Dimension::PIEZO_GAIN, Range::closed(1e-12, 1e-4), "um/V"), Required, "rho", "0.1262 um/V";
+        stack_gain: f64 = one(Dimension::PIEZO_GAIN, Range::closed(1e-12, 1e-4), "um/V"), Required, "rho" ["gain", "d33", "piezo_gain", "displacement_per_volt"], "0.1262 um/V";
         /// Free stroke of a leg.
-        stroke: f64 = one(Dimension::LENGTH, Range::closed(1e-9, 0.01), "um"), Required, "", "60 um";
+        stroke: f64 = one(Dimension::LENGTH, Range::closed(1e-9, 0.01), "um"), Required, "" ["travel", "displacement", "range", "elongation"], "60 um";
         /// Smallest and largest voltage that the controller may ask for.
-        voltage: [f64; 2] = list(&[VOLTS; 2]), Required, "", ["0 V", "100 V"];
+        voltage: [f64; 2] = list(&[VOLTS; 2]), Required, "" ["drive", "voltage_range", "U", "limits", "voltage_limits"], ["0 V", "100 V"];
         /// Fastest change of voltage that amplifier and stack stand.
-        slew_rate: f64 = one(Dimension::SLEW_RATE, Range::closed(1e-3, 1e12), "V/ms"), Required, "", "40 V/ms";
+        slew_rate: f64 = one(Dimension::SLEW_RATE, Range::closed(1e-3, 1e12), "V/ms"), Required, "" ["slew", "max_slew", "rate"], "40 V/ms";
         /// Axial stiffness of a leg.
-        axial_stiffness: f64 = one(Dimension::STIFFNESS, Range::closed(1.0, 1e12), "N/m"), Required, "k_a", "1e7 N/m";
+        axial_stiffness: f64 = one(Dimension::STIFFNESS, Range::closed(1.0, 1e12), "N/m"), Required, "k_a" ["stiffness", "k", "c"], "1e7 N/m";
         /// First axial resonance of a leg as mounted.
-        resonance: f64 = one(Dimension::FREQUENCY, Range::closed(0.1, 1e7), "Hz"), Required, "", "870 Hz";
+        resonance: f64 = one(Dimension::FREQUENCY, Range::closed(0.1, 1e7), "Hz"), Required, "" ["f_0", "f_r", "natural_frequency", "eigenfrequency", "resonant_frequency", "resonance_frequency"], "870 Hz";
         /// Damping ratio of that resonance.
-        damping_ratio: f64 = number(Range::open(0.0, 1.0)), Required, "zeta", 0.1;
+        damping_ratio: f64 = number(Range::open(0.0, 1.0)), Required, "zeta" ["damping"], 0.1;
         /// Of all stacks of a leg together, for the current that their voltage takes.
-        capacitance: Option<f64> = one(Dimension::CAPACITANCE, Range::above(0.0, 1.0), "uF"), Optional, "", "35 uF";
+        capacitance: Option<f64> = one(Dimension::CAPACITANCE, Range::above(0.0, 1.0), "uF"), Optional, "" ["C", "C_p"], "35 uF";
     }
 }
 
@@ -57,13 +57,13 @@ section! {
     /// Power amplifier between converter and stack. No lag is the cautious default: lag damps the resonance.
     ///
     /// In s, V and A.
-    "amplifier", Plain => Amplifier {
+    "amplifier" ["amp", "driver"], Plain => Amplifier {
         /// Time constant of its first-order lag.
-        lag: f64 = one(Dimension::TIME, Range::closed(0.0, 10.0), "ms"), Default("0 ms"), "", "0.35 ms";
+        lag: f64 = one(Dimension::TIME, Range::closed(0.0, 10.0), "ms"), Default("0 ms"), "" ["tau", "time_constant", "bandwidth", "delay"], "0.35 ms";
         /// Output noise, rms.
-        noise: f64 = one(Dimension::VOLTAGE, Range::closed(0.0, 100.0), "mV"), Default("0 V"), "", "2 mV";
+        noise: f64 = one(Dimension::VOLTAGE, Range::closed(0.0, 100.0), "mV"), Default("0 V"), "" ["sigma", "rms", "noise_rms"], "2 mV";
         /// Largest output current for one leg; slew rate and trajectories are held against it with `actuator.capacitance`.
-        current: Option<f64> = one(Dimension::CURRENT, Range::above(0.0, 1e4), "mA"), Optional, "", "2 A";
+        current: Option<f64> = one(Dimension::CURRENT, Range::above(0.0, 1e4), "mA"), Optional, "" ["I", "I_max", "max_current", "peak_current"], "2 A";
     }
 }
 
@@ -71,11 +71,11 @@ section! {
     /// Converter that drives the amplifier, in volts at the stack.
     ///
     /// Full scale is code 2^bits − 1; in V.
-    "dac", Plain => Dac {
+    "dac" ["converter", "output"], Plain => Dac {
         /// Resolution.
-        bits: u32 = integer(8, 24), Required, "", 16;
+        bits: u32 = integer(8, 24), Required, "" ["resolution", "n_bits"], 16;
         /// Voltage at code 0 and at full scale.
-        range: [f64; 2] = list(&[VOLTS; 2]), Required, "", ["0 V", "150 V"];
+        range: [f64; 2] = list(&[VOLTS; 2]), Required, "" ["voltage", "output_range"], ["0 V", "150 V"];
     }
 }
 
@@ -83,13 +83,13 @@ section! {
     /// Displacement gauge of a leg; with [control], of the six that see the platform.
     ///
     /// Displacements in m; voltages in V, ±10 V without the key.
-    "sensor", Plain => Sensor {
+    "sensor" ["gauges", "lvdt", "encoder"], Plain => Sensor {
         /// Smallest and largest displacement that it can report.
-        range: [f64; 2] = list(&[READING; 2]), Required, "", ["-2 um", "48 um"];
+        range: [f64; 2] = list(&[READING; 2]), Required, "" ["travel", "measuring_range"], ["-2 um", "48 um"];
         /// Noise, rms.
-        noise: f64 = one(Dimension::LENGTH, Range::closed(0.0, 1e-3), "nm"), Default("0 nm"), "", "2.2 nm";
+        noise: f64 = one(Dimension::LENGTH, Range::closed(0.0, 1e-3), "nm"), Default("0 nm"), "" ["sigma", "rms", "noise_rms"], "2.2 nm";
         /// Resolution of its converter over the range.
-        bits: u32 = integer(8, 32), Required, "", 16;
+        bits: u32 = integer(8, 32), Required, "" ["resolution", "n_bits"], 16;
         /// With a calibration: voltage of its converter at code 0 and at full scale.
         input_range: Option<[f64; 2]> = list(&[VOLTS; 2]), Rule(r#"["-10 V", "10 V"]"#), "", ["0 V", "10 V"];
         /// With [control]: displacement as a polynomial of the gauge's voltage, lowest power first; the gauge words are then volts. For all six gauges; a gauge may have its own.

@@ -17,13 +17,13 @@ section! {
     /// The inverse Preisach model and the measurements that identify it.
     ///
     /// Times in s.
-    "hysteresis", Plain => Hysteresis {
+    "hysteresis" ["preisach", "model"], Plain => Hysteresis {
         /// Intervals per axis of the Preisach plane; the table grows and the error falls with its square.
-        grid: usize = integer(2, MAX_GRID as i64), Default(32), "N", 32;
+        grid: usize = integer(2, MAX_GRID as i64), Default(32), "N" ["n", "cells", "discretization"], 32;
         /// Reversals that the controller can remember.
-        memory: usize = integer(8, 256), Default(64), "", 64;
+        memory: usize = integer(8, 256), Default(64), "" ["depth"], 64;
         /// Reversal-curve files, relative to the spec: one for all legs, or six. A table that `specgen identify -o` wrote is taken as it is.
-        records: Vec<String> = Shape::Records, Required, "", ["records/reference-forc.csv"];
+        records: Vec<String> = Shape::Records, Required, "" ["record", "file", "files", "data"], ["records/reference-forc.csv"];
         /// Rate dependence in model and inverse: none; the dynamic Preisach model (6); creep behind the static model. `specgen identify rate` finds out which is worth it.
         rate = one_of(&["static", "dynamic-preisach", "creep"]), Default("static"), "", "creep";
         /// With "dynamic-preisach": tables of the second weight as `specgen identify rate -o` writes them, one for all legs or six.
@@ -82,7 +82,7 @@ section! {
     /// A bandwidth in the spec is a weight here: ω = Ω·T_run.
     "adaptation", Plain => Adaptation {
         /// Inverse model alone; with the level estimate (AII.3); with level and drift (AII.5), (AII.6).
-        mode: AdaptationMode = one_of(AdaptationMode::WORDS), Default("invhys"), "", "pcc";
+        mode: AdaptationMode = one_of(AdaptationMode::WORDS), Default("invhys"), "" ["law"], "pcc";
         /// Weight of a new reading in the level estimate, per run: (AII.3), (AII.5).
         level_weight = WEIGHT, InsteadOf("level_bandwidth"), "omega_1", 0.252;
         /// The same as a bandwidth: weight = bandwidth x period x run_interval.

@@ -26,17 +26,17 @@ section! {
     /// Joints of base and platform, on circles as in equations (1) and (2) or one by one, and the pose at rest.
     ///
     /// Radii and angles of a spec, (1) and (2), are joints here already. Lengths in m.
-    "geometry", Plain => Geometry {
+    "geometry" ["hexapod", "stewart", "kinematics"], Plain => Geometry {
         /// Radius of the circle through the six base joints.
-        base_radius = one(Dimension::LENGTH, RADIUS, "mm"), Form(CIRCLES), "r_B", "150 mm";
+        base_radius = one(Dimension::LENGTH, RADIUS, "mm"), Form(CIRCLES), "r_B" ["base_circle", "bottom_radius"], "150 mm";
         /// Radius of the circle through the six platform joints.
-        platform_radius = one(Dimension::LENGTH, RADIUS, "mm"), Form(CIRCLES), "r_P", "100 mm";
+        platform_radius = one(Dimension::LENGTH, RADIUS, "mm"), Form(CIRCLES), "r_P" ["top_radius", "moving_radius", "plate_radius"], "100 mm";
         /// Angle between the two base joints of a pair.
-        base_angle = one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Form(CIRCLES), "alpha_B", "0.012 pi rad";
+        base_angle = one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Form(CIRCLES), "alpha_B" ["base_joint_angle"], "0.012 pi rad";
         /// Angle between the two platform joints of a pair.
-        platform_angle = one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Form(CIRCLES), "alpha_P", "0.012 pi rad";
+        platform_angle = one(Dimension::ANGLE, JOINT_ANGLE, "rad"), Form(CIRCLES), "alpha_P" ["platform_joint_angle", "top_angle"], "0.012 pi rad";
         /// Height of P_C, the origin of {P}, above that of {B} at rest; with joint circles, of the platform's joint plane above the base's.
-        height: f64 = one(Dimension::LENGTH, RADIUS, "mm"), Required, "P_z", "180 mm";
+        height: f64 = one(Dimension::LENGTH, RADIUS, "mm"), Required, "P_z" ["h", "z0", "z", "rest_height", "H_0"], "180 mm";
         /// The six base joints in {B}, leg by leg: where the joints lie on no circle.
         base_joints = Shape::Rows(6, JOINT), Form(JOINTS), "B_i", BASE_JOINTS;
         /// The six platform joints in {P}, leg by leg.
@@ -82,15 +82,15 @@ section! {
     /// The moving platform as a rigid body, in its own frame {P}, Table 4: its part of (4).
     ///
     /// In kg, kg m² and m; I_xy is −∫xy dm.
-    "platform", Plain => RigidBody {
+    "platform" ["plate", "load", "payload", "body", "top"], Plain => RigidBody {
         /// Mass with everything that is mounted on it.
-        mass: f64 = one(Dimension::MASS, BODY_MASS, "kg"), Required, "m", "1.195 kg";
+        mass: f64 = one(Dimension::MASS, BODY_MASS, "kg"), Required, "m" ["payload", "weight", "load"], "1.195 kg";
         /// Moments of inertia about the centre of mass.
-        inertia: [f64; 3] = list(&[item(Dimension::INERTIA, MOMENT, "g mm^2"); 3]), Required, "I_xx I_yy I_zz", ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"];
+        inertia: [f64; 3] = list(&[item(Dimension::INERTIA, MOMENT, "g mm^2"); 3]), Required, "I_xx I_yy I_zz" ["I", "J", "moments", "moment_of_inertia"], ["3.26e7 g mm^2", "3.26e7 g mm^2", "9.7e6 g mm^2"];
         /// Entries of the inertia matrix off the diagonal: I_xy is minus the integral of x y dm.
-        products: [f64; 3] = list(&[PRODUCT; 3]), Default(["0 g mm^2", "0 g mm^2", "0 g mm^2"]), "I_xy I_xz I_yz", ["0 g mm^2", "0 g mm^2", "0 g mm^2"];
+        products: [f64; 3] = list(&[PRODUCT; 3]), Default(["0 g mm^2", "0 g mm^2", "0 g mm^2"]), "I_xy I_xz I_yz" ["products_of_inertia", "cross_inertia"], ["0 g mm^2", "0 g mm^2", "0 g mm^2"];
         /// Centre of mass, from the centre of the platform joints.
-        center_of_mass: [f64; 3] = POINT, Default(["0 mm", "0 mm", "0 mm"]), "", ["0 mm", "0 mm", "0 mm"];
+        center_of_mass: [f64; 3] = POINT, Default(["0 mm", "0 mm", "0 mm"]), "" ["com", "cog", "centre_of_mass", "center_of_gravity"], ["0 mm", "0 mm", "0 mm"];
     }
 }
 
@@ -98,21 +98,21 @@ section! {
     /// The two parts of a leg, the same for all six, Table 4: masses and inertias of (AI.9) and (AI.12).
     ///
     /// In kg, kg m², m and rad.
-    "leg", Plain => LegBody {
+    "leg" ["strut"], Plain => LegBody {
         /// Mass of the part at the base joint.
-        fixed_mass: f64 = one(Dimension::MASS, BODY_MASS, "g"), Required, "m_s", "90.26 g";
+        fixed_mass: f64 = one(Dimension::MASS, BODY_MASS, "g"), Required, "m_s" ["lower_mass", "base_mass"], "90.26 g";
         /// Mass of the part at the platform joint.
-        extensible_mass: f64 = one(Dimension::MASS, BODY_MASS, "g"), Required, "m_e", "73.62 g";
+        extensible_mass: f64 = one(Dimension::MASS, BODY_MASS, "g"), Required, "m_e" ["upper_mass", "moving_mass"], "73.62 g";
         /// Moment of inertia of the base-side part about a transverse axis through its mass centre.
-        fixed_inertia: f64 = one(Dimension::INERTIA, MOMENT, "g mm^2"), Required, "I_s", "1.07e5 g mm^2";
+        fixed_inertia: f64 = one(Dimension::INERTIA, MOMENT, "g mm^2"), Required, "I_s" ["lower_inertia"], "1.07e5 g mm^2";
         /// The same of the platform-side part.
-        extensible_inertia: f64 = one(Dimension::INERTIA, MOMENT, "g mm^2"), Required, "I_e", "5.27e4 g mm^2";
+        extensible_inertia: f64 = one(Dimension::INERTIA, MOMENT, "g mm^2"), Required, "I_e" ["upper_inertia"], "5.27e4 g mm^2";
         /// Mass centre of the base-side part, from the base joint.
-        fixed_center: f64 = LEG_CENTER, Required, "l_s", "50 mm";
+        fixed_center: f64 = LEG_CENTER, Required, "l_s" ["lower_center"], "50 mm";
         /// Mass centre of the platform-side part, from the platform joint.
-        extensible_center: f64 = LEG_CENTER, Required, "l_e", "50 mm";
+        extensible_center: f64 = LEG_CENTER, Required, "l_e" ["upper_center"], "50 mm";
         /// Angle by which the joints of a leg may turn from rest, either way.
-        joint_angle: Option<f64> = one(Dimension::ANGLE, Range::above(0.0, 1.5), "mrad"), Optional, "", "20 mrad";
+        joint_angle: Option<f64> = one(Dimension::ANGLE, Range::above(0.0, 1.5), "mrad"), Optional, "" ["joint_range"], "20 mrad";
     }
 }
 
@@ -120,11 +120,11 @@ section! {
     /// Bounds on the pose that may be asked for, from rest.
     ///
     /// Translations in m, rotations in rad.
-    "workspace", Plain => Workspace {
+    "workspace" ["range", "limits", "travel"], Plain => Workspace {
         /// Bounds on |x|, |y|, |z|.
-        translation: [f64; 3] = list(&[TRAVEL; 3]), Required, "", ["40 um", "40 um", "40 um"];
+        translation: [f64; 3] = list(&[TRAVEL; 3]), Required, "" ["xyz", "position", "travel", "translations"], ["40 um", "40 um", "40 um"];
         /// Bounds on |theta_x|, |theta_y|, |theta_z|.
-        rotation: [f64; 3] = list(&[TURN; 3]), Required, "", ["0.6 mrad", "0.6 mrad", "0.6 mrad"];
+        rotation: [f64; 3] = list(&[TURN; 3]), Required, "" ["angles", "orientation", "tilt", "rotations"], ["0.4 mrad", "0.35 mrad", "0.5 mrad"];
     }
 }
 

@@ -10,7 +10,7 @@ section! {
     /// What the supervisor in the controller takes for a fault, and for how long it must last; docs/supervisor.md. Gauges are looked at in turn, one a tick.
     ///
     /// In V, s, V/s and m; none where the rule of the key holds.
-    "supervisor", Plain => Supervisor {
+    "supervisor" ["faults", "watchdog", "safety"], Plain => Supervisor {
         /// Voltage at which the legs stand while disarmed and to which they ramp down. Amplifiers that are switched off leave a stack at 0 V: from any other rest it jumps when they are switched on and off.
         rest_voltage: Option<f64> = Shape::One(VOLTS), Rule("0 V, or the limit of `actuator.voltage` that is nearest to it"), "", "0 V";
         /// Time without any condition that arming takes. Of six legs with their own gauges also the time constant with which the set-point is approached from where the legs are.
@@ -46,7 +46,7 @@ section! {
     /// What `specgen robust` varies: smallest and largest factor on what the other sections say, and the error that it lets pass. Nothing of it is in the controller.
     ///
     /// Errors in m and rad; none where the spec does not say.
-    "robust", Optional => Robust {
+    "robust" ["uncertainty", "tolerances"], Optional => Robust {
         /// On mass and inertia of the platform.
         mass: Option<[f64; 2]> = FACTORS, Rule("[0.95, 1.05]"), "", [0.95, 1.05];
         /// On the axial stiffness of a leg.

@@ -9,9 +9,9 @@ section! {
     /// Control timing.
     ///
     /// In s.
-    "timing", Plain => Timing {
+    "timing" ["sampling", "rate", "clock"], Plain => Timing {
         /// Control period.
-        period: f64 = one(Dimension::TIME, Range::closed(1e-6, 10.0), "us"), Required, "T_s", "200 us";
+        period: f64 = one(Dimension::TIME, Range::closed(1e-6, 10.0), "us"), Required, "T_s" ["rate", "sample_rate", "sampling_rate", "sample_time", "sampling_time", "sampling_period", "frequency", "f_s", "dt", "control_rate", "loop_rate"], "200 us";
     }
 }
 
@@ -49,17 +49,43 @@ section! {
     /// What the platform is for. A spec that cannot meet it is refused.
     ///
     /// In m.
-    "requirements", Optional => Requirements {
+    "requirements" ["goals", "specification"], Optional => Requirements {
         /// Finest displacement that matters. No converter code may move a leg by more, nor half a code on every leg the platform along an axis.
-        precision: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "50 nm";
+        precision: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "" ["resolution", "accuracy"], "50 nm";
     }
 }
 
 section! {
+    /// What the physical lint lets pass. Nothing of it is in the controller.
+    "lint", Optional => Lint {
+        /// Keys whose values are meant although they do not fit what the other values imply, each with the reason. What is found about them is then a note: also what would be refused because it is off by 7 times and more.
+        allow: Vec<String> = Shape::Reasons, Default([]), "", ["actuator.axial_stiffness: flexures in series, measured"];
+    }
+}
+
+impl Lint {
+    /// The reason for which `key`, or the list that it is an item of, is let pass.
+    #[must_use]
+    pub fn reason(&self, key: &str) -> Option<&str> {
+        self.reasons().find(|(allowed, _)| covers(allowed, key)).map(|(_, reason)| reason)
+    }
+
+    /// Each key with its reason.
+    pub fn reasons(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.allow.iter().filter_map(|entry| entry.split_once(':')).map(|(key, reason)| (key.trim(), reason.trim()))
+    }
+}
+
+/// Whether `key` is `allowed` or an item of it.
+fn covers(allowed: &str, key: &str) -> bool {
+    key.strip_prefix(allowed).is_some_and(|rest| rest.is_empty() || rest.starts_with('['))
+}
+
+section! {
     /// What it runs on.
-    "target", Plain => Target {
+    "target" ["mcu", "board", "hardware"], Plain => Target {
         /// Microcontroller: `mps2-an500` and `stm32h743zi` are a Cortex-M7 with double-precision FPU, `mps2-an386` and `stm32f446re` a Cortex-M4F with single precision; the first of each is emulated.
-        mcu: Mcu = one_of(&["mps2-an500", "mps2-an386", "stm32h743zi", "stm32f446re"]), Default("mps2-an500"), "", "mps2-an500";
+        mcu: Mcu = one_of(&["mps2-an500", "mps2-an386", "stm32h743zi", "stm32f446re"]), Default("mps2-an500"), "" ["processor", "part", "chip", "board", "cpu"], "mps2-an500";
     }
     and |fields, _table| {
         /// What it may use there.

@@ -79,17 +79,17 @@ section! {
     /// The task-space controller of section 4. With it the six gauges see the platform ([[gauge]]); without it each leg has its own gauge and its own feed-forward.
     ///
     /// A pose is x, y, z, θx, θy, θz from rest, m and rad; times in s.
-    "control", Optional => TaskSpace {
+    "control" ["loop", "task_space", "feedback"], Optional => TaskSpace {
         /// Loops closed at start-up: position feedback and feed-forward, feedback alone, feed-forward alone. How the feed-forward adapts is `adaptation.mode`.
         mode: ControlMode = one_of(ControlMode::WORDS), Default("p/f"), "", "p/f";
         /// Damping ratio of the lowest mode of the platform on its legs. Give what is measured, or less: less is the cautious side.
-        modal_damping: f64 = number(Range::open(0.0, 1.0)), Required, "zeta", 0.02;
+        modal_damping: f64 = number(Range::open(0.0, 1.0)), Required, "zeta" ["damping", "damping_ratio"], 0.02;
         /// Whether a modal notch stands in the feedback; without one the bandwidth falls to about a twelfth.
         notch = FLAG, Default(true), "", true;
         /// Damping ratio that the notch leaves of each mode, above `modal_damping`.
         notch_damping = number(Range::above(0.0, 1.0)), Rule("1, with a notch"), "zeta_d", 1.0;
         /// First-order low-pass of the pose derivative, below half the tick rate (pi rad / period).
-        velocity_cutoff = BANDWIDTH, Rule("0.6 pi rad / period"), "", "9e3 rad/s";
+        velocity_cutoff = BANDWIDTH, Rule("0.6 pi rad / period"), "" ["cutoff", "velocity_filter"], "9e3 rad/s";
         /// Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words.
         interaction: Interaction = one_of(Interaction::WORDS), Default("none"), "", "none";
         /// Time by which the leg displacements are asked for early, in proportion to their rate: about the amplifier lag less one period. Takes out part of the lag of fast motion; a set-point that steps is overshot by step x lead / period for one tick.
@@ -149,7 +149,7 @@ section! {
     /// The work piece that the platform presses on, (5), in the order x, y, z, theta_x, theta_y, theta_z at P_C.
     ///
     /// Stiffness in N/m and N m/rad, pose in m and rad.
-    "control.environment", Optional => Environment {
+    "control.environment" ["contact", "work_piece"], Optional => Environment {
         /// Diagonal of its stiffness.
         stiffness: [f64; 6] = list(STIFFNESSES), Required, "K_e", ["0 N/m", "0 N/m", "3e6 N/m", "0 N m/rad", "0 N m/rad", "0 N m/rad"];
         /// Pose, from rest, at which it is unloaded.
@@ -202,13 +202,13 @@ section! {
     /// Diagonal gains of (7) for P/F in the order x, y, z, theta_x, theta_y, theta_z. Without it the compiler derives them.
     ///
     /// In N/m, N m/rad and, with their times, N/(m s), N m/(rad s), N s/m, N m s/rad.
-    "gains", Optional => Gains {
+    "gains" ["pid"], Optional => Gains {
         /// Proportional gain.
-        proportional: [f64; 6] = list(STIFFNESSES), Required, "k_p", ["5e6 N/m", "5e6 N/m", "2e7 N/m", "1e5 N m/rad", "1e5 N m/rad", "5e4 N m/rad"];
+        proportional: [f64; 6] = list(STIFFNESSES), Required, "k_p" ["kp", "p", "K"], ["5e6 N/m", "5e6 N/m", "2e7 N/m", "1e5 N m/rad", "1e5 N m/rad", "5e4 N m/rad"];
         /// Integral gain.
-        integral: [f64; 6] = list(STIFFNESS_RATES), Required, "k_I", INTEGRAL;
+        integral: [f64; 6] = list(STIFFNESS_RATES), Required, "k_I" ["ki", "i"], INTEGRAL;
         /// Derivative gain.
-        derivative: [f64; 6] = list(DAMPINGS), Required, "k_v", ["0 N s/m", "0 N s/m", "0 N s/m", "0 N m s/rad", "0 N m s/rad", "0 N m s/rad"];
+        derivative: [f64; 6] = list(DAMPINGS), Required, "k_v" ["kd", "d"], ["0 N s/m", "0 N s/m", "0 N s/m", "0 N m s/rad", "0 N m s/rad", "0 N m s/rad"];
     }
 }
 
@@ -223,9 +223,9 @@ section! {
     /// The reading is the distance (m) from the probe point to the plane along `direction`, from rest.
     "gauge", Repeated(6, 6) => Probe {
         /// A point of the measuring line in {B}.
-        point: [f64; 3] = POINT, Required, "", ["80 mm", "0 mm", "180 mm"];
+        point: [f64; 3] = POINT, Required, "" ["position", "location", "place"], ["80 mm", "0 mm", "180 mm"];
         /// Direction of the line in {B}, of any length: the reading grows when the target moves this way.
-        direction = list(&[DIRECTION; 3]), Required, "", [0, 0, 1];
+        direction = list(&[DIRECTION; 3]), Required, "" ["normal", "axis", "n"], [0, 0, 1];
         /// A point of the target plane in {P}.
         target_point = POINT, Rule("`point`, at rest"), "", ["80 mm", "0 mm", "0 mm"];
         /// Normal of the target plane in {P}, of any length and either sign.
@@ -260,13 +260,13 @@ pub(crate) fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
 
 section! {
     /// A trajectory that the controller can play, numbered from 0 in the order of the file; with [control] alone.
-    "trajectory", Repeated(0, MAX_TABLES) => Trajectory {
+    "trajectory" ["path"], Repeated(0, MAX_TABLES) => Trajectory {
         /// Its name, once in the file.
         name: String = NAME, Required, "", "circle";
         /// One of the paper's paths, or a table of poses.
         kind = one_of(&["case-1", "case-2", "machining", "waveform"]), Required, "", "case-1";
         /// Of a paper's path: operating frequency.
-        frequency = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Rule("error, but for a waveform"), "f_c", "1 Hz";
+        frequency = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Rule("error, but for a waveform"), "f_c" ["f", "rate"], "1 Hz";
         /// Of a paper's path: the formulas as printed, with their jumps.
         as_printed = FLAG, Rule("`false`"), "", false;
         /// Of a waveform: the table of poses, a CSV file relative to the spec.

@@ -7,6 +7,7 @@ mod adaptation;
 mod control;
 mod electrical;
 mod gauges;
+mod lint;
 mod mechanics;
 mod rate;
 mod records;
@@ -30,7 +31,6 @@ const CHECKS: &[Check] = &[
     mechanics::platform_gyration,
     mechanics::legs_have_length,
     mechanics::geometry_holds,
-    mechanics::workspace_in_reach,
     electrical::limits_in_order,
     electrical::voltage_inside_dac,
     electrical::slew_moves_a_code,
@@ -59,6 +59,7 @@ const CHECKS: &[Check] = &[
     gauges::calibrated_alike,
     gauges::input_of_calibrated,
     robust::ranges_in_order,
+    lint::reasons,
     trajectories::keys_of_kind,
     trajectories::names_differ,
     trajectories::not_too_many,

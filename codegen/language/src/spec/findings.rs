@@ -34,6 +34,15 @@ impl Findings {
         }
     }
 
+    /// Says that `line` may stand at `place` instead of what the last finding is about, if that is about `key`.
+    pub(super) fn instead(&mut self, key: &str, place: Range<usize>, line: &str) {
+        if let Some(last) = self.list.last_mut().filter(|last| last.key == key) {
+            last.help = format!("write {line}");
+            last.replacement = Some(line.to_owned());
+            last.place = Place::Spec(place);
+        }
+    }
+
     /// Counts findings that were not even made.
     pub(super) fn leave_out(&mut self, count: usize) {
         self.left_out += count;

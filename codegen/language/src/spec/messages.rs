@@ -36,7 +36,7 @@ fn item_of(key: &Key, path: &str) -> Option<Item> {
             let index = path.rsplit_once('[').and_then(|(_, rest)| rest.trim_end_matches(']').parse::<usize>().ok());
             items.get(index.unwrap_or(0)).copied()
         }
-        Shape::Records => None,
+        Shape::Records | Shape::Reasons => None,
     }
 }
 
@@ -74,6 +74,42 @@ pub(super) fn range_help(key: &Key, path: &str) -> String {
     format!("give a value in range{range}, such as {}. {}", example_of(key, path), key.doc)
 }
 
+/// The units of the item that `path` names, for a help: "kg or g", "N/m, N/um or another of a stiffness".
+pub(super) fn units_of(key: &Key, path: &str) -> Option<String> {
+    let Some(Item::Quantity { dimension, unit, .. }) = item_of(key, path) else { return None };
+    let mut units: Vec<&str> = quantity::common_units(dimension).collect();
+    if !units.contains(&unit) {
+        units.insert(0, unit);
+    }
+    match units.as_slice() {
+        [only] => Some((*only).to_owned()),
+        [first @ .., last] => Some(format!("{} or {last}", first.join(", "))),
+        [] => None,
+    }
+}
+
+/// What the item that `path` names measures: "a mass".
+pub(super) fn what(key: &Key, path: &str) -> String {
+    match item_of(key, path) {
+        Some(Item::Quantity { dimension, .. }) => dimension.describe(),
+        _ => "a quantity".to_owned(),
+    }
+}
+
+/// The time that a rate stands for, where the key takes one: the period of "20 kHz" is "50 us". A lag's rate is its corner.
+pub(super) fn time_of_rate(key: &Key, found: &str) -> Option<String> {
+    let Shape::One(Item::Quantity { dimension: Dimension::TIME, unit, range }) = key.shape else { return None };
+    let rate = quantity::parse(found).ok().filter(|rate| rate.dimension == Dimension::FREQUENCY)?;
+    let turn = match key.name {
+        "period" => 1.0,
+        "lag" => std::f64::consts::TAU,
+        _ => return None,
+    };
+    let time = 1.0 / (turn * rate.value);
+    let scale = quantity::unit_value(unit).map_or(1.0, |one| one.value);
+    range.contains(time).then(|| format!("{} {unit}", text::number(time / scale)))
+}
+
 /// Message and help for a unit that measures something else.
 pub(super) fn wrong_dimension(
     key: &Key,
@@ -84,6 +120,9 @@ pub(super) fn wrong_dimension(
 ) -> (String, String) {
     let message =
         format!("`{path}` is \"{}\": this is {}, expected {}", text::shorten(found), is.describe(), wanted.describe());
+    if let Some(time) = time_of_rate(key, found) {
+        return (message, format!("{found} is a {} of \"{time}\"", key.name));
+    }
     let hint = if is == Dimension::FREQUENCY && wanted == Dimension::ANGULAR_RATE {
         "1 Hz is 2 pi rad/s; "
     } else if is.without_angle() != wanted.without_angle() {
@@ -115,7 +154,10 @@ pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem
         Problem::UnknownUnit(unit, meant) => (
             codes::UNKNOWN_UNIT,
             format!("{is}: unknown unit {}", text::quote(unit)),
-            meant.map_or(format!("write a unit as in {example}; upper and lower case matter"), |m| {
+            meant.map_or_else(|| {
+                let units = units_of(key, path).map_or_else(String::new, |units| format!(", such as {units}"));
+                format!("write a unit as in {example}{units}; upper and lower case matter")
+            }, |m| {
                 format!("did you mean \"{m}\"? Upper and lower case matter")
             }),
         ),

@@ -25,14 +25,26 @@ pub(super) fn child_name(outer: &Section, inner: &'static Section) -> Option<&'s
     (!name.is_empty() && !name.contains('.')).then_some(name)
 }
 
-/// A key or section of this name in another place.
+/// The key, or the section within `outer`, that people call `name`: by the symbol of the paper or a common name.
+pub(super) fn called(outer: &'static Section, name: &str, is_table: bool) -> Option<&'static str> {
+    if is_table {
+        return SECTIONS.iter().filter(|inner| inner.is_called(name)).find_map(|inner| child_name(outer, inner));
+    }
+    outer.keys.iter().find(|key| key.is_called(name)).map(|key| key.name)
+}
+
+/// A key or section of this name in another place; then one that people call so.
 pub(super) fn elsewhere(section: &Section, name: &str) -> Option<String> {
-    SECTIONS.iter().filter(|other| other.name != section.name).find_map(|other| {
+    let others = || SECTIONS.iter().filter(|other| other.name != section.name);
+    let exact = others().find_map(|other| {
         if other.name.rsplit('.').next() == Some(name) {
             return Some(format!("[{}]", other.name));
         }
         other.keys.iter().find(|key| key.name == name).map(|key| other.path(key.name))
-    })
+    });
+    let called =
+        || others().find_map(|other| other.keys.iter().find(|key| key.is_called(name)).map(|key| other.path(key.name)));
+    exact.or_else(called)
 }
 
 pub(super) fn known_names(section: &Section, sections: bool) -> String {

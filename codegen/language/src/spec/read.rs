@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::findings::Findings;
 use super::keys::{self, Key, Kind, MAX_TABLES, Presence, SECTIONS, Section};
-use super::names::{Meaning, child_name, elsewhere, known_names, lookup};
+use super::names::{Meaning, called, child_name, elsewhere, known_names, lookup};
 use super::value::ValueReader;
 use super::{messages, text};
 use crate::diagnostic::codes;
@@ -46,6 +46,9 @@ impl Reader<'_> {
         }
         for (name, value) in table {
             match self.meaning(section, path, table, name) {
+                Some(Meaning::Key(key)) if self.is_rate_of_time(path, key, name, value) => {
+                    found.insert(key.name, text::clamp(self.source, name.span()));
+                }
                 Some(Meaning::Key(key)) => {
                     found.insert(key.name, text::clamp(self.source, name.span()));
                     self.value(path, key, value);
@@ -148,9 +151,28 @@ impl Reader<'_> {
             let keys = section.keys.iter().filter(move |_| !wants_table).map(|key| key.name);
             sections.chain(keys)
         };
-        let meant = text::nearest(written, candidates(is_table)).filter(|meant| !table.contains_key(*meant));
-        self.unknown(section, path, name, is_table, meant);
-        meant.and_then(|meant| lookup(section, meant))
+        let named = called(section, written, is_table);
+        let meant = named.or_else(|| text::nearest(written, candidates(is_table)));
+        let free = meant.filter(|meant| !table.contains_key(*meant));
+        self.unknown(section, path, name, is_table, (free, named.filter(|_| free.is_none())));
+        free.and_then(|meant| lookup(section, meant))
+    }
+
+    /// Whether a time was given as a rate under a name of its own, as in `rate = "20 kHz"`: the fix is then the whole line.
+    fn is_rate_of_time(
+        &mut self,
+        table: &str,
+        key: &'static Key,
+        name: &Spanned<toml::de::DeString<'_>>,
+        value: &Spanned<DeValue<'_>>,
+    ) -> bool {
+        let written = name.get_ref().as_ref();
+        let DeValue::String(text) = value.get_ref() else { return false };
+        let Some(time) = messages::time_of_rate(key, text).filter(|_| written != key.name) else { return false };
+        let line = format!("{} = \"{time}\"", key.name);
+        let place = name.span().start..value.span().end;
+        self.findings.instead(&keys::join(table, &text::shorten(written)), place, &line);
+        true
     }
 
     fn unknown(
@@ -159,7 +181,7 @@ impl Reader<'_> {
         table: &str,
         name: &Spanned<toml::de::DeString<'_>>,
         is_table: bool,
-        meant: Option<&str>,
+        (meant, taken): (Option<&str>, Option<&str>),
     ) {
         let written = name.get_ref().as_ref();
         let path = keys::join(table, &text::shorten(written));
@@ -167,8 +189,10 @@ impl Reader<'_> {
         let place = if section.name.is_empty() { String::new() } else { format!(" in {}", section.header()) };
         let help = match (meant, elsewhere(section, written)) {
             (Some(meant), _) => format!("did you mean `{meant}`?"),
+            (None, _) if let Some(taken) = taken => format!("take it out; `{taken}` says this already"),
             (None, Some(path)) if is_table => format!("did you mean `{path}`?"),
             (None, Some(path)) if path.starts_with('[') => format!("there is a section {path}: does it belong there?"),
+            (None, Some(path)) if !path.ends_with(written) => format!("did you mean `{path}`, in its own section?"),
             (None, Some(path)) => format!("`{path}` exists: did it slip out of its section?"),
             (None, None) => format!("take it out; {}", known_names(section, is_table)),
         };

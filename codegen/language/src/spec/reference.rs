@@ -42,13 +42,14 @@ pub fn reference_markdown() -> String {
         for key in section.keys {
             let _ = writeln!(
                 text,
-                "| `{}` | {} | {} | {} | {}{} |",
+                "| `{}` | {} | {} | {} | {}{}{} |",
                 key.name,
                 form(key),
                 range(key),
                 absence(key),
                 symbol(key),
-                key.doc
+                key.doc,
+                aliases(key)
             );
         }
     }
@@ -60,8 +61,9 @@ pub fn reference_markdown() -> String {
 pub fn key_markdown(path: &str, key: &Key) -> String {
     let symbol = if key.symbol.is_empty() { String::new() } else { format!(", {} in the paper", key.symbol) };
     format!(
-        "`{path}`{symbol}\n\n{}\n\n- example: {}\n- range: {}\n- if left out: {}\n",
+        "`{path}`{symbol}\n\n{}{}\n\n- example: {}\n- range: {}\n- if left out: {}\n",
         key.doc,
+        aliases(key),
         form(key),
         range(key),
         absence(key)
@@ -70,7 +72,7 @@ pub fn key_markdown(path: &str, key: &Key) -> String {
 
 fn form(key: &Key) -> String {
     match key.shape {
-        Shape::One(_) | Shape::Records => format!("`{}`", key.example),
+        Shape::One(_) | Shape::Records | Shape::Reasons => format!("`{}`", key.example),
         Shape::List(items) if items.len() > 3 => {
             format!("{} values, `{}`", items.len(), key.example)
         }
@@ -94,6 +96,7 @@ fn range(key: &Key) -> String {
             format!("{least} to {} values: {each}{}", items.len(), ranges.join(", then "))
         }
         Shape::Records => "1 or 6 files".to_owned(),
+        Shape::Reasons => "texts `KEY: REASON`".to_owned(),
     }
 }
 
@@ -106,6 +109,11 @@ fn absence(key: &Key) -> String {
         Presence::Form(form) => format!("error, unless in another form than {form}"),
         Presence::Rule(rule) => rule.to_owned(),
     }
+}
+
+/// What else it is called, as a sentence to add.
+fn aliases(key: &Key) -> String {
+    if key.aliases.is_empty() { String::new() } else { format!(" Elsewhere: {}.", key.aliases.join(", ")) }
 }
 
 fn symbol(key: &Key) -> String {

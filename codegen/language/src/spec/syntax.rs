@@ -8,6 +8,7 @@ use std::ops::Range;
 use toml::de::DeTable;
 
 use super::findings::{Findings, MAX_FINDINGS};
+use super::keys::{Item, Shape};
 use super::{keys, text};
 use crate::diagnostic::{Place, codes};
 
@@ -69,14 +70,33 @@ fn unquoted(source: &str, span: Range<usize>, findings: &mut Findings) {
         return;
     }
     let found = &source[span.clone()];
+    let key = key_at(source, span.start);
     findings.add(
         codes::UNQUOTED,
-        "",
+        &key,
         span,
         format!("{} is a text without quotes", text::quote(found)),
         format!("texts and quantities stand in quotes: write \"{}\"", text::shorten(found.trim())),
     );
-    findings.replace_by("", Some(format!("\"{}\"", found.trim())));
+    // Where the key takes no text, quotes are not enough.
+    let takes_text = keys::key(&key).is_none_or(|key| {
+        !matches!(key.shape, Shape::One(Item::Number(_) | Item::Integer(..) | Item::Flag))
+    });
+    findings.replace_by(&key, takes_text.then(|| format!("\"{}\"", found.trim())));
+}
+
+/// Path of the key whose value stands at `offset`; empty where the line has no key of its own.
+fn key_at(source: &str, offset: usize) -> String {
+    let line = source[..offset].rfind('\n').map_or(0, |i| i + 1);
+    let name = key_name(&source[line..offset]).unwrap_or_default();
+    let (header, is_header) = header_before(source, offset);
+    let bare = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '.');
+    if is_header || name.is_empty() || !name.chars().all(bare) {
+        return String::new();
+    }
+    let (_, repetition) = section_start(source, header, offset);
+    let table = repetition.map_or_else(|| header.to_owned(), |index| format!("{header}[{index}]"));
+    text::shorten(&keys::join(&table, name))
 }
 
 /// The text without quotes that the parser took for a bad number or truth value: `150mm`, `f32`, `invhys`.

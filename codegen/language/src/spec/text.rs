@@ -74,7 +74,7 @@ pub(super) fn alternatives(words: &[&str]) -> String {
     }
 }
 
-/// The candidate, in lower case, that `name` is probably a slip of, such as a key or the name of a trajectory; none if it is
+/// The candidate that `name` is probably a slip of: at a distance of a third of its letters, at least one. None if it is
 /// like none of them.
 #[must_use]
 pub fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {

@@ -54,7 +54,8 @@ impl ValueReader<'_> {
                 (Parsed::Numbers(numbers), spans)
             }
             Shape::Rows(count, items) => self.rows(count, items, value)?,
-            Shape::Records => self.records(value)?,
+            Shape::Records => self.texts("a file name", value)?,
+            Shape::Reasons => self.texts("a text", value)?,
         };
         Some(Field { parsed, span, items, given: true })
     }
@@ -120,9 +121,9 @@ impl ValueReader<'_> {
         );
     }
 
-    fn records(&mut self, value: &Spanned<DeValue<'_>>) -> Option<(Parsed, Vec<Range<usize>>)> {
+    fn texts(&mut self, what: &str, value: &Spanned<DeValue<'_>>) -> Option<(Parsed, Vec<Range<usize>>)> {
         let DeValue::Array(array) = value.get_ref() else {
-            return self.wrong_type(self.path, value, "an array of file names", None);
+            return self.wrong_type(self.path, value, &format!("an array, each value {what}"), None);
         };
         let mut texts = Vec::new();
         let mut spans = Vec::new();
@@ -131,7 +132,7 @@ impl ValueReader<'_> {
             let path = format!("{}[{i}]", self.path);
             match element.get_ref() {
                 DeValue::String(file) => texts.push(file.to_string()),
-                _ => return self.wrong_type(&path, element, "a file name", None),
+                _ => return self.wrong_type(&path, element, what, None),
             }
         }
         Some((Parsed::Texts(texts), spans))
@@ -246,7 +247,11 @@ impl ValueReader<'_> {
         expected: &str,
         fix: Option<String>,
     ) -> Option<T> {
-        let help = fix.unwrap_or_else(|| format!("write {} = {}", self.key.name, self.key.example));
+        let units = messages::units_of(self.key, path);
+        let help = fix.unwrap_or_else(|| match units {
+            Some(units) => format!("write the number with its unit, in quotes: {units}; as in {} = {}", self.key.name, self.key.example),
+            None => format!("write {} = {}", self.key.name, self.key.example),
+        });
         self.findings.add(
             codes::WRONG_TYPE,
             path,

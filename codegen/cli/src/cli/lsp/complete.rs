@@ -8,57 +8,6 @@ use specgen_language::spec::quantity;
 
 use super::text::Spot;
 
-/// Units that are offered where their dimension fits; any other unit of it will do, too.
-const UNITS: &[&str] = &[
-    "m",
-    "mm",
-    "um",
-    "nm",
-    "kg",
-    "g",
-    "rad",
-    "mrad",
-    "urad",
-    "nrad",
-    "deg",
-    "s",
-    "ms",
-    "us",
-    "Hz",
-    "kHz",
-    "V",
-    "mV",
-    "V/ms",
-    "V/s",
-    "um/V",
-    "nm/V",
-    "N/m",
-    "N/um",
-    "N m/rad",
-    "N s/m",
-    "N m s/rad",
-    "N/(m s)",
-    "N m/(rad s)",
-    "kg m^2",
-    "g mm^2",
-    "um/s",
-    "mm/s",
-    "mrad/s",
-    "rad/s",
-    "mm/s^2",
-    "m/s^2",
-    "mrad/s^2",
-    "rad/s^2",
-    "m/s^3",
-    "rad/s^3",
-    "A",
-    "mA",
-    "uF",
-    "nF",
-    "KiB",
-    "MiB",
-];
-
 pub fn at(text: &str, spot: &Spot, folder: &Path) -> Vec<CompletionItem> {
     if spot.is_header || spot.before.trim_start().starts_with('[') && !spot.in_value {
         return sections(&spot.before);
@@ -115,11 +64,11 @@ fn values(shape: Shape, example: &str, before: &str, folder: &Path) -> Vec<Compl
             [] => return Vec::new(),
         },
         Shape::Records => Item::File,
+        Shape::Reasons => return Vec::new(),
     };
     match first {
         Item::Quantity { dimension, .. } if quoted => {
-            let fits = |unit: &&&str| quantity::unit_value(unit).is_some_and(|found| found.dimension == dimension);
-            UNITS.iter().filter(fits).map(|unit| item(*unit, CompletionItemKind::UNIT, *unit, "unit")).collect()
+            quantity::common_units(dimension).map(|unit| item(unit, CompletionItemKind::UNIT, unit, "unit")).collect()
         }
         Item::Choice(words) => {
             words.iter().map(|word| item(*word, CompletionItemKind::ENUM_MEMBER, text(word), "")).collect()

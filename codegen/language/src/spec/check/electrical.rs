@@ -8,6 +8,8 @@ use crate::spec::text::number;
 
 /// Stroke and travel further apart than this are refused.
 const LARGEST_MISMATCH: f64 = 4.0;
+/// Noise of a gauge, of what there is to see: strain gauges have a thousandth, capacitive ones a hundred times less.
+const LARGEST_NOISE: f64 = 2e-3;
 
 pub(super) fn limits_in_order(f: &Fields, findings: &mut Findings) -> Option<()> {
     for path in ["actuator.voltage", "dac.range", "sensor.range", "sensor.input_range"] {
@@ -74,7 +76,7 @@ pub(super) fn stroke_fits_gain(f: &Fields, findings: &mut Findings) -> Option<()
         number(travel * 1e6),
         number(stroke * 1e6)
     );
-    let check = "check `actuator.stacks`, `actuator.stack_gain` (of one stack, not of the leg), `actuator.voltage` and `actuator.stroke`";
+    let check = "check figures and units of `actuator.stacks`, `actuator.stack_gain` (of one stack, not of the leg), `actuator.voltage` and `actuator.stroke`";
     if (1.0 / LARGEST_MISMATCH..=LARGEST_MISMATCH).contains(&ratio) {
         findings.add(codes::STROKE_MISMATCH, key, span, message, check.to_owned());
     } else {
@@ -134,17 +136,19 @@ pub(super) fn sensor_fits(f: &Fields, findings: &mut Findings) -> Option<()> {
         );
     }
     let noise = f.number("sensor.noise")?;
-    if noise > 0.01 * span {
+    let seen = f.number("actuator.stroke").filter(|stroke| *stroke < span).unwrap_or(span);
+    if noise > LARGEST_NOISE * seen {
         findings.add(
             codes::SENSOR_NOISE,
             "sensor.noise",
             f.span("sensor.noise"),
             format!(
-                "a noise of {} nm rms is more than a hundredth of the range of {} um",
+                "a noise of {} nm rms is {} of the {} um that there are to see",
                 number(noise * 1e9),
-                number(span * 1e6)
+                number(noise / seen),
+                number(seen * 1e6)
             ),
-            "check the unit: nm or um".to_owned(),
+            "check the unit, nm or um: gauges of piezo platforms have a tenth of a nanometre to some ten".to_owned(),
         );
     }
     Some(())

@@ -25,7 +25,7 @@ pub(super) fn six(f: &Fields, findings: &mut Findings) -> Option<()> {
         path,
         place.unwrap_or(0..0),
         format!("there are {count} sections [[gauge]], expected 6"),
-        "write one for each gauge, in the order of the gauge words:\n[[gauge]]\npoint = [\"80 mm\", \"0 mm\", \"180 mm\"]\ndirection = [0, 0, 1]".to_owned(),
+        "write six, one for each gauge, in the order of the gauge words:\n[[gauge]]\npoint = [\"80 mm\", \"0 mm\", \"180 mm\"]\ndirection = [0, 0, 1]".to_owned(),
     );
     Some(())
 }

@@ -1,6 +1,6 @@
 //! Masses, inertias and geometry: could this platform exist, and does it hold?
 
-use nalgebra::{Matrix3, Matrix6, RowVector6, Vector3, Vector6};
+use nalgebra::{Matrix3, Matrix6, RowVector6, Vector3};
 
 use crate::diagnostic::codes;
 use crate::keys::fields::Fields;
@@ -191,60 +191,6 @@ pub(super) fn geometry_holds(f: &Fields, findings: &mut Findings) -> Option<()> 
         "make the height comparable to the radii and the joint pairs close (small base_angle and platform_angle)"
             .to_owned(),
     );
-    Some(())
-}
-
-/// The pose, to first order, at which every leg is at half its stroke: m and rad from rest.
-fn middle_of_strokes(jacobian: &Matrix6<f64>, stroke: f64) -> Option<Vector6<f64>> {
-    jacobian.lu().solve(&Vector6::repeat(0.5 * stroke))
-}
-
-/// Three significant digits, so that the number shown is itself accepted.
-fn rounded_down(value: f64) -> f64 {
-    let scale = libm::pow(10.0, 2.0 - libm::floor(libm::log10(value)));
-    libm::floor(value * scale) / scale
-}
-
-/// Whether each axis alone, within its bound, needs no more than the stroke. The whole box may need more: the
-/// controller limits each leg.
-pub(super) fn workspace_in_reach(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let Legs { jacobian, lengths } = legs_at_rest(&Geometry::read(f, "geometry")?);
-    if lengths.iter().any(|length| *length < SHORTEST_LEG) {
-        return None;
-    }
-    let stroke = f.number("actuator.stroke")?;
-    let middle = f.table("control").and_then(|_| middle_of_strokes(&jacobian, stroke));
-    for (path, first, unit, scale) in [("workspace.translation", 0, "um", 1e6), ("workspace.rotation", 3, "mrad", 1e3)]
-    {
-        let Some(bounds) = f.list::<3>(path) else {
-            continue;
-        };
-        for (axis, bound) in bounds.into_iter().enumerate() {
-            let steepest = jacobian.column(first + axis).amax();
-            let most = match middle {
-                // What the check of reach will accept: from the middle of the strokes, less the curvature of the way.
-                Some(middle) => (middle[first + axis].abs() + 0.5 * stroke / steepest) * 0.995,
-                None => stroke / steepest,
-            };
-            if bound * steepest <= stroke {
-                continue;
-            }
-            findings.add(
-                codes::WORKSPACE_UNREACHABLE,
-                &format!("{path}[{axis}]"),
-                f.item_span(path, axis),
-                format!(
-                    "this bound needs a leg motion of {} um, but the stroke is {} um",
-                    number(bound * steepest * 1e6),
-                    number(stroke * 1e6)
-                ),
-                format!(
-                    "at most {} {unit} can be reached on this axis alone; check the unit (rad, mrad, urad)",
-                    number(rounded_down(most * scale))
-                ),
-            );
-        }
-    }
     Some(())
 }
 

@@ -13,7 +13,7 @@ use crate::spec::{messages, text};
 
 impl ValueReader<'_> {
     pub(super) fn quantity(&mut self, item: Item, path: &str, value: &Spanned<DeValue<'_>>) -> Option<f64> {
-        let Item::Quantity { dimension, range, unit } = item else {
+        let Item::Quantity { dimension, range, .. } = item else {
             return None;
         };
         let span = text::clamp(self.source, value.span());
@@ -21,7 +21,7 @@ impl ValueReader<'_> {
             DeValue::String(found) => found,
             DeValue::Integer(_) | DeValue::Float(_) => {
                 let number = self.plain_number(path, value)?;
-                self.unit_missing(path, span, number, unit);
+                self.unit_missing(path, span, number);
                 return None;
             }
             _ => {
@@ -31,12 +31,14 @@ impl ValueReader<'_> {
         };
         match quantity::parse(found) {
             Ok(quantity) if quantity.dimension == Dimension::NONE => {
-                self.unit_missing(path, span, quantity.value, unit);
+                self.unit_missing(path, span, quantity.value);
                 None
             }
             Ok(quantity) if quantity.dimension != dimension => {
                 let (message, help) = messages::wrong_dimension(self.key, path, found, quantity.dimension, dimension);
                 self.findings.add(codes::WRONG_DIMENSION, path, span, message, help);
+                let time = messages::time_of_rate(self.key, found);
+                self.findings.replace_by(path, time.map(|time| format!("\"{time}\"")));
                 None
             }
             Ok(quantity) => {
@@ -70,16 +72,15 @@ impl ValueReader<'_> {
         }
     }
 
-    fn unit_missing(&mut self, path: &str, span: Range<usize>, number: f64, unit: &str) {
-        let form = format!("\"{} {unit}\"", text::number(number));
-        let message = format!("`{path}` is a number without unit, expected a quantity such as {form}");
-        self.findings.add(
-            codes::UNIT_MISSING,
-            path,
-            span,
-            message,
-            format!("write {form}, with the unit that you mean"),
+    fn unit_missing(&mut self, path: &str, span: Range<usize>, number: f64) {
+        let units = messages::units_of(self.key, path).unwrap_or_default();
+        let message = format!("`{path}` is a number without unit");
+        let help = format!(
+            "in which unit? Write \"{} UNIT\", in quotes, with {units} or another unit of {}",
+            text::number(number),
+            messages::what(self.key, path)
         );
+        self.findings.add(codes::UNIT_MISSING, path, span, message, help);
     }
 
     pub(super) fn plain_number(&mut self, path: &str, value: &Spanned<DeValue<'_>>) -> Option<f64> {
