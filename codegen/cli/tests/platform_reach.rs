@@ -189,7 +189,7 @@ fn bounds_and_bias_out_of_reach_are_refused_with_a_number_that_is_accepted() {
     model.workspace.rotation[2] = 1e-3;
     let found = checked(&model, &task).unwrap_err();
     let keys: Vec<(&str, &str)> = found.iter().map(|one| (one.code, one.key.as_str())).collect();
-    assert_eq!(keys, [("E0441", "workspace.translation[0]"), ("E0441", "workspace.rotation[2]")]);
+    assert_eq!(keys, [("E0313", "workspace.translation[0]"), ("E0313", "workspace.rotation[2]")]);
     let offered: Vec<f64> =
         found.iter().map(|one| one.help.split(' ').nth(2).unwrap().parse::<f64>().unwrap() * 1e-6).collect();
     model.workspace.translation[0] = offered[0];

@@ -9,7 +9,7 @@ use crate::ir::Ir;
 use crate::lint::{self, paths::PathDemand};
 use crate::lower::setpoint::{self, Stopping};
 use crate::lower::{self, PoseNoise};
-use crate::reach::Reach;
+use crate::reach::{self, Reach};
 use crate::stability::platform::{Design, RestDynamics};
 use crate::stability::{self, Margins};
 use crate::{requirements, workspace};
@@ -71,7 +71,11 @@ pub fn compile(path: &Path) -> Result<Compiled, Refused> {
 pub fn compile_source(source: SpecSource) -> Result<Compiled, Refused> {
     let mut findings = Vec::new();
     let compiled = phases(&source, &mut findings);
-    compiled.ok_or(Refused { source: Some(source), findings })
+    lint::in_order(&source, &mut findings);
+    match compiled {
+        Some(compiled) => Ok(Compiled { findings, ..compiled }),
+        None => Err(Refused { source: Some(source), findings }),
+    }
 }
 
 /// The phases in their order. None: at least one of `findings` is an error.
@@ -96,6 +100,8 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compile
     let ir = accepted(lower::lower(&model, task, &records.tables, &records.rate_tables, &digest), findings)?;
     let pose_noise = accepted(lower::pose_noise(&model), findings)?;
     let files = workspace::files(&ir, &emit::emit(&ir));
+    lint::allow(&model, findings);
+    findings.extend(lint::unused(&model, findings));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));
     Some(Compiled {
         source: source.clone(),
@@ -109,7 +115,7 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compile
         pose_noise,
         ir,
         files,
-        findings: std::mem::take(findings),
+        findings: Vec::new(),
     })
 }
 
@@ -123,7 +129,9 @@ fn check_spec(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Mod
     let (model, found) = spec::load_as_far(source);
     findings.extend(found);
     let model = model?;
+    findings.extend(reach::check_bounds(&model));
     findings.extend(lint::check(&model));
+    lint::allow(&model, findings);
     if findings.iter().all(|finding| finding.severity < Severity::Error) {
         return Some(model);
     }

@@ -34,15 +34,15 @@ pub fn check(model: &Model, setpoints: Option<&Setpoints>, tables: &[EverettTabl
     let stroke = largest.fold(model.actuator.stroke, |a, b| if b < a { b } else { a });
     match (&model.task_space, setpoints) {
         (Some(task), Some(setpoints)) => of_platform(model, task, &platform(model)?, setpoints, stroke),
-        _ => Ok(of_legs(model, stroke)),
+        _ => of_legs(model, stroke),
     }
 }
 
 /// Legs may be driven one by one where they do not hold a platform: then there is no pose to look at.
-fn of_legs(model: &Model, stroke: f64) -> Demand {
-    let Ok(platform) = platform(model) else { return Demand::default() };
-    let (reach, warnings) = reach::check_legs(model, &platform, stroke);
-    Demand { reach: Some(reach), warnings, ..Demand::default() }
+fn of_legs(model: &Model, stroke: f64) -> Result<Demand, Vec<Diagnostic>> {
+    let Ok(platform) = platform(model) else { return Ok(Demand::default()) };
+    let (reach, warnings) = reach::check_legs(model, &platform, stroke)?;
+    Ok(Demand { reach: Some(reach), warnings, ..Demand::default() })
 }
 
 fn of_platform(

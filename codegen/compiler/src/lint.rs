@@ -5,14 +5,20 @@
 //! others imply, says both numbers, and names the key that it suspects. Thresholds are wide: a factor of a thousand lies far
 //! outside, an unusual platform well inside.
 //!
+//! A value that is off by [`FAR_OFF`] times what its rule lets pass, and more, is refused, unless `[lint] allow` names its key with
+//! a reason: see [`allow`]. That concerns what is measured or bought (sizes, masses, stacks, electronics, gauges); what is chosen
+//! (workspace, limits of moves, budgets) is never more than pointed out.
+//!
 //! What needs no such judgement is checked elsewhere: ranges and consistency in [`specgen_language::spec`], reach in [`crate::reach`],
 //! stability in [`crate::stability`], paths in [`crate::lower::setpoint`], gauges in [`crate::lower`].
 
 mod actuator;
 mod alike;
+mod allow;
 mod bodies;
 mod budget;
 mod contact;
+mod culprit;
 mod electronics;
 mod gauge_layout;
 mod gauge_pattern;
@@ -20,16 +26,19 @@ mod gauges;
 mod layout;
 mod motion;
 pub mod paths;
+mod requirements;
 mod timing;
 mod weights;
 
+pub use allow::{allow, unused};
 pub use budget::{estimated, least};
+pub use culprit::in_order;
 
 use specgen_runtime::Platform;
 
 use crate::figure::{AXES, figure};
 use crate::stability::platform::{ModalBasis, RestDynamics};
-use specgen_language::diagnostic::{Code, Diagnostic};
+use specgen_language::diagnostic::{Code, Diagnostic, codes};
 use specgen_language::model::Model;
 
 /// A rule looks at the platform and reports what it finds.
@@ -41,6 +50,7 @@ const RULES: &[Rule] = &[
     layout::base_is_wider,
     layout::proportions,
     layout::legs_cross,
+    layout::angles_of_pairs,
     bodies::leg_parts_have_size,
     bodies::mass_centres_off_the_joints,
     bodies::parts_are_bodies,
@@ -48,6 +58,7 @@ const RULES: &[Rule] = &[
     bodies::moments_of_each_axis,
     bodies::moments_fit_symmetry,
     bodies::leg_parts_against_platform,
+    bodies::moments_about_the_centre,
     actuator::strain,
     actuator::stiffness_fits_resonance,
     actuator::slew_spares_the_stacks,
@@ -57,9 +68,11 @@ const RULES: &[Rule] = &[
     electronics::lag_fits_slew,
     electronics::current_fits_slew,
     electronics::amplifier_noise,
+    electronics::capacitance_of_the_stacks,
     electronics::converter_step,
     electronics::converter_range,
     electronics::rest_without_power,
+    gauges::differ,
     gauges::noise_of_a_step,
     gauges::range_centred,
     gauges::range_beyond_zero,
@@ -69,6 +82,7 @@ const RULES: &[Rule] = &[
     gauges::size_of_layout,
     gauge_pattern::out_of_pattern,
     gauge_layout::slip_of_one,
+    alike::calibrations_fit_converter,
     alike::calibrations,
     alike::calibrations_straight,
     alike::gains_by_stiffness,
@@ -88,9 +102,22 @@ const RULES: &[Rule] = &[
     motion::moves_end,
     motion::limits_bind,
     motion::stream_limit_binds,
+    motion::streams_keep_up,
+    motion::streams_within_slew,
     motion::workspace_is_used,
+    requirements::ask_something,
     budget::tables_fit,
 ];
+
+/// A value that is so many times beyond what its rule lets pass is refused. A slip of a thousand is 32 times where its root
+/// counts, as that of a stiffness in a resonance, and no such rule is wider than four and a half.
+const FAR_OFF: f64 = 7.0;
+
+/// How many times `value` lies beyond the nearer end of `sound`; 1 and less: inside.
+fn times_beyond(value: f64, sound: &core::ops::RangeInclusive<f64>) -> f64 {
+    let (below, above) = (sound.start() / value, value / sound.end());
+    if below > above { below } else { above }
+}
 
 /// What every rule may look at.
 pub(crate) struct Facts<'a> {
@@ -161,6 +188,16 @@ impl<'a> Found<'a> {
 
     pub(crate) fn list(self) -> Vec<Diagnostic> {
         self.list
+    }
+
+    /// The same of a value that lies so many `times` beyond what the rule lets pass.
+    fn add_off(&mut self, times: f64, code: Code, key: &str, message: String, help: &str) {
+        if times < FAR_OFF || times.is_nan() {
+            return self.add(code, key, message, help);
+        }
+        let message = format!("{message}: {} times beyond what passes", figure(times));
+        let help = format!("{help}; if it is meant, say why in [lint]: allow = [\"{key}: REASON\"]");
+        self.add(codes::FAR_OFF, key, message, &help);
     }
 
     /// At `key`; where only its list or its section stands in the spec, there.

@@ -100,15 +100,31 @@ pub fn check(
 /// Looks at the workspace of `model`, whose legs have gauges of their own and no bias: set-points count from rest, where the
 /// legs stand at the lower end of their strokes. `stroke`: what every leg can do, m.
 ///
-/// Nothing is refused here: legs are limited one by one, so a pose beyond reach is approached, not refused.
-#[must_use]
-pub fn check_legs(model: &Model, platform: &Platform<f64>, stroke: f64) -> (Reach, Vec<Diagnostic>) {
+/// # Errors
+/// A bound that its axis cannot reach, where set-points are poses.
+pub fn check_legs(
+    model: &Model,
+    platform: &Platform<f64>,
+    stroke: f64,
+) -> Result<(Reach, Vec<Diagnostic>), Vec<Diagnostic>> {
     let reach = measure(model, platform, stroke, &[0.0; 6]);
     let found = findings::of_legs(model, &reach);
-    (reach, found)
+    if found.iter().any(|one| one.severity == specgen_language::diagnostic::Severity::Error) {
+        return Err(found);
+    }
+    Ok((reach, found))
 }
 
-/// Where legs with gauges of their own end before the workspace or after their gauges: for `check`, not for every build.
+/// Bounds of the workspace that no pose reaches, with the stroke that the spec declares: nothing else is needed to know it.
+#[must_use]
+pub fn check_bounds(model: &Model) -> Vec<Diagnostic> {
+    let Ok(platform) = crate::lower::platform(model) else { return Vec::new() };
+    let legs = travel::Legs { platform: &platform, stroke: model.actuator.stroke };
+    let middle = legs.middle();
+    findings::of_bounds(model, legs.stroke, |axis| [-1.0, 1.0].map(|sign| legs.travel(&middle, axis, sign)))
+}
+
+/// Where legs with gauges of their own end after their gauges: for `check`, not for every build.
 #[must_use]
 pub fn notes(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
     if model.task_space.is_some() { Vec::new() } else { findings::notes_of_legs(model, reach) }

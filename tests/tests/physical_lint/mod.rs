@@ -5,10 +5,10 @@ mod boundaries;
 mod paper;
 mod rounding;
 mod slips;
-mod support;
+pub mod support;
 
 /// A key without the indices of list items: `gauge[2].point[1]` → `gauge[2].point`.
-fn list(key: &str) -> &str {
+pub fn list(key: &str) -> &str {
     let table = key.rfind('.').unwrap_or(0);
     key[table..].find('[').map_or(key, |at| &key[..table + at])
 }

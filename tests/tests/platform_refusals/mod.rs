@@ -37,7 +37,7 @@ fn a_bias_a_bound_or_a_path_out_of_reach() {
         case(
             "a bound that its axis cannot reach",
             &[("translation = [\"50 um\"", "translation = [\"56 um\"")],
-            ("E0441", "\"56 um\"", "no pose reaches |x| = 56.00 um"),
+            ("E0313", "\"56 um\"", "no pose reaches |x| = 56.00 um"),
             |help, bad, _| put(bad, "\"56 um\"", &format!("\"{} um\"", after(help, "at most "))),
         ),
         case(
@@ -49,8 +49,8 @@ fn a_bias_a_bound_or_a_path_out_of_reach() {
         case(
             "the paper's angle",
             &[("rotation    = [\"0.4 mrad\", \"0.35 mrad\"", "rotation    = [\"0.4 mrad\", \"0.013889 pi rad\"")],
-            ("E0313", "\"0.013889 pi rad\"", "needs a leg motion of"),
-            |help, bad, _| put(bad, "\"0.013889 pi rad\"", &format!("\"{} mrad\"", after(help, "at most "))),
+            ("E0313", "\"0.013889 pi rad\"", "the stroke is 60 um"),
+            |help, bad, _| put(bad, "\"0.013889 pi rad\"", &format!("\"{} urad\"", after(help, "at most "))),
         ),
         case(
             "a bound of z",

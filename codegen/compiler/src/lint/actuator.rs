@@ -2,7 +2,7 @@
 
 use core::f64::consts::TAU;
 
-use super::{Facts, Found, figure};
+use super::{Facts, Found, figure, times_beyond};
 use specgen_language::diagnostic::codes;
 
 /// Stroke of a leg, in leg lengths. Stacks give 0.0015 of their own length; levers in a leg make ten times that.
@@ -13,6 +13,9 @@ const SMALLEST_STRAIN: f64 = 1e-6;
 const MOUNTING: f64 = 2.0;
 /// A rod fixed at one end resonates at π/2 of what stiffness and mass make; a fifth more for tolerances.
 const FREE_ROD: f64 = 1.9;
+/// What legs of stacks have, N/m, and Hz as mounted.
+const STIFFNESSES: core::ops::RangeInclusive<f64> = 2e5..=2e9;
+const RESONANCES: core::ops::RangeInclusive<f64> = 20.0..=5e4;
 /// Share of the resonance's period in which a stack may be driven over its range: makers of stacks give a third as the least.
 const FASTEST: f64 = 1.0 / 3.0;
 /// A stack that takes longer over its range, s, follows nothing.
@@ -27,10 +30,12 @@ const COARSEST_GRID: usize = 8;
 pub(super) fn strain(facts: &Facts, found: &mut Found) {
     let Some(legs) = &facts.legs else { return };
     let (stroke, length) = (facts.model.actuator.stroke, legs.shortest());
-    if (SMALLEST_STRAIN..=LARGEST_STRAIN).contains(&(stroke / length)) {
+    let off = times_beyond(stroke / length, &(SMALLEST_STRAIN..=LARGEST_STRAIN));
+    if off <= 1.0 {
         return;
     }
-    found.add(
+    found.add_off(
+        off,
         codes::STRAIN_ODD,
         "actuator.stroke",
         format!(
@@ -50,9 +55,13 @@ pub(super) fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
     let of = |mass: f64| libm::sqrt(model.actuator.axial_stiffness / mass) / TAU;
     let (loaded, bare) = (of(own + model.platform.mass / 6.0), of(own));
     let resonance = model.actuator.resonance;
-    if resonance >= loaded / MOUNTING && resonance <= bare * FREE_ROD {
+    let off = times_beyond(resonance, &(loaded / MOUNTING..=bare * FREE_ROD));
+    if off <= 1.0 {
         return;
     }
+    // Where only one of the two is what legs have, the other is suspected.
+    let leg_like = (STIFFNESSES.contains(&model.actuator.axial_stiffness), RESONANCES.contains(&resonance));
+    let key = if leg_like == (false, true) { "actuator.axial_stiffness" } else { "actuator.resonance" };
     let sizes = format!(
         "a leg of {} N/m resonates at {} Hz with its extensible part of {} g alone and at {} Hz with a sixth of the platform",
         figure(model.actuator.axial_stiffness),
@@ -60,11 +69,12 @@ pub(super) fn stiffness_fits_resonance(facts: &Facts, found: &mut Found) {
         figure(own * 1e3),
         figure(loaded)
     );
-    found.add(
+    found.add_off(
+        off,
         codes::RESONANCE_ODD,
-        "actuator.resonance",
+        key,
         format!("{sizes}; the spec says {} Hz", figure(resonance)),
-        "check the units of `actuator.resonance`, `actuator.axial_stiffness`, `leg.extensible_mass` and `platform.mass`",
+        "check the units of `actuator.axial_stiffness` (N/m or N/um), `actuator.resonance` (Hz or kHz), `leg.extensible_mass` and `platform.mass`",
     );
 }
 
@@ -76,7 +86,8 @@ pub(super) fn slew_spares_the_stacks(facts: &Facts, found: &mut Found) {
     if time * actuator.resonance >= FASTEST {
         return;
     }
-    found.add(
+    found.add_off(
+        FASTEST / (time * actuator.resonance),
         codes::SLEW_TOO_FAST,
         "actuator.slew_rate",
         format!(
@@ -101,7 +112,8 @@ pub(super) fn slew_moves_the_legs(facts: &Facts, found: &mut Found) {
     if time <= SLOWEST {
         return;
     }
-    found.add(
+    found.add_off(
+        time / SLOWEST,
         codes::SLEW_TOO_SLOW,
         "actuator.slew_rate",
         format!(
@@ -120,7 +132,8 @@ pub(super) fn resonance_is_damped(facts: &Facts, found: &mut Found) {
     if actuator.damping_ratio >= LEAST_DAMPED {
         return;
     }
-    found.add(
+    found.add_off(
+        LEAST_DAMPED / actuator.damping_ratio,
         codes::DAMPING_ODD,
         "actuator.damping_ratio",
         format!(

@@ -1,7 +1,7 @@
 //! Values that come six at a time and are much alike: calibrations of gauges, gains by stiffness.
 
-use super::{AXES, Facts, Found, figure};
-use specgen_language::diagnostic::codes;
+use super::{AXES, Facts, Found, figure, times_beyond};
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Gains, TaskSpace};
 
 /// A coefficient of a calibration against the middle one of the six.
@@ -21,9 +21,50 @@ fn middle(values: [f64; 6]) -> f64 {
     0.5 * (sorted[2] + sorted[3])
 }
 
+/// Input of a gauge's converter without `sensor.input_range`, V.
+const INPUT: [f64; 2] = [-10.0, 10.0];
+/// What a gauge reads over the whole input of its converter, in ranges of the gauge.
+const SOUND_SPAN: core::ops::RangeInclusive<f64> = 0.05..=20.0;
+
+/// The volts of a calibration are those of the converter.
+pub(super) fn calibrations_fit_converter(facts: &Facts, found: &mut Found) {
+    let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
+    let sensor = &facts.model.sensor;
+    let [[low, high], [from, to]] = [sensor.range, sensor.input_range.unwrap_or(INPUT)];
+    let mut keys: Vec<String> = Vec::new();
+    for (gauge, powers) in calibration.iter().enumerate() {
+        let own = format!("gauge[{gauge}].calibration");
+        let key = if found.model.spans.contains_key(&own) { own } else { "sensor.calibration".to_owned() };
+        let read = libm::fabs(powers[1]) * (to - from);
+        let off = times_beyond(read / (high - low), &SOUND_SPAN);
+        if off <= 1.0 || keys.contains(&key) {
+            continue;
+        }
+        found.add_off(
+            off,
+            codes::CALIBRATION_ODD,
+            &format!("{key}[1]"),
+            format!(
+                "at {} um/V the gauge reads {} um over the {} V of its converter, and `sensor.range` is {} um",
+                figure(powers[1] * 1e6),
+                figure(read * 1e6),
+                figure(to - from),
+                figure((high - low) * 1e6)
+            ),
+            &format!("check the unit of this coefficient of `{key}`, `sensor.range` and `sensor.input_range`"),
+        );
+        keys.push(key);
+    }
+}
+
 /// Gauges of one make have calibrations alike.
 pub(super) fn calibrations(facts: &Facts, found: &mut Found) {
     let Some(calibration) = facts.model.task_space.as_ref().and_then(|task| task.calibration.as_ref()) else { return };
+    // Where slopes do not fit the converter, that says which.
+    let said = |one: &Diagnostic| one.key.ends_with("calibration[1]");
+    if found.list.iter().any(said) {
+        return;
+    }
     // Offset and slope; higher powers differ from gauge to gauge.
     for power in 0..2 {
         let values: [f64; 6] = core::array::from_fn(|k| calibration[k].get(power).copied().unwrap_or(0.0));
@@ -105,7 +146,8 @@ pub(super) fn gains_by_stiffness(facts: &Facts, found: &mut Found) {
             if ratio == 0.0 || usual == 0.0 || (1.0 / GAIN_SPREAD..=GAIN_SPREAD).contains(&(ratio / usual)) {
                 continue;
             }
-            found.add(
+            found.add_off(
+                times_beyond(ratio / usual, &(1.0 / GAIN_SPREAD..=GAIN_SPREAD)),
                 codes::GAIN_UNEVEN,
                 &format!("{key}[{axis}]"),
                 format!(

@@ -1,6 +1,6 @@
 //! Masses and inertias against sizes.
 
-use super::{Facts, Found, figure};
+use super::{Facts, Found, figure, times_beyond};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// Least radius of gyration of a leg part, in leg lengths: that of a disc a fifteenth of the leg long.
@@ -41,7 +41,8 @@ pub(super) fn leg_parts_have_size(facts: &Facts, found: &mut Found) {
         if radius >= THINNEST * length {
             continue;
         }
-        found.add(
+        found.add_off(
+            THINNEST * length / radius,
             codes::LEG_PART_SMALL,
             &format!("leg.{part}_inertia"),
             format!(
@@ -64,7 +65,8 @@ pub(super) fn mass_centres_off_the_joints(facts: &Facts, found: &mut Found) {
         if *center == 0.0 || *center >= NEAREST_CENTRE * radius {
             continue;
         }
-        found.add(
+        found.add_off(
+            NEAREST_CENTRE * radius / center,
             codes::CENTRE_AT_JOINT,
             &format!("leg.{part}_center"),
             format!(
@@ -87,7 +89,8 @@ pub(super) fn parts_are_bodies(facts: &Facts, found: &mut Found) {
         if *center == 0.0 || SOUND_PART.contains(&(radius / center)) || found.list.iter().any(said) {
             continue;
         }
-        found.add(
+        found.add_off(
+            times_beyond(radius / center, &SOUND_PART),
             codes::LEG_PART_SHAPE,
             &key,
             format!(
@@ -112,7 +115,8 @@ pub(super) fn centre_over_joints(facts: &Facts, found: &mut Found) {
         if libm::fabs(value) <= FARTHEST_CENTRE[axis] * size {
             continue;
         }
-        found.add(
+        found.add_off(
+            libm::fabs(value) / (FARTHEST_CENTRE[axis] * size),
             codes::CENTRE_FAR,
             &format!("platform.center_of_mass[{axis}]"),
             format!(
@@ -135,7 +139,8 @@ pub(super) fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
         if sound.contains(&(radius / size)) {
             continue;
         }
-        found.add(
+        found.add_off(
+            times_beyond(radius / size, &sound),
             codes::MOMENT_ODD,
             &format!("platform.inertia[{axis}]"),
             format!(
@@ -146,7 +151,7 @@ pub(super) fn moments_of_each_axis(facts: &Facts, found: &mut Found) {
                 figure(body.mass),
                 figure(size * 1e3)
             ),
-            "check the units of `platform.inertia` and `platform.mass`",
+            "check the units of `platform.inertia` (kg m^2 or g mm^2) and `platform.mass`; the moments are about the centre of mass",
         );
     }
 }
@@ -187,11 +192,38 @@ pub(super) fn leg_parts_against_platform(facts: &Facts, found: &mut Found) {
         if SOUND_SHARE.contains(&(mass / platform)) {
             continue;
         }
-        found.add(
+        found.add_off(
+            times_beyond(mass / platform, &SOUND_SHARE),
             codes::LEG_MASS_ODD,
             &format!("leg.{part}_mass"),
             format!("the {part} part of a leg weighs {} kg, the platform {} kg", figure(*mass), figure(platform)),
             &format!("check the units of `leg.{part}_mass` and `platform.mass`: kg or g"),
         );
     }
+}
+
+/// Moments are about the centre of mass. About the base's origin they would be larger by m h², as if mass lay as far above and
+/// below the platform as its base is.
+pub(super) fn moments_about_the_centre(facts: &Facts, found: &mut Found) {
+    let (body, height) = (&facts.model.platform, facts.model.geometry.height);
+    let [xx, yy, zz] = body.inertia;
+    // I_xx + I_yy − I_zz = 2 ∫ z² dm.
+    let spread = libm::sqrt((xx + yy - zz) / (2.0 * body.mass));
+    if spread.is_nan() || spread < height {
+        return;
+    }
+    found.add(
+        codes::MOMENTS_ELSEWHERE,
+        "platform.inertia[0]",
+        format!(
+            "with these moments and {} kg the mass of the platform lies {} mm (rms) above and below its centre, and the base is {} mm away",
+            figure(body.mass),
+            figure(spread * 1e3),
+            figure(height * 1e3)
+        ),
+        &format!(
+            "`platform.inertia` is about the centre of mass: from moments about the base's origin, take mass x height^2 = {} g mm^2 off I_xx and I_yy; check their unit, too",
+            figure(body.mass * height * height * 1e9)
+        ),
+    );
 }

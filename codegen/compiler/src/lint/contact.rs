@@ -1,6 +1,6 @@
 //! The work piece that the platform touches.
 
-use super::{AXES, Facts, Found, amount, figure};
+use super::{AXES, Facts, Found, amount, figure, times_beyond};
 use specgen_language::diagnostic::codes;
 
 /// Stiffness of a work piece over that of the platform on its legs.
@@ -17,7 +17,8 @@ pub(super) fn work_piece(facts: &Facts, found: &mut Found) {
         if value == 0.0 || SOUND_WORK_PIECE.contains(&ratio) {
             continue;
         }
-        found.add(
+        found.add_off(
+            times_beyond(ratio, &SOUND_WORK_PIECE),
             codes::WORK_PIECE_ODD,
             &format!("control.environment.stiffness[{axis}]"),
             format!(

@@ -1,13 +1,16 @@
 //! Amplifier and converter.
 
-use super::{Facts, Found, figure};
+use super::{Facts, Found, figure, times_beyond};
 use specgen_language::diagnostic::codes;
 use specgen_language::model::Model;
 
 /// Largest slew rate of a first-order lag is range over time constant: a limit above that never binds.
 const LAG_SLACK: f64 = 1.0;
 /// Noise of an amplifier, of its range.
-const SOUND_NOISE: core::ops::RangeInclusive<f64> = 2e-7..=1e-2;
+const SOUND_NOISE: core::ops::RangeInclusive<f64> = 2e-7..=2e-3;
+/// Energy of the blocked leg, k s²/2, over that of its charge, C U²/2: ceramics turn at most half of the one into the other,
+/// and levers leave a hundredth of that. Wide, for both figures come from data sheets.
+const SOUND_COUPLING: core::ops::RangeInclusive<f64> = 1e-3..=5.0;
 /// A converter step of more than this share of the stroke is too coarse for any nanopositioning.
 const COARSEST_STEP: f64 = 1e-3;
 
@@ -18,10 +21,12 @@ const WIDEST_RANGE: f64 = 4.0;
 pub(super) fn lag_fits_slew(facts: &Facts, found: &mut Found) {
     let (amplifier, actuator) = (&facts.model.amplifier, &facts.model.actuator);
     let [low, high] = actuator.voltage;
-    if amplifier.lag * actuator.slew_rate <= LAG_SLACK * (high - low) {
+    let off = amplifier.lag * actuator.slew_rate / (LAG_SLACK * (high - low));
+    if off <= 1.0 {
         return;
     }
-    found.add(
+    found.add_off(
+        off,
         codes::LAG_AGAINST_SLEW,
         "amplifier.lag",
         format!(
@@ -43,7 +48,8 @@ pub(super) fn current_fits_slew(facts: &Facts, found: &mut Found) {
     if needed <= current {
         return;
     }
-    found.add(
+    found.add_off(
+        needed / current,
         codes::CURRENT_AGAINST_SLEW,
         "amplifier.current",
         format!(
@@ -54,7 +60,7 @@ pub(super) fn current_fits_slew(facts: &Facts, found: &mut Found) {
             figure(current)
         ),
         &format!(
-            "the amplifier's own limit is {} V/ms: write that as `actuator.slew_rate`, or check `actuator.capacitance` (of a whole leg) and `amplifier.current`",
+            "the amplifier's own limit is {} V/ms: write that as `actuator.slew_rate`, or check `actuator.capacitance` (of a whole leg) and `amplifier.current` (mA or A)",
             figure(current / capacitance * 1e-3)
         ),
     );
@@ -65,11 +71,13 @@ pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
     let (noise, actuator) = (facts.model.amplifier.noise, &facts.model.actuator);
     let [low, high] = actuator.voltage;
     let share = noise / (high - low);
-    if noise == 0.0 || SOUND_NOISE.contains(&share) {
+    let off = times_beyond(share, &SOUND_NOISE);
+    if noise == 0.0 || off <= 1.0 {
         return;
     }
-    let how = if share > 1e-3 { "more than a hundredth of its range" } else { "quieter than any amplifier" };
-    found.add(
+    let how = if share > 1e-3 { "more than a five-hundredth of its range" } else { "quieter than any amplifier" };
+    found.add_off(
+        off,
         codes::AMPLIFIER_NOISE,
         "amplifier.noise",
         format!(
@@ -82,6 +90,33 @@ pub(super) fn amplifier_noise(facts: &Facts, found: &mut Found) {
     );
 }
 
+/// What a stack makes of its charge.
+pub(super) fn capacitance_of_the_stacks(facts: &Facts, found: &mut Found) {
+    let actuator = &facts.model.actuator;
+    let Some(capacitance) = actuator.capacitance else { return };
+    let [low, high] = actuator.voltage;
+    let volts = high - low;
+    let (blocked, charged) =
+        (actuator.axial_stiffness * actuator.stroke * actuator.stroke, capacitance * volts * volts);
+    let off = times_beyond(blocked / charged, &SOUND_COUPLING);
+    if off <= 1.0 {
+        return;
+    }
+    found.add_off(
+        off,
+        codes::CAPACITANCE_ODD,
+        "actuator.capacitance",
+        format!(
+            "charging {} uF to {} V takes {} J, and the blocked leg holds {} J (stiffness x stroke^2 / 2)",
+            figure(capacitance * 1e6),
+            figure(volts),
+            figure(charged / 2.0),
+            figure(blocked / 2.0)
+        ),
+        "ceramics turn at most half of the one into the other: check the unit of `actuator.capacitance` (uF or nF; of a whole leg), and `actuator.axial_stiffness`",
+    );
+}
+
 /// One code of the converter in nanometres.
 pub(super) fn converter_step(facts: &Facts, found: &mut Found) {
     let (dac, actuator) = (&facts.model.dac, &facts.model.actuator);
@@ -91,7 +126,8 @@ pub(super) fn converter_step(facts: &Facts, found: &mut Found) {
     if step <= COARSEST_STEP * actuator.stroke {
         return;
     }
-    found.add(
+    found.add_off(
+        step / (COARSEST_STEP * actuator.stroke),
         codes::CONVERTER_COARSE,
         "dac.bits",
         format!(

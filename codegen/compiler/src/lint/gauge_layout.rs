@@ -3,7 +3,7 @@
 use nalgebra::Matrix6;
 
 use super::{Facts, Found, figure};
-use specgen_language::diagnostic::codes;
+use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Probe;
 use specgen_numerics::{cross, dot};
 
@@ -83,8 +83,9 @@ fn condition(probes: &[Probe; 6], height: f64, radius: f64) -> f64 {
 /// Names the one gauge whose sign or order of coordinates would explain a layout that sees badly.
 pub(super) fn slip_of_one(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
-    // A slip that puts a gauge out of the pattern of the others is known better from that.
-    if found.list.iter().any(|finding| finding.code == codes::GAUGE_PATTERN) {
+    // A slip that puts a gauge out of the pattern of the others is known better from that, and a copy as a copy.
+    let known = |finding: &Diagnostic| finding.code == codes::GAUGE_PATTERN || finding.code == codes::GAUGES_ALIKE;
+    if found.list.iter().any(known) {
         return;
     }
     let (height, radius) = (facts.model.geometry.height, facts.model.geometry.joint_radius());

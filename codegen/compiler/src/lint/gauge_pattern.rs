@@ -62,6 +62,16 @@ fn triangle(probes: &[Probe; 6], gauge: usize) -> Option<bool> {
     axial(&probes[gauge]).then_some(ab > 0.0 && alike)
 }
 
+/// A point in the platform's frame, for one in the base's.
+fn frame(gauge: usize, probe: &Probe, height: f64) -> Change {
+    let [x, y, z] = probe.point;
+    Change {
+        key: format!("gauge[{gauge}].point"),
+        what: "z counted from the base, in {B},".to_owned(),
+        probe: Probe { point: [x, y, z + height], plane_point: [x, y, z], ..probe.clone() },
+    }
+}
+
 /// A digit too many or too few in a coordinate, or cm for mm.
 fn digits(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
     let each = (0..3).flat_map(|axis| [(axis, 10.0), (axis, 0.1)]);
@@ -80,6 +90,10 @@ fn digits(gauge: usize, probe: &Probe, height: f64) -> Vec<Change> {
 /// Names the gauge whose sign, digits or order of coordinates would put it in line with the others.
 pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
     let Some(task) = &facts.model.task_space else { return };
+    // A copy is known as a copy.
+    if found.list.iter().any(|finding| finding.code == codes::GAUGES_ALIKE) {
+        return;
+    }
     // How many patterns each change restores, and one of them; changes that break none.
     let mut restoring: Vec<(usize, &str, Change)> = Vec::new();
     for gauge in 0..6 {
@@ -88,7 +102,8 @@ pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
             continue;
         }
         let (probe, height) = (&task.probes[gauge], facts.model.geometry.height);
-        for change in changes(gauge, probe, height).into_iter().chain(digits(gauge, probe, height)) {
+        let other = digits(gauge, probe, height).into_iter().chain([frame(gauge, probe, height)]);
+        for change in changes(gauge, probe, height).into_iter().chain(other) {
             let mut probes = task.probes.clone();
             probes[gauge] = change.probe.clone();
             let then = PATTERNS.map(|(pattern, _)| pattern(&probes, gauge));
@@ -113,7 +128,7 @@ pub(super) fn out_of_pattern(facts: &Facts, found: &mut Found) {
         &first.key,
         format!("with {} in `{}` changed, the gauge {pattern}; as it is written it does not", first.what, first.key),
         &format!(
-            "check signs, digits and order of the coordinates in {}",
+            "check signs, digits and order of the coordinates, in {{B}}, in {}",
             keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ")
         ),
     );

@@ -119,7 +119,8 @@ pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
     if step <= COARSEST_STEP * stroke {
         return;
     }
-    found.add(
+    found.add_off(
+        step / (COARSEST_STEP * stroke),
         codes::GAUGE_COARSE,
         "sensor.bits",
         format!(
@@ -130,6 +131,24 @@ pub(super) fn step_against_stroke(facts: &Facts, found: &mut Found) {
         ),
         "a converter of 16 bits or more is usual; check `sensor.range` and `sensor.bits`",
     );
+}
+
+/// Two gauges that see the same are one, whatever they are called: most often a section that was copied and not changed.
+pub(super) fn differ(facts: &Facts, found: &mut Found) {
+    let Some(task) = &facts.model.task_space else { return };
+    let seen = |gauge: usize| {
+        let probe = &task.probes[gauge];
+        (probe.point, probe.direction, probe.plane_point, probe.plane_normal)
+    };
+    for later in 1..6 {
+        let Some(earlier) = (0..later).find(|earlier| seen(*earlier) == seen(later)) else { continue };
+        found.add(
+            codes::GAUGES_ALIKE,
+            &format!("gauge[{later}].point"),
+            format!("gauge {later} stands and looks as gauge {earlier}: six readings are needed, and these two are one"),
+            &format!("change `point` or `direction` of `gauge[{later}]`, if it was copied from `gauge[{earlier}]`"),
+        );
+    }
 }
 
 /// A coordinate in the wrong unit is a tiny one beside large ones.
@@ -217,7 +236,8 @@ pub(super) fn size_of_layout(facts: &Facts, found: &mut Found) {
             }
             continue;
         }
-        found.add(
+        found.add_off(
+            far / (DETACHED * radius),
             codes::GAUGE_FAR,
             &format!("gauge[{gauge}].point"),
             format!(

@@ -1,5 +1,7 @@
 //! Where the joints are.
 
+use core::f64::consts::PI;
+
 use super::{Facts, Found, figure};
 use crate::reach::joints;
 use specgen_language::diagnostic::codes;
@@ -11,6 +13,8 @@ const NEAREST: f64 = 1e-2;
 const OUT_OF_PROPORTION: f64 = 5.0;
 /// Legs that would be shorter by more than this share with each other's joints cross.
 const CROSSED: f64 = 1e-3;
+/// Six joints evenly on their circle are so many degrees apart: no pair is wider.
+const WIDEST_PAIR: f64 = 60.0;
 
 /// The joints of a pair are two parts that stand beside each other.
 pub(super) fn joints_apart(facts: &Facts, found: &mut Found) {
@@ -122,7 +126,8 @@ pub(super) fn proportions(facts: &Facts, found: &mut Found) {
     if !apart[odd].is_finite() || apart[odd] <= libm::log(OUT_OF_PROPORTION) {
         return;
     }
-    found.add(
+    found.add_off(
+        libm::exp(apart[odd]) / OUT_OF_PROPORTION,
         codes::OUT_OF_PROPORTION,
         keys[odd],
         format!(
@@ -161,5 +166,24 @@ pub(super) fn legs_cross(facts: &Facts, found: &mut Found) {
             "`geometry.base_joints` and `geometry.platform_joints` list the legs in the same order: check it on both bodies",
         );
         return;
+    }
+}
+
+/// Joints of a pair are nearer to each other than to the next pair.
+pub(super) fn angles_of_pairs(facts: &Facts, found: &mut Found) {
+    let geometry = &facts.model.geometry;
+    for (body, joints, other) in [("base", &geometry.base_joints, 1), ("platform", &geometry.platform_joints, 5)] {
+        let key = format!("geometry.{body}_angle");
+        let ([ax, ay, _], [bx, by, _]) = (joints[0], joints[other]);
+        let angle = libm::fabs(libm::atan2(ax * by - ay * bx, ax * bx + ay * by)) * 180.0 / PI;
+        if !found.model.spans.contains_key(&key) || angle <= WIDEST_PAIR {
+            continue;
+        }
+        found.add(
+            codes::PAIR_WIDE,
+            &key,
+            format!("the joints of a pair are {} deg apart, and {} deg from those of the next pair", figure(angle), figure(120.0 - angle)),
+            &format!("`{key}` is the angle within a pair, the smaller of the two: if \"{} deg\" is meant, write that", figure(120.0 - angle)),
+        );
     }
 }

@@ -10,6 +10,8 @@ const LONGEST_MOVE: f64 = 120.0;
 const NEVER: f64 = 4.0;
 /// A limit of jerk that is so much larger than what the acceleration needs ends within a tick.
 const WITHIN_TICK: f64 = 1.0;
+/// A stream that may go slower than this share of the speed of moves.
+const SLOWEST_STREAM: f64 = 0.1;
 /// Largest bound against what its legs reach, and smallest.
 const SMALLEST_USE: f64 = 5e-3;
 
@@ -141,6 +143,54 @@ pub(super) fn stream_limit_binds(facts: &Facts, found: &mut Found) {
             "a jump across the workspace would pass: check the unit",
         );
     }
+}
+
+/// A stream that may not go a tenth as fast as moves go is in another unit.
+pub(super) fn streams_keep_up(facts: &Facts, found: &mut Found) {
+    let Some(rules) = rules(facts) else { return };
+    for (axis, stream) in rules.stream_speed.into_iter().enumerate() {
+        if stream >= SLOWEST_STREAM * rules.speed[axis] {
+            continue;
+        }
+        found.add(
+            codes::STREAM_SLOW,
+            &format!("control.setpoint.stream_speed[{axis}]"),
+            format!(
+                "streamed set-points may move at {}/s along {}, while moves go at {}/s",
+                amount(axis, stream),
+                AXES[axis],
+                amount(axis, rules.speed[axis])
+            ),
+            "check the units of `control.setpoint.stream_speed` and `control.setpoint.speed`: um/s or mm/s",
+        );
+    }
+}
+
+/// The voltage follows a stream at its largest speed. Where it does not on most axes, the slew rate is suspected.
+pub(super) fn streams_within_slew(facts: &Facts, found: &mut Found) {
+    let (Some(rules), Some(legs)) = (rules(facts), &facts.legs) else { return };
+    let actuator = &facts.model.actuator;
+    let slews: [f64; 6] =
+        core::array::from_fn(|axis| legs.steepest(axis) * rules.stream_speed[axis] / actuator.leg_gain());
+    let beyond: Vec<usize> = (0..6).filter(|axis| slews[*axis] > actuator.slew_rate).collect();
+    let Some(worst) = beyond.iter().copied().reduce(|a, b| if slews[b] > slews[a] { b } else { a }) else { return };
+    let key = if beyond.len() > 3 {
+        "actuator.slew_rate".to_owned()
+    } else {
+        format!("control.setpoint.stream_speed[{worst}]")
+    };
+    found.add(
+        codes::MOVE_BEYOND_SLEW,
+        &key,
+        format!(
+            "a stream along {} at {}/s needs {} V/ms, but `actuator.slew_rate` is {} V/ms",
+            AXES[worst],
+            amount(worst, rules.stream_speed[worst]),
+            figure(slews[worst] * 1e-3),
+            figure(actuator.slew_rate * 1e-3)
+        ),
+        "check the units of `actuator.slew_rate` (V/ms or V/s) and `control.setpoint.stream_speed`",
+    );
 }
 
 /// A bound that uses next to nothing of what the legs reach.

@@ -167,6 +167,22 @@ fn arcs(largest: f64, scalar: Scalar) -> (Vec<f64>, Vec<f64>) {
     (arc_sine, arc_tangent)
 }
 
+/// Largest magnitude of each axis alone that the gauges read, m and rad; none without gauges that see the platform.
+pub(crate) fn seen(model: &Model) -> Option<[f64; 6]> {
+    let layout = layout::check(model, &model.task_space.as_ref()?.probes).ok()?;
+    Some(core::array::from_fn(|axis| seen_along(model, &layout, axis)))
+}
+
+fn seen_along(model: &Model, layout: &Layout, axis: usize) -> f64 {
+    let [low, high] = model.sensor.range;
+    let legs = leg_jacobian(&model.geometry).unwrap_or([[0.0; 6]; 6]);
+    let ways = [-1.0, 1.0].into_iter().filter(|way| !legs.iter().all(|leg| leg[axis] * way < 0.0));
+    let ends = ways.flat_map(|way| layout.jacobian.iter().map(move |row| row[axis] * way)).filter_map(|slope| {
+        if slope == 0.0 { None } else { Some(if slope > 0.0 { high / slope } else { low / slope }) }
+    });
+    ends.fold(f64::INFINITY, |least, end| if end < least { end } else { least })
+}
+
 /// A pose that is accepted must be one that the gauges can read: each axis by itself, up to its bound. Where that way lies
 /// below the reach of every leg, as all poses below rest do, it need not be read.
 fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
@@ -202,7 +218,12 @@ fn range_holds_workspace(model: &Model, layout: &Layout) -> Vec<Diagnostic> {
             low * 1e6,
             high * 1e6
         ),
-        format!("reduce workspace.{name}, or use gauges whose range takes in {:.3} µm", reading * 1e6),
+        format!(
+            "at most {} {unit} on this axis (workspace.{name}[{}]), or gauges whose range takes in {:.3} µm; check the unit of sensor.range",
+            libm::floor(seen_along(model, layout, axis) * scale * 1e4) / 1e4,
+            axis % 3,
+            reading * 1e6
+        ),
     )]
 }
 

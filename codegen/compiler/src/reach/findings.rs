@@ -3,6 +3,8 @@
 use std::fmt::Write as _;
 
 use super::{PathReach, ROOM, Reach};
+use crate::figure::figure;
+use crate::lower;
 use specgen_language::diagnostic::{Diagnostic, Severity, codes};
 use specgen_language::model::{Model, SetpointKind};
 
@@ -16,59 +18,28 @@ const fn unit(axis: usize) -> (&'static str, f64) {
 pub(super) fn of(model: &Model, reach: &Reach, bias: &PathReach) -> Vec<Diagnostic> {
     let mut findings = Vec::new();
     findings.extend(of_bias(model, reach, bias));
-    for axis in 0..6 {
-        findings.extend(of_axis(model, reach, axis));
-    }
+    findings.extend(of_bounds(model, reach.stroke, |axis| reach.axes[axis].from_middle));
     findings.extend(of_condition(model, reach));
     findings
 }
 
-/// Warnings about legs with their own gauges.
+/// Findings about legs with their own gauges.
 pub(super) fn of_legs(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
-    of_gauge_ends(model, reach).filter(is_warning).into_iter().chain(of_condition(model, reach)).collect()
+    let bounds = of_bounds(model, reach.stroke, |axis| reach.axes[axis].from_middle);
+    bounds
+        .into_iter()
+        .chain(of_gauge_ends(model, reach).filter(is_warning))
+        .chain(of_condition(model, reach))
+        .collect()
 }
 
-/// Notes about them: what is cut short where they end.
+/// Notes about them.
 pub(super) fn notes_of_legs(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
-    let cut = (model.controller.setpoint == SetpointKind::Pose).then(|| of_furthest_axis(model, reach)).flatten();
-    cut.into_iter().chain(of_gauge_ends(model, reach).filter(|one| !is_warning(one))).collect()
+    of_gauge_ends(model, reach).filter(|one| !is_warning(one)).into_iter().collect()
 }
 
 fn is_warning(finding: &Diagnostic) -> bool {
     finding.severity > Severity::Note
-}
-
-/// The bound that lies furthest beyond what its axis reaches.
-fn of_furthest_axis(model: &Model, reach: &Reach) -> Option<Diagnostic> {
-    let furthest = |axis: usize| {
-        let [low, high] = reach.axes[axis].from_middle;
-        if -low > high { -low } else { high }
-    };
-    let beyond = |axis: usize| reach.axes[axis].declared / furthest(axis);
-    let worst = (1..6).fold(0, |worst, axis| if beyond(axis) > beyond(worst) { axis } else { worst });
-    if beyond(worst).is_nan() || beyond(worst) <= 1.0 + 1e-9 {
-        return None;
-    }
-    let (table, item) = if worst < 3 { ("workspace.translation", worst) } else { ("workspace.rotation", worst - 3) };
-    let (unit, scale) = unit(worst);
-    let [low, high] = reach.axes[worst].from_middle;
-    Some(Diagnostic::at(
-        &model.spans,
-        &[&format!("{table}[{item}]"), table, "workspace"],
-        codes::LEGS_CUT_SHORT,
-        format!(
-            "no pose reaches |{}| = {:.2} {unit}: from the middle of the strokes, at z = {:.1} um, this axis alone goes from {:.2} to {:.2} {unit}",
-            AXES[worst],
-            reach.axes[worst].declared * scale,
-            reach.boxes.centre[2] * 1e6,
-            low * scale,
-            high * scale
-        ),
-        format!(
-            "set-points beyond are accepted and each leg stops at the end of its stroke; to have them refused, declare at most {:.2} {unit}",
-            libm::floor(furthest(worst) * scale * 100.0) / 100.0
-        ),
-    ))
 }
 
 /// A gauge that sees less than this share of its leg's stroke is hardly meant.
@@ -91,7 +62,7 @@ fn of_gauge_ends(model: &Model, reach: &Reach) -> Option<Diagnostic> {
             high * 1e6,
             reach.stroke * 1e6
         ),
-        "a leg beyond the end of its gauge is a gauge fault: keep set-points within the gauge, or take one that sees the whole stroke".to_owned(),
+        "a leg beyond the end of its gauge is a gauge fault: keep set-points within the gauge, or take one that sees the whole stroke; check the unit of `sensor.range`".to_owned(),
     ))
 }
 
@@ -118,10 +89,15 @@ fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic>
     if beyond(reach.stroke, reach.at_bias) {
         let help = advice(bias, "bias");
         let message = format!(
-            "at the bias the legs would be at {:.3} um to {:.3} um, but they move between 0 and {:.3} um",
+            "at the bias the legs would be at {:.3} um to {:.3} um, but they move between 0 and {:.3} um{}",
             low * 1e6,
             high * 1e6,
-            reach.stroke * 1e6
+            reach.stroke * 1e6,
+            if reach.stroke < model.actuator.stroke {
+                format!(": {}", of_table(model, reach.stroke))
+            } else {
+                String::new()
+            }
         );
         return Some(Diagnostic::at(&model.spans, &KEYS, codes::BIAS_UNREACHABLE, message, help));
     }
@@ -139,31 +115,62 @@ fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic>
     Some(Diagnostic::at(&model.spans, &KEYS, codes::NO_ROOM, message, help))
 }
 
-fn of_axis(model: &Model, reach: &Reach, axis: usize) -> Option<Diagnostic> {
-    let one = &reach.axes[axis];
-    let [low, high] = one.from_middle;
+/// Bounds that no pose reaches, `stroke` (m) being what every leg can do, and `from_middle` how far an axis alone goes from the
+/// middle of the strokes (m or rad). Legs that are driven one by one have no workspace.
+pub(super) fn of_bounds(model: &Model, stroke: f64, from_middle: impl Fn(usize) -> [f64; 2]) -> Vec<Diagnostic> {
+    if model.task_space.is_none() && model.controller.setpoint == SetpointKind::Leg {
+        return Vec::new();
+    }
+    let bounds = model.workspace.bounds();
+    let each = (0..6).filter_map(|axis| of_axis(model, stroke, axis, bounds[axis], from_middle(axis)));
+    each.collect()
+}
+
+fn of_axis(model: &Model, stroke: f64, axis: usize, declared: f64, [low, high]: [f64; 2]) -> Option<Diagnostic> {
     let furthest = if -low > high { -low } else { high };
-    if one.declared <= furthest * (1.0 + 1e-9) {
+    if declared <= furthest * (1.0 + 1e-9) {
         return None;
     }
     let (table, item) = if axis < 3 { ("workspace.translation", axis) } else { ("workspace.rotation", axis - 3) };
     let key = format!("{table}[{item}]");
     let (unit, scale) = unit(axis);
     // Rounded down, so that the number shown is itself accepted.
-    let shown = libm::floor(furthest * scale * 100.0) / 100.0;
+    let shown = |value: f64| libm::floor(value * scale * 100.0) / 100.0;
+    let seen = lower::seen(model).map_or(f64::INFINITY, |seen| seen[axis]);
+    let most = if seen < furthest {
+        format!("at most {} {unit}, where the gauges end (the legs reach {} {unit})", shown(seen), shown(furthest))
+    } else {
+        format!("at most {} {unit}", shown(furthest))
+    };
+    // The table of a leg may end before its data sheet does.
+    let (code, binds, way_out) = if stroke < model.actuator.stroke {
+        (codes::AXIS_UNREACHABLE, of_table(model, stroke), "use a record that reaches the whole stroke")
+    } else {
+        let binds = format!("the stroke is {} um", figure(stroke * 1e6));
+        (codes::WORKSPACE_UNREACHABLE, binds, "use legs with more stroke")
+    };
     Some(Diagnostic::at(
         &model.spans,
         &[&key, table, "workspace"],
-        codes::AXIS_UNREACHABLE,
+        code,
         format!(
-            "no pose reaches |{}| = {:.2} {unit}: from the middle of the strokes, this axis alone goes from {:.2} to {:.2} {unit}",
+            "no pose reaches |{}| = {:.2} {unit}: {binds}, and from the middle of it this axis alone goes from {:.2} to {:.2} {unit}",
             AXES[axis],
-            one.declared * scale,
+            declared * scale,
             low * scale,
             high * scale
         ),
-        format!("at most {shown} {unit}; check the unit, or use legs with more stroke"),
+        format!("{most}; check the unit, or {way_out}"),
     ))
+}
+
+/// Says that not the declared stroke binds, but what was identified.
+fn of_table(model: &Model, stroke: f64) -> String {
+    format!(
+        "the identified hysteresis ends at {} um, before the stroke of {} um (`actuator.stroke`)",
+        figure(stroke * 1e6),
+        figure(model.actuator.stroke * 1e6)
+    )
 }
 
 /// What is wrong with a path, if anything.
@@ -172,10 +179,11 @@ pub(super) fn of_path(model: &Model, stroke: f64, [key, name]: [&str; 2], path: 
         return None;
     }
     let message = format!(
-        "`{name}` needs leg displacements from {:.3} um to {:.3} um, but the legs move between 0 and {:.3} um",
+        "`{name}` needs leg displacements from {:.3} um to {:.3} um, but the legs move between 0 and {:.3} um{}",
         path.displacement[0] * 1e6,
         path.displacement[1] * 1e6,
-        stroke * 1e6
+        stroke * 1e6,
+        if stroke < model.actuator.stroke { format!(": {}", of_table(model, stroke)) } else { String::new() }
     );
     let section = key.split('.').next().unwrap_or(key);
     Some(Diagnostic::at(

@@ -1,0 +1,229 @@
+//! Which one value would explain the most findings: that is named first.
+//!
+//! A wrong unit shows wherever the value is compared with others, and often first at a key that is right. So each value that a
+//! finding names is tried with other powers of ten and the other sign; the one that takes most findings away is suspected.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+use super::{allow, check};
+use crate::reach;
+use specgen_language::diagnostic::{Diagnostic, Place, Severity, codes};
+use specgen_language::spec::{self, SpecSource};
+
+/// What is tried, the likeliest slips first; of a number without unit only what does not come from a unit.
+const SLIPS: [(f64, &str); 11] = [
+    (1e3, "1000 times larger"),
+    (1e-3, "1000 times smaller"),
+    (1e6, "a million times larger"),
+    (1e-6, "a million times smaller"),
+    (10.0, "ten times larger"),
+    (0.1, "ten times smaller"),
+    (100.0, "a hundred times larger"),
+    (0.01, "a hundred times smaller"),
+    (2.0, "twice as large"),
+    (0.5, "half as large"),
+    (-1.0, "with the other sign"),
+];
+const OF_UNITS: usize = 4;
+/// A spec with so many values under suspicion has more than one slip.
+const MOST_SUSPECTS: usize = 40;
+
+/// What is found before records and paths are looked at.
+type Found = BTreeSet<(&'static str, String)>;
+
+struct Culprit {
+    key: String,
+    how: String,
+    explained: usize,
+    of: usize,
+}
+
+/// How soon a finding is shown. What may be wrong with a value comes before what follows from it.
+fn rank(one: &Diagnostic) -> u8 {
+    let of_values = ["01", "02", "03", "08"].iter().any(|part| one.code[1..].starts_with(part));
+    match (one.severity, of_values) {
+        (Severity::Error, true) => 0,
+        (Severity::Warning, true) => 1,
+        (Severity::Error, false) => 2,
+        (Severity::Warning, false) => 3,
+        (Severity::Note, _) => 4,
+    }
+}
+
+/// Puts first what is found about the one value that would explain most of the findings; then errors and doubts about values,
+/// then what later phases found with them.
+pub fn in_order(source: &SpecSource, findings: &mut Vec<Diagnostic>) {
+    findings.sort_by_key(rank);
+    let Some(culprit) = culprit(source, findings) else { return };
+    let own = |one: &Diagnostic| one.severity > Severity::Note && list_of(&one.key) == list_of(&culprit.key);
+    // That of the same item, if there is one.
+    let own = findings
+        .iter()
+        .position(|one| own(one) && one.key == culprit.key)
+        .or_else(|| findings.iter().position(own));
+    let explains = format!("{} {} of {} findings would be gone", culprit.how, culprit.explained, culprit.of);
+    let first = match own {
+        Some(at) => {
+            let mut own = findings.remove(at);
+            own.help = format!("{}; {explains}", own.help);
+            own
+        }
+        None => {
+            let spans = spec::load_as_far(source).0.map(|model| model.spans).unwrap_or_default();
+            let Some(span) = spans.get(&culprit.key) else { return };
+            let message = format!("`{}` would explain most of what follows", culprit.key);
+            let help = format!("check its unit, sign and order; {explains}");
+            Diagnostic::new(codes::ONE_VALUE, &culprit.key, Place::Spec(span.clone()), message, help)
+        }
+    };
+    findings.insert(0, first);
+}
+
+fn list_of(key: &str) -> &str {
+    key.rsplit_once('[').filter(|_| key.ends_with(']')).map_or(key, |(list, _)| list)
+}
+
+/// What is found in a text, and where its values stand; none where it is not read as a whole.
+fn found(source: &SpecSource) -> Option<(Found, BTreeMap<String, Range<usize>>)> {
+    let (model, mut findings) = spec::load_as_far(source);
+    let model = model?;
+    findings.extend(reach::check_bounds(&model));
+    findings.extend(check(&model));
+    allow(&model, &mut findings);
+    findings.retain(|one| one.severity > Severity::Note);
+    Some((findings.into_iter().map(|one| (one.code, one.key)).collect(), model.spans))
+}
+
+fn culprit(source: &SpecSource, findings: &[Diagnostic]) -> Option<Culprit> {
+    if findings.iter().filter(|one| one.severity > Severity::Note).count() < 2 {
+        return None;
+    }
+    let (base, spans) = found(source)?;
+    if base.len() < 2 {
+        return None;
+    }
+    let suspects = suspects(findings, &spans);
+    if suspects.len() > MOST_SUSPECTS {
+        return None;
+    }
+    let mut best: Option<(usize, Culprit)> = None;
+    let consider = |best: &mut Option<(usize, Culprit)>, key: &str, text: String, how: &dyn Fn() -> String| {
+        let Some((now, _)) = found(&SpecSource { text, ..source.clone() }) else { return };
+        let (gone, new) = (base.difference(&now).count(), now.difference(&base).count());
+        let score = gone.saturating_sub(2 * new);
+        if score >= 2 && 2 * gone > base.len() && best.as_ref().is_none_or(|(most, _)| score > *most) {
+            *best = Some((score, Culprit { key: key.to_owned(), how: how(), explained: gone, of: base.len() }));
+        }
+    };
+    for (key, places) in &suspects {
+        // One that explains everything is enough.
+        if best.as_ref().is_some_and(|(score, _)| *score == base.len()) {
+            break;
+        }
+        for (index, (factor, how)) in SLIPS.into_iter().enumerate() {
+            let Some(text) = changed(&source.text, places, factor, index < OF_UNITS) else { continue };
+            // One value is shown as it would be written.
+            let written = || match places.as_slice() {
+                [place] => format!("as {}", &text[place.start..place.end + text.len() - source.text.len()]),
+                _ => how.to_owned(),
+            };
+            consider(&mut best, key, text.clone(), &written);
+        }
+    }
+    for [a, b] in exchanged(findings, &spans) {
+        let (first, second) = if spans[a].start < spans[b].start { (&spans[a], &spans[b]) } else { (&spans[b], &spans[a]) };
+        let mut text = source.text.clone();
+        text.replace_range(second.clone(), &source.text[first.clone()]);
+        text.replace_range(first.clone(), &source.text[second.clone()]);
+        consider(&mut best, a, text, &|| format!("with `{b}` in its place and the other way round,"));
+    }
+    best.map(|(_, culprit)| culprit)
+}
+
+/// Pairs of keys of which a finding says that they may be in each other's place.
+fn exchanged<'a>(findings: &'a [Diagnostic], spans: &BTreeMap<String, Range<usize>>) -> Vec<[&'a str; 2]> {
+    let said = findings.iter().filter(|one| one.help.contains("each other's place"));
+    said.filter_map(|one| {
+        let mut keys = one.help.split('`').skip(1).step_by(2).filter(|key| spans.contains_key(*key));
+        Some([keys.next()?, keys.next()?])
+    })
+    .collect()
+}
+
+/// Values that findings are about or name, in their order: each item, and each list as a whole; with the places of their
+/// literals.
+fn suspects(findings: &[Diagnostic], spans: &BTreeMap<String, Range<usize>>) -> Vec<(String, Vec<Range<usize>>)> {
+    let mut named: Vec<&str> = Vec::new();
+    for finding in findings.iter().filter(|one| one.severity > Severity::Note) {
+        named.push(&finding.key);
+        for text in [&finding.message, &finding.help] {
+            named.extend(text.split('`').skip(1).step_by(2));
+        }
+        // "[geometry]" stands for every value in it.
+        for (section, _) in finding.help.split('[').skip(1).filter_map(|rest| rest.split_once(']')) {
+            let within = |key: &&String| key.rsplit_once('.').is_some_and(|(outer, _)| outer == section);
+            named.extend(spans.keys().filter(within).map(String::as_str));
+        }
+    }
+    let items = |list: &str| -> Vec<Range<usize>> {
+        (0..).map_while(|index| spans.get(&format!("{list}[{index}]")).cloned()).collect()
+    };
+    let mut suspects: Vec<(String, Vec<Range<usize>>)> = Vec::new();
+    let mut add = |key: &str, places: Vec<Range<usize>>| {
+        if !places.is_empty() && suspects.iter().all(|(known, _)| known != key) {
+            suspects.push((key.to_owned(), places));
+        }
+    };
+    for key in named.into_iter().filter(|key| spans.contains_key(list_of(key))) {
+        let list = list_of(key);
+        let whole = items(list);
+        if whole.is_empty() {
+            add(list, vec![spans[list].clone()]);
+        } else {
+            whole.iter().enumerate().for_each(|(index, place)| add(&format!("{list}[{index}]"), vec![place.clone()]));
+            add(list, whole);
+        }
+    }
+    suspects
+}
+
+/// The text with every literal times `factor`; none where one is no number, or has no unit and ought to, or nothing would change.
+fn changed(text: &str, places: &[Range<usize>], factor: f64, of_unit: bool) -> Option<String> {
+    let mut changed = text.to_owned();
+    let mut any = false;
+    for place in places.iter().rev() {
+        let literal = text.get(place.clone())?;
+        let inner = literal.trim_matches('"').trim_start();
+        let end = inner.find(|c: char| !(c.is_ascii_digit() || "+-.eE".contains(c))).unwrap_or(inner.len());
+        let number: f64 = inner[..end].parse().ok()?;
+        // As decimal arithmetic has it.
+        let scaled: f64 = format!("{:.12e}", number * factor).parse().ok()?;
+        any |= scaled != number;
+        let quote = if literal.starts_with('"') { "\"" } else { "" };
+        let whole = quote.is_empty() && number % 1.0 == 0.0 && !inner.contains(['.', 'e', 'E']);
+        if (quote.is_empty() && of_unit) || (whole && scaled % 1.0 != 0.0) {
+            return None;
+        }
+        let plain = whole || scaled == 0.0 || (1e-3..1e6).contains(&scaled.abs());
+        let written = if plain { format!("{scaled}") } else { format!("{scaled:e}") };
+        changed.replace_range(place.clone(), &format!("{quote}{written}{}{quote}", &inner[end..]));
+    }
+    any.then_some(changed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn literals_are_scaled_with_their_units() {
+        let text = "a = \"25 N/m\"\nb = [\"-1e2 um\", 3, 0.5]";
+        let places: Vec<Range<usize>> =
+            ["\"25 N/m\"", "\"-1e2 um\"", "3", "0.5"].map(|one| text.find(one).unwrap()).into_iter().zip([8, 9, 1, 3]).map(|(at, length)| at..at + length).collect();
+        let changed = changed(text, &places, 1000.0, false).unwrap();
+        assert_eq!(changed, "a = \"25000 N/m\"\nb = [\"-100000 um\", 3000, 500]");
+        assert_eq!(super::changed(text, &places, 1000.0, true), None, "3 and 0.5 have no unit");
+        assert_eq!(super::changed("records = \"leg.csv\"", &[10..19], 10.0, false), None);
+    }
+}
