@@ -38,8 +38,11 @@ use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use serde::Serialize;
 
+use specgen_compiler::compile::{Compiled, Refused};
 use specgen_compiler::ir::Ir;
+use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt;
+use specgen_language::spec::nearest;
 use specgen_toolchain as target;
 use ui::{Failure, Outcome, Ui};
 
@@ -71,6 +74,24 @@ struct Common {
     /// Build anew: take no build that was kept, and keep none.
     #[arg(long, global = true)]
     no_cache: bool,
+}
+
+/// How findings are taken.
+#[derive(Args, Debug, Clone, Copy)]
+struct Strictness {
+    /// Refuse a spec with warnings, as one with errors. A key that is meant is named in `[lint] allow`, with the reason.
+    #[arg(long)]
+    deny_warnings: bool,
+}
+
+impl Strictness {
+    /// Refuses `compiled` if warnings are denied and there is one among `findings`.
+    fn accept(self, compiled: &Compiled, findings: &[Diagnostic]) -> Result<(), Failure> {
+        if !self.deny_warnings || findings.iter().all(|one| one.severity < Severity::Warning) {
+            return Ok(());
+        }
+        Err(Refused { source: Some(compiled.source.clone()), findings: findings.to_vec() }.into())
+    }
 }
 
 #[derive(Subcommand, Debug)]
@@ -146,7 +167,10 @@ pub fn run() -> ExitCode {
         target::cache::switch_off();
     }
     let done = match &cli.command {
-        None => build::run(&cli.build, &mut ui),
+        None => match misspelt(cli.build.spec.as_deref()) {
+            Some(failure) => Err(failure),
+            None => build::run(&cli.build, &mut ui),
+        },
         Some(Command::New(arguments)) => new::run(arguments, &mut ui),
         Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
         Some(Command::Explain(arguments)) => explain::run(arguments, &ui),
@@ -193,8 +217,12 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         ErrorKind::ArgumentConflict if error.get(ContextKind::InvalidSubcommand).is_some() => {
             let mut command = command();
             let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
-            let message =
-                format!("one spec file is expected, or a command ({}) with its own arguments", names.join(", "));
+            let written = std::env::args().skip(1).find(|argument| !argument.starts_with('-')).unwrap_or_default();
+            let meant = nearest(&written, names.iter().copied());
+            let message = match meant {
+                Some(meant) => format!("there is no command `{written}`; did you mean `specgen {meant}`?"),
+                None => format!("one spec file is expected, or a command ({}) with its own arguments", names.join(", ")),
+            };
             command.error(ErrorKind::ArgumentConflict, message)
         }
         _ => error,
@@ -206,6 +234,14 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
         return ExitCode::from(Ui::new(true).failed(&Failure::Usage(message)));
     }
     error.exit()
+}
+
+/// `specgen chek`: a spec that is not there, under the name of a command or nearly so.
+fn misspelt(spec: Option<&std::path::Path>) -> Option<Failure> {
+    let spec = spec.filter(|spec| !spec.exists())?;
+    let (written, command) = (spec.to_str()?, command());
+    let meant = nearest(written, command.get_subcommands().map(clap::Command::get_name))?;
+    Some(Failure::Usage(format!("there is no file and no command `{written}`; did you mean `specgen {meant}`?")))
 }
 
 /// Every constant of a controller.

@@ -43,8 +43,10 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["legs.toml", "-o", ""], "--output"),
         (&["legs.toml", "minimal.toml"], "one spec file is expected"),
         (&["legs.toml", "--no-build", "--setup"], "--setup"),
+        (&["chek", "legs.toml"], "did you mean `specgen check`?"),
+        (&["chek"], "did you mean `specgen check`?"),
         (
-            &["chek", "legs.toml"],
+            &["frobnicate", "legs.toml"],
             "new, check, explain, build, size, flash, sim, tune, robust, report, reproduce, pil, operate, replay, dynamics, identify, forc, plant, doctor, lsp, dump-ir, cache, completions",
         ),
         (&["check"], "<SPEC>"),

@@ -106,7 +106,7 @@ fn a_bound_and_a_bias_beyond_the_strokes_are_refused() {
     let found = edit("bias         = [\"0 um\", \"0 um\", \"10 um\"", "bias         = [\"0 um\", \"0 um\", \"-3 um\"");
     assert_eq!(found.finding("E0440")["key"], "control.setpoint.bias[2]");
     let found = edit("translation = [\"50 um\"", "translation = [\"56 um\"");
-    assert_eq!(found.finding("E0441")["key"], "workspace.translation[0]");
+    assert_eq!(found.finding("E0313")["key"], "workspace.translation[0]");
 }
 
 #[test]
@@ -124,5 +124,32 @@ fn a_declared_trajectory_beyond_the_strokes_is_refused_at_its_place() {
         assert!(finding["message"].as_str().unwrap().contains("case-1"), "{finding}");
     } else {
         panic!("{:#}", found.value);
+    }
+}
+
+#[test]
+fn warnings_are_denied_unless_the_spec_says_why() {
+    let (folder, text) = folder("legs.toml");
+    let noisy = text.replace("\"2 mV\"", "\"300 mV\"");
+    folder.write("noisy.toml", &noisy);
+    assert_eq!(folder.run(&["check", "noisy.toml"]).code, 0);
+    for denied in [&["check", "noisy.toml", "--deny-warnings"][..], &["noisy.toml", "--deny-warnings", "--no-build"]] {
+        let run = folder.run(denied);
+        run.says(1, &["W0807", "noisy.toml is refused"]);
+        assert!(!folder.path("legs-controller").exists());
+    }
+    let reason = "[lint]\nallow = [\"amplifier.noise: lent until the new one comes\"]\n";
+    folder.write("allowed.toml", format!("{noisy}\n{reason}"));
+    folder.run(&["check", "allowed.toml", "--deny-warnings"]).says(0, &["N0891", "lent until"]);
+    // Far off is refused in any case, and let pass in the same way.
+    let far = noisy.replace("\"300 mV\"", "\"2 V\"");
+    folder.write("far.toml", &far);
+    folder.run(&["check", "far.toml"]).says(1, &["E0890", "amplifier.noise", "10 times beyond"]);
+    folder.write("far.toml", format!("{far}\n{reason}"));
+    assert_eq!(folder.run(&["check", "far.toml", "--deny-warnings"]).code, 0);
+    // An exception needs a key and a reason, and something to let pass.
+    for (entry, code) in [("amplifier.noise", "E0329"), ("amplifier.nose: old", "E0329"), ("dac.bits: old", "W0892")] {
+        folder.write("bad.toml", format!("{text}\n[lint]\nallow = [\"{entry}\"]\n"));
+        folder.run(&["check", "bad.toml", "--deny-warnings"]).says(1, &[code]);
     }
 }

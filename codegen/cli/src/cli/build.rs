@@ -26,7 +26,7 @@ pub(super) const TICKS: u32 = 20_000;
 pub struct Arguments {
     /// The spec file.
     #[arg(required = true)]
-    spec: Option<PathBuf>,
+    pub spec: Option<PathBuf>,
     /// Output folder; `<name>-controller` if not given. Must be new, empty, or an unchanged earlier output.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -43,6 +43,8 @@ pub struct Arguments {
     /// Exit with code 3 where what needs a missing cross compiler or emulator is left out.
     #[arg(long, conflicts_with = "no_build")]
     require_target: bool,
+    #[command(flatten)]
+    strictness: super::Strictness,
 }
 
 #[derive(Debug, Serialize)]
@@ -86,7 +88,13 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     if let Some(error) = &set_up {
         ui.progress(&format!("{error}; going on without"));
     }
-    let compiled = spec::compiled(spec, ui)?;
+    let compiled = spec::quietly(spec, ui)?;
+    arguments.strictness.accept(&compiled, &compiled.findings)?;
+    if arguments.details {
+        ui.findings(Some(&compiled.source), &compiled.findings);
+    } else {
+        ui.findings_in_brief(&compiled.source, &compiled.findings);
+    }
     let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
     let _hold = workspace::write(&output, &compiled.files)?;
     ui.progress(&format!("wrote {} files to {}", compiled.files.len(), output.display()));

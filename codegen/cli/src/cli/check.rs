@@ -29,6 +29,8 @@ pub struct Arguments {
     /// Everything that was found, below the verdict.
     #[arg(long)]
     details: bool,
+    #[command(flatten)]
+    strictness: super::Strictness,
 }
 
 /// A good spec and what is known of it.
@@ -68,6 +70,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
     findings.extend(lint::estimated(&compiled.model));
     findings.extend(compiled.reach.iter().flat_map(|reach| reach::notes(&compiled.model, reach)));
+    arguments.strictness.accept(&compiled, &findings)?;
     ui.findings(Some(&compiled.source), &findings);
     let ratio = Ratio {
         legs: precision.legs.ratio(),

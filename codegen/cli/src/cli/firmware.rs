@@ -48,6 +48,8 @@ pub struct Common {
     /// Do not run the emulator: no instruction counts, no comparison of bits.
     #[arg(long)]
     no_measure: bool,
+    #[command(flatten)]
+    strictness: super::Strictness,
 }
 
 /// Arguments of `build`.
@@ -125,7 +127,9 @@ fn any(_: Target) -> Result<(), Failure> {
 
 /// Compiles, writes, builds, checks, measures. A target that the command does not `accept` is refused before anything is written.
 fn make(spec: &Path, common: &Common, accept: fn(Target) -> Result<(), Failure>, ui: &mut Ui) -> Result<Made, Failure> {
-    let compiled = spec::compiled(spec, ui)?;
+    let compiled = spec::quietly(spec, ui)?;
+    common.strictness.accept(&compiled, &compiled.findings)?;
+    ui.findings(Some(&compiled.source), &compiled.findings);
     let declared = compiled.model.target.mcu;
     // clap lets only known names through.
     let target = common.target.as_deref().and_then(Target::named).unwrap_or_else(|| Target::of(declared));
