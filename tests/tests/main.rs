@@ -43,6 +43,7 @@ mod spec_errors;
 mod spec_fuzz;
 mod spec_platform;
 mod spec_schema;
+mod spec_slips;
 mod stability_refusal;
 mod supervisor;
 mod support;

@@ -1,0 +1,217 @@
+//! The first hour of an engineer: slips in a spec are found, at the right key first, with a help that leads out.
+
+mod edit;
+mod set;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+
+use host_sim::forc::ReversalExperiment;
+use host_sim::noise::Gauge;
+use host_sim::plant::{LegParameters, LegPlant};
+use specgen::diagnostic::{Diagnostic, Place, Severity};
+use specgen::spec::{SpecSource, load_as_far};
+
+use crate::physical_lint::list;
+use crate::physical_lint::support::{plausible, spec, verdict};
+use edit::Edit;
+use set::{Of, SET, Slip};
+
+/// Of all slips: found, found at the right key first, with the right help.
+const BARS: [f64; 3] = [0.99, 0.95, 0.98];
+const RECORD: &str = "leg.csv";
+
+/// A spec as it is without a slip, in a folder with the files that it names.
+struct Base {
+    text: String,
+    folder: tempfile::TempDir,
+    known: BTreeSet<(String, String)>,
+}
+
+impl Base {
+    fn of(which: Of) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let text = match which {
+            Of::Own => include_str!("own.toml").to_owned(),
+            Of::Small => include_str!("small.toml").to_owned(),
+            Of::Reference => spec("reference.toml"),
+            Of::Gains => spec("features/platform-gains.toml"),
+            Of::WorkPiece => spec("features/platform-environment.toml"),
+            Of::Calibrated => spec("features/platform-calibration.toml"),
+        };
+        if matches!(which, Of::Own | Of::Small) {
+            fs::write(folder.path().join(RECORD), record(&text, folder.path())).unwrap();
+        } else {
+            fs::create_dir(folder.path().join("records")).unwrap();
+            let from = specgen_tests::repository().join("specs/records/reference-forc.csv");
+            fs::copy(from, folder.path().join("records/reference-forc.csv")).unwrap();
+        }
+        let (accepted, findings) = verdict(&text, folder.path());
+        assert!(accepted, "{which:?}: {findings:#?}");
+        let known = findings.iter().map(mark).collect();
+        Self { text, folder, known }
+    }
+
+    /// What is found with the slip and not without, in the order in which it is shown; and the text with the slip.
+    fn with(&self, slip: &Slip) -> (String, Vec<Diagnostic>) {
+        let text = slip.edit.of(&self.text);
+        let path = self.folder.path().join(RECORD);
+        let found = if let Edit::Record(change) = slip.edit {
+            let record = fs::read_to_string(&path).unwrap();
+            fs::write(&path, change(&record)).unwrap();
+            let (_, found) = verdict(&text, self.folder.path());
+            fs::write(&path, record).unwrap();
+            found
+        } else {
+            assert_ne!(text, self.text, "{slip:?}");
+            verdict(&text, self.folder.path()).1
+        };
+        let new = |one: &Diagnostic| one.severity > Severity::Note && !self.known.contains(&mark(one));
+        (text, found.into_iter().filter(new).collect())
+    }
+}
+
+fn mark(one: &Diagnostic) -> (String, String) {
+    (one.code.to_owned(), one.key.clone())
+}
+
+/// The record that `specgen new` simulates for such a spec.
+fn record(text: &str, dir: &Path) -> String {
+    let source = SpecSource { display_name: "spec".to_owned(), text: text.to_owned(), dir: dir.to_owned() };
+    let model = load_as_far(&source).0.unwrap();
+    let leg = specgen::machine::leg(&model, &LegParameters::reference());
+    let experiment = ReversalExperiment {
+        drive_max: leg.u_max,
+        rate: leg.u_max / 5.0,
+        ..ReversalExperiment::reference(model.hysteresis.grid as u32)
+    };
+    let mut record = experiment.run(&mut LegPlant::new(&leg), &mut Gauge::new(&leg.noise, 1, 0));
+    record.rows.iter_mut().for_each(|row| row.drive += model.actuator.voltage[0]);
+    record.to_csv()
+}
+
+fn bases() -> BTreeMap<Of, Base> {
+    let which: BTreeSet<Of> = SET.iter().map(|slip| slip.of).collect();
+    which.into_iter().map(|of| (of, Base::of(of))).collect()
+}
+
+/// Whether the finding is about one of the keys of the slip.
+fn is_at(found: &Diagnostic, slip: &Slip) -> bool {
+    // A finding about a file is about the record, whatever else the spec calls it.
+    let in_record = matches!(&found.place, Place::File { .. }) && slip.keys.contains(&"");
+    in_record || (!found.key.is_empty() && slip.keys.iter().any(|key| list(&found.key) == list(key)))
+}
+
+#[test]
+fn slips_of_the_first_hour_are_found_at_the_right_key_with_a_help_that_leads_out() {
+    assert!(SET.len() >= 120);
+    let bases = bases();
+    let mut counts: BTreeMap<&str, [usize; 4]> = BTreeMap::new();
+    let mut missed = String::new();
+    for slip in SET {
+        let (_, found) = bases[&slip.of].with(slip);
+        let first = found.first().is_some_and(|one| is_at(one, slip));
+        let helps = |one: &Diagnostic| slip.fix.iter().any(|fix| one.help.contains(fix));
+        let fixed = found.iter().find(|one| is_at(one, slip)).is_some_and(helps);
+        let results = [!found.is_empty(), first, fixed];
+        let count = counts.entry(slip.kind).or_default();
+        count[0] += 1;
+        for (sum, good) in count[1..].iter_mut().zip(results) {
+            *sum += usize::from(good);
+        }
+        if results.contains(&false) {
+            missed += &format!("  {results:?} {:?} {} {:?} for {:?}\n", slip.of, slip.kind, slip.edit, slip.keys);
+            for one in found.iter().take(4) {
+                missed += &format!("      {} {}: {} / {}\n", one.code, one.key, one.message, one.help);
+            }
+        }
+    }
+    println!("{:<24}{:>5}{:>8}{:>16}{:>12}", "kind", "all", "found", "right key first", "right help");
+    let mut sum = [0; 4];
+    for (kind, count) in &counts {
+        println!("{kind:<24}{:>5}{:>8}{:>16}{:>12}", count[0], count[1], count[2], count[3]);
+        sum.iter_mut().zip(count).for_each(|(sum, count)| *sum += count);
+    }
+    println!("{:<24}{:>5}{:>8}{:>16}{:>12}\nnot right:\n{missed}", "all", sum[0], sum[1], sum[2], sum[3]);
+    for (good, bar) in sum[1..].iter().zip(BARS) {
+        assert!(*good as f64 >= bar * sum[0] as f64, "{sum:?} against {BARS:?}");
+    }
+}
+
+/// What stands as a replacement or as a figure in a help is accepted: with it in the text, what was found there is not found
+/// again, and nothing new is refused at that key.
+#[test]
+fn every_fix_that_is_offered_is_accepted_by_the_next_check() {
+    let bases = bases();
+    let (mut tried, mut refused) = (0, String::new());
+    let mut try_fix = |what: &str, found: &[Diagnostic], at: usize, text: &str, next: &dyn Fn(&str) -> Vec<Diagnostic>| {
+        for fixed in fixes(&found[at], text) {
+            tried += 1;
+            let again = next(&fixed);
+            let known = |one: &Diagnostic| found.iter().any(|old| mark(old) == mark(one));
+            let stays = again.iter().filter(|one| mark(one) == mark(&found[at])).count()
+                >= found.iter().filter(|one| mark(one) == mark(&found[at])).count();
+            let new = again.iter().find(|one| {
+                one.severity == Severity::Error && !known(one) && list(&one.key) == list(&found[at].key)
+            });
+            if stays || new.is_some() {
+                let old = &found[at];
+                refused += &format!("{what}: {} {}: {} / {:?}, then {new:#?}\n", old.code, old.key, old.help, old.replacement);
+            }
+        }
+    };
+    for slip in SET {
+        let base = &bases[&slip.of];
+        let (text, found) = base.with(slip);
+        let next = |text: &str| verdict(text, base.folder.path()).1;
+        (0..found.len()).for_each(|at| try_fix(&format!("{:?}", slip.edit), &found, at, &text, &next));
+    }
+    let specs = specgen_tests::repository().join("specs");
+    for entry in fs::read_dir(specgen_tests::repository().join("tests/corpus")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let text = SpecSource::read(&path).unwrap().text;
+        let next = |text: &str| verdict(text, &specs).1;
+        let found = next(&text);
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        (0..found.len()).for_each(|at| try_fix(&name, &found, at, &text, &next));
+    }
+    println!("{tried} fixes tried");
+    assert!(tried > 100, "{tried}");
+    assert!(refused.is_empty(), "{refused}");
+}
+
+/// The text with the fix that a finding offers: its replacement, or the largest value of a bound.
+fn fixes(found: &Diagnostic, text: &str) -> Vec<String> {
+    let Place::Spec(place) = &found.place else { return Vec::new() };
+    let with = |new: &str| format!("{}{new}{}", &text[..place.start], &text[place.end..]);
+    let mut fixes: Vec<String> = found.replacement.iter().map(|new| with(new)).collect();
+    let bound = ["E0313", "E0441"].contains(&found.code);
+    if let Some(most) = found.help.strip_prefix("at most ").filter(|_| bound) {
+        let value = most.split([',', ';']).next().unwrap();
+        fixes.push(with(&format!("\"{value}\"")));
+    }
+    fixes
+}
+
+/// Beside those of `physical_lint` and of `specgen new`: other platforms, which nobody looked at while rules were made.
+#[test]
+fn a_hundred_plausible_platforms_are_not_refused() {
+    let mut refused = String::new();
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(20_261_123);
+    for index in 0..100 {
+        let text = plausible::platform(&mut random, folder.path(), index);
+        let (accepted, found) = verdict(&text, folder.path());
+        if !accepted {
+            refused += &format!("platform {index}: {:#?}\n{text}", found.first());
+        }
+    }
+    assert!(refused.is_empty(), "{refused}");
+}
