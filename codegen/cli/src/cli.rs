@@ -221,7 +221,9 @@ fn refuse_arguments(error: clap::Error) -> ExitCode {
             let meant = nearest(&written, names.iter().copied());
             let message = match meant {
                 Some(meant) => format!("there is no command `{written}`; did you mean `specgen {meant}`?"),
-                None => format!("one spec file is expected, or a command ({}) with its own arguments", names.join(", ")),
+                None => {
+                    format!("one spec file is expected, or a command ({}) with its own arguments", names.join(", "))
+                }
             };
             command.error(ErrorKind::ArgumentConflict, message)
         }

@@ -18,8 +18,8 @@ mod task_space;
 pub use dynamics::{GRAVITY, platform};
 pub(crate) use integrity::digest;
 pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
-pub use sensing::{PoseNoise, pose_noise};
 pub(crate) use sensing::seen;
+pub use sensing::{PoseNoise, pose_noise};
 
 use crate::ir::{Bounds, Defaults, Hysteresis, Ir, Law, Scalar, Sensing, Setpoint, Setpoints, TaskSpace};
 use crate::stability::platform::{Design, RestDynamics};

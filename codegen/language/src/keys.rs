@@ -233,8 +233,11 @@ impl Section {
 
 /// Whether two names differ by nothing but case and what joins words; the case of a single letter counts, as in `k` and `K`.
 fn is_same(a: &str, b: &str) -> bool {
-    let plain = |name: &str| name.replace(['_', '-', ' '], "").to_lowercase();
-    !a.is_empty() && (a == b || (a.len() > 1 && plain(a) == plain(b)))
+    !a.is_empty() && (a == b || (a.len() > 1 && letters(a).eq(letters(b))))
+}
+
+fn letters(name: &str) -> impl Iterator<Item = u8> {
+    name.bytes().filter(|byte| !matches!(byte, b'_' | b'-' | b' ')).map(|byte| byte.to_ascii_lowercase())
 }
 
 /// Key path of `key` in the table at `table`: `gauge[2].point`, or `name` before the first table.

@@ -148,22 +148,26 @@ fn slips_of_the_first_hour_are_found_at_the_right_key_with_a_help_that_leads_out
 fn every_fix_that_is_offered_is_accepted_by_the_next_check() {
     let bases = bases();
     let (mut tried, mut refused) = (0, String::new());
-    let mut try_fix = |what: &str, found: &[Diagnostic], at: usize, text: &str, next: &dyn Fn(&str) -> Vec<Diagnostic>| {
-        for fixed in fixes(&found[at], text) {
-            tried += 1;
-            let again = next(&fixed);
-            let known = |one: &Diagnostic| found.iter().any(|old| mark(old) == mark(one));
-            let stays = again.iter().filter(|one| mark(one) == mark(&found[at])).count()
-                >= found.iter().filter(|one| mark(one) == mark(&found[at])).count();
-            let new = again.iter().find(|one| {
-                one.severity == Severity::Error && !known(one) && list(&one.key) == list(&found[at].key)
-            });
-            if stays || new.is_some() {
-                let old = &found[at];
-                refused += &format!("{what}: {} {}: {} / {:?}, then {new:#?}\n", old.code, old.key, old.help, old.replacement);
+    let mut try_fix =
+        |what: &str, found: &[Diagnostic], at: usize, text: &str, next: &dyn Fn(&str) -> Vec<Diagnostic>| {
+            for fixed in fixes(&found[at], text) {
+                tried += 1;
+                let again = next(&fixed);
+                let known = |one: &Diagnostic| found.iter().any(|old| mark(old) == mark(one));
+                let stays = again.iter().filter(|one| mark(one) == mark(&found[at])).count()
+                    >= found.iter().filter(|one| mark(one) == mark(&found[at])).count();
+                let new = again.iter().find(|one| {
+                    one.severity == Severity::Error && !known(one) && list(&one.key) == list(&found[at].key)
+                });
+                if stays || new.is_some() {
+                    let old = &found[at];
+                    refused += &format!(
+                        "{what}: {} {}: {} / {:?}, then {new:#?}\n",
+                        old.code, old.key, old.help, old.replacement
+                    );
+                }
             }
-        }
-    };
+        };
     for slip in SET {
         let base = &bases[&slip.of];
         let (text, found) = base.with(slip);

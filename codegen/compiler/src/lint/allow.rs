@@ -22,7 +22,8 @@ pub fn allow(model: &Model, findings: &mut [Diagnostic]) {
 #[must_use]
 pub fn unused(model: &Model, findings: &[Diagnostic]) -> Vec<Diagnostic> {
     let used = |allowed: &str| {
-        let covered = |key: &str| key.strip_prefix(allowed).is_some_and(|rest| rest.is_empty() || rest.starts_with('['));
+        let covered =
+            |key: &str| key.strip_prefix(allowed).is_some_and(|rest| rest.is_empty() || rest.starts_with('['));
         findings.iter().any(|one| one.code == codes::ALLOWED && covered(&one.key))
     };
     let idle = model.lint.reasons().enumerate().filter(|(_, (key, _))| !used(key));

@@ -58,10 +58,8 @@ pub fn in_order(source: &SpecSource, findings: &mut Vec<Diagnostic>) {
     let Some(culprit) = culprit(source, findings) else { return };
     let own = |one: &Diagnostic| one.severity > Severity::Note && list_of(&one.key) == list_of(&culprit.key);
     // That of the same item, if there is one.
-    let own = findings
-        .iter()
-        .position(|one| own(one) && one.key == culprit.key)
-        .or_else(|| findings.iter().position(own));
+    let own =
+        findings.iter().position(|one| own(one) && one.key == culprit.key).or_else(|| findings.iter().position(own));
     let explains = format!("{} {} of {} findings would be gone", culprit.how, culprit.explained, culprit.of);
     let first = match own {
         Some(at) => {
@@ -111,8 +109,10 @@ fn culprit(source: &SpecSource, findings: &[Diagnostic]) -> Option<Culprit> {
     let consider = |best: &mut Option<(usize, Culprit)>, key: &str, text: String, how: &dyn Fn() -> String| {
         let Some((now, _)) = found(&SpecSource { text, ..source.clone() }) else { return };
         let (gone, new) = (base.difference(&now).count(), now.difference(&base).count());
+        // Findings about one list name it already.
+        let lists: BTreeSet<&str> = base.difference(&now).map(|(_, key)| list_of(key)).collect();
         let score = gone.saturating_sub(2 * new);
-        if score >= 2 && 2 * gone > base.len() && best.as_ref().is_none_or(|(most, _)| score > *most) {
+        if lists.len() >= 2 && score >= 2 && 2 * gone > base.len() && best.as_ref().is_none_or(|(most, _)| score > *most) {
             *best = Some((score, Culprit { key: key.to_owned(), how: how(), explained: gone, of: base.len() }));
         }
     };
@@ -132,7 +132,8 @@ fn culprit(source: &SpecSource, findings: &[Diagnostic]) -> Option<Culprit> {
         }
     }
     for [a, b] in exchanged(findings, &spans) {
-        let (first, second) = if spans[a].start < spans[b].start { (&spans[a], &spans[b]) } else { (&spans[b], &spans[a]) };
+        let (first, second) =
+            if spans[a].start < spans[b].start { (&spans[a], &spans[b]) } else { (&spans[b], &spans[a]) };
         let mut text = source.text.clone();
         text.replace_range(second.clone(), &source.text[first.clone()]);
         text.replace_range(first.clone(), &source.text[second.clone()]);
@@ -219,11 +220,16 @@ mod tests {
     #[test]
     fn literals_are_scaled_with_their_units() {
         let text = "a = \"25 N/m\"\nb = [\"-1e2 um\", 3, 0.5]";
-        let places: Vec<Range<usize>> =
-            ["\"25 N/m\"", "\"-1e2 um\"", "3", "0.5"].map(|one| text.find(one).unwrap()).into_iter().zip([8, 9, 1, 3]).map(|(at, length)| at..at + length).collect();
+        let places: Vec<Range<usize>> = ["\"25 N/m\"", "\"-1e2 um\"", "3", "0.5"]
+            .map(|one| text.find(one).unwrap())
+            .into_iter()
+            .zip([8, 9, 1, 3])
+            .map(|(at, length)| at..at + length)
+            .collect();
         let changed = changed(text, &places, 1000.0, false).unwrap();
         assert_eq!(changed, "a = \"25000 N/m\"\nb = [\"-100000 um\", 3000, 500]");
         assert_eq!(super::changed(text, &places, 1000.0, true), None, "3 and 0.5 have no unit");
-        assert_eq!(super::changed("records = \"leg.csv\"", &[10..19], 10.0, false), None);
+        let file = std::slice::from_ref(&places[0]);
+        assert_eq!(super::changed("a = \"leg.csv\"", file, 10.0, false), None);
     }
 }

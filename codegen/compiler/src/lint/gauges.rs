@@ -145,7 +145,9 @@ pub(super) fn differ(facts: &Facts, found: &mut Found) {
         found.add(
             codes::GAUGES_ALIKE,
             &format!("gauge[{later}].point"),
-            format!("gauge {later} stands and looks as gauge {earlier}: six readings are needed, and these two are one"),
+            format!(
+                "gauge {later} stands and looks as gauge {earlier}: six readings are needed, and these two are one"
+            ),
             &format!("change `point` or `direction` of `gauge[{later}]`, if it was copied from `gauge[{earlier}]`"),
         );
     }

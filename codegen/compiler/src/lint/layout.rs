@@ -182,8 +182,15 @@ pub(super) fn angles_of_pairs(facts: &Facts, found: &mut Found) {
         found.add(
             codes::PAIR_WIDE,
             &key,
-            format!("the joints of a pair are {} deg apart, and {} deg from those of the next pair", figure(angle), figure(120.0 - angle)),
-            &format!("`{key}` is the angle within a pair, the smaller of the two: if \"{} deg\" is meant, write that", figure(120.0 - angle)),
+            format!(
+                "the joints of a pair are {} deg apart, and {} deg from those of the next pair",
+                figure(angle),
+                figure(120.0 - angle)
+            ),
+            &format!(
+                "`{key}` is the angle within a pair, the smaller of the two: if \"{} deg\" is meant, write that",
+                figure(120.0 - angle)
+            ),
         );
     }
 }

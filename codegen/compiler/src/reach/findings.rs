@@ -26,11 +26,7 @@ pub(super) fn of(model: &Model, reach: &Reach, bias: &PathReach) -> Vec<Diagnost
 /// Findings about legs with their own gauges.
 pub(super) fn of_legs(model: &Model, reach: &Reach) -> Vec<Diagnostic> {
     let bounds = of_bounds(model, reach.stroke, |axis| reach.axes[axis].from_middle);
-    bounds
-        .into_iter()
-        .chain(of_gauge_ends(model, reach).filter(is_warning))
-        .chain(of_condition(model, reach))
-        .collect()
+    bounds.into_iter().chain(of_gauge_ends(model, reach).filter(is_warning)).chain(of_condition(model, reach)).collect()
 }
 
 /// Notes about them.

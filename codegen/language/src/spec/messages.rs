@@ -74,7 +74,7 @@ pub(super) fn range_help(key: &Key, path: &str) -> String {
     format!("give a value in range{range}, such as {}. {}", example_of(key, path), key.doc)
 }
 
-/// The units of the item that `path` names, for a help: "kg or g", "N/m, N/um or another of a stiffness".
+/// The usual units of the item that `path` names, for a help: "kg or g".
 pub(super) fn units_of(key: &Key, path: &str) -> Option<String> {
     let Some(Item::Quantity { dimension, unit, .. }) = item_of(key, path) else { return None };
     let mut units: Vec<&str> = quantity::common_units(dimension).collect();
@@ -85,14 +85,6 @@ pub(super) fn units_of(key: &Key, path: &str) -> Option<String> {
         [only] => Some((*only).to_owned()),
         [first @ .., last] => Some(format!("{} or {last}", first.join(", "))),
         [] => None,
-    }
-}
-
-/// What the item that `path` names measures: "a mass".
-pub(super) fn what(key: &Key, path: &str) -> String {
-    match item_of(key, path) {
-        Some(Item::Quantity { dimension, .. }) => dimension.describe(),
-        _ => "a quantity".to_owned(),
     }
 }
 
@@ -154,12 +146,13 @@ pub(super) fn bad_quantity(key: &Key, path: &str, found: &str, problem: &Problem
         Problem::UnknownUnit(unit, meant) => (
             codes::UNKNOWN_UNIT,
             format!("{is}: unknown unit {}", text::quote(unit)),
-            meant.map_or_else(|| {
-                let units = units_of(key, path).map_or_else(String::new, |units| format!(", such as {units}"));
-                format!("write a unit as in {example}{units}; upper and lower case matter")
-            }, |m| {
-                format!("did you mean \"{m}\"? Upper and lower case matter")
-            }),
+            meant.map_or_else(
+                || {
+                    let units = units_of(key, path).map_or_else(String::new, |units| format!(", such as {units}"));
+                    format!("write a unit as in {example}{units}; upper and lower case matter")
+                },
+                |m| format!("did you mean \"{m}\"? Upper and lower case matter"),
+            ),
         ),
         Problem::AmbiguousQuotient => (
             codes::BAD_QUANTITY,

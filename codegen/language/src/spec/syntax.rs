@@ -79,9 +79,8 @@ fn unquoted(source: &str, span: Range<usize>, findings: &mut Findings) {
         format!("texts and quantities stand in quotes: write \"{}\"", text::shorten(found.trim())),
     );
     // Where the key takes no text, quotes are not enough.
-    let takes_text = keys::key(&key).is_none_or(|key| {
-        !matches!(key.shape, Shape::One(Item::Number(_) | Item::Integer(..) | Item::Flag))
-    });
+    let takes_text = keys::key(&key)
+        .is_none_or(|key| !matches!(key.shape, Shape::One(Item::Number(_) | Item::Integer(..) | Item::Flag)));
     findings.replace_by(&key, takes_text.then(|| format!("\"{}\"", found.trim())));
 }
 

@@ -249,7 +249,10 @@ impl ValueReader<'_> {
     ) -> Option<T> {
         let units = messages::units_of(self.key, path);
         let help = fix.unwrap_or_else(|| match units {
-            Some(units) => format!("write the number with its unit, in quotes: {units}; as in {} = {}", self.key.name, self.key.example),
+            Some(units) => format!(
+                "write the number with its unit, in quotes: {units}; as in {} = {}",
+                self.key.name, self.key.example
+            ),
             None => format!("write {} = {}", self.key.name, self.key.example),
         });
         self.findings.add(

@@ -116,10 +116,10 @@ pub const RULES: &[Rule] = &[
         "geometry.base_angle",
         ["base_angle      = \"0.012 pi rad\"", "base_angle      = \"14.7 mrad\"", "base_angle      = \"14.9 mrad\""],
     ),
-    of("W0816", "geometry.base_radius", ["\"150 mm\"", "\"99.9 mm\"", "\"100.1 mm\""])
+    of("W0816", "geometry.base_radius", ["\"150 mm\"", "\"99.9 mm\"", "\"100.1 mm\""]).on("legs.toml").also(&["E0313"]),
+    of("W0817", "geometry.height", ["\"180 mm\"", "\"613 mm\"", "\"612 mm\""])
         .on("legs.toml")
-        .also(&["E0313"]),
-    of("W0817", "geometry.height", ["\"180 mm\"", "\"613 mm\"", "\"612 mm\""]).on("legs.toml").also(&["W0815", "E0313"]),
+        .also(&["W0815", "E0313"]),
     of(
         "W0818",
         "geometry.platform_joints[4]",
@@ -130,9 +130,8 @@ pub const RULES: &[Rule] = &[
         ],
     )
     .on("features/platform-joints.toml")
-    .also(&["E0313"])
     .at("")
-    .also(&["E0441"]),
+    .also(&["E0313"]),
     // Gauges, control, trajectories, reach and budgets; in the order of the codes.
     of("W0820", "sensor.noise", ["\"2.2 nm\"", "\"0.0167 nm\"", "\"0.0169 nm\""]),
     of("W0822", "sensor.bits", ["bits  = 17", "bits  = 10", "bits  = 11"]),
@@ -260,11 +259,7 @@ pub const RULES: &[Rule] = &[
     of(
         "W0864",
         "actuator.capacitance",
-        [
-            "[amplifier]",
-            "capacitance = \"0.71 uF\"\n\n[amplifier]",
-            "capacitance = \"0.73 uF\"\n\n[amplifier]",
-        ],
+        ["[amplifier]", "capacitance = \"0.71 uF\"\n\n[amplifier]", "capacitance = \"0.73 uF\"\n\n[amplifier]"],
     )
     .at("capacitance = "),
     of(

@@ -15,7 +15,9 @@ pub(super) fn reasons(f: &Fields, findings: &mut Findings) -> Option<()> {
         let known = keys::key(list);
         let (what, help) = match known {
             None => ("names no key of a spec", "write the path of the key, as in"),
-            Some(_) if reason.trim().is_empty() => ("gives no reason", "write why the value is meant, behind a colon, as in"),
+            Some(_) if reason.trim().is_empty() => {
+                ("gives no reason", "write why the value is meant, behind a colon, as in")
+            }
             Some(_) => continue,
         };
         findings.add(

@@ -75,11 +75,7 @@ impl ValueReader<'_> {
     fn unit_missing(&mut self, path: &str, span: Range<usize>, number: f64) {
         let units = messages::units_of(self.key, path).unwrap_or_default();
         let message = format!("`{path}` is a number without unit");
-        let help = format!(
-            "in which unit? Write \"{} UNIT\", in quotes, with {units} or another unit of {}",
-            text::number(number),
-            messages::what(self.key, path)
-        );
+        let help = format!("in which unit? Write \"{} UNIT\", in quotes, UNIT such as {units}", text::number(number));
         self.findings.add(codes::UNIT_MISSING, path, span, message, help);
     }
 
