@@ -53,7 +53,9 @@ pub struct MachineInput {
     pub tick: TickInput,
     /// What is wanted of the supervisor; it holds for as long as it is given.
     pub request: Request,
-    /// What the target noticed since the last tick: [`MISSED_TICK`], [`LINK_LOST`], [`INTEGRITY`], [`CONVERTER`], [`STOP`].
+    /// What the target noticed since the last tick, as bits: [`MISSED_TICK`](supervisor::MISSED_TICK),
+    /// [`LINK_LOST`](supervisor::LINK_LOST), [`INTEGRITY`](supervisor::INTEGRITY), [`CONVERTER`](supervisor::CONVERTER),
+    /// [`STOP`](supervisor::STOP).
     pub events: u32,
 }
 
