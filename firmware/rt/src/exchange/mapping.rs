@@ -23,7 +23,7 @@ const MODE: u32 = 0o600;
 /// Why a file is not mapped.
 #[derive(Debug)]
 pub(super) enum Unfit {
-    /// Another user can change it, or what it leads to.
+    /// Somebody else can change it, or what it leads to.
     NotOwn(String),
     /// It has another size than a `T`.
     Size,

@@ -52,7 +52,7 @@ pub(super) struct Words {
     bells: [Bell; 2],
 }
 
-/// A count that the other side raises, and whether a thread sleeps on it.
+/// A count that the other side raises, and whether somebody sleeps on it.
 #[derive(Default)]
 #[repr(C)]
 struct Bell {
