@@ -5,8 +5,8 @@
 //! others imply, says both numbers, and names the key that it suspects. Thresholds are wide: a factor of a thousand lies far
 //! outside, an unusual platform well inside.
 //!
-//! A value that is off by [`FAR_OFF`] times what its rule lets pass, and more, is refused, unless `[lint] allow` names its key with
-//! a reason: see [`allow`]. That concerns what is measured or bought (sizes, masses, stacks, electronics, gauges); what is chosen
+//! A value that is seven times and more beyond what its rule lets pass is refused, unless `[lint] allow` names its key with
+//! a reason: see [`allow()`]. That concerns what is measured or bought (sizes, masses, stacks, electronics, gauges); what is chosen
 //! (workspace, limits of moves, budgets) is never more than pointed out.
 //!
 //! What needs no such judgement is checked elsewhere: ranges and consistency in [`specgen_language::spec`], reach in [`crate::reach`],

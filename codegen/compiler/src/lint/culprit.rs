@@ -112,7 +112,11 @@ fn culprit(source: &SpecSource, findings: &[Diagnostic]) -> Option<Culprit> {
         // Findings about one list name it already.
         let lists: BTreeSet<&str> = base.difference(&now).map(|(_, key)| list_of(key)).collect();
         let score = gone.saturating_sub(2 * new);
-        if lists.len() >= 2 && score >= 2 && 2 * gone > base.len() && best.as_ref().is_none_or(|(most, _)| score > *most) {
+        if lists.len() >= 2
+            && score >= 2
+            && 2 * gone > base.len()
+            && best.as_ref().is_none_or(|(most, _)| score > *most)
+        {
             *best = Some((score, Culprit { key: key.to_owned(), how: how(), explained: gone, of: base.len() }));
         }
     };
