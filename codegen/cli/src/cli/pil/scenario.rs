@@ -73,8 +73,9 @@ impl Plan {
             None => sim::legs::modes(&compiled.model.adaptation),
         };
         let frequency = arguments.frequency.unwrap_or(FREQUENCY);
-        sim::legs::judge(compiled, frequency, arguments.samples)?;
-        Ok(Self::Legs { modes, frequency, samples: arguments.samples.unwrap_or(SAMPLES) })
+        let samples = arguments.samples.unwrap_or(SAMPLES);
+        sim::legs::judge(compiled, frequency, samples)?;
+        Ok(Self::Legs { modes, frequency, samples })
     }
 
     fn platform(arguments: &Arguments, task: &TaskSpace) -> Result<Self, Failure> {

@@ -41,22 +41,25 @@ pub(super) fn check(arguments: &Arguments, compiled: &Compiled) -> Result<(), Fa
     if arguments.record.is_some() {
         return Ok(());
     }
-    let frequencies = if arguments.paper { &TRACKING_FREQUENCIES[..] } else { arguments.frequencies() };
-    frequencies.iter().try_for_each(|hertz| judge(compiled, *hertz, arguments.samples))
+    if arguments.paper {
+        let samples = arguments.samples.unwrap_or(SAMPLES);
+        return TRACKING_FREQUENCIES.iter().try_for_each(|hertz| judge(compiled, *hertz, samples));
+    }
+    let Some(samples) = arguments.samples else { return Ok(()) };
+    arguments.frequencies().iter().try_for_each(|hertz| judge(compiled, *hertz, samples))
 }
 
 /// Refuses `samples` ticks a period at `hertz` if a law of the spec is unstable at that interval: the check of the spec is for
-/// its own period. A longer one is slower by as much, and as stable.
-pub(in crate::cli) fn judge(compiled: &Compiled, hertz: f64, samples: Option<u32>) -> Result<(), Failure> {
-    let Some(samples) = samples else { return Ok(()) };
+/// its own period.
+pub(in crate::cli) fn judge(compiled: &Compiled, hertz: f64, samples: u32) -> Result<(), Failure> {
     let period = compiled.model.timing.period;
     let mut model = compiled.model.clone();
     model.timing.period = 1.0 / hertz / f64::from(samples);
     let Err(findings) = stability::check(&model) else { return Ok(()) };
     let why = findings.first().map_or("", |finding| finding.message.as_str());
     Err(Failure::Gate(format!(
-        "--samples {samples} at {hertz} Hz is an interval of {:.1} µs, not the {:.1} µs of timing.period: there {why}. Take {:.0} \
-         samples, which are timing.period, or fewer",
+        "--samples {samples} at {hertz} Hz is an interval of {:.1} µs, not the {:.1} µs of timing.period: there {why}. Take \
+         --samples {:.0}, which is timing.period",
         model.timing.period * 1e6,
         period * 1e6,
         1.0 / hertz / period
