@@ -13,6 +13,7 @@ mod law;
 mod margins;
 mod modes;
 mod notch;
+mod open_loop;
 mod refusal;
 mod report;
 mod rule;

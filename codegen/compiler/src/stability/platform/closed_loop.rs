@@ -74,6 +74,11 @@ impl ClosedLoop {
         Assembly::new(self, law, tuning, conditions).matrix()
     }
 
+    /// The amplifier lag, or what stands for none, s.
+    pub(super) fn lag_used(&self) -> f64 {
+        if self.lag > 1e-4 * self.period { self.lag } else { 1e-4 * self.period }
+    }
+
     fn contact(&self, touching: bool) -> Matrix6 {
         if touching { self.basis.couple(&self.environment) } else { [[0.0; 6]; 6] }
     }
@@ -309,7 +314,7 @@ impl<'a> Assembly<'a> {
 
     /// The plant under the requests that act during this tick, and the requests still on their way.
     fn plant(&mut self, request: &[Signal; 6]) {
-        let lag = if self.of.lag > 1e-4 * self.of.period { self.of.lag } else { 1e-4 * self.of.period };
+        let lag = self.of.lag_used();
         let contact = self.of.contact(self.conditions.touching);
         let damping = self.of.damping.map(|ratio| ratio * self.conditions.damping);
         let plant = Plant::new(&self.of.basis, &damping, self.conditions.stiffness, &contact, lag);

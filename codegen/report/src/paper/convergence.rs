@@ -1,0 +1,34 @@
+//! How the genetic algorithm of Table 3 converges on this spec.
+
+use super::chart::{Axis, Chart, DASHED, LINE, pairs};
+use super::section::{Grid, Section};
+use specgen_studies::paper::convergence::Convergence;
+use specgen_studies::paper::printed::TABLE_3;
+use specgen_studies::reproduce::write::fell;
+
+/// The section of a search; `command` makes its content again.
+#[must_use]
+pub fn section(found: &Convergence, command: &str) -> Section {
+    let x: Vec<f64> = found.history.iter().map(|generation| generation.evaluations as f64).collect();
+    let of = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    let best: Vec<f64> = found.history.iter().map(|generation| of(generation.best)).collect();
+    let median: Vec<f64> = found.history.iter().map(|generation| of(generation.median)).collect();
+    let chart = Chart::new(
+        "convergence",
+        "Cost (9) by generation",
+        Axis::linear("strings tried", ""),
+        Axis::log("cost", "µm s²"),
+    )
+    .with("best so far", LINE, pairs(&x, &best))
+    .with("median of the generation", DASHED, pairs(&x, &median));
+    let charts = if best.iter().any(|cost| cost.is_finite()) { vec![chart] } else { Vec::new() };
+    let mut table = Grid::new("Table 3: settings", &["what", "paper", "here"]);
+    for row in TABLE_3 {
+        table.push(row.map(str::to_owned).to_vec());
+    }
+    Section::new("convergence", "Genetic algorithm", command)
+        .text(&fell(found))
+        .text("The spec keeps its own numbers: specgen tune writes better ones into it, by this algorithm or CMA-ES.")
+        .charts(charts)
+        .table(table)
+}

@@ -1,0 +1,125 @@
+//! Fig. 4 and Table 1: what is left of hysteresis when the inverse model is in front.
+
+use host_sim::closed_loop::RunError;
+use host_sim::controller::{Controller, TickController};
+use host_sim::platform::PlatformScenario;
+use host_sim::platform::rig::{Record, RunOptions};
+use host_sim::platform::scenario::PLATFORM_MODES;
+use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, select};
+use host_sim::table::Line;
+use host_sim::trajectory::{PaperPath, PaperPose, Reading};
+use specgen_runtime::Platform;
+use specgen_runtime::setpoint::{REFUSED, STALE};
+
+use super::chart::{Axis, Chart, LINE, pairs};
+use super::motion::REFUSED_PATH;
+use super::section::{Grid, Section};
+use specgen_language::model::Actuator;
+use specgen_studies::reproduce;
+use specgen_studies::reproduce::write::digits;
+
+/// Frequencies at which a platform is tried, Hz.
+const PLATFORM_FREQUENCIES: [f64; 2] = [1.0, 10.0];
+/// Points of a line on a chart, at most.
+const POINTS: usize = 500;
+
+fn chart(title: &str) -> Chart {
+    let x = Axis::linear("virtual voltage X = q̂/ρ̂", "V");
+    Chart::new("linear", title, x, Axis::linear("displacement Y", "µm"))
+}
+
+/// Six legs with their own gauges.
+///
+/// # Errors
+/// As [`LegScenario::run`].
+pub fn of_legs(
+    scenario: &LegScenario,
+    controller: &mut dyn TickController,
+    actuator: &Actuator,
+    command: &str,
+) -> Result<Section, RunError> {
+    let table = reproduce::legs::table_1(scenario, controller, actuator.stack_gain * 1e6, actuator.stacks)?;
+    let mut lines = chart("Fig. 4: leg 1 with the inverse model alone, last period");
+    select(controller, MODES[0].1)?;
+    for frequency in LINEARITY_FREQUENCIES {
+        let tracking = scenario.run(controller, frequency)?.tracking;
+        let start = tracking.samples.len().saturating_sub(reproduce::legs::SAMPLES as usize);
+        let last = &tracking.samples[start..];
+        let x: Vec<f64> = last.iter().map(|sample| sample.requested[0] / actuator.leg_gain()).collect();
+        let y: Vec<f64> = last.iter().map(|sample| sample.measured[0] * 1e6).collect();
+        lines = lines.with(&format!("{frequency} Hz"), LINE, pairs(&x, &y));
+    }
+    Ok(Section::new("linear", "Linear relation behind the inverse model", command)
+        .text("Y against X: a straight line would be a perfect inverse. Its slope over ρ̂ is the λ that the adaptation must stand.")
+        .charts(vec![lines])
+        .comparison(&table))
+}
+
+/// A platform: what its legs really do in case 1 with F and the inverse model alone, against what was requested.
+///
+/// # Errors
+/// As [`PlatformScenario::run`].
+pub fn of_platform(
+    machine: &PlatformScenario,
+    controller: &mut Controller,
+    platform: &Platform<f64>,
+    actuator: &Actuator,
+    command: &str,
+) -> Result<Section, RunError> {
+    let mut traced = machine.clone();
+    traced.options = RunOptions { record: Record::Trace, ..machine.options.clone() };
+    let jacobian = platform.jacobian(&[0.0; 6]);
+    let mut lines = chart("Fig. 4: legs 1 and 4 in case 1, F with the inverse model alone");
+    let mut table = Grid::new(
+        "Straight line through the points of each leg, Y = λ q̂ + δ",
+        &["leg", "Hz", "λ = ρ/ρ̂", "δ, nm", "deviation from the line, nm rms"],
+    );
+    select(controller, PLATFORM_MODES[1].1)?;
+    let first = controller.description().output("requested[0]")?;
+    let (words, scalar) = (controller.description().input_names.len(), controller.description().scalar);
+    for frequency in PLATFORM_FREQUENCIES {
+        let trajectory = PaperPose { path: PaperPath::Case1, reading: Reading::Corrected, frequency };
+        let run = traced.run(controller, &trajectory)?;
+        if run.status & (REFUSED | STALE) != 0 {
+            continue;
+        }
+        let Some(trace) = &run.trace else { continue };
+        let before = trace.len().saturating_sub(run.samples.len());
+        for leg in 0..6 {
+            let points: Vec<(f64, f64)> = trace
+                .rows()
+                .skip(before)
+                .zip(&run.samples)
+                .map(|(row, sample)| {
+                    let moved = jacobian[leg].iter().zip(&sample.tick.pose).map(|(j, h)| j * h).sum();
+                    (scalar.decode(row[words + first + leg]), moved)
+                })
+                .collect();
+            let Some(line) = Line::fit(&points) else { continue };
+            let off: f64 = points.iter().map(|(x, y)| y - line.slope * x - line.offset).map(|e| e * e).sum();
+            let rms = libm::sqrt(off / points.len() as f64) * 1e9;
+            table.push(vec![
+                format!("{}", leg + 1),
+                format!("{frequency}"),
+                digits(line.slope),
+                digits(line.offset * 1e9),
+                digits(rms),
+            ]);
+            if leg % 3 == 0 {
+                let every = points.len().div_ceil(POINTS).max(1);
+                let (x, y): (Vec<f64>, Vec<f64>) =
+                    points.iter().step_by(every).map(|(x, y)| (x / actuator.leg_gain(), y * 1e6)).unzip();
+                let name = format!("leg {}, {frequency} Hz", leg + 1);
+                lines = lines.with(&name, LINE, pairs(&x, &y));
+            }
+        }
+    }
+    let section = Section::new("linear", "Linear relation behind the inverse model", command);
+    if lines.series.is_empty() {
+        return Ok(section.text(&format!("Not made: case 1 is not followed. {REFUSED_PATH}")));
+    }
+    Ok(section
+        .text("What a leg really does, J h of the true pose, against what the inverse model was asked for. The legs are out of tolerance, each in its own way, and share one record if the spec names one: λ is how far off. Table 1 of the paper is with six legs on their own gauges: specgen report specs/legs.toml.")
+        .charts(vec![lines])
+        .table(table))
+}
