@@ -15,8 +15,8 @@ struct Drawn {
     console: Vec<String>,
 }
 
-/// The page in headless Chromium; none where there is no such program.
-fn drawn(page: &Path) -> Option<Drawn> {
+/// The page in headless Chromium, in a window of this width (px); none where there is no such program.
+fn drawn(page: &Path, width: u32) -> Option<Drawn> {
     let profile = tempfile::tempdir().unwrap();
     let run = |program: &str| {
         Command::new(program)
@@ -27,6 +27,7 @@ fn drawn(page: &Path) -> Option<Drawn> {
                 "--enable-logging=stderr",
                 "--virtual-time-budget=4000",
             ])
+            .arg(format!("--window-size={width},800"))
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .args(["--dump-dom", &format!("file://{}", page.display())])
             .output()
@@ -51,77 +52,152 @@ fn figures(dom: &str) -> (usize, Vec<String>) {
     (tags.len(), empty)
 }
 
+/// Every figure drawn, nothing in the console, no sideways scroll: on a desk and on a phone.
 #[track_caller]
-fn is_drawn(folder: &Folder, name: &str, expected: usize) {
-    let Some(drawn) = drawn(&folder.path(name)) else {
-        return support::skipped("no chromium: the page is not drawn");
-    };
-    assert_eq!(drawn.console, Vec::<String>::new(), "console");
-    assert!(drawn.dom.contains("data-errors=\"0\""), "the page's own count of errors");
-    let (count, empty) = figures(&drawn.dom);
-    assert_eq!((count, empty), (expected, Vec::new()));
-    assert_eq!(drawn.dom.matches("<svg viewBox=\"0 0 460 290\"").count() + 1, expected, "a picture in each figure");
+fn is_drawn(folder: &Folder, name: &str, expected: &serde_json::Value) {
+    for width in [1280, 390] {
+        let Some(drawn) = drawn(&folder.path(name), width) else {
+            return support::skipped("no chromium: the page is not drawn");
+        };
+        assert_eq!(drawn.console, Vec::<String>::new(), "console");
+        assert!(drawn.dom.contains("data-errors=\"0\""), "the page's own count of errors");
+        assert!(drawn.dom.contains("data-overflow=\"0\""), "{width} px: the page is wider than its window");
+        let (count, empty) = figures(&drawn.dom);
+        assert_eq!((count, empty), (expected.as_u64().unwrap() as usize, Vec::new()));
+        assert_eq!(drawn.dom.matches("<svg role=\"img\"").count(), count, "a picture in each figure");
+    }
+}
+
+/// Whether the numbers of figures stand at the end: as many tables as the heading says.
+#[track_caller]
+fn has_numbers(page: &str) {
+    let (_, rest) = page.split_once("<summary>Numbers of ").unwrap();
+    let (count, rest) = rest.split_once(" figures</summary>").unwrap();
+    let tables = rest.split("</details>").next().unwrap().matches("<table>").count();
+    assert!(tables > 5 && tables == count.parse::<usize>().unwrap(), "{tables} tables of {count} figures");
+    // A chart or a picture of rows is data of the page; each has its table, however often it is shown.
+    let kept = page.matches("\"series\":[").count();
+    assert!(tables >= kept, "{tables} tables, {kept} charts");
+}
+
+/// Where words stand in a page, in this order.
+#[track_caller]
+fn in_order(page: &str, words: &[&str]) {
+    let mut from = 0;
+    for word in words {
+        from += page[from..].find(word).unwrap_or_else(|| panic!("{word} does not follow"));
+    }
 }
 
 #[test]
-fn the_report_of_six_legs_is_one_small_page_with_every_figure() {
+fn the_report_of_six_legs_is_one_small_page_that_begins_with_the_verdict() {
     let folder = Folder::new();
-    let arguments = ["report", "legs.toml", "--generations", "1", "--no-target", "-o"];
+    let arguments = ["report", "legs.toml", "--no-target", "-o"];
     let document = folder.json(&[&arguments[..], &["page.html"]].concat());
     assert_eq!(document.code, 0, "{:#}", document.value);
     let result = &document.value["result"];
     let page = folder.read("page.html");
-    assert_eq!(result["bytes"], page.len());
+    assert_eq!((&result["bytes"], &result["verdict"]), (&page.len().into(), &"Ready, not measured".into()));
     assert!(page.len() < LARGEST, "{} bytes", page.len());
-    for word in
-        ["Fig. 3", "Fig. 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 29", "Table 1", "Table 2", "Table 3", "Error budget"]
-    {
-        assert!(page.contains(word), "{word}");
-    }
+    in_order(
+        &page,
+        &[
+            "id=\"verdict\"",
+            "Ready, not measured",
+            "Reach per axis",
+            "data-view=\"platform\"",
+            "Findings",
+            "id=\"tracking\"",
+            "id=\"error-budget\"",
+            "id=\"margins\"",
+            "id=\"hysteresis\"",
+            "id=\"tables\"",
+            "Everything that check says",
+        ],
+    );
     assert!(page.contains("Not measured: left out by --no-target"));
-    let sections = result["sections"].as_array().unwrap().len();
-    assert_eq!(page.matches("Again: <code>specgen ").count(), sections, "every section names its command");
-    is_drawn(&folder, "page.html", result["figures"].as_u64().unwrap() as usize);
-    if support::length(false, true) {
-        assert_eq!(folder.run(&[&arguments[..], &["again.html"]].concat()).code, 0);
-        assert!(folder.read("again.html") == page, "two runs, two pages");
-    }
+    has_numbers(&page);
+    is_drawn(&folder, "page.html", &result["figures"]);
+    assert_eq!(folder.run(&[&arguments[..], &["again.html"]].concat()).code, 0);
+    assert!(folder.read("again.html") == page, "two runs, two pages");
 }
 
+/// With limits of two kinds, one of which does not hold; and the paper's figures on a page of their own.
 #[test]
-fn the_report_of_a_platform_has_the_figures_of_section_4() {
+fn the_report_of_a_platform_judges_errors_by_their_limits() {
     let folder = Folder::new();
-    let arguments = ["report", "reference.toml", "--generations", "1", "--no-target", "-o", "page.html"];
-    let document = folder.json(&arguments);
+    let limits = "[[requirements.tracking]]\ntrajectory = \"case-1\"\ntranslation = \"50 nm\"\n\n[[requirements.tracking]]\ntrajectory = \"case-2\"\nfrequency = \"10 Hz\"\naxes = [\"1 nm\", \"1 um\", \"1 um\", \"1 mrad\", \"1 mrad\", \"1 mrad\"]\n\n[target]\n";
+    let spec = folder.read("reference.toml");
+    folder.write("limited.toml", spec.replace("[target]\n", limits));
+    let document = folder.json(&["report", "limited.toml", "--no-target", "-o", "limited.html"]);
+    assert_eq!(document.value["result"]["verdict"], "Not safe to build: error above its limit");
+    let page = folder.read("limited.html");
+    in_order(&page, &["Not safe to build", "Error of case-2 10 Hz x", "requirements.tracking", "<table>"]);
+    let table = page.split("<caption>Errors on trajectories, rms</caption>").nth(1).unwrap();
+    for (name, word) in [
+        ("case-1 1 Hz xyz", "holds"),
+        ("case-2 10 Hz x", "beyond its limit"),
+        ("machining 1 Hz", "no limit in the spec"),
+    ] {
+        let row = table.split(&format!("<td>{name}</td>")).nth(1).unwrap().split("</tr>").next().unwrap();
+        assert!(row.contains(word), "{name}: {row}");
+    }
+
+    let document =
+        folder.json(&["report", "reference.toml", "--paper", "--generations", "1", "--no-target", "-o", "page.html"]);
     assert_eq!(document.code, 0, "{:#}", document.value);
     let page = folder.read("page.html");
     assert!(page.len() < LARGEST, "{} bytes", page.len());
+    assert!(page.contains("No limit in the spec: shown, not judged"));
+    assert!(page.contains("W0458") && page.contains("href=\"page-paper.html\""), "a finding of check, the other page");
+    has_numbers(&page);
+    is_drawn(&folder, "page.html", &document.value["result"]["figures"]);
+
+    let paper = folder.read("page-paper.html");
     for figure in (11..=28).chain([3, 4, 29]) {
-        assert!(page.contains(&format!("Fig. {figure}")), "Fig. {figure}");
+        assert!(paper.contains(&format!("Fig. {figure}")), "Fig. {figure}");
     }
     for table in (5..=9).chain([3]) {
-        assert!(page.contains(&format!("Table {table}")), "Table {table}");
+        assert!(paper.contains(&format!("Table {table}")), "Table {table}");
     }
-    assert!(page.contains("W0458"), "a finding of check");
-    is_drawn(&folder, "page.html", document.value["result"]["figures"].as_u64().unwrap() as usize);
+    is_drawn(&folder, "page-paper.html", &document.value["result"]["paper"]["figures"]);
+}
+
+/// The paper's figures of six legs. Each section names its command.
+#[test]
+fn the_papers_page_of_six_legs_has_its_figures_and_tables() {
+    let folder = Folder::new();
+    let document =
+        folder.json(&["report", "legs.toml", "--paper", "--generations", "1", "--no-target", "-o", "page.html"]);
+    assert_eq!(document.code, 0, "{:#}", document.value);
+    let page = folder.read("page-paper.html");
+    for word in ["Fig. 3", "Fig. 4", "Fig. 6", "Fig. 7", "Fig. 8", "Fig. 29", "Table 1", "Table 2", "Table 3"] {
+        assert!(page.contains(word), "{word}");
+    }
+    is_drawn(&folder, "page-paper.html", &document.value["result"]["paper"]["figures"]);
 }
 
 /// A spec whose workspace holds none of the paper's paths: why is said once, and no figure or table is left empty.
 #[test]
 fn paths_that_are_refused_leave_no_empty_figure_or_table() {
     if support::length(true, false) {
-        return support::skipped("only in the soak: a third report");
+        return support::skipped("only in the soak: another report");
     }
     let folder = Folder::new();
     let spec = std::fs::read_to_string(support::repository().join("specs/features/platform-frames.toml")).unwrap();
     folder.write("frames.toml", spec.replace("../records/", "records/"));
-    let document = folder.json(&["report", "frames.toml", "--generations", "1", "--no-target", "-o", "page.html"]);
+    let arguments = ["report", "frames.toml", "--paper", "--generations", "1", "--no-target", "-o", "page.html"];
+    let document = folder.json(&arguments);
     assert_eq!(document.code, 0, "{:#}", document.value);
-    let page = folder.read("page.html");
+    let paper = folder.read("page-paper.html");
     // Two cases, machining, and the linear relation.
-    assert_eq!(page.matches("The controller refused set-points").count(), 4);
-    assert!(!page.contains("<td>–</td>") && !page.contains("class=\"n\">–</td>"), "a value that was not made");
-    is_drawn(&folder, "page.html", document.value["result"]["figures"].as_u64().unwrap() as usize);
+    assert_eq!(paper.matches("The controller refused set-points").count(), 4);
+    for (name, figures) in [("page.html", "figures"), ("page-paper.html", "paper")] {
+        let page = folder.read(name);
+        assert!(!page.contains("<td>–</td>") && !page.contains("class=\"n\">–</td>"), "a value that was not made");
+        let result = &document.value["result"];
+        is_drawn(&folder, name, if figures == "paper" { &result["paper"]["figures"] } else { &result["figures"] });
+    }
 }
 
 /// The judge of pages sees what it is there for.
@@ -133,20 +209,71 @@ fn a_page_with_an_empty_figure_or_an_error_is_seen() {
     assert_eq!((count, empty.len()), (3, 2));
     let folder = Folder::new();
     folder.write("bad.html", "<!doctype html><title>x</title><script>nowhere()</script>");
-    match drawn(&folder.path("bad.html")) {
+    match drawn(&folder.path("bad.html"), 800) {
         Some(drawn) => assert_eq!(drawn.console.len(), 1, "{:?}", drawn.console),
         None => support::skipped("no chromium: console errors are not seen"),
     }
 }
 
 #[test]
-fn a_spec_that_is_refused_gives_no_page() {
+fn a_spec_that_is_refused_gives_a_page_that_says_why() {
     let folder = Folder::new();
     folder.spec("bad.toml", &[("grid    = 32", "grid    = 1")]);
+    let document = folder.json(&["report", "bad.toml", "-o", "bad.html"]);
+    document.finding("E0301");
+    assert_eq!(document.code, 1);
+    let page = folder.read("bad.html");
+    in_order(
+        &page,
+        &["Not safe to build: ", "Nothing was generated", "<u>1</u>", "<b>Do:</b>", "Explain E0301", "not computed"],
+    );
+    is_drawn(&folder, "bad.html", &document.value["result"]["figures"]);
+
+    let spec = folder.read("reference.toml");
+    folder.write("far.toml", spec.replace("\"50 um\", \"50 um\", \"52 um\"", "\"50 um\", \"50 um\", \"95 um\""));
+    let document = folder.json(&["report", "far.toml", "-o", "far.html"]);
+    assert_eq!(document.code, 1);
+    let page = folder.read("far.html");
+    in_order(
+        &page,
+        &["Not safe to build: z is out of reach", "<u>", "95 um", "Reach per axis", "data-view=\"platform\"", "W0458"],
+    );
+    assert_eq!(document.value["result"]["figures"], 1, "the platform");
+    is_drawn(&folder, "far.html", &document.value["result"]["figures"]);
+
     let before = folder.listing();
-    folder.json(&["report", "bad.toml"]).finding("E0301");
     folder.json(&["report", "nothing.toml"]).finding("E0101");
     assert_eq!(folder.listing(), before);
+}
+
+/// A recorded run, which here is a simulated one: the simulation of its commands gives the same errors.
+#[test]
+fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
+    let folder = Folder::new();
+    let run = folder.run(&["sim", "reference.toml", "--record", "run.rec", "--seconds", "0.5"]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let document = folder.json(&["report", "reference.toml", "--record", "run.rec", "-o", "run.html"]);
+    assert_eq!(document.code, 0, "{:#}", document.value);
+    let page = folder.read("run.html");
+    in_order(
+        &page,
+        &[
+            "The run is whole",
+            "the simulation of the same commands gives",
+            "late ticks",
+            "equal over",
+            "id=\"errors\"",
+            "id=\"spectra\"",
+            "id=\"noise\"",
+            "id=\"hysteresis\"",
+            "id=\"timing\"",
+        ],
+    );
+    has_numbers(&page);
+    is_drawn(&folder, "run.html", &document.value["result"]["figures"]);
+    // Of another spec.
+    let refused = folder.json(&["report", "legs.toml", "--record", "run.rec", "-o", "other.html"]);
+    assert!(refused.code == 1 && refused.error().contains("name the spec that the target was built from"));
 }
 
 /// The whole list but for a short search, in the soak twice; away from the repository, for the specs are in the binary.

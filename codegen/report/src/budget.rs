@@ -16,6 +16,7 @@ use host_sim::trajectory::{PaperPose, Reading};
 use serde_json::{Value, json};
 
 use super::chart::{Axis, Chart, DASHED, INK, LINE, pairs};
+use super::margins::adapting_name;
 use super::section::{Grid, Part, Rows, Section};
 use super::spectrum::cumulative;
 use super::tracking::{AXES, Followed, PLAYED, mode_of, path};
@@ -141,7 +142,7 @@ pub fn of_legs(leg: &LegParameters, mode: usize, controllers: Pair, seed: u64) -
     }
     let found = each(&quiet, added, silent);
     let together = run(own, &leg.noise)?;
-    let what = format!("the leg trajectory at 1 Hz, {name}");
+    let what = format!("the leg trajectory at 1 Hz with {}", adapting_name(name));
     let mut section = empty();
     section.parts = parts(&what, 0, &LEGS, &found, &together, interval);
     Ok(section.text("Errors are as the gauges read them, their own noise included."))
@@ -207,18 +208,26 @@ fn parts(what: &str, number: usize, names: &[&str; 6], added: &[Added], together
     table.push(row("simulated, all together", &all));
 
     let bars = |axes: core::ops::Range<usize>, unit: &str| {
-        let largest = axes.clone().map(|axis| {
-            let end = libm::sqrt(squares[axis]);
-            if all[axis] > end { all[axis] } else { end }
-        }).fold(0.0, |a: f64, b| if b > a { b } else { a });
-        let rows: Vec<Value> = axes.clone().map(|axis| bar(names[axis], axis, &values, all[axis], squares[axis], unit)).collect();
+        let largest = axes
+            .clone()
+            .map(|axis| {
+                let end = libm::sqrt(squares[axis]);
+                if all[axis] > end { all[axis] } else { end }
+            })
+            .fold(0.0, |a: f64, b| if b > a { b } else { a });
+        let rows: Vec<Value> =
+            axes.clone().map(|axis| bar(names[axis], axis, &values, all[axis], squares[axis], unit)).collect();
         let end = 1.35 * largest;
         Rows {
             id: format!("budget-{number}-{unit}"),
             title: format!("{what}, {unit} rms"),
             data: json!({ "scale": "square", "range": [0.0, end], "unit": format!("{unit} rms"), "ticks": squared(end), "rows": rows, "left": 46, "step": 44,
                 "right": 90, "label": format!("Error budget of {what}") }),
-            numbers: if axes.start == 0 { table.clone() } else { Grid::new(&format!("Error budget in {unit}: with the one in nm"), &[]) },
+            numbers: if axes.start == 0 {
+                table.clone()
+            } else {
+                Grid::new(&format!("Error budget in {unit}: with the one in nm"), &[])
+            },
         }
     };
     let swatches: Vec<String> = values
@@ -229,7 +238,10 @@ fn parts(what: &str, number: usize, names: &[&str; 6], added: &[Added], together
         })
         .collect();
     let columns = if legs {
-        vec![Part::Columns(vec![vec![Part::Rows(bars(0..3, "nm"))], vec![Part::Rows(Rows { id: "budget-0-nm-b".to_owned(), ..bars(3..6, "nm") })]])]
+        vec![Part::Columns(vec![
+            vec![Part::Rows(bars(0..3, "nm"))],
+            vec![Part::Rows(Rows { id: "budget-0-nm-b".to_owned(), ..bars(3..6, "nm") })],
+        ])]
     } else {
         vec![Part::Columns(vec![vec![Part::Rows(bars(0..3, "nm"))], vec![Part::Rows(bars(3..6, "nrad"))]])]
     };
@@ -277,7 +289,8 @@ fn bar(name: &str, axis: usize, values: &[(&str, [f64; 6])], all: f64, square: f
 /// Four or five round ticks of a squared axis up to `end`.
 fn squared(end: f64) -> Vec<f64> {
     let decade = libm::pow(10.0, libm::floor(libm::log10(end)));
-    let step = [0.2, 0.25, 0.5, 1.0, 2.0].iter().map(|k| k * decade).find(|step| end / step <= 5.0).unwrap_or(2.0 * decade);
+    let step =
+        [0.2, 0.25, 0.5, 1.0, 2.0].iter().map(|k| k * decade).find(|step| end / step <= 5.0).unwrap_or(2.0 * decade);
     (0..=5).map(|k| f64::from(k) * step).filter(|v| *v <= end).collect()
 }
 

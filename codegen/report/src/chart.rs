@@ -1,6 +1,9 @@
 //! What a chart shows. A page's script draws it (`page`), to be zoomed and saved; [`plot`](super::plot) draws it as SVG.
 
 use serde_json::{Value, json};
+use specgen_studies::reproduce::write::digits;
+
+use super::section::Grid;
 
 /// Points of a series that is drawn over time.
 const POINTS: usize = 640;
@@ -20,10 +23,62 @@ pub enum Mark {
 
 /// A line as pages draw it; their script chooses sizes.
 pub const LINE: Mark = Mark::Line(1.3);
+/// What stands behind a dashed line.
+pub const WIDE: Mark = Mark::Line(3.0);
 /// A dashed line as pages draw it.
 pub const DASHED: Mark = Mark::Dashed(1.6);
 /// Dots as pages draw them.
 pub const DOTS: Mark = Mark::Dots(3.5);
+/// Colour of data on a page; 0 to 3 are the lightnesses of an ordered series, the most important first.
+pub const BLUE: usize = 4;
+/// Colour of targets and predictions on a page.
+pub const INK: usize = 5;
+/// Colour of what is above its limit on a page.
+pub const ORANGE: usize = 6;
+/// Colour of what was before, on a page.
+pub const EDGE: usize = 7;
+
+/// What is written into a chart of a page beside its series.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Note {
+    /// Where values usually are: lowest and highest y, with their texts at the right.
+    Band([f64; 2], [String; 2]),
+    /// A limit of y with the band beyond it, upward or downward.
+    Beyond {
+        /// The limit.
+        y: f64,
+        /// Whether it is a largest value.
+        up: bool,
+        /// Its name and value.
+        text: String,
+    },
+    /// A time at which something that a finding knows happens.
+    Cause(f64, String),
+    /// A point worth a look.
+    Ring([f64; 2], String),
+    /// A margin: x, both ends in y, its value.
+    Segment(f64, [f64; 2], String),
+    /// A value of y that matters.
+    Level(f64, String),
+    /// Places of x at the bottom, with their numbers.
+    Modes(Vec<f64>, Vec<String>),
+}
+
+impl Note {
+    fn data(&self) -> Value {
+        match self {
+            Self::Band(y, text) => json!({ "k": "band", "y": y.map(short), "text": text }),
+            Self::Beyond { y, up, text } => json!({ "k": "beyond", "y": short(*y), "up": up, "text": text }),
+            Self::Cause(x, text) => json!({ "k": "cause", "x": short(*x), "text": text }),
+            Self::Ring([x, y], text) => json!({ "k": "ring", "x": short(*x), "y": short(*y), "text": text }),
+            Self::Segment(x, y, text) => json!({ "k": "segment", "x": short(*x), "y": y.map(short), "text": text }),
+            Self::Level(y, text) => json!({ "k": "level", "y": short(*y), "text": text }),
+            Self::Modes(x, text) => {
+                json!({ "k": "modes", "x": x.iter().map(|v| short(*v)).collect::<Vec<_>>(), "text": text })
+            }
+        }
+    }
+}
 
 /// Points drawn in one way.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,6 +163,8 @@ pub struct Chart {
     pub id: String,
     /// Above it, with the figure of the paper if there is one.
     pub title: String,
+    /// In the corner of its small form on a page.
+    pub short: String,
     /// The axis across.
     pub x: Axis,
     /// The axis upward.
@@ -118,8 +175,16 @@ pub struct Chart {
     pub patches: Vec<Patch>,
     /// Entry of the legend for hatched patches, if there are any.
     pub hatched: Option<String>,
-    /// Fixed limits of y, else those of the series; in pictures only.
+    /// Fixed limits of y, else those of the series.
     pub y_limits: Option<[f64; 2]>,
+    /// On a page: what is written into it.
+    pub notes: Vec<Note>,
+    /// On a page: whether names are keys below it, for curves that close upon themselves, and not at the ends of lines.
+    pub keys: bool,
+    /// On a page: whether it stands above another one that has the same x.
+    pub bare: bool,
+    /// On a page: height, px; 0: the usual one.
+    pub height: u32,
 }
 
 impl Chart {
@@ -129,12 +194,17 @@ impl Chart {
         Self {
             id: id.to_owned(),
             title: title.to_owned(),
+            short: String::new(),
             x,
             y,
             series: Vec::new(),
             patches: Vec::new(),
             hatched: None,
             y_limits: None,
+            notes: Vec::new(),
+            keys: false,
+            bare: false,
+            height: 0,
         }
     }
 
@@ -151,6 +221,13 @@ impl Chart {
         if let Some(last) = self.series.last_mut() {
             last.color = color;
         }
+        self
+    }
+
+    /// Writes something into it.
+    #[must_use]
+    pub fn noted(mut self, note: Note) -> Self {
+        self.notes.push(note);
         self
     }
 
@@ -177,6 +254,7 @@ impl Chart {
                 None => self.x.packed(&of(0)),
             };
             let style = match one.mark {
+                Mark::Line(width) if width > 2.0 => "wide",
                 Mark::Line(_) => "line",
                 Mark::Dashed(_) => "dash",
                 Mark::Dots(_) => "dots",
@@ -184,7 +262,32 @@ impl Chart {
             json!({ "name": one.name, "style": style, "color": one.color, "x": x, "y": self.y.packed(&of(1)) })
         };
         let series: Vec<Value> = self.series.iter().map(series).collect();
-        json!({ "id": self.id, "title": self.title, "x": self.x.data(), "y": self.y.data(), "series": series })
+        let notes: Vec<Value> = self.notes.iter().map(Note::data).collect();
+        json!({
+            "id": self.id, "title": self.title, "short": self.short, "x": self.x.data(), "y": self.y.data(), "series": series,
+            "notes": notes, "keys": self.keys, "bare": self.bare, "height": self.height, "y_limits": self.y_limits,
+        })
+    }
+
+    /// What a table says of its series: where each begins and ends, its lowest and highest value, its rms.
+    #[must_use]
+    pub fn numbers(&self) -> Grid {
+        let head = ["series", "points", "from", "to", "lowest", "at", "highest", "at", "rms"];
+        let mut grid = Grid::new(&format!("{} ({} over {})", self.title, self.y.text(), self.x.text()), &head);
+        for one in &self.series {
+            let seen: Vec<&[f64; 2]> =
+                one.points.iter().filter(|point| point[0].is_finite() && point[1].is_finite()).collect();
+            let (Some(first), Some(last)) = (seen.first(), seen.last()) else { continue };
+            let extreme = |sign: f64| {
+                seen.iter().fold(**first, |best, point| if sign * point[1] > sign * best[1] { **point } else { best })
+            };
+            let ([low_at, low], [high_at, high]) = (extreme(-1.0), extreme(1.0));
+            let square: f64 = seen.iter().map(|point| point[1] * point[1]).sum();
+            let name = if one.name.is_empty() { self.y.label.clone() } else { one.name.clone() };
+            let numbers = [first[0], last[0], low, low_at, high, high_at, libm::sqrt(square / seen.len() as f64)];
+            grid.push([vec![name, seen.len().to_string()], numbers.map(digits).to_vec()].concat());
+        }
+        grid
     }
 }
 

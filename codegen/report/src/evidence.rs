@@ -1,4 +1,4 @@
-//! What needs no simulation of a trajectory: summary, findings, margins, time and memory, digests.
+//! What needs no simulation of a trajectory: findings, modes, rounding errors, time and memory, digests.
 
 use core::f64::consts::TAU;
 
@@ -6,35 +6,19 @@ use super::section::{Grid, Section};
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::ir::Scalar;
 use specgen_compiler::precision::{self, Precision};
+use specgen_compiler::stability::platform::Design;
 use specgen_language::diagnostic::to_json;
 use specgen_language::model::Target;
 use specgen_studies::reproduce::write::digits;
+use specgen_studies::verdict::{Mark, Subject, Verdict};
 use specgen_studies::verify::Measurement;
 
-/// What `specgen check` says of the spec.
-#[must_use]
-pub fn summary(compiled: &Compiled, described: &str, command: &str) -> Section {
-    let section = Section::new("summary", "Summary", command);
-    if compiled.design.is_some() {
-        return section
-            .text("A platform that six gauges see, with the task-space controller.")
-            .lines(described.trim_end());
-    }
-    section
-        .text("Six legs with their own gauges: the leg feed-forward.")
-        .text(
-            "The spec has no [control], so that there is nothing here of position control of the platform: free motion \
-             (Figs 11 to 22, Tables 5 to 8), machining (Figs 23 to 28, Table 9), modes, gains and pose noise.",
-        )
-        .lines(described.trim_end())
-}
-
-/// Findings with their places.
+/// Findings with their places, and what `specgen check` says of the spec.
 #[must_use]
 pub fn findings(compiled: &Compiled, command: &str) -> Section {
-    let section = Section::new("findings", "Findings of check", command);
+    let section = Section::new("findings", "Findings", command);
     if compiled.findings.is_empty() {
-        return section.text("None: no error, no warning, no note.");
+        return section.lead("None: no error, no warning, no note.");
     }
     let mut table = Grid::new("Findings", &["", "code", "line", "column", "key", "what", "fix"]);
     for finding in to_json(&compiled.findings, &compiled.source).as_array().into_iter().flatten() {
@@ -45,61 +29,57 @@ pub fn findings(compiled: &Compiled, command: &str) -> Section {
         };
         table.push(["severity", "code", "line", "column", "key", "message", "help"].map(text).to_vec());
     }
-    section.text("No error: with one nothing would have been generated.").table(table)
+    section.lead("Nothing is refused.").table(table)
 }
 
-/// Stability of what is emitted.
+/// Errors on trajectories and their limits.
 #[must_use]
-pub fn margins(compiled: &Compiled, command: &str) -> Section {
-    let section = Section::new("margins", "Margins", command);
+pub fn tracking(verdict: &Verdict, command: &str) -> Section {
+    let mut table = Grid::new("Errors on trajectories, rms", &["what", "found", "limit", "unit", ""]);
+    for figure in verdict.figures.iter().filter(|figure| figure.subject == Subject::Tracking) {
+        let word = match figure.mark {
+            Mark::Within => "holds",
+            Mark::Beyond => "beyond its limit",
+            Mark::NoLimit => "no limit in the spec",
+        };
+        let texts = [&figure.name, &digits(figure.value), &figure.limit_text(), figure.unit, word];
+        table.push(texts.map(str::to_owned).to_vec());
+    }
+    Section::new("errors", "Errors and their limits", command).table(table)
+}
+
+/// Every control mode that a running controller can be put into.
+#[must_use]
+pub fn control_modes(design: &Design) -> Grid {
     let or = |value: Option<f64>, none: &str| value.map_or_else(|| none.to_owned(), digits);
-    if let Some(design) = &compiled.design {
-        let mut table = Grid::new(
-            "Every control mode that a running controller can be put into",
-            &[
-                "mode",
-                "spectral radius",
-                "λ up to",
-                "gain × up to",
-                "delay up to, ticks",
-                "settles, ms",
-                "least damped",
-            ],
-        );
-        for one in &design.margins {
-            let least = one.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
-            table.push(vec![
-                one.law.name().to_owned(),
-                format!("{:.5}", one.spectral_radius),
-                or(one.gain_ratio_limit, "> 10"),
-                or(one.gain_margin, "none met"),
-                or(one.delay_margin_ticks, "> 5"),
-                or(one.settling.map(|time| time * 1e3), "no feedback"),
-                least.map_or_else(String::new, |mode| format!("{:.0} Hz, ζ {:.4}", mode.frequency, mode.damping_ratio)),
-            ]);
-        }
-        let mut modes = Grid::new("Modes of the platform on its legs", &["mode", "Hz", "ζ"]);
-        for (number, mode) in design.modes.iter().enumerate() {
-            let hertz = mode.frequency / TAU;
-            modes.push(vec![format!("{}", number + 1), digits(hertz), format!("{:.4}", mode.damping_ratio)]);
-        }
-        return section
-            .text("The sampled closed loop with the platform's modes, amplifier lag and notch, over the declared gain_ratio.")
-            .table(table)
-            .table(modes);
+    let mut table = Grid::new(
+        "Every control mode that a running controller can be put into",
+        &["mode", "spectral radius", "λ up to", "gain × up to", "delay up to, ticks", "settles, ms", "least damped"],
+    );
+    for one in &design.margins {
+        let least = one.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
+        table.push(vec![
+            one.law.name().to_owned(),
+            format!("{:.5}", one.spectral_radius),
+            or(one.gain_ratio_limit, "> 10"),
+            or(one.gain_margin, "none met"),
+            or(one.delay_margin_ticks, "> 5"),
+            or(one.settling.map(|time| time * 1e3), "no feedback"),
+            least.map_or_else(String::new, |mode| format!("{:.0} Hz, ζ {:.4}", mode.frequency, mode.damping_ratio)),
+        ]);
     }
-    let Some(margins) = &compiled.margins else { return section };
-    let mut table = Grid::new("Adaptation of a leg", &["what", "value"]);
-    let adapts = "the law does not adapt";
-    for (what, value) in [
-        ("level weight of the spec", digits(compiled.model.adaptation.level_weight)),
-        ("largest stable level weight, drift weight in proportion", or(margins.largest_level_weight, adapts)),
-        ("spectral radius of the sampled leg over gain_ratio", format!("{:.5}", margins.spectral_radius)),
-        ("largest λ without leg dynamics (AII.18, AII.19)", or(margins.static_gain_limit, adapts)),
-    ] {
-        table.push(vec![what.to_owned(), value]);
+    table
+}
+
+/// Modes of the platform on its legs.
+#[must_use]
+pub fn modes(design: &Design) -> Grid {
+    let mut modes = Grid::new("Modes of the platform on its legs", &["mode", "Hz", "ζ"]);
+    for (number, mode) in design.modes.iter().enumerate() {
+        let hertz = mode.frequency / TAU;
+        modes.push(vec![format!("{}", number + 1), digits(hertz), format!("{:.4}", mode.damping_ratio)]);
     }
-    section.table(table)
+    modes
 }
 
 /// Rounding errors of the scalar, axis by axis.
@@ -136,9 +116,9 @@ pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &s
         let declared = declared.map_or_else(String::new, |declared| declared.to_string());
         table.push(vec![what.to_owned(), format!("{used:.0}"), declared, share]);
     };
-    row("flash, bytes", m.flash as f64, budget.flash);
+    row("flash, bytes", m.used.flash as f64, budget.flash);
     row("of which code a tick can reach, bytes", m.tick_code as f64, None);
-    row("RAM, bytes", m.ram as f64, budget.ram);
+    row("RAM, bytes, stack of a tick included", m.used.ram as f64, budget.ram);
     row("of which State, bytes", m.state as f64, None);
     if let Some(bound) = m.stack_bound {
         row("stack of a tick, bytes (static bound)", bound as f64, budget.stack);

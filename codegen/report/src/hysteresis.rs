@@ -1,39 +1,230 @@
-//! Fig. 3: hysteresis loops of a leg at several rates.
+//! Hysteresis of the legs: without a model, behind the inverse model, with feedback.
 
 use core::f64::consts::TAU;
 
+use host_sim::closed_loop::RunError;
+use host_sim::controller::{Controller, TickController};
 use host_sim::plant::{LegParameters, LegPlant, Plant};
-
-use super::chart::{Axis, Chart, LINE, pairs};
-use super::section::{Grid, Section};
+use host_sim::platform::PlatformScenario;
+use host_sim::platform::rig::{Record, RunOptions};
+use host_sim::platform::scenario::{PLATFORM_MODES, select};
+use host_sim::table::Line;
+use host_sim::trajectory::{PaperPose, Reading};
+use serde_json::{Value, json};
+use specgen_identify::Report;
+use specgen_language::model::{Actuator, TaskSpace, TrajectoryKind};
+use specgen_runtime::Platform;
+use specgen_runtime::setpoint::{REFUSED, STALE};
 use specgen_studies::reproduce::write::digits;
 
-const FREQUENCIES: [f64; 6] = [0.1, 1.0, 10.0, 20.0, 40.0, 50.0];
+use super::chart::{Axis, BLUE, Chart, LINE, Note, pairs};
+use super::section::{Grid, Part, Rows, Section};
+use super::tracking::{AXES, Followed, PLAYED, path, short};
+
+/// Rates of the loops, Hz, the least important first.
+const FREQUENCIES: [f64; 3] = [0.1, 10.0, 50.0];
+/// Rates of the paper's figure, Hz.
+const PAPER: [f64; 6] = [0.1, 1.0, 10.0, 20.0, 40.0, 50.0];
 /// Held voltages in a period.
 const SAMPLES: usize = 400;
+/// Points of a curve, at most.
+const POINTS: usize = 400;
 
-/// Loops of the simulated leg of the spec; `lowest` is the voltage at which it rests, V.
-#[must_use]
-pub fn section(leg: &LegParameters, lowest: f64) -> Section {
-    let mut chart = Chart::new(
-        "loops",
-        "Fig. 3: displacement over voltage, second period of a sine over the whole range",
-        Axis::linear("voltage", "V"),
-        Axis::linear("displacement", "µm"),
-    );
-    let mut table = Grid::new("Loops", &["rate, Hz", "travel, µm", "width at half voltage, %"]);
-    for frequency in FREQUENCIES {
-        let (voltages, displacements) = sine(leg, frequency);
-        let travel = displacements[SAMPLES / 2] - displacements[0];
-        let width = (displacements[3 * SAMPLES / 4] - displacements[SAMPLES / 4]) / travel;
-        table.push(vec![format!("{frequency}"), digits(travel), digits(100.0 * width)]);
-        let voltages: Vec<f64> = voltages.iter().map(|v| v + lowest).collect();
-        chart = chart.with(&format!("{frequency} Hz"), LINE, pairs(&voltages, &displacements));
+/// A leg behind its inverse model on a path: what was asked of it (V, virtual) against what is left (nm), and the line.
+struct Behind {
+    points: Vec<[f64; 2]>,
+    line: Line,
+    rms: f64,
+}
+
+/// Loops of each leg, what the inverse model leaves of them on the trajectory of the spec, and what feedback leaves.
+/// `lowest`: voltage at which legs rest, V.
+///
+/// # Errors
+/// As [`PlatformScenario::run`].
+#[allow(clippy::too_many_arguments)]
+pub fn of_platform(
+    machine: &PlatformScenario,
+    controller: &mut Controller,
+    platform: &Platform<f64>,
+    task: &TaskSpace,
+    actuator: &Actuator,
+    legs: &[LegParameters; 6],
+    records: &[Option<Report>],
+    all: &[Followed],
+) -> Result<Section, RunError> {
+    let own = all.iter().find(|one| one.own && one.run.is_some());
+    let behind = match own {
+        Some(own) => behind(machine, controller, platform, task, actuator, own)?,
+        None => Vec::new(),
+    };
+    let mut section = Section::new("hysteresis", "Hysteresis", "");
+    for (k, leg) in legs.iter().enumerate() {
+        let (loops, width) = loops(
+            leg,
+            actuator.voltage[0],
+            &FREQUENCIES,
+            &format!("loops-{k}"),
+            &format!("Leg {} without compensation, by rate", k + 1),
+        );
+        let record = records.get(if records.len() == 6 { k } else { 0 }).and_then(Option::as_ref);
+        let mut steps = vec![("loop, no model", width * 1e3)];
+        steps.extend(record.map(|record| ("record fit, whole record", record.fit_rms * 1e9)));
+        let mut columns = vec![vec![Part::Chart(loops)]];
+        if let (Some(one), Some(own)) = (behind.get(k), own) {
+            steps.push(("inverse model, open loop", one.rms));
+            columns.push(vec![Part::Chart(one.chart(k, own))]);
+        }
+        let mut last = None;
+        if let Some(rms) = own.and_then(Followed::rms) {
+            let worst = (1..3).fold(0, |worst, axis| if rms[axis] > rms[worst] { axis } else { worst });
+            steps.push(("with feedback, worst axis", rms[worst]));
+            last = Some((AXES[worst], rms[worst]));
+        }
+        let behind_it =
+            behind.get(k).map_or_else(String::new, |one| format!(" becomes {} by the inverse model", length(one.rms)));
+        let fed = last.map_or_else(String::new, |(axis, rms)| format!(" and {} of {axis} with feedback", length(rms)));
+        columns.push(vec![Part::Rows(funnel(k, &steps))]);
+        let lead = format!("A loop of {} at {} Hz{behind_it}{fed}.", length(width * 1e3), FREQUENCIES[2]);
+        section = section.pane(&[&format!("leg {}", k + 1)], vec![Part::Lead(lead), Part::Columns(columns)]);
     }
-    Section::new("hysteresis", "Rate-dependent hysteresis", "")
+    Ok(section)
+}
+
+/// The loops of six equal legs with their own gauges, as the simulator has them.
+#[must_use]
+pub fn of_legs(leg: &LegParameters, lowest: f64, records: &[Option<Report>]) -> Section {
+    let (chart, width) = loops(leg, lowest, &FREQUENCIES, "loops-0", "A leg without compensation, by rate");
+    let mut steps = vec![("loop, no model", width * 1e3)];
+    steps.extend(records.iter().flatten().next().map(|record| ("record fit, whole record", record.fit_rms * 1e9)));
+    Section::new("hysteresis", "Hysteresis", "")
+        .lead(&format!("A loop of {} at {} Hz.", length(width * 1e3), FREQUENCIES[2]))
+        .part(Part::Columns(vec![vec![Part::Chart(chart)], vec![Part::Rows(funnel(0, &steps))]]))
+}
+
+/// Fig. 3: loops at the paper's rates; `lowest` is the voltage at which the leg rests, V.
+#[must_use]
+pub fn of_paper(leg: &LegParameters, lowest: f64) -> Section {
+    let title = "Fig. 3: displacement over voltage, second period of a sine over the whole range";
+    let (chart, _) = loops(leg, lowest, &PAPER, "paper-loops", title);
+    Section::new("loops", "Rate-dependent hysteresis", "")
         .text("The simulated leg, open loop: amplifier lag, plays with rate-dependent thresholds, creep, asymmetry, resonance. It is not of the controller's model class: no Everett table can hold it. The loop becomes rounder and wider with the rate, as in the paper.")
         .charts(vec![chart])
-        .table(table)
+}
+
+/// A length given in nm.
+fn length(nm: f64) -> String {
+    if nm >= 1e3 { format!("{}\u{2009}µm", short(nm * 1e-3)) } else { format!("{}\u{2009}nm", short(nm)) }
+}
+
+/// The chart of the loops, and the width of the fastest one, µm.
+fn loops(leg: &LegParameters, lowest: f64, frequencies: &[f64], id: &str, title: &str) -> (Chart, f64) {
+    let mut chart = Chart::new(id, title, Axis::linear("voltage", "V"), Axis::linear("displacement", "µm"));
+    let mut widest = 0.0;
+    for (k, frequency) in frequencies.iter().enumerate() {
+        let (voltages, displacements) = sine(leg, *frequency);
+        let travel = displacements[SAMPLES / 2] - displacements[0];
+        widest = displacements[3 * SAMPLES / 4] - displacements[SAMPLES / 4];
+        let voltages: Vec<f64> = voltages.iter().map(|v| v + lowest).collect();
+        let name = format!("{frequency} Hz: travel {travel:.1} µm, width {:.1} %", 100.0 * widest / travel);
+        // The fastest, which is the widest, is darkest.
+        let color = (frequencies.len() - 1 - k) * 3 / (frequencies.len() - 1).max(1);
+        chart = chart.with(&name, LINE, pairs(&voltages, &displacements)).colored(color);
+    }
+    chart.keys = true;
+    chart.height = 290;
+    (chart, widest)
+}
+
+fn behind(
+    machine: &PlatformScenario,
+    controller: &mut Controller,
+    platform: &Platform<f64>,
+    task: &TaskSpace,
+    actuator: &Actuator,
+    own: &Followed,
+) -> Result<Vec<Behind>, RunError> {
+    let mut traced = machine.clone();
+    traced.options = RunOptions { record: Record::Trace, ..machine.options.clone() };
+    select(controller, PLATFORM_MODES[1].1)?;
+    let number = task.trajectories.iter().position(|one| one.name == own.name).unwrap_or_default();
+    let run = match (&task.trajectories[number].kind, own.frequency) {
+        (TrajectoryKind::Paper { path: which, as_printed, .. }, Some(frequency)) => {
+            let reading = if *as_printed { Reading::AsPrinted } else { Reading::Corrected };
+            traced.run(controller, &PaperPose { path: path(*which), reading, frequency })?
+        }
+        _ => traced.play(controller, number as u32, PLAYED)?,
+    };
+    let Some(trace) = run.trace.as_ref().filter(|_| run.status & (REFUSED | STALE) == 0) else { return Ok(Vec::new()) };
+    let jacobian = platform.jacobian(&[0.0; 6]);
+    let first = controller.description().output("requested[0]")?;
+    let (words, scalar) = (controller.description().input_names.len(), controller.description().scalar);
+    let before = trace.len().saturating_sub(run.samples.len());
+    let of = |leg: usize| {
+        let points: Vec<(f64, f64)> = trace
+            .rows()
+            .skip(before)
+            .zip(&run.samples)
+            .map(|(row, sample)| {
+                let moved = jacobian[leg].iter().zip(&sample.tick.pose).map(|(j, h)| j * h).sum();
+                (scalar.decode(row[words + first + leg]), moved)
+            })
+            .collect();
+        let line = Line::fit(&points)?;
+        let left: Vec<[f64; 2]> =
+            points.iter().map(|(x, y)| [x / actuator.leg_gain(), (y - line.slope * x - line.offset) * 1e9]).collect();
+        let rms = libm::sqrt(left.iter().map(|point| point[1] * point[1]).sum::<f64>() / left.len() as f64);
+        let every = left.len().div_ceil(POINTS).max(1);
+        Some(Behind { points: left.into_iter().step_by(every).collect(), line, rms })
+    };
+    Ok((0..6).map_while(of).collect())
+}
+
+impl Behind {
+    fn chart(&self, leg: usize, own: &Followed) -> Chart {
+        let mut chart = Chart::new(
+            &format!("behind-{leg}"),
+            &format!(
+                "What the inverse model leaves: leg {}, {}, {}; λ {}, δ {} nm",
+                leg + 1,
+                own.name,
+                own.speed(),
+                digits(self.line.slope),
+                short(self.line.offset * 1e9)
+            ),
+            Axis::linear("virtual voltage", "V"),
+            Axis::linear("residual", "nm"),
+        )
+        .with("", LINE, self.points.clone())
+        .colored(BLUE)
+        .noted(Note::Band([-self.rms, self.rms], [format!("+rms {} nm", short(self.rms)), "−rms".to_owned()]));
+        chart.height = 290;
+        chart
+    }
+}
+
+/// From the loop to the error, nm.
+fn funnel(leg: usize, steps: &[(&str, f64)]) -> Rows {
+    let mut numbers = Grid::new(&format!("From loop to error, leg {}", leg + 1), &["what", "nm"]);
+    let positive = steps.iter().filter(|(_, nm)| *nm > 0.0);
+    let (low, high) = positive.clone().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), (_, nm)| {
+        (if *nm < low { *nm } else { low }, if *nm > high { *nm } else { high })
+    });
+    let decade = |v: f64| libm::pow(10.0, v);
+    let least = decade(libm::floor(libm::log10(low / 1.2)));
+    let rows: Vec<Value> = positive
+        .map(|(name, nm)| {
+            numbers.push(vec![(*name).to_owned(), digits(*nm)]);
+            json!({ "name": name, "line": [least, nm], "marks": [{ "m": "dot", "x": nm, "text": length(*nm) }] })
+        })
+        .collect();
+    Rows {
+        id: format!("funnel-{leg}"),
+        title: "From loop to error, rms (loop: width)".to_owned(),
+        data: json!({ "scale": "log", "range": [least, decade(libm::ceil(libm::log10(high)))], "unit": "nm", "rows": rows, "above": true, "step": 50, "right": 70,
+            "label": "From loop to error" }),
+        numbers,
+    }
 }
 
 /// Voltages from rest (V) and displacements from the settled leg (µm) over the second period, the start of the third

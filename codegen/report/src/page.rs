@@ -2,79 +2,305 @@
 
 use std::fmt::Write as _;
 
+use serde_json::{Map, Value};
+
 use super::chart::Chart;
 use super::plot::escaped;
-use super::section::{Grid, Part, Section};
+use super::section::{Grid, Multiples, Part, Section};
 
 const STYLE: &str = include_str!("assets/report.css");
-const SCRIPT: &str =
-    concat!(include_str!("assets/chart.js"), include_str!("assets/view.js"), include_str!("assets/page.js"));
+const SCRIPT: &str = concat!(
+    include_str!("assets/draw.js"),
+    include_str!("assets/plot.js"),
+    include_str!("assets/rows.js"),
+    include_str!("assets/view.js"),
+    include_str!("assets/page.js")
+);
+/// The marks, by the shape that tells them apart without colour.
+const MARKS: &str = r##"<svg width="0" height="0" style="position:absolute" aria-hidden="true"><defs>
+<symbol id="m-ok" viewBox="0 0 16 16"><circle cx="8" cy="8" r="7.5" fill="var(--blue)"/><path d="M4.6 8.3l2.4 2.4 4.5-5" fill="none" stroke="var(--on)" stroke-width="1.8" stroke-linecap="round" stroke-linejoin="round"/></symbol>
+<symbol id="m-warning" viewBox="0 0 16 16"><path d="M8 1.6L15 14H1z" fill="none" stroke="var(--orange)" stroke-width="1.5" stroke-linejoin="round"/><path d="M8 6v4M8 11.6v.9" stroke="var(--orange)" stroke-width="1.6" stroke-linecap="round"/></symbol>
+<symbol id="m-error" viewBox="0 0 16 16"><path d="M5 .8h6L15.2 5v6L11 15.2H5L.8 11V5z" fill="var(--orange)"/><path d="M5.5 5.5l5 5M10.5 5.5l-5 5" stroke="var(--on)" stroke-width="1.8" stroke-linecap="round"/></symbol>
+<symbol id="m-none" viewBox="0 0 16 16"><circle cx="8" cy="8" r="6.8" fill="none" stroke="var(--edge)" stroke-width="1.4" stroke-dasharray="3 2"/><path d="M5.2 8h5.6" stroke="var(--ink2)" stroke-width="1.5"/></symbol>
+<symbol id="m-note" viewBox="0 0 16 16"><circle cx="8" cy="8" r="6.9" fill="none" stroke="var(--ink2)" stroke-width="1.4"/><path d="M8 7.2v4M8 4.6v.9" stroke="var(--ink2)" stroke-width="1.6" stroke-linecap="round"/></symbol>
+</defs></svg>
+"##;
 
 /// What stands above the sections.
 #[derive(Debug, Clone)]
 pub struct Head {
-    /// Name of the platform.
-    pub name: String,
+    /// File of the spec.
+    pub file: String,
+    /// What the page is, in the title of its window.
+    pub title: String,
     /// Digest of the spec, hexadecimal.
     pub digest: String,
+    /// Versions and target.
+    pub versions: String,
     /// The command that makes the page.
     pub command: String,
+    /// Whether the spec is refused.
+    pub refused: bool,
+    /// Another page: its file, and what it is.
+    pub other: Option<[String; 2]>,
 }
 
-/// The page. The same sections give the same bytes.
+/// The page: `first`, what is seen first, then the sections; at the end the numbers of every figure and `evidence`, to be
+/// opened. The same arguments give the same bytes.
 #[must_use]
-pub fn html(head: &Head, sections: &[Section]) -> String {
-    let mut out = String::new();
-    let title = escaped(&head.name);
+pub fn html(head: &Head, first: &[Part], sections: &[Section], evidence: &[Section]) -> String {
+    let mut page = Page { out: String::new(), data: Map::new(), numbers: Vec::new(), figures: 0 };
+    let (file, digest) = (escaped(&head.file), escaped(&head.digest));
+    let short: String = head.digest.chars().take(16).collect();
     // Writing to a String cannot fail, here and below.
     let _ = write!(
-        out,
-        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"generator\" content=\"specgen {version}\">\n<title>{title}: report</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>Report of specgen {version} on spec digest <code>{digest}</code>. This page again: <code>{command}</code>. <button id=\"theme\" type=\"button\">light / dark</button></p>\n<noscript><p><strong>The figures are drawn by this page's own script; it is switched off.</strong></p></noscript>\n</header>\n",
-        version = env!("CARGO_PKG_VERSION"),
-        digest = escaped(&head.digest),
-        command = escaped(&head.command),
+        page.out,
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<meta name=\"generator\" content=\"specgen {}\">\n<title>{file}: {}</title>\n<link rel=\"icon\" href=\"data:,\">\n<style>\n{STYLE}</style>\n</head>\n<body{}>\n{MARKS}<header class=\"top\"><b>{file}</b><code title=\"{digest}\">{}</code><span class=\"versions\">{}</span>",
+        env!("CARGO_PKG_VERSION"),
+        escaped(&head.title),
+        if head.refused { " class=\"refused-page\"" } else { "" },
+        escaped(&short),
+        escaped(&head.versions),
     );
-    out.push_str("<nav><ul>\n");
-    for section in sections {
-        let _ = writeln!(out, "<li><a href=\"#{}\">{}</a></li>", section.id, escaped(&section.title));
+    page.out.push_str("<nav>");
+    if !first.is_empty() {
+        page.out.push_str("<a href=\"#verdict\">Verdict</a>");
     }
-    out.push_str("</ul></nav>\n<main>\n");
-    let mut data = serde_json::Map::new();
     for section in sections {
-        write_section(&mut out, section, &mut data);
+        let _ = write!(page.out, "<a href=\"#{}\">{}</a>", section.id, escaped(&section.title));
     }
-    out.push_str("</main>\n");
-    // `</script>` in a text would end it.
-    let data = serde_json::Value::Object(data).to_string().replace("</", "<\\/");
+    if let Some([href, text]) = &head.other {
+        let _ = write!(page.out, "<a href=\"{}\">{}</a>", escaped(href), escaped(text));
+    }
+    page.out.push_str("<a href=\"#tables\">Tables</a></nav><button id=\"theme\" type=\"button\">Light / dark</button></header>\n<noscript><p><strong>The figures are drawn by this page's own script; it is switched off.</strong></p></noscript>\n<main>\n");
+    page.parts(first);
+    for section in sections {
+        page.section(section);
+    }
+    page.tables(evidence);
     let _ = write!(
-        out,
+        page.out,
+        "</main>\n<footer>Again: <code>{}</code><span class=\"digest\"> · digest {digest}</span></footer>\n",
+        escaped(&head.command)
+    );
+    // `</script>` in a text would end it.
+    let data = Value::Object(page.data).to_string().replace("</", "<\\/");
+    let _ = write!(
+        page.out,
         "<script type=\"application/json\" id=\"data\">{data}</script>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n"
     );
-    out
+    page.out
 }
 
-fn write_section(out: &mut String, section: &Section, data: &mut serde_json::Map<String, serde_json::Value>) {
-    let _ = writeln!(out, "<section id=\"{}\">\n<h2>{}</h2>", section.id, escaped(&section.title));
-    if !section.command.is_empty() {
-        let _ = writeln!(out, "<p class=\"again\">Again: <code>{}</code></p>", escaped(&section.command));
+/// Figures that a page of these parts has.
+#[must_use]
+pub fn figures(first: &[Part], sections: &[Section]) -> usize {
+    let mut page = Page { out: String::new(), data: Map::new(), numbers: Vec::new(), figures: 0 };
+    page.parts(first);
+    sections.iter().for_each(|section| page.section(section));
+    page.figures
+}
+
+struct Page {
+    out: String,
+    data: Map<String, Value>,
+    numbers: Vec<Grid>,
+    figures: usize,
+}
+
+impl Page {
+    fn section(&mut self, section: &Section) {
+        let chosen = if section.panes.is_empty() { "" } else { " data-choices" };
+        let _ = write!(
+            self.out,
+            "<section id=\"{}\" class=\"card section\"{chosen}>\n<div class=\"head\"><h2>{}</h2><div class=\"tools\">",
+            section.id,
+            escaped(&section.title)
+        );
+        let depth = section.panes.first().map_or(0, |pane| pane.values.len());
+        for axis in 0..depth {
+            let mut values: Vec<&str> = Vec::new();
+            for pane in &section.panes {
+                if !values.contains(&pane.values[axis].as_str()) {
+                    values.push(&pane.values[axis]);
+                }
+            }
+            self.choice(axis, &values, &section.panes[0].values[axis]);
+        }
+        self.out.push_str("</div></div>\n");
+        for (k, pane) in section.panes.iter().enumerate() {
+            // In the names of buttons a space is no break.
+            let value: Vec<String> = pane.values.iter().map(|value| joined(value)).collect();
+            let hidden = if k == 0 { "" } else { " hidden" };
+            let _ = writeln!(self.out, "<div class=\"pane\" data-value=\"{}\"{hidden}>", escaped(&value.join(" ")));
+            self.parts(&pane.parts);
+            self.out.push_str("</div>\n");
+        }
+        self.parts(&section.parts);
+        if !section.command.is_empty() {
+            let _ = writeln!(self.out, "<p class=\"again\">Again: <code>{}</code></p>", escaped(&section.command));
+        }
+        self.out.push_str("</section>\n");
     }
-    for part in &section.parts {
-        match part {
-            Part::Text(text) => {
-                let _ = writeln!(out, "<p>{}</p>", escaped(text));
-            }
-            Part::Lines(lines) => {
-                let _ = writeln!(out, "<pre>{}</pre>", escaped(lines));
-            }
-            Part::Table(grid) => write_table(out, grid),
-            Part::Charts(charts) => write_charts(out, charts, data),
-            Part::View(view) => {
-                let _ = writeln!(out, "<figure class=\"view\" data-view=\"{}\"></figure>", section.id);
-                data.insert(section.id.to_owned(), view.clone());
+
+    fn choice(&mut self, axis: usize, values: &[&str], first: &str) {
+        let _ = write!(self.out, "<span class=\"choice\" data-axis=\"{axis}\">");
+        for value in values {
+            let on = if *value == first { (" class=\"on\"", true) } else { ("", false) };
+            let _ = write!(
+                self.out,
+                "<button type=\"button\"{} aria-pressed=\"{}\" data-value=\"{}\">{}</button>",
+                on.0,
+                on.1,
+                escaped(&joined(value)),
+                marked(value)
+            );
+        }
+        self.out.push_str("</span>");
+    }
+
+    fn parts(&mut self, parts: &[Part]) {
+        for part in parts {
+            match part {
+                Part::Lead(text) => {
+                    let _ = writeln!(self.out, "<p class=\"lead\">{}</p>", marked(text));
+                }
+                Part::Text(text) => {
+                    let _ = writeln!(self.out, "<p class=\"soft\">{}</p>", marked(text));
+                }
+                Part::Lines(lines) => {
+                    let _ = writeln!(self.out, "<pre>{}</pre>", escaped(lines));
+                }
+                Part::Table(grid) => write_table(&mut self.out, grid),
+                Part::Chart(chart) => {
+                    self.keep(chart);
+                    self.figures += 1;
+                    let _ = writeln!(
+                        self.out,
+                        "<figure class=\"plot only\" data-plot=\"{}\"><figcaption>{}</figcaption></figure>",
+                        chart.id,
+                        marked(&chart.title)
+                    );
+                }
+                Part::Multiples(multiples) => self.multiples(multiples),
+                Part::Rows(rows) => {
+                    self.figures += 1;
+                    let _ = writeln!(
+                        self.out,
+                        "<figure class=\"rows\" data-rows=\"{}\"><figcaption>{}</figcaption></figure>",
+                        rows.id,
+                        marked(&rows.title)
+                    );
+                    let mut data = rows.data.clone();
+                    data["title"] = Value::String(rows.title.clone());
+                    self.data.insert(rows.id.clone(), data);
+                    self.numbers.push(rows.numbers.clone());
+                }
+                Part::View(id, view) => {
+                    self.figures += 1;
+                    let _ = writeln!(self.out, "<figure class=\"view\" data-view=\"{id}\"></figure>");
+                    self.data.insert((*id).to_owned(), view.clone());
+                }
+                Part::Columns(columns) => {
+                    let class = if columns.len() == 2 { "two" } else { "three" };
+                    let _ = writeln!(self.out, "<div class=\"columns {class}\">");
+                    for column in columns {
+                        self.out.push_str("<div>\n");
+                        self.parts(column);
+                        self.out.push_str("</div>\n");
+                    }
+                    self.out.push_str("</div>\n");
+                }
+                Part::Html(html) => self.out.push_str(html),
             }
         }
     }
-    out.push_str("</section>\n");
+
+    fn keep(&mut self, chart: &Chart) {
+        if self.data.insert(chart.id.clone(), chart.data()).is_none() {
+            self.numbers.push(chart.numbers());
+        }
+    }
+
+    fn multiples(&mut self, multiples: &Multiples) {
+        let selected = multiples.items.get(multiples.selected);
+        let _ = writeln!(
+            self.out,
+            "<div class=\"multiples\" data-multiples=\"{}\" data-selected=\"{}\">\n<div class=\"large\">",
+            multiples.id, multiples.selected
+        );
+        for _ in selected.into_iter().flatten() {
+            self.figures += 1;
+            self.out.push_str("<figure class=\"plot large\"><figcaption></figcaption></figure>\n");
+        }
+        let many = if multiples.items.len() > 6 || multiples.groups.len() == 1 { " many" } else { "" };
+        let _ = writeln!(self.out, "</div>\n<div class=\"small{many}\">");
+        if multiples.groups.len() == 2 {
+            for group in &multiples.groups {
+                let _ = writeln!(self.out, "<p class=\"caption\">{}</p>", marked(&group.title));
+            }
+        }
+        // Groups stand in columns: the script finds the figures by their order.
+        for (k, charts) in multiples.items.iter().enumerate() {
+            charts.iter().for_each(|chart| self.keep(chart));
+            self.figures += 1;
+            let title = charts.last().map_or("", |chart| chart.title.as_str());
+            let named = charts.last().is_some_and(|chart| !chart.short.is_empty());
+            let caption = if named { String::new() } else { marked(title) };
+            let caption = if caption.is_empty() { caption } else { format!("<figcaption>{caption}</figcaption>") };
+            let column = multiples.groups.iter().position(|group| group.items.contains(&k)).unwrap_or(0);
+            let style = if multiples.groups.len() == 2 {
+                format!(" style=\"grid-column:{}\"", column + 1)
+            } else {
+                String::new()
+            };
+            let _ = writeln!(
+                self.out,
+                "<figure class=\"plot\" tabindex=\"0\" role=\"button\" aria-label=\"{}\"{style}>{caption}</figure>",
+                escaped(title)
+            );
+        }
+        self.out.push_str("</div>\n</div>\n");
+        self.data.insert(multiples.id.clone(), multiples.data());
+    }
+
+    /// The numbers of every figure.
+    fn tables(&mut self, evidence: &[Section]) {
+        let numbers: Vec<Grid> =
+            std::mem::take(&mut self.numbers).into_iter().filter(|grid| !grid.rows.is_empty()).collect();
+        let _ = write!(
+            self.out,
+            "<section id=\"tables\" class=\"card section\">\n<div class=\"head\"><h2>Tables</h2></div>\n<p class=\"lead\">The numbers of every figure. All points of a chart are in its own CSV.</p>\n<details><summary>Numbers of {} figures</summary>\n",
+            numbers.len()
+        );
+        for grid in &numbers {
+            write_table(&mut self.out, grid);
+        }
+        self.out.push_str("</details>\n");
+        for section in evidence {
+            let _ = writeln!(self.out, "<details id=\"{}\"><summary>{}</summary>", section.id, escaped(&section.title));
+            self.parts(&section.parts);
+            if !section.command.is_empty() {
+                let _ = writeln!(self.out, "<p class=\"again\">Again: <code>{}</code></p>", escaped(&section.command));
+            }
+            self.out.push_str("</details>\n");
+        }
+        self.out.push_str("</section>\n");
+    }
+}
+
+fn joined(value: &str) -> String {
+    value.replace([' ', '\u{2009}'], "_")
+}
+
+/// Escaped; the axis of an angle stands low.
+#[must_use]
+pub fn marked(text: &str) -> String {
+    let mut out = escaped(text);
+    for axis in ["x", "y", "z"] {
+        out = out.replace(&format!("θ{axis}"), &format!("θ<sub>{axis}</sub>"));
+    }
+    out
 }
 
 fn write_table(out: &mut String, grid: &Grid) {
@@ -106,20 +332,6 @@ fn numeric(grid: &Grid, column: usize) -> bool {
     2 * numbers > all
 }
 
-fn write_charts(out: &mut String, charts: &[Chart], data: &mut serde_json::Map<String, serde_json::Value>) {
-    out.push_str("<div class=\"charts\">\n");
-    for chart in charts {
-        let _ = writeln!(
-            out,
-            "<figure class=\"chart\" data-chart=\"{}\"><figcaption>{}</figcaption></figure>",
-            chart.id,
-            escaped(&chart.title)
-        );
-        data.insert(chart.id.clone(), chart.data());
-    }
-    out.push_str("</div>\n");
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -136,8 +348,17 @@ mod tests {
         table.push(vec!["-1.5".to_owned(), "<b>".to_owned()]);
         let section =
             Section::new("first", "A & B", "specgen sim x.toml").text("a < b").table(table).charts(vec![chart]);
-        let head = Head { name: "n".to_owned(), digest: "d".to_owned(), command: "c".to_owned() };
-        html(&head, &[section])
+        let text = |text: &str| text.to_owned();
+        let head = Head {
+            file: text("n.toml"),
+            title: text("report"),
+            digest: text("d"),
+            versions: text("v"),
+            command: text("c"),
+            refused: false,
+            other: None,
+        };
+        html(&head, &[], &[section], &[])
     }
 
     #[test]
@@ -157,5 +378,14 @@ mod tests {
         for word in ["fetch(", "XMLHttpRequest", "import ", "@import", "url("] {
             assert!(!page.contains(word), "{word}");
         }
+    }
+
+    #[test]
+    fn a_figure_has_its_numbers() {
+        let page = page();
+        assert!(
+            page.contains("<summary>Numbers of 1 figures</summary>")
+                && page.contains("x &lt; y (&lt;/script&gt; (nm) over t (s))")
+        );
     }
 }

@@ -56,11 +56,16 @@ pub fn standing(model: &Model, findings: &[Diagnostic]) -> Part {
     data["label"] = json!(format!(
         "The platform of {}: base, six legs, {}, dimensions.",
         model.name,
-        if model.task_space.is_some() { "six gauges with the direction of their positive reading" } else { "a gauge in each leg" }
+        if model.task_space.is_some() {
+            "six gauges with the direction of their positive reading"
+        } else {
+            "a gauge in each leg"
+        }
     ));
     if let Some(task) = &model.task_space {
         let round = |point: [f64; 3]| point.map(|v| libm::round(v * 1e6) / 1e6);
-        let gauges = task.probes.each_ref().map(|probe| json!({ "p": round(probe.point), "d": round(probe.direction) }));
+        let gauges =
+            task.probes.each_ref().map(|probe| json!({ "p": round(probe.point), "d": round(probe.direction) }));
         data["gauges"] = json!(gauges);
         data["part"] = json!(task.frames.tool);
     }
@@ -73,7 +78,8 @@ pub fn standing(model: &Model, findings: &[Diagnostic]) -> Part {
     };
     let legs = ["workspace", "control.setpoint.bias", "trajectory", "actuator", "leg", "hysteresis"];
     let about_legs = errors().any(|finding| legs.iter().any(|key| finding.key.starts_with(key)));
-    data["bad"] = json!({ "legs": if about_legs { (0..6).collect() } else { Vec::<usize>::new() }, "gauges": numbered("gauge") });
+    data["bad"] =
+        json!({ "legs": if about_legs { (0..6).collect() } else { Vec::<usize>::new() }, "gauges": numbered("gauge") });
     Part::View("platform", data)
 }
 

@@ -54,6 +54,22 @@ pub fn cumulative(signals: &[&[f64]], interval: f64) -> (Vec<f64>, Vec<f64>) {
     (frequencies, roots)
 }
 
+/// Amplitude spectral density of a signal about its straight line, per root hertz: frequencies (Hz) and values, each the mean
+/// power of a band, evenly spaced in decades.
+#[must_use]
+pub fn density(signal: &[f64], interval: f64) -> (Vec<f64>, Vec<f64>) {
+    let (frequencies, roots) = cumulative(&[signal], interval);
+    let (mut middle, mut values) = (Vec::new(), Vec::new());
+    let (mut last, mut before) = (0.0, 0.0);
+    for (frequency, root) in frequencies.iter().zip(&roots) {
+        let power = (root * root - before) / (frequency - last);
+        middle.push(if last > 0.0 { libm::sqrt(last * frequency) } else { *frequency });
+        values.push(libm::sqrt(if power > 0.0 { power } else { 0.0 }));
+        (last, before) = (*frequency, root * root);
+    }
+    (middle, values)
+}
+
 /// Mean and slope per sample.
 fn line(signal: &[f64]) -> (f64, f64) {
     let count = signal.len() as f64;
@@ -86,6 +102,9 @@ mod tests {
         assert!(at(5.0) < 0.1, "{}", at(5.0));
         assert!((at(50.0) - 2.0 / 2f64.sqrt()).abs() < 0.03, "{}", at(50.0));
         assert!((roots.last().unwrap() - 2.5f64.sqrt()).abs() < 0.03);
+        let (frequencies, densities) = density(&signal, interval);
+        let highest = (0..densities.len()).max_by(|a, b| densities[*a].total_cmp(&densities[*b])).unwrap();
+        assert!((9.0..11.0).contains(&frequencies[highest]), "{}", frequencies[highest]);
         let (_, both) = cumulative(&[&signal, &signal], interval);
         assert!((both.last().unwrap() / roots.last().unwrap() - 2f64.sqrt()).abs() < 1e-9);
     }

@@ -101,9 +101,10 @@ Examples:
 
 pub const REPORT: &str = "\
 Examples:
-  specgen report legs.toml -o legs.html --generations 0 --no-target
-      quick: simulated runs and findings
-  specgen report platform.toml      # (minutes) everything, platform-report.html";
+  specgen report legs.toml -o legs.html --no-target   # simulated runs, findings
+  specgen report platform.toml   # with time, memory, bits: platform-report.html
+  specgen report platform.toml --paper --no-target
+      # (minutes) and the paper's figures on a second page";
 
 pub const REPRODUCE: &str = "\
 Examples:

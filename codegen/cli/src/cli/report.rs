@@ -1,31 +1,30 @@
-//! `specgen report`: one HTML file about a spec.
+//! `specgen report`: one HTML file about a spec, or about a run of its machine.
+
+mod paper;
+mod recorded;
+mod simulated;
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use host_sim::closed_loop::LEGS;
 use host_sim::controller::{Controller, TickController};
-use host_sim::plant::LegParameters;
-use host_sim::platform::rig::Noise;
-use host_sim::scenario::{MODES, select};
 use serde::Serialize;
 
 use super::check::describe;
 use super::file::{check_place, write_file};
 use super::sim::{emitted, environment};
 use super::ui::{Failure, Outcome, Ui};
-use crate::{lower, machine, precision, reproduce, target, workspace};
+use crate::{precision, target, workspace};
 use specgen_compiler::compile::{self, Compiled, Refused};
+use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt::Scratch;
-use specgen_language::model::TaskSpace;
-use specgen_language::spec::SpecSource;
-use specgen_report::evidence::Bits;
-use specgen_report::noise::{FINE_BITS, Pair};
+use specgen_language::spec::{self, SpecSource};
+use specgen_report::budget::FINE_BITS;
+use specgen_report::evidence::{self, Bits};
 use specgen_report::page::{self, Head};
 use specgen_report::section::{Part, Section};
-use specgen_report::view::Motion;
-use specgen_report::{evidence, hysteresis, legs, linear, machining, motion, noise, region, view};
-use specgen_studies::paper::convergence;
+use specgen_report::{first, tracking};
+use specgen_studies::verdict::Verdict;
 use specgen_studies::verify::{self, Measurement};
 
 /// Seed of machine, noise and strings.
@@ -42,27 +41,43 @@ pub struct Arguments {
     /// File to write; `<name>-report.html` if not given.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Generations of the genetic algorithm, 100 strings each; 0 leaves it out.
+    /// A second page beside it, `<output>-paper.html`: the paper's figures and tables.
+    #[arg(long)]
+    paper: bool,
+    /// With --paper: generations of the genetic algorithm, 100 strings each; 0 leaves it out.
     #[arg(long, default_value_t = 10, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(0..=10_000))]
     generations: u32,
+    /// A page about this run of the machine instead: beside the simulation of the same commands.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["paper", "no_target"])]
+    record: Option<PathBuf>,
     /// Without the emulated microcontroller: no time, memory and comparison of bits.
     #[arg(long)]
     no_target: bool,
 }
 
 #[derive(Serialize)]
-struct Page<'a> {
+struct Page {
     file: String,
-    digest: &'a str,
+    digest: String,
     bytes: usize,
-    sections: Vec<&'a str>,
+    sections: Vec<&'static str>,
     figures: usize,
+    /// The sentence that the page begins with.
+    verdict: Option<String>,
+    /// The page of the paper's figures.
+    paper: Option<Box<Page>>,
 }
 
-impl Outcome for Page<'_> {
+impl Outcome for Page {
     fn text(&self) -> String {
         let (sections, figures) = (self.sections.len(), self.figures);
-        format!("wrote {}: {sections} sections, {figures} figures, {} kB\n", self.file, self.bytes / 1000)
+        let verdict = self.verdict.as_ref().map_or_else(String::new, |verdict| format!("{verdict}\n"));
+        let paper = self.paper.as_ref().map_or_else(String::new, |paper| paper.text());
+        format!(
+            "{verdict}wrote {}: {sections} sections, {figures} figures, {} kB\n{paper}",
+            self.file,
+            self.bytes / 1000
+        )
     }
 }
 
@@ -76,50 +91,171 @@ struct Built {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let compiled = compile::compile(&arguments.spec)?;
+    let compiled = match compile::compile(&arguments.spec) {
+        Ok(compiled) => compiled,
+        Err(refused) => return self::refused(arguments, refused, ui),
+    };
     ui.findings(Some(&compiled.source), &compiled.findings);
-    let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-report.html", compiled.ir.name)));
+    let output = place(arguments, &compiled.ir.name);
     check_place(&output)?;
+    if let Some(record) = &arguments.record {
+        return of_record(arguments, record, &output, &compiled, ui);
+    }
     let mut built = build(&compiled, arguments.no_target, ui)?;
     let name = file_name(&arguments.spec);
+    let command = again(arguments, &name);
     let mut fine = fine(&compiled, ui)?;
-    let simulated = match &compiled.model.task_space {
-        Some(task) => of_platform(&compiled, task, [&mut built.controller, &mut fine], &name, ui)?,
-        None => of_legs(&compiled, [&mut built.controller, &mut fine], &name, ui)?,
-    };
-    let converged = converge(&compiled, &built.controller, arguments.generations, &name, ui)?;
+    let simulated = simulated::of(&compiled, [&mut built.controller, &mut fine], &name, ui)?;
 
     let measured = built.measured.as_ref().map_err(String::as_str);
-    let check = format!("specgen check {name}");
-    let main = format!("specgen {name} -o DIR");
-    let mut sections =
-        vec![evidence::summary(&compiled, &describe(&compiled), &check), evidence::findings(&compiled, &check)];
-    sections.extend(simulated);
-    sections.extend(converged);
-    sections.push(evidence::margins(&compiled, &check));
-    let rounding = precision::of(&compiled.model, &compiled.ir)
-        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
-    sections.push(evidence::rounding(&rounding, compiled.ir.scalar, &check));
-    sections.push(evidence::budget(&compiled.model.target, measured, &main));
-    let bits = Bits { ticks: built.ticks, trace: built.trace, state: built.state, measured };
-    sections.push(evidence::digests(&compiled, &bits, &main));
-    let command = again(arguments, &name);
+    let mut verdict = Verdict::of(&compiled, built.measured.as_ref().err().map_or("", String::as_str));
+    if let Ok(measurement) = measured {
+        verdict.measured(&compiled, measurement);
+    }
+    simulated.judged.into_iter().for_each(|figure| verdict.push(figure));
+    let mode = tracking::mode_of(&built.controller);
+    let first = first::of(&compiled, &verdict, measured, simulated.errors, mode);
+    let mut behind = evidence_of(&compiled, &built, &name)?;
+    behind.insert(0, evidence::tracking(&verdict, &command));
+    let mut sections = simulated.sections;
     for section in sections.iter_mut().filter(|section| section.command.is_empty()) {
         section.command.clone_from(&command);
     }
+    let paper = arguments.paper.then(|| beside(&output));
+    let mut head = head(&compiled.source.display_name, &compiled.ir.digest, "report", command);
+    head.versions = format!(
+        "specgen {} · f{} · {}",
+        env!("CARGO_PKG_VERSION"),
+        compiled.ir.scalar.bits(),
+        compiled.model.target.mcu.part().name
+    );
+    head.other = paper.as_deref().map(|path| [file_name(path), "Beside the paper".to_owned()]);
+    let mut page = write(&output, &head, &first, &sections, &behind)?;
+    page.verdict = Some(specgen_report::verdict::Sentence::of(&verdict).verdict);
+    if let Some(path) = paper {
+        let sections = paper::sections(&compiled, &mut built.controller, arguments.generations, &name, ui)?;
+        head.title = "beside the paper".to_owned();
+        head.other = Some([file_name(&output), "Report".to_owned()]);
+        page.paper = Some(Box::new(write(&path, &head, &[], &sections, &[])?));
+    }
+    ui.result(&page);
+    Ok(())
+}
 
-    let head = Head { name: compiled.ir.name.clone(), digest: compiled.ir.digest.clone(), command };
-    let html = page::html(&head, &sections);
-    write_file(&output, html.as_bytes())?;
-    let figures: usize = sections.iter().flat_map(|section| &section.parts).map(figures).sum();
-    ui.result(&Page {
+/// A run of the machine, as a page.
+fn of_record(
+    arguments: &Arguments,
+    record: &Path,
+    output: &Path,
+    compiled: &Compiled,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let run = recorded::read(record, compiled, ui)?;
+    let (first, mut sections) = specgen_report::record::page(compiled, &run);
+    let command = format!("{} --record {}", again(arguments, &file_name(&arguments.spec)), file_name(record));
+    for section in &mut sections {
+        section.command.clone_from(&command);
+    }
+    let mut head = head(&compiled.source.display_name, &compiled.ir.digest, "run", command);
+    head.versions = format!("specgen {} · {}", env!("CARGO_PKG_VERSION"), file_name(record));
+    let page = write(output, &head, &first, &sections, &[])?;
+    ui.result(&page);
+    Ok(())
+}
+
+/// Why a spec is refused, as a page.
+fn refused(arguments: &Arguments, refused: Refused, ui: &mut Ui) -> Result<(), Failure> {
+    let Some(source) = &refused.source else { return Err(refused.into()) };
+    let (model, _) = spec::load_as_far(source);
+    let name = arguments.spec.file_stem().map_or_else(|| "spec".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    let output = place(arguments, &name);
+    check_place(&output)?;
+    let first = first::refused(source, &refused.findings, model.as_ref(), accepted(source, &refused.findings));
+    let digest = target::sha256(source.text.as_bytes());
+    let mut head = head(&source.display_name, &digest, "refused", again(arguments, &file_name(&arguments.spec)));
+    head.versions = format!("specgen {}", env!("CARGO_PKG_VERSION"));
+    head.refused = true;
+    let lines = specgen_language::diagnostic::render(&refused.findings, source, false);
+    let text = Section::new("text", "Findings as text", "").lines(&lines);
+    let page = write(&output, &head, &first, &[], &[text])?;
+    ui.findings(refused.source.as_ref(), &refused.findings);
+    let message = format!("{} is refused; {} says why", source.display_name, output.display());
+    ui.judged(&page, Some(message))
+}
+
+/// Whether the spec with the replacement of its first error has one error less.
+fn accepted(source: &SpecSource, findings: &[Diagnostic]) -> bool {
+    use specgen_language::diagnostic::Place;
+    let errors = |findings: &[Diagnostic]| findings.iter().filter(|one| one.severity == Severity::Error).count();
+    let Some(first) = findings.iter().find(|one| one.severity == Severity::Error) else { return false };
+    let (Some(replacement), Place::Spec(span)) = (&first.replacement, &first.place) else { return false };
+    let (Some(before), Some(after)) = (source.text.get(..span.start), source.text.get(span.end..)) else {
+        return false;
+    };
+    let text = format!("{before}{replacement}{after}");
+    match compile::compile_source(SpecSource { text, ..source.clone() }) {
+        Ok(_) => true,
+        Err(refused) => {
+            errors(&refused.findings) < errors(findings)
+                && refused.findings.iter().all(|one| one.code != first.code || one.key != first.key)
+        }
+    }
+}
+
+fn head(file: &str, digest: &str, title: &str, command: String) -> Head {
+    Head {
+        file: file_name(Path::new(file)),
+        title: title.to_owned(),
+        digest: digest.to_owned(),
+        versions: String::new(),
+        command,
+        refused: false,
+        other: None,
+    }
+}
+
+fn write(
+    output: &Path,
+    head: &Head,
+    first: &[Part],
+    sections: &[Section],
+    evidence: &[Section],
+) -> Result<Page, Failure> {
+    let html = page::html(head, first, sections, evidence);
+    write_file(output, html.as_bytes())?;
+    Ok(Page {
         file: output.display().to_string(),
-        digest: &compiled.ir.digest,
+        digest: head.digest.clone(),
         bytes: html.len(),
         sections: sections.iter().map(|section| section.id).collect(),
-        figures,
-    });
-    Ok(())
+        figures: page::figures(first, sections),
+        verdict: None,
+        paper: None,
+    })
+}
+
+/// What needs no simulation, to be opened at the end.
+fn evidence_of(compiled: &Compiled, built: &Built, name: &str) -> Result<Vec<Section>, Failure> {
+    let check = format!("specgen check {name}");
+    let main = format!("specgen {name} -o DIR");
+    let measured = built.measured.as_ref().map_err(String::as_str);
+    let rounding = precision::of(&compiled.model, &compiled.ir)
+        .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
+    let bits = Bits { ticks: built.ticks, trace: built.trace.clone(), state: built.state, measured };
+    let mut sections = vec![evidence::findings(compiled, &check)];
+    if let Some(design) = &compiled.design {
+        let modes = Section::new("modes", "Modes", &check).table(evidence::modes(design));
+        sections.push(modes.text(
+            "The sampled closed loop has the platform's modes, amplifier lag and notch, over the declared gain_ratio.",
+        ));
+    }
+    sections.extend([
+        evidence::rounding(&rounding, compiled.ir.scalar, &check),
+        evidence::budget(&compiled.model.target, measured, &main),
+        evidence::digests(compiled, &bits, &main),
+        Section::new("text", "Everything that check says", &check).lines(describe(compiled).trim_end()),
+    ]);
+    Ok(sections)
 }
 
 /// The controller of the spec with a drive converter as fine as there is, for the error budget.
@@ -140,18 +276,22 @@ fn fine(compiled: &Compiled, ui: &Ui) -> Result<Controller, Failure> {
     emitted(&fine, ui)
 }
 
-/// Charts and views of a part.
-fn figures(part: &Part) -> usize {
-    match part {
-        Part::Charts(charts) => charts.len(),
-        Part::View(_) => 1,
-        Part::Text(_) | Part::Lines(_) | Part::Table(_) => 0,
-    }
+fn place(arguments: &Arguments, name: &str) -> PathBuf {
+    arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}-report.html")))
+}
+
+/// The page of the paper's figures beside a report.
+fn beside(output: &Path) -> PathBuf {
+    let stem = output.file_stem().map_or_else(|| "report".to_owned(), |stem| stem.to_string_lossy().into_owned());
+    output.with_file_name(format!("{stem}-paper.html"))
 }
 
 /// The command line with the name of the spec alone: its folder is the user's business.
 fn again(arguments: &Arguments, name: &str) -> String {
     let mut command = format!("specgen report {name}");
+    if arguments.paper {
+        command.push_str(" --paper");
+    }
     if arguments.generations != 10 {
         command.push_str(&format!(" --generations {}", arguments.generations));
     }
@@ -191,101 +331,4 @@ fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure
     };
     let state = host.rows().last().and_then(|row| row.last().copied()).unwrap_or_default();
     Ok(Built { controller, measured, ticks: host.len(), trace: target::sha256(&host.to_bytes()), state })
-}
-
-fn of_platform(
-    compiled: &Compiled,
-    task: &TaskSpace,
-    [controller, fine]: [&mut Controller; 2],
-    name: &str,
-    ui: &Ui,
-) -> Result<Vec<Section>, Failure> {
-    let model = &compiled.model;
-    let specimen = machine::specimen(model, task, &LegParameters::reference(), Some(SEED));
-    let platform = lower::platform(model).map_err(|_| {
-        Failure::Environment("the model of the platform was lost; report this as a defect of specgen".to_owned())
-    })?;
-    ui.progress("preparing the machine: pre-cycle, settling, gauges zeroed");
-    let scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED);
-    let sim = format!("specgen sim {name} --frequency 0.1,1,10 -o DIR");
-    let (motions, shown) =
-        motion::sections(&scenario, controller, &sim, &|what| ui.progress(what)).map_err(environment)?;
-    ui.progress("machining, linear relation, error budget");
-    let machined =
-        machining::section(&scenario, controller, &format!("specgen sim {name} -o DIR")).map_err(environment)?;
-    let lines = linear::of_platform(&scenario, controller, &platform, &model.actuator, "").map_err(environment)?;
-    let budget =
-        noise::of_platform(model, task, &specimen, Pair { own: controller, fine }, SEED).map_err(environment)?;
-    let played = shown.as_ref().map(|run| Motion::of_platform(&platform, run, model.timing.period));
-    let mut sections = vec![view::section(model, played.as_ref()), budget];
-    sections.extend(motions);
-    sections.push(machined);
-    sections.push(hysteresis::section(&specimen.legs[0], model.actuator.voltage[0]));
-    sections.push(lines);
-    sections.push(region::section(compiled, None).map_err(environment)?);
-    Ok(sections)
-}
-
-fn of_legs(
-    compiled: &Compiled,
-    [controller, fine]: [&mut Controller; 2],
-    name: &str,
-    ui: &Ui,
-) -> Result<Vec<Section>, Failure> {
-    let model = &compiled.model;
-    let leg = LegParameters::reference();
-    ui.progress("preparing six legs: pre-cycle, settling, gauges zeroed");
-    let legs: [LegParameters; LEGS] = std::array::from_fn(|_| leg.clone());
-    let scenario = machine::legs(model, &legs, &leg.noise, SEED, reproduce::legs::SAMPLES);
-    let sim = format!("specgen sim {name} -o DIR");
-    ui.progress("leg tracking, linear relation, error budget, stability region");
-    let adaptation = &model.adaptation;
-    let mode = usize::from(adaptation.level_weight > 0.0) + usize::from(adaptation.drift_weight > 0.0);
-    select(controller, MODES[mode].1).map_err(environment)?;
-    let played = scenario.run(controller, 1.0).map_err(environment)?;
-    let mut tracking = legs::section(&scenario, controller, &sim).map_err(environment)?;
-    // A law without its weight is the one before it.
-    let same = [
-        "The spec gives no weights: EWMA and PCC are here the inverse model alone, and no reproduction of the paper's.",
-        "The spec gives no drift weight: PCC is here EWMA, and no reproduction of the paper's.",
-    ];
-    if let Some(text) = same.get(mode) {
-        tracking = tracking.text(text);
-    }
-    let lines = linear::of_legs(&scenario, controller, &model.actuator, &sim).map_err(environment)?;
-    let budget = noise::of_legs(&leg, mode, Pair { own: controller, fine }, SEED).map_err(environment)?;
-    let region = region::section(compiled, Some(controller)).map_err(environment)?;
-    Ok(vec![
-        view::section(model, Motion::of_legs(model, &played.tracking).as_ref()),
-        budget,
-        tracking,
-        hysteresis::section(&leg, model.actuator.voltage[0]),
-        lines,
-        region,
-    ])
-}
-
-/// The genetic algorithm, or why it was not run: left out, or the spec's mode has nothing to tune.
-fn converge(
-    compiled: &Compiled,
-    controller: &Controller,
-    generations: u32,
-    name: &str,
-    ui: &Ui,
-) -> Result<Option<Section>, Failure> {
-    let absent =
-        |why: &str| Some(Section::new("convergence", "Genetic algorithm", "").text(&format!("Not run: {why}")));
-    if generations == 0 {
-        return Ok(absent("left out by --generations 0."));
-    }
-    ui.progress(&format!("the genetic algorithm, {generations} generations"));
-    let leg = LegParameters::reference();
-    match convergence::run(compiled, controller, &leg, SEED, generations as usize, &|_| {}) {
-        Ok(found) => {
-            let command = format!("specgen tune {name} --optimiser genetic --evaluations {}", 100 * generations);
-            Ok(Some(specgen_report::convergence::section(&found, &command)))
-        }
-        Err(convergence::ConvergenceError::NothingToTune(why)) => Ok(absent(&format!("{why}."))),
-        Err(convergence::ConvergenceError::Run(error)) => Err(environment(error)),
-    }
 }

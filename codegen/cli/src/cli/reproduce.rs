@@ -111,7 +111,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         arguments.output.display(),
         steps.begun.elapsed().as_secs_f64()
     ));
-    let chart = specgen_report::convergence::chart(&results.convergence);
+    let chart = specgen_report::paper::convergence::chart(&results.convergence);
     if let Some(line) = arguments.plot.charts("Table 3", "the genetic algorithm", &[chart])? {
         ui.progress(line.trim_end());
     }

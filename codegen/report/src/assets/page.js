@@ -1,6 +1,6 @@
 // Draws every figure, and says in the page what went wrong: a report that hides an error is worse than none.
 (function () {
-  const root = document.documentElement;
+  const root = document.documentElement, drawn = [];
   let failed = 0;
   window.addEventListener("error", () => { root.dataset.errors = String(++failed); });
   root.dataset.errors = "0";
@@ -9,21 +9,96 @@
   const apply = () => root.classList.toggle("dark", chosen === null ? dark.matches : chosen);
   dark.addEventListener("change", apply);
   document.getElementById("theme").addEventListener("click", () => { chosen = !root.classList.contains("dark"); apply(); });
-  // Paper is white.
-  window.addEventListener("beforeprint", () => root.classList.remove("dark"));
-  window.addEventListener("afterprint", apply);
   apply();
+
   const data = JSON.parse(document.getElementById("data").textContent);
-  for (const figure of document.querySelectorAll("figure[data-chart]")) new Chart(figure, data[figure.dataset.chart]);
-  for (const figure of document.querySelectorAll("figure[data-view]")) new View(figure, data[figure.dataset.view]);
-  for (const table of document.querySelectorAll("table")) {
-    const name = table.caption.textContent.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60);
-    const button = html("button", table.caption, "CSV", "tool");
-    table.caption.insertBefore(document.createTextNode(" "), button);
-    button.addEventListener("click", () => {
-      const quoted = cell => { const text = cell.textContent; return /[",\n]/.test(text) ? '"' + text.replace(/"/g, '""') + '"' : text; };
-      const rows = [...table.rows].map(row => [...row.cells].map(quoted).join(","));
-      download(name + ".csv", rows.join("\n") + "\n");
+  const add = (Kind, figure, of, options) => { const made = new Kind(figure, of, options); drawn.push(made); return made; };
+  for (const figure of document.querySelectorAll("figure[data-plot]")) add(Plot, figure, data[figure.dataset.plot]);
+  for (const figure of document.querySelectorAll("figure[data-rows]")) add(Rows, figure, data[figure.dataset.rows]);
+  for (const figure of document.querySelectorAll("figure[data-view]")) add(View, figure, data[figure.dataset.view]);
+  for (const place of document.querySelectorAll("[data-multiples]")) multiples(place, data[place.dataset.multiples]);
+
+  // Small figures of one scale; the chosen one is the large figure.
+  function multiples(place, items) {
+    const figures = [...place.querySelectorAll(".large figure")], small = [...place.querySelectorAll(".small figure")];
+    let shown = [];
+    const show = k => {
+      shown.forEach(plot => drawn.splice(drawn.indexOf(plot), 1));
+      small.forEach((figure, j) => { figure.classList.toggle("on", j === k); figure.setAttribute("aria-pressed", String(j === k)); });
+      shown = figures.map((figure, j) => {
+        const of = data[items[k].large[j]], caption = figure.querySelector("figcaption");
+        figure.replaceChildren(caption);
+        caption.textContent = j === 0 || of.bare ? of.title : "";
+        delete figure.dataset.points;
+        return add(Plot, figure, of);
+      });
+    };
+    small.forEach((figure, k) => {
+      add(Plot, figure, data[items[k].small], { small: true, range: items[k].range });
+      const open = () => show(k);
+      figure.addEventListener("click", open);
+      figure.addEventListener("keydown", e => { if (e.key === "Enter" || e.key === " ") { e.preventDefault(); open(); } });
+    });
+    show(Number(place.dataset.selected) || 0);
+  }
+
+  const redraw = () => { for (const one of drawn) { delete one.figure.dataset.points; one.draw(); } };
+
+  // Segmented choices: each picks one value of a key; a pane is shown where all its keys are picked.
+  for (const box of document.querySelectorAll("[data-choices]")) {
+    const groups = [...box.querySelectorAll(".choice[data-axis]")];
+    const panes = [...box.querySelectorAll(".pane")].filter(pane => pane.closest("[data-choices]") === box);
+    const set = () => {
+      const wanted = groups.map(group => group.querySelector(".on").dataset.value);
+      const exact = panes.find(pane => pane.dataset.value === wanted.join(" "));
+      // A combination that was not run: the first of the same group.
+      const pane = exact || panes.find(pane => pane.dataset.value.split(" ")[0] === wanted[0]);
+      panes.forEach(one => { one.hidden = one !== pane; });
+      pane.dataset.value.split(" ").forEach((value, k) => [...groups[k].children].forEach(button => {
+        button.classList.toggle("on", button.dataset.value === value);
+        button.setAttribute("aria-pressed", String(button.dataset.value === value));
+      }));
+      redraw();
+    };
+    for (const group of groups) for (const button of group.children) button.addEventListener("click", () => {
+      [...group.children].forEach(one => one.classList.toggle("on", one === button));
+      set();
     });
   }
+
+  for (const button of document.querySelectorAll("[data-copy]")) button.addEventListener("click", () => {
+    navigator.clipboard.writeText(button.dataset.copy).then(() => { button.textContent = "Copied"; }, () => {});
+  });
+  for (const button of document.querySelectorAll("[data-toggle]")) button.addEventListener("click", () => {
+    const target = document.getElementById(button.dataset.toggle);
+    target.hidden = !target.hidden;
+  });
+
+  for (const table of document.querySelectorAll("table")) {
+    const name = table.caption.textContent.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60);
+    const button = html("button", table.caption, "CSV");
+    table.caption.insertBefore(document.createTextNode(" "), button);
+    button.addEventListener("click", () => download(name + ".csv", [...table.rows].map(row => [...row.cells].map(cell => quoted(cell.textContent)).join(",")).join("\n") + "\n"));
+  }
+
+  // The section that is read is marked above.
+  const links = [...document.querySelectorAll(".top nav a")];
+  const here = () => {
+    let last = links[0];
+    for (const link of links) {
+      const target = document.querySelector(link.getAttribute("href"));
+      if (target && target.getBoundingClientRect().top < 120) last = link;
+    }
+    links.forEach(link => link.classList.toggle("here", link === last));
+  };
+  window.addEventListener("scroll", here, { passive: true });
+  here();
+  // What a phone would have to be moved sideways for, px.
+  root.dataset.overflow = String(root.scrollWidth - root.clientWidth);
+
+  let width = window.innerWidth;
+  window.addEventListener("resize", () => { if (window.innerWidth !== width) { width = window.innerWidth; redraw(); } });
+  // Paper is white, and its figures are drawn at its width.
+  window.addEventListener("beforeprint", () => { root.classList.remove("dark"); redraw(); });
+  window.addEventListener("afterprint", () => { apply(); redraw(); });
 })();

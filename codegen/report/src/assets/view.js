@@ -1,53 +1,78 @@
-// The platform, seen in parallel projection; drawn as SVG, so that it prints and follows the colours of the page.
+// The platform in parallel projection, to turn, to zoom and, with a motion, to play.
+const VIEWS = { "3-D": [-0.62, 0.42], top: [0, Math.PI / 2], front: [0, 0], side: [-Math.PI / 2, 0] };
+
 class View {
   constructor(figure, data) {
     this.figure = figure;
     this.data = data;
-    this.turn = [-0.6, 0.42];
-    // What stands still, as on paper, shows the largest move.
-    const far = p => Math.hypot(p[0], p[1], p[2]);
-    this.frame = data.poses.reduce((best, p, k) => (far(p) > far(data.poses[best]) ? k : best), 0);
+    this.poses = data.poses || [];
+    this.frame = 0;
     this.playing = false;
-    // Without a motion there are no bars on the right.
-    const still = data.poses.length < 2;
-    if (still) figure.classList.add("still");
-    this.svg = element("svg", { viewBox: still ? "0 0 600 460" : "0 0 960 460", role: "img", "aria-label": "the platform" }, figure);
+    this.bars = this.poses.length > 1;
+    this.svg = element("svg", { role: "img", tabindex: 0, "aria-label": data.label + " Arrow keys turn it, plus and minus zoom, 0 resets" + (this.bars ? ", space plays." : ".") }, figure);
     const bar = html("div", figure, "", "bar");
-    if (!still) {
-      const controls = html("span", bar, "", "controls bar");
-      this.button = html("button", controls, "play");
+    const choice = html("span", bar, "", "choice");
+    this.buttons = Object.keys(VIEWS).map(name => {
+      const button = html("button", choice, name);
+      button.addEventListener("click", () => { this.turn = [...VIEWS[name]]; this.draw(); });
+      return [name, button];
+    });
+    const near = html("span", bar);
+    for (const [text, title, act] of [["\u2212", "smaller", () => this.nearer(1 / 1.25)], ["+", "larger", () => this.nearer(1.25)], ["Reset", "as at the beginning", () => this.start()]]) {
+      const button = html("button", near, text);
+      button.title = title;
+      button.addEventListener("click", act);
+      near.append(" ");
+    }
+    if (this.bars) {
+      const controls = html("span", bar);
+      this.button = html("button", controls, "Play");
       this.button.addEventListener("click", () => this.play(!this.playing));
-      this.time = this.slider(controls, "time", 0, data.poses.length - 1, this.frame, 1, v => { this.play(false); this.frame = v; });
-      // Some 30 mm for the longest move at the start.
-      const largest = Math.max(1, ...data.poses.flatMap(p => p.slice(0, 3).map(Math.abs)));
-      this.by = Math.log10(3e7 / largest);
-      this.slider(controls, "exaggeration", 0, 4.3, this.by, 0.02, v => { this.by = v; });
-    } else this.by = 0;
-    this.read = html("div", bar, "", "read");
+      this.time = this.slider(controls, " time", 0, this.poses.length - 1, 0, 1, v => { this.play(false); this.frame = v; });
+      this.by = Math.log10(this.largest());
+      this.slider(controls, " motion larger", 0, 4.3, this.by, 0.02, v => { this.by = v; });
+      this.read = html("div", bar, "", "read");
+    }
     this.events();
+    this.start();
+  }
+
+  // A round factor that makes the longest way a fifth of the height.
+  largest() {
+    const far = Math.max(1, ...this.poses.flatMap(p => p.slice(0, 3).map(Math.abs))) * 1e-9;
+    const factor = this.data.height / 5 / far, decade = Math.pow(10, Math.floor(Math.log10(factor)));
+    return Math.max(1, Math.min(20000, Math.floor(factor / decade) * decade));
+  }
+
+  start() {
+    this.turn = [...VIEWS["3-D"]];
+    this.zoom = 1;
+    this.frame = 0;
+    if (this.time) this.time.value = 0;
+    this.play(false);
     this.draw();
   }
 
+  nearer(factor) { this.zoom = Math.min(Math.max(this.zoom * factor, 0.5), 8); this.draw(); }
+
   slider(parent, name, min, max, value, step, set) {
-    const label = html("label", parent, name + " ");
-    const input = html("input", label);
+    const label = html("label", parent, name + " "), input = html("input", label);
     Object.assign(input, { type: "range", min, max, step, value });
     input.addEventListener("input", () => { set(Number(input.value)); this.draw(); });
     return input;
   }
 
   play(on) {
-    if (this.button) this.button.textContent = on ? "pause" : "play";
+    if (this.button) this.button.textContent = on ? "Pause" : "Play";
     if (this.playing === on) return;
     this.playing = on;
     let last = null;
     const next = now => {
       if (!this.playing) return;
       if (last !== null) {
-        const span = this.data.step * this.data.poses.length;
         // The whole path in five seconds at least.
-        this.frame += (now - last) / 1000 / this.data.step / Math.max(1, 5 / span);
-        if (this.frame >= this.data.poses.length) this.frame = 0;
+        this.frame += (now - last) / 1000 / this.data.step / Math.max(1, 5 / (this.data.step * this.poses.length));
+        if (this.frame >= this.poses.length) this.frame = 0;
         this.time.value = Math.floor(this.frame);
         this.draw();
       }
@@ -57,21 +82,30 @@ class View {
     if (on) requestAnimationFrame(next);
   }
 
+  tilt(by) { this.turn[1] = Math.min(Math.max(this.turn[1] + by, -Math.PI / 2), Math.PI / 2); }
+
   events() {
     let from = null;
     this.svg.addEventListener("pointerdown", e => { from = [e.clientX, e.clientY]; this.svg.setPointerCapture(e.pointerId); });
     this.svg.addEventListener("pointermove", e => {
       if (!from) return;
       this.turn[0] += (e.clientX - from[0]) * 0.008;
-      this.turn[1] = Math.min(Math.max(this.turn[1] + (e.clientY - from[1]) * 0.008, -1.57), 1.57);
+      this.tilt((e.clientY - from[1]) * 0.008);
       from = [e.clientX, e.clientY];
       this.draw();
     });
     for (const end of ["pointerup", "pointercancel"]) this.svg.addEventListener(end, () => { from = null; });
+    const keys = { ArrowLeft: () => { this.turn[0] -= 0.1; }, ArrowRight: () => { this.turn[0] += 0.1; }, ArrowUp: () => this.tilt(-0.1), ArrowDown: () => this.tilt(0.1), "+": () => this.nearer(1.25), "=": () => this.nearer(1.25), "-": () => this.nearer(0.8), "0": () => this.start(), " ": () => this.bars && this.play(!this.playing) };
+    this.svg.addEventListener("keydown", e => {
+      if (!keys[e.key]) return;
+      e.preventDefault();
+      keys[e.key]();
+      this.draw();
+    });
   }
 
-  // R = Rz Ry Rx of exaggerated angles, about the origin of the platform.
-  joint(p, pose) {
+  // R = Rz Ry Rx of the angles as drawn, about the origin of the platform.
+  moved(p, pose) {
     const [a, b, c] = pose.slice(3);
     let [x, y, z] = p;
     [y, z] = [y * Math.cos(a) - z * Math.sin(a), y * Math.sin(a) + z * Math.cos(a)];
@@ -80,70 +114,177 @@ class View {
     return [x + pose[0], y + pose[1], z + pose[2] + this.data.height];
   }
 
+  // Right, down and depth.
   project([x, y, z]) {
     const [turn, tilt] = this.turn;
-    const u = x * Math.cos(turn) - y * Math.sin(turn), v = x * Math.sin(turn) + y * Math.cos(turn);
-    const w = z - this.data.height / 2;
-    return [300 + u * this.scale, 235 - (w * Math.cos(tilt) + v * Math.sin(tilt)) * this.scale, v * Math.cos(tilt) - w * Math.sin(tilt)];
+    const u = x * Math.cos(turn) - y * Math.sin(turn), v = x * Math.sin(turn) + y * Math.cos(turn), w = z - this.data.height / 2;
+    return [this.center[0] + u * this.scale, this.center[1] - (w * Math.cos(tilt) + v * Math.sin(tilt)) * this.scale, v * Math.cos(tilt) - w * Math.sin(tilt)];
   }
+
+  path(points) { return "M" + points.map(p => p[0].toFixed(1) + " " + p[1].toFixed(1)).join("L") + "Z"; }
+
+  // A round plate: the outline of both its faces, then the upper face.
+  plate(place, radius, thick, style) {
+    const ring = dz => Array.from({ length: 72 }, (_, k) => this.project(place([radius * Math.cos(k * Math.PI / 36), radius * Math.sin(k * Math.PI / 36), dz])));
+    const top = ring(0), bottom = ring(-thick);
+    element("path", { d: this.path(hull(top.concat(bottom))), fill: style.side, stroke: style.edge, "stroke-dasharray": style.dash || "none" }, this.svg);
+    element("path", { d: this.path(this.turn[1] < 0 ? bottom : top), fill: style.face, stroke: style.edge, "stroke-width": style.width || 1, "stroke-dasharray": style.dash || "none" }, this.svg);
+  }
+
+  line(a, b, attributes) { return element("line", Object.assign({ x1: a[0], y1: a[1], x2: b[0], y2: b[1] }, attributes), this.svg); }
+
+  arrow(a, b, color, width) {
+    this.line(a, b, { stroke: color, "stroke-width": width });
+    const length = Math.hypot(b[0] - a[0], b[1] - a[1]);
+    if (length < 6) return;
+    const [u, v] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length], size = 3 + 2 * width;
+    element("path", { d: this.path([[b[0] + u * 2, b[1] + v * 2], [b[0] - u * size - v * size / 2, b[1] - v * size + u * size / 2], [b[0] - u * size + v * size / 2, b[1] - v * size - u * size / 2]]), fill: color }, this.svg);
+  }
+
+  text(x, y, text, kind, anchor, more) { return element("text", Object.assign({ x, y, class: kind, "text-anchor": anchor || "middle" }, more), this.svg, text); }
 
   draw() {
-    const { data, svg } = this;
+    const { data, svg } = this, radius = p => Math.max(...p.map(q => Math.hypot(q[0], q[1])));
+    const wide = Math.max(this.figure.clientWidth || 396, 260), aside = this.bars && wide > 640 ? 320 : 0;
+    const tall = Math.min(420, Math.max(300, (wide - aside) * 1.02));
+    svg.setAttribute("viewBox", "0 0 " + wide + " " + (tall + (this.bars && !aside ? 170 : 0)));
     svg.replaceChildren();
-    const frame = Math.min(Math.floor(this.frame), Math.max(0, data.poses.length - 1));
-    const pose = data.poses[frame] || [0, 0, 0, 0, 0, 0], factor = Math.pow(10, this.by);
-    const shown = pose.map((v, k) => v * 1e-9 * (data.poses.length ? factor : 1));
-    const size = Math.max(data.height, ...data.base.flat().map(Math.abs), ...data.platform.flat().map(Math.abs));
-    this.scale = 175 / size;
-    const base = data.base.map(p => this.project(p)), top = data.platform.map(p => this.project(this.joint(p, shown)));
-    const plate = (points, color) => element("path", { d: "M" + points.map(p => p[0].toFixed(1) + " " + p[1].toFixed(1)).join("L") + "Z", fill: "var(" + color + ")", "fill-opacity": 0.14, stroke: "var(" + color + ")", "stroke-width": 2 }, svg);
-    plate(base, "--c5");
+    const rb = radius(data.base), rp = radius(data.platform), reach = Math.max(rb, rp);
+    // Room above for a pose that is drawn larger.
+    const rise = Math.max(0, data.ghost ? data.ghost[2] : 0);
+    this.scale = this.zoom * Math.min((wide - aside - 96) / (2 * reach), (tall - 96) / (data.height + rise + 0.9 * rb + 0.1 * rp));
+    this.center = [(wide - aside) / 2 - 14, tall / 2 + 6 * this.zoom + rise * this.scale / 2];
+    const frame = Math.min(Math.floor(this.frame), Math.max(0, this.poses.length - 1));
+    const pose = this.poses[frame] || [0, 0, 0, 0, 0, 0], factor = this.bars ? Math.pow(10, this.by) : 1;
+    const drawn = this.bars ? pose.map(v => v * 1e-9 * factor) : data.pose || pose;
+    const bad = data.bad || {};
+    const on = p => this.moved(p, drawn), thick = 0.06 * rb;
+    this.plate(p => p, rb * 1.02, thick, { side: "var(--track)", face: "var(--page)", edge: "var(--edge)" });
+    this.axes(0.34 * data.height);
+    const base = data.base.map(p => this.project(p)), top = data.platform.map(p => this.project(on(p)));
     const legs = base.map((p, k) => [p, top[k], k]).sort((a, b) => b[0][2] + b[1][2] - a[0][2] - a[1][2]);
+    const between = (a, b, t) => [a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t];
     for (const [from, to, k] of legs) {
-      element("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1], stroke: "var(--c" + k + ")", "stroke-width": 5, "stroke-linecap": "round" }, svg);
+      const color = (bad.legs || []).includes(k) ? "var(--orange)" : null, middle = between(from, to, 0.55);
+      this.line(from, to, { stroke: "var(--card)", "stroke-width": 10 });
+      this.line(from, to, { stroke: color || "var(--ink2)", "stroke-width": 3 });
+      this.line(from, middle, { stroke: color || "var(--edge)", "stroke-width": 7 });
+      element("circle", { cx: from[0], cy: from[1], r: 4.5, fill: "var(--card)", class: "ink" }, svg);
     }
-    plate(top, "--c0");
-    // Joints come in pairs: a quarter up the legs the numbers are apart.
+    this.plate(on, rp * 1.02, thick * 0.7, { side: "var(--track)", face: "var(--blue2)", edge: "var(--blue)", width: 1.5 });
     for (const [from, to, k] of legs) {
-      const at = { x: 0.75 * from[0] + 0.25 * to[0] + 9, y: 0.75 * from[1] + 0.25 * to[1] + 4, stroke: "var(--back)", "stroke-width": 4, "paint-order": "stroke" };
-      element("text", at, svg).textContent = String(k + 1);
+      const at = between(from, to, k % 2 ? 0.34 : 0.4), color = (bad.legs || []).includes(k) ? "var(--orange)" : "var(--edge)";
+      element("circle", { cx: at[0], cy: at[1], r: 8.5, fill: "var(--card)", stroke: color }, svg);
+      this.text(at[0], at[1] + 4, String(k + 1), "strong");
     }
-    this.axes();
-    if (data.poses.length) this.path(frame, factor);
-    if (data.poses.length) this.bars(data.legs[frame]);
-    const moved = pose.slice(0, 3).map(v => number(v / 1000)).join(", "), turned = pose.slice(3).map(v => number(v / 1000)).join(", ");
-    this.read.textContent = data.poses.length ? "t = " + (frame * data.step).toFixed(3) + " s, x, y, z = " + moved + " µm, θx, θy, θz = " + turned + " µrad, exaggerated " + number(factor) + " times" : "";
-    this.figure.dataset.points = 12 + data.poses.length;
+    if (data.part) this.box(on, data.part, 0.26 * rp);
+    if (!data.ghost) this.gauges(0.42 * rp, bad.gauges || []);
+    if (data.ghost) this.plate(p => this.moved(p, data.ghost), rp * 1.02, 0, { side: "none", face: "none", edge: "var(--orange)", dash: "5 3", width: 1.5 });
+    if (this.bars) {
+      this.way(frame, factor);
+      const legsAt = aside ? [wide - aside + 50, 60, aside - 110] : [40, tall + 10, wide - 110];
+      this.strokes(data.legs[frame], ...legsAt, aside ? 40 : 24);
+      const at = k => pose.slice(k, k + 3).map(v => number(v / 1000)).join(", ");
+      this.read.textContent = "t = " + (frame * data.step).toFixed(3) + " s: x, y, z = " + at(0) + " µm; θx, θy, θz = " + at(3) + " µrad. Motion drawn " + number(factor) + " times larger.";
+    } else this.dimensions(rb, rp, on);
+    for (const [k, text] of (data.texts || []).entries()) this.text(8, 16 + 17 * k, text, "orange halo", "start");
+    for (const [name, button] of this.buttons) button.classList.toggle("on", VIEWS[name].every((v, k) => Math.abs(v - this.turn[k]) < 1e-9));
+    this.figure.dataset.points = 12 + this.poses.length;
   }
 
-  axes() {
-    const length = 0.3 * this.data.height, from = this.project([0, 0, 0]);
-    [["x", [length, 0, 0]], ["y", [0, length, 0]], ["z", [0, 0, length]]].forEach(([name, p]) => {
+  axes(length) {
+    const from = this.project([0, 0, 0]);
+    for (const [name, p] of [["x", [length, 0, 0]], ["y", [0, length, 0]], ["z", [0, 0, length]]]) {
       const to = this.project(p);
-      element("line", { x1: from[0], y1: from[1], x2: to[0], y2: to[1], stroke: "var(--soft)", "stroke-width": 1.5 }, this.svg);
-      element("text", { x: to[0] + 5, y: to[1] + 4 }, this.svg).textContent = name;
+      if (Math.hypot(to[0] - from[0], to[1] - from[1]) < 8) continue;
+      this.arrow(from, to, "var(--ink2)", 1);
+      this.text(to[0] + (to[0] - from[0]) * 0.18, to[1] + (to[1] - from[1]) * 0.18 + 4, name, "");
+    }
+  }
+
+  // Fixed in the base frame, beside the platform.
+  gauges(length, bad) {
+    (this.data.gauges || []).forEach((gauge, k) => {
+      const color = bad.includes(k) ? "var(--orange)" : "var(--blue)";
+      const a = this.project(gauge.p), b = this.project(gauge.p.map((v, i) => v + gauge.d[i] * length));
+      element("circle", { cx: a[0], cy: a[1], r: 4, fill: color }, this.svg);
+      this.arrow(a, b, color, 2);
+      const size = Math.hypot(b[0] - a[0], b[1] - a[1]), [u, v] = size > 6 ? [(b[0] - a[0]) / size, (b[1] - a[1]) / size] : [0.7, -0.7];
+      // At the tail of one that points away, so that it is not on another's.
+      const [x, y] = b[2] > a[2] + 1e-6 && Math.abs(gauge.d[2]) < 0.7 ? [a[0] - u * 14, a[1] - v * 14] : [b[0] + u * 13, b[1] + v * 13];
+      this.text(x, y + 4, "G" + (k + 1), (bad.includes(k) ? "orange" : "blue") + " halo");
     });
+  }
+
+  // The work part: the faces that are seen.
+  box(on, [cx, cy, cz], size) {
+    const corner = (i, j, k) => this.project(on([cx + (i - 0.5) * size, cy + (j - 0.5) * size, cz + k * size]));
+    const faces = [[[0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], [[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], [[1, 0, 0], [1, 1, 0], [1, 1, 1], [1, 0, 1]], [[1, 1, 0], [0, 1, 0], [0, 1, 1], [1, 1, 1]], [[0, 1, 0], [0, 0, 0], [0, 0, 1], [0, 1, 1]], [[0, 1, 0], [1, 1, 0], [1, 0, 0], [0, 0, 0]]];
+    for (const face of faces) {
+      const p = face.map(c => corner(...c));
+      const turn = (p[1][0] - p[0][0]) * (p[2][1] - p[0][1]) - (p[1][1] - p[0][1]) * (p[2][0] - p[0][0]);
+      if (turn < 0) element("path", { d: this.path(p), fill: face === faces[0] ? "var(--card)" : "var(--track)", stroke: "var(--edge)" }, this.svg);
+    }
+  }
+
+  dimensions(rb, rp, on) {
+    const { data } = this, [cx] = this.project([0, 0, 0]), level = this.project([0, 0, 0])[1], upper = this.project(on([0, 0, 0]));
+    const s = this.scale, flat = Math.abs(Math.sin(this.turn[1])), millimetres = v => number(Math.round(v * 1e4) / 10) + "\u2009mm";
+    const measure = (a, b, text, x, y, turn) => {
+      this.arrow([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], a, "var(--ink2)", 1);
+      this.arrow([(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], b, "var(--ink2)", 1);
+      this.text(x, y, text, "strong halo", "middle", turn ? { transform: "rotate(-90 " + x + " " + y + ")" } : {});
+    };
+    const down = level + rb * s * flat + 26, left = cx - rb * s;
+    this.line([left, level], [left, down + 4], { class: "grid" });
+    measure([left, down], [cx, down], "base r " + millimetres(rb), (left + cx) / 2, down - 6);
+    const up = upper[1] - rp * s * flat - 30 - (data.gauges ? 0.4 * rp * s * Math.abs(Math.cos(this.turn[1])) : 0), edge = upper[0] + rp * s;
+    this.line([edge, upper[1]], [edge, up - 4], { class: "grid" });
+    this.line([upper[0], upper[1]], [upper[0], up - 4], { class: "grid" });
+    measure([upper[0], up], [edge, up], "platform r " + millimetres(rp), upper[0] + rp * s / 2, up - 7);
+    if (Math.abs(level - upper[1]) < 30) return;
+    const right = cx + Math.max(rb, rp) * s + 24;
+    this.line([cx + rb * s + 4, level], [right + 4, level], { class: "grid" });
+    this.line([edge + 4, upper[1]], [right + 4, upper[1]], { class: "grid" });
+    measure([right, upper[1]], [right, level], millimetres(data.height), right - 6, (upper[1] + level) / 2, true);
   }
 
   // Way of the platform's origin so far and to come.
-  path(frame, factor) {
-    const points = this.data.poses.map(p => this.project([p[0] * 1e-9 * factor, p[1] * 1e-9 * factor, p[2] * 1e-9 * factor + this.data.height]));
-    const line = (list, width) => list.length > 1 && element("path", { d: "M" + list.map(p => p[0].toFixed(1) + " " + p[1].toFixed(1)).join("L"), fill: "none", stroke: "var(--c4)", "stroke-width": width, "stroke-opacity": width > 1 ? 1 : 0.6 }, this.svg);
-    line(points, 0.8);
-    line(points.slice(0, frame + 1), 2);
-    const here = points[frame];
-    element("circle", { cx: here[0], cy: here[1], r: 4, fill: "var(--c4)" }, this.svg);
+  way(frame, factor) {
+    const points = this.poses.map(p => this.project([p[0] * 1e-9 * factor, p[1] * 1e-9 * factor, p[2] * 1e-9 * factor + this.data.height]));
+    const line = (list, width, color) => list.length > 1 && element("path", { d: this.path(list).slice(0, -1), fill: "none", stroke: color, "stroke-width": width }, this.svg);
+    line(points, 1, "var(--edge)");
+    line(points.slice(0, frame + 1), 2, "var(--ink)");
+    element("circle", { cx: points[frame][0], cy: points[frame][1], r: 4, fill: "var(--ink)" }, this.svg);
   }
 
-  bars(legs) {
-    const stroke = this.data.stroke * 1e9, [left, top, wide, step] = [640, 96, 250, 46];
-    element("text", { x: left, y: top - 34 }, this.svg).textContent = "leg extension in µm, stroke " + number(stroke / 1000) + " µm";
+  // Where each leg stands in the travel that it has.
+  strokes(legs, left, top, wide, step) {
+    const travel = this.data.travel * 1e9;
+    this.text(left, top - 12, "legs, µm of " + number(Number((travel / 1000).toPrecision(3))) + " µm of travel", "strong", "start");
     legs.forEach((v, k) => {
-      const y = top + k * step, length = Math.min(Math.max(v / stroke, 0), 1) * wide;
-      element("text", { x: left - 8, y: y + 13, "text-anchor": "end" }, this.svg).textContent = String(k + 1);
-      element("rect", { x: left, y, width: wide, height: 18, class: "frame" }, this.svg);
-      element("rect", { x: left, y, width: length, height: 18, fill: "var(--c" + k + ")" }, this.svg);
-      element("text", { x: left + wide + 8, y: y + 13 }, this.svg).textContent = (v / 1000).toFixed(2);
+      const y = top + k * step, over = v < 0 || v > travel;
+      this.text(left - 10, y + 13, String(k + 1), "strong", "end");
+      element("rect", { x: left, y: y + 2, width: wide, height: 14, fill: "var(--track)" }, this.svg);
+      element("rect", { x: left, y: y + 2, width: Math.min(Math.max(v / travel, 0), 1) * wide, height: 14, fill: over ? "var(--orange)" : "var(--blue)" }, this.svg);
+      this.text(left + wide + 8, y + 13, shown((v / 1000).toFixed(1)), over ? "orange" : "", "start");
     });
   }
+}
+
+function hull(points) {
+  const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  const half = list => {
+    const out = [];
+    for (const p of list) {
+      while (out.length > 1) {
+        const [a, b] = [out[out.length - 2], out[out.length - 1]];
+        if ((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) > 0) break;
+        out.pop();
+      }
+      out.push(p);
+    }
+    return out.slice(0, -1);
+  };
+  return half(sorted).concat(half(sorted.reverse()));
 }

@@ -1,7 +1,7 @@
 //! How the genetic algorithm of Table 3 converges on this spec.
 
-use super::chart::{Axis, Chart, DASHED, LINE, pairs};
-use super::section::{Grid, Section};
+use crate::chart::{Axis, Chart, DASHED, LINE, pairs};
+use crate::section::{Grid, Section};
 use specgen_studies::paper::convergence::Convergence;
 use specgen_studies::paper::printed::TABLE_3;
 use specgen_studies::reproduce::write::fell;
@@ -9,19 +9,8 @@ use specgen_studies::reproduce::write::fell;
 /// The section of a search; `command` makes its content again.
 #[must_use]
 pub fn section(found: &Convergence, command: &str) -> Section {
-    let x: Vec<f64> = found.history.iter().map(|generation| generation.evaluations as f64).collect();
-    let of = |value: Option<f64>| value.unwrap_or(f64::NAN);
-    let best: Vec<f64> = found.history.iter().map(|generation| of(generation.best)).collect();
-    let median: Vec<f64> = found.history.iter().map(|generation| of(generation.median)).collect();
-    let chart = Chart::new(
-        "convergence",
-        "Cost (9) by generation",
-        Axis::linear("strings tried", ""),
-        Axis::log("cost", "µm s²"),
-    )
-    .with("best so far", LINE, pairs(&x, &best))
-    .with("median of the generation", DASHED, pairs(&x, &median));
-    let charts = if best.iter().any(|cost| cost.is_finite()) { vec![chart] } else { Vec::new() };
+    let found_any = found.history.iter().any(|generation| generation.best.is_some());
+    let charts = if found_any { vec![chart(found)] } else { Vec::new() };
     let mut table = Grid::new("Table 3: settings", &["what", "paper", "here"]);
     for row in TABLE_3 {
         table.push(row.map(str::to_owned).to_vec());
@@ -31,4 +20,16 @@ pub fn section(found: &Convergence, command: &str) -> Section {
         .text("The spec keeps its own numbers: specgen tune writes better ones into it, by this algorithm or CMA-ES.")
         .charts(charts)
         .table(table)
+}
+
+/// Best and median cost by generation.
+#[must_use]
+pub fn chart(found: &Convergence) -> Chart {
+    let x: Vec<f64> = found.history.iter().map(|generation| generation.evaluations as f64).collect();
+    let of = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    let best: Vec<f64> = found.history.iter().map(|generation| of(generation.best)).collect();
+    let median: Vec<f64> = found.history.iter().map(|generation| of(generation.median)).collect();
+    Chart::new("convergence", "Cost (9) by generation", Axis::linear("strings tried", ""), Axis::log("cost", "µm s²"))
+        .with("best so far", LINE, pairs(&x, &best))
+        .with("median of the generation", DASHED, pairs(&x, &median))
 }

@@ -4,9 +4,9 @@ use host_sim::closed_loop::{RunError, Tracking};
 use host_sim::controller::TickController;
 use host_sim::scenario::{LegScenario, MODES, TRACKING_FREQUENCIES, select};
 
-use super::chart::{Axis, Chart, DASHED, LINE};
 use super::motion::TARGETS;
-use super::section::Section;
+use crate::chart::{Axis, Chart, DASHED, LINE};
+use crate::section::Section;
 use specgen_studies::reproduce;
 
 /// Runs of every law at every frequency, with Table 2.

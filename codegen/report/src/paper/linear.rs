@@ -11,9 +11,9 @@ use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen_runtime::Platform;
 use specgen_runtime::setpoint::{REFUSED, STALE};
 
-use super::chart::{Axis, Chart, LINE, pairs};
 use super::motion::REFUSED_PATH;
-use super::section::{Grid, Section};
+use crate::chart::{Axis, Chart, LINE, pairs};
+use crate::section::{Grid, Section};
 use specgen_language::model::Actuator;
 use specgen_studies::reproduce;
 use specgen_studies::reproduce::write::digits;

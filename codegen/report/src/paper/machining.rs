@@ -9,9 +9,10 @@ use host_sim::platform::table::MachiningTable;
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen_runtime::setpoint::{REFUSED, STALE};
 
-use super::chart::{Axis, Chart, DASHED, LINE};
-use super::motion::{AXES, REFUSED_PATH, TARGETS, change, error};
-use super::section::Section;
+use super::motion::{REFUSED_PATH, TARGETS, change, error};
+use crate::chart::{Axis, Chart, DASHED, EDGE, LINE};
+use crate::section::Section;
+use crate::tracking::AXES;
 use specgen_studies::reproduce::platform::{MACHINING_FREQUENCY, parts, table_9};
 
 /// Both work parts.
@@ -66,7 +67,7 @@ pub fn section(
                     chart.over_time(&format!("{label}, {law}"), LINE, times, &values).colored(if combined {
                         axis % 3
                     } else {
-                        TARGETS + axis % 3
+                        EDGE
                     })
                 });
                 if combined {
@@ -78,7 +79,7 @@ pub fn section(
                             .over_time(label, LINE, times, &pose)
                             .colored(axis % 3)
                             .over_time(&format!("{label} target"), DASHED, times, &target)
-                            .colored(TARGETS + axis % 3)
+                            .colored(TARGETS)
                     });
                     let name = [["Fx", "Fy", "Fz"], ["Tx", "Ty", "Tz"]][turning][axis % 3];
                     change(&mut wrench[turning], |chart| chart.over_time(name, LINE, times, &load));

@@ -3,21 +3,19 @@
 use host_sim::closed_loop::RunError;
 use host_sim::controller::TickController;
 use host_sim::platform::PlatformScenario;
-use host_sim::platform::rig::{PlatformRun, PoseSample, Record, RunOptions};
+use host_sim::platform::rig::{PoseSample, Record, RunOptions};
 use host_sim::platform::scenario::{FREE_MODES, select};
 use host_sim::platform::table::{PoseRow, PoseTable};
 use host_sim::trajectory::{PaperPose, Reading};
 use specgen_runtime::setpoint::{REFUSED, STALE};
 
-use super::chart::{Axis, Chart, DASHED, LINE};
-use super::section::Section;
+use crate::chart::{Axis, Chart, DASHED, INK, LINE};
+use crate::section::Section;
+use crate::tracking::AXES;
 use specgen_studies::reproduce::platform::{CASES, FREQUENCIES, tables};
 
-/// Names of the coordinates on charts.
-pub(super) const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
-
-/// Colours of targets, beside those of the axes.
-pub(super) const TARGETS: usize = 8;
+/// Colour of targets.
+pub(super) const TARGETS: usize = INK;
 
 /// Why a run is not scored.
 pub(super) const REFUSED_PATH: &str = "The controller refused set-points: the path leaves the workspace of the spec, or moves faster than its control.setpoint.stream_speed.";
@@ -25,7 +23,7 @@ pub(super) const REFUSED_PATH: &str = "The controller refused set-points: the pa
 /// What a sample shows of one coordinate.
 type Pick = fn(&PoseSample, usize) -> f64;
 
-/// The sections of both cases, and the run that the view plays: case 1 at 1 Hz, or the first that was followed.
+/// The sections of both cases.
 ///
 /// # Errors
 /// As [`PlatformScenario::run`].
@@ -34,11 +32,10 @@ pub fn sections(
     controller: &mut dyn TickController,
     command: &str,
     progress: &dyn Fn(&str),
-) -> Result<(Vec<Section>, Option<PlatformRun>), RunError> {
+) -> Result<Vec<Section>, RunError> {
     let mut sampled = machine.clone();
     sampled.options = RunOptions { record: Record::Samples, ..machine.options.clone() };
     let mut sections = Vec::new();
-    let mut shown: Option<PlatformRun> = None;
     for (case, (name, path)) in CASES.into_iter().enumerate() {
         let mut section = Section::new(
             ["case-1", "case-2"][case],
@@ -61,9 +58,6 @@ pub fn sections(
                 }
                 table.rows.push(PoseRow::of(name, mode, frequency, &run.errors));
                 figures.add(mode, &run.samples);
-                if mode == "pf-pcc" && (shown.is_none() || (case == 0 && frequency == 1.0)) {
-                    shown = Some(run);
-                }
             }
             if let Some(charts) = figures.finish() {
                 section = section.charts(charts);
@@ -77,7 +71,7 @@ pub fn sections(
         }
         sections.push(section);
     }
-    Ok((sections, shown))
+    Ok(sections)
 }
 
 /// The charts of one case at one frequency.
@@ -130,7 +124,7 @@ impl Figures {
                         .over_time(name, LINE, times, &of(|s, k| s.tick.pose[k] * 1e6))
                         .colored(axis % 3)
                         .over_time(&format!("{name} target"), DASHED, times, &of(|s, k| s.target[k] * 1e6))
-                        .colored(TARGETS + axis % 3)
+                        .colored(TARGETS)
                 });
                 change(&mut self.errors[turning], |chart| chart.over_time(name, LINE, times, &of(error)));
             }

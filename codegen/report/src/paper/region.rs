@@ -2,8 +2,8 @@
 
 use host_sim::controller::{ControllerError, TickController};
 
-use super::chart::{Axis, Chart, DASHED, DOTS, LINE, pairs};
-use super::section::{Grid, Section};
+use crate::chart::{Axis, Chart, DASHED, DOTS, LINE, pairs};
+use crate::section::{Grid, Section};
 use specgen_compiler::compile::Compiled;
 use specgen_studies::paper::region::{jury, limits, printed};
 use specgen_studies::reproduce::write::digits;

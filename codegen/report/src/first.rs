@@ -1,0 +1,340 @@
+//! What a page begins with: verdict, key figures, platform, findings; for a refused spec its source.
+
+use std::fmt::Write as _;
+
+use serde_json::json;
+use specgen_compiler::compile::Compiled;
+use specgen_compiler::lower;
+use specgen_compiler::reach::{self, Reach};
+use specgen_compiler::stability::platform::Law;
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
+use specgen_language::model::Model;
+use specgen_language::spec::SpecSource;
+use specgen_studies::verdict::{Figure, Mark, Subject, Verdict};
+use specgen_studies::verify::Measurement;
+use specgen_toolchain::budget::group;
+
+use super::margins;
+use super::page::marked;
+use super::platform;
+use super::section::{Part, Rows};
+use super::tracking::{AXES, short};
+use super::verdict::{
+    Sentence, card, findings, limit_row, mark, rows, share, source, text_row, thin, tightest, value_row,
+};
+
+/// Limits of errors that are seen at once.
+const JUDGED: usize = 3;
+/// What is not computed for a spec that is refused.
+const LATER: [&str; 7] = ["trajectories", "margins", "instructions", "flash, RAM", "stack", "bits", "error budget"];
+
+/// The errors on trajectories.
+#[derive(Debug, Clone)]
+pub struct Errors {
+    /// One picture for each unit, by the unit.
+    pub pictures: Vec<(&'static str, Rows)>,
+    /// In a few words.
+    pub said: String,
+    /// What the figures are.
+    pub note: String,
+}
+
+/// The first screen of a spec that compiled. `mode`: its control mode, as the word `mode` has it.
+#[must_use]
+pub fn of(
+    compiled: &Compiled,
+    verdict: &Verdict,
+    measured: Result<&Measurement, &str>,
+    errors: Errors,
+    mode: u32,
+) -> Vec<Part> {
+    let sentence = Sentence::of(verdict);
+    let mut parts = vec![Part::Html(format!(
+        "{}<div class=\"first\">\n{}{}",
+        sentence.html(&compiled.findings),
+        tightest(verdict, &errors.said),
+        reach_card(compiled, verdict)
+    ))];
+    parts.extend(error_card(verdict, errors));
+    parts.extend(platform_card(
+        &compiled.model,
+        platform::standing(&compiled.model, &compiled.findings),
+        "drag to turn · to scale",
+    ));
+    parts.push(Part::Html(format!(
+        "{}{}{}</div>\n",
+        controller_card(compiled, verdict, measured),
+        margin_card(compiled, verdict, mode),
+        findings("Findings", "nothing refused · one row per code", &compiled.findings, &compiled.source)
+    )));
+    parts
+}
+
+fn reach_card(compiled: &Compiled, verdict: &Verdict) -> String {
+    let mut content = rows(verdict, &[Subject::Reach]);
+    if let Some(reach) = &compiled.reach {
+        content += &text_row(
+            "all at once",
+            &format!(
+                "{:.0}\u{2009}% of the box about {}",
+                100.0 * reach.share,
+                if compiled.design.is_some() { "the bias" } else { "rest" }
+            ),
+            "note",
+        );
+    }
+    let noise = verdict.figures.iter().filter(|figure| figure.subject == Subject::Noise && figure.name == "step");
+    content += &noise.map(|figure| limit_row("resolution", figure)).collect::<String>();
+    let note =
+        if compiled.design.is_some() { "asked of available, line: limit" } else { "from the middle of the strokes" };
+    card("Reach per axis", note, "", &content)
+}
+
+fn error_card(verdict: &Verdict, errors: Errors) -> Vec<Part> {
+    let mut head =
+        "<div class=\"card\" data-choices><div class=\"head\"><h3>Error on your trajectories</h3>".to_owned();
+    if errors.pictures.len() > 1 {
+        head += "<span class=\"choice note\" data-axis=\"0\">";
+        for (k, (unit, _)) in errors.pictures.iter().enumerate() {
+            let on = if k == 0 { " class=\"on\"" } else { "" };
+            let _ = write!(head, "<button type=\"button\"{on} data-value=\"{unit}\">{unit}</button>");
+        }
+        head += "</span>";
+    }
+    head += "</div>\n";
+    let mut parts = vec![Part::Html(head)];
+    for (k, (unit, picture)) in errors.pictures.into_iter().enumerate() {
+        let hidden = if k == 0 { "" } else { " hidden" };
+        parts.push(Part::Html(format!("<div class=\"pane\" data-value=\"{unit}\"{hidden}>\n")));
+        parts.push(Part::Rows(picture));
+        parts.push(Part::Html("</div>\n".to_owned()));
+    }
+    let judged: Vec<&Figure> =
+        verdict.figures.iter().filter(|figure| figure.subject == Subject::Tracking && figure.limit.is_some()).collect();
+    // The tightest are seen at once, all stand in the tables.
+    let mut tight = judged.clone();
+    tight.sort_by(|a, b| share(b).unwrap_or_default().total_cmp(&share(a).unwrap_or_default()));
+    let mut content: String = tight.iter().take(JUDGED).map(|figure| limit_row(&figure.name, figure)).collect();
+    let open = match judged.len() {
+        0 => "No limit in the spec: shown, not judged. ".to_owned(),
+        few if few <= JUDGED => "Limits: requirements.tracking. ".to_owned(),
+        many => format!("The tightest of {many} limits of requirements.tracking. "),
+    };
+    let sign = if judged.is_empty() { mark("none") } else { String::new() };
+    let _ = write!(
+        content,
+        "<p class=\"legend\" style=\"display:flex;gap:4px\">{sign}<span>{open}{}</span></p></div>\n",
+        marked(&errors.note)
+    );
+    parts.push(Part::Html(content));
+    parts
+}
+
+fn controller_card(compiled: &Compiled, verdict: &Verdict, measured: Result<&Measurement, &str>) -> String {
+    let machine = measured.map_or_else(|_| compiled.model.target.mcu.part().emulated.to_owned(), |m| m.machine.clone());
+    let mut content = String::new();
+    for figure in verdict.figures.iter().filter(|figure| matches!(figure.subject, Subject::Time | Subject::Memory)) {
+        // Said with the period below.
+        if figure.name != "longest tick" {
+            content += &limit_row(&figure.name, figure);
+        }
+    }
+    match measured {
+        Ok(m) => {
+            let bits = verdict.figures.iter().find(|figure| figure.subject == Subject::Bits);
+            let good = bits.is_some_and(|figure| figure.mark == Mark::Within);
+            let text = if good {
+                format!("equal to the host over {} ticks", thin(&group(m.ticks)))
+            } else {
+                "DIFFER from the host".to_owned()
+            };
+            content += &text_row("bits", &text, if good { "ok" } else { "error" });
+            if let Some(step) = m.stage("step") {
+                let period = compiled.model.timing.period;
+                let text = format!(
+                    "{} in {}\u{2009}µs: core ≥ {} MIPS",
+                    thin(&group(step.max)),
+                    short(period * 1e6).trim_end_matches(".0"),
+                    short(step.max as f64 / period * 1e-6)
+                );
+                content += &text_row("worst tick", &text, "none");
+            }
+        }
+        Err(why) => {
+            for what in ["time", "memory", "bits"] {
+                content += &text_row(what, "not measured", "none");
+            }
+            let _ = writeln!(content, "<p class=\"legend\">{}</p>", marked(why));
+        }
+    }
+    card(&format!("Controller on {machine}"), "used of budget", "", &content)
+}
+
+fn margin_card(compiled: &Compiled, verdict: &Verdict, mode: u32) -> String {
+    let slew = compiled.demands.iter().map(|demand| demand.slew).fold(0.0, |a: f64, b| if b > a { b } else { a });
+    let slew_row = |content: &mut String| {
+        let limit = compiled.model.actuator.slew_rate;
+        if slew > 0.0 {
+            let share = slew / limit;
+            let text = |value: f64| short(value * 1e-3).trim_end_matches(".0").to_owned();
+            *content += &value_row(
+                "leg slew",
+                [&text(slew), &text(limit), "V/ms"],
+                share,
+                if share <= 1.0 { "ok" } else { "error" },
+            );
+        }
+    };
+    let mut content = String::new();
+    let Some(design) = &compiled.design else {
+        content += &rows(verdict, &[Subject::Margins]);
+        slew_row(&mut content);
+        return card("Margins of the adaptation", "asked of stable", "", &content);
+    };
+    let law = Law::ALL.get(mode as usize).copied().unwrap_or(Law::Position);
+    let highest = compiled.model.adaptation.gain_ratio[1];
+    if let Some(own) = design.margins.iter().find(|one| one.law == law) {
+        let limit = own.gain_ratio_limit;
+        let text = limit.map_or_else(|| ">10".to_owned(), |limit| format!("{limit:.2}"));
+        content +=
+            &value_row("leg gain λ", [&format!("{highest:.2}"), &text, ""], highest / limit.unwrap_or(10.0), "ok");
+        if let Some(gain) = own.gain_margin {
+            content += &value_row("loop gain", ["×1", &format!("×{gain:.2}"), ""], 1.0 / gain, "ok");
+        }
+        let delay = own.delay_margin_ticks.map_or_else(|| ">5".to_owned(), |ticks| format!("{ticks:.2}"));
+        content += &value_row("extra delay", ["0", &delay, "ticks"], 0.0, "ok");
+        slew_row(&mut content);
+        if let Some(settling) = own.settling {
+            let least = own.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
+            let least = least.map_or_else(String::new, |mode| {
+                format!("; least damped {:.0}\u{2009}Hz, ζ {:.3}", mode.frequency, mode.damping_ratio)
+            });
+            content += &text_row("settles in", &format!("{:.0}\u{2009}ms{least}", settling * 1e3), "none");
+        }
+    }
+    let stable = design.margins.iter().filter(|one| one.spectral_radius < 1.0).count();
+    let worst = design
+        .margins
+        .iter()
+        .filter_map(|one| one.gain_ratio_limit.map(|limit| (one.law, limit)))
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    let worst = worst.map_or_else(String::new, |(law, limit)| format!("; tightest {}, λ {limit:.2}", law.name()));
+    let all = stable == design.margins.len();
+    content += &text_row(
+        "all modes",
+        &format!("{stable} of {} stable{worst}", design.margins.len()),
+        if all { "ok" } else { "error" },
+    );
+    card(&format!("Loop margins, {}", margins::name(law)), "asked of stable", "", &content)
+}
+
+fn platform_card(model: &Model, view: Part, note: &str) -> Vec<Part> {
+    let gauges = if model.task_space.is_some() {
+        "<span><b class=\"blue\">G1–G6</b> gauge, arrow: positive reading</span>"
+    } else {
+        "<span>a gauge in each leg, positive when it is longer</span>"
+    };
+    let part = if model.task_space.is_some() { "<span>box: work part</span>" } else { "" };
+    let mass = format!("{}", model.platform.mass);
+    vec![
+        Part::Html(format!(
+            "<div class=\"card platform\"><div class=\"head\"><h3>Platform</h3><span class=\"note\">{}</span></div>\n",
+            marked(note)
+        )),
+        view,
+        Part::Html(format!(
+            "<p class=\"legend\">{gauges}<span><b>1–6</b> legs, {}\u{2009}µm stroke</span><span>{mass}\u{2009}kg platform</span>{part}</p></div>\n",
+            short(model.actuator.stroke * 1e6).trim_end_matches(".0")
+        )),
+    ]
+}
+
+/// The page of a spec that is refused. `model`: as far as it could be read; `accepted`: whether the fix of the first error
+/// was tried and is good.
+#[must_use]
+pub fn refused(text: &SpecSource, all: &[Diagnostic], model: Option<&Model>, accepted: bool) -> Vec<Part> {
+    let errors: Vec<&Diagnostic> = all.iter().filter(|finding| finding.severity == Severity::Error).collect();
+    let Some(first) = errors.first() else { return Vec::new() };
+    let title =
+        codes::REGISTRY.iter().find(|code| code.id == first.code).map_or("the spec is refused", |code| code.title);
+    let measured = model.and_then(|model| Some((model, measure(model)?)));
+    let beyond = measured.as_ref().and_then(|(_, reach)| {
+        (0..6).map(|axis| (axis, reach_figure(reach, axis))).find(|(_, figure)| figure.mark == Mark::Beyond)
+    });
+    let (reason, why) = match &beyond {
+        Some((axis, figure)) if first.key.starts_with("workspace") => (
+            format!("{} is out of reach", AXES[*axis]),
+            format!(
+                "The spec asks for {}\u{2009}{unit} in {}; the legs reach {}\u{2009}{unit}. Nothing was generated.",
+                figure.limit_text(),
+                AXES[*axis],
+                figure.value_text(),
+                unit = figure.unit
+            ),
+        ),
+        _ => (title.to_owned(), format!("{} Nothing was generated.", super::verdict::sentence(&first.message))),
+    };
+    let sentence = Sentence { verdict: format!("Not safe to build: {reason}"), why, mark: "error" };
+    let mut html = format!("{}<div class=\"first\">\n{}", sentence.html(all), source(all, text, accepted));
+    let mut parts = Vec::new();
+    if let Some((_, reach)) = &measured {
+        let content: String = (0..6).map(|axis| limit_row(AXES[axis], &reach_figure(reach, axis))).collect();
+        html += &card("Reach per axis", "asked of available", "", &content);
+    }
+    let later: String = LATER.iter().map(|what| text_row(what, "not computed", "none")).collect();
+    html += &card("Not computed", &format!("waits for {}", first.code), "", &later);
+    parts.push(Part::Html(html));
+    if let Some(model) = model {
+        let mut view = platform::standing(model, all);
+        let mut note = "drag to turn · to scale".to_owned();
+        if let (Part::View(_, data), Some((axis, figure))) = (&mut view, &beyond) {
+            let asked = figure.limit.as_ref().map_or(0.0, |limit| limit.value) * 1e-6;
+            let has = figure.value * 1e-6;
+            let larger = larger(model, *axis, asked);
+            let pose = |value: f64| {
+                let mut pose = [0.0; 6];
+                pose[*axis] = value * larger;
+                pose
+            };
+            data["pose"] = json!(pose(has));
+            data["ghost"] = json!(pose(asked));
+            data["texts"] = json!([
+                format!("{} {}\u{2009}{} asked", AXES[*axis], figure.limit_text(), figure.unit),
+                format!("{}\u{2009}{} reached", figure.value_text(), figure.unit)
+            ]);
+            note = format!("motion drawn {}\u{2009}times larger", thin(&group(larger as u64)));
+        }
+        parts.extend(platform_card(model, view, &note));
+    }
+    let other: Vec<Diagnostic> = all.iter().filter(|finding| !core::ptr::eq(*finding, *first)).cloned().collect();
+    let note = if errors.len() > 1 { "errors refuse the spec" } else { "these alone would refuse nothing" };
+    parts.push(Part::Html(format!("{}</div>\n", findings("Other findings", note, &other, text))));
+    parts
+}
+
+/// What is reached, as far as that can be said of a spec that is refused.
+fn measure(model: &Model) -> Option<Reach> {
+    let bias = model.task_space.as_ref()?.setpoint.bias;
+    let platform = lower::platform(model).ok()?;
+    Some(reach::measure(model, &platform, model.actuator.stroke, &bias))
+}
+
+fn reach_figure(reach: &Reach, axis: usize) -> Figure {
+    let [low, high] = reach.axes[axis].from_middle.map(f64::abs);
+    let unit = if axis < 3 { "µm" } else { "µrad" };
+    Figure::new(Subject::Reach, AXES[axis], 1e6 * if low > high { low } else { high }, unit)
+        .at_least(1e6 * reach.axes[axis].declared, "workspace")
+}
+
+/// A round factor by which a motion is seen.
+fn larger(model: &Model, axis: usize, value: f64) -> f64 {
+    let wanted = if axis < 3 { 0.3 * model.geometry.height / value } else { 0.4 / value };
+    let decade = libm::pow(10.0, libm::floor(libm::log10(wanted)));
+    if wanted >= 5.0 * decade {
+        5.0 * decade
+    } else if wanted >= 2.0 * decade {
+        2.0 * decade
+    } else {
+        decade
+    }
+}

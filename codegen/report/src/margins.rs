@@ -1,0 +1,227 @@
+//! How far the loops are from instability: the open loop of each axis, and every control mode.
+
+use core::f64::consts::TAU;
+
+use serde_json::{Value, json};
+use specgen_compiler::compile::Compiled;
+use specgen_compiler::lower;
+use specgen_compiler::stability::platform::{Design, Law, RestDynamics, closed_loop_of};
+use specgen_language::model::TaskSpace;
+use specgen_studies::reproduce::write::digits;
+
+use super::chart::{Axis, BLUE, Chart, LINE, Note, pairs};
+use super::evidence;
+use super::section::{Grid, Part, Rows, Section};
+use super::tracking::{AXES, short};
+
+/// Points of a Bode plot.
+const POINTS: usize = 160;
+/// Lowest frequency of a Bode plot, Hz.
+const LOWEST: f64 = 1.0;
+/// Margins are looked for up to here.
+const LARGEST: f64 = 10.0;
+
+/// A control mode as people write it.
+#[must_use]
+pub fn name(law: Law) -> String {
+    let name = law.name();
+    match name.rsplit_once(' ') {
+        Some((loops, adapting)) => {
+            let word = adapting_name(adapting);
+            format!("{loops} with {word}")
+        }
+        None => name.to_owned(),
+    }
+}
+
+/// A law of adaptation as people write it: `invhys`, `ewma` or `pcc`.
+#[must_use]
+pub fn adapting_name(word: &str) -> &'static str {
+    match word {
+        "invhys" => "the inverse model",
+        "ewma" => "EWMA",
+        _ => "PCC",
+    }
+}
+
+/// The section. `mode`: the control mode of the spec, as the word `mode` has it.
+#[must_use]
+pub fn section(compiled: &Compiled, mode: u32, command: &str) -> Section {
+    let section = Section::new("margins", "Margins", command);
+    let Some((design, task)) = compiled.design.as_ref().zip(compiled.model.task_space.as_ref()) else {
+        return of_legs(compiled, section);
+    };
+    let law = Law::ALL.get(mode as usize).copied().unwrap_or(Law::Position);
+    let all = control_modes(compiled, design, law);
+    let own = design.margins.iter().find(|margins| margins.law == law);
+    let stable = design.margins.iter().filter(|margins| margins.spectral_radius < 1.0).count();
+    let or = |value: Option<f64>, beyond: &str| value.map_or_else(|| beyond.to_owned(), |value| format!("{value:.2}"));
+    let lead = own.map_or_else(String::new, |own| {
+        format!(
+            "With {} the loop takes {} times its gain and legs {} times as strong. Stable in {stable} of {} modes, {}.",
+            name(law),
+            or(own.gain_margin, "as many as were looked at"),
+            or(own.gain_ratio_limit, "more than 10"),
+            design.margins.len(),
+            if design.touching { "free and touching the declared work piece" } else { "free of contact" }
+        )
+    });
+    let Some(loops) = bode(compiled, design, task, law) else {
+        return section.lead(&lead).part(Part::Rows(all)).part(Part::Table(evidence::modes(design)));
+    };
+    let mut section = section;
+    for (axis, charts) in loops.into_iter().enumerate() {
+        let mut all = all.clone();
+        // The same rows stand in each pane.
+        all.id = format!("modes-{axis}");
+        if axis > 0 {
+            all.numbers = Grid::default();
+        }
+        let left = charts.into_iter().map(Part::Chart).collect();
+        section = section
+            .pane(&[AXES[axis]], vec![Part::Lead(lead.clone()), Part::Columns(vec![left, vec![Part::Rows(all)]])]);
+    }
+    section.text("The open loop is that of the model with the sampled platform, amplifier lag and notch, opened at the legs, all axes at once: its gain margin is λ = ρ/ρ̂ of the legs. The limits of the control modes are found by eigenvalues of the whole closed loop.")
+}
+
+fn bode(compiled: &Compiled, design: &Design, task: &TaskSpace, law: Law) -> Option<Vec<Vec<Chart>>> {
+    let rest = RestDynamics::of(&lower::platform(&compiled.model).ok()?);
+    let closed_loop = closed_loop_of(&compiled.model, task, &rest)?;
+    let tuning = if law == Law::Position { &design.position } else { &design.combined };
+    let highest = 0.45 / compiled.model.timing.period;
+    let decades = libm::log10(highest / LOWEST);
+    let frequencies: Vec<f64> =
+        (0..=POINTS).map(|k| LOWEST * libm::pow(10.0, decades * k as f64 / POINTS as f64)).collect();
+    let found = closed_loop.open_loop(law, tuning, &frequencies);
+    if found.iter().flatten().flatten().any(|value| !value.is_finite())
+        || found.iter().flatten().all(|point| point[0] == 0.0)
+    {
+        return None;
+    }
+    let modes: Vec<f64> = design.modes.iter().map(|mode| mode.frequency / TAU).collect();
+    let numbers = (1..=6).map(|k| k.to_string()).collect::<Vec<_>>();
+    let of = |(axis, points): (usize, &Vec<[f64; 2]>)| {
+        let decibels: Vec<f64> = points.iter().map(|point| 20.0 * libm::log10(point[0])).collect();
+        let phases: Vec<f64> = points.iter().map(|point| point[1]).collect();
+        let chart = |kind: &str, label: &str, unit: &str, values: &[f64]| {
+            Chart::new(
+                &format!("{kind}-{axis}"),
+                &format!("Open loop, {}, {}", AXES[axis], name(law)),
+                Axis::log("frequency", "Hz"),
+                Axis::linear(label, unit),
+            )
+            .with("", LINE, pairs(&frequencies, values))
+            .colored(BLUE)
+        };
+        let mut gain = chart("gain", "gain", "dB", &decibels)
+            .noted(Note::Level(0.0, "0\u{2009}dB".to_owned()))
+            .noted(Note::Modes(modes.clone(), numbers.clone()));
+        let mut phase = chart("phase", "phase", "°", &phases).noted(Note::Level(-180.0, "−180°".to_owned()));
+        phase.title = format!("Phase of the open loop, {}", AXES[axis]);
+        let at = |k: usize, values: &[f64], level: f64, of: &[f64]| {
+            let part = (level - values[k]) / (values[k + 1] - values[k]);
+            let mix = |list: &[f64]| list[k] + part * (list[k + 1] - list[k]);
+            (libm::exp(mix(&frequencies.iter().map(|f| libm::log(*f)).collect::<Vec<_>>())), mix(of))
+        };
+        let crossing = |values: &[f64], level: f64, of: &[f64]| -> Vec<(f64, f64)> {
+            (0..POINTS)
+                .filter(|k| values[*k] > level && values[k + 1] <= level)
+                .map(|k| at(k, values, level, of))
+                .collect()
+        };
+        // The least of all crossings of −180° is the margin.
+        if let Some((hertz, value)) = crossing(&phases, -180.0, &decibels)
+            .into_iter()
+            .filter(|one| one.1 < 0.0)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+        {
+            let times = libm::pow(10.0, -value / 20.0);
+            gain = gain.noted(Note::Segment(hertz, [0.0, value], format!("gain margin ×{}", short(times))));
+        }
+        if let Some((hertz, value)) = crossing(&decibels, 0.0, &phases)
+            .into_iter()
+            .filter(|one| one.1 > -180.0)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+        {
+            phase = phase.noted(Note::Segment(hertz, [-180.0, value], format!("phase margin {:.0}°", value + 180.0)));
+        }
+        gain.height = 190;
+        phase.height = 170;
+        gain.bare = true;
+        vec![gain, phase]
+    };
+    Some(found.iter().enumerate().map(of).collect())
+}
+
+/// λ and gain up to which each control mode is stable.
+fn control_modes(compiled: &Compiled, design: &Design, own: Law) -> Rows {
+    let [low, high] = compiled.model.adaptation.gain_ratio;
+    let mut rows: Vec<Value> = Vec::new();
+    let mut furthest = LARGEST;
+    for one in &design.margins {
+        let text =
+            |value: Option<f64>, beyond: &str| value.map_or_else(|| beyond.to_owned(), |value| format!("{value:.2}"));
+        let mut marks = vec![match one.gain_ratio_limit {
+            Some(limit) => json!({ "m": "dot", "x": limit }),
+            None => json!({ "m": "arrow", "x": LARGEST }),
+        }];
+        marks.extend(one.gain_margin.map(|gain| json!({ "m": "square", "x": gain })));
+        let ends = [one.gain_ratio_limit.unwrap_or(LARGEST), one.gain_margin.unwrap_or(1.0)];
+        let end = if ends[0] > ends[1] { ends[0] } else { ends[1] };
+        furthest = if end > furthest { end } else { furthest };
+        rows.push(json!({
+            "name": one.law.name().replace("invhys", "Invhys").replace("ewma", "EWMA").replace("pcc", "PCC"),
+            "line": [high, end], "marks": marks, "box": one.law == own,
+            "note": format!("{} · {}", text(one.gain_ratio_limit, "> 10"), text(one.gain_margin, "–")),
+        }));
+    }
+    let least = if low < 0.85 { low } else { 0.85 };
+    Rows {
+        id: "modes-0".to_owned(),
+        title: "How far each control mode is from instability".to_owned(),
+        data: json!({
+            "scale": "log", "range": [least, 1.15 * furthest], "prefix": "×", "ticks": [1, 2, 3, 5, 10, 20], "rows": rows, "step": 37, "right": 100, "left": 100,
+            "band": { "from": low, "to": high, "text": format!("declared {low}–{high}") },
+            "legend": [{ "m": "dot", "text": "λ" }, { "m": "square", "text": "gain" }],
+            "label": "λ and gain up to which each control mode is stable",
+        }),
+        numbers: evidence::control_modes(design),
+    }
+}
+
+fn of_legs(compiled: &Compiled, section: Section) -> Section {
+    let Some(margins) = &compiled.margins else {
+        return section.lead("The law does not adapt: there is no loop that could be unstable.");
+    };
+    let [low, high] = compiled.model.adaptation.gain_ratio;
+    let adapts = "the law does not adapt";
+    let or = |value: Option<f64>| value.map_or_else(|| adapts.to_owned(), digits);
+    let mut table = Grid::new("Adaptation of a leg", &["what", "value"]);
+    for (what, value) in [
+        ("level weight of the spec", digits(compiled.model.adaptation.level_weight)),
+        ("largest stable level weight, drift weight in proportion", or(margins.largest_level_weight)),
+        ("spectral radius of the sampled leg over gain_ratio", format!("{:.5}", margins.spectral_radius)),
+        ("largest λ without leg dynamics (AII.18, AII.19)", or(margins.static_gain_limit)),
+    ] {
+        table.push(vec![what.to_owned(), value]);
+    }
+    let Some(limit) = margins.static_gain_limit else {
+        return section.lead("The law does not adapt: there is no loop that could be unstable.").table(table);
+    };
+    let end = if limit > high { limit } else { high };
+    let rows = Rows {
+        id: "leg-margin".to_owned(),
+        title: "How far the adaptation of a leg is from instability".to_owned(),
+        data: json!({
+            "scale": "log", "range": [if low < 0.85 { low } else { 0.85 }, 1.3 * end], "prefix": "×", "ticks": [1, 2, 3, 5, 10, 20, 50, 100], "left": 100, "right": 90,
+            "rows": [{ "name": "λ", "line": [high, limit], "marks": [{ "m": "dot", "x": limit }], "note": format!("{limit:.2}"), "box": true }],
+            "band": { "from": low, "to": high, "text": format!("declared {low}–{high}") },
+            "label": "λ up to which the adaptation of a leg is stable",
+        }),
+        numbers: table.clone(),
+    };
+    section
+        .lead(&format!("Legs {limit:.2} times as strong as declared are still stable, without leg dynamics; the sampled leg has spectral radius {:.4}.", margins.spectral_radius))
+        .part(Part::Rows(rows))
+        .table(table)
+}

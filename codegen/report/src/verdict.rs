@@ -1,0 +1,440 @@
+//! What is seen first: the verdict, the figures that decide with their limits, the findings.
+
+use std::fmt::Write as _;
+
+use specgen_language::diagnostic::{Diagnostic, Place, Severity, to_json};
+use specgen_language::spec::SpecSource;
+use specgen_studies::verdict::{Answer, Figure, Mark, Subject, Verdict};
+
+use super::page::marked;
+use super::plot::escaped;
+
+/// Width of a limit bar, px; the limit is a line at four fifths of it.
+const BAR: f64 = 76.0;
+const LIMIT: f64 = 0.8 * BAR;
+/// From here on a figure is near its limit.
+const TIGHT: f64 = 0.9;
+/// Findings that are seen at once; the others are in their section.
+const SEEN: usize = 3;
+
+/// A mark by its name: `ok`, `warning`, `error`, `none`, `note`.
+#[must_use]
+pub fn mark(name: &str) -> String {
+    let label = match name {
+        "ok" => "holds",
+        "none" => "not judged",
+        other => other,
+    };
+    format!("<svg class=\"mark\" role=\"img\" aria-label=\"{label}\"><use href=\"#m-{name}\"/></svg>")
+}
+
+fn mark_of(figure: &Figure) -> &'static str {
+    match figure.mark {
+        Mark::Within => "ok",
+        Mark::Beyond => "error",
+        Mark::NoLimit => "none",
+    }
+}
+
+/// A number with thin spaces between thousands and a true minus.
+#[must_use]
+pub fn thin(text: &str) -> String {
+    text.replace(',', "\u{2009}").replace('-', "\u{2212}")
+}
+
+/// How much of what there is a figure takes: of the limit, or the limit of it where it must be large.
+#[must_use]
+pub fn share(figure: &Figure) -> Option<f64> {
+    let limit = figure.limit.as_ref()?;
+    let share = if limit.least { limit.value / figure.value } else { figure.value / limit.value };
+    share.is_finite().then_some(share)
+}
+
+/// A row of a card: label, value against limit, bar, share, mark.
+#[must_use]
+pub fn limit_row(label: &str, figure: &Figure) -> String {
+    let Some((limit, share)) = figure.limit.as_ref().zip(share(figure)) else {
+        let text = figure.words.clone().unwrap_or_else(|| format!("{} {}", thin(&figure.value_text()), unit(figure)));
+        return text_row(label, &text, mark_of(figure));
+    };
+    let (asked, has) = if limit.least { (limit.value, figure.value) } else { (figure.value, limit.value) };
+    let decimals = decimals(asked, figure.unit);
+    let sign = if figure.subject == Subject::Reach && figure.name != "z" { "±" } else { "" };
+    let more = if figure.more { ">" } else { "" };
+    let number = |value: f64| format!("{sign}{}", grouped(value, figure.unit, decimals));
+    value_row(label, [&number(asked), &format!("{more}{}", number(has)), unit(figure)], share, mark_of(figure))
+}
+
+/// A row of a card: label, a value of another one in their unit, how much that is, the name of a mark.
+#[must_use]
+pub fn value_row(label: &str, [asked, has, unit]: [&str; 3], share: f64, mark_name: &str) -> String {
+    let percent = 100.0 * share;
+    let percent = if percent > 0.0 && percent < 0.95 { format!("{percent:.1}") } else { format!("{percent:.0}") };
+    let tight = if share >= TIGHT { " tight" } else { "" };
+    let over = if mark_name == "error" { " over" } else { "" };
+    let unit = if unit.is_empty() { String::new() } else { format!("\u{2009}{unit}") };
+    format!(
+        "<div class=\"limit{over}\"><span>{}</span><span class=\"value\">{asked} <i>of</i> {has}{unit}</span>{}<span class=\"share{tight}\">{percent}\u{2009}%</span>{}</div>\n",
+        marked(label),
+        bar(share),
+        mark(mark_name)
+    )
+}
+
+/// A row of a card that has a text instead of a bar.
+#[must_use]
+pub fn text_row(label: &str, text: &str, mark_name: &str) -> String {
+    format!(
+        "<div class=\"limit plain\"><span>{}</span><span class=\"value\">{}</span>{}</div>\n",
+        marked(label),
+        marked(text),
+        mark(mark_name)
+    )
+}
+
+/// The bar of a limit row: what is beyond the limit is hatched.
+fn bar(share: f64) -> String {
+    let inside = if share < 1.0 { share * LIMIT } else { LIMIT };
+    let beyond = if share > 1.0 { (if share < 1.25 { share * LIMIT } else { BAR }) - LIMIT } else { 0.0 };
+    let mut hatch = String::new();
+    if beyond > 0.0 {
+        let _ =
+            write!(hatch, "<rect x=\"{LIMIT}\" y=\"5\" width=\"{beyond:.1}\" height=\"8\" fill=\"var(--orange)\"/>");
+        let mut at = LIMIT + 3.0;
+        while at < LIMIT + beyond - 1.0 {
+            let _ = write!(hatch, "<path d=\"M{at:.1} 13l3-8\" stroke=\"var(--card)\" stroke-width=\"1.4\"/>");
+            at += 5.0;
+        }
+    }
+    format!(
+        "<svg width=\"{BAR}\" height=\"18\" viewBox=\"0 0 {BAR} 18\" aria-hidden=\"true\"><rect y=\"5\" width=\"{BAR}\" height=\"8\" fill=\"var(--track)\"/><rect y=\"5\" width=\"{inside:.1}\" height=\"8\" fill=\"var(--blue)\"/>{hatch}<rect x=\"{:.1}\" y=\"2\" width=\"1.5\" height=\"14\" fill=\"var(--ink)\"/></svg>",
+        LIMIT - 0.75
+    )
+}
+
+fn unit(figure: &Figure) -> &'static str {
+    match figure.unit {
+        "bytes" => "KiB",
+        "instructions" => "",
+        unit => unit,
+    }
+}
+
+fn decimals(value: f64, unit: &str) -> usize {
+    let value = if unit == "bytes" { value / 1024.0 } else { value };
+    match value {
+        _ if unit == "instructions" => 0,
+        size if size >= 99.95 => 0,
+        size if size >= 9.995 => 1,
+        _ => 2,
+    }
+}
+
+fn grouped(value: f64, unit: &str, decimals: usize) -> String {
+    let value = if unit == "bytes" { value / 1024.0 } else { value };
+    let text = format!("{value:.decimals$}");
+    if decimals > 0 || text.len() < 4 { text } else { thin(&specgen_toolchain::budget::group(value as u64)) }
+}
+
+/// A card: title, note at its right, rows.
+#[must_use]
+pub fn card(title: &str, note: &str, class: &str, content: &str) -> String {
+    format!(
+        "<div class=\"card {class}\"><div class=\"head\"><h3>{}</h3><span class=\"note\">{}</span></div>\n{content}</div>\n",
+        marked(title),
+        marked(note)
+    )
+}
+
+/// The verdict in words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sentence {
+    /// At most six words.
+    pub verdict: String,
+    /// Number, limit, consequence.
+    pub why: String,
+    /// `ok`, `none` or `error`.
+    pub mark: &'static str,
+}
+
+impl Sentence {
+    /// What a verdict says.
+    #[must_use]
+    pub fn of(verdict: &Verdict) -> Self {
+        let judged: Vec<(&Figure, f64)> =
+            verdict.figures.iter().filter_map(|figure| share(figure).map(|share| (figure, share))).collect();
+        let tightest = judged.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+        let within = verdict.figures.iter().filter(|figure| figure.mark == Mark::Within).count();
+        let tight = tightest.map_or_else(String::new, |(figure, share)| {
+            format!(" Tightest: {}, {:.0}\u{2009}% used.", said(figure), 100.0 * share)
+        });
+        let errors = verdict.figures.iter().any(|figure| figure.subject == Subject::Tracking && figure.limit.is_some());
+        let open = if errors { "" } else { " The errors on trajectories have no limit in the spec." };
+        match verdict.answer {
+            Answer::Ready => Self {
+                verdict: "Ready to build".to_owned(),
+                why: format!("All {within} limits hold.{tight}{open}"),
+                mark: "ok",
+            },
+            Answer::NotMeasured => Self {
+                verdict: "Ready, not measured".to_owned(),
+                why: format!(
+                    "All {within} limits looked at hold.{tight} Time, memory and bits: {}.",
+                    verdict.unmeasured.as_deref().unwrap_or("not measured")
+                ),
+                mark: "none",
+            },
+            Answer::NotReady => {
+                let beyond: Vec<&Figure> = verdict.beyond().collect();
+                let first = beyond.first().map_or_else(String::new, |figure| match figure.subject {
+                    Subject::Tracking => "error above its limit".to_owned(),
+                    Subject::Time | Subject::Memory => format!("{} over budget", figure.name),
+                    _ => said(figure),
+                });
+                let why = beyond.iter().map(|figure| match (&figure.words, &figure.limit) {
+                    (Some(words), _) => format!("{words}."),
+                    (None, Some(limit)) => format!(
+                        "{}: {} against {}\u{2009}{} of {}.",
+                        said(figure),
+                        thin(&figure.value_text()),
+                        thin(&figure.limit_text()),
+                        unit(figure),
+                        limit.from
+                    ),
+                    (None, None) => String::new(),
+                });
+                Self {
+                    verdict: format!("Not safe to build: {first}"),
+                    why: why.map(|text| capital(&text)).collect::<Vec<_>>().join(" "),
+                    mark: "error",
+                }
+            }
+        }
+    }
+
+    /// The card, with how many errors, warnings and notes there are.
+    #[must_use]
+    pub fn html(&self, findings: &[Diagnostic]) -> String {
+        let count = |severity: Severity, name: &str, word: &str| {
+            let number = findings.iter().filter(|finding| finding.severity == severity).count();
+            let zero = if number == 0 { " class=\"zero\"" } else { "" };
+            let sign = if name == "error" && number == 0 { "ok" } else { name };
+            let s = if number == 1 { "" } else { "s" };
+            format!("<span{zero}>{}<span><b>{number}</b> {word}{s}</span></span>", mark(sign))
+        };
+        format!(
+            "<div id=\"verdict\" class=\"card verdict{}\">{}<div><h1>{}</h1><p>{}</p></div><div class=\"counts\">{}{}{}</div></div>\n",
+            if self.mark == "error" { " refused" } else { "" },
+            mark(self.mark),
+            marked(&self.verdict),
+            marked(&self.why),
+            count(Severity::Error, "error", "error"),
+            count(Severity::Warning, "warning", "warning"),
+            count(Severity::Note, "note", "note"),
+        )
+    }
+}
+
+fn said(figure: &Figure) -> String {
+    match figure.subject {
+        Subject::Reach => format!("reach in {}", figure.name),
+        Subject::Margins => format!("margin of {}", figure.name),
+        Subject::Tracking => format!("error of {}", figure.name),
+        Subject::Bits => "bits differ".to_owned(),
+        _ => figure.name.clone(),
+    }
+}
+
+/// Rows of a subject.
+#[must_use]
+pub fn rows(verdict: &Verdict, subjects: &[Subject]) -> String {
+    let of = |figure: &&Figure| subjects.contains(&figure.subject);
+    verdict.figures.iter().filter(of).map(|figure| limit_row(&figure.name, figure)).collect()
+}
+
+/// On a phone: the tightest figure of each group.
+#[must_use]
+pub fn tightest(verdict: &Verdict, error: &str) -> String {
+    let mut content = String::new();
+    for (subject, prefix) in
+        [(Subject::Reach, "reach "), (Subject::Time, ""), (Subject::Memory, ""), (Subject::Margins, "margin ")]
+    {
+        let all = verdict.figures.iter().filter(|figure| figure.subject == subject);
+        let found =
+            all.filter_map(|figure| share(figure).map(|share| (figure, share))).max_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((figure, _)) = found {
+            content += &limit_row(&format!("{prefix}{}", figure.name), figure);
+        }
+    }
+    for figure in verdict.figures.iter().filter(|figure| figure.subject == Subject::Bits) {
+        let good = figure.mark == Mark::Within;
+        content += &text_row(
+            "bits",
+            if good { "equal on host and microcontroller" } else { "DIFFER from the host" },
+            mark_of(figure),
+        );
+    }
+    let judged = verdict.figures.iter().filter(|figure| figure.subject == Subject::Tracking && figure.limit.is_some());
+    let worst =
+        judged.filter_map(|figure| share(figure).map(|share| (figure, share))).max_by(|a, b| a.1.total_cmp(&b.1));
+    content += &match worst {
+        Some((figure, _)) => limit_row("error", figure),
+        None => text_row("error", error, "none"),
+    };
+    card("Tightest of each group", "used of limit", "tightest", &content)
+}
+
+/// Findings, one row a code, places listed.
+#[must_use]
+pub fn findings(title: &str, note: &str, findings: &[Diagnostic], source: &SpecSource) -> String {
+    let list = to_json(findings, source);
+    let all: Vec<&serde_json::Value> = list.as_array().into_iter().flatten().collect();
+    let mut codes: Vec<&str> = Vec::new();
+    for finding in findings {
+        if !codes.contains(&finding.code) {
+            codes.push(finding.code);
+        }
+    }
+    let worst =
+        |code: &str| findings.iter().filter(|finding| finding.code == code).map(|finding| finding.severity).max();
+    codes.sort_by_key(|code| std::cmp::Reverse(worst(code)));
+    let mut content = String::new();
+    for (row, code) in codes.iter().enumerate() {
+        let same: Vec<(&Diagnostic, &serde_json::Value)> =
+            findings.iter().zip(all.iter().copied()).filter(|(finding, _)| finding.code == *code).collect();
+        let Some((first, _)) = same.first() else { continue };
+        let name = match first.severity {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+            Severity::Note => "note",
+        };
+        let places: Vec<String> = same
+            .iter()
+            .filter_map(|(_, json)| Some((json["file"].as_str()?, json["line"].as_u64())))
+            .enumerate()
+            .map(|(k, (file, line))| {
+                let file = if k == 0 { file.rsplit(['/', '\\']).next().unwrap_or(file) } else { "" };
+                line.map_or_else(|| file.to_owned(), |line| format!("{file}:{line}"))
+            })
+            .collect();
+        let count =
+            if same.len() > 1 { format!("<div class=\"places\">{} places</div>", same.len()) } else { String::new() };
+        let more = if same.len() > 1 { format!(" And {} more.", same.len() - 1) } else { String::new() };
+        let _ = writeln!(
+            content,
+            "<div class=\"finding{}\">{}<div><b>{code}</b>{count}</div><div>{}{more} <code class=\"soft\">{}</code></div><div><b>Do:</b> {}</div></div>",
+            if row < SEEN { "" } else { " more" },
+            mark(name),
+            marked(&sentence(&first.message)),
+            escaped(&places.join(", ")),
+            marked(&pretty(&first.help)),
+        );
+    }
+    if codes.is_empty() {
+        content.push_str(&text_row("", "none: no error, no warning, no note", "ok"));
+    }
+    let hidden = codes.len().saturating_sub(SEEN);
+    let note = if hidden > 0 { format!("{note} · {hidden} more in the section Findings") } else { note.to_owned() };
+    card(title, &note, "all", &content)
+}
+
+/// The source of the first error: its line with neighbours, the word underlined, the line that would do.
+#[must_use]
+pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> String {
+    let Some(first) = findings.iter().find(|finding| finding.severity == Severity::Error) else { return String::new() };
+    let title = specgen_language::diagnostic::codes::REGISTRY
+        .iter()
+        .find(|code| code.id == first.code)
+        .map_or((String::new(), String::new()), |code| (code.title.to_owned(), code.explanation.to_owned()));
+    let mut content = String::new();
+    let mut place = String::new();
+    let mut fix = None;
+    if let Place::Spec(span) = &first.place {
+        let list = to_json(std::slice::from_ref(first), source);
+        let line = list[0]["line"].as_u64().unwrap_or(1) as usize;
+        let name = source.display_name.rsplit(['/', '\\']).next().unwrap_or_default();
+        place = format!("{name}, line {line}, column {}", list[0]["column"]);
+        let lines: Vec<&str> = source.text.lines().collect();
+        let start = source.text[..span.start.min(source.text.len())].rfind('\n').map_or(0, |at| at + 1);
+        content.push_str("<div class=\"source\" tabindex=\"0\">");
+        for number in line.saturating_sub(1).max(1)..=(line + 1).min(lines.len()) {
+            let text = lines.get(number - 1).copied().unwrap_or_default();
+            if number != line {
+                let _ = writeln!(content, "<div><b>{number}</b><span>{}</span></div>", escaped(text));
+                continue;
+            }
+            let cut = |at: usize| {
+                let mut at = at.saturating_sub(start).min(text.len());
+                while !text.is_char_boundary(at) {
+                    at -= 1;
+                }
+                at
+            };
+            let (from, to) = (cut(span.start), cut(span.end));
+            let _ = writeln!(
+                content,
+                "<div class=\"bad\"><b>{number}</b><span>{}<u>{}</u>{}</span></div>",
+                escaped(&text[..from]),
+                escaped(&text[from..to]),
+                escaped(&text[to..])
+            );
+            if let Some(replacement) = first.replacement.as_ref().filter(|_| accepted) {
+                let line = format!("{}{replacement}{}", &text[..from], &text[to..]);
+                let _ = writeln!(
+                    content,
+                    "<div class=\"fix\"><b>+</b><span>{}<strong>{}</strong>{}   # checked: accepted</span></div>",
+                    escaped(&text[..from]),
+                    escaped(replacement),
+                    escaped(&text[to..])
+                );
+                fix = Some(line);
+            }
+        }
+        content.push_str("</div>\n");
+    } else if let Place::File { path, line } = &first.place {
+        place = line.map_or_else(|| path.clone(), |line| format!("{path}, line {line}"));
+    }
+    let copy = fix.map_or_else(String::new, |line| {
+        format!("<button type=\"button\" data-copy=\"{}\">Copy line</button>", escaped(line.trim()))
+    });
+    let _ = write!(
+        content,
+        "<p>{}</p><div class=\"do\"><span><b>Do:</b> {}</span><span>{copy}<button type=\"button\" data-toggle=\"explain\">Explain {}</button></span></div><p id=\"explain\" class=\"soft\" hidden>{}</p>\n",
+        marked(&sentence(&first.message)),
+        marked(&pretty(&first.help)),
+        first.code,
+        marked(&title.1)
+    );
+    format!(
+        "<div class=\"card wide\"><div class=\"head\">{}<h2>{} {}</h2><span class=\"note\">{}</span></div>\n{content}</div>\n",
+        mark("error"),
+        first.code,
+        marked(&capital(&title.0)),
+        escaped(&place)
+    )
+}
+
+/// A message in the letters of the page: its units are typed, its minus is a hyphen.
+fn pretty(text: &str) -> String {
+    let mut text = text.to_owned();
+    for axis in ["x", "y", "z"] {
+        text = text.replace(&format!("theta_{axis}"), &format!("θ{axis}"));
+    }
+    for (typed, shown) in [(" um", "\u{2009}µm"), (" urad", "\u{2009}µrad"), (" us", "\u{2009}µs"), (" -", " \u{2212}")]
+    {
+        text = text.replace(typed, shown);
+    }
+    text
+}
+
+/// A message as a sentence of the page.
+#[must_use]
+pub fn sentence(text: &str) -> String {
+    let text = capital(&pretty(text));
+    if text.ends_with(['.', '!', '?']) { text } else { format!("{text}.") }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
