@@ -121,9 +121,9 @@ fn error_card(verdict: &Verdict, errors: Errors) -> Vec<Part> {
         many => format!("The tightest of {many} limits of requirements.tracking. "),
     };
     let sign = if judged.is_empty() { mark("none") } else { String::new() };
-    let _ = write!(
+    let _ = writeln!(
         content,
-        "<p class=\"legend\" style=\"display:flex;gap:4px\">{sign}<span>{open}{}</span></p></div>\n",
+        "<p class=\"legend\" style=\"display:flex;gap:4px\">{sign}<span>{open}{}</span></p></div>",
         marked(&errors.note)
     );
     parts.push(Part::Html(content));

@@ -195,7 +195,7 @@ pub fn lines(model: &Model, noise: Option<&[f64; 6]>, all: &[Followed], turning:
             of().filter(|one| one.run.is_none()).map(|one| format!("{} refused", one.speed())).collect();
         let limit = model.requirements.tracking.iter().find_map(|limit| {
             let holds = limit.trajectory.as_ref().is_none_or(|for_| for_ == name);
-            holds.then(|| if turning { limit.rotation } else { limit.translation }).flatten()
+            holds.then_some(if turning { limit.rotation } else { limit.translation }).flatten()
         });
         lines.push(Line {
             name: name.to_owned(),
@@ -276,7 +276,7 @@ pub fn section(all: &[Followed], law: &str, interval: f64, corners: bool, comman
     let hardest = |one: &&Followed| one.rms().map_or(-1.0, |rms| norm(&rms, false));
     let first = all.iter().max_by(|a, b| hardest(a).total_cmp(&hardest(b))).map(|one| one.name.clone());
     let mut ordered: Vec<&Followed> = all.iter().collect();
-    ordered.sort_by_key(|one| (Some(&one.name) != first.as_ref(), !(Some(&one.name) == first.as_ref() && !one.own)));
+    ordered.sort_by_key(|one| (Some(&one.name) != first.as_ref(), Some(&one.name) != first.as_ref() || one.own));
     let mut refused = Vec::new();
     for one in ordered {
         let speed = one.speed();

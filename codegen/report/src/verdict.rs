@@ -397,9 +397,9 @@ pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> S
     let copy = fix.map_or_else(String::new, |line| {
         format!("<button type=\"button\" data-copy=\"{}\">Copy line</button>", escaped(line.trim()))
     });
-    let _ = write!(
+    let _ = writeln!(
         content,
-        "<p>{}</p><div class=\"do\"><span><b>Do:</b> {}</span><span>{copy}<button type=\"button\" data-toggle=\"explain\">Explain {}</button></span></div><p id=\"explain\" class=\"soft\" hidden>{}</p>\n",
+        "<p>{}</p><div class=\"do\"><span><b>Do:</b> {}</span><span>{copy}<button type=\"button\" data-toggle=\"explain\">Explain {}</button></span></div><p id=\"explain\" class=\"soft\" hidden>{}</p>",
         marked(&sentence(&first.message)),
         marked(&pretty(&first.help)),
         first.code,

@@ -102,9 +102,8 @@ Examples:
 pub const REPORT: &str = "\
 Examples:
   specgen report legs.toml -o legs.html --no-target   # simulated runs, findings
-  specgen report platform.toml   # with time, memory, bits: platform-report.html
-  specgen report platform.toml --paper --no-target
-      # (minutes) and the paper's figures on a second page";
+  specgen report platform.toml   # (minutes) with time, memory, bits
+  specgen report platform.toml --paper --no-target  # (minutes) 2nd page";
 
 pub const REPRODUCE: &str = "\
 Examples:

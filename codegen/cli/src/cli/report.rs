@@ -179,8 +179,8 @@ fn refused(arguments: &Arguments, refused: Refused, ui: &mut Ui) -> Result<(), F
     let text = Section::new("text", "Findings as text", "").lines(&lines);
     let page = write(&output, &head, &first, &[], &[text])?;
     ui.findings(refused.source.as_ref(), &refused.findings);
-    let message = format!("{} is refused; {} says why", source.display_name, output.display());
-    ui.judged(&page, Some(message))
+    ui.progress(page.text().trim_end());
+    Err(Failure::Gate(format!("{} is refused; {} says why", source.display_name, output.display())))
 }
 
 /// Whether the spec with the replacement of its first error has one error less.

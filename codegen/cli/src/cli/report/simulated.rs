@@ -91,11 +91,11 @@ fn of_platform(
         (unit, tracking::dumbbell(&lines, [speed(true), speed(false)], unit))
     };
     let first = all.iter().find(|one| one.run.is_some());
-    let said = first.and_then(|first| {
+    let said = first.map(|first| {
         let of = all.iter().filter(|one| one.name == first.name);
         let each =
             of.filter_map(|one| Some(format!("{}\u{2009}nm at {}", short(norm(&one.rms()?, false)), one.speed())));
-        Some(each.collect::<Vec<_>>().join(", "))
+        each.collect::<Vec<_>>().join(", ")
     });
     let errors = Errors {
         pictures: vec![picture(false, "nm"), picture(true, "nrad")],

@@ -66,6 +66,40 @@ pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
     Some(())
 }
 
+/// A limit is for a trajectory that there is, and limits something.
+pub(super) fn limits(f: &Fields, findings: &mut Findings) -> Option<()> {
+    let names: Vec<&str> =
+        (0..f.count("trajectory")).filter_map(|index| f.name(&format!("trajectory[{index}].name"))).collect();
+    for index in 0..f.count("requirements.tracking") {
+        let table = format!("requirements.tracking[{index}]");
+        let path = keys::join(&table, "trajectory");
+        if let Some(name) = f.name(&path)
+            && !names.contains(&name)
+        {
+            let known = if names.is_empty() { "no [[trajectory]]".to_owned() } else { names.join(", ") };
+            findings.add(
+                codes::UNKNOWN_CHOICE,
+                &path,
+                f.span(&path),
+                format!("the spec has {known}, but not \"{name}\""),
+                "name one of its [[trajectory]] tables, or take the key out: then the limit is for all of them"
+                    .to_owned(),
+            );
+        }
+        let given = |key: &str| f.given(&keys::join(&table, key));
+        if !["translation", "rotation", "axes"].iter().any(|key| given(key)) {
+            findings.add(
+                codes::MISSING_KEY,
+                &keys::join(&table, "translation"),
+                f.table(&table).unwrap_or(0..0),
+                format!("`{table}` limits nothing"),
+                "write, in [[requirements.tracking]]: translation = \"50 nm\", rotation or axes".to_owned(),
+            );
+        }
+    }
+    Some(())
+}
+
 pub(super) fn not_too_many(f: &Fields, findings: &mut Findings) -> Option<()> {
     let count = f.count("trajectory");
     if count > MAX_TABLES {
