@@ -23,7 +23,7 @@ pub use hysteresis::{Adaptation, AdaptationMode, Hysteresis, LARGEST_RUN_INTERVA
 pub use mcu::{Mcu, Part};
 pub use mechanics::{Geometry, LARGEST_TRAVEL, LARGEST_TURN, LegBody, RigidBody, Workspace};
 pub use supervisor::{Robust, Supervisor};
-pub use target::{Budget, ControllerOptions, Lint, Requirements, Scalar, SetpointKind, Target, Timing};
+pub use target::{Budget, ControllerOptions, Lint, Requirements, Scalar, SetpointKind, Target, Timing, TrackingLimit};
 pub(crate) use task_space::unit;
 pub use task_space::{
     ControlMode, Environment, Frames, Gains, Interaction, LARGEST_GAIN, PaperPath, Probe, SetpointRules, TaskSpace,
@@ -54,6 +54,7 @@ pub const SECTIONS: &[Section] = &[
     Workspace::SECTION,
     ControllerOptions::SECTION,
     Requirements::SECTION,
+    TrackingLimit::SECTION,
     Supervisor::SECTION,
     Target::SECTION,
     Budget::SECTION,

@@ -1,7 +1,13 @@
 //! What is emitted, at which rate it runs, on what, and within which limits.
 
 use super::Mcu;
+use crate::keys::MAX_TABLES;
 use crate::keys::declare::*;
+
+const ERRORS: &[Item] = &six(
+    item(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"),
+    item(Dimension::ANGLE, Range::closed(1e-12, 1e-1), "nrad"),
+);
 
 const BYTES: Shape = one(Dimension::MEMORY, Range::closed(1.0, 1_099_511_627_776.0), "KiB");
 
@@ -52,6 +58,30 @@ section! {
     "requirements" ["goals", "specification"], Optional => Requirements {
         /// Finest displacement that matters. No converter code may move a leg by more, nor half a code on every leg the platform along an axis.
         precision: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "" ["resolution", "accuracy"], "50 nm";
+    }
+    and |fields, _table| {
+        /// How well trajectories are to be followed.
+        tracking: Vec<TrackingLimit> = (0..fields.count("requirements.tracking"))
+            .map(|index| TrackingLimit::read(fields, &format!("requirements.tracking[{index}]")))
+            .collect::<Option<_>>()?;
+    }
+}
+
+section! {
+    /// How well trajectories are to be followed: largest rms error of the true pose. `specgen report` judges the simulated run by it; without one the error is shown and not judged.
+    ///
+    /// In m and rad.
+    "requirements.tracking", Repeated(0, MAX_TABLES) => TrackingLimit {
+        /// The trajectory that it holds for; every one without it.
+        trajectory: Option<String> = NAME, Optional, "", "case-1";
+        /// The operating frequency that it holds for; that of the trajectory without it.
+        frequency: Option<f64> = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Optional, "", "10 Hz";
+        /// Largest norm of the errors of x, y and z, rms.
+        translation: Option<f64> = one(Dimension::LENGTH, Range::closed(1e-12, 1e-3), "nm"), Optional, "", "50 nm";
+        /// Largest norm of the errors of θx, θy and θz, rms.
+        rotation: Option<f64> = one(Dimension::ANGLE, Range::closed(1e-12, 1e-1), "nrad"), Optional, "", "500 nrad";
+        /// Largest error of each axis, rms.
+        axes: Option<[f64; 6]> = list(ERRORS), Optional, "", ["30 nm", "30 nm", "10 nm", "200 nrad", "200 nrad", "200 nrad"];
     }
 }
 

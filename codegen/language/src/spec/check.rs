@@ -62,6 +62,7 @@ const CHECKS: &[Check] = &[
     lint::reasons,
     trajectories::keys_of_kind,
     trajectories::names_differ,
+    trajectories::limits,
     trajectories::not_too_many,
 ];
 
