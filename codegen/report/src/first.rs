@@ -256,7 +256,7 @@ pub fn refused(text: &SpecSource, all: &[Diagnostic], model: Option<&Model>, acc
     let errors: Vec<&Diagnostic> = all.iter().filter(|finding| finding.severity == Severity::Error).collect();
     let Some(first) = errors.first() else { return Vec::new() };
     let title =
-        codes::REGISTRY.iter().find(|code| code.id == first.code).map_or("the spec is refused", |code| code.title);
+        codes::REGISTRY.iter().find(|code| code.id == first.code).map_or("the spec is refused", |code| code.title());
     let measured = model.and_then(|model| Some((model, measure(model)?)));
     let beyond = measured.as_ref().and_then(|(_, reach)| {
         (0..6).map(|axis| (axis, reach_figure(reach, axis))).find(|(_, figure)| figure.mark == Mark::Beyond)

@@ -345,7 +345,7 @@ pub fn source(findings: &[Diagnostic], source: &SpecSource, accepted: bool) -> S
     let title = specgen_language::diagnostic::codes::REGISTRY
         .iter()
         .find(|code| code.id == first.code)
-        .map_or((String::new(), String::new()), |code| (code.title.to_owned(), code.explanation.to_owned()));
+        .map_or((String::new(), String::new()), |code| (code.title().to_owned(), code.explanation()));
     let mut content = String::new();
     let mut place = String::new();
     let mut fix = None;

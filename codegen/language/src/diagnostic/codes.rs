@@ -34,6 +34,14 @@ impl Code {
         let heading = self.page.lines().next().unwrap_or_default();
         heading.split_once(": ").map_or(heading, |(_, title)| title)
     }
+
+    /// What is checked and why it matters: the text of the page above its example, without headings, as one line.
+    #[must_use]
+    pub fn explanation(self) -> String {
+        let text = self.page.split("\n## Example").next().unwrap_or_default();
+        let lines = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
+        lines.collect::<Vec<_>>().join(" ")
+    }
 }
 
 /// A [`Diagnostic::code`](super::Diagnostic::code) beside the constant.

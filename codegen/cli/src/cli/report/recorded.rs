@@ -39,7 +39,7 @@ pub fn read(path: &Path, compiled: &Compiled, ui: &Ui) -> Result<Run, Failure> {
     ui.progress("running the record again");
     let mut blocks: Vec<Block> = Vec::new();
     let header = reader.header().clone();
-    let found = record::replay(&mut reader, &mut machine, |_, block| blocks.push(block.clone()))
+    let found = record::replay(&mut reader, &mut machine, |_, block, _| blocks.push(block.clone()))
         .map_err(|error| refuse(&error))?;
     if found.ticks == 0 {
         return Err(refuse(&"there is no tick in it; record again"));
