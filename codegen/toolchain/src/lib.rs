@@ -18,6 +18,7 @@ pub mod cache;
 pub mod callgraph;
 pub mod checks;
 pub mod emulator;
+pub mod engine;
 pub mod error;
 pub mod host;
 pub mod image;

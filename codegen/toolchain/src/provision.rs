@@ -13,8 +13,9 @@ use super::error::TargetError;
 use super::places::Places;
 use super::process::{self, clean_command};
 use super::toolchain::{self, Toolchain};
-use super::{TRIPLE, Tools, unpacked};
+use super::{TRIPLE, Tools, engine, unpacked};
 use specgen_language::interrupt::Scratch;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Longest time for rustup: it downloads some megabytes.
@@ -67,6 +68,21 @@ fn emulator(places: &Places, say: &mut dyn FnMut(&str)) -> Result<Emulator, Targ
     }
     let found = search.debian(&[emulator::PROGRAM], &find);
     found.ok_or_else(|| search.failed("QEMU for ARM", emulator::install_command()))
+}
+
+/// Brings the engine of the emulated boards and returns where it is. Not among [`Tools`]: only this repository's tests need it.
+///
+/// # Errors
+/// As [`provision`].
+pub fn engine(say: &mut dyn FnMut(&str)) -> Result<PathBuf, TargetError> {
+    let places = Places::here();
+    let find = || engine::find_in(&places);
+    let mut search = Search { places: &places, say, tried: Vec::new() };
+    if let Some(found) = search.already(&find) {
+        return Ok(found);
+    }
+    let found = search.debian(&[engine::PACKAGE], &find);
+    found.ok_or_else(|| search.failed("the Unicorn engine", engine::install_command()))
 }
 
 /// What looks for a tool; it alone judges whether a way has led there.

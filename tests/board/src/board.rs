@@ -1,0 +1,504 @@
+//! The board: every device at its address, and what the pins do to the converters.
+
+use crate::ad5686r::Ad5686r;
+use crate::ad7606::Ad7606;
+use crate::cost::Cost;
+use crate::dma::Dma;
+use crate::fault::Fault;
+use crate::gpio::{self, Gpio};
+use crate::line::Line;
+use crate::meter::Meter;
+use crate::nvic::Nvic;
+use crate::part::{DMA_INTERRUPTS, Part, Pin, SPI1, SPI3, TIM2, TIM2_INTERRUPT};
+use crate::plant::Plant;
+use crate::rcc::{self, Clocks};
+use crate::spi::Spi;
+use crate::store::{self, Store};
+use crate::time::{MICROSECOND, Time, cycle, microseconds};
+use crate::timer::Timer;
+use crate::unicorn::{Core, Guest, Register};
+use crate::usart::Usart;
+use crate::violations::Violations;
+use crate::watchdog::Watchdog;
+
+/// How often the line and the commands are looked at.
+const LOOK: Time = 100 * MICROSECOND;
+const WFI: u32 = 0xbf30;
+const CYCCNT: u32 = 0xe000_1004;
+
+/// Why the core stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// An exception is due before the instruction at this address.
+    Exception { number: usize, at: u32 },
+    /// It came to the address that means the end of an exception.
+    Return,
+    /// It sleeps at this address.
+    Sleep { at: u32 },
+    /// A reset.
+    Reset,
+    /// Line and commands are to be looked at, before the instruction at this address.
+    Look { at: u32 },
+}
+
+/// Devices that a reset sets back.
+struct Devices {
+    nvic: Nvic,
+    store: Store,
+    gpio: Gpio,
+    timer: Timer,
+    /// SPI1 of the ADC, SPI3 of the DACs.
+    spi: [Spi; 2],
+    dma: Dma,
+    usart: Usart,
+    watchdog: Watchdog,
+    clocks: Clocks,
+}
+
+impl Devices {
+    fn new(part: &Part) -> Self {
+        let mut store = Store::default();
+        // HSI is on.
+        store.set(part.rcc, 1);
+        let clocks = rcc::clocks(part.family, part.rcc, &store);
+        Self {
+            nvic: Nvic::new(),
+            store,
+            gpio: Gpio::default(),
+            timer: Timer::default(),
+            spi: [Spi::new(part.family), Spi::new(part.family)],
+            dma: Dma::default(),
+            usart: Usart::new(part.family, part.usart),
+            watchdog: Watchdog::new(),
+            clocks,
+        }
+    }
+}
+
+/// Pins that lead to a part, and how they stand: CONVST, CS, RESET of the ADC, both SYNC, LDAC, enable.
+#[derive(Clone, Copy, PartialEq)]
+struct Levels {
+    convst: bool,
+    select: bool,
+    reset: bool,
+    sync: [bool; 2],
+    ldac: bool,
+    enable: bool,
+}
+
+pub struct Board {
+    pub part: &'static Part,
+    devices: Devices,
+    /// From `part.flash` on.
+    flash: Vec<u8>,
+    pub now: Time,
+    /// Of the core.
+    cycle: Time,
+    advanced: Time,
+    /// When something happens next.
+    due: Time,
+    looked: Time,
+    cost: Cost,
+    pub instructions: u64,
+    /// Instructions that still belong to an IT block.
+    conditional: u32,
+    levels: Levels,
+    pub adc: Ad7606,
+    pub dacs: [Ad5686r; 2],
+    plant: Plant,
+    /// The part whose fault stops all: an answer that never came.
+    pub broken: Option<String>,
+    bits: [u32; 2],
+    pub violations: Violations,
+    pub meter: Meter,
+    pub stop: Stop,
+    pub resets: u32,
+    /// Lowest address of the stack at an exception.
+    pub stack: u32,
+    pub faults: Vec<Fault>,
+    /// What the enable line did, and what else there is to say.
+    pub log: Vec<String>,
+    /// Registers without a model that were touched.
+    pub unmodelled: std::collections::BTreeSet<u32>,
+}
+
+impl Board {
+    /// `bits`: of the ADC and of a gauge.
+    pub fn new(part: &'static Part, flash: Vec<u8>, bits: [u32; 2], plant: Plant) -> Self {
+        let devices = Devices::new(part);
+        let levels = Levels { convst: true, select: true, reset: false, sync: [true; 2], ldac: true, enable: false };
+        let mut board = Self {
+            part,
+            cycle: cycle(devices.clocks.core),
+            devices,
+            flash,
+            now: 0,
+            advanced: 0,
+            due: 0,
+            looked: 0,
+            cost: Cost::new(part.family),
+            instructions: 0,
+            conditional: 0,
+            levels,
+            adc: Ad7606::new(bits[0]),
+            dacs: [Ad5686r::new("DAC 1"), Ad5686r::new("DAC 2")],
+            plant,
+            broken: None,
+            bits,
+            violations: Violations::default(),
+            meter: Meter::default(),
+            stop: Stop::Reset,
+            resets: 0,
+            stack: u32::MAX,
+            faults: Vec::new(),
+            log: Vec::new(),
+            unmodelled: std::collections::BTreeSet::new(),
+        };
+        board.clocked();
+        board
+    }
+
+    /// The microcontroller is reset; the converters are not.
+    pub fn reset(&mut self, why: &str) {
+        self.say(&format!("reset: {why}"));
+        self.devices = Devices::new(self.part);
+        self.resets += 1;
+        self.conditional = 0;
+        self.meter = Meter::default();
+        self.clocked();
+        self.pins();
+    }
+
+    pub fn say(&mut self, text: &str) {
+        self.log.push(format!("{:.3} ms: {text}", microseconds(self.now) / 1e3));
+    }
+
+    pub fn nvic(&mut self) -> &mut Nvic {
+        &mut self.devices.nvic
+    }
+
+    /// Whether the amplifiers are on.
+    pub fn enabled(&self) -> bool {
+        self.levels.enable
+    }
+
+    pub fn has(&self, fault: Fault) -> bool {
+        self.faults.contains(&fault)
+    }
+
+    /// Puts a fault in.
+    pub fn fail(&mut self, fault: Fault) {
+        self.say(&format!("fault {fault:?}"));
+        self.faults.push(fault);
+        match fault {
+            Fault::Adc(fault) => self.adc.fault = Some(fault),
+            Fault::Dac(fault) => self.dacs[0].fault = Some(fault),
+            Fault::Uart => self.devices.usart.damaged = true,
+            _ => {}
+        }
+    }
+
+    /// Takes all faults away.
+    pub fn heal(&mut self) {
+        self.say("healed");
+        self.faults.clear();
+        self.adc.fault = None;
+        self.dacs[0].fault = None;
+    }
+
+    /// The registers of the clocks changed.
+    fn clocked(&mut self) {
+        let clocks = rcc::clocks(self.part.family, self.part.rcc, &self.devices.store);
+        self.devices.clocks = clocks;
+        self.cycle = cycle(clocks.core.max(1));
+        self.devices.timer.clock(self.now, clocks.timer.max(1));
+        for (spi, hertz) in self.devices.spi.iter_mut().zip(clocks.spi) {
+            spi.clock(hertz.max(1));
+        }
+        self.devices.usart.clock(clocks.usart.max(1));
+        self.cost.clock(clocks.core);
+        self.schedule();
+    }
+
+    /// Moves line bytes; true once per look.
+    pub fn look(&mut self, line: Option<&mut Line>) {
+        self.looked = self.now;
+        let usart = &mut self.devices.usart;
+        if let Some(line) = line {
+            line.exchange(&mut usart.incoming, &mut usart.outgoing);
+        }
+        self.schedule();
+    }
+
+    /// Whether line and commands are to be looked at.
+    pub fn due_look(&self) -> bool {
+        self.now >= self.looked + LOOK
+    }
+
+    /// The converters as at power-up.
+    pub fn power_up(&mut self) {
+        self.adc = Ad7606::new(self.bits[0]);
+        self.dacs = [Ad5686r::new("DAC 1"), Ad5686r::new("DAC 2")];
+        self.faults.clear();
+    }
+
+    /// What entering or leaving an exception takes.
+    pub fn entry(&self) -> Time {
+        self.cycle * Cost::EXCEPTION
+    }
+
+    /// The stack reached down to here.
+    pub fn lowest_stack(&mut self, address: u32) {
+        self.stack = self.stack.min(address);
+    }
+
+    /// Clocks and rate, to show.
+    pub fn clock_text(&self) -> String {
+        let Clocks { core, timer, spi, usart } = self.devices.clocks;
+        let baud = self.devices.usart.baud();
+        format!("core={core} timer={timer} spi={spi:?} usart={usart} baud={baud}")
+    }
+
+    fn schedule(&mut self) {
+        let Devices { timer, usart, watchdog, dma, .. } = &self.devices;
+        let events = [timer.next(self.advanced), usart.next(self.now, dma), watchdog.due, Some(self.looked + LOOK)];
+        self.due = events.into_iter().flatten().min().unwrap_or(Time::MAX);
+    }
+
+    /// Goes on to the next event, asleep.
+    pub fn sleep(&mut self, core: &Core<'_>) {
+        self.now = self.now.max(self.due);
+        self.advance(core);
+    }
+
+    /// What is due by now happens.
+    fn advance(&mut self, core: &Core<'_>) {
+        self.advance_timer();
+        self.devices.usart.advance(self.now, &mut self.devices.dma, core);
+        self.lines();
+        self.schedule();
+    }
+
+    fn advance_timer(&mut self) {
+        self.devices.timer.advance(self.advanced, self.now);
+        self.advanced = self.now;
+    }
+
+    /// Interrupt lines as the devices have them.
+    fn lines(&mut self) {
+        let Devices { nvic, timer, usart, dma, .. } = &mut self.devices;
+        nvic.line(TIM2_INTERRUPT, timer.line());
+        nvic.line(self.part.usart_interrupt, usart.line());
+        for (stream, interrupt) in DMA_INTERRUPTS.into_iter().enumerate() {
+            nvic.line(interrupt, dma.line(stream));
+        }
+    }
+
+    /// Whether the watchdog has bitten.
+    pub fn bitten(&self) -> bool {
+        self.devices.watchdog.due.is_some_and(|due| due <= self.now)
+    }
+
+    /// Bytes on the converters' wires.
+    fn advance_spi(&mut self) {
+        let [first, second] = &mut self.devices.spi;
+        first.advance(self.now, |byte| self.adc.exchange(byte, &mut self.violations));
+        second.advance(self.now, |byte| {
+            let [first, second] = &mut self.dacs;
+            let answers = [first, second].map(|dac| dac.exchange(byte, &mut self.violations));
+            match answers {
+                [None, None] => {
+                    self.violations.note("DAC", "SCLK without SYNC", byte.begin);
+                    0xff
+                }
+                [Some(_), Some(_)] => {
+                    self.violations.note("DAC", "both parts drive SDO", byte.begin);
+                    0xff
+                }
+                [Some(value), None] | [None, Some(value)] => value,
+            }
+        });
+    }
+
+    /// What pins that changed do.
+    fn pins(&mut self) {
+        let gpio = &self.devices.gpio;
+        let level = |pin: Pin, floating: bool| if gpio.is_output(pin) { gpio.level(pin) } else { floating };
+        let part = self.part;
+        let levels = Levels {
+            convst: level(part.convst, true),
+            select: level(part.adc_select, true),
+            reset: level(part.adc_reset, false),
+            sync: part.dac_select.map(|pin| level(pin, true)),
+            ldac: level(part.ldac, true),
+            enable: level(part.enable, false),
+        };
+        let before = std::mem::replace(&mut self.levels, levels);
+        if before == levels {
+            return;
+        }
+        let now = self.now;
+        let moving = self.devices.spi.each_ref().map(Spi::moves);
+        let Self { adc, dacs, violations, .. } = self;
+        if levels.reset != before.reset {
+            adc.reset(levels.reset, now, violations);
+        }
+        if levels.select != before.select {
+            adc.select(!levels.select, moving[0], now, violations);
+        }
+        for (dac, (after, before)) in dacs.iter_mut().zip(levels.sync.iter().zip(before.sync)) {
+            if *after != before {
+                dac.select(!after, moving[1], now, violations);
+            }
+        }
+        if levels.ldac != before.ldac {
+            dacs.iter_mut().for_each(|dac| dac.ldac(levels.ldac, now, violations));
+        }
+        if levels.convst != before.convst && adc.convst(levels.convst, now, violations) {
+            self.meter.sampled(now);
+            match self.plant.sample(now, self.bits[1]) {
+                Ok(codes) => {
+                    let reference = self.dacs[0].reference();
+                    self.adc.sample(codes.map(|code| code << (self.bits[0] - self.bits[1])), reference);
+                }
+                Err(text) => self.broken = Some(text),
+            }
+        }
+        if levels.enable != before.enable {
+            self.say(if levels.enable { "amplifiers on" } else { "amplifiers off" });
+        }
+        if !levels.ldac && before.ldac {
+            self.meter.loaded(now);
+        }
+        if levels.enable != before.enable || (!levels.ldac && before.ldac) {
+            let [a, b] = self.dacs.each_ref().map(|dac| dac.output);
+            self.plant.actuate(levels.enable, [a[0], a[1], a[2], b[0], b[1], b[2]]);
+        }
+    }
+
+    fn fetch(&self, address: u32) -> Option<u32> {
+        let at = address.checked_sub(self.part.flash)? as usize;
+        Some(u32::from(u16::from_le_bytes(self.flash.get(at..at + 2)?.try_into().ok()?)))
+    }
+}
+
+impl Guest for Board {
+    fn instruction(&mut self, core: &Core<'_>, address: u32, size: u32) -> bool {
+        if self.now >= self.due {
+            self.advance(core);
+            if self.bitten() || self.devices.nvic.reset {
+                self.stop = Stop::Reset;
+                return false;
+            }
+            if self.conditional == 0 && self.now >= self.looked + LOOK {
+                self.stop = Stop::Look { at: address };
+                return false;
+            }
+        }
+        if self.conditional > 0 {
+            self.conditional -= 1;
+        } else if self.devices.nvic.next().is_some() {
+            let masks = [Register::PRIMASK, Register::BASEPRI].map(|register| core.get(register));
+            if let Some(number) = self.devices.nvic.ready(masks[0], masks[1]) {
+                self.stop = Stop::Exception { number, at: address };
+                return false;
+            }
+        }
+        let code = self.fetch(address).unwrap_or(0);
+        if code == WFI && (self.devices.nvic.next().is_none() || self.has(Fault::Background)) {
+            self.stop = Stop::Sleep { at: address };
+            return false;
+        }
+        if code & 0xff00 == 0xbf00 && code & 0xf != 0 {
+            self.conditional = 4 - (code & 0xf).trailing_zeros();
+        }
+        self.now += self.cycle * self.cost.of(address, size, code);
+        self.instructions += 1;
+        true
+    }
+
+    fn read(&mut self, address: u32, size: u32) -> u32 {
+        self.now += self.cycle * self.cost.access(address);
+        self.advance_spi();
+        let aligned = address & !3;
+        let part = self.part;
+        let within = |base: u32, length: u32| address.wrapping_sub(base) < length;
+        let devices = &mut self.devices;
+        let word = match address {
+            CYCCNT => (self.now / self.cycle) as u32,
+            _ if Nvic::has(address) => return devices.nvic.read(address, size),
+            _ if within(part.gpio, gpio::SPAN) => {
+                devices.gpio.drive(part.busy, self.adc.busy(self.now));
+                // Closed to ground; open the pull-up is left.
+                devices.gpio.drive(part.stop, self.faults.contains(&Fault::Stop));
+                devices.gpio.read(aligned - part.gpio)
+            }
+            _ if within(TIM2, 0x400) => {
+                devices.timer.advance(self.advanced, self.now);
+                self.advanced = self.now;
+                devices.timer.read(aligned - TIM2, self.now)
+            }
+            _ if within(SPI1, 0x400) => devices.spi[0].read(aligned - SPI1),
+            _ if within(SPI3, 0x400) => devices.spi[1].read(aligned - SPI3),
+            _ if within(part.dma, 0x400) => devices.dma.read(aligned - part.dma),
+            _ if within(part.usart, 0x400) => {
+                let word = devices.usart.read(aligned - part.usart);
+                self.lines();
+                word
+            }
+            _ if within(part.watchdog, 0x400) => devices.watchdog.read(aligned - part.watchdog),
+            _ if within(part.rcc, 0x400) => rcc::read(part.family, aligned - part.rcc, devices.store.word(aligned)),
+            _ if within(part.pwr, 0x400) => rcc::power(part.family, aligned - part.pwr, devices.store.word(aligned)),
+            _ => {
+                self.unmodelled.insert(aligned);
+                devices.store.word(aligned)
+            }
+        };
+        store::part(word, address, size)
+    }
+
+    fn write(&mut self, address: u32, size: u32, value: u32) {
+        self.now += self.cycle * self.cost.access(address);
+        self.advance_spi();
+        self.advance_timer();
+        let aligned = address & !3;
+        let part = self.part;
+        let within = |base: u32, length: u32| address.wrapping_sub(base) < length;
+        let devices = &mut self.devices;
+        match address {
+            _ if Nvic::has(address) => {
+                devices.nvic.write(address, size, value);
+                if devices.nvic.reset {
+                    self.due = self.now;
+                }
+                return;
+            }
+            _ if within(part.gpio, gpio::SPAN) => {
+                // BSRR takes halves as they are; every other register is changed in part.
+                let offset = aligned - part.gpio;
+                let before = devices.gpio.read(offset);
+                devices.gpio.write(offset, store::merged(before, address, size, value));
+                self.pins();
+            }
+            _ if within(TIM2, 0x400) => devices.timer.write(aligned - TIM2, value, self.now),
+            _ if within(SPI1, 0x400) => devices.spi[0].write(aligned - SPI1, size, value, self.now),
+            _ if within(SPI3, 0x400) => devices.spi[1].write(aligned - SPI3, size, value, self.now),
+            _ if within(part.dma, 0x400) => devices.dma.write(aligned - part.dma, value),
+            _ if within(part.usart, 0x400) => devices.usart.write(aligned - part.usart, value),
+            _ if within(part.watchdog, 0x400) => devices.watchdog.write(aligned - part.watchdog, value, self.now),
+            _ if aligned == part.rcc + rcc::SOURCE && rcc::locked(part.family, devices.store.word(part.rcc)) => {
+                self.violations.note("RCC", "PLLCKSELR written while a PLL runs, which has no effect", self.now);
+            }
+            _ => {
+                devices.store.write(address, size, value);
+                if within(part.rcc, 0x400) {
+                    self.clocked();
+                } else if !within(part.pwr, 0x400) {
+                    self.unmodelled.insert(aligned);
+                }
+            }
+        }
+        self.lines();
+        self.schedule();
+    }
+}

@@ -1,0 +1,46 @@
+//! Faults that can be put in, by their names.
+
+use crate::{ad5686r, ad7606};
+
+/// What goes wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// The emergency contact opens.
+    Stop,
+    Adc(ad7606::Fault),
+    /// Of the first part.
+    Dac(ad5686r::Fault),
+    /// One byte of the link with a framing error.
+    Uart,
+    /// The background does not come back from its sleep.
+    Background,
+    /// The core stands still.
+    Hang,
+    /// The core takes a hard fault.
+    Hard,
+    /// The supply breaks down and comes back: a reset, with RAM that is no longer what it was.
+    BrownOut,
+}
+
+/// Names, for commands.
+pub const NAMES: [(&str, Fault); 13] = [
+    ("stop", Fault::Stop),
+    ("adc-dead", Fault::Adc(ad7606::Fault::Dead)),
+    ("adc-endless", Fault::Adc(ad7606::Fault::Endless)),
+    ("adc-shifted", Fault::Adc(ad7606::Fault::Shifted)),
+    ("adc-no-reference", Fault::Adc(ad7606::Fault::NoReference)),
+    ("adc-blank", Fault::Adc(ad7606::Fault::Blank)),
+    ("dac-stuck", Fault::Dac(ad5686r::Fault::Stuck)),
+    ("dac-mute", Fault::Dac(ad5686r::Fault::Mute)),
+    ("uart", Fault::Uart),
+    ("background", Fault::Background),
+    ("hang", Fault::Hang),
+    ("hard-fault", Fault::Hard),
+    ("brown-out", Fault::BrownOut),
+];
+
+impl Fault {
+    pub fn of(name: &str) -> Option<Self> {
+        NAMES.iter().find(|(known, _)| *known == name).map(|(_, fault)| *fault)
+    }
+}

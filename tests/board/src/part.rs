@@ -1,0 +1,97 @@
+//! What differs between the two microcontrollers and their wiring; the pins are those of `docs/bring-up.md`.
+
+/// A pin: port (0 is A) and number.
+pub type Pin = (usize, u32);
+
+/// Which family, where the registers of a peripheral differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Family {
+    H7,
+    F4,
+}
+
+/// A microcontroller with its board.
+#[derive(Debug)]
+pub struct Part {
+    pub family: Family,
+    /// Begin and length, multiples of 4 KiB.
+    pub memories: &'static [[u32; 2]],
+    pub flash: u32,
+    pub gpio: u32,
+    pub rcc: u32,
+    pub pwr: u32,
+    pub dma: u32,
+    pub usart: u32,
+    pub usart_interrupt: usize,
+    pub watchdog: u32,
+    pub convst: Pin,
+    pub busy: Pin,
+    pub adc_select: Pin,
+    pub adc_reset: Pin,
+    pub dac_select: [Pin; 2],
+    pub ldac: Pin,
+    pub enable: Pin,
+    pub stop: Pin,
+}
+
+/// The same on both.
+pub const TIM2: u32 = 0x4000_0000;
+pub const TIM2_INTERRUPT: usize = 28;
+pub const SPI1: u32 = 0x4001_3000;
+pub const SPI3: u32 = 0x4000_3c00;
+/// DMA1 streams 0 to 7.
+pub const DMA_INTERRUPTS: [usize; 8] = [11, 12, 13, 14, 15, 16, 17, 47];
+/// The crystal's clock from the ST-LINK, Hz.
+pub const HSE: u64 = 8_000_000;
+/// Where registers are.
+pub const DEVICES: [[u32; 2]; 2] = [[0x4000_0000, 0x2000_0000], [0xe000_0000, 0x10_0000]];
+
+const A: usize = 0;
+const B: usize = 1;
+const C: usize = 2;
+const D: usize = 3;
+const E: usize = 4;
+const F: usize = 5;
+const G: usize = 6;
+
+pub const H743: Part = Part {
+    family: Family::H7,
+    memories: &[[0x0800_0000, 0x20_0000], [0x2000_0000, 0x2_0000], [0x2400_0000, 0x8_0000]],
+    flash: 0x0800_0000,
+    gpio: 0x5802_0000,
+    rcc: 0x5802_4400,
+    pwr: 0x5802_4800,
+    dma: 0x4002_0000,
+    usart: 0x4000_4800,
+    usart_interrupt: 39,
+    watchdog: 0x5800_4800,
+    convst: (D, 15),
+    busy: (F, 3),
+    adc_select: (D, 14),
+    adc_reset: (E, 9),
+    dac_select: [(D, 2), (G, 2)],
+    ldac: (G, 3),
+    enable: (E, 11),
+    stop: (G, 12),
+};
+
+pub const F446: Part = Part {
+    family: Family::F4,
+    memories: &[[0x0800_0000, 0x8_0000], [0x2000_0000, 0x2_0000]],
+    flash: 0x0800_0000,
+    gpio: 0x4002_0000,
+    rcc: 0x4002_3800,
+    pwr: 0x4000_7000,
+    dma: 0x4002_6000,
+    usart: 0x4000_4400,
+    usart_interrupt: 38,
+    watchdog: 0x4000_3000,
+    convst: (C, 7),
+    busy: (A, 9),
+    adc_select: (B, 6),
+    adc_reset: (B, 10),
+    dac_select: [(D, 2), (C, 8)],
+    ldac: (C, 6),
+    enable: (C, 9),
+    stop: (A, 8),
+};
