@@ -41,6 +41,12 @@ pub fn scratch(name: &str) -> PathBuf {
     folder
 }
 
+/// Where the image of a board stays with its spec, for what runs after the tests.
+#[must_use]
+pub fn kept(board: &str) -> PathBuf {
+    builds().join("boards").join(board)
+}
+
 /// Where cargo builds images: shared, so that what they have in common is compiled once, but not by two tests at once, as cargo
 /// would let one wait for the other.
 #[must_use]

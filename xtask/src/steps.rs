@@ -7,7 +7,7 @@ use std::time::Instant;
 use crate::binaries::{self, Binary, Mode, Ran};
 use crate::judged::Trial;
 use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::{fuzz, generated, mutants, packages, setup, soak};
+use crate::{board, fuzz, generated, mutants, packages, setup, soak};
 
 /// Its own workspace, built for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
@@ -20,10 +20,21 @@ const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 /// Its own workspace, because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
 /// Workspaces of their own with lock files of their own.
-const STANDING_ALONE: [&str; 7] = [FIRMWARE, REAL_TIME, SCHEMA, fuzz::MANIFEST, LOOM, BOARDS[0], BOARDS[1]];
+const STANDING_ALONE: [&str; 8] =
+    [FIRMWARE, REAL_TIME, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM, BOARDS[0], BOARDS[1]];
 /// Every lock file there is.
-const LOCKED: [&str; 9] =
-    ["Cargo.toml", FIRMWARE, REAL_TIME, SCHEMA, fuzz::MANIFEST, LOOM, BOARDS[0], BOARDS[1], LINK_PROOF];
+const LOCKED: [&str; 10] = [
+    "Cargo.toml",
+    FIRMWARE,
+    REAL_TIME,
+    SCHEMA,
+    fuzz::MANIFEST,
+    board::MANIFEST,
+    LOOM,
+    BOARDS[0],
+    BOARDS[1],
+    LINK_PROOF,
+];
 /// Its own workspace, built by a test.
 const LINK_PROOF: &str = "firmware/link/tests/proof/Cargo.toml";
 /// Its own workspace, because of its dependencies too.
@@ -68,12 +79,13 @@ pub fn setup() -> ExitCode {
 
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
-    let mut report = Report::new(10 + LOCKED.len());
+    let mut report = Report::new(11 + LOCKED.len());
     report.step("cross compiler and QEMU", setup::microcontroller);
     let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
     report.step("formatting", || formatting(root));
     let binaries = compiled(root, &mut report);
     report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
+    report.step("images on the emulated board", || board::short(root));
     report.step("examples in the documentation", || binaries::examples(root));
     report.step("lints", || lints(root));
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
@@ -92,7 +104,7 @@ pub fn test(root: &Path) -> ExitCode {
 
 /// `cargo xtask soak`
 pub fn soak(root: &Path) -> ExitCode {
-    let mut report = Report::new(10);
+    let mut report = Report::new(11);
     report.step("cross compiler and QEMU", setup::microcontroller);
     report.step("known defects of packages", || packages::advisories(root, &LOCKED));
     report.step("published schema", || PUBLISHED_SCHEMA.run(root));
@@ -106,6 +118,7 @@ pub fn soak(root: &Path) -> ExitCode {
         binaries::test(root, &binaries, Mode { soak: true, ..Mode::default() }, &mut ran)
     });
     let took = start.elapsed();
+    report.step("images on the emulated board, and faults", || board::long(root));
     report.step("mutants", || mutants::run(root, None));
     let good = !report.has_failed();
     report.step("record of the soak", || soak::write(root, &ran, took, good));
@@ -168,8 +181,9 @@ fn formatting(root: &Path) -> Outcome {
     }
     // Not `--all`: the emitted controller is formatted by specgen itself.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
-    let excluded =
-        [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, LOOM].into_iter().chain(BOARDS);
+    let excluded = [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM]
+        .into_iter()
+        .chain(BOARDS);
     let excluded = excluded.map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
         let fix = format!("run: cargo fmt {}", scope.join(" "));
@@ -213,8 +227,8 @@ fn lints(root: &Path) -> Outcome {
     // tests.
     let own: &[&str] = &["--workspace", "--all-targets"];
     // Into the same folder: most of its dependencies are those of the workspace.
-    let alone = ["--manifest-path", REAL_TIME, "--all-targets", "--locked", "--target-dir", "target"];
-    for scope in [own, &alone] {
+    let alone = |manifest| ["--manifest-path", manifest, "--all-targets", "--locked", "--target-dir", "target"];
+    for scope in [own, &alone(REAL_TIME), &alone(board::MANIFEST)] {
         let clippy = [&["clippy", "--release", "--quiet"], scope, &["--", "-D", "warnings"]].concat();
         let outcome = expect_success(cargo(root, &clippy), "fix what is reported above");
         if !matches!(outcome, Outcome::Passed) {

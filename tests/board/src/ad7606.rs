@@ -52,6 +52,8 @@ pub struct Ad7606 {
     given: u32,
     last: Time,
     pub fault: Option<Fault>,
+    /// It is whole again after a RESET.
+    wants_reset: bool,
     /// Rising edges of CONVST.
     pub conversions: u64,
 }
@@ -109,6 +111,17 @@ impl Ad7606 {
             violations.shorter(NAME, "RESET high", now - rose, RESET_HIGH, now);
             self.ready = Some(now + SETUP);
             self.converted = None;
+            if self.wants_reset {
+                (self.fault, self.wants_reset) = (None, false);
+            }
+        }
+    }
+
+    /// What was wrong is over. A part whose conversions hung needs a RESET as well.
+    pub fn heal(&mut self) {
+        match self.fault {
+            Some(Fault::Dead | Fault::Endless) => self.wants_reset = true,
+            _ => self.fault = None,
         }
     }
 
@@ -207,6 +220,20 @@ mod tests {
         assert_eq!(bytes[..8], [0, 0, 0x80, 0, 0x7f, 0xff, 0, 1]);
         assert_eq!(bytes[14..], [0x40, 0]);
         assert!(violations.none(), "{violations:?}");
+    }
+
+    #[test]
+    fn conversions_that_hung_need_a_reset() {
+        let mut violations = Violations::default();
+        let (mut adc, at) = ready(&mut violations);
+        adc.fault = Some(Fault::Dead);
+        adc.heal();
+        let begun = convert(&mut adc, CONVST_LOW, at, &mut violations);
+        assert!(!adc.busy(begun + BUSY_RISES));
+        adc.reset(true, begun, &mut violations);
+        adc.reset(false, begun + RESET_HIGH, &mut violations);
+        let begun = convert(&mut adc, CONVST_LOW, begun + 2 * SETUP, &mut violations);
+        assert!(adc.busy(begun + BUSY_RISES));
     }
 
     #[test]

@@ -24,6 +24,8 @@ use crate::watchdog::Watchdog;
 /// How often the line and the commands are looked at.
 const LOOK: Time = 100 * MICROSECOND;
 const WFI: u32 = 0xbf30;
+/// Of the core: whether its caches are on.
+const CCR: u32 = 0xe000_ed14;
 const CYCCNT: u32 = 0xe000_1004;
 
 /// Why the core stopped.
@@ -123,8 +125,8 @@ pub struct Board {
 }
 
 impl Board {
-    /// `bits`: of the ADC and of a gauge.
-    pub fn new(part: &'static Part, flash: Vec<u8>, bits: [u32; 2], plant: Plant) -> Self {
+    /// `bits`: of the ADC and of a gauge; `modelled`: cycles by the model of [`Cost`].
+    pub fn new(part: &'static Part, flash: Vec<u8>, bits: [u32; 2], plant: Plant, modelled: bool) -> Self {
         let devices = Devices::new(part);
         let levels = Levels { convst: true, select: true, reset: false, sync: [true; 2], ldac: true, enable: false };
         let mut board = Self {
@@ -136,7 +138,7 @@ impl Board {
             advanced: 0,
             due: 0,
             looked: 0,
-            cost: Cost::new(part.family),
+            cost: Cost::new(part.family, modelled),
             instructions: 0,
             conditional: 0,
             levels,
@@ -202,7 +204,7 @@ impl Board {
     pub fn heal(&mut self) {
         self.say("healed");
         self.faults.clear();
-        self.adc.fault = None;
+        self.adc.heal();
         self.dacs[0].fault = None;
     }
 
@@ -216,7 +218,6 @@ impl Board {
             spi.clock(hertz.max(1));
         }
         self.devices.usart.clock(clocks.usart.max(1));
-        self.cost.clock(clocks.core);
         self.schedule();
     }
 
@@ -412,13 +413,14 @@ impl Guest for Board {
         if code & 0xff00 == 0xbf00 && code & 0xf != 0 {
             self.conditional = 4 - (code & 0xf).trailing_zeros();
         }
-        self.now += self.cycle * self.cost.of(address, size, code);
+        let second = if size == 4 { self.fetch(address + 2).unwrap_or(0) } else { 0 };
+        self.now += self.cycle * self.cost.of(address, size, [code, second]);
         self.instructions += 1;
         true
     }
 
     fn read(&mut self, address: u32, size: u32) -> u32 {
-        self.now += self.cycle * self.cost.access(address);
+        self.now += self.cycle * self.cost.access(false);
         self.advance_spi();
         let aligned = address & !3;
         let part = self.part;
@@ -458,7 +460,7 @@ impl Guest for Board {
     }
 
     fn write(&mut self, address: u32, size: u32, value: u32) {
-        self.now += self.cycle * self.cost.access(address);
+        self.now += self.cycle * self.cost.access(true);
         self.advance_spi();
         self.advance_timer();
         let aligned = address & !3;
@@ -495,6 +497,8 @@ impl Guest for Board {
                     self.clocked();
                 } else if !within(part.pwr, 0x400) {
                     self.unmodelled.insert(aligned);
+                    let [access, control] = [part.flash_access, CCR].map(|at| self.devices.store.word(at));
+                    self.cost.configure(access, control);
                 }
             }
         }

@@ -1,29 +1,423 @@
-//! What an instruction costs, in cycles of the core.
+//! What an instruction costs, in cycles of the core: one each, or by a model whose assumptions are these.
+//!
+//! | what | Cortex-M7 | Cortex-M4 |
+//! |---|---|---|
+//! | integer instruction | 1; goes with a load, store, branch or f32 instruction before it | 1 |
+//! | load, store | 1 a cycle; of several registers two words a cycle | load 2, store 1, of several registers 1 and 1 each |
+//! | branch | goes with what stands before it, and is foreseen | 3 if taken |
+//! | integer division | 8 | 8 |
+//! | f32: add, multiply | 1 a cycle, result after 3 | 1 |
+//! | f32: multiply and add; divide, root | result after 6; 16 | 3; 14 |
+//! | f64: add; multiply; both | alone in its cycle, result after 4; 7; 11 | not there |
+//! | f64: divide, root | 30, and nothing else meanwhile | not there |
+//! | result of a load into a floating-point register | after 2 | at once |
+//! | code in flash | lines of 32 bytes, cache of 16 KiB in two ways, LRU; a line that is missing costs 2 (wait states + 8) | lines of 16 bytes; each other line costs the wait states, unless the accelerator's 64 lines have it |
+//! | constants beside the code, in flash | in the data cache | the wait states, unless the accelerator's data cache is on |
+//! | register of a device: read, write | 24, 8 | 6, 3 |
+//! | entering or leaving an exception | 29 | 29 |
+//!
+//! Not in it: integer registers that one instruction waits for, branches that are not foreseen, misses of the data cache, the
+//! buses to AXI SRAM, and the DMA on them. Latencies of the M7 are those of LLVM's scheduling model, of the M4 those of its manual.
 
 use crate::part::Family;
 
+/// Lines of the M7's instruction cache: two ways.
+const SETS: usize = 256;
+/// Lines of the F4's accelerator.
+const LINES: usize = 64;
+
 pub struct Cost {
-    _family: Family,
+    family: Family,
+    modelled: bool,
+    /// Issue cycle of the last instruction, and what it was.
+    time: u64,
+    last: Kind,
+    /// From when on each single register holds its value.
+    ready: [u64; 32],
+    /// Where the next instruction is if the last one did not jump.
+    follows: u32,
+    /// Lines by set, the one used last first.
+    ways: [[u32; 2]; SETS],
+    lines: Vec<u32>,
+    line: u32,
+    wait_states: u64,
+    /// Instruction cache, and data cache of the F4's accelerator.
+    cached: [bool; 2],
+}
+
+/// What decides about the issue of the next one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Integer,
+    /// So many words.
+    Memory(u64),
+    Load(u64),
+    Branch,
+    Division,
+    Float(Operation),
+}
+
+/// A floating-point instruction: registers as numbers of single ones, so many for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Operation {
+    double: bool,
+    class: Class,
+    sources: [usize; 3],
+    target: Option<usize>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Class {
+    Add,
+    Multiply,
+    Both,
+    Long,
+    /// From memory.
+    Load,
+    /// To memory or to an integer register.
+    Out,
 }
 
 impl Cost {
     /// Of stacking or unstacking with floating-point registers.
     pub const EXCEPTION: u64 = 29;
 
-    pub fn new(family: Family) -> Self {
-        Self { _family: family }
+    pub fn new(family: Family, modelled: bool) -> Self {
+        Self {
+            family,
+            modelled,
+            time: 0,
+            last: Kind::Integer,
+            ready: [0; 32],
+            follows: 0,
+            ways: [[u32::MAX; 2]; SETS],
+            lines: Vec::new(),
+            line: u32::MAX,
+            wait_states: 0,
+            cached: [false; 2],
+        }
     }
 
-    /// The core's clock changed, Hz.
-    pub fn clock(&mut self, _hertz: u64) {}
+    /// FLASH_ACR and CCR of the core, as they are now.
+    pub fn configure(&mut self, access: u32, control: u32) {
+        self.wait_states = u64::from(access & 0xf);
+        self.cached = match self.family {
+            Family::H7 => [control >> 17 & 1 == 1, true],
+            Family::F4 => [access >> 9 & 1 == 1, access >> 10 & 1 == 1],
+        };
+    }
 
-    /// Of the instruction.
-    pub fn of(&mut self, _address: u32, _size: u32, _code: u32) -> u64 {
-        1
+    /// Of an instruction: its halves, the second where it has one.
+    pub fn of(&mut self, address: u32, size: u32, code: [u32; 2]) -> u64 {
+        if !self.modelled {
+            return 1;
+        }
+        let before = self.time;
+        let jumped = address != self.follows;
+        self.follows = address + size;
+        self.time += self.fetched(address);
+        if size == 4 {
+            self.time += self.fetched(address + 2);
+        }
+        let kind = kind(code, size);
+        if beside_code(code, size) && !self.cached[1] {
+            self.time += self.wait_states;
+        }
+        match self.family {
+            Family::H7 => self.issue(kind, jumped),
+            Family::F4 => {
+                self.time += match kind {
+                    Kind::Integer | Kind::Branch => 1,
+                    Kind::Memory(words) if words < 2 => 1,
+                    Kind::Load(words) | Kind::Memory(words) => 1 + words,
+                    Kind::Division => 8,
+                    Kind::Float(operation) => match operation.class {
+                        Class::Add | Class::Multiply => 1,
+                        Class::Both => 3,
+                        Class::Long => 14,
+                        Class::Load | Class::Out => 2,
+                    },
+                } + if jumped { 2 } else { 0 };
+            }
+        }
+        self.last = kind;
+        self.time - before
+    }
+
+    /// When an M7 issues it.
+    fn issue(&mut self, kind: Kind, jumped: bool) {
+        let alone = |kind| matches!(kind, Kind::Float(operation) if operation.double && !operation.is_move());
+        let pairs = match (self.last, kind) {
+            _ if jumped || alone(self.last) || alone(kind) => false,
+            (Kind::Branch | Kind::Division, _) | (_, Kind::Division) => false,
+            (_, Kind::Branch) => true,
+            (Kind::Integer, Kind::Integer) => false,
+            (Kind::Integer, _) | (_, Kind::Integer) => true,
+            (Kind::Float(one), Kind::Float(other)) => one.is_move() != other.is_move(),
+            (Kind::Float(one), _) | (_, Kind::Float(one)) => !one.is_move(),
+            _ => false,
+        };
+        // A third one in the same cycle is a cycle later.
+        let last = if pairs { Kind::Branch } else { kind };
+        self.time += u64::from(!pairs);
+        match kind {
+            Kind::Memory(words) | Kind::Load(words) => self.time += words.div_ceil(2).max(1) - 1,
+            Kind::Division => self.time += 7,
+            Kind::Float(operation) => {
+                let width = 1 + usize::from(operation.double);
+                for source in operation.sources {
+                    for register in self.ready.iter().skip(source).take(width) {
+                        self.time = self.time.max(*register);
+                    }
+                }
+                let latency = operation.latency();
+                if let Some(target) = operation.target {
+                    for register in self.ready.iter_mut().skip(target).take(width) {
+                        *register = self.time + latency;
+                    }
+                }
+                if operation.class == Class::Long && operation.double {
+                    self.time += latency - 1;
+                }
+            }
+            Kind::Integer | Kind::Branch => {}
+        }
+        self.last = last;
+    }
+
+    /// What it costs to get the code at an address.
+    fn fetched(&mut self, address: u32) -> u64 {
+        match self.family {
+            Family::H7 => {
+                let line = address >> 5;
+                if line == self.line {
+                    return 0;
+                }
+                self.line = line;
+                let set = &mut self.ways[line as usize % SETS];
+                let there = self.cached[0] && set.contains(&line);
+                if set[0] != line {
+                    *set = [line, set[0]];
+                }
+                if there { 0 } else { 2 * (self.wait_states + 8) }
+            }
+            Family::F4 => {
+                let line = address >> 4;
+                if line == self.line {
+                    return 0;
+                }
+                self.line = line;
+                let there = self.lines.iter().position(|known| *known == line);
+                if let Some(at) = there {
+                    self.lines.remove(at);
+                } else if self.lines.len() == LINES {
+                    self.lines.pop();
+                }
+                self.lines.insert(0, line);
+                if there.is_some() && self.cached[0] { 0 } else { self.wait_states }
+            }
+        }
     }
 
     /// Of an access to a register of a device, beyond its instruction.
-    pub fn access(&self, _address: u32) -> u64 {
-        4
+    pub fn access(&self, write: bool) -> u64 {
+        match (self.modelled, self.family, write) {
+            (false, ..) => 4,
+            (true, Family::H7, false) => 24,
+            (true, Family::H7, true) => 8,
+            (true, Family::F4, false) => 6,
+            (true, Family::F4, true) => 3,
+        }
+    }
+}
+
+impl Operation {
+    fn is_move(&self) -> bool {
+        matches!(self.class, Class::Load | Class::Out)
+    }
+
+    /// Of an M7.
+    fn latency(&self) -> u64 {
+        match (self.class, self.double) {
+            (Class::Add | Class::Multiply, false) => 3,
+            (Class::Both, false) => 6,
+            (Class::Long, false) => 16,
+            (Class::Add, true) => 4,
+            (Class::Multiply, true) => 7,
+            (Class::Both, true) => 11,
+            (Class::Long, true) => 30,
+            (Class::Load | Class::Out, _) => 2,
+        }
+    }
+}
+
+fn kind(code: [u32; 2], size: u32) -> Kind {
+    let [first, second] = code;
+    if size == 2 {
+        return match first >> 8 {
+            // Literal, by register, by offset, on the stack.
+            0x48..=0x4f | 0x56..=0x5f | 0x68..=0x6f | 0x78..=0x7f | 0x88..=0x8f | 0x98..=0x9f => Kind::Load(1),
+            0x50..=0x55 | 0x60..=0x67 | 0x70..=0x77 | 0x80..=0x87 | 0x90..=0x97 => Kind::Memory(1),
+            0xb4 | 0xb5 | 0xc0..=0xc7 => Kind::Memory(u64::from((first & 0x1ff).count_ones())),
+            0xbc | 0xbd | 0xc8..=0xcf => Kind::Load(u64::from((first & 0x1ff).count_ones())),
+            0xd0..=0xe7 | 0x47 | 0xb1 | 0xb3 | 0xb9 | 0xbb => Kind::Branch,
+            _ => Kind::Integer,
+        };
+    }
+    let coprocessor = second >> 8 & 0xf;
+    if first >> 10 == 0x3b && matches!(coprocessor, 0xa | 0xb) {
+        return float(first, second, coprocessor == 0xb);
+    }
+    match first >> 4 & 0xfff {
+        // LDM, STM; LDRD, STRD.
+        0xe88..=0xe8b | 0xe90..=0xe93 if first & 0x40 == 0 => {
+            let words = u64::from(second.count_ones());
+            if first & 0x10 == 0 { Kind::Memory(words) } else { Kind::Load(words) }
+        }
+        0xe80..=0xe9f => {
+            if first & 0x10 == 0 {
+                Kind::Memory(2)
+            } else {
+                Kind::Load(2)
+            }
+        }
+        0xf80..=0xf9f => {
+            if first & 0x10 == 0 {
+                Kind::Memory(1)
+            } else {
+                Kind::Load(1)
+            }
+        }
+        0xfb9 | 0xfbb => Kind::Division,
+        0xf00..=0xf7f if second & 0x8000 != 0 => Kind::Branch,
+        _ => Kind::Integer,
+    }
+}
+
+/// Whether it reads a constant that lies beside the code.
+fn beside_code([first, _]: [u32; 2], size: u32) -> bool {
+    if size == 2 { first >> 11 == 0x09 } else { matches!(first & 0xff7f, 0xf85f) || first & 0xff3f == 0xed1f }
+}
+
+fn float(first: u32, second: u32, double: bool) -> Kind {
+    let register = |number: u32, extra: u32| (if double { 2 * number } else { 2 * number + extra }) as usize % 32;
+    let target = register(second >> 12 & 0xf, first >> 6 & 1);
+    let left = register(first & 0xf, second >> 7 & 1);
+    let right = register(second & 0xf, second >> 5 & 1);
+    let operation = |class, sources, target| Kind::Float(Operation { double, class, sources, target });
+    // Loads and stores, of one register and of several.
+    if first >> 5 == 0x762 {
+        // Two integer registers.
+        return operation(Class::Load, [right; 3], Some(right));
+    }
+    if first >> 9 == 0x76 {
+        let loads = first & 0x10 != 0;
+        let words = u64::from(second & 0xff);
+        return match (first & 0x0120 == 0x0100, loads) {
+            (true, true) => operation(Class::Load, [target; 3], Some(target)),
+            (true, false) => operation(Class::Out, [target; 3], None),
+            (false, true) => Kind::Load(words),
+            (false, false) => Kind::Memory(words),
+        };
+    }
+    if first >> 8 == 0xee && second & 0x10 != 0 {
+        // Between integer and floating-point registers.
+        let inward = first & 0x10 == 0;
+        return operation(if inward { Class::Load } else { Class::Out }, [left; 3], inward.then_some(left));
+    }
+    let all = [target, left, right];
+    match first >> 4 & 0xb {
+        0 | 1 | 9 | 10 => operation(Class::Both, all, Some(target)),
+        2 => operation(Class::Multiply, [left, right, right], Some(target)),
+        3 => operation(Class::Add, [left, right, right], Some(target)),
+        8 => operation(Class::Long, [left, right, right], Some(target)),
+        // Root, by its number; the rest as an addition of one operand.
+        _ if first & 0xf == 1 && second >> 6 & 3 == 3 => operation(Class::Long, [right; 3], Some(target)),
+        _ => operation(Class::Add, [right; 3], Some(target)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Cycles of these instructions in cached code on an M7, after a first round that fills the cache.
+    fn cycles(code: &[[u32; 2]]) -> u64 {
+        let mut cost = Cost::new(Family::H7, true);
+        cost.configure(2, 1 << 17);
+        let mut round = || {
+            let mut address = 0x0800_0000;
+            let mut sum = 0;
+            for halves in code {
+                let size = if halves[0] >> 11 >= 0x1d { 4 } else { 2 };
+                sum += cost.of(address, size, *halves);
+                address += size;
+            }
+            sum
+        };
+        round();
+        round()
+    }
+
+    /// vfma.f64 d0, d1, d2
+    const FMA: [u32; 2] = [0xeea1, 0x0b02];
+    /// subs r0, #1
+    const SUBS: [u32; 2] = [0x3801, 0];
+    /// bne
+    const BNE: [u32; 2] = [0xd1fd, 0];
+
+    #[test]
+    fn a_loop_of_a_delay_takes_one_cycle_a_turn() {
+        assert_eq!(cycles(&[SUBS, BNE]), 1);
+    }
+
+    #[test]
+    fn a_chain_of_multiply_and_add_waits_for_each_result() {
+        // vfma.f64 d3, d1, d2
+        let other = [0xeea1, 0x3b02];
+        assert_eq!(cycles(&[FMA, FMA]), 22);
+        assert_eq!(cycles(&[FMA, other]), 11);
+    }
+
+    #[test]
+    fn instructions_are_told_apart() {
+        let class = |code| match kind(code, 4) {
+            Kind::Float(Operation { class, double, .. }) => Some((class, double)),
+            _ => None,
+        };
+        for (code, expected) in [
+            (FMA, (Class::Both, true)),
+            // vmul.f32 s0, s1, s2; vadd.f64 d0, d1, d2; vdiv.f64 d0, d1, d2; vsqrt.f64 d0, d1
+            ([0xee20, 0x0a81], (Class::Multiply, false)),
+            ([0xee31, 0x0b02], (Class::Add, true)),
+            ([0xee81, 0x0b02], (Class::Long, true)),
+            ([0xeeb1, 0x0bc1], (Class::Long, true)),
+            // vldr d0, [r0]; vstr d0, [r0]; vmov s0, r0; vmov r0, s0
+            ([0xed90, 0x0b00], (Class::Load, true)),
+            ([0xed80, 0x0b00], (Class::Out, true)),
+            ([0xee00, 0x0a10], (Class::Load, false)),
+            ([0xee10, 0x0a10], (Class::Out, false)),
+        ] {
+            assert_eq!(class(code), Some(expected), "{code:#x?}");
+        }
+        // ldr.w r0, [r1]; str.w r0, [r1]; sdiv; bl; add.w; vldmia r0, {d0-d3}
+        assert_eq!(kind([0xf8d1, 0], 4), Kind::Load(1));
+        assert_eq!(kind([0xf8c1, 0], 4), Kind::Memory(1));
+        assert_eq!(kind([0xfb90, 0xf0f1], 4), Kind::Division);
+        assert_eq!(kind([0xf000, 0xf800], 4), Kind::Branch);
+        assert_eq!(kind([0xeb00, 0x0001], 4), Kind::Integer);
+        assert_eq!(kind([0xec90, 0x0b08], 4), Kind::Load(8));
+        assert_eq!(kind([0xbd10, 0], 2), Kind::Load(2));
+    }
+
+    #[test]
+    fn without_a_cache_every_line_is_fetched_again() {
+        let mut cost = Cost::new(Family::F4, true);
+        cost.configure(5, 0);
+        let lines = [0x0800_0000, 0x0800_0010, 0x0800_0000];
+        let of = |cost: &mut Cost| lines.map(|address| cost.of(address, 2, [0xbf00, 0]));
+        assert_eq!(of(&mut cost), [8, 8, 8]);
+        cost.configure(5 | 1 << 9, 0);
+        assert_eq!(of(&mut cost), [3, 3, 3]);
     }
 }

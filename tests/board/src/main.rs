@@ -40,12 +40,13 @@ use meter::Meter;
 use plant::Plant;
 use time::{MICROSECOND, Time, microseconds};
 
-const USAGE: &str = "usage: emulated-board --library FILE --target stm32h743|stm32f4 --bits N [--plant NAME] [--socket PATH] IMAGE
+const USAGE: &str = "usage: emulated-board --library FILE --target stm32h743|stm32f4 --bits N [--plant NAME] [--socket PATH] [--cycles] IMAGE
 
   --library FILE  the Unicorn engine, libunicorn.so.2
   --bits N        of a gauge: sensor.bits of the spec
   --plant NAME    the machine that `specgen plant --name NAME` serves; gauges in mid-range if not given
   --socket PATH   where a host finds the link: `specgen operate --socket PATH`
+  --cycles        times by the model of src/cost.rs; one cycle an instruction if not given
 
 Commands on standard input: run MS, fail FAULT, heal, report, registers, quit. Without --socket the board runs by `run` alone.";
 
@@ -55,12 +56,14 @@ struct Options {
     bits: u32,
     plant: Option<String>,
     socket: Option<PathBuf>,
+    cycles: bool,
     image: PathBuf,
 }
 
 fn options() -> Option<Options> {
     let mut arguments = std::env::args().skip(1);
     let (mut library, mut part, mut bits, mut plant, mut socket, mut image) = (None, None, None, None, None, None);
+    let mut cycles = false;
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
             "--library" => library = Some(arguments.next()?.into()),
@@ -74,11 +77,12 @@ fn options() -> Option<Options> {
             "--bits" => bits = arguments.next()?.parse().ok().filter(|bits| (8..=18).contains(bits)),
             "--plant" => plant = Some(arguments.next()?),
             "--socket" => socket = Some(arguments.next()?.into()),
+            "--cycles" => cycles = true,
             file if !file.starts_with('-') => image = Some(file.into()),
             _ => return None,
         }
     }
-    Some(Options { library: library?, part: part?, bits: bits?, plant, socket, image: image? })
+    Some(Options { library: library?, part: part?, bits: bits?, plant, socket, cycles, image: image? })
 }
 
 fn main() -> ExitCode {
@@ -111,7 +115,7 @@ fn serve(options: &Options) -> Result<(), String> {
         place.ok_or("the image is larger than the flash")?.copy_from_slice(&segment.bytes);
     }
     let adc_bits = if options.bits <= 16 { 16 } else { 18 };
-    let board = Board::new(options.part, flash, [adc_bits, options.bits], plant);
+    let board = Board::new(options.part, flash, [adc_bits, options.bits], plant, options.cycles);
     let mut machine = Machine::new(&options.library, board, &image)?;
     let mut line = match &options.socket {
         Some(path) => Some(Line::listen(path).map_err(|error| format!("{}: {error}", path.display()))?),

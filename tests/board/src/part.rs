@@ -17,6 +17,8 @@ pub struct Part {
     /// Begin and length, multiples of 4 KiB.
     pub memories: &'static [[u32; 2]],
     pub flash: u32,
+    /// FLASH_ACR.
+    pub flash_access: u32,
     pub gpio: u32,
     pub rcc: u32,
     pub pwr: u32,
@@ -58,6 +60,7 @@ pub const H743: Part = Part {
     family: Family::H7,
     memories: &[[0x0800_0000, 0x20_0000], [0x2000_0000, 0x2_0000], [0x2400_0000, 0x8_0000]],
     flash: 0x0800_0000,
+    flash_access: 0x5200_2000,
     gpio: 0x5802_0000,
     rcc: 0x5802_4400,
     pwr: 0x5802_4800,
@@ -79,6 +82,7 @@ pub const F446: Part = Part {
     family: Family::F4,
     memories: &[[0x0800_0000, 0x8_0000], [0x2000_0000, 0x2_0000]],
     flash: 0x0800_0000,
+    flash_access: 0x4002_3c00,
     gpio: 0x4002_0000,
     rcc: 0x4002_3800,
     pwr: 0x4000_7000,

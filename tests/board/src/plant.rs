@@ -7,7 +7,7 @@ use specgen_rt::exchange::{CHANNELS, Client, path_of};
 use crate::time::Time;
 
 /// How long a reading may take, ns: at first the machine may be pre-cycling.
-const PATIENCE: u64 = 60_000_000_000;
+const LIMIT: u64 = 60_000_000_000;
 
 pub enum Plant {
     /// Every gauge in the middle of its range.
@@ -23,6 +23,8 @@ pub struct Served {
     /// Time of the first reading, which is tick 0, and the latest.
     first: Option<Time>,
     tick: u64,
+    /// Whether codes went out in it: the machine then stands at the next.
+    over: bool,
 }
 
 impl Plant {
@@ -33,7 +35,7 @@ impl Plant {
     pub fn served(name: &str, digest: &str, period: Time) -> Result<Self, String> {
         let path = path_of(name)?;
         let client = Client::open(Path::new(&path), digest).map_err(|error| error.to_string())?;
-        Ok(Self::Served(Served { client, period, first: None, tick: 0 }))
+        Ok(Self::Served(Served { client, period, first: None, tick: 0, over: false }))
     }
 
     /// Codes of `bits` bits, 0 at the lower end of the range.
@@ -42,8 +44,11 @@ impl Plant {
             Self::Still => Ok([1 << (bits - 1); CHANNELS]),
             Self::Served(served) => {
                 let first = *served.first.get_or_insert(now);
-                served.tick = (now - first + served.period / 2) / served.period;
-                let sensed = served.client.sense(served.tick, PATIENCE);
+                let tick = (now - first + served.period / 2) / served.period;
+                // Two within one period, where the second began late and the first early: the machine goes on in whole ones.
+                served.tick = tick.max(served.tick + u64::from(served.over));
+                served.over = false;
+                let sensed = served.client.sense(served.tick, LIMIT);
                 let sensed = sensed.ok_or("the plant does not answer; is `specgen plant` still running?")?;
                 Ok(sensed.codes.map(|code| code.max(0) as u32))
             }
@@ -53,6 +58,7 @@ impl Plant {
     /// Amplifiers and codes from now on.
     pub fn actuate(&mut self, enable: bool, codes: [u16; CHANNELS]) {
         if let Self::Served(served) = self {
+            served.over = true;
             served.client.actuate(served.tick, enable, &codes.map(i32::from));
         }
     }

@@ -1,0 +1,189 @@
+//! The boards' images, unmodified, on the emulated board of `tests/board`: arm, run, wave, settings, record, replay; and faults.
+//!
+//! Four processes: the emulated board, `specgen plant` with the machine, `specgen operate` as host, and this.
+
+mod faults;
+mod session;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::thread;
+
+use specgen_toolchain::provision;
+
+use crate::run::{Outcome, Report, cargo, expect_success};
+use crate::setup;
+use session::{Host, Session};
+
+/// Its own workspace.
+pub const MANIFEST: &str = "tests/board/Cargo.toml";
+/// Where `tests/tests/boards.rs` leaves image and spec of each target.
+const TESTED: &str = "target/tests/boards";
+/// What is done against data sheets and manuals, and known.
+const KNOWN: [&str; 1] = ["RCC: PLLCKSELR written while a PLL runs"];
+const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
+
+/// An image, what it was built from, and where its run leaves its files.
+#[derive(Clone)]
+struct Trial {
+    spec: PathBuf,
+    target: &'static str,
+    image: PathBuf,
+    folder: PathBuf,
+    /// Where specgen and the tool are.
+    programs: PathBuf,
+    /// Times by the tool's model of cycles; else a cycle an instruction.
+    cycles: bool,
+}
+
+/// `cargo xtask board SPEC [--target stm32h743|stm32f4] [--cycles | --faults]`; none if the arguments are something else.
+pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
+    let (arguments, with_faults, cycles) = match arguments {
+        [rest @ .., "--faults"] => (rest, true, false),
+        [rest @ .., "--cycles"] => (rest, false, true),
+        all => (all, false, false),
+    };
+    let (spec, target) = match *arguments {
+        [spec] | [spec, "--target", "stm32h743"] => (spec, "stm32h743"),
+        [spec, "--target", "stm32f4"] => (spec, "stm32f4"),
+        _ => return None,
+    };
+    let folder = built_in(root).join("board").join(target);
+    let trial = Trial {
+        spec: std::path::absolute(spec).unwrap_or_else(|_| spec.into()),
+        target,
+        image: folder.join(format!("controller/target/{target}.elf")),
+        folder,
+        programs: built_in(root).join("release"),
+        cycles,
+    };
+    let mut report = Report::new(3 + usize::from(with_faults));
+    report.step("the tool, the engine and specgen", || built(root));
+    report.step("the image", || image(&trial));
+    if !report.has_failed() {
+        report.step("from boot to a record that replays", || outcome(run(&trial, true)));
+        if with_faults {
+            report.step("faults", || outcome(faults::run(&trial)));
+        }
+    }
+    Some(report.finish())
+}
+
+/// For the test run, after the tests: both images as these built them. Replay is the longest part, and the law the same on both.
+pub fn short(root: &Path) -> Outcome {
+    tested(root, |trial| run(trial, trial.target == "stm32h743"))
+}
+
+/// For the soak.
+pub fn long(root: &Path) -> Outcome {
+    tested(root, |trial| run(trial, true).and_then(|()| faults::run(trial)))
+}
+
+/// Both images that the tests built, at once.
+fn tested(root: &Path, work: impl Fn(&Trial) -> Result<(), String> + Sync) -> Outcome {
+    let prepared = built(root);
+    if !matches!(prepared, Outcome::Passed) {
+        return prepared;
+    }
+    let folder = root.join(TESTED);
+    let trials = ["stm32h743", "stm32f4"].map(|target| Trial {
+        spec: folder.join(target).join("platform.toml"),
+        target,
+        image: folder.join(target).join("image.elf"),
+        folder: folder.join(target),
+        programs: built_in(root).join("release"),
+        cycles: false,
+    });
+    if let Some(trial) = trials.iter().find(|trial| !trial.image.is_file()) {
+        return setup::missing(format!("{} is not there; the tests of the boards build it", trial.image.display()));
+    }
+    let results = thread::scope(|scope| {
+        let runs = trials.each_ref().map(|trial| scope.spawn(|| work(trial)));
+        runs.map(|run| run.join().unwrap_or_else(|_| Err("it panicked".to_owned())))
+    });
+    outcome(results.into_iter().collect())
+}
+
+fn outcome(result: Result<(), String>) -> Outcome {
+    result.map_or_else(Outcome::Failed, |()| Outcome::Passed)
+}
+
+/// What is built and brought before a run.
+fn built(root: &Path) -> Outcome {
+    if let Err(error) = provision::engine(&mut |line| println!("{line}")) {
+        return setup::missing(format!("{error}"));
+    }
+    for package in [["--package", "specgen"], ["--manifest-path", MANIFEST]] {
+        let mut build = cargo(root, &[&["build", "--release", "--quiet", "--locked"], &package[..]].concat());
+        // The same folder for both: what the tool depends on is among the workspace's.
+        build.arg("--target-dir").arg(built_in(root));
+        let outcome = expect_success(build, "see above");
+        if !matches!(outcome, Outcome::Passed) {
+            return outcome;
+        }
+    }
+    Outcome::Passed
+}
+
+fn built_in(root: &Path) -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
+}
+
+fn image(trial: &Trial) -> Outcome {
+    let _ = fs::remove_dir_all(&trial.folder);
+    if let Err(error) = fs::create_dir_all(&trial.folder) {
+        return Outcome::Failed(format!("{}: {error}", trial.folder.display()));
+    }
+    let mut build = Command::new(trial.programs.join("specgen"));
+    build.arg("build").arg(&trial.spec).args(["--no-measure", "--target", trial.target]);
+    build.arg("-o").arg(trial.folder.join("controller"));
+    expect_success(build, "see above")
+}
+
+/// From reset to a record, which is replayed.
+fn run(trial: &Trial, replay: bool) -> Result<(), String> {
+    let failed = |error: std::io::Error| format!("{}: {error}", trial.folder.display());
+    fs::create_dir_all(&trial.folder).map_err(failed)?;
+    fs::write(trial.folder.join("wave.toml"), WAVE).map_err(failed)?;
+    let mut session = Session::begin(trial)?;
+    let operated = operate(trial, &mut session);
+    let report = session.report()?;
+    println!("{}: {}", trial.target, report.text);
+    operated.map_err(|why| format!("{}: {why}", trial.target))?;
+    if let Some(text) = report.violations.iter().find(|text| !KNOWN.iter().any(|known| text.contains(known))) {
+        return Err(format!("{}: against a data sheet: {text}", trial.target));
+    }
+    if report.value("resets") != Some(0.0) || report.value("enable") != Some(0.0) {
+        return Err(format!("{}: expected amplifiers off and no reset", trial.target));
+    }
+    drop(session);
+    if !replay {
+        return Ok(());
+    }
+    let mut replay = Command::new(trial.programs.join("specgen"));
+    replay.current_dir(&trial.folder).args(["replay", "run.rec", "--spec"]).arg(&trial.spec);
+    match replay.status() {
+        Ok(status) if status.success() => Ok(()),
+        _ => Err(format!("{}: the record does not replay bit by bit, see above", trial.target)),
+    }
+}
+
+/// From arming to a record; times are the board's, ms. The record is short: what it holds has to go over the line.
+fn operate(trial: &Trial, session: &mut Session) -> Result<(), String> {
+    let settings = format!("config write {}\nstatus", trial.spec.display());
+    let stands = ", status 0x";
+    let mut host = Host::of(session.host(trial))?;
+    for (orders, words, time) in [
+        ("status\narm\nwait holding 60\nrun\nwait running 60\nset command=0\nstatus", ": running", 200.0),
+        ("record arm 300\nwave wave.toml\nstatus", stands, 60.0),
+        (&settings, stands, 20.0),
+        ("record trigger\nstatus", stands, 60.0),
+        ("record stop\nrecord download run.rec", "wrote ", 0.0),
+        ("ramp-down\nwait disarmed 60\nstatus", "disarmed, amplifiers off", 0.0),
+    ] {
+        host.order(orders, words)?;
+        session.pass(time)?;
+    }
+    Ok(())
+}

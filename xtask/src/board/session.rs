@@ -1,0 +1,210 @@
+//! An emulated board with its machine, from outside.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use specgen_language::{SpecSource, spec};
+use specgen_toolchain::provision;
+
+use super::Trial;
+
+/// What an answer may take.
+const ANSWER: Duration = Duration::from_secs(60);
+
+/// Both processes end with it.
+pub struct Session {
+    plant: Child,
+    board: Child,
+    commands: ChildStdin,
+    lines: Receiver<String>,
+    socket: PathBuf,
+    shared: PathBuf,
+    /// What the board said of itself, each line with its time.
+    pub log: Vec<String>,
+}
+
+/// How a board stands.
+pub struct Report {
+    /// `name=value`, separated by blanks.
+    pub text: String,
+    /// What was done against data sheets.
+    pub violations: Vec<String>,
+}
+
+impl Report {
+    /// A number in it.
+    pub fn value(&self, name: &str) -> Option<f64> {
+        let values = self.text.split(' ').filter_map(|word| word.split_once('='));
+        values.into_iter().find(|(known, _)| *known == name)?.1.parse().ok()
+    }
+}
+
+impl Session {
+    pub fn begin(trial: &Trial) -> Result<Self, String> {
+        static BEGUN: AtomicU32 = AtomicU32::new(0);
+        let engine = provision::engine(&mut |_| {}).map_err(|error| error.to_string())?;
+        let bits = gauge_bits(&trial.spec)?;
+        // A name that no other has.
+        let name = format!("board-{}-{}", std::process::id(), BEGUN.fetch_add(1, Ordering::Relaxed));
+        let shared = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
+        let socket = trial.folder.join("link.sock");
+        let _ = fs::remove_file(&socket);
+        let mut plant = Command::new(trial.programs.join("specgen"));
+        plant.arg("plant").arg(&trial.spec).args(["--name", &name]).stdout(Stdio::null()).stderr(Stdio::null());
+        let plant = plant.spawn().map_err(|error| format!("specgen plant: {error}"))?;
+        let mut board = Command::new(trial.programs.join("emulated-board"));
+        board.arg("--library").arg(engine).args(["--target", trial.target, "--bits", &bits, "--plant", &name]);
+        if trial.cycles {
+            board.arg("--cycles");
+        }
+        board.arg("--socket").arg(&socket).arg(&trial.image).stdin(Stdio::piped()).stdout(Stdio::piped());
+        let (plant, mut board) = started(plant, &shared, board)?;
+        let (Some(commands), Some(output)) = (board.stdin.take(), board.stdout.take()) else {
+            return Err("the emulated board has no pipes".to_owned());
+        };
+        let lines = lines_of(output);
+        let mut session = Self { plant, board, commands, lines, socket, shared, log: Vec::new() };
+        wait_for(&session.socket, &mut session.board)?;
+        Ok(session)
+    }
+
+    /// `specgen operate` on its link.
+    pub fn host(&self, trial: &Trial) -> Command {
+        let mut host = Command::new(trial.programs.join("specgen"));
+        host.current_dir(&trial.folder).arg("operate").arg("--socket").arg(&self.socket).arg(&trial.spec);
+        host
+    }
+
+    /// Gives the board a command that it answers by one line.
+    pub fn command(&mut self, command: &str) -> Result<Report, String> {
+        writeln!(self.commands, "{command}").map_err(|error| format!("the emulated board: {error}"))?;
+        let mut violations = Vec::new();
+        loop {
+            let line = self.lines.recv_timeout(ANSWER).map_err(|_| "the emulated board does not answer")?;
+            if let Some(text) = line.strip_prefix("! ") {
+                violations.push(text.to_owned());
+            } else if let Some(text) = line.strip_prefix("# ") {
+                self.log.push(text.to_owned());
+            } else if line != "ready" {
+                return Ok(Report { text: line, violations });
+            }
+        }
+    }
+
+    pub fn report(&mut self) -> Result<Report, String> {
+        self.command("report")
+    }
+
+    /// Its time, ms.
+    pub fn time(&mut self) -> Result<f64, String> {
+        self.report()?.value("time_ms").ok_or_else(|| "the board does not say its time".to_owned())
+    }
+
+    /// Until so much of its time has passed, ms.
+    pub fn pass(&mut self, time: f64) -> Result<(), String> {
+        let end = self.time()? + time;
+        while self.time()? < end {
+            thread::sleep(Duration::from_millis(50));
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        end(&mut self.board);
+        end(&mut self.plant);
+        // A process that is killed leaves it.
+        let _ = fs::remove_file(&self.shared);
+    }
+}
+
+/// The lines of a process as they come.
+fn lines_of(output: ChildStdout) -> Receiver<String> {
+    let (sender, lines) = channel();
+    thread::spawn(move || {
+        for line in BufReader::new(output).lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    lines
+}
+
+fn end(process: &mut Child) {
+    // It may have ended.
+    let _ = process.kill();
+    let _ = process.wait();
+}
+
+/// The board, once the machine is there.
+fn started(mut plant: Child, shared: &Path, mut board: Command) -> Result<(Child, Child), String> {
+    let there = wait_for(shared, &mut plant);
+    match there.and_then(|()| board.spawn().map_err(|error| format!("the emulated board: {error}"))) {
+        Ok(board) => Ok((plant, board)),
+        Err(why) => {
+            end(&mut plant);
+            Err(why)
+        }
+    }
+}
+
+/// Until what the process makes is there.
+fn wait_for(path: &Path, process: &mut Child) -> Result<(), String> {
+    let begin = Instant::now();
+    while !path.exists() {
+        if !matches!(process.try_wait(), Ok(None)) || begin.elapsed() > ANSWER {
+            return Err(format!("{} did not come to be, see above", path.display()));
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
+    Ok(())
+}
+
+fn gauge_bits(path: &Path) -> Result<String, String> {
+    let source = SpecSource::read(path).map_err(|finding| finding.message)?;
+    let (model, _) = spec::load(&source);
+    Ok(model.ok_or_else(|| format!("{} is refused", path.display()))?.sensor.bits.to_string())
+}
+
+/// A host that goes on until it is ended.
+pub struct Host {
+    process: Child,
+    lines: Receiver<String>,
+}
+
+impl Host {
+    pub fn of(mut command: Command) -> Result<Self, String> {
+        let command = command.stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut process = command.spawn().map_err(|error| format!("specgen operate: {error}"))?;
+        let output = process.stdout.take().ok_or("specgen operate has no pipe")?;
+        Ok(Self { process, lines: lines_of(output) })
+    }
+
+    /// Gives orders and waits for these words.
+    pub fn order(&mut self, orders: &str, words: &str) -> Result<(), String> {
+        let input = self.process.stdin.as_mut().ok_or("specgen operate has no pipe")?;
+        writeln!(input, "{orders}").map_err(|error| format!("specgen operate: {error}"))?;
+        while !self.lines.recv_timeout(ANSWER).map_err(|_| format!("the host does not say `{words}`"))?.contains(words)
+        {
+        }
+        Ok(())
+    }
+
+    pub fn end(&mut self) {
+        end(&mut self.process);
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
