@@ -8,7 +8,6 @@ mod session;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
-use std::thread;
 
 use specgen_toolchain::provision;
 
@@ -25,7 +24,6 @@ const KNOWN: [&str; 1] = ["RCC: PLLCKSELR written while a PLL runs"];
 const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
 
 /// An image, what it was built from, and where its run leaves its files.
-#[derive(Clone)]
 struct Trial {
     spec: PathBuf,
     target: &'static str,
@@ -62,7 +60,7 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     report.step("the tool, the engine and specgen", || built(root));
     report.step("the image", || image(&trial));
     if !report.has_failed() {
-        report.step("from boot to a record that replays", || outcome(run(&trial, true)));
+        report.step("from boot to a record that replays", || outcome(run(&trial)));
         if with_faults {
             report.step("faults", || outcome(faults::run(&trial)));
         }
@@ -70,39 +68,40 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     Some(report.finish())
 }
 
-/// For the test run, after the tests: both images as these built them. Replay is the longest part, and the law the same on both.
+/// For the test run, after the tests, which have built this one image.
 pub fn short(root: &Path) -> Outcome {
-    tested(root, |trial| run(trial, trial.target == "stm32h743"))
+    tested(root, &["stm32h743"], run)
 }
 
-/// For the soak.
+/// For the soak: both images, and faults.
 pub fn long(root: &Path) -> Outcome {
-    tested(root, |trial| run(trial, true).and_then(|()| faults::run(trial)))
+    tested(root, &["stm32h743", "stm32f4"], |trial| run(trial).and_then(|()| faults::run(trial)))
 }
 
-/// Both images that the tests built, at once.
-fn tested(root: &Path, work: impl Fn(&Trial) -> Result<(), String> + Sync) -> Outcome {
+/// Images that the tests built, one after the other: a host does not wait long for a board that has half a processor.
+fn tested(root: &Path, targets: &[&'static str], work: impl Fn(&Trial) -> Result<(), String>) -> Outcome {
     let prepared = built(root);
     if !matches!(prepared, Outcome::Passed) {
         return prepared;
     }
-    let folder = root.join(TESTED);
-    let trials = ["stm32h743", "stm32f4"].map(|target| Trial {
-        spec: folder.join(target).join("platform.toml"),
-        target,
-        image: folder.join(target).join("image.elf"),
-        folder: folder.join(target),
-        programs: built_in(root).join("release"),
-        cycles: false,
-    });
-    if let Some(trial) = trials.iter().find(|trial| !trial.image.is_file()) {
-        return setup::missing(format!("{} is not there; the tests of the boards build it", trial.image.display()));
+    for target in targets {
+        let folder = root.join(TESTED).join(target);
+        let trial = Trial {
+            spec: folder.join("platform.toml"),
+            target,
+            image: folder.join("image.elf"),
+            folder,
+            programs: built_in(root).join("release"),
+            cycles: false,
+        };
+        if !trial.image.is_file() {
+            return setup::missing(format!("{} is not there; the tests of the boards build it", trial.image.display()));
+        }
+        if let Err(why) = work(&trial) {
+            return Outcome::Failed(why);
+        }
     }
-    let results = thread::scope(|scope| {
-        let runs = trials.each_ref().map(|trial| scope.spawn(|| work(trial)));
-        runs.map(|run| run.join().unwrap_or_else(|_| Err("it panicked".to_owned())))
-    });
-    outcome(results.into_iter().collect())
+    Outcome::Passed
 }
 
 fn outcome(result: Result<(), String>) -> Outcome {
@@ -142,7 +141,7 @@ fn image(trial: &Trial) -> Outcome {
 }
 
 /// From reset to a record, which is replayed.
-fn run(trial: &Trial, replay: bool) -> Result<(), String> {
+fn run(trial: &Trial) -> Result<(), String> {
     let failed = |error: std::io::Error| format!("{}: {error}", trial.folder.display());
     fs::create_dir_all(&trial.folder).map_err(failed)?;
     fs::write(trial.folder.join("wave.toml"), WAVE).map_err(failed)?;
@@ -158,9 +157,6 @@ fn run(trial: &Trial, replay: bool) -> Result<(), String> {
         return Err(format!("{}: expected amplifiers off and no reset", trial.target));
     }
     drop(session);
-    if !replay {
-        return Ok(());
-    }
     let mut replay = Command::new(trial.programs.join("specgen"));
     replay.current_dir(&trial.folder).args(["replay", "run.rec", "--spec"]).arg(&trial.spec);
     match replay.status() {

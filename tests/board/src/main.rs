@@ -48,7 +48,7 @@ const USAGE: &str = "usage: emulated-board --library FILE --target stm32h743|stm
   --socket PATH   where a host finds the link: `specgen operate --socket PATH`
   --cycles        times by the model of src/cost.rs; one cycle an instruction if not given
 
-Commands on standard input: run MS, fail FAULT, heal, report, registers, quit. Without --socket the board runs by `run` alone.";
+Commands on standard input: run MS, fail FAULT, heal, time, report, registers, quit. Without --socket the board runs by `run` alone.";
 
 struct Options {
     library: PathBuf,
@@ -212,6 +212,7 @@ fn obey(machine: &mut Machine, command: &str, until: &mut Time) -> Option<String
             machine.board().heal();
             "healed".to_owned()
         }
+        ["time"] => format!("time_ms={:.3}", microseconds(machine.board().now) / 1e3),
         ["report"] => report(machine.board()),
         ["registers"] => {
             let touched: Vec<String> = machine.board().unmodelled.iter().map(|at| format!("{at:#x}")).collect();

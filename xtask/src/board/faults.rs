@@ -65,7 +65,7 @@ pub fn run(trial: &Trial) -> Result<(), String> {
 fn one(trial: &Trial, name: &str) -> Result<End, String> {
     let mut session = Session::begin(trial)?;
     let mut host = Host::of(session.host(trial))?;
-    host.order("arm\nwait holding 60\nrun\nwait running 60\nset command=0", ": running")?;
+    host.order("arm\nwait holding 60\nrun\nwait running 60\nset command=0\nstatus", ": running, ")?;
     session.pass(50.0)?;
     if name == "host-killed" {
         host.end();

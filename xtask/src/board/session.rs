@@ -53,8 +53,7 @@ impl Session {
         // A name that no other has.
         let name = format!("board-{}-{}", std::process::id(), BEGUN.fetch_add(1, Ordering::Relaxed));
         let shared = Path::new("/dev/shm").join(format!("specgen-plant-{name}"));
-        let socket = trial.folder.join("link.sock");
-        let _ = fs::remove_file(&socket);
+        let socket = trial.folder.join(format!("{name}.sock"));
         let mut plant = Command::new(trial.programs.join("specgen"));
         plant.arg("plant").arg(&trial.spec).args(["--name", &name]).stdout(Stdio::null()).stderr(Stdio::null());
         let plant = plant.spawn().map_err(|error| format!("specgen plant: {error}"))?;
@@ -103,7 +102,7 @@ impl Session {
 
     /// Its time, ms.
     pub fn time(&mut self) -> Result<f64, String> {
-        self.report()?.value("time_ms").ok_or_else(|| "the board does not say its time".to_owned())
+        self.command("time")?.value("time_ms").ok_or_else(|| "the board does not say its time".to_owned())
     }
 
     /// Until so much of its time has passed, ms.
@@ -120,8 +119,9 @@ impl Drop for Session {
     fn drop(&mut self) {
         end(&mut self.board);
         end(&mut self.plant);
-        // A process that is killed leaves it.
+        // Processes that are killed leave them.
         let _ = fs::remove_file(&self.shared);
+        let _ = fs::remove_file(&self.socket);
     }
 }
 
