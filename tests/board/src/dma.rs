@@ -66,6 +66,11 @@ impl Dma {
         self.streams.iter().any(|s| s.runs() && s.peripheral == register && !s.receives() && s.left > 0)
     }
 
+    /// Whether a stream would take a byte from this register.
+    pub fn takes(&self, register: u32) -> bool {
+        self.streams.iter().any(|s| s.runs() && s.peripheral == register && s.receives() && s.left > 0)
+    }
+
     /// The next byte for a register.
     pub fn fetch(&mut self, register: u32, core: &Core<'_>) -> Option<u8> {
         let address = self.serving(register, false)?.step();

@@ -95,7 +95,8 @@ impl Usart {
             self.sends() && self.control[2] >> 7 & 1 == 1 && self.sending.is_none() && dma.feeds(self.registers[1]);
         let loads = self.sending.is_some() && self.shifting.is_none();
         let begins = self.receives() && self.arriving.is_none() && !self.incoming.is_empty();
-        let at_once = (fed || loads || begins).then_some(now);
+        let taken = self.status & RECEIVED != 0 && self.control[2] >> 6 & 1 == 1 && dma.takes(self.registers[0]);
+        let at_once = (fed || loads || begins || taken).then_some(now);
         [at_once, self.shifting.map(|(_, end)| end), self.arriving, self.quiet].into_iter().flatten().min()
     }
 
@@ -119,6 +120,13 @@ impl Usart {
                 self.shifting = Some((byte, now + self.byte_time()));
                 self.status &= !SENT;
             }
+        }
+        // A byte that came before its DMA was on.
+        if self.status & RECEIVED != 0
+            && self.control[2] >> 6 & 1 == 1
+            && dma.deliver(self.registers[0], self.data, core)
+        {
+            self.status &= !RECEIVED;
         }
         self.status = self.status & !EMPTY | if self.sending.is_none() { EMPTY } else { 0 };
         if self.quiet.is_some_and(|at| at <= now) {
