@@ -115,16 +115,12 @@ impl WordKind {
 pub fn status_words(status: u32) -> String {
     let mut words = Vec::new();
     let mut legs = |first: u32, what: &str, then: &str| {
-        words.extend(
-            (0..6).filter(|leg| status >> (first + leg) & 1 == 1).map(|leg| format!("{what} {leg}{then}")),
-        );
+        words.extend((0..6).filter(|leg| status >> (first + leg) & 1 == 1).map(|leg| format!("{what} {leg}{then}")));
     };
     legs(0, "leg", " limited");
     legs(8, "gauge", " fault");
     legs(24, "leg", " inverse static");
-    for (bit, what) in
-        [(16, "set-point refused"), (17, "set-point stale"), (18, "moving"), (19, "wrench fault")]
-    {
+    for (bit, what) in [(16, "set-point refused"), (17, "set-point stale"), (18, "moving"), (19, "wrench fault")] {
         words.extend((status >> bit & 1 == 1).then(|| what.to_owned()));
     }
     let known = 0x3f | 0x3f << 8 | 0xf << 16 | 0x3f << 24;
