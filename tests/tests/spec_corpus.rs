@@ -73,7 +73,8 @@ fn flattened(text: &str, inline: bool) -> String {
     let mut repeated: std::collections::BTreeMap<String, Vec<String>> = std::collections::BTreeMap::new();
     for (name, keys) in &sections {
         // An inline table is closed: one that holds sections can only be written with dots.
-        let holds_sections = sections.iter().any(|(other, _)| other.starts_with(&format!("{name}.")));
+        let holds_sections =
+            sections.iter().any(|(other, _)| other.trim_start_matches('[').starts_with(&format!("{name}.")));
         if let Some(name) = name.strip_prefix('[').and_then(|n| n.strip_suffix(']')) {
             repeated.entry(name.to_owned()).or_default().push(format!("{{ {keys} }}"));
         } else if inline && !holds_sections && !name.contains('.') {

@@ -53,7 +53,8 @@ fn links_lead_somewhere() {
 #[test]
 fn files_and_folders_that_are_named_exist() {
     let mut found = 0;
-    for name in documents() {
+    // Examples of findings bring files of their own.
+    for name in documents().into_iter().filter(|name| name != "docs/diagnostics.md") {
         for word in quoted(&read(&name)) {
             let tops = ["codegen/", "firmware/", "host-sim/", "specs/", "tests/", "xtask/", "docs/"];
             let is_path = tops.iter().any(|top| word.starts_with(top)) && !word.contains(['*', ' ']);
@@ -172,7 +173,7 @@ fn the_example_in_c_runs() {
 /// The status bits of the page are those of the emitted controller.
 #[test]
 fn status_bits_are_those_that_are_emitted() {
-    let (page, step) = (read("docs/control-law.md"), read("firmware/controller/src/step.rs"));
+    let (page, step) = (read("docs/control-law.md"), read("firmware/controller/src/tick.rs"));
     for (rows, constant, value) in [
         ("0–5", "LEG_LIMITED", 0x3f_u32),
         ("8–13", "GAUGE_FAULT", 0x3f00),

@@ -274,7 +274,10 @@ fn a_refused_run_leaves_no_folder_behind() {
     // Accepted by every check of the spec, refused where its constants are computed.
     folder.spec(
         "coarse.toml",
-        &[("bits  = 16\nrange = [\"0 V\", \"150 V\"]", "bits  = 8\nrange = [\"0 V\", \"500 V\"]")],
+        &[
+            ("bits  = 16\nrange = [\"0 V\", \"150 V\"]", "bits  = 8\nrange = [\"0 V\", \"500 V\"]"),
+            ("[timing]", "[lint]\nallow = [\"dac.bits: what there was\"]\n\n[timing]"),
+        ],
     );
     let before = folder.listing();
     for (spec, code) in [

@@ -10,6 +10,7 @@
 //! | [`Traced`] | numbers that record every operation: bounds of rounding errors over a box of poses |
 //! | [`ewma_limit`], [`pcc_limit`] | Jury limits of the run-to-run laws |
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
+//! | [`largest`] | where a condition ceases to hold, by bisection |
 //! | [`Kernels`], [`displacements`], [`jacobian`] | the controller's kernels on these numbers, compiled here |
 //!
 //! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
@@ -22,6 +23,7 @@ mod jury;
 mod kernels;
 mod matrix;
 pub mod nnls;
+mod search;
 mod space;
 mod symmetric;
 mod traced;
@@ -33,6 +35,7 @@ pub use form::magnitude;
 pub use jury::{ewma_limit, pcc_limit};
 pub use kernels::{Kernels, displacements, jacobian};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
+pub use search::largest;
 pub use space::{cross, dot, norm, rotation};
 pub use symmetric::{diagonalize, generalized_modes, inverse_of_modes, symmetric_eigen};
 pub use traced::{Trace, Traced, trace};

@@ -148,7 +148,7 @@ pub fn of_legs(leg: &LegParameters, mode: usize, controllers: Pair, seed: u64) -
     Ok(section.text("Errors are as the gauges read them, their own noise included."))
 }
 
-const LEGS: [&str; 6] = ["leg 1", "leg 2", "leg 3", "leg 4", "leg 5", "leg 6"];
+const LEGS: [&str; 6] = ["leg 0", "leg 1", "leg 2", "leg 3", "leg 4", "leg 5"];
 
 /// What is left without noise, and what each source adds to it; last what the drive converter adds, from the run `silent`
 /// without noise with the converter of the spec.

@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use specgen_studies::reproduce::write::digits;
 
-use super::section::Grid;
+use super::grid::Grid;
 
 /// Points of a series that is drawn over time.
 const POINTS: usize = 640;

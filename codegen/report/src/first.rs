@@ -230,7 +230,7 @@ fn margin_card(compiled: &Compiled, verdict: &Verdict, mode: u32) -> String {
 
 fn platform_card(model: &Model, view: Part, note: &str) -> Vec<Part> {
     let gauges = if model.task_space.is_some() {
-        "<span><b class=\"blue\">G1–G6</b> gauge, arrow: positive reading</span>"
+        "<span><b class=\"blue\">G0–G5</b> gauge, arrow: positive reading</span>"
     } else {
         "<span>a gauge in each leg, positive when it is longer</span>"
     };
@@ -243,7 +243,7 @@ fn platform_card(model: &Model, view: Part, note: &str) -> Vec<Part> {
         )),
         view,
         Part::Html(format!(
-            "<p class=\"legend\">{gauges}<span><b>1–6</b> legs, {}\u{2009}µm stroke</span><span>{mass}\u{2009}kg platform</span>{part}</p></div>\n",
+            "<p class=\"legend\">{gauges}<span><b>0–5</b> legs, {}\u{2009}µm stroke</span><span>{mass}\u{2009}kg platform</span>{part}</p></div>\n",
             short(model.actuator.stroke * 1e6).trim_end_matches(".0")
         )),
     ]

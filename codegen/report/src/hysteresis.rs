@@ -65,7 +65,7 @@ pub fn of_platform(
             actuator.voltage[0],
             &FREQUENCIES,
             &format!("loops-{k}"),
-            &format!("Leg {} without compensation, by rate", k + 1),
+            &format!("Leg {k} without compensation, by rate"),
         );
         let record = records.get(if records.len() == 6 { k } else { 0 }).and_then(Option::as_ref);
         let mut steps = vec![("loop, no model", width * 1e3)];
@@ -86,7 +86,7 @@ pub fn of_platform(
         let fed = last.map_or_else(String::new, |(axis, rms)| format!(" and {} of {axis} with feedback", length(rms)));
         columns.push(vec![Part::Rows(funnel(k, &steps))]);
         let lead = format!("A loop of {} at {} Hz{behind_it}{fed}.", length(width * 1e3), FREQUENCIES[2]);
-        section = section.pane(&[&format!("leg {}", k + 1)], vec![Part::Lead(lead), Part::Columns(columns)]);
+        section = section.pane(&[&format!("leg {k}")], vec![Part::Lead(lead), Part::Columns(columns)]);
     }
     Ok(section)
 }
@@ -185,8 +185,7 @@ impl Behind {
         let mut chart = Chart::new(
             &format!("behind-{leg}"),
             &format!(
-                "What the inverse model leaves: leg {}, {}, {}; λ {}, δ {} nm",
-                leg + 1,
+                "What the inverse model leaves: leg {leg}, {}, {}; λ {}, δ {} nm",
                 own.name,
                 own.speed(),
                 digits(self.line.slope),
@@ -205,7 +204,7 @@ impl Behind {
 
 /// From the loop to the error, nm.
 fn funnel(leg: usize, steps: &[(&str, f64)]) -> Rows {
-    let mut numbers = Grid::new(&format!("From loop to error, leg {}", leg + 1), &["what", "nm"]);
+    let mut numbers = Grid::new(&format!("From loop to error, leg {leg}"), &["what", "nm"]);
     let positive = steps.iter().filter(|(_, nm)| *nm > 0.0);
     let (low, high) = positive.clone().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), (_, nm)| {
         (if *nm < low { *nm } else { low }, if *nm > high { *nm } else { high })

@@ -14,6 +14,7 @@ pub mod chart;
 pub mod evidence;
 pub mod first;
 pub mod front;
+mod grid;
 pub mod hysteresis;
 pub mod identification;
 pub mod margins;

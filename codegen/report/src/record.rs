@@ -16,7 +16,7 @@ use core::f64::consts::TAU;
 use specgen_compiler::stability::platform::Law;
 use specgen_toolchain::budget::group;
 
-const LEGS: [&str; 6] = ["leg 1", "leg 2", "leg 3", "leg 4", "leg 5", "leg 6"];
+const LEGS: [&str; 6] = ["leg 0", "leg 1", "leg 2", "leg 3", "leg 4", "leg 5"];
 const GAUGES: [&str; 6] = ["gauge 1", "gauge 2", "gauge 3", "gauge 4", "gauge 5", "gauge 6"];
 /// Points of a loop, at most.
 const POINTS: usize = 500;
@@ -356,7 +356,7 @@ fn loops(model: &Model, run: &Run) -> Section {
         .map(|k| {
             let mut chart = Chart::new(
                 &format!("record-loop-{k}"),
-                &format!("Leg {}: displacement by the gauges over voltage", k + 1),
+                &format!("Leg {k}: displacement by the gauges over voltage"),
                 Axis::linear("voltage", "V"),
                 Axis::linear("displacement", "µm"),
             );
@@ -369,7 +369,7 @@ fn loops(model: &Model, run: &Run) -> Section {
                 chart = chart.with(SIMULATED, Mark::Dashed(1.6), of(run.simulated())).colored(INK);
             }
             chart.keys = true;
-            chart.short = format!("leg {}", k + 1);
+            chart.short = format!("leg {k}");
             chart.height = 340;
             chart
         })
@@ -388,7 +388,7 @@ fn loops(model: &Model, run: &Run) -> Section {
     );
     for k in 0..6 {
         let simulated = run.simulated.as_ref().map_or_else(|_| String::new(), |samples| digits(gain(samples, k)));
-        table.push(vec![format!("{}", k + 1), digits(gain(&run.recorded, k)), simulated]);
+        table.push(vec![k.to_string(), digits(gain(&run.recorded, k)), simulated]);
     }
     Section::new("hysteresis", "Hysteresis", "").charts(charts).table(table)
 }

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::chart::Chart;
+pub use super::grid::Grid;
 use specgen_studies::reproduce::table::{Cell, Table as Comparison};
 use specgen_studies::reproduce::write::{cell, digits};
 
@@ -110,34 +111,6 @@ pub struct Rows {
     pub data: Value,
     /// Its numbers.
     pub numbers: Grid,
-}
-
-/// A table of texts.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Grid {
-    /// What stands above the table.
-    pub caption: String,
-    /// Names of the columns.
-    pub head: Vec<String>,
-    /// As many texts each as the head.
-    pub rows: Vec<Vec<String>>,
-}
-
-impl Grid {
-    /// A table without rows.
-    #[must_use]
-    pub fn new(caption: &str, head: &[&str]) -> Self {
-        Self {
-            caption: caption.to_owned(),
-            head: head.iter().map(|text| (*text).to_owned()).collect(),
-            rows: Vec::new(),
-        }
-    }
-
-    /// Adds a row at the end.
-    pub fn push(&mut self, row: Vec<String>) {
-        self.rows.push(row);
-    }
 }
 
 impl Section {

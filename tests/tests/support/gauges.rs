@@ -19,6 +19,7 @@ pub fn model(probes: [Probe; 6]) -> Model {
     let mut model = compile(&repository().join("specs/legs.toml")).unwrap().model;
     assert_eq!(model.geometry.height, HEIGHT);
     model.sensor.range = [-70e-6, 70e-6];
+    model.workspace.rotation = [0.6e-3; 3];
     model.task_space = Some(TaskSpace {
         mode: ControlMode::PF,
         probes,

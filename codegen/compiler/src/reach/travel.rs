@@ -1,13 +1,11 @@
 //! Leg displacements along axes, over boxes and along paths, from the kinematics that the controller uses.
 
 use nalgebra::{Matrix6, Vector6};
-use specgen_numerics::{displacements, jacobian};
+use specgen_numerics::{displacements, jacobian, largest};
 use specgen_runtime::Platform;
 
 use super::{INTERIOR_POSES, PathReach, Pose, wider};
 
-/// Bisections of a travel: 2⁻⁴⁰ of it is far below an atom.
-const BISECTIONS: u32 = 40;
 /// The kinematics holds up to here, rad.
 const LARGEST_ANGLE: f64 = core::f64::consts::FRAC_PI_4;
 /// A leg counts as within its stroke up to this part of it beyond: rounding must not refuse a path that starts at rest.
@@ -128,19 +126,6 @@ impl Legs<'_> {
         path.shift = (path.poses > 0 && lowest <= highest).then_some([lowest, highest]);
         path
     }
-}
-
-/// Largest value up to `far` below which `holds`, by bisection; 0 if nowhere.
-pub(crate) fn largest(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
-    if holds(far) {
-        return far;
-    }
-    let (mut good, mut bad) = (0.0, far);
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (good + bad);
-        if holds(middle) { good = middle } else { bad = middle }
-    }
-    good
 }
 
 /// Signs of the 64 corners of a box.

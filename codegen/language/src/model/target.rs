@@ -73,7 +73,7 @@ section! {
     /// In m and rad.
     "requirements.tracking", Repeated(0, MAX_TABLES) => TrackingLimit {
         /// The trajectory that it holds for; every one without it.
-        trajectory: Option<String> = NAME, Optional, "", "case-1";
+        trajectory: Option<String> = NAME, Optional, "", "circle";
         /// The operating frequency that it holds for; that of the trajectory without it.
         frequency: Option<f64> = one(Dimension::FREQUENCY, Range::closed(1e-3, 1e3), "Hz"), Optional, "", "10 Hz";
         /// Largest norm of the errors of x, y and z, rms.

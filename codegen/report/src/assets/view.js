@@ -175,7 +175,7 @@ class View {
     for (const [from, to, k] of legs) {
       const at = between(from, to, k % 2 ? 0.34 : 0.4), color = (bad.legs || []).includes(k) ? "var(--orange)" : "var(--edge)";
       element("circle", { cx: at[0], cy: at[1], r: 8.5, fill: "var(--card)", stroke: color }, svg);
-      this.text(at[0], at[1] + 4, String(k + 1), "strong");
+      this.text(at[0], at[1] + 4, String(k), "strong");
     }
     if (data.part) this.box(on, data.part, 0.26 * rp);
     if (!data.ghost) this.gauges(0.42 * rp, bad.gauges || []);
@@ -212,7 +212,7 @@ class View {
       const size = Math.hypot(b[0] - a[0], b[1] - a[1]), [u, v] = size > 6 ? [(b[0] - a[0]) / size, (b[1] - a[1]) / size] : [0.7, -0.7];
       // At the tail of one that points away, so that it is not on another's.
       const [x, y] = b[2] > a[2] + 1e-6 && Math.abs(gauge.d[2]) < 0.7 ? [a[0] - u * 14, a[1] - v * 14] : [b[0] + u * 13, b[1] + v * 13];
-      this.text(x, y + 4, "G" + (k + 1), (bad.includes(k) ? "orange" : "blue") + " halo");
+      this.text(x, y + 4, "G" + k, (bad.includes(k) ? "orange" : "blue") + " halo");
     });
   }
 
@@ -264,7 +264,7 @@ class View {
     this.text(left, top - 12, "legs, µm of " + number(Number((travel / 1000).toPrecision(3))) + " µm of travel", "strong", "start");
     legs.forEach((v, k) => {
       const y = top + k * step, over = v < 0 || v > travel;
-      this.text(left - 10, y + 13, String(k + 1), "strong", "end");
+      this.text(left - 10, y + 13, String(k), "strong", "end");
       element("rect", { x: left, y: y + 2, width: wide, height: 14, fill: "var(--track)" }, this.svg);
       element("rect", { x: left, y: y + 2, width: Math.min(Math.max(v / travel, 0), 1) * wide, height: 14, fill: over ? "var(--orange)" : "var(--blue)" }, this.svg);
       this.text(left + wide + 8, y + 13, shown((v / 1000).toFixed(1)), over ? "orange" : "", "start");

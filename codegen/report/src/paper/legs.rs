@@ -24,13 +24,13 @@ pub fn section(
         let place = ["a", "b", "c"][figure - 6];
         let mut path = Chart::new(
             &format!("legs-{place}-path"),
-            &format!("Fig. {figure}: leg 1 at {frequency} Hz"),
+            &format!("Fig. {figure}: leg 0 at {frequency} Hz"),
             Axis::linear("time", "s"),
             Axis::linear("displacement", "µm"),
         );
         let mut error = Chart::new(
             &format!("legs-{place}-error"),
-            &format!("Fig. {figure}: error of leg 1 at {frequency} Hz"),
+            &format!("Fig. {figure}: error of leg 0 at {frequency} Hz"),
             Axis::linear("time", "s"),
             Axis::linear("T − Y", "nm"),
         );

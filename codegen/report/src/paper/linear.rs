@@ -39,7 +39,7 @@ pub fn of_legs(
     command: &str,
 ) -> Result<Section, RunError> {
     let table = reproduce::legs::table_1(scenario, controller, actuator.stack_gain * 1e6, actuator.stacks)?;
-    let mut lines = chart("Fig. 4: leg 1 with the inverse model alone, last period");
+    let mut lines = chart("Fig. 4: leg 0 with the inverse model alone, last period");
     select(controller, MODES[0].1)?;
     for frequency in LINEARITY_FREQUENCIES {
         let tracking = scenario.run(controller, frequency)?.tracking;
@@ -99,7 +99,7 @@ pub fn of_platform(
             let off: f64 = points.iter().map(|(x, y)| y - line.slope * x - line.offset).map(|e| e * e).sum();
             let rms = libm::sqrt(off / points.len() as f64) * 1e9;
             table.push(vec![
-                format!("{}", leg + 1),
+                leg.to_string(),
                 format!("{frequency}"),
                 digits(line.slope),
                 digits(line.offset * 1e9),
@@ -109,7 +109,7 @@ pub fn of_platform(
                 let every = points.len().div_ceil(POINTS).max(1);
                 let (x, y): (Vec<f64>, Vec<f64>) =
                     points.iter().step_by(every).map(|(x, y)| (x / actuator.leg_gain(), y * 1e6)).unzip();
-                let name = format!("leg {}, {frequency} Hz", leg + 1);
+                let name = format!("leg {leg}, {frequency} Hz");
                 lines = lines.with(&name, LINE, pairs(&x, &y));
             }
         }

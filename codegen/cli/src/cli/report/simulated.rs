@@ -24,7 +24,7 @@ use crate::{lower, machine, reproduce};
 
 /// Frequencies at which six legs are tried, Hz: that of the budget first.
 const LEG_FREQUENCIES: [f64; 2] = [1.0, 10.0];
-const LEGS_NAMES: [&str; 6] = ["leg 1", "leg 2", "leg 3", "leg 4", "leg 5", "leg 6"];
+const LEGS_NAMES: [&str; 6] = ["leg 0", "leg 1", "leg 2", "leg 3", "leg 4", "leg 5"];
 
 /// What runs gave.
 pub struct Simulated {

@@ -11,9 +11,9 @@ use specgen_runtime::setpoint::StopLimits;
 use super::poses::{Stretch, along};
 use super::{AXES, User, amount, stop};
 use crate::ir::Setpoints;
-use crate::reach::largest;
 use specgen_language::diagnostic::Diagnostic;
 use specgen_language::model::{Model, TaskSpace};
+use specgen_numerics::largest;
 
 /// A stop beside a wall is shortened while it runs; a trajectory up to the wall itself is not refused for that.
 const SLACK: f64 = 0.01;

@@ -68,12 +68,13 @@ pub(super) fn names_differ(f: &Fields, findings: &mut Findings) -> Option<()> {
 
 /// A limit is for a trajectory that there is, and limits something.
 pub(super) fn limits(f: &Fields, findings: &mut Findings) -> Option<()> {
-    let names: Vec<&str> =
-        (0..f.count("trajectory")).filter_map(|index| f.name(&format!("trajectory[{index}].name"))).collect();
+    // None where one has no name that can be read, which is a finding of its own.
+    let names: Option<Vec<&str>> =
+        (0..f.count("trajectory")).map(|index| f.name(&format!("trajectory[{index}].name"))).collect();
     for index in 0..f.count("requirements.tracking") {
         let table = format!("requirements.tracking[{index}]");
         let path = keys::join(&table, "trajectory");
-        if let Some(name) = f.name(&path)
+        if let (Some(names), Some(name)) = (&names, f.name(&path))
             && !names.contains(&name)
         {
             let known = if names.is_empty() { "no [[trajectory]]".to_owned() } else { names.join(", ") };
