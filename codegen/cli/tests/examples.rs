@@ -120,6 +120,7 @@ fn documents() -> Vec<(String, String)> {
     for entry in fs::read_dir(repository().join("docs")).unwrap() {
         names.push(format!("docs/{}", entry.unwrap().file_name().to_str().unwrap()));
     }
+    names.retain(|name| name.ends_with(".md"));
     names.sort();
     names.into_iter().map(|name| (name.clone(), fs::read_to_string(repository().join(name)).unwrap())).collect()
 }
