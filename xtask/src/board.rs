@@ -68,11 +68,6 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     Some(report.finish())
 }
 
-/// For the test run, after the tests, which have built this one image.
-pub fn short(root: &Path) -> Outcome {
-    tested(root, &["stm32h743"], run)
-}
-
 /// For the soak: both images, and faults.
 pub fn long(root: &Path) -> Outcome {
     tested(root, &["stm32h743", "stm32f4"], |trial| run(trial).and_then(|()| faults::run(trial)))
@@ -168,7 +163,7 @@ fn run(trial: &Trial) -> Result<(), String> {
 /// From arming to a record; times are the board's, ms. The record is short: what it holds has to go over the line.
 fn operate(trial: &Trial, session: &mut Session) -> Result<(), String> {
     let settings = format!("config write {}\nstatus", trial.spec.display());
-    let stands = ", status 0x";
+    let stands = "; status 0x";
     let mut host = Host::of(session.host(trial))?;
     for (orders, words, time) in [
         ("status\narm\nwait holding 60\nrun\nwait running 60\nset command=0\nstatus", ": running", 200.0),

@@ -85,7 +85,6 @@ pub fn test(root: &Path) -> ExitCode {
     report.step("formatting", || formatting(root));
     let binaries = compiled(root, &mut report);
     report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
-    report.step("images on the emulated board", || board::short(root));
     report.step("examples in the documentation", || binaries::examples(root));
     report.step("lints", || lints(root));
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));

@@ -114,7 +114,7 @@ enum Command {
     Tune(tune::Arguments),
     /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
     Robust(robust::Arguments),
-    /// Write one HTML file about a spec: the paper's figures from the emitted controller, error budget, margins, findings.
+    /// Write one HTML page about a spec: a verdict, tracking, error budget, margins, hysteresis, findings; or about a run.
     Report(report::Arguments),
     /// Run the paper's whole list of experiments, from specs in the binary: ours beside the paper's, with remarks.
     Reproduce(reproduce::Arguments),
