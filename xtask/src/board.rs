@@ -68,18 +68,14 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     Some(report.finish())
 }
 
-/// For the soak: both images, and faults.
+/// For the soak: both images that its tests built, with faults, one after the other: a host does not wait long for a board that
+/// has half a processor.
 pub fn long(root: &Path) -> Outcome {
-    tested(root, &["stm32h743", "stm32f4"], |trial| run(trial).and_then(|()| faults::run(trial)))
-}
-
-/// Images that the tests built, one after the other: a host does not wait long for a board that has half a processor.
-fn tested(root: &Path, targets: &[&'static str], work: impl Fn(&Trial) -> Result<(), String>) -> Outcome {
     let prepared = built(root);
     if !matches!(prepared, Outcome::Passed) {
         return prepared;
     }
-    for target in targets {
+    for target in ["stm32h743", "stm32f4"] {
         let folder = root.join(TESTED).join(target);
         let trial = Trial {
             spec: folder.join("platform.toml"),
@@ -92,7 +88,7 @@ fn tested(root: &Path, targets: &[&'static str], work: impl Fn(&Trial) -> Result
         if !trial.image.is_file() {
             return setup::missing(format!("{} is not there; the tests of the boards build it", trial.image.display()));
         }
-        if let Err(why) = work(&trial) {
+        if let Err(why) = run(&trial).and_then(|()| faults::run(&trial)) {
             return Outcome::Failed(why);
         }
     }

@@ -19,7 +19,7 @@ use super::chart::{Axis, Chart, DASHED, INK, LINE, pairs};
 use super::margins::adapting_name;
 use super::section::{Grid, Part, Rows, Section};
 use super::spectrum::cumulative;
-use super::tracking::{AXES, Followed, PLAYED, mode_of, path};
+use super::tracking::{AXES, Followed, LEGS, PLAYED, mode_of, path};
 use specgen_language::model::{Model, TaskSpace, TrajectoryKind};
 use specgen_studies::machine;
 use specgen_studies::reproduce;
@@ -147,8 +147,6 @@ pub fn of_legs(leg: &LegParameters, mode: usize, controllers: Pair, seed: u64) -
     section.parts = parts(&what, 0, &LEGS, &found, &together, interval);
     Ok(section.text("Errors are as the gauges read them, their own noise included."))
 }
-
-const LEGS: [&str; 6] = ["leg 0", "leg 1", "leg 2", "leg 3", "leg 4", "leg 5"];
 
 /// What is left without noise, and what each source adds to it; last what the drive converter adds, from the run `silent`
 /// without noise with the converter of the spec.

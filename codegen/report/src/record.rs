@@ -8,15 +8,14 @@ use specgen_studies::reproduce::write::digits;
 use super::chart::{Axis, BLUE, Chart, INK, LINE, Mark, Note, pairs};
 use super::margins;
 use super::page::marked;
-use super::section::{Grid, Group, Multiples, Part, Rows, Section};
+use super::section::{Grid, Multiples, Part, Rows, Section};
 use super::spectrum::density;
-use super::tracking::{AXES, norm, round_up, short};
+use super::tracking::{AXES, LEGS, error_groups, norm, round_up, short};
 use super::verdict::{Sentence, card, text_row, thin, value_row};
 use core::f64::consts::TAU;
 use specgen_compiler::stability::platform::Law;
 use specgen_toolchain::budget::group;
 
-const LEGS: [&str; 6] = ["leg 0", "leg 1", "leg 2", "leg 3", "leg 4", "leg 5"];
 const GAUGES: [&str; 6] = ["gauge 1", "gauge 2", "gauge 3", "gauge 4", "gauge 5", "gauge 6"];
 /// Points of a loop, at most.
 const POINTS: usize = 500;
@@ -247,17 +246,7 @@ fn errors(model: &Model, run: &Run) -> Section {
         let largest = round_up(peaks[axes].iter().fold(0.0, |a: f64, b| if *b > a { *b } else { a }));
         Some([-largest, largest])
     };
-    let groups = if platform {
-        vec![
-            Group { title: "Position error, nm over s".to_owned(), items: vec![0, 1, 2], range: range(0..3) },
-            Group { title: "Angle error, nrad over s".to_owned(), items: vec![3, 4, 5], range: range(3..6) },
-        ]
-    } else {
-        vec![
-            Group { title: "Error, nm over s".to_owned(), items: vec![0, 1, 2], range: range(0..6) },
-            Group { title: String::new(), items: vec![3, 4, 5], range: range(0..6) },
-        ]
-    };
+    let groups = error_groups(platform, range);
     let worst = (1..lengths).fold(0, |worst, k| if found[k] > found[worst] { k } else { worst });
     let against = if run.simulated.is_ok() {
         format!(", the simulation {}\u{2009}nm", short(simulated[worst]))

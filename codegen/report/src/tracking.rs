@@ -17,6 +17,8 @@ use super::section::{Grid, Group, Multiples, Part, Rows, Section};
 
 /// Names of the coordinates.
 pub const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
+/// Names of the legs, counted as their words are.
+pub const LEGS: [&str; 6] = ["leg 0", "leg 1", "leg 2", "leg 3", "leg 4", "leg 5"];
 /// A trajectory is run at its own frequency and at this many times it.
 const FAST: f64 = 10.0;
 /// A trajectory on board that does not end is followed for this long, s.
@@ -422,17 +424,7 @@ pub fn pane(run: &Shown) -> Vec<Part> {
         let round = round_up(largest);
         Some([-round, round])
     };
-    let groups = if run.lengths == 3 {
-        vec![
-            Group { title: "Position error, nm over s".to_owned(), items: vec![0, 1, 2], range: range(0..3) },
-            Group { title: "Angle error, nrad over s".to_owned(), items: vec![3, 4, 5], range: range(3..6) },
-        ]
-    } else {
-        vec![
-            Group { title: "Error, nm over s".to_owned(), items: vec![0, 1, 2], range: range(0..6) },
-            Group { title: String::new(), items: vec![3, 4, 5], range: range(0..6) },
-        ]
-    };
+    let groups = error_groups(run.lengths == 3, range);
     let follows = if at_corner { "; the peak follows a corner of the path" } else { "" };
     vec![
         Part::Lead(format!(
@@ -498,6 +490,19 @@ fn bends(samples: &[[[f64; 6]; 2]], interval: f64) -> Vec<f64> {
     }
     times.sort_by(f64::total_cmp);
     times
+}
+
+/// Small multiples of errors: of a pose (`axes`), lengths apart from angles, or of six legs. `range`: that of some of them.
+pub(crate) fn error_groups(axes: bool, range: impl Fn(core::ops::Range<usize>) -> Option<[f64; 2]>) -> Vec<Group> {
+    let group = |title: &str, items: Vec<usize>, of| Group { title: title.to_owned(), items, range: range(of) };
+    if axes {
+        vec![
+            group("Position error, nm over s", vec![0, 1, 2], 0..3),
+            group("Angle error, nrad over s", vec![3, 4, 5], 3..6),
+        ]
+    } else {
+        vec![group("Error, nm over s", vec![0, 1, 2], 0..6), group("", vec![3, 4, 5], 0..6)]
+    }
 }
 
 #[cfg(test)]

@@ -69,7 +69,7 @@ pub fn of_platform(
     let mut traced = machine.clone();
     traced.options = RunOptions { record: Record::Trace, ..machine.options.clone() };
     let jacobian = platform.jacobian(&[0.0; 6]);
-    let mut lines = chart("Fig. 4: legs 1 and 4 in case 1, F with the inverse model alone");
+    let mut lines = chart("Fig. 4: legs 0 and 3 in case 1, F with the inverse model alone");
     let mut table = Grid::new(
         "Straight line through the points of each leg, Y = λ q̂ + δ",
         &["leg", "Hz", "λ = ρ/ρ̂", "δ, nm", "deviation from the line, nm rms"],

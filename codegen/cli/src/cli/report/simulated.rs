@@ -24,7 +24,6 @@ use crate::{lower, machine, reproduce};
 
 /// Frequencies at which six legs are tried, Hz: that of the budget first.
 const LEG_FREQUENCIES: [f64; 2] = [1.0, 10.0];
-const LEGS_NAMES: [&str; 6] = ["leg 0", "leg 1", "leg 2", "leg 3", "leg 4", "leg 5"];
 
 /// What runs gave.
 pub struct Simulated {
@@ -131,7 +130,7 @@ fn of_legs(
             id: format!("legs-{frequency}hz"),
             what: format!("the leg trajectory at {speed}"),
             law,
-            names: LEGS_NAMES,
+            names: tracking::LEGS,
             lengths: 6,
             interval: run.interval,
             samples: run.samples.iter().map(|sample| [sample.target, sample.measured]).collect(),
