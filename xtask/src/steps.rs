@@ -49,8 +49,9 @@ const SHARED_MEMORY: Trial = Trial { manifest: LOOM, judges: &[("firmware/rt/src
 /// Time that the soak gives each target of the fuzzer, s.
 const FUZZING: u32 = 300;
 /// Members of the workspace that people write.
-const HAND_WRITTEN: [&str; 18] = [
+const HAND_WRITTEN: [&str; 19] = [
     "specgen",
+    "specgen-cycles",
     "specgen-numerics",
     "specgen-language",
     "specgen-identify",

@@ -1,8 +1,9 @@
 //! The board: every device at its address, and what the pins do to the converters.
 
+use specgen_cycles::Cost;
+
 use crate::ad5686r::Ad5686r;
 use crate::ad7606::Ad7606;
-use crate::cost::Cost;
 use crate::dma::Dma;
 use crate::fault::Fault;
 use crate::gpio::{self, Gpio};

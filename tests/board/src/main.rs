@@ -5,7 +5,6 @@
 mod ad5686r;
 mod ad7606;
 mod board;
-mod cost;
 mod dma;
 mod elf;
 mod fault;
@@ -46,7 +45,7 @@ const USAGE: &str = "usage: emulated-board --library FILE --target stm32h743|stm
   --bits N        of a gauge: sensor.bits of the spec
   --plant NAME    the machine that `specgen plant --name NAME` serves; gauges in mid-range if not given
   --socket PATH   where a host finds the link: `specgen operate --socket PATH`
-  --cycles        times by the model of src/cost.rs; one cycle an instruction if not given
+  --cycles        times by the model of specgen-cycles; one cycle an instruction if not given
 
 Commands on standard input: run MS, fail FAULT, heal, time, report, registers, quit. Without --socket the board runs by `run` alone.";
 

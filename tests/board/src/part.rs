@@ -3,12 +3,7 @@
 /// A pin: port (0 is A) and number.
 pub type Pin = (usize, u32);
 
-/// Which family, where the registers of a peripheral differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Family {
-    H7,
-    F4,
-}
+pub use specgen_cycles::Family;
 
 /// A microcontroller with its board.
 #[derive(Debug)]

@@ -19,13 +19,22 @@
 //! Not in it: integer registers that one instruction waits for, branches that are not foreseen, misses of the data cache, the
 //! buses to AXI SRAM, and the DMA on them. Latencies of the M7 are those of LLVM's scheduling model, of the M4 those of its manual.
 
-use crate::part::Family;
+/// Which family, where cores and registers of peripherals differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Family {
+    /// Cortex-M7 with double precision, caches: STM32H7.
+    H7,
+    /// Cortex-M4F behind a flash accelerator: STM32F4.
+    F4,
+}
 
 /// Lines of the M7's instruction cache: two ways.
 const SETS: usize = 256;
 /// Lines of the F4's accelerator.
 const LINES: usize = 64;
 
+/// What has been executed so far, as far as it decides about what comes.
+#[derive(Debug)]
 pub struct Cost {
     family: Family,
     modelled: bool,
@@ -82,6 +91,8 @@ impl Cost {
     /// Of stacking or unstacking with floating-point registers.
     pub const EXCEPTION: u64 = 29;
 
+    /// Nothing executed yet, caches empty; `modelled`: by the table, else one cycle an instruction.
+    #[must_use]
     pub fn new(family: Family, modelled: bool) -> Self {
         Self {
             family,
@@ -220,6 +231,7 @@ impl Cost {
     }
 
     /// Of an access to a register of a device, beyond its instruction.
+    #[must_use]
     pub fn access(&self, write: bool) -> u64 {
         match (self.modelled, self.family, write) {
             (false, ..) => 4,
