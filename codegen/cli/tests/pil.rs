@@ -78,7 +78,10 @@ fn six_legs_and_a_platform_are_bit_equal_in_closed_loop_and_legs_outrun_real_tim
     let (_one, folder) = workspace();
     let mut fastest = 0.0;
     for _ in 0..3 {
-        let value = document(&mut pil(&spec("legs.toml"), &folder, &[]), 0);
+        let plot = folder.with_extension("svg").display().to_string();
+        let value = document(&mut pil(&spec("legs.toml"), &folder, &["--plot", &plot]), 0);
+        let drawn = std::fs::read_to_string(&plot).unwrap();
+        assert!(["invhys at 10 Hz", "pcc at 10 Hz", "leg 5"].iter().all(|text| drawn.contains(text)), "{drawn}");
         let result = &value["result"];
         assert_eq!(result["first_difference"], Value::Null);
         let ticks = number(&result["ticks"]);

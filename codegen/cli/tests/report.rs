@@ -271,6 +271,24 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
     );
     has_numbers(&page);
     is_drawn(&folder, "run.html", &document.value["result"]["figures"]);
+    // Of six legs; and without its first block, so that it begins in the middle of a run.
+    let run = folder.run(&["sim", "legs.toml", "--record", "legs.rec", "--seconds", "1.5"]);
+    assert_eq!(run.code, 0, "{}", run.stderr);
+    let whole = std::fs::read(folder.path("legs.rec")).unwrap();
+    let mut blocks = whole.windows(8).enumerate().filter(|(_, word)| word == b"SPGBLOCK").map(|(place, _)| place);
+    let [first, second] = [blocks.next().unwrap(), blocks.next().unwrap()];
+    std::fs::write(folder.path("middle.rec"), [&whole[..first], &whole[second..]].concat()).unwrap();
+    for (record, drawn_only) in [("legs.rec", false), ("middle.rec", true)] {
+        let document = folder.json(&["report", "legs.toml", "--record", record, "-o", "legs.html"]);
+        assert_eq!(document.code, 0, "{:#}", document.value);
+        let page = folder.read("legs.html");
+        let number = |before: &str| -> f64 {
+            page.split_once(before).unwrap().1.split('\u{2009}').next().unwrap().parse().unwrap()
+        };
+        let [recorded, simulated] = [number("recorded. Error "), number("the same commands gives ")];
+        assert!((0.9..1.1).contains(&(recorded / simulated)), "{record}: {recorded} nm, simulated {simulated} nm");
+        assert_eq!(page.contains("0.20 s of the record are drawn but not counted"), drawn_only, "{record}");
+    }
     // Of another spec.
     let refused = folder.json(&["report", "legs.toml", "--record", "run.rec", "-o", "other.html"]);
     assert!(refused.code == 1 && refused.error().contains("name the spec that the target was built from"));

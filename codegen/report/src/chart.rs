@@ -147,7 +147,7 @@ impl Axis {
         }
         let largest = values.iter().fold(0.0, |largest: f64, v| if v.abs() > largest { v.abs() } else { largest });
         let k = short(if largest > 0.0 { largest / STEPS } else { 1.0 });
-        json!({ "k": k, "v": values.iter().map(|v| libm::round(v / k) as i32).collect::<Vec<_>>() })
+        json!({ "k": k, "v": values.iter().map(|v| v.is_finite().then(|| libm::round(v / k) as i32)).collect::<Vec<_>>() })
     }
 }
 
@@ -242,6 +242,23 @@ impl Chart {
             last.even = Some([start, step * every]);
         }
         chart
+    }
+
+    /// Adds a line in stretches, each with its start and its values at even times, `step` apart (s).
+    #[must_use]
+    pub fn in_stretches(self, name: &str, mark: Mark, step: f64, stretches: Vec<(f64, Vec<f64>)>) -> Self {
+        if let [(start, values)] = &stretches[..] {
+            return self.over_time(name, mark, [*start, step], values);
+        }
+        let mut points = Vec::new();
+        for (start, values) in stretches {
+            if !points.is_empty() {
+                points.push([f64::NAN; 2]);
+            }
+            let (every, thin) = thinned(&values);
+            points.extend(thin.iter().enumerate().map(|(k, value)| [start + k as f64 * step * every, *value]));
+        }
+        self.with(name, mark, points)
     }
 
     /// As data of a page's script.

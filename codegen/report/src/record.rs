@@ -29,6 +29,8 @@ pub struct Sample {
     pub tick: u64,
     /// Whether the law was at work.
     pub running: bool,
+    /// Whether its error counts: the law was at work, and what stands beside it can be compared.
+    pub scored: bool,
     /// Readings of the gauges, m.
     pub gauge: [f64; 6],
     /// Target, m and rad; of legs, m.
@@ -85,7 +87,7 @@ pub fn page(compiled: &Compiled, run: &Run) -> (Vec<Part>, Vec<Section>) {
 
 fn rms(samples: &[Sample], of: impl Fn(&Sample) -> f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
-    for sample in samples.iter().filter(|sample| sample.running) {
+    for sample in samples.iter().filter(|sample| sample.scored) {
         let value = of(sample);
         sum += value * value;
         count += 1;
@@ -93,7 +95,7 @@ fn rms(samples: &[Sample], of: impl Fn(&Sample) -> f64) -> f64 {
     libm::sqrt(sum / count.max(1) as f64)
 }
 
-/// rms of the error of each coordinate while the law is at work, nm and nrad.
+/// rms of the error of each coordinate over the ticks that count, nm and nrad.
 fn error_rms(samples: &[Sample]) -> [f64; 6] {
     core::array::from_fn(|k| rms(samples, |sample| (sample.target[k] - sample.measured[k]) * 1e9))
 }
@@ -194,17 +196,27 @@ fn first(compiled: &Compiled, run: &Run) -> Vec<Part> {
     ))]
 }
 
-/// Times of the samples from the first one, s; a gap breaks lines.
-fn values(samples: &[Sample], of: impl Fn(&Sample) -> f64) -> Vec<f64> {
-    samples.iter().map(of).collect()
+/// Adds a line over time; a gap breaks it.
+fn over_time(
+    chart: Chart,
+    name: &str,
+    mark: Mark,
+    period: f64,
+    samples: &[Sample],
+    of: impl Fn(&Sample) -> f64,
+) -> Chart {
+    let stretches = samples.chunk_by(|a, b| b.tick == a.tick + 1).map(|stretch| {
+        let start = stretch.first().map_or(0, |sample| sample.tick) as f64 * period;
+        (start, stretch.iter().map(&of).collect())
+    });
+    chart.in_stretches(name, mark, period, stretches.collect())
 }
 
 fn errors(model: &Model, run: &Run) -> Section {
     let platform = model.task_space.is_some();
     let (names, lengths) = if platform { (AXES, 3) } else { (LEGS, 6) };
     let (found, simulated) = (error_rms(&run.recorded), error_rms(run.simulated()));
-    let start = run.recorded.first().map_or(0, |sample| sample.tick) as f64 * model.timing.period;
-    let times = [start, model.timing.period];
+    let period = model.timing.period;
     let mut peaks = [0.0; 6];
     let items = (0..6)
         .map(|k| {
@@ -212,29 +224,27 @@ fn errors(model: &Model, run: &Run) -> Section {
             let name = names[k];
             let error =
                 |sample: &Sample| if sample.running { (sample.target[k] - sample.measured[k]) * 1e9 } else { 0.0 };
-            let recorded = values(&run.recorded, error);
-            peaks[k] = recorded.iter().fold(0.0, |peak: f64, v| if v.abs() > peak { v.abs() } else { peak });
-            let mut chart = Chart::new(
+            peaks[k] = run.recorded.iter().map(|s| error(s).abs()).fold(0.0, |peak, v| if v > peak { v } else { peak });
+            let chart = Chart::new(
                 &format!("record-error-{k}"),
                 &format!("Error of {name} by the gauges, while the law is at work"),
                 Axis::linear("time", "s"),
                 Axis::linear(&format!("error of {name}"), unit),
-            )
-            .over_time(RECORDED, LINE, times, &recorded)
-            .colored(BLUE);
+            );
+            let mut chart = over_time(chart, RECORDED, LINE, period, &run.recorded, error).colored(BLUE);
             if run.simulated.is_ok() {
-                chart = chart.over_time(SIMULATED, LINE, times, &values(run.simulated(), error)).colored(INK);
+                chart = over_time(chart, SIMULATED, LINE, period, run.simulated(), error).colored(INK);
             }
-            let mut path = Chart::new(
+            let path = Chart::new(
                 &format!("record-path-{k}"),
                 &format!("{name}: path above, error below"),
                 Axis::linear("time", "s"),
                 Axis::linear(name, if k < lengths { "µm" } else { "µrad" }),
-            )
-            .over_time("measured", Mark::Line(3.0), times, &values(&run.recorded, |sample| sample.measured[k] * 1e6))
-            .colored(2)
-            .over_time("target", Mark::Dashed(1.6), times, &values(&run.recorded, |sample| sample.target[k] * 1e6))
-            .colored(INK);
+            );
+            let path =
+                over_time(path, "measured", Mark::Line(3.0), period, &run.recorded, |s| s.measured[k] * 1e6).colored(2);
+            let mut path =
+                over_time(path, "target", Mark::Dashed(1.6), period, &run.recorded, |s| s.target[k] * 1e6).colored(INK);
             chart.short = format!("{name} {} {unit}", short(found[k]));
             chart.height = 240;
             path.height = 130;
@@ -253,9 +263,24 @@ fn errors(model: &Model, run: &Run) -> Section {
     } else {
         String::new()
     };
-    Section::new("errors", "Errors", "")
-        .lead(&format!("{} has {}\u{2009}nm rms{against}.", names[worst], short(found[worst])))
-        .part(Part::Multiples(Multiples { id: "record-errors".to_owned(), items, groups, selected: worst }))
+    let left_out = run.recorded.iter().filter(|sample| sample.running && !sample.scored).count();
+    let section = Section::new("errors", "Errors", "").lead(&format!(
+        "{} has {}\u{2009}nm rms{against}.",
+        names[worst],
+        short(found[worst])
+    ));
+    let section = if left_out == 0 {
+        section
+    } else {
+        section.text(&format!(
+            "{} s of the record are drawn but not counted. Where it begins in the middle of a run, or goes on behind a gap, the \
+             controller is that of its snapshot, and the simulated machine was led to the voltages of the first tick with its gauges \
+             set to the readings of that tick: how the machine came there, its creep and its speed are not in a record. From the \
+             time on that it takes to settle the two are compared; where the law is at work in one alone, they are not.",
+            short(left_out as f64 * period)
+        ))
+    };
+    section.part(Part::Multiples(Multiples { id: "record-errors".to_owned(), items, groups, selected: worst }))
 }
 
 fn spectra(compiled: &Compiled, run: &Run) -> Section {
@@ -275,7 +300,7 @@ fn spectra(compiled: &Compiled, run: &Run) -> Section {
             );
             let of = |samples: &[Sample]| {
                 let running: Vec<f64> =
-                    samples.iter().filter(|s| s.running).map(|s| (s.target[k] - s.measured[k]) * 1e9).collect();
+                    samples.iter().filter(|s| s.scored).map(|s| (s.target[k] - s.measured[k]) * 1e9).collect();
                 density(&running, model.timing.period)
             };
             let (frequencies, values) = of(&run.recorded);

@@ -14,6 +14,7 @@ use serde_json::json;
 use specgen_link::Counted;
 use specgen_link::client::{Port, Timeout};
 
+use super::plot::Plot;
 use super::sim::{PlantArguments, environment, frequency};
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
@@ -64,6 +65,8 @@ pub struct Arguments {
     /// Run this image in QEMU, instead of building one.
     #[arg(long, value_name = "FILE")]
     elf: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -74,6 +77,7 @@ fn seconds(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // What is wrong with the arguments, or missing on the machine, is reported before the minutes of the rest.
     arguments.plant.leg()?;
+    arguments.plot.wanted()?;
     let compiled = spec::compiled(&arguments.spec, ui)?;
     let plan = scenario::Plan::of(arguments, &compiled)?;
     let line = match &arguments.port {
@@ -166,6 +170,8 @@ fn in_the_loop<P: Port>(
     }
     match (done, stop) {
         (Ok(()), None) => {
+            let below = if compiled.model.task_space.is_some() { "target less true pose" } else { "target less gauge" };
+            report.plot = arguments.plot.charts(&report.name, below, &report.charts)?;
             ui.result(&report);
             Ok(())
         }

@@ -18,7 +18,7 @@ use super::spec;
 use super::table::{left, right, row};
 use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
-use specgen_report::chart::{Axis, Chart, LINE};
+use specgen_report::chart::{Axis, Chart, DASHED, LINE};
 
 /// Changes of the phase that are shown.
 const SHOWN: usize = 20;
@@ -323,7 +323,7 @@ impl Errors {
         let chart = Chart::new("", title, Axis::linear("time", "s"), Axis::linear("error", "nm"));
         let name = |k: usize| if self.platform { ["x", "y", "z"][k].to_owned() } else { format!("leg {k}") };
         let lines = self.points.iter().enumerate().filter(|(_, points)| !points.is_empty());
-        lines.fold(chart, |chart, (k, points)| chart.with(&name(k), LINE, points.clone()))
+        lines.fold(chart, |chart, (k, points)| chart.with(&name(k), if k < 4 { LINE } else { DASHED }, points.clone()))
     }
 }
 

@@ -1,5 +1,6 @@
 //! `specgen report`: one HTML file about a spec, or about a run of its machine.
 
+mod beside;
 mod paper;
 mod recorded;
 mod simulated;

@@ -36,7 +36,7 @@ function number(v) {
 // Values as they were written: even, scaled integers, or plain.
 function values(packed) {
   if (Array.isArray(packed)) return packed.map(v => (v === null ? NaN : v));
-  if (packed.v) return packed.v.map(v => v * packed.k);
+  if (packed.v) return packed.v.map(v => (v === null ? NaN : v * packed.k));
   return Array.from({ length: packed.n }, (_, k) => packed.a + packed.d * k);
 }
 

@@ -12,6 +12,7 @@ use crate::cli::table::{left, right, row};
 use crate::cli::ui::Outcome;
 use specgen_compiler::compile::Compiled;
 use specgen_operate::pil::{Cost, Difference};
+use specgen_report::chart::Chart;
 
 #[derive(Debug, Serialize)]
 pub struct Report {
@@ -46,6 +47,12 @@ pub struct Report {
     /// Errors in words.
     #[serde(skip)]
     pub errors: String,
+    /// Errors over time, a chart a run.
+    #[serde(skip)]
+    pub charts: Vec<Chart>,
+    /// The line about the picture of them.
+    #[serde(skip)]
+    pub plot: Option<String>,
 }
 
 fn as_seconds<S: serde::Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
@@ -75,6 +82,8 @@ impl Report {
             free_motion: PoseTable::default(),
             machining: Value::Null,
             errors: String::new(),
+            charts: Vec::new(),
+            plot: None,
         }
     }
 
@@ -127,6 +136,6 @@ impl Outcome for Report {
             (1.0 / self.interval).round(),
             100.0 * self.waited.as_secs_f64() / if self.seconds > 0.0 { self.seconds } else { 1.0 },
         );
-        out
+        out + self.plot.as_deref().unwrap_or_default()
     }
 }

@@ -135,6 +135,7 @@ impl Plan {
                     select_legs(lockstep, word).map_err(host_sim::closed_loop::RunError::from)?;
                     let mut rig = rig.clone();
                     let run = timed(&mut report.seconds, || rig.run(lockstep, &trajectory, interval))?;
+                    report.charts.push(sim::legs::chart(&run.tracking, &format!("{mode} at {frequency} Hz")));
                     report.tracking.rows.push(TrackingRow::of(mode, *frequency, &run.tracking));
                 }
                 report.errors = format!("tracking error of the leg trajectory, T − Y\n{}", report.tracking.to_text());
@@ -152,6 +153,8 @@ impl Plan {
                         None => scenario.run(lockstep, &trajectory),
                         Some(part) => scenario.against(lockstep, &trajectory, *part),
                     })?;
+                    let title = format!("{name} at {frequency} Hz, {mode}");
+                    report.charts.push(sim::platform::chart(&title, scenario.options.interval, &run));
                     refused(name, &run, report);
                     match part {
                         None => report.free_motion.rows.push(PoseRow::of(name, mode, *frequency, &run.errors)),
@@ -174,6 +177,7 @@ impl Plan {
                 let limit = arguments.seconds.unwrap_or(sim::platform::PLAYED);
                 let run = timed(&mut report.seconds, || scenario.play(lockstep, *selector, limit))?;
                 report.errors = on_board(name, &run);
+                report.charts.push(sim::platform::chart(name, scenario.options.interval, &run));
                 refused(name, &run, report);
                 Ok(())
             }

@@ -5,7 +5,6 @@ use std::io::BufReader;
 use std::path::Path;
 
 use host_sim::controller::{MachineWord, Supervised, TickController};
-use host_sim::platform::rig::Noise;
 use host_sim::record::{self, Block, Header, Reader};
 use host_sim::word::Scalar;
 use specgen_compiler::compile::Compiled;
@@ -14,10 +13,9 @@ use specgen_report::record::{Run, Sample};
 use specgen_runtime::record::Reason;
 use specgen_runtime::supervisor::MISSED_TICK;
 
-use super::SEED;
+use super::beside;
 use crate::cli::sim::{emitted, environment};
 use crate::cli::ui::{Failure, Ui};
-use crate::machine;
 
 /// Phases of the supervisor.
 const RUNNING: u8 = 2;
@@ -47,7 +45,7 @@ pub fn read(path: &Path, compiled: &Compiled, ui: &Ui) -> Result<Run, Failure> {
     let words = Words::of(&header, &machine, compiled)?;
     let mut run = Run {
         recorded: Vec::new(),
-        simulated: Err("the record does not begin at power-up".to_owned()),
+        simulated: Err(String::new()),
         mode: words.mode(&header, &blocks),
         bits: match &found.divergence {
             None => Ok(found.ticks),
@@ -64,19 +62,17 @@ pub fn read(path: &Path, compiled: &Compiled, ui: &Ui) -> Result<Run, Failure> {
         run.phases.push((change.tick, format!("{word}, amplifiers {}", if word.amplifier_on { "on" } else { "off" })));
     }
     run.recorded = again(&mut machine, &blocks, &words)?;
-    if blocks.first().is_some_and(|block| block.reason == Reason::Started) && run.gaps.is_empty() {
-        ui.progress("the same commands with a simulated machine");
-        run.simulated = simulate(&mut machine, &blocks, &words, compiled);
-    }
+    ui.progress("the same commands with a simulated machine");
+    run.simulated = beside::simulate(&mut machine, &blocks, &words, compiled, &mut run.recorded);
     Ok(run)
 }
 
 /// Where the words are that a page needs.
-struct Words {
-    scalar: Scalar,
-    gauge: [usize; 6],
-    wrench: Option<[usize; 6]>,
-    events: usize,
+pub(super) struct Words {
+    pub(super) scalar: Scalar,
+    pub(super) gauge: [usize; 6],
+    pub(super) wrench: Option<[usize; 6]>,
+    pub(super) events: usize,
     voltage: [usize; 6],
     /// Among the outputs, or among the inputs.
     target: Result<[usize; 6], [usize; 6]>,
@@ -124,7 +120,7 @@ impl Words {
         word.and_then(|word| u32::try_from(*word).ok()).unwrap_or_default()
     }
 
-    fn sample(&self, tick: u64, word: MachineWord, input: &[u64], output: &[u64]) -> Sample {
+    pub(super) fn sample(&self, tick: u64, word: MachineWord, input: &[u64], output: &[u64]) -> Sample {
         let six = |places: &[usize; 6], words: &[u64]| places.map(|place| self.scalar.decode(words[place]));
         let mut gauge = six(&self.gauge, input);
         if let Some(calibration) = &self.calibration {
@@ -143,6 +139,7 @@ impl Words {
         Sample {
             tick,
             running: word.phase == RUNNING,
+            scored: word.phase == RUNNING,
             gauge,
             target: of(&self.target),
             measured,
@@ -170,44 +167,6 @@ fn again(machine: &mut Supervised, blocks: &[Block], words: &Words) -> Result<Ve
             samples.push(words.sample(row.tick, word, &row.input, &output));
         }
         next = Some(block.first + block.rows.len() as u64);
-    }
-    Ok(samples)
-}
-
-fn simulate(
-    machine: &mut Supervised,
-    blocks: &[Block],
-    words: &Words,
-    compiled: &Compiled,
-) -> Result<Vec<Sample>, String> {
-    let model = &compiled.model;
-    let Some(task) = &model.task_space else {
-        return Err("it is made for a spec with [control] alone".to_owned());
-    };
-    let leg = host_sim::plant::LegParameters::reference();
-    let specimen = machine::specimen(model, task, &leg, Some(SEED));
-    let mut rig = machine::scenario(model, task, &specimen, &Noise::of(&specimen), SEED).rig().clone();
-    machine.reset();
-    let mut output = vec![0; machine.output_names().len()];
-    let mut samples = Vec::new();
-    for block in blocks {
-        machine.configure(&block.config).map_err(|error| error.to_string())?;
-        for row in &block.rows {
-            let mut input = row.input.clone();
-            for (place, value) in words.gauge.iter().zip(rig.read_gauges()) {
-                input[*place] = words.scalar.encode(value);
-            }
-            let wrench = rig.read_wrench();
-            for (place, value) in words.wrench.iter().flatten().zip(wrench) {
-                input[*place] = words.scalar.encode(value);
-            }
-            // What was late at the machine is not late here.
-            input[words.events] &= !u64::from(MISSED_TICK);
-            let word = machine.step(&input, &mut output);
-            let sample = words.sample(row.tick, word, &input, &output);
-            rig.hold(&sample.voltage, model.timing.period);
-            samples.push(sample);
-        }
     }
     Ok(samples)
 }

@@ -117,12 +117,14 @@ fn own(arguments: &Arguments, compiled: &Compiled, controller: &mut Controller, 
 }
 
 /// Errors of the legs over time, nm.
-fn chart(tracking: &Tracking, title: &str) -> Chart {
+pub(in crate::cli) fn chart(tracking: &Tracking, title: &str) -> Chart {
     let mut chart = Chart::new("", title, Axis::linear("time", "s"), Axis::linear("error", "nm"));
     for leg in 0..6 {
         let errors: Vec<f64> =
             tracking.samples.iter().map(|sample| 1e9 * (sample.target[leg] - sample.measured[leg])).collect();
-        chart = chart.over_time(&format!("leg {leg}"), LINE, [tracking.interval; 2], &errors);
+        // There are four colours.
+        let mark = if leg < 4 { LINE } else { DASHED };
+        chart = chart.over_time(&format!("leg {leg}"), mark, [tracking.interval; 2], &errors);
     }
     chart
 }

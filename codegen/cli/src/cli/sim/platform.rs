@@ -439,7 +439,7 @@ impl Experiment<'_> {
 }
 
 /// Errors of x, y and z over time, nm.
-fn chart(name: &str, interval: f64, run: &PlatformRun) -> Chart {
+pub(in crate::cli) fn chart(name: &str, interval: f64, run: &PlatformRun) -> Chart {
     let mut chart = Chart::new("", name, Axis::linear("time", "s"), Axis::linear("error", "nm"));
     for (axis, name) in AXES.iter().enumerate().take(3) {
         let errors: Vec<f64> =

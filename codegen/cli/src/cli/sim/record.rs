@@ -217,9 +217,9 @@ fn legs(
     wave: Wave<f64>,
     seconds: f64,
 ) -> Result<(), RunError> {
-    let (parameters, noise) = (host_sim::plant::LegParameters::reference(), host_sim::plant::NoiseParameters::NONE);
-    let noise = if arguments.plant.no_noise { noise } else { parameters.noise };
-    let legs = std::array::from_fn(|_| parameters.clone());
+    let leg = machine::leg(&compiled.model, &host_sim::plant::LegParameters::reference());
+    let noise = if arguments.plant.no_noise { host_sim::plant::NoiseParameters::NONE } else { leg.noise };
+    let legs = std::array::from_fn(|_| leg.clone());
     let scenario = machine::legs(&compiled.model, &legs, &noise, arguments.plant.seed, 1);
     let law = controller.default_config().first().copied().unwrap_or_default();
     select(controller, u32::try_from(law).unwrap_or_default())?;
