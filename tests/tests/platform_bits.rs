@@ -17,7 +17,7 @@ use specgen_tests::{Emitted, assert_same_bits, column, host_trace, integers};
 
 /// Ticks of each mode under the hostile record.
 fn ticks() -> usize {
-    specgen_tests::length(20_000, 100_000)
+    specgen_tests::length(10_000, 100_000)
 }
 /// Ticks of each mode in closed loop.
 fn tracked() -> u32 {
