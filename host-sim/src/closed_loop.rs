@@ -336,7 +336,7 @@ impl<P: Plant> Rig<P> {
 
     /// Reads the six gauges, m.
     pub fn read(&mut self) -> [f64; LEGS] {
-        self.channels.each_mut().map(|channel| channel.gauge.read(channel.leg.displacement()))
+        self.channels.each_mut().map(|channel| channel.gauge.read(channel.leg.seen()))
     }
 }
 

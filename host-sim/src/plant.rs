@@ -8,6 +8,7 @@ mod parameters;
 mod play;
 mod stack;
 
+pub(crate) use filter::SmoothLag;
 pub use leg::LegPlant;
 pub(crate) use parameters::{Bound, checked};
 pub use parameters::{LegParameters, NoiseParameters, ParameterError, REFERENCE_LEG};
@@ -21,6 +22,11 @@ pub trait Plant {
 
     /// Displacement now, m, as [`Plant::hold`] returned it last.
     fn displacement(&self) -> f64;
+
+    /// What a gauge shows of it now, without noise, m.
+    fn seen(&self) -> f64 {
+        self.displacement()
+    }
 
     /// Drives a straight line from `from` to `to` (V) in `duration` (s), as steps of `update` (s) or a little less,
     /// each at the value of its end, and returns the displacement at the end (m).

@@ -98,6 +98,8 @@ const RULES: &[Rule] = &[
     timing::transfer,
     timing::velocity_filter,
     timing::ticks_against_modes,
+    timing::gauges_in_time,
+    timing::modes_seen_as_others,
     motion::moves_within_slew,
     motion::moves_end,
     motion::limits_bind,

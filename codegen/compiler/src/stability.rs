@@ -4,8 +4,8 @@
 //!
 //! 1. **Jury**, for a leg that follows its voltage at once (Appendix B): EWMA 0 < λω < 2, the corrected (AII.18); PCC (AII.19),
 //!    of which λ < 4/(2ω_Σ − ω_Π) binds.
-//! 2. **Spectral radius** of the sampled loop with the leg's own dynamics: amplifier lag and axial resonance, exactly
-//!    discretised over one run (the drive is held), closed by the filter form of the run-to-run law. This limit is lower:
+//! 2. **Spectral radius** of the sampled loop with the leg's own dynamics: amplifier lag, axial resonance and lag of the
+//!    gauge, exactly discretised over one run (the drive is held), closed by the filter form of the run-to-run law. This limit is lower:
 //!    the integrator meets the resonance.
 
 mod phase;
@@ -115,18 +115,24 @@ fn check_law(
     let radius = worst_radius(dynamics, adaptation, law, 1.0);
     if radius > LARGEST_RADIUS {
         let message = format!(
-            "{} is unstable on this leg: the sampled loop (run of {} s, amplifier lag {} s, resonance {} Hz, ζ {}) has \
+            "{} is unstable on this leg: the sampled loop (run of {} s, amplifier lag {} s, resonance {} Hz, ζ {}{}) has \
              spectral radius {radius:.4} somewhere in gain_ratio {:?}; it must be below 1",
             law.name(),
             dynamics.run,
             dynamics.lag,
             model.actuator.resonance,
             dynamics.damping_ratio,
+            gauge_lag_text(dynamics.gauge_lag),
             adaptation.gain_ratio
         );
         return Err(vec![refusal(model, codes::UNSTABLE_SAMPLED, message, largest)]);
     }
     Ok((static_limit, radius))
+}
+
+/// What a message about a loop adds for gauges that lag.
+fn gauge_lag_text(lag: f64) -> String {
+    if lag > 0.0 { format!(", gauges that lag {lag} s") } else { String::new() }
 }
 
 /// Largest spectral radius over the λ interval with both weights scaled by `scale`.
@@ -183,7 +189,7 @@ fn refusal(model: &Model, code: Code, message: String, largest: f64) -> Diagnost
     };
     let help = if largest <= 0.0 {
         "no weight adapts this leg at this run interval: lengthen the run (run_interval, timing.period), or check \
-         actuator.resonance, actuator.damping_ratio and amplifier.lag"
+         actuator.resonance, actuator.damping_ratio, amplifier.lag and sensor.lag"
             .to_owned()
     } else {
         let proportion = model.adaptation.drift_weight / model.adaptation.level_weight;

@@ -98,6 +98,7 @@ pub fn leg(model: &Model, leg: &LegParameters) -> LegParameters {
         creep_thresholds_v: volts(&leg.creep_thresholds_v),
         forc_rate_v_per_s: leg.forc_rate_v_per_s * stretch,
         tau_amp_s: model.amplifier.lag,
+        gauge_lag_s: model.sensor.lag,
         fn_hz: model.actuator.resonance,
         zeta: model.actuator.damping_ratio,
         noise: NoiseParameters {

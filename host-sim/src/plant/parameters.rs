@@ -31,6 +31,9 @@ pub struct LegParameters {
     pub tau_rate_s: f64,
     /// Lag of the amplifier, s.
     pub tau_amp_s: f64,
+    /// Lag of the gauge and the filter behind it, s; 0 for none. Of a platform the first leg's counts, for all six gauges.
+    #[serde(default)]
+    pub gauge_lag_s: f64,
     /// Axial resonance, Hz.
     pub fn_hz: f64,
     /// Damping ratio of that resonance, below 1.
@@ -158,6 +161,7 @@ impl LegParameters {
         expect("v0_V_per_s", self.v0_v_per_s, Above(0.0), AtMost(1e9));
         expect("tau_rate_s", self.tau_rate_s, AtLeast(0.0), AtMost(10.0));
         expect("tau_amp_s", self.tau_amp_s, AtLeast(0.0), AtMost(10.0));
+        expect("gauge_lag_s", self.gauge_lag_s, AtLeast(0.0), AtMost(0.01));
         expect("fn_hz", self.fn_hz, Above(0.0), AtMost(1e6));
         expect("zeta", self.zeta, AtLeast(0.0), Below(1.0));
         expect("settle_s", self.settle_s, AtLeast(0.0), AtMost(600.0));

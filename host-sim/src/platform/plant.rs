@@ -7,7 +7,7 @@ use super::specimen::Specimen;
 use super::structure::Structure;
 use super::whole_tick::WholeTick;
 use crate::closed_loop::Preparation;
-use crate::plant::{Stack, steps_within};
+use crate::plant::{SmoothLag, Stack, steps_within};
 
 /// Amplifier and stacks of one leg.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +48,8 @@ impl Actuator {
 pub struct PlatformPlant {
     actuators: [Actuator; 6],
     structure: Structure,
+    /// What the gauges make of each coordinate of the pose; none: they show it at once.
+    gauges: Option<[SmoothLag; 6]>,
     longest_step: f64,
     step: f64,
     /// In use instead of actuators and structure, see [`PlatformPlant::step_whole_ticks`].
@@ -68,7 +70,9 @@ impl PlatformPlant {
             peak: leg.u_max,
         });
         let structure = Structure::new(specimen.structure(), nominal.step_s);
-        Self { actuators, structure, longest_step: nominal.step_s, step: 0.0, whole_tick: None }
+        let lag = specimen.legs[0].gauge_lag_s;
+        let gauges = (lag > 0.0).then(|| std::array::from_fn(|_| SmoothLag::new(lag)));
+        Self { actuators, structure, gauges, longest_step: nominal.step_s, step: 0.0, whole_tick: None }
     }
 
     /// Sets the longest integration step, s (> 0).
@@ -125,6 +129,7 @@ impl PlatformPlant {
         self.step = 0.0;
         self.structure.release();
         self.structure.set_state(&[0.0; 6], &[0.0; 6], &[0.0; 6]);
+        self.gauges.iter_mut().flatten().for_each(|gauge| gauge.rest_at(0.0));
         if rest > 0.0 {
             let steps = steps_within(rest / rate, update);
             for step in 1..=steps {
@@ -140,7 +145,9 @@ impl PlatformPlant {
     pub fn hold(&mut self, voltages: &Six, interval: f64) {
         if let Some(whole) = &mut self.whole_tick {
             if whole.interval().to_bits() == interval.to_bits() {
-                return whole.hold(voltages);
+                let before = (whole.pose(), whole.rate());
+                whole.hold(voltages);
+                return self.gauges_follow(&before, interval);
             }
             self.step_small();
         }
@@ -158,8 +165,28 @@ impl PlatformPlant {
                 actuator.advance(*voltage, step == 0);
             }
             let displacement = self.free_displacements();
+            let before = (self.structure.pose(), self.structure.rate());
             self.structure.advance(&displacement);
+            self.gauges_follow(&before, interval / f64::from(steps));
         }
+    }
+
+    /// Lets the gauges follow a step over `interval` (s) that began with this pose and rate.
+    fn gauges_follow(&mut self, (pose, rate): &(Six, Six), interval: f64) {
+        if self.gauges.is_none() {
+            return;
+        }
+        let (pose_after, rate_after) = (self.pose(), self.rate());
+        for (k, gauge) in self.gauges.iter_mut().flatten().enumerate() {
+            gauge.set_step(interval);
+            gauge.advance([pose[k], rate[k]], [pose_after[k], rate_after[k]]);
+        }
+    }
+
+    /// The pose that the gauges show: h behind their lag, which differs from the lag of each reading by less than 1e-14 m.
+    #[must_use]
+    pub fn seen(&self) -> Six {
+        self.gauges.as_ref().map_or_else(|| self.pose(), |gauges| gauges.each_ref().map(SmoothLag::output))
     }
 
     /// h, from rest, m and rad.

@@ -134,7 +134,7 @@ impl PlatformRig {
 
     /// Reads the six gauges, in m or V.
     pub fn read_gauges(&mut self) -> Six {
-        let pose = self.plant.pose();
+        let pose = self.plant.seen();
         let turn = rotation(angles(&pose));
         let [low, high] = self.range;
         for k in 0..6 {

@@ -3,6 +3,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "what stands in a test is emitted nowhere")]
 mod design;
+mod plant;
 mod simulation;
 mod study;
 
@@ -197,6 +198,7 @@ fn run_of(closed_loop: &ClosedLoop, law: Law, tuning: &Tuning, conditions: &Cond
         rate: 1.0 / closed_loop.period,
         damping: closed_loop.damping[0] * conditions.damping,
         lag: closed_loop.lag,
+        gauge_lag: closed_loop.gauge_lag,
         axial_stiffness: 1e7,
         notch: closed_loop.notch.as_ref().map(|_| 1.0),
         gain_ratio: conditions.gain_ratio,
@@ -277,6 +279,32 @@ fn predicted_limits_hold_with_velocity_feedback_and_with_a_work_piece() {
         closed_loop.measured = measured;
         let what = format!("P/F N on glass, measured {measured}");
         limit_holds_in_simulation(&what, &closed_loop, COMBINED, |g| (tuning.scaled(g, g), touching));
+    }
+}
+
+#[test]
+fn predicted_limits_hold_behind_gauges_that_lag() {
+    // An AD7606 at ±5 V, and a capacitive gauge of 500 Hz.
+    for gauge_lag in [15e-6, 0.32e-3] {
+        let behind = |(tuning, closed_loop): (Tuning, ClosedLoop)| (tuning, ClosedLoop { gauge_lag, ..closed_loop });
+        let (tuning, closed_loop) = behind(base("N"));
+        let at = |what: &str| format!("{what}, gauges that lag {gauge_lag} s");
+        limit_holds_in_simulation(&at("P/F N"), &closed_loop, COMBINED, |g| (tuning.scaled(g, g), Conditions::NOMINAL));
+        if length(true, false) && gauge_lag < 1e-4 {
+            continue;
+        }
+        // From one tick late on.
+        limit_holds_in_simulation(&at("P/F N, delay"), &closed_loop, COMBINED, |x| {
+            (tuning.scaled(1.5, 1.5), Conditions { delay: x - 1.0, ..Conditions::NOMINAL })
+        });
+        let touching = Conditions { touching: true, ..Conditions::NOMINAL };
+        let on_glass =
+            ClosedLoop { environment: [2.4e6, 2.4e6, 3e6, 4e3, 4e3, 1e2], measured: true, ..closed_loop.clone() };
+        limit_holds_in_simulation(&at("P/F N on glass"), &on_glass, COMBINED, |g| (tuning.scaled(g, g), touching));
+        let (tuning, closed_loop) = behind(base("P alone, N"));
+        limit_holds_in_simulation(&at("P"), &closed_loop, Law::Position, |g| {
+            (tuning.scaled(g, g), Conditions::NOMINAL)
+        });
     }
 }
 

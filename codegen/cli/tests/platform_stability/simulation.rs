@@ -10,6 +10,8 @@ pub struct Run {
     pub rate: f64,
     pub damping: f64,
     pub lag: f64,
+    /// Of the gauges, s; 0: none.
+    pub gauge_lag: f64,
     pub axial_stiffness: f64,
     pub notch: Option<f64>,
     pub gain_ratio: f64,
@@ -79,21 +81,23 @@ struct Plant {
     stiffness: f64,
     damper: f64,
     lag: f64,
+    gauge_lag: f64,
 }
 
-/// Pose, its rate, leg displacements that the amplifiers drive.
-type State = (Vector6<f64>, Vector6<f64>, Vector6<f64>);
+/// Pose, its rate, leg displacements that the amplifiers drive, pose that gauges with a lag show.
+type State = (Vector6<f64>, Vector6<f64>, Vector6<f64>, Vector6<f64>);
 
 impl Plant {
-    fn slope(&self, (x, v, d): &State, command: &Vector6<f64>) -> State {
+    fn slope(&self, (x, v, d, shown): &State, command: &Vector6<f64>) -> State {
         let force = (d - self.jacobian * x) * self.stiffness - self.jacobian * v * self.damper;
         let acceleration = self.inverse_mass * (self.jacobian.transpose() * force - self.contact * x);
-        (*v, acceleration, (command - d) / self.lag)
+        let following = if self.gauge_lag > 0.0 { (x - shown) / self.gauge_lag } else { Vector6::zeros() };
+        (*v, acceleration, (command - d) / self.lag, following)
     }
 
     /// Classical Runge–Kutta.
     fn step(&self, s: &State, command: &Vector6<f64>, dt: f64) -> State {
-        let ahead = |k: &State, h: f64| (s.0 + k.0 * h, s.1 + k.1 * h, s.2 + k.2 * h);
+        let ahead = |k: &State, h: f64| (s.0 + k.0 * h, s.1 + k.1 * h, s.2 + k.2 * h, s.3 + k.3 * h);
         let k1 = self.slope(s, command);
         let k2 = self.slope(&ahead(&k1, 0.5 * dt), command);
         let k3 = self.slope(&ahead(&k2, 0.5 * dt), command);
@@ -103,6 +107,7 @@ impl Plant {
             s.0 + sum(k1.0, k2.0, k3.0, k4.0) * dt,
             s.1 + sum(k1.1, k2.1, k3.1, k4.1) * dt,
             s.2 + sum(k1.2, k2.2, k3.2, k4.2) * dt,
+            s.3 + sum(k1.3, k2.3, k3.3, k4.3) * dt,
         )
     }
 }
@@ -124,17 +129,22 @@ pub fn settles(run: &Run, rest: &RestDynamics) -> bool {
         stiffness: run.axial_stiffness,
         damper: 2.0 * run.damping / first.sqrt() * run.axial_stiffness,
         lag: run.lag,
+        gauge_lag: run.gauge_lag,
     };
     let period = 1.0 / run.rate;
     // 1/30 of the shortest period of a mode at least: Runge–Kutta's own damping is then far below 1e-4 of a mode's.
-    let fine = (period * 800.0 * 60.0).ceil().max(4.0) as usize;
+    let mut fine = (period * 800.0 * 60.0).ceil().max(4.0) as usize;
+    if run.gauge_lag > 0.0 {
+        fine = fine.max((4.0 * period / run.gauge_lag).ceil() as usize);
+    }
     let mut notches =
         run.notch.map(|_| (ModalNotch::new(run, &mass, &stiffness), ModalNotch::new(run, &mass, &stiffness)));
     let (inverse, inverse_transposed) = (jacobian.try_inverse().unwrap(), jacobian.transpose().try_inverse().unwrap());
     let vector = |gains: &[f64; 6]| Vector6::from(*gains);
     let pole = (-run.velocity_cutoff * period).exp();
 
-    let mut state: State = (Vector6::new(1e-6, -2e-6, 1.5e-6, 1e-5, 2e-5, -1e-5), Vector6::zeros(), Vector6::zeros());
+    let kick = Vector6::new(1e-6, -2e-6, 1.5e-6, 1e-5, 2e-5, -1e-5);
+    let mut state: State = (kick, Vector6::zeros(), Vector6::zeros(), kick);
     let (mut level, mut drift, mut sum) = (Vector6::zeros(), Vector6::zeros(), Vector6::zeros());
     let (mut last_pose, mut velocity) = (state.0, Vector6::zeros());
     // q̂ − p of the interval that just ended; requests on their way.
@@ -144,7 +154,7 @@ pub fn settles(run: &Run, rest: &RestDynamics) -> bool {
     let (mut middle, mut late) = (0.0_f64, 0.0_f64);
     let scale = Vector6::new(1.0, 1.0, 1.0, 0.1, 0.1, 0.1);
     for tick in 0..ticks {
-        let pose = state.0;
+        let pose = if run.gauge_lag > 0.0 { state.3 } else { state.0 };
         let mut error = -pose;
         let mut innovation = inverse * (jacobian * pose - known - level - drift);
         if let Some((of_error, of_innovation)) = &mut notches {
@@ -160,7 +170,7 @@ pub fn settles(run: &Run, rest: &RestDynamics) -> bool {
         let mut load_force = -vector(&run.derivative).component_mul(&velocity);
         if run.measured {
             // The work piece pushes with −K_e x; the load to be held is its opposite.
-            load_force += vector(&run.contact).component_mul(&pose);
+            load_force += vector(&run.contact).component_mul(&state.0);
         }
         let load = inverse_transposed * load_force / run.axial_stiffness;
         let feedback =

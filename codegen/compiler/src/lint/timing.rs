@@ -11,6 +11,10 @@ const LARGEST_LEAD: f64 = 1.25;
 const LONGEST_TRANSFER: f64 = 5.0;
 /// A velocity filter slower than this share of the lowest mode.
 const SLOWEST_FILTER: f64 = 0.1;
+/// Ticks that gauges may lag: beyond that the tick is faster than anything that it sees.
+const SLOWEST_GAUGE: f64 = 5.0;
+/// Part of a mode above half the tick rate that gauges may show.
+const LARGEST_ALIAS: f64 = 1.0 / 3.0;
 /// Ticks in a period of the lowest mode, at least; and at most, by far.
 const FEWEST_TICKS: f64 = 4.0;
 const MOST_TICKS: f64 = 3000.0;
@@ -22,6 +26,7 @@ pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
     let lead = model.task_space.as_ref().map_or(0.0, |task| task.lead);
     for (key, time) in [
         ("amplifier.lag", model.amplifier.lag),
+        ("sensor.lag", model.sensor.lag),
         ("control.lead", lead),
         ("hysteresis.dead_time", model.hysteresis.dead_time),
     ] {
@@ -121,5 +126,52 @@ pub(super) fn ticks_against_modes(facts: &Facts, found: &mut Found) {
             figure(tick * 1e6)
         ),
         "ten to a hundred ticks are usual: check `timing.period`, and `actuator.axial_stiffness` and the masses, which make the mode",
+    );
+}
+
+/// Gauges see what a tick does within some ticks.
+pub(super) fn gauges_in_time(facts: &Facts, found: &mut Found) {
+    let (lag, tick) = (facts.model.sensor.lag, facts.model.timing.period);
+    let off = lag / (SLOWEST_GAUGE * tick);
+    if off <= 1.0 {
+        return;
+    }
+    found.add_off(
+        off,
+        codes::GAUGE_LATE,
+        "sensor.lag",
+        format!(
+            "the gauges lag {} us, {} ticks of {} us: what a tick does is seen long after",
+            figure(lag * 1e6),
+            figure(lag / tick),
+            figure(tick * 1e6)
+        ),
+        "check the unit (us or ms); a tick this much faster than its gauges gains nothing: lengthen `timing.period` or let the gauges pass more",
+    );
+}
+
+/// A mode above half the tick rate is sampled as another frequency, unless the gauges keep it out.
+pub(super) fn modes_seen_as_others(facts: &Facts, found: &mut Found) {
+    let (lag, tick) = (facts.model.sensor.lag, facts.model.timing.period);
+    let Some(modes) = facts.legs.as_ref().and_then(|legs| legs.modes) else { return };
+    let share = |mode: f64| 1.0 / libm::hypot(1.0, core::f64::consts::TAU * mode * lag);
+    let seen = |mode: &&f64| **mode * tick > 0.5 && share(**mode) > LARGEST_ALIAS;
+    let Some(mode) = modes.iter().find(seen) else { return };
+    let alias = (mode - libm::rint(mode * tick) / tick).abs();
+    found.add(
+        codes::MODE_ALIASED,
+        "timing.period",
+        format!(
+            "a mode of the platform of {} Hz lies above half the tick rate, {} Hz: the gauges show it as {} Hz, with {} of its amplitude",
+            figure(*mode),
+            figure(0.5 / tick),
+            figure(alias),
+            figure(share(*mode))
+        ),
+        &format!(
+            "a period below {} us samples all modes as what they are; or filter the gauges before they are sampled, with a lag above {} us, and write that as `sensor.lag`",
+            figure(0.5e6 / modes[5]),
+            figure(libm::sqrt(1.0 / (LARGEST_ALIAS * LARGEST_ALIAS) - 1.0) / (core::f64::consts::TAU * mode) * 1e6)
+        ),
     );
 }

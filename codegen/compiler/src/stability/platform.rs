@@ -1,12 +1,12 @@
 //! Stability and design of a platform controller, decided when compiling.
 //!
-//! The platform rests on six legs of axial stiffness k_a; its modes, together with the amplifier lag, bound how fast
-//! anything may be fed back. Here the modes are found, the notch on them is designed, gains and bandwidths that the spec
+//! The platform rests on six legs of axial stiffness k_a; its modes, together with the lags of amplifiers and gauges, bound
+//! how fast anything may be fed back. Here the modes are found, the notch on them is designed, gains and bandwidths that the spec
 //! leaves out get start values, and every control mode that a running controller can be switched to is checked: the
 //! spectral radius of one tick of the closed loop, with the platform sampled exactly, over the declared interval of λ.
 //!
 //! Pose coordinates are x, y, z (m) and θx, θy, θz (rad) from rest. Not in the model: flexure stiffness, bending of legs,
-//! axial modes inside a leg, hysteresis (λ stands for it), sensor dynamics.
+//! axial modes inside a leg, hysteresis (λ stands for it), dynamics of the gauges beyond a first-order lag.
 
 mod closed_loop;
 mod law;
@@ -151,6 +151,7 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
         damping,
         period,
         lag: model.amplifier.lag,
+        gauge_lag: model.sensor.lag,
         notch,
         velocity_cutoff: task.velocity_cutoff,
         environment: task.environment.stiffness,

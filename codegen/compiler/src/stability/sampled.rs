@@ -1,11 +1,13 @@
-//! Spectral radius of one leg under run-to-run adaptation, with amplifier lag and axial resonance.
+//! Spectral radius of one leg under run-to-run adaptation, with amplifier lag, axial resonance and lag of its gauge.
 //!
-//! State at the end of a run: [p, y, v, δ̂, φ̂] with amplifier output p, displacement y, velocity v (all as displacement).
+//! State at the end of a run: [p, y, v, g, δ̂, φ̂] with amplifier output p, displacement y, velocity v and what the gauge shows
+//! g (all as displacement); g is y, and no state, where the gauge does not lag.
 //! Over a run the request q̂ = −δ̂ − φ̂ is held:
 //!
 //! ```text
 //! τ ṗ = λ q̂ − p ;   ÿ + 2ζω ẏ + ω² y = ω² p         discretised exactly over the run
-//! m = y − q̂ ;  δ̂ ← ω1 m + (1−ω1) δ̂ ;  φ̂ ← ω2 (m − δ̂_old) + (1−ω2) φ̂
+//! τ_g ġ = y − g
+//! m = g − q̂ ;  δ̂ ← ω1 m + (1−ω1) δ̂ ;  φ̂ ← ω2 (m − δ̂_old) + (1−ω2) φ̂
 //! ```
 
 use core::f64::consts::TAU;
@@ -20,6 +22,8 @@ pub struct LegDynamics {
     pub run: f64,
     /// Amplifier lag τ, s, ≥ 0.
     pub lag: f64,
+    /// Lag of the gauge with the filter behind it, s, ≥ 0.
+    pub gauge_lag: f64,
     /// ω of the axial resonance, rad/s.
     pub resonance: f64,
     /// ζ.
@@ -33,24 +37,43 @@ impl LegDynamics {
         Self {
             run: model.timing.period * f64::from(model.adaptation.run_interval),
             lag: model.amplifier.lag,
+            gauge_lag: model.sensor.lag,
             resonance: TAU * model.actuator.resonance,
             damping_ratio: model.actuator.damping_ratio,
         }
     }
 
-    /// State transition of [p, y, v] over one run, and in the fourth column its response to a held input.
+    /// State transition of [p, y, v, g] over one run, and in the last column its response to a held input. Without a lag of
+    /// the gauge there is no g.
     fn discretise(&self) -> Matrix {
         // A lag far below the run is as good as none; the bound keeps the matrix exponential well scaled.
-        let shortest = 1e-4 * self.run;
+        let shortest = self.shortest();
         let lag = if self.lag > shortest { self.lag } else { shortest };
         let stiffness = self.resonance * self.resonance;
         let damping = 2.0 * self.damping_ratio * self.resonance;
         // [A B; 0 0], velocity in units of ω y to balance the rows.
-        let mut continuous = Matrix::zeros(4);
-        continuous.set_row(0, &[-1.0 / lag, 0.0, 0.0, 1.0 / lag]);
-        continuous.set_row(1, &[0.0, 0.0, self.resonance, 0.0]);
-        continuous.set_row(2, &[stiffness / self.resonance, -stiffness / self.resonance, -damping, 0.0]);
+        let input = self.states();
+        let mut continuous = Matrix::zeros(input + 1);
+        continuous[(0, 0)] = -1.0 / lag;
+        continuous[(0, input)] = 1.0 / lag;
+        continuous[(1, 2)] = self.resonance;
+        continuous[(2, 0)] = stiffness / self.resonance;
+        continuous[(2, 1)] = -stiffness / self.resonance;
+        continuous[(2, 2)] = -damping;
+        if input > 3 {
+            continuous[(3, 1)] = 1.0 / self.gauge_lag;
+            continuous[(3, 3)] = -1.0 / self.gauge_lag;
+        }
         exponential(&continuous.scaled(self.run))
+    }
+
+    fn shortest(&self) -> f64 {
+        1e-4 * self.run
+    }
+
+    /// Of the leg: three, and a fourth where the gauge lags.
+    fn states(&self) -> usize {
+        if self.gauge_lag > self.shortest() { 4 } else { 3 }
     }
 }
 
@@ -60,48 +83,54 @@ pub fn spectral_radius(dynamics: &LegDynamics, level_weight: f64, drift_weight: 
     largest_magnitude(&transition(dynamics, level_weight, drift_weight, gain_ratio))
 }
 
-/// The loop from run to run as a matrix over [p, y, v, δ̂, φ̂], φ̂ left out for EWMA.
+/// The loop from run to run as a matrix over [p, y, v, g, δ̂, φ̂], φ̂ left out for EWMA and g without a lag of the gauge.
 #[must_use]
 pub fn transition(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> Matrix {
     let discrete = dynamics.discretise();
-    let states = if drift_weight.is_some() { 5 } else { 4 };
+    let leg = dynamics.states();
+    let states = leg + if drift_weight.is_some() { 2 } else { 1 };
     let mut one_run = Matrix::zeros(states);
-    // Estimates after the reading: m = y + δ̂ + φ̂ (φ̂ = 0 under EWMA).
-    let level_row = estimate_row(states, [level_weight, 1.0, level_weight]);
-    one_run.set_row(3, &level_row);
+    // Estimates after the reading: m = g + δ̂ + φ̂ (φ̂ = 0 under EWMA).
+    let level_row = estimate_row(leg, states, [level_weight, 1.0, level_weight]);
+    one_run.set_row(leg, &level_row);
     let mut request_row: Vec<f64> = level_row.iter().map(|x| -x).collect();
     if let Some(weight) = drift_weight {
-        let drift_row = estimate_row(states, [weight, 0.0, 1.0]);
-        one_run.set_row(4, &drift_row);
+        let drift_row = estimate_row(leg, states, [weight, 0.0, 1.0]);
+        one_run.set_row(leg + 1, &drift_row);
         for (request, drift) in request_row.iter_mut().zip(&drift_row) {
             *request -= drift;
         }
     }
-    for row in 0..3 {
-        let input = discrete[(row, 3)];
+    for row in 0..leg {
+        let input = discrete[(row, leg)];
         for column in 0..states {
-            let own = if column < 3 { discrete[(row, column)] } else { 0.0 };
+            let own = if column < leg { discrete[(row, column)] } else { 0.0 };
             one_run[(row, column)] = own + gain_ratio * input * request_row[column];
         }
     }
     one_run
 }
 
-/// Row of an estimate over [p, y, v, δ̂, φ̂]: its factors of y, δ̂ and φ̂.
-fn estimate_row(states: usize, [measured, level, drift]: [f64; 3]) -> Vec<f64> {
-    let row = [0.0, measured, 0.0, level, drift];
-    row[..states].to_vec()
+/// Row of an estimate over the states, of which the first `leg` are the leg's: its factors of the reading, δ̂ and φ̂.
+fn estimate_row(leg: usize, states: usize, [measured, level, drift]: [f64; 3]) -> Vec<f64> {
+    let mut row = vec![0.0; leg];
+    // What the gauge shows is its own state, or the displacement.
+    row[if leg > 3 { 3 } else { 1 }] = measured;
+    row.extend([level, drift]);
+    row.truncate(states);
+    row
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const REFERENCE: LegDynamics = LegDynamics { run: 1e-4, lag: 0.35e-3, resonance: TAU * 870.0, damping_ratio: 0.1 };
+    const REFERENCE: LegDynamics =
+        LegDynamics { run: 1e-4, lag: 0.35e-3, gauge_lag: 0.0, resonance: TAU * 870.0, damping_ratio: 0.1 };
 
     /// Fine-step simulation of the same loop, independent of the matrix exponential: does a disturbance die out?
     fn settles(dynamics: &LegDynamics, level_weight: f64, drift_weight: Option<f64>, gain_ratio: f64) -> bool {
-        let (mut p, mut y, mut v, mut level, mut drift) = (0.0, 1e-3, 0.0, 0.0, 0.0);
+        let (mut p, mut y, mut v, mut g, mut level, mut drift) = (0.0, 1e-3, 0.0, 0.0, 0.0, 0.0);
         let fine = 200;
         let dt = dynamics.run / f64::from(fine);
         let (w, z) = (dynamics.resonance, dynamics.damping_ratio);
@@ -115,10 +144,17 @@ mod tests {
                     ((gain_ratio * request - p) / dynamics.lag, v, w * w * (p - y) - 2.0 * z * w * v)
                 };
                 let (dp, dy, dv) = slope(p, y, v);
-                let (dp, dy, dv) = slope(p + 0.5 * dt * dp, y + 0.5 * dt * dy, v + 0.5 * dt * dv);
+                let middle = y + 0.5 * dt * dy;
+                let (dp, dy, dv) = slope(p + 0.5 * dt * dp, middle, v + 0.5 * dt * dv);
                 (p, y, v) = (p + dt * dp, y + dt * dy, v + dt * dv);
+                g = if dynamics.gauge_lag == 0.0 {
+                    y
+                } else {
+                    let ahead = g + 0.5 * dt * (middle - 0.5 * dt * dy - g) / dynamics.gauge_lag;
+                    g + dt * (middle - ahead) / dynamics.gauge_lag
+                };
             }
-            let model_error = y - request;
+            let model_error = g - request;
             let old = level;
             level = level_weight * model_error + (1.0 - level_weight) * old;
             if let Some(weight) = drift_weight {
@@ -136,8 +172,8 @@ mod tests {
 
     #[test]
     fn radius_one_is_where_the_simulated_loop_stops_settling() {
-        for run in [5e-5, 9e-5, 2e-4, 1e-3] {
-            let dynamics = LegDynamics { run, ..REFERENCE };
+        for (run, gauge_lag) in [(5e-5, 0.0), (9e-5, 0.0), (2e-4, 0.0), (1e-3, 0.0), (9e-5, 15e-6), (9e-5, 0.3e-3)] {
+            let dynamics = LegDynamics { run, gauge_lag, ..REFERENCE };
             for drift in [None, Some(0.044)] {
                 let radius = |weight: f64| spectral_radius(&dynamics, weight, drift.map(|d| d * weight), 1.0);
                 let (mut low, mut high) = (1e-3, 4.0);
@@ -150,7 +186,7 @@ mod tests {
                     assert_eq!(
                         settles(&dynamics, weight, drift.map(|d| d * weight), 1.0),
                         expected,
-                        "run {run} s, limit {low:.4}, × {factor}"
+                        "run {run} s, lag of the gauge {gauge_lag} s, limit {low:.4}, × {factor}"
                     );
                 }
             }
@@ -166,7 +202,7 @@ mod tests {
 
     #[test]
     fn a_leg_without_dynamics_gives_the_jury_limit() {
-        let stiff = LegDynamics { run: 1.0, lag: 0.0, resonance: TAU * 100.0, damping_ratio: 0.7 };
+        let stiff = LegDynamics { run: 1.0, lag: 0.0, gauge_lag: 0.0, resonance: TAU * 100.0, damping_ratio: 0.7 };
         let limit = super::super::pcc_limit(0.252, 0.011);
         assert!(spectral_radius(&stiff, 0.252, Some(0.011), 0.99 * limit) < 1.0);
         assert!(spectral_radius(&stiff, 0.252, Some(0.011), 1.01 * limit) > 1.0);

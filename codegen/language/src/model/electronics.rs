@@ -88,6 +88,8 @@ section! {
         range: [f64; 2] = list(&[READING; 2]), Required, "" ["travel", "measuring_range"], ["-2 um", "48 um"];
         /// Noise, rms.
         noise: f64 = one(Dimension::LENGTH, Range::closed(0.0, 1e-3), "nm"), Default("0 nm"), "" ["sigma", "rms", "noise_rms"], "2.2 nm";
+        /// Time constant of its first-order lag: bandwidth of the gauge, and the filter before its converter.
+        lag: f64 = one(Dimension::TIME, Range::closed(0.0, 0.01), "us"), Default("0 us"), "" ["tau", "time_constant", "bandwidth", "filter", "cutoff", "latency", "delay"], "15 us";
         /// Resolution of its converter over the range.
         bits: u32 = integer(8, 32), Required, "" ["resolution", "n_bits"], 16;
         /// With a calibration: voltage of its converter at code 0 and at full scale.

@@ -59,7 +59,7 @@ section! {
         hysteresis: Option<[f64; 2]> = FACTORS, Rule("[0.9, 1.1]"), "", [0.9, 1.1];
         /// On the creep of a leg.
         creep: Option<[f64; 2]> = FACTORS, Rule("[0.9, 1.1]"), "", [0.9, 1.1];
-        /// On the lag of an amplifier.
+        /// On the lag of an amplifier, and of the gauges.
         lag: Option<[f64; 2]> = FACTORS, Rule("[0.8, 1.2]"), "", [0.8, 1.2];
         /// On the noise of gauges, amplifiers and force sensor.
         noise: Option<[f64; 2]> = FACTORS, Rule("[0.5, 1.5]"), "", [0.5, 1.5];

@@ -28,7 +28,7 @@ pub struct LegDeviation {
     pub hysteresis: f64,
     /// On its creep.
     pub creep: f64,
-    /// On the lag of its amplifier.
+    /// On the lag of its amplifier and of its gauge; the gauges of a platform have that of the first leg.
     pub lag: f64,
 }
 
@@ -123,6 +123,7 @@ impl Deviation {
         own.play_thresholds_v.iter_mut().for_each(|threshold| *threshold *= deviation.hysteresis);
         own.creep_weights.iter_mut().for_each(|weight| *weight *= deviation.creep);
         own.tau_amp_s *= deviation.lag;
+        own.gauge_lag_s *= deviation.lag;
         own.noise.sensor_nm_rms *= self.noise;
         own.noise.amplifier_mv_rms *= self.noise;
         own
@@ -132,4 +133,20 @@ impl Deviation {
 fn damped(ratio: f64, factor: f64) -> f64 {
     let ratio = ratio * factor;
     if ratio < MOST_DAMPING { ratio } else { MOST_DAMPING }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lag_is_of_amplifier_and_gauge() {
+        let leg = LegParameters { gauge_lag_s: 15e-6, ..LegParameters::reference() };
+        let longer =
+            Deviation::common(|factor| if factor == Factor::Lag { 1.5 } else { factor.nominal() }).legs_of(&leg);
+        for (found, nominal) in longer.iter().flat_map(|own| [(own.gauge_lag_s, 15e-6), (own.tau_amp_s, leg.tau_amp_s)])
+        {
+            assert!((found / nominal - 1.5).abs() < 1e-12, "{found} {nominal}");
+        }
+    }
 }

@@ -22,7 +22,7 @@ pub enum Factor {
     Hysteresis,
     /// On its creep.
     Creep,
-    /// On the lag of an amplifier.
+    /// On the lag of an amplifier, and of the gauges.
     Lag,
     /// On the noise of gauges, amplifiers and force sensor.
     Noise,

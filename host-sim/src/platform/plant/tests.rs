@@ -186,3 +186,60 @@ fn whole_ticks_have_the_same_bits_on_every_processor_and_end_where_they_must() {
         assert!((after - before).abs() < 1e-18);
     }
 }
+
+/// What gauges show of a kick, against an integration of their lag of its own behind the true pose of fine steps.
+#[test]
+fn gauges_show_the_pose_behind_their_lag_in_small_steps_and_in_whole_ticks() {
+    for lag in [15e-6, 0.3e-3] {
+        let mut specimen = Specimen::reference();
+        specimen.legs.iter_mut().for_each(|leg| leg.gauge_lag_s = lag);
+        let kick = |tick: usize| [if tick < 5 { 10.0 } else { 0.0 }, 0.0, 10.0, 0.0, 0.0, 5.0];
+        let mut fine = prepared(&specimen);
+        assert_eq!(fine.seen(), [0.0; 6]);
+        let mut shown = [0.0; 6];
+        let mut expected = Vec::new();
+        for tick in 0..100 {
+            for _ in 0..100 {
+                let before = fine.pose();
+                fine.hold(&kick(tick), 1e-6);
+                // Of an input that is a straight line over the step: y − τ ẏ and what is left of the beginning.
+                for (k, pose) in fine.pose().into_iter().enumerate() {
+                    let slope = (pose - before[k]) / 1e-6;
+                    let left = (shown[k] - (before[k] - lag * slope)) * libm::exp(-1e-6 / lag);
+                    shown[k] = pose - lag * slope + left;
+                }
+            }
+            expected.push(shown);
+        }
+        let run = |whole: bool| -> Vec<Six> {
+            let mut plant = prepared(&specimen);
+            if whole {
+                plant.step_whole_ticks(1e-4);
+            }
+            let shown = |tick| {
+                plant.hold(&kick(tick), 1e-4);
+                plant.seen()
+            };
+            (0..100).map(shown).collect()
+        };
+        let moved = expected.iter().map(|pose| pose[2].abs()).fold(0.0, f64::max);
+        let [small, whole] = [false, true].map(|whole| worst(&run(whole), &expected));
+        println!(
+            "lag {lag} s: {:.1} pm in small steps, {:.1} pm in whole ticks, of {:.2} µm",
+            small * 1e12,
+            whole * 1e12,
+            moved * 1e6
+        );
+        assert!(moved > 1e-6 && small < 1e-9 && whole < 3e-9, "{small:e} {whole:e}");
+    }
+}
+
+#[test]
+fn gauges_without_a_lag_show_the_pose_to_the_bit() {
+    let specimen = Specimen::reference();
+    let mut plant = prepared(&specimen);
+    for tick in 0..50 {
+        plant.hold(&voltages(tick), 1e-4);
+        assert_eq!(plant.seen().map(f64::to_bits), plant.pose().map(f64::to_bits));
+    }
+}

@@ -178,6 +178,16 @@ pub const RULES: &[Rule] = &[
     of("W0834", "timing.period", ["\"200 us\"", "\"0.7 ms\"", "\"0.69 ms\""])
         .on("legs.toml")
         .with(&[("mode         = \"pcc\"", "mode         = \"invhys\"")])
+        .also(&["W0302", "W0869"]),
+    of(
+        "W0862",
+        "sensor.lag",
+        ["noise = \"2.2 nm\"", "noise = \"2.2 nm\"\nlag = \"501 us\"", "noise = \"2.2 nm\"\nlag = \"499 us\""],
+    )
+    .at("lag = "),
+    of("W0869", "timing.period", ["\"200 us\"", "\"0.63 ms\"", "\"0.62 ms\""])
+        .on("legs.toml")
+        .with(&[("mode         = \"pcc\"", "mode         = \"invhys\"")])
         .also(&["W0302"]),
     of(
         "W0840",

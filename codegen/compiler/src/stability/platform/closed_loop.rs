@@ -1,19 +1,20 @@
 //! One tick of the closed loop (8) as a matrix: the plant, sampled exactly, and the controller's tick, line by line.
 //!
 //! Everything is in modal coordinates z = V⁻¹ x, where leg motions are V⁻¹ J⁻¹ of leg coordinates and a wrench w is
-//! V⁻¹ K⁻¹ w, the leg motion that it asks for. Set-point and load are zero: only what is fed back matters.
+//! V⁻¹ K⁻¹ w, the leg motion that it asks for. Set-point and load are zero: only what is fed back matters. g is what the
+//! gauges show of z: z itself, or behind their lag.
 //!
 //! ```text
-//! e  = N(−z) ;   s ← s + T k_I e ;   u = K⁻¹ (k_p e + s)
-//! ν  = N(z − u_last) ;   δ̂ ← δ̂ + ω1 (ν + φ̂) ;   φ̂ ← φ̂ + ω2 ν          Y − (q̂ − p) − δ̂ − φ̂ is z − u_last
-//! v  ← a v + (1 − a) (z − z_last)/T ;   p = K⁻¹ (K_w z − k_v v)          K_w: measured interaction force
+//! e  = N(−g) ;   s ← s + T k_I e ;   u = K⁻¹ (k_p e + s)
+//! ν  = N(g − u_last) ;   δ̂ ← δ̂ + ω1 (ν + φ̂) ;   φ̂ ← φ̂ + ω2 ν          Y − (q̂ − p) − δ̂ − φ̂ is g − u_last
+//! v  ← a v + (1 − a) (g − g_last)/T ;   p = K⁻¹ (K_w z − k_v v)          K_w: measured interaction force
 //! q̂ = u − δ̂ − φ̂ + p ;   d = λ q̂, late by the delay
 //! ```
 
 use super::law::{Adapting, Law, Tuning};
 use super::modes::ModalBasis;
 use super::notch::{Biquad, Notch};
-use super::sampled::{Plant, STATES};
+use super::sampled::{PLACE, Plant, shown, states};
 use specgen_numerics::{Matrix, Matrix6, spectral_radius};
 
 /// A linear combination of the states.
@@ -50,6 +51,8 @@ pub struct ClosedLoop {
     pub period: f64,
     /// Amplifier lag τ, s.
     pub lag: f64,
+    /// Lag of the gauges with the filter behind them, s.
+    pub gauge_lag: f64,
     /// On feedback.
     pub notch: Option<Notch>,
     /// Cut-off of the velocity filter, rad/s.
@@ -74,9 +77,14 @@ impl ClosedLoop {
         Assembly::new(self, law, tuning, conditions).matrix()
     }
 
-    /// The amplifier lag, or what stands for none, s.
-    pub(super) fn lag_used(&self) -> f64 {
-        if self.lag > 1e-4 * self.period { self.lag } else { 1e-4 * self.period }
+    /// Lags of amplifier and gauges, s. One below a ten-thousandth of a tick is as good as none: the amplifier's is then that,
+    /// the gauges' nothing, which keeps the matrix exponential well scaled.
+    pub(super) fn lags_used(&self) -> [f64; 2] {
+        let shortest = 1e-4 * self.period;
+        [
+            if self.lag > shortest { self.lag } else { shortest },
+            if self.gauge_lag > shortest { self.gauge_lag } else { 0.0 },
+        ]
     }
 
     fn contact(&self, touching: bool) -> Matrix6 {
@@ -133,7 +141,7 @@ impl<'a> Assembly<'a> {
         let integrating = if feeds_back { used(&tuning.integral) } else { Vec::new() };
         let damped = if feeds_back { used(&tuning.derivative) } else { Vec::new() };
         let notch = |wanted: bool| if wanted && of.notch.is_some() { 12 } else { 0 };
-        let mut total = STATES;
+        let mut total = states(of.lags_used()[1]);
         let mut take = |count: usize| {
             total += count;
             total - count
@@ -164,10 +172,12 @@ impl<'a> Assembly<'a> {
     }
 
     fn matrix(mut self) -> Matrix {
-        let place: [Signal; 6] = core::array::from_fn(|i| self.state(6 + i));
-        let feedback = self.feedback(&place);
-        let estimates = self.adaptation(&place, &feedback);
-        let load = self.load(&place);
+        let shown = shown(self.of.lags_used()[1]);
+        let [place, seen] =
+            [PLACE, shown].map(|first| -> [Signal; 6] { core::array::from_fn(|i| self.state(first + i)) });
+        let feedback = self.feedback(&seen);
+        let estimates = self.adaptation(&seen, &feedback);
+        let load = self.load(&place, &seen);
         let request: [Signal; 6] = core::array::from_fn(|i| {
             let mut request = feedback[i].clone();
             add(&mut request, -1.0, &estimates[i]);
@@ -216,12 +226,12 @@ impl<'a> Assembly<'a> {
     }
 
     /// u = K⁻¹ (k_p e + s).
-    fn feedback(&mut self, place: &[Signal; 6]) -> [Signal; 6] {
+    fn feedback(&mut self, seen: &[Signal; 6]) -> [Signal; 6] {
         let mut feedback = self.zeros();
         if !self.feeds_back {
             return feedback;
         }
-        let minus = core::array::from_fn(|i| scaled(-1.0, &place[i]));
+        let minus = core::array::from_fn(|i| scaled(-1.0, &seen[i]));
         let error = self.notched(self.layout.error_notch, &minus);
         let proportional = self.of.asked(&self.of.basis.couple(&self.tuning.proportional));
         for (out, row) in feedback.iter_mut().zip(&proportional) {
@@ -247,12 +257,12 @@ impl<'a> Assembly<'a> {
     }
 
     /// δ̂ + φ̂ after the reading.
-    fn adaptation(&mut self, place: &[Signal; 6], feedback: &[Signal; 6]) -> [Signal; 6] {
+    fn adaptation(&mut self, seen: &[Signal; 6], feedback: &[Signal; 6]) -> [Signal; 6] {
         let mut estimates = self.zeros();
         if !self.adapts {
             return estimates;
         }
-        let mut innovation = place.clone();
+        let mut innovation = seen.clone();
         if self.feeds_back {
             for i in 0..6 {
                 let index = self.layout.last_feedback + i;
@@ -280,8 +290,8 @@ impl<'a> Assembly<'a> {
         estimates
     }
 
-    /// p = K⁻¹ (K_w z − k_v v): known to the model, so the innovation does not see it.
-    fn load(&mut self, place: &[Signal; 6]) -> [Signal; 6] {
+    /// p = K⁻¹ (K_w z − k_v v): known to the model, so the innovation does not see it. The force sensor does not lag.
+    fn load(&mut self, place: &[Signal; 6], seen: &[Signal; 6]) -> [Signal; 6] {
         let mut load = self.zeros();
         if self.of.measured && self.conditions.touching {
             let fed = self.of.asked(&self.of.contact(true));
@@ -295,7 +305,7 @@ impl<'a> Assembly<'a> {
         for (k, axis) in self.damped.clone().into_iter().enumerate() {
             let (last, index) = (self.layout.last_pose + k, self.layout.velocity + k);
             let mut pose = self.zero();
-            for (factor, signal) in self.of.basis.from_modal[axis].iter().zip(place) {
+            for (factor, signal) in self.of.basis.from_modal[axis].iter().zip(seen) {
                 add(&mut pose, *factor, signal);
             }
             // Displacement per tick.
@@ -314,10 +324,9 @@ impl<'a> Assembly<'a> {
 
     /// The plant under the requests that act during this tick, and the requests still on their way.
     fn plant(&mut self, request: &[Signal; 6]) {
-        let lag = self.of.lag_used();
         let contact = self.of.contact(self.conditions.touching);
         let damping = self.of.damping.map(|ratio| ratio * self.conditions.damping);
-        let plant = Plant::new(&self.of.basis, &damping, self.conditions.stiffness, &contact, lag);
+        let plant = Plant::new(&self.of.basis, &damping, self.conditions.stiffness, &contact, self.of.lags_used());
         let whole = libm::floor(self.conditions.delay);
         let part = self.conditions.delay - whole;
         // Request of `age` ticks ago.
@@ -326,7 +335,7 @@ impl<'a> Assembly<'a> {
         };
         let over_tick = plant.sample(self.of.period);
         let late = (part > 0.0).then(|| plant.sample(self.of.period * (1.0 - part)).input);
-        for row in 0..STATES {
+        for row in 0..over_tick.transition.len() {
             let mut next = self.zero();
             for (column, factor) in over_tick.transition[row].iter().enumerate() {
                 next[column] += factor;

@@ -4,7 +4,7 @@ use core::f64::consts::TAU;
 
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::{Law, Tuning};
-use super::sampled::{Plant, STATES};
+use super::sampled::Plant;
 
 /// Re and Im.
 type Complex = [f64; 2];
@@ -18,7 +18,7 @@ impl ClosedLoop {
         // λ stands before what the request does to the plant and nowhere else: that part of the tick is the way back.
         let (open, closed) = (at(0.0), at(1.0));
         let size = open.size();
-        let plant = Plant::new(&self.basis, &self.damping, 1.0, &[[0.0; 6]; 6], self.lag_used());
+        let plant = Plant::new(&self.basis, &self.damping, 1.0, &[[0.0; 6]; 6], self.lags_used());
         let input = plant.sample(self.period).input;
         // In modal coordinates a request moves the drive of its own mode, the first six states, and through that the rest.
         let request: [Vec<f64>; 6] = core::array::from_fn(|i| {
@@ -32,7 +32,7 @@ impl ClosedLoop {
                 .map(|i| {
                     let of =
                         |j: usize| [if i == j { z[0] } else { 0.0 } - open[(i, j)], if i == j { z[1] } else { 0.0 }];
-                    let right = |k: usize| [if i < STATES { input[i][k] } else { 0.0 }, 0.0];
+                    let right = |k: usize| [input.get(i).map_or(0.0, |row| row[k]), 0.0];
                     (0..size).map(of).chain((0..6).map(right)).collect()
                 })
                 .collect();

@@ -99,9 +99,10 @@ impl Case<'_> {
     fn what(&self, (law, radius): Unstable) -> String {
         let touching = if self.closed_loop.environment == [0.0; 6] { "" } else { ", free or touching the work piece" };
         let [low, high] = self.model.adaptation.gain_ratio;
+        let gauges = super::super::gauge_lag_text(self.closed_loop.gauge_lag);
         format!(
             "control mode {} is unstable on this platform: the loop sampled every {} s, with modes from {:.0} Hz to \
-             {:.0} Hz (damping ratio {:.3} of the first) and an amplifier lag of {} s, has spectral radius {radius:.4} \
+             {:.0} Hz (damping ratio {:.3} of the first) and an amplifier lag of {} s{gauges}, has spectral radius {radius:.4} \
              somewhere in gain_ratio [{low}, {high}]{touching}; it must be below 1",
             law.name(),
             self.closed_loop.period,
