@@ -17,6 +17,8 @@ use specgen::target::{build, image, stack, toolchain};
 use specgen::workspace;
 use specgen_tests::{compile_edited, image_target, kept, repository, scratch};
 
+use crate::porting::own_board_builds;
+
 /// Bytes of RAM, the stack's reserve included, without the buffer of a recorder.
 const RAM: u64 = 24 * 1024;
 /// Bytes that memory.x reserves for the stack, below everything else.
@@ -172,6 +174,7 @@ fn no_path_of_this_machine_is_in_flash(board: &Board, elf: &[u8]) {
 #[test]
 fn the_stm32h743_image_fits_and_its_tick_cannot_fail() {
     check(&H743);
+    own_board_builds();
 }
 
 #[test]

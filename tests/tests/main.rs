@@ -30,6 +30,7 @@ mod platform_promises;
 mod platform_refusals;
 mod platform_stops;
 mod platform_tables;
+mod porting;
 mod promises;
 mod rate_options;
 mod record;

@@ -70,6 +70,27 @@ fn the_guide_can_be_walked() {
     assert!(here.ends_with("bench") && here.join("run.csv").is_file() && here.join("report.html").is_file());
 }
 
+/// docs/porting.md: what is generated, and the drivers of the example beside it. Its programs are built by `tests/tests/porting.rs`.
+#[test]
+fn the_page_about_porting_can_be_walked() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(repository().join("docs/porting.md")).unwrap();
+    // Of packages that others wrote nothing changes from run to run.
+    let (root, target) = (repository(), repository().join("target/tests/own-board"));
+    let script: String = blocks(&text)
+        .iter()
+        .filter(|block| block.language == "sh")
+        .flat_map(|block| block.body.lines())
+        .filter(|line| !is_marked(line))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    assert!(script.contains(" --board") && script.contains("cargo test"), "{script}");
+    let environment = format!("export SPECGEN='{}' CARGO_TARGET_DIR='{}'", root.display(), target.display());
+    let run = shell(folder.path(), &format!("{environment}\n{script}"));
+    assert_eq!(run.code, 0, "{script}{}\n{}", run.stdout, run.stderr);
+    assert!(run.stdout.contains("test result: ok. 6 passed"), "{}", run.stdout);
+}
+
 /// The judge sees another form, and no more than that.
 #[test]
 fn a_line_that_is_not_said_is_seen() {

@@ -81,7 +81,7 @@ pub fn section(compiled: &Compiled, mode: u32, command: &str) -> Section {
         section = section
             .pane(&[AXES[axis]], vec![Part::Lead(lead.clone()), Part::Columns(vec![left, vec![Part::Rows(all)]])]);
     }
-    section.text("The open loop is that of the model with the sampled platform, amplifier lag and notch, opened at the legs, all axes at once: its gain margin is λ = ρ/ρ̂ of the legs. The limits of the control modes are found by eigenvalues of the whole closed loop.")
+    section.text("The open loop is that of the model with the sampled platform, lags of amplifiers and gauges, and notch, opened at the legs, all axes at once: its gain margin is λ = ρ/ρ̂ of the legs. The limits of the control modes are found by eigenvalues of the whole closed loop.")
 }
 
 fn bode(compiled: &Compiled, design: &Design, task: &TaskSpace, law: Law) -> Option<Vec<Vec<Chart>>> {

@@ -33,6 +33,9 @@ pub struct Arguments {
     /// Write the source only.
     #[arg(long)]
     no_build: bool,
+    /// Also write the crates that a board of one's own is made of: `hal`, `board`, `link`. See docs/porting.md.
+    #[arg(long)]
+    board: bool,
     /// First bring what is missing for the microcontroller (cross compiler, emulator): by rustup or apt, else into the user's
     /// cache. Where that fails, the job goes on without.
     #[arg(long, conflicts_with = "no_build")]
@@ -96,10 +99,13 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         ui.findings_in_brief(&compiled.source, &compiled.findings);
     }
     let output = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}-controller", compiled.ir.name)));
-    let _hold = workspace::write(&output, &compiled.files)?;
-    ui.progress(&format!("wrote {} files to {}", compiled.files.len(), output.display()));
+    let with_board = || workspace::files_with(&compiled.ir, &specgen_compiler::emit::emit(&compiled.ir), &["board"]);
+    let files = if arguments.board { with_board() } else { compiled.files.clone() };
+    let _hold = workspace::write(&output, &files)?;
+    ui.progress(&format!("wrote {} files to {}", files.len(), output.display()));
 
     let mut summary = Summary::of(&compiled, &output, arguments.details);
+    summary.files = files.len();
     // What was written is whole, whatever follows.
     let built = if arguments.no_build {
         summary.missing = Some("not built: --no-build".to_owned());
