@@ -1,4 +1,4 @@
-//! Tells the linker where the memory map is and which layout to use.
+//! Tells the linker where the layout is.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ fn main() {
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
     println!("cargo:rustc-link-search={}", root.display());
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
-    println!("cargo:rerun-if-changed=memory.x");
+    println!("cargo:rerun-if-changed=link.x");
 
     // See src/panic.rs.
     println!("cargo:rustc-check-cfg=cfg(specgen_locate_panics)");

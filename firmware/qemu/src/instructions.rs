@@ -10,8 +10,15 @@
 #![allow(unsafe_code)] // Assembly, and calls from it.
 
 use core::arch::{asm, naked_asm};
-use cortex_m::peripheral::{SYST, syst::SystClkSource};
 
+/// SysTick's registers: control and status, value to begin anew with, current value.
+const CONTROL: *mut u32 = 0xe000_e010 as *mut u32;
+const START: *mut u32 = 0xe000_e014 as *mut u32;
+const CURRENT: *mut u32 = 0xe000_e018 as *mut u32;
+/// In the control register: counts, of the core clock; has come to zero since it was read.
+const COUNTS: u32 = 1;
+const OF_CORE: u32 = 1 << 2;
+const WRAPPED: u32 = 1 << 16;
 /// 24 bits.
 const RELOAD: u32 = 0x00ff_ffff;
 /// Period of the core clock of the AN500 and the AN386, ns.
@@ -25,7 +32,6 @@ pub type SelfTest = [u64; 4];
 
 /// Counts the instructions of a piece of code.
 pub struct InstructionCounter {
-    timer: SYST,
     /// What measuring an empty function costs: the call, its return, one reading. Instructions.
     overhead: u32,
     /// Measurements that did not fit into the 24 bits.
@@ -34,12 +40,14 @@ pub struct InstructionCounter {
 
 impl InstructionCounter {
     /// Starts the timer (no interrupt) and calibrates the overhead by an empty function.
-    pub fn new(mut timer: SYST) -> Self {
-        timer.set_clock_source(SystClkSource::Core);
-        timer.set_reload(RELOAD);
-        timer.clear_current();
-        timer.enable_counter();
-        let mut counter = Self { timer, overhead: 0, overflows: 0 };
+    pub fn new() -> Self {
+        // SAFETY: registers of the core, which nothing else uses.
+        unsafe {
+            START.write_volatile(RELOAD);
+            CURRENT.write_volatile(0);
+            CONTROL.write_volatile(COUNTS | OF_CORE);
+        }
+        let mut counter = Self { overhead: 0, overflows: 0 };
         // SAFETY: it does nothing.
         counter.overhead = unsafe { counter.measure_call(no_nops as *const (), [0; 4]) };
         counter
@@ -52,15 +60,15 @@ impl InstructionCounter {
     /// expects.
     #[inline(always)]
     pub unsafe fn measure_call(&mut self, function: *const (), arguments: [usize; 4]) -> u32 {
-        self.timer.clear_current();
         let (start, end): (u32, u32);
-        // SAFETY: reads the timer; the call is the caller's promise.
-        unsafe {
+        // SAFETY: resets and reads the timer; the call is the caller's promise.
+        let control = unsafe {
+            CURRENT.write_volatile(0);
             asm!(
                 "ldr r4, [r8]",
                 "blx r5",
                 "ldr r5, [r8]",
-                in("r8") &raw const (*SYST::PTR).cvr,
+                in("r8") CURRENT,
                 inout("r5") function => end,
                 out("r4") start,
                 inout("r0") arguments[0] => _,
@@ -69,8 +77,9 @@ impl InstructionCounter {
                 inout("r3") arguments[3] => _,
                 clobber_abi("C"),
             );
-        }
-        if self.timer.has_wrapped() {
+            CONTROL.read_volatile()
+        };
+        if control & WRAPPED != 0 {
             self.overflows += 1;
         }
         let counts = start.wrapping_sub(end) & RELOAD;

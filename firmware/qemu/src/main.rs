@@ -15,10 +15,10 @@ mod panic;
 mod semihosting;
 mod stack;
 mod stages;
+mod start;
 mod stats;
 
 use controller::{CONFIG_WORDS, Config, INPUT_WORDS, OUTPUT_WORDS, State, TickInput, TickOutput, output_words, step};
-use cortex_m_rt::entry;
 use instructions::InstructionCounter;
 use semihosting::{Exit, File, exit};
 use stages::Stages;
@@ -26,8 +26,7 @@ use stages::Stages;
 /// Ticks per file access.
 const BATCH: usize = 256;
 
-#[entry]
-fn main() -> ! {
+extern "C" fn main() -> ! {
     exit(match replay() {
         Ok(()) => Exit::Done,
         Err(code) => code,
@@ -40,8 +39,7 @@ fn replay() -> Result<(), Exit> {
     if !controller::integrity::intact() {
         return Err(Exit::Corrupt);
     }
-    let timer = cortex_m::Peripherals::take().ok_or(Exit::Fault)?.SYST;
-    let mut counter = InstructionCounter::new(timer);
+    let mut counter = InstructionCounter::new();
     let self_test = counter.self_test();
 
     let config = read_config()?;
@@ -104,7 +102,7 @@ fn read_config() -> Result<Config, Exit> {
         return Err(Exit::ConfigSize);
     }
     let words = words.first_chunk().ok_or(Exit::ConfigSize)?;
-    Config::from_words(words).map_err(|error| Exit::ConfigRefused(error.word as u32))
+    Config::from_words(words).map_err(|error| Exit::ConfigRefused(error.word))
 }
 
 /// Ticks that the stages and the stack are measured on, for that takes longer than the tick: every eighth of the first

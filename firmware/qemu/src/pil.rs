@@ -14,11 +14,11 @@ mod pipe;
 mod semihosting;
 mod stack;
 mod stages;
+mod start;
 #[allow(dead_code)] // The file of figures is `replay`'s.
 mod stats;
 mod steps;
 
-use cortex_m_rt::entry;
 use instructions::InstructionCounter;
 use pipe::Pipe;
 use semihosting::{Exit, exit};
@@ -26,8 +26,7 @@ use specgen_link::lockstep::Lockstep;
 use specgen_link::{Endpoint, FRAME};
 use steps::Steps;
 
-#[entry]
-fn main() -> ! {
+extern "C" fn main() -> ! {
     exit(match serve() {
         Ok(()) => Exit::Done,
         Err(code) => code,
@@ -36,8 +35,7 @@ fn main() -> ! {
 
 /// Answers the host until it closes the pipe.
 fn serve() -> Result<(), Exit> {
-    let timer = cortex_m::Peripherals::take().ok_or(Exit::Fault)?.SYST;
-    let mut counter = InstructionCounter::new(timer);
+    let mut counter = InstructionCounter::new();
     let exact = counter.self_test() == [0, 1, 100, 1000];
     let mut device = Lockstep::new(Steps::new(counter, exact));
     let mut endpoint = Endpoint::new();

@@ -5,8 +5,7 @@
 
 #![allow(unsafe_code)] // A semihosting call passes raw addresses to the emulator.
 
-use crate::semihosting::open;
-use cortex_m_semihosting::{nr, syscall};
+use crate::semihosting::{FOR_READING, FOR_WRITING, open, read, write};
 
 /// An open pipe.
 pub struct Pipe {
@@ -16,25 +15,25 @@ pub struct Pipe {
 impl Pipe {
     /// Opens the end that bytes come out of; `name` ends with a zero byte. Waits for the host.
     pub fn reader(name: &'static [u8]) -> Option<Self> {
-        Some(Self { handle: open(name, nr::open::R_BINARY)? })
+        Some(Self { handle: open(name, FOR_READING)? })
     }
 
     /// Opens the end that bytes go into; `name` ends with a zero byte. Waits for the host.
     pub fn writer(name: &'static [u8]) -> Option<Self> {
-        Some(Self { handle: open(name, nr::open::W_TRUNC_BINARY)? })
+        Some(Self { handle: open(name, FOR_WRITING)? })
     }
 
     /// Waits for bytes and takes those that are there; how many. 0: the host has closed its end.
     pub fn receive(&self, bytes: &mut [u8]) -> usize {
         let size = bytes.len();
         // SAFETY: at most `size` bytes are written, all within `bytes`.
-        let missing = unsafe { syscall!(READ, self.handle, bytes.as_mut_ptr(), size) };
+        let missing = unsafe { read(self.handle, bytes.as_mut_ptr(), size) };
         size.saturating_sub(missing)
     }
 
     /// Sends all of the bytes; false if the host has closed its end.
     pub fn send(&self, bytes: &[u8]) -> bool {
-        // SAFETY: SYS_WRITE reads the bytes.
-        unsafe { syscall!(WRITE, self.handle, bytes.as_ptr(), bytes.len()) == 0 }
+        // SAFETY: they are only read.
+        unsafe { write(self.handle, bytes.as_ptr(), bytes.len()) == 0 }
     }
 }

@@ -8,6 +8,7 @@
 mod instructions;
 mod panic;
 mod semihosting;
+mod start;
 mod stats;
 
 use controller::snapshot::recorder::{Recorder, Settings};
@@ -17,7 +18,6 @@ use controller::supervised::{
 };
 use controller::{CONFIG_WORDS, Config};
 use core::mem::MaybeUninit;
-use cortex_m_rt::entry;
 use instructions::InstructionCounter;
 use semihosting::{Exit, File, exit};
 use stats::Stage;
@@ -26,8 +26,7 @@ const BATCH: usize = 64;
 /// Words of a block; the host's test has the same.
 const BLOCK: usize = 8192;
 
-#[entry]
-fn main() -> ! {
+extern "C" fn main() -> ! {
     exit(match replay() {
         Ok(()) => Exit::Done,
         Err(code) => code,
@@ -35,8 +34,7 @@ fn main() -> ! {
 }
 
 fn replay() -> Result<(), Exit> {
-    let timer = cortex_m::Peripherals::take().ok_or(Exit::Fault)?.SYST;
-    let mut counter = InstructionCounter::new(timer);
+    let mut counter = InstructionCounter::new();
     let self_test = counter.self_test();
     let config = read_config()?;
     let input = File::open(b"input.bin\0").ok_or(Exit::NoInput)?;
@@ -74,7 +72,7 @@ fn replay() -> Result<(), Exit> {
             }
             // Every so often the machine goes on as the one that its words give.
             if ticks % 97 == 0 {
-                machine = Machine::load(&words).map_err(|invalid| Exit::ConfigRefused(invalid.word as u32))?;
+                machine = Machine::load(&words).map_err(|invalid| Exit::ConfigRefused(invalid.word))?;
             }
             let all = hash(&words);
             let block = recorder.block(0).map_or(0, hash);
@@ -112,7 +110,7 @@ fn read_config() -> Result<Config, Exit> {
     if file.read(&mut words) != size_of::<[u64; CONFIG_WORDS]>() {
         return Err(Exit::ConfigSize);
     }
-    Config::from_words(&words).map_err(|error| Exit::ConfigRefused(error.word as u32))
+    Config::from_words(&words).map_err(|error| Exit::ConfigRefused(error.word))
 }
 
 /// What a counted tick takes besides the machine.
