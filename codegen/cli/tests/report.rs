@@ -129,8 +129,12 @@ fn the_report_of_a_platform_judges_errors_by_their_limits() {
     let limits = "[[requirements.tracking]]\ntrajectory = \"case-1\"\ntranslation = \"50 nm\"\n\n[[requirements.tracking]]\ntrajectory = \"case-2\"\nfrequency = \"10 Hz\"\naxes = [\"1 nm\", \"1 um\", \"1 um\", \"1 mrad\", \"1 mrad\", \"1 mrad\"]\n\n[target]\n";
     let spec = folder.read("reference.toml");
     folder.write("limited.toml", spec.replace("[target]\n", limits));
-    let document = folder.json(&["report", "limited.toml", "--no-target", "-o", "limited.html"]);
-    assert_eq!(document.value["result"]["verdict"], "Not safe to build: error above its limit");
+    let checked = folder.run(&["check", "limited.toml"]);
+    assert_eq!(checked.code, 0, "{}", checked.stderr);
+    in_order(&checked.stdout, &["reference is good so far", "2 limits, not simulated here: specgen report"]);
+    let run = folder.run(&["report", "limited.toml", "--no-target", "-o", "limited.html"]);
+    run.says(1, &["reference is NOT ready: case-2 10 Hz x"]);
+    assert!(run.stdout.starts_with("Not safe to build: error above its limit\n"), "{}", run.stdout);
     let page = folder.read("limited.html");
     in_order(&page, &["Not safe to build", "Error of case-2 10 Hz x", "requirements.tracking", "<table>"]);
     let table = page.split("<caption>Errors on trajectories, rms</caption>").nth(1).unwrap();

@@ -191,45 +191,40 @@ fn margin_card(compiled: &Compiled, verdict: &Verdict, mode: u32) -> String {
         slew_row(&mut content);
         return card("Margins of the adaptation", "asked of stable", "", &content);
     };
+    for figure in verdict.figures.iter().filter(|figure| figure.subject == Subject::Margins) {
+        let text = figure.value_text();
+        content += &match (figure.name.as_str(), &figure.limit) {
+            (_, Some(_)) => limit_row("leg gain λ", figure),
+            ("delay", None) => value_row("extra delay", ["0", &text, "ticks"], 0.0, "ok"),
+            (_, None) => value_row("loop gain", ["×1", &format!("×{text}"), ""], 1.0 / figure.value, "ok"),
+        };
+    }
+    slew_row(&mut content);
     let law = Law::ALL.get(mode as usize).copied().unwrap_or(Law::Position);
-    let highest = compiled.model.adaptation.gain_ratio[1];
-    if let Some(own) = design.margins.iter().find(|one| one.law == law) {
-        let limit = own.gain_ratio_limit;
-        let text = limit.map_or_else(|| ">10".to_owned(), |limit| format!("{limit:.2}"));
-        content +=
-            &value_row("leg gain λ", [&format!("{highest:.2}"), &text, ""], highest / limit.unwrap_or(10.0), "ok");
-        if let Some(gain) = own.gain_margin {
-            content += &value_row("loop gain", ["×1", &format!("×{gain:.2}"), ""], 1.0 / gain, "ok");
-        }
-        let delay = own.delay_margin_ticks.map_or_else(|| ">5".to_owned(), |ticks| format!("{ticks:.2}"));
-        content += &value_row("extra delay", ["0", &delay, "ticks"], 0.0, "ok");
-        slew_row(&mut content);
-        if let Some(settling) = own.settling {
-            let least = own.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
-            let least = least.map_or_else(String::new, |mode| {
-                format!("; least damped {:.0}\u{2009}Hz, ζ {:.3}", mode.frequency, mode.damping_ratio)
-            });
-            content += &text_row("settles in", &format!("{:.0}\u{2009}ms{least}", settling * 1e3), "none");
-        }
+    let own = design.margins.iter().find(|one| one.law == law);
+    if let Some((own, settling)) = own.and_then(|own| Some((own, own.settling?))) {
+        let least = own.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
+        let least = least.map_or_else(String::new, |mode| {
+            format!("; {:.0}\u{2009}Hz has ζ {:.3}", mode.frequency, mode.damping_ratio)
+        });
+        let text = format!("{:.0}\u{2009}ms, {}{least}", settling * 1e3, margins::name(law));
+        content += &text_row("settles in", &text, "none");
     }
     let stable = design.margins.iter().filter(|one| one.spectral_radius < 1.0).count();
-    let worst = design
-        .margins
-        .iter()
-        .filter_map(|one| one.gain_ratio_limit.map(|limit| (one.law, limit)))
-        .min_by(|a, b| a.1.total_cmp(&b.1));
-    let worst = worst.map_or_else(String::new, |(law, limit)| format!("; tightest {}, λ {limit:.2}", law.name()));
     let all = stable == design.margins.len();
     content += &text_row(
         "all modes",
-        &format!("{stable} of {} stable{worst}", design.margins.len()),
+        &format!("{stable} of {} stable", design.margins.len()),
         if all { "ok" } else { "error" },
     );
-    card(&format!("Loop margins, {}", margins::name(law)), "asked of stable", "", &content)
+    card("Loop margins", "worst control mode · asked of stable", "", &content)
 }
 
 fn platform_card(model: &Model, view: Part, note: &str) -> Vec<Part> {
-    let gauges = if model.task_space.is_some() {
+    // Where two poses are drawn, gauges would hide them.
+    let gauges = if matches!(&view, Part::View(_, data) if data.get("ghost").is_some()) {
+        ""
+    } else if model.task_space.is_some() {
         "<span><b class=\"blue\">G0–G5</b> gauge, arrow: positive reading</span>"
     } else {
         "<span>a gauge in each leg, positive when it is longer</span>"

@@ -6,7 +6,7 @@ use host_sim::closed_loop::RunError;
 use host_sim::controller::{Controller, TickController};
 use host_sim::plant::{LegParameters, LegPlant, Plant};
 use host_sim::platform::PlatformScenario;
-use host_sim::platform::rig::{Record, RunOptions};
+use host_sim::platform::rig::{PlatformRun, Record, RunOptions};
 use host_sim::platform::scenario::{PLATFORM_MODES, select};
 use host_sim::table::Line;
 use host_sim::trajectory::{PaperPose, Reading};
@@ -155,21 +155,7 @@ fn behind(
         }
         _ => traced.play(controller, number as u32, PLAYED)?,
     };
-    let Some(trace) = run.trace.as_ref().filter(|_| run.status & (REFUSED | STALE) == 0) else { return Ok(Vec::new()) };
-    let jacobian = platform.jacobian(&[0.0; 6]);
-    let first = controller.description().output("requested[0]")?;
-    let (words, scalar) = (controller.description().input_names.len(), controller.description().scalar);
-    let before = trace.len().saturating_sub(run.samples.len());
-    let of = |leg: usize| {
-        let points: Vec<(f64, f64)> = trace
-            .rows()
-            .skip(before)
-            .zip(&run.samples)
-            .map(|(row, sample)| {
-                let moved = jacobian[leg].iter().zip(&sample.tick.pose).map(|(j, h)| j * h).sum();
-                (scalar.decode(row[words + first + leg]), moved)
-            })
-            .collect();
+    let of = |points: Vec<(f64, f64)>| {
         let line = Line::fit(&points)?;
         let left: Vec<[f64; 2]> =
             points.iter().map(|(x, y)| [x / actuator.leg_gain(), (y - line.slope * x - line.offset) * 1e9]).collect();
@@ -177,7 +163,29 @@ fn behind(
         let every = left.len().div_ceil(POINTS).max(1);
         Some(Behind { points: left.into_iter().step_by(every).collect(), line, rms })
     };
-    Ok((0..6).map_while(of).collect())
+    Ok(moved_over_requested(controller, platform, &run)?.into_iter().map_while(of).collect())
+}
+
+/// Of each leg and tick, m: what was requested of its inverse model, and what the leg did, J h of the true pose. Nothing if the
+/// controller refused the path, or no trace was kept.
+pub(crate) fn moved_over_requested(
+    controller: &Controller,
+    platform: &Platform<f64>,
+    run: &PlatformRun,
+) -> Result<Vec<Vec<(f64, f64)>>, RunError> {
+    let Some(trace) = run.trace.as_ref().filter(|_| run.status & (REFUSED | STALE) == 0) else { return Ok(Vec::new()) };
+    let description = controller.description();
+    let (requested, words) = (description.outputs("requested")?, description.input_names.len());
+    let before = trace.len().saturating_sub(run.samples.len());
+    let of = |(row, place): ([f64; 6], usize)| {
+        let both = trace.rows().skip(before).zip(&run.samples);
+        both.map(|(words_of, sample)| {
+            let moved = row.iter().zip(&sample.tick.pose).map(|(j, h)| j * h).sum();
+            (description.scalar.decode(words_of[words + place]), moved)
+        })
+        .collect()
+    };
+    Ok(platform.jacobian(&[0.0; 6]).into_iter().zip(requested).map(of).collect())
 }
 
 impl Behind {

@@ -56,9 +56,15 @@ pub fn section(compiled: &Compiled, mode: u32, command: &str) -> Section {
     let own = design.margins.iter().find(|margins| margins.law == law);
     let stable = design.margins.iter().filter(|margins| margins.spectral_radius < 1.0).count();
     let or = |value: Option<f64>, beyond: &str| value.map_or_else(|| beyond.to_owned(), |value| format!("{value:.2}"));
+    let worst = design
+        .margins
+        .iter()
+        .filter_map(|one| one.gain_ratio_limit.map(|limit| (one.law, limit)))
+        .min_by(|a, b| a.1.total_cmp(&b.1));
+    let worst = worst.map_or_else(String::new, |(law, limit)| format!(", with {} {limit:.2}, the least", name(law)));
     let lead = own.map_or_else(String::new, |own| {
         format!(
-            "With {} the loop takes {} times its gain and legs {} times as strong. Stable in {stable} of {} modes, {}.",
+            "With {} the loop takes {} times its gain and legs {} times as strong{worst}. Stable in {stable} of {} modes, {}.",
             name(law),
             or(own.gain_margin, "as many as were looked at"),
             or(own.gain_ratio_limit, "more than 10"),

@@ -1,13 +1,17 @@
 //! Whether a platform is ready, and the figures that decide: what `specgen check`, the main job and the report say first.
 
+mod figure;
+mod known;
+
 use serde::Serialize;
 
 use specgen_compiler::compile::Compiled;
-use specgen_compiler::requirements;
 use specgen_language::diagnostic::Severity;
 use specgen_toolchain::budget::{self, Used, group};
 
 use crate::verify::{Inspection, Measurement};
+
+pub use figure::{Figure, Limit, Mark, Subject};
 
 /// Longest line of [`Verdict::text`], letters.
 pub const WIDTH: usize = 80;
@@ -15,176 +19,8 @@ pub const WIDTH: usize = 80;
 const AXES: [&str; 6] = ["x", "y", "z", "θx", "θy", "θz"];
 /// Beyond this no gain ratio and no delay (ticks) is looked for.
 const LOOKED_AT: [f64; 2] = [10.0, 5.0];
-
-/// What a figure is about: a line of the text, a row of a card.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Subject {
-    /// How far each axis goes alone, from the middle of the strokes, µm and µrad; the limit is the declared workspace.
-    Reach,
-    /// Noise of the measured pose and of a gauge, rms; `step`: the finest of the converters, at a leg or the platform.
-    Noise,
-    /// How well the hysteresis tables fit their records.
-    Record,
-    /// How far the worst control mode is from instability.
-    Margins,
-    /// Errors along trajectories of the spec. [`Verdict::of`] has none: a run has to be made.
-    Tracking,
-    /// Instructions of a tick.
-    Time,
-    /// Flash, RAM and stack; what the image must not do.
-    Memory,
-    /// Whether host and microcontroller compute the same bits.
-    Bits,
-}
-
-impl Subject {
-    /// In the order in which they are said.
-    pub const ALL: [Self; 8] =
-        [Self::Reach, Self::Noise, Self::Record, Self::Margins, Self::Tracking, Self::Time, Self::Memory, Self::Bits];
-
-    /// In one word.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Reach => "reach",
-            Self::Noise => "noise",
-            Self::Record => "record",
-            Self::Margins => "margins",
-            Self::Tracking => "tracking",
-            Self::Time => "time",
-            Self::Memory => "memory",
-            Self::Bits => "bits",
-        }
-    }
-}
-
-/// How a figure stands to its limit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Mark {
-    /// It keeps it.
-    Within,
-    /// It does not: the platform is not ready.
-    Beyond,
-    /// There is none: the figure is not judged.
-    NoLimit,
-}
-
-/// What a figure may be.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Limit {
-    /// In the unit of the figure.
-    pub value: f64,
-    /// Whether the figure must be at least this; else at most.
-    pub least: bool,
-    /// Who says so: a key of the spec, or the part.
-    pub from: String,
-}
-
-/// A number about the platform, and its limit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Figure {
-    /// What it is about.
-    pub subject: Subject,
-    /// Which one of these, such as `z` or `flash`.
-    pub name: String,
-    /// In `unit`.
-    pub value: f64,
-    /// Whether it is more than `value`: nothing beyond was looked at.
-    pub more: bool,
-    /// Of value and limit; empty for ratios.
-    pub unit: &'static str,
-    /// If the spec or the part has one.
-    pub limit: Option<Limit>,
-    /// How it stands to that.
-    pub mark: Mark,
-    /// Said in place of the number, where it is no measure.
-    pub words: Option<String>,
-}
-
-impl Figure {
-    /// A figure that is not judged.
-    #[must_use]
-    pub fn new(subject: Subject, name: &str, value: f64, unit: &'static str) -> Self {
-        let name = name.to_owned();
-        Self { subject, name, value, more: false, unit, limit: None, mark: Mark::NoLimit, words: None }
-    }
-
-    /// A fact in words that is as it must be, or not.
-    #[must_use]
-    pub fn fact(subject: Subject, name: &str, words: String, good: bool) -> Self {
-        let mark = if good { Mark::Within } else { Mark::Beyond };
-        Self { mark, words: Some(words), ..Self::new(subject, name, 0.0, "") }
-    }
-
-    /// A figure of which only this is known: it is more.
-    #[must_use]
-    pub fn more_than(subject: Subject, name: &str, value: f64, unit: &'static str) -> Self {
-        Self { more: true, ..Self::new(subject, name, value, unit) }
-    }
-
-    /// The same, which must be at most `value` by what `from` says.
-    #[must_use]
-    pub fn at_most(self, value: f64, from: &str) -> Self {
-        let mark = if self.value <= value && !self.more { Mark::Within } else { Mark::Beyond };
-        Self { mark, limit: Some(Limit { value, least: false, from: from.to_owned() }), ..self }
-    }
-
-    /// The same, which must be at least `value` by what `from` says.
-    #[must_use]
-    pub fn at_least(self, value: f64, from: &str) -> Self {
-        let mark = if self.value >= value { Mark::Within } else { Mark::Beyond };
-        Self { mark, limit: Some(Limit { value, least: true, from: from.to_owned() }), ..self }
-    }
-
-    /// The value without its unit, in KiB where that is bytes; `> 5` where it is more.
-    #[must_use]
-    pub fn value_text(&self) -> String {
-        if self.more { format!("> {}", plain(self.value, self.unit)) } else { number(self.value, self.unit) }
-    }
-
-    /// How value and limit stand to each other: `≤`, `>`, `≥` or `<`; none without a limit.
-    #[must_use]
-    pub fn relation(&self) -> Option<&'static str> {
-        let limit = self.limit.as_ref()?;
-        Some(match (limit.least, self.mark) {
-            (false, Mark::Beyond) => ">",
-            (false, _) => "≤",
-            (true, Mark::Beyond) => "<",
-            (true, _) => "≥",
-        })
-    }
-
-    /// The limit without its unit, as the value; empty without one.
-    #[must_use]
-    pub fn limit_text(&self) -> String {
-        self.limit.as_ref().map_or_else(String::new, |limit| plain(limit.value, self.unit))
-    }
-}
-
-/// A number that was chosen has few decimals.
-fn plain(value: f64, unit: &str) -> String {
-    let text = number(value, unit);
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-/// Counts with their thousands, bytes in KiB, three digits.
-fn number(value: f64, unit: &str) -> String {
-    if unit == "instructions" {
-        return group(value as u64);
-    }
-    let value = if unit == "bytes" { value / 1024.0 } else { value };
-    let size = value.abs();
-    let decimals = if size >= 99.95 {
-        0
-    } else if size >= 9.995 {
-        1
-    } else {
-        2
-    };
-    format!("{value:.decimals$}")
-}
+/// Name of the figure that stands for limits on errors which no run was held against.
+const NOT_SIMULATED: &str = "not simulated";
 
 /// The answer to whether this platform may be run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -192,7 +28,7 @@ fn number(value: f64, unit: &str) -> String {
 pub enum Answer {
     /// Every figure that has a limit keeps it.
     Ready,
-    /// So far yes: time, memory or bits are not measured.
+    /// So far yes: time, memory or bits are not measured, or limits on errors not simulated.
     NotMeasured,
     /// A figure is beyond its limit.
     NotReady,
@@ -231,13 +67,15 @@ impl Verdict {
             unmeasured: Some(unmeasured.to_owned()),
             next: Vec::new(),
         };
-        let figures = [reach(compiled), noise(compiled), record(compiled), margins(compiled)];
-        figures.into_iter().flatten().for_each(|figure| verdict.push(figure));
+        known::figures(compiled).for_each(|figure| verdict.push(figure));
         verdict
     }
 
-    /// Adds a figure, and answers with it.
+    /// Adds a figure, and answers with it. An error that was simulated takes the place of those that were not.
     pub fn push(&mut self, figure: Figure) {
+        if figure.subject == Subject::Tracking {
+            self.figures.retain(|one| one.name != NOT_SIMULATED);
+        }
         let order = |subject: Subject| Subject::ALL.iter().position(|one| *one == subject);
         let place = self.figures.partition_point(|one| order(one.subject) <= order(figure.subject));
         self.figures.insert(place, figure);
@@ -286,7 +124,7 @@ impl Verdict {
     fn judge(&mut self) {
         self.answer = if self.beyond().next().is_some() {
             Answer::NotReady
-        } else if self.unmeasured.is_some() {
+        } else if self.unmeasured.is_some() || self.figures.iter().any(|one| one.name == NOT_SIMULATED) {
             Answer::NotMeasured
         } else {
             Answer::Ready
@@ -347,7 +185,7 @@ impl Verdict {
         (!said.is_empty()).then(|| said.join(", "))
     }
 
-    /// At most nine lines of at most [`WIDTH`] letters: the answer, a line a subject, what comes next.
+    /// At most ten lines of at most [`WIDTH`] letters: the answer, a line a subject, what comes next.
     #[must_use]
     pub fn text(&self) -> String {
         let mut lines = vec![self.headline()];
@@ -391,84 +229,6 @@ fn said(group: &[&Figure]) -> String {
         text += &format!(" {relation} {}", list(&Figure::limit_text));
     }
     text
-}
-
-fn reach(compiled: &Compiled) -> Vec<Figure> {
-    let Some(reach) = &compiled.reach else { return Vec::new() };
-    let axes = reach.axes.iter().enumerate().map(|(axis, one)| {
-        let [low, high] = one.from_middle.map(f64::abs);
-        let unit = if axis < 3 { "µm" } else { "µrad" };
-        let figure = Figure::new(Subject::Reach, AXES[axis], 1e6 * if low > high { low } else { high }, unit);
-        // Legs with gauges of their own stop one by one at the ends of their strokes: the workspace binds nothing.
-        if compiled.design.is_none() {
-            return figure;
-        }
-        let key = if axis < 3 { "workspace.translation" } else { "workspace.rotation" };
-        figure.at_least(1e6 * one.declared, key)
-    });
-    axes.collect()
-}
-
-fn noise(compiled: &Compiled) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    if let Some(noise) = &compiled.pose_noise {
-        for (axis, value) in noise.pose.iter().enumerate() {
-            let unit = if axis < 3 { "nm" } else { "nrad" };
-            figures.push(Figure::new(Subject::Noise, AXES[axis], 1e9 * value, unit));
-        }
-        figures.push(Figure::new(Subject::Noise, "gauge", 1e9 * noise.reading, "nm"));
-    } else if compiled.model.sensor.noise > 0.0 {
-        figures.push(Figure::new(Subject::Noise, "gauge", 1e9 * compiled.model.sensor.noise, "nm"));
-    }
-    let steps = requirements::steps(&compiled.model);
-    let largest = steps.platform.iter().fold(steps.leg, |largest, step| if *step > largest { *step } else { largest });
-    let step = Figure::new(Subject::Noise, "step", 1e9 * largest, "nm");
-    figures.push(match compiled.model.requirements.precision {
-        Some(precision) => step.at_most(1e9 * precision, "requirements.precision"),
-        None => step,
-    });
-    figures
-}
-
-fn record(compiled: &Compiled) -> Vec<Figure> {
-    let worst = compiled.records.iter().flatten().max_by(|a, b| a.fit_rms_percent.total_cmp(&b.fit_rms_percent));
-    let Some(worst) = worst else { return Vec::new() };
-    vec![
-        Figure::new(Subject::Record, "fit", worst.fit_rms_percent, "%"),
-        Figure::new(Subject::Record, "range", 1e6 * worst.displacement_range, "µm"),
-        Figure::new(Subject::Record, "noise", 1e9 * worst.noise_floor, "nm"),
-    ]
-}
-
-fn margins(compiled: &Compiled) -> Vec<Figure> {
-    let subject = Subject::Margins;
-    let highest = compiled.model.adaptation.gain_ratio[1];
-    let lambda = |limit: Option<f64>| {
-        let figure = limit.map_or_else(
-            || Figure::more_than(subject, "λ", LOOKED_AT[0], ""),
-            |limit| Figure::new(subject, "λ", limit, ""),
-        );
-        figure.at_least(highest, "adaptation.gain_ratio")
-    };
-    if let Some(design) = &compiled.design {
-        let least = |of: fn(&specgen_compiler::stability::platform::ModeMargins) -> Option<f64>| {
-            design.margins.iter().filter_map(of).min_by(f64::total_cmp)
-        };
-        let mut figures = vec![lambda(least(|mode| mode.gain_ratio_limit))];
-        figures.extend(least(|mode| mode.gain_margin).map(|gain| Figure::new(subject, "gain ×", gain, "")));
-        figures.push(least(|mode| mode.delay_margin_ticks).map_or_else(
-            || Figure::more_than(subject, "delay", LOOKED_AT[1], "ticks"),
-            |ticks| Figure::new(subject, "delay", ticks, "ticks"),
-        ));
-        return figures;
-    }
-    let Some(margins) = &compiled.margins else { return Vec::new() };
-    let mut figures: Vec<Figure> = margins.static_gain_limit.map(|limit| lambda(Some(limit))).into_iter().collect();
-    if let Some(largest) = margins.largest_level_weight {
-        let weight = Figure::new(subject, "level weight", compiled.model.adaptation.level_weight, "");
-        figures.push(weight.at_most(largest, "stability of the sampled leg"));
-    }
-    figures
 }
 
 #[cfg(test)]

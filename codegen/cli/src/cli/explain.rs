@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::ui::{Failure, Outcome, Ui};
 use specgen_language::diagnostic::codes;
+use specgen_studies::verdict::WIDTH;
 
 /// Arguments of `explain`.
 #[derive(Args, Debug)]
@@ -42,18 +43,74 @@ impl Outcome for Explained {
     /// The page without its marks, code indented.
     fn text(&self) -> String {
         let mut text = String::new();
-        let mut is_code = false;
+        let mut code = None;
         for line in self.page.lines() {
-            if line.starts_with("```") {
-                is_code = !is_code;
+            if let Some(language) = line.strip_prefix("```") {
+                code = code.is_none().then_some(language);
                 continue;
             }
-            if is_code && !line.is_empty() {
-                text += "    ";
+            match code {
+                Some(language) => wrapped(line, language).iter().for_each(|part| {
+                    text += if part.is_empty() { "" } else { INDENT };
+                    text += part;
+                    text.push('\n');
+                }),
+                None => {
+                    text += line.trim_start_matches('#').trim_start();
+                    text.push('\n');
+                }
             }
-            text += if is_code { line } else { line.trim_start_matches('#').trim_start() };
-            text.push('\n');
         }
         text
+    }
+}
+
+/// Before a line of code.
+const INDENT: &str = "    ";
+
+/// A line of code as lines that fit on a terminal and say the same: a list goes on in the next line, with the mark of a change
+/// before it; a command goes on behind a backslash.
+fn wrapped(line: &str, language: &str) -> Vec<String> {
+    let width = WIDTH - INDENT.len();
+    let shell = language == "sh";
+    let (space, end) = if shell { (" ", " \\") } else { (", ", ",") };
+    let mark = line.chars().next().filter(|first| language == "diff" && "+-".contains(*first));
+    let begin = format!("{}    ", mark.map_or_else(String::new, String::from));
+    let mut lines = Vec::new();
+    let mut rest = line.to_owned();
+    while rest.chars().count() > width {
+        let fits = rest.char_indices().nth(width - end.len()).map_or(rest.len(), |(place, _)| place);
+        // Not within the beginning, which would never come to an end.
+        let Some(place) = rest[..fits].rfind(space).filter(|place| *place > begin.len()) else { break };
+        lines.push(format!("{}{end}", &rest[..place]));
+        rest = format!("{begin}{}", &rest[place + space.len()..]);
+    }
+    lines.push(rest);
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_line_of_a_page_is_longer_than_a_terminal_is_wide() {
+        for code in codes::REGISTRY {
+            let page = Explained { code: code.id, title: code.title(), page: code.page }.text();
+            let long = page.lines().find(|line| line.chars().count() > WIDTH);
+            assert_eq!(long, None, "{}", code.id);
+        }
+    }
+
+    #[test]
+    fn a_line_that_is_wrapped_says_the_same() {
+        let list = format!("+key = [{}]", ["\"10 mm/s^2\""; 12].join(", "));
+        let lines = wrapped(&list, "diff");
+        assert!(lines.len() == 3 && lines.iter().all(|line| line.starts_with('+')), "{lines:#?}");
+        let plain: String = lines.iter().map(|line| line[1..].trim_start()).collect::<Vec<_>>().join(" ");
+        assert_eq!(plain, list[1..]);
+        let command = ["specgen identify"; 9].join(" ");
+        let again = wrapped(&command, "sh").join("\n").replace(" \\\n    ", " ");
+        assert_eq!(again, command);
     }
 }

@@ -25,7 +25,7 @@ use specgen_report::evidence::{self, Bits};
 use specgen_report::page::{self, Head};
 use specgen_report::section::{Part, Section};
 use specgen_report::{first, tracking};
-use specgen_studies::verdict::Verdict;
+use specgen_studies::verdict::{Answer, Verdict};
 use specgen_studies::verify::{self, Measurement};
 
 /// Seed of machine, noise and strings.
@@ -139,8 +139,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         head.other = Some([file_name(&output), "Report".to_owned()]);
         page.paper = Some(Box::new(write(&path, &head, &[], &sections, &[])?));
     }
-    ui.result(&page);
-    Ok(())
+    ui.judged(&page, (verdict.answer == Answer::NotReady).then(|| verdict.headline()))
 }
 
 /// A run of the machine, as a page.

@@ -72,11 +72,21 @@ fn of_condition(model: &Model, reach: &Reach) -> Option<Diagnostic> {
     }
     Some(Diagnostic::at(&model.spans, &["geometry.height", "geometry"], codes::CONDITION_POOR,
         format!(
-            "the condition number of the legs is {:.1} at rest and may come to {:.1} in the workspace",
-            conditioning.at_rest, conditioning.worst_bound
+            "the condition number of the legs is {} at rest {}",
+            of_number(conditioning.at_rest, 1),
+            if conditioning.worst_bound < f64::MAX {
+                format!("and may come to {} in the workspace", of_number(conditioning.worst_bound, 1))
+            } else {
+                "and has no bound: a pose of the workspace may be singular".to_owned()
+            }
         ),
         "make the height comparable to the radii, close the joint pairs (small base_angle and platform_angle), or reduce [workspace]".to_owned(),
     ))
+}
+
+/// A condition number; one that is beyond all use in powers of ten.
+fn of_number(value: f64, decimals: usize) -> String {
+    if value < 1e6 { format!("{value:.decimals$}") } else { format!("{value:.1e}") }
 }
 
 fn of_bias(model: &Model, reach: &Reach, bias: &PathReach) -> Option<Diagnostic> {
@@ -247,10 +257,14 @@ pub fn describe(reach: &Reach, biased: bool) -> String {
     let conditioning = &reach.conditioning;
     let _ = writeln!(
         text,
-        "  condition of J {:.2} at rest, {:.2} at worst, below {:.3} anywhere in the workspace; no singular pose within {:.1} mm of it",
-        conditioning.at_rest,
-        conditioning.worst,
-        conditioning.worst_bound,
+        "  condition of J {} at rest, {} at worst, {} anywhere in the workspace; no singular pose within {:.1} mm of it",
+        of_number(conditioning.at_rest, 2),
+        of_number(conditioning.worst, 2),
+        if conditioning.worst_bound < f64::MAX {
+            format!("below {}", of_number(conditioning.worst_bound, 3))
+        } else {
+            "without a bound".to_owned()
+        },
         conditioning.free_of_singularities * 1e3
     );
     let [base, platform] = reach.joint_angles.map(|angle| angle * 1e3);

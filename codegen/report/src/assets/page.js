@@ -99,6 +99,6 @@
   let width = window.innerWidth;
   window.addEventListener("resize", () => { if (window.innerWidth !== width) { width = window.innerWidth; redraw(); } });
   // Paper is white, and its figures are drawn at its width.
-  window.addEventListener("beforeprint", () => { root.classList.remove("dark"); redraw(); });
-  window.addEventListener("afterprint", () => { apply(); redraw(); });
+  window.addEventListener("beforeprint", () => { root.classList.remove("dark"); root.classList.add("print"); redraw(); });
+  window.addEventListener("afterprint", () => { root.classList.remove("print"); apply(); redraw(); });
 })();

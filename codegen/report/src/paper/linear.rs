@@ -9,10 +9,10 @@ use host_sim::scenario::{LINEARITY_FREQUENCIES, LegScenario, MODES, select};
 use host_sim::table::Line;
 use host_sim::trajectory::{PaperPath, PaperPose, Reading};
 use specgen_runtime::Platform;
-use specgen_runtime::setpoint::{REFUSED, STALE};
 
 use super::motion::REFUSED_PATH;
 use crate::chart::{Axis, Chart, LINE, pairs};
+use crate::hysteresis::moved_over_requested;
 use crate::section::{Grid, Section};
 use specgen_language::model::Actuator;
 use specgen_studies::reproduce;
@@ -68,33 +68,16 @@ pub fn of_platform(
 ) -> Result<Section, RunError> {
     let mut traced = machine.clone();
     traced.options = RunOptions { record: Record::Trace, ..machine.options.clone() };
-    let jacobian = platform.jacobian(&[0.0; 6]);
     let mut lines = chart("Fig. 4: legs 0 and 3 in case 1, F with the inverse model alone");
     let mut table = Grid::new(
         "Straight line through the points of each leg, Y = λ q̂ + δ",
         &["leg", "Hz", "λ = ρ/ρ̂", "δ, nm", "deviation from the line, nm rms"],
     );
     select(controller, PLATFORM_MODES[1].1)?;
-    let first = controller.description().output("requested[0]")?;
-    let (words, scalar) = (controller.description().input_names.len(), controller.description().scalar);
     for frequency in PLATFORM_FREQUENCIES {
         let trajectory = PaperPose { path: PaperPath::Case1, reading: Reading::Corrected, frequency };
         let run = traced.run(controller, &trajectory)?;
-        if run.status & (REFUSED | STALE) != 0 {
-            continue;
-        }
-        let Some(trace) = &run.trace else { continue };
-        let before = trace.len().saturating_sub(run.samples.len());
-        for leg in 0..6 {
-            let points: Vec<(f64, f64)> = trace
-                .rows()
-                .skip(before)
-                .zip(&run.samples)
-                .map(|(row, sample)| {
-                    let moved = jacobian[leg].iter().zip(&sample.tick.pose).map(|(j, h)| j * h).sum();
-                    (scalar.decode(row[words + first + leg]), moved)
-                })
-                .collect();
+        for (leg, points) in moved_over_requested(controller, platform, &run)?.into_iter().enumerate() {
             let Some(line) = Line::fit(&points) else { continue };
             let off: f64 = points.iter().map(|(x, y)| y - line.slope * x - line.offset).map(|e| e * e).sum();
             let rms = libm::sqrt(off / points.len() as f64) * 1e9;

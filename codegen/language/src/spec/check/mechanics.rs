@@ -134,12 +134,7 @@ pub(super) fn platform_gyration(f: &Fields, findings: &mut Findings) -> Option<(
         number(largest),
         number(size)
     );
-    // A slip between g and kg is the usual one: say so if the mass would then fit.
-    let slip = [1e3, 1e-3].into_iter().find(|factor: &f64| SOUND.contains(&(ratio / factor.sqrt())));
-    let did_you_mean =
-        slip.map_or_else(String::new, |factor| format!("did you mean \"{} kg\"? ", number(mass * factor)));
-    let help =
-        format!("{did_you_mean}check the units of `platform.mass` (kg or g) and `platform.inertia` (mm^2 or m^2)");
+    let help = "check the units of `platform.mass` (kg or g) and `platform.inertia` (mm^2 or m^2)".to_owned();
     let (path, span) = ("platform.mass", f.span("platform.mass"));
     if (0.02..=10.0).contains(&ratio) {
         findings.add(codes::GYRATION_ODD, path, span, message, help);
