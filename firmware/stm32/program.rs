@@ -1,7 +1,7 @@
 // The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `RECORD` and `prepare`.
 
 use specgen_board::{Exchange, Noticed};
-use specgen_stm32::converters;
+use specgen_stm32::{converters, timer};
 
 /// The machine on this board's converters.
 type Board = converters::OnBoard<{ clocks::DELAY }>;
@@ -10,7 +10,7 @@ type Board = converters::OnBoard<{ clocks::DELAY }>;
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn specgen_tick(board: &mut Board, exchange: &mut Exchange, noticed: Noticed) -> bool {
-    board.tick(exchange, noticed)
+    board.timed_tick(exchange, noticed, timer::now)
 }
 
 /// Of the watchdog, µs: some hundred ticks, and starting the converters anew.
@@ -21,18 +21,16 @@ mod app {
     use core::mem::MaybeUninit;
 
     use controller::supervised::Machine;
-    use embassy_stm32::gpio::Input;
     use embassy_stm32::interrupt::{InterruptExt, Priority};
-    use embassy_stm32::mode::Async;
-    use embassy_stm32::usart::{RingBufferedUartRx, UartTx};
     use embassy_stm32::wdg::IndependentWatchdog;
-    use specgen_board::{Desk, Exchange, Health, Noticed, Schedule, recorder};
+    use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, recorder};
     use specgen_link::Endpoint;
     use specgen_stm32::converters::BusCell;
     use specgen_stm32::cycles::{self, CYCLES};
-    use specgen_stm32::{converters, serial, timer};
+    use specgen_stm32::enable::Stop;
+    use specgen_stm32::{converters, serial, stack_used, timer};
 
-    use crate::pins::{self, Watchdog};
+    use crate::pins::{self, Link, Watchdog};
     use crate::{Board, RECORD, WATCHDOG, clocks, prepare, safe};
 
     #[shared]
@@ -46,9 +44,8 @@ mod app {
         schedule: Schedule,
         health: Health,
         watchdog: IndependentWatchdog<'static, Watchdog>,
-        stop: Input<'static>,
-        receiver: RingBufferedUartRx<'static>,
-        sender: UartTx<'static, Async>,
+        stop: Stop,
+        line: Link,
     }
 
     // What is large is made where it stays: a move of some kilobytes would go over the stack.
@@ -56,8 +53,6 @@ mod app {
         dac_bus: BusCell = MaybeUninit::uninit(),
         machine: MaybeUninit<Machine> = MaybeUninit::uninit(),
         exchange: Exchange = Exchange::new(),
-        #[unsafe(link_section = ".axisram.ring")]
-        ring: [u8; serial::RING] = [0; serial::RING],
         #[unsafe(link_section = ".record.memory")]
         record: [u64; RECORD] = [0; RECORD],
     ])]
@@ -73,15 +68,13 @@ mod app {
         let intact = controller::integrity::intact();
         let exchange = context.local.exchange;
         exchange.recorder = recorder(context.local.record);
+        exchange.probes = Probes { hertz: clocks::TIMER * 1_000_000, stack: stack_used };
         let machine = converters::at_reset(context.local.machine);
         let board = converters::board(wiring.adc, wiring.dac, context.local.dac_bus, machine, intact);
-        let (Some(mut board), Ok(uart)) = (board, wiring.uart) else { safe::stop() };
+        let Some(mut board) = board else { safe::stop() };
         board.start(&mut exchange.report);
 
         pins::LINK.set_priority(Priority::P8);
-        let (sender, receiver) = uart.split();
-        let receiver = receiver.into_ring_buffered(context.local.ring);
-
         let mut schedule = Schedule::new(timer::period(clocks::TIMER), 0);
         if !timer::start(&mut schedule, clocks::TIMER) || link::spawn().is_err() {
             safe::stop();
@@ -89,7 +82,7 @@ mod app {
         watchdog.pet();
         (
             Shared { exchange, board },
-            Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, receiver, sender },
+            Local { schedule, health: Health::new(), watchdog, stop: wiring.stop, line: wiring.link },
         )
     }
 
@@ -100,12 +93,13 @@ mod app {
         timer::acknowledge();
         let due = local.schedule.begin(begin);
         timer::arm(due.next);
-        let noticed = Noticed { missed: due.missed, stop: local.stop.is_high() };
+        let noticed = Noticed { missed: due.missed, stop: local.stop.is_open() };
         (context.shared.exchange, context.shared.board).lock(|exchange, board| {
             if crate::specgen_tick(board, exchange, noticed) {
                 timer::arm(local.schedule.restart(timer::now()));
             }
-            exchange.report.took(due.late, timer::now().wrapping_sub(begin));
+            exchange.report.took(due.late, timer::now().wrapping_sub(begin), timer::period(clocks::TIMER).get());
+            exchange.orphaned = local.health.is_orphaned();
             if local.health.tick(exchange.beat, due.missed, exchange.report.amplifier_on) {
                 local.watchdog.pet();
             }
@@ -117,7 +111,9 @@ mod app {
         priority = 1,
         shared = [exchange, board],
         local = [
-            receiver, sender,
+            line,
+            #[unsafe(link_section = ".axisram.ring")]
+            ring: [u8; serial::RING] = [0; serial::RING],
             endpoint: Endpoint = Endpoint::new(),
             desk: Desk = Desk::new(CYCLES),
             #[unsafe(link_section = ".axisram.answer")]
@@ -127,7 +123,7 @@ mod app {
     async fn link(context: link::Context) {
         let local = context.local;
         let mut shared = (context.shared.exchange, context.shared.board);
-        serial::serve(local.receiver, local.sender, local.endpoint, local.desk, local.answer, |action| {
+        serial::serve(local.line, local.ring, local.endpoint, local.desk, local.answer, |action| {
             shared.lock(|exchange, board| action(exchange, board.machine_mut()));
         })
         .await;
@@ -148,14 +144,14 @@ mod safe {
 
     use cortex_m_rt::{ExceptionFrame, exception};
 
-    use crate::pins;
+    use specgen_stm32::enable;
 
     /// Amplifiers off and nothing more: the watchdog is fed by the tick alone, and resets the part within 20 ms. Reset leaves
     /// the enable line to its pull-down.
     pub fn stop() -> ! {
         cortex_m::interrupt::disable();
         loop {
-            pins::amplifiers_off();
+            enable::off();
         }
     }
 

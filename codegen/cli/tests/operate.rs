@@ -190,7 +190,16 @@ fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     let output = running.wait_with_output().unwrap();
     let shown = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{shown}");
-    assert!(shown.contains("the machine is faulted: gauge not finite, at tick "), "{shown}");
+    assert!(shown.contains("the machine is faulted: converter, at tick "), "{shown}");
+    // One acknowledgement starts the converters again; what happened is told however often the link was polled since, and once.
+    board.fails.store(false, Ordering::Relaxed);
+    let script = ["reference.toml", "acknowledge", "wait disarmed 20", "wait 0.2", "status", "status"];
+    let run = Run::of(&mut board.operate(&folder, &script));
+    run.says(0, &[]);
+    let (first, second) = run.stdout.split_once("events since asked last: ").unwrap().1.split_once("tick ").unwrap();
+    assert!(first.starts_with("link lost, converter\n") || first.starts_with("converter\n"), "{first}");
+    assert!(first.contains("converter: all bits of the ADC's frame are the same"), "{first}");
+    assert!(second.contains("events since asked last: none"), "{second}");
 }
 
 #[test]

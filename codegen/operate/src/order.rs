@@ -18,7 +18,7 @@ const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, se
 /// One order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Order {
-    /// Say how the machine stands.
+    /// Say how the machine stands and what it noticed of itself.
     Status,
     /// Ask the supervisor.
     Ask(Request),

@@ -4,7 +4,9 @@ use std::time::{Duration, Instant};
 
 use host_sim::description::Description;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
-use specgen_link::{Identity, RecorderAction, RecorderStatus, Reply, Request, Status, WORDS, WaveAction, put_words};
+use specgen_link::{
+    Health, Identity, RecorderAction, RecorderStatus, Reply, Request, Status, WORDS, WaveAction, put_words,
+};
 use specgen_runtime::supervisor;
 
 use crate::pil::{self, OpenError, Opened};
@@ -91,7 +93,7 @@ impl<P: Port> Session<P> {
         self.client.damaged()
     }
 
-    /// How it stands, and that the host is there. The events are those since the last call.
+    /// How it stands, and that the host is there. Events stay until [`Session::health`] is asked for.
     ///
     /// # Errors
     /// As [`Client::ask`], here and below.
@@ -102,6 +104,14 @@ impl<P: Port> Session<P> {
                 self.asked = Instant::now();
                 Ok(&self.status)
             }
+            _ => Err(ClientError::Unexpected),
+        }
+    }
+
+    /// What the device noticed of itself; its events are forgotten with that.
+    pub fn health(&mut self) -> Result<Health, ClientError> {
+        match self.client.ask(&Request::Health)? {
+            Reply::Health(health) => Ok(health),
             _ => Err(ClientError::Unexpected),
         }
     }

@@ -16,7 +16,7 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal_bus::spi::ExclusiveDevice;
 use embedded_io::{Read, ReadReady, Write};
 use specgen_board::{
-    Access, Board, Desk, Exchange, Health, Noticed, PERIOD_NANOSECONDS, Schedule, Stopwatch, Visit, recorder,
+    Access, Board, Desk, Exchange, Health, Noticed, PERIOD_NANOSECONDS, Probes, Schedule, Stopwatch, Visit, recorder,
 };
 use specgen_link::Endpoint;
 
@@ -58,7 +58,7 @@ type OnBoard = Board<'static, Gauges, Amplifiers>;
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn specgen_tick(board: &mut OnBoard, exchange: &mut Exchange, noticed: Noticed) -> bool {
-    board.tick(exchange, noticed)
+    board.timed_tick(exchange, noticed, timer::now)
 }
 
 /// Everything that a tick needs.
@@ -101,6 +101,8 @@ pub fn start(
     let mut board = Board::new(gauges, Dac80508::new(dac, enable, Cycles), machine, controller::integrity::intact());
     let mut exchange = Exchange::new();
     exchange.recorder = recorder(record);
+    // Times of ticks; the stack is not measured.
+    exchange.probes = Probes { hertz: TIMER * 1_000_000, ..Probes::NONE };
     board.start(&mut exchange.report);
 
     let mut line = usart::Config::default();
@@ -159,10 +161,12 @@ impl Running {
             timer::arm(self.schedule.restart(timer::now()));
         }
         let report = &mut self.exchange.report;
-        report.took(due.late, timer::now().wrapping_sub(begin));
+        report.took(due.late, timer::now().wrapping_sub(begin), PERIOD.get());
         if self.health.tick(self.exchange.beat, due.missed, report.amplifier_on) {
             self.watchdog.pet();
         }
+        // A dead background: the next tick ramps down.
+        self.exchange.orphaned = self.health.is_orphaned();
     }
 
     /// For the background, with the tick held off: the shorter the better.

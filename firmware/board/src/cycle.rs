@@ -4,13 +4,14 @@ use controller::sensing;
 use controller::snapshot::recorder::Recorder;
 use controller::snapshot::{record_after, record_before};
 use controller::supervised::{
-    CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Request, STOP,
+    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Request, STOP,
 };
 use controller::{Config, Real};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
 use specgen_link::Silence;
 
-use crate::exchange::{self, Exchange, Orders, Report};
+use crate::exchange::{self, Exchange, Orders};
+use crate::report::Report;
 use crate::words::GAUGE_BITS;
 
 /// What the target noticed since the last tick.
@@ -80,7 +81,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         self.started = true;
         for fault in [disabled, amplifiers, gauges].into_iter().filter_map(Result::err) {
             self.started = false;
-            note(report, fault);
+            report.converter(fault);
         }
     }
 
@@ -92,19 +93,32 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
 
     /// One tick. True if it started the converters again and so took longer than a tick may: then the schedule begins anew.
     ///
-    /// Converters that failed are started again by a new request to acknowledge, while the amplifiers are off.
+    /// A new request to acknowledge starts the converters again while the amplifiers are off, whatever the cause was: both are
+    /// proved before they get power again. The supervisor hears of the request in the tick after that, when nothing that was
+    /// read before the start is left to contradict it.
     pub fn tick(&mut self, exchange: &mut Exchange, noticed: Noticed) -> bool {
+        self.timed_tick(exchange, noticed, || 0)
+    }
+
+    /// The same, where `now` is the counter of [`Probes::hertz`](crate::Probes::hertz).
+    #[inline]
+    pub fn timed_tick(&mut self, exchange: &mut Exchange, noticed: Noticed, now: impl Fn() -> u32) -> bool {
         if exchange.in_lockstep() {
             self.stand_by(exchange, noticed);
             return false;
         }
         exchange.advance_wave();
-        let Exchange { orders, config, report, silence, recorder, .. } = exchange;
+        let Exchange { orders, config, report, silence, recorder, orphaned, .. } = exchange;
         let acknowledged = orders.request == Request::Acknowledge && self.request != Request::Acknowledge;
         self.request = orders.request;
-        let failed = !self.started || report.cause == Cause::Converter;
-        let restart = acknowledged && failed && !report.amplifier_on;
+        let restart = acknowledged && !report.amplifier_on;
+        let request = match orders.request {
+            _ if restart => Request::None,
+            _ if *orphaned => Request::RampDown,
+            asked => asked,
+        };
         if restart {
+            self.pending = 0;
             self.start(report);
         }
 
@@ -121,17 +135,18 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
                 events |= event;
             }
         }
+        let sampled = now();
         let readings = match self.gauges.read() {
             Ok(codes) => codes.map(|code| sensing::CONVERTER.reading(code >> Self::SPARE_BITS)),
             Err(fault) => {
-                note(report, fault);
+                report.converter(fault);
                 events |= CONVERTER;
                 // What was not read is not believed: no number stands for it.
                 [Real::NAN; CHANNELS]
             }
         };
 
-        let input = take(&mut self.input, orders, &readings, events);
+        let input = take(&mut self.input, orders, &readings, request, events);
         if let Some(recorder) = recorder {
             begin_row(config, self.machine, recorder);
         }
@@ -146,6 +161,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         }
         self.codes = Some(output.tick.dac_code);
         self.done(report, |amplifiers| amplifiers.write(&output.tick.dac_code));
+        report.gave_out(now().wrapping_sub(sampled));
         // Converters that did not answer do not get power, whatever the supervisor has not seen yet.
         if output.amplifier_on && self.started {
             self.done(report, |amplifiers| amplifiers.enable(true));
@@ -156,7 +172,8 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         report.cause = output.cause;
         report.amplifier_on = output.amplifier_on;
         report.status = output.tick.status;
-        report.events |= events;
+        report.health.events |= events;
+        report.conditions(self.machine.supervisor.conditions);
         report.missed = report.missed.saturating_add(noticed.missed);
         restart
     }
@@ -172,7 +189,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         report.tick += 1;
         report.missed = report.missed.saturating_add(noticed.missed);
         if noticed.stop {
-            report.events |= STOP;
+            report.health.events |= STOP;
         }
         if exchange.lockstep.as_mut().is_none_or(Silence::tick) {
             exchange.leave_lockstep(self.machine);
@@ -193,7 +210,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
     /// Does something to the amplifiers; a fault is an event of the next tick.
     fn done(&mut self, report: &mut Report, action: impl FnOnce(&mut A) -> Result<(), Fault>) {
         if let Err(fault) = action(&mut self.amplifiers) {
-            note(report, fault);
+            report.converter(fault);
             self.pending |= CONVERTER;
         }
     }
@@ -205,9 +222,10 @@ fn take<'a>(
     slot: &'a mut Option<MachineInput>,
     orders: &Orders,
     readings: &[Real; CHANNELS],
+    request: Request,
     events: u32,
 ) -> &'a MachineInput {
-    slot.insert(MachineInput::measured(&orders.command, readings, &[Real::NAN; CHANNELS], orders.request, events))
+    slot.insert(MachineInput::measured(&orders.command, readings, &[Real::NAN; CHANNELS], request, events))
 }
 
 /// What the recorder keeps from before a tick. In a frame of its own, as [`take`].
@@ -220,10 +238,4 @@ fn begin_row(config: &Config, machine: &Machine, recorder: &mut Recorder<'static
 #[inline(never)]
 fn end_row(machine: &Machine, input: &MachineInput, output: &MachineOutput, recorder: &mut Recorder<'static>) {
     record_after(machine, input, output, recorder);
-}
-
-/// Counts a fault of a converter.
-fn note(report: &mut Report, fault: Fault) {
-    report.converter_faults = report.converter_faults.saturating_add(1);
-    report.faults |= fault.bit();
 }

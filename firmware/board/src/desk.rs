@@ -5,13 +5,14 @@ use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, Real};
 use specgen_link::lockstep::{Session, piece};
 use specgen_link::{
-    Bytes, Counted, Counters, Device, Identity, RecorderAction, Refusal, Reply, Request, Status, WaveAction,
+    Bytes, Counted, Counters, Device, Health, Identity, RecorderAction, Refusal, Reply, Request, Status, WaveAction,
 };
 use specgen_runtime::wave::{self, Settings};
 
 use crate::download::{self, Download};
 use crate::exchange::{Access, Exchange};
 use crate::recording;
+use crate::report::Probes;
 use crate::stepper::{Costs, Stepper, Stopwatch};
 
 /// Words of the longest answer: settings, what a step gives, a piece of a record.
@@ -73,22 +74,30 @@ impl Visit<'_, '_> {
     fn status(&mut self) -> Reply<'static> {
         let mut reply = Reply::Refused(Refusal::State);
         (self.with)(&mut |exchange, _| {
-            let report = &mut exchange.report;
+            let report = &exchange.report;
             reply = Reply::Status(Status {
                 tick: report.tick,
                 phase: report.phase.word() as u8,
                 cause: report.cause.word() as u8,
                 amplifier_on: report.amplifier_on,
                 status: report.status,
-                events: report.events,
+                events: report.health.events,
                 late: report.missed,
                 // The endpoint fills it in.
                 link: Counters::NONE,
             });
-            // An answer that is lost is given again as it is.
-            report.events = 0;
         });
         reply
+    }
+
+    fn health(&mut self) -> Reply<'static> {
+        let (mut health, mut probes) = (Health::default(), Probes::NONE);
+        (self.with)(&mut |exchange, _| {
+            (health, probes) = (exchange.report.health, exchange.probes);
+            // An answer that is lost is given again as it is.
+            exchange.report.health.events = 0;
+        });
+        Reply::Health(Health { clock: probes.hertz, stack: (probes.stack)(), ..health })
     }
 
     /// Asks for something of the ticks, unless the host steps the machine or `order` refuses.
@@ -277,6 +286,7 @@ impl Device for Visit<'_, '_> {
             Request::Hello => Reply::Identity(self.identity()),
             Request::Describe { offset } => piece(DESCRIPTION.as_bytes(), offset),
             Request::Status => self.status(),
+            Request::Health => self.health(),
             Request::Supervise { request } => self.supervise(request),
             Request::Setpoint { words } => self.command(words),
             Request::ReadConfig => self.config(),

@@ -1,13 +1,15 @@
 //! What lies between the tick and the background.
 
 use controller::snapshot::recorder::Recorder;
-use controller::supervised::{Cause, Machine, MachineInput, MachineOutput, Phase, Request, supervise};
+use controller::supervised::{Machine, MachineInput, MachineOutput, Phase, Request, supervise};
 use controller::supervision::HOST_TICKS;
 use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config};
 use specgen_link::Silence;
 use specgen_runtime::wave::Stage;
 
+use crate::report::{Probes, Report};
+#[cfg(feature = "lockstep")]
 use crate::words::PERIOD_NANOSECONDS;
 
 /// A lock-step is over after so long without a request, ns: 2 s, for its host also computes, and nothing moves meanwhile.
@@ -23,62 +25,6 @@ pub struct Orders {
     pub request: Request,
 }
 
-/// What the ticks have to say.
-#[derive(Debug, Clone, Copy)]
-pub struct Report {
-    /// Ticks since power-up.
-    pub tick: u64,
-    /// What the machine does.
-    pub phase: Phase,
-    /// Why.
-    pub cause: Cause,
-    /// Whether the amplifiers are enabled.
-    pub amplifier_on: bool,
-    /// The controller's status word.
-    pub status: u32,
-    /// Events since they were last taken, as of `supervised`.
-    pub events: u32,
-    /// Ticks that never came.
-    pub missed: u32,
-    /// Ticks in which a converter was not believed.
-    pub converter_faults: u32,
-    /// Which [`Fault`](specgen_hal::Fault)s there were, by [`Fault::bit`](specgen_hal::Fault::bit).
-    pub faults: u32,
-    /// Largest delay of a tick's beginning, counts of the timer.
-    pub latest: u32,
-    /// Longest tick, counts of the timer.
-    pub longest: u32,
-}
-
-impl Report {
-    /// At power-up.
-    pub const NONE: Self = Self {
-        tick: 0,
-        phase: Phase::Disarmed,
-        cause: Cause::None,
-        amplifier_on: false,
-        status: 0,
-        events: 0,
-        missed: 0,
-        converter_faults: 0,
-        faults: 0,
-        latest: 0,
-        longest: 0,
-    };
-}
-
-impl Report {
-    /// A tick has run: when it began after it was due, and how long it took, counts of the timer.
-    pub const fn took(&mut self, late: u32, duration: u32) {
-        if late > self.latest {
-            self.latest = late;
-        }
-        if duration > self.longest {
-            self.longest = duration;
-        }
-    }
-}
-
 /// Orders one way, reports the other. Whoever holds it holds off the tick: copy and let go.
 #[derive(Debug)]
 pub struct Exchange {
@@ -88,8 +34,12 @@ pub struct Exchange {
     pub config: Config,
     /// How it stands.
     pub report: Report,
+    /// What times and stack are measured with.
+    pub probes: Probes,
     /// Counted up by the background, so that the tick sees it alive.
     pub beat: u32,
+    /// The background is dead, and with it whoever could ask for anything: the tick ramps down.
+    pub orphaned: bool,
     /// Whether the host is still there.
     pub silence: Silence,
     /// Keeps what the ticks do, where a memory was given for it.
@@ -117,7 +67,9 @@ impl Exchange {
             orders: Orders { command: [0; COMMAND_WORDS], request: Request::None },
             config: Config::new(),
             report: Report::NONE,
+            probes: Probes::NONE,
             beat: 0,
+            orphaned: false,
             silence: Silence::new(HOST_TICKS),
             recorder: None,
             wave: None,

@@ -1,8 +1,20 @@
 //! Whether the watchdog may be fed.
 
-/// Ticks without a sign of the background after which the watchdog is starved, once the amplifiers are off: one second at
-/// 10 kHz. While they are on the supervisor has the link's silence to go by, and brings the platform to rest first.
-pub const BACKGROUND_SILENCE: u32 = 10_000;
+use controller::limits::CODES;
+use controller::supervision::SUPERVISION;
+
+use crate::words::PERIOD_NANOSECONDS;
+
+/// Ticks in a second.
+const SECOND: u32 = 1_000_000_000 / PERIOD_NANOSECONDS + 1;
+/// Ticks without a sign of the background after which it is dead: one second. Nobody can ask for anything any more, so the tick
+/// ramps down; once the amplifiers are off the watchdog is starved.
+pub const BACKGROUND_SILENCE: u32 = SECOND;
+/// Ticks after which it is starved even with the amplifiers on: a second to come to rest, and a ramp over all codes.
+pub const RAMPED_DOWN: u32 = {
+    let steps = CODES[1].abs_diff(CODES[0]) / SUPERVISION.ramp_step.unsigned_abs() + 1;
+    BACKGROUND_SILENCE.saturating_add(SECOND).saturating_add(steps.saturating_mul(SUPERVISION.ramp_every))
+};
 /// Ticks in a row with missed ones before them, after which the watchdog is starved: the controller is too slow for good.
 pub const MISSES_IN_A_ROW: u32 = 64;
 
@@ -27,7 +39,13 @@ impl Health {
         self.silent = if beat == self.beat { self.silent.saturating_add(1) } else { 0 };
         self.beat = beat;
         self.misses = if missed > 0 { self.misses.saturating_add(1) } else { 0 };
-        let background = amplifier_on || self.silent < BACKGROUND_SILENCE;
-        background && self.misses < MISSES_IN_A_ROW
+        let silence = if amplifier_on { RAMPED_DOWN } else { BACKGROUND_SILENCE };
+        self.silent < silence && self.misses < MISSES_IN_A_ROW
+    }
+
+    /// Whether the background is dead: the next tick is to ramp down.
+    #[must_use]
+    pub const fn is_orphaned(&self) -> bool {
+        self.silent >= BACKGROUND_SILENCE
     }
 }

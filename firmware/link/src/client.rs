@@ -45,10 +45,30 @@ pub struct Timeout {
 }
 
 impl Timeout {
-    /// For a serial line: an answer comes within milliseconds, and noise may eat a frame.
+    /// For a serial line: an answer comes within milliseconds, and noise may eat a frame. A short request is sent again after a
+    /// quarter of the limit: a machine whose host asks every 20 ms has it before it takes the host for lost
+    /// (`supervisor.host_lost`, 100 ms).
     pub const SERIAL: Self = Self { limit: Duration::from_millis(250), attempts: 8 };
     /// For a pipe, which loses nothing: an answer comes, or the other side hangs.
     pub const PIPE: Self = Self { limit: Duration::from_secs(10), attempts: 1 };
+}
+
+impl Timeout {
+    /// What is sent in pieces, or computed for, gets its whole limit: asked for again too early it would only be slower.
+    fn of(self, request: &Request<'_>) -> Self {
+        let short = matches!(
+            request,
+            Request::Status
+                | Request::Health
+                | Request::Supervise { .. }
+                | Request::Setpoint { .. }
+                | Request::Wave { .. }
+        );
+        if !short || self.attempts == 1 {
+            return self;
+        }
+        Self { limit: self.limit / 4, attempts: self.attempts.saturating_mul(4) }
+    }
 }
 
 /// Why there is no answer.
@@ -186,19 +206,19 @@ impl<P: Port> Client<P> {
         if !self.request.set(&header, request) {
             return Err(ClientError::TooLong);
         }
+        let Timeout { limit, attempts } = self.timeout.of(request);
         let start = Instant::now();
         let before = self.damaged;
         let mut came = false;
-        for _ in 0..self.timeout.attempts {
+        for _ in 0..attempts {
             self.port.send(self.request.bytes()).map_err(ClientError::Port)?;
-            if self.wait(&header)? {
+            if self.wait(&header, limit)? {
                 came = true;
                 break;
             }
         }
         if !came {
-            let (attempts, damaged) = (self.timeout.attempts, self.damaged - before);
-            return Err(ClientError::Silent { waited: start.elapsed(), attempts, damaged });
+            return Err(ClientError::Silent { waited: start.elapsed(), attempts, damaged: self.damaged - before });
         }
         match frame::message::<Reply<'_>>(&self.answer).ok_or(ClientError::Unexpected)? {
             // Not carried out, so the number was not used.
@@ -217,11 +237,11 @@ impl<P: Port> Client<P> {
     }
 
     /// Keeps the message of the answer to a request; false if it does not come in time.
-    fn wait(&mut self, asked: &Header) -> Result<bool, ClientError> {
+    fn wait(&mut self, asked: &Header, limit: Duration) -> Result<bool, ClientError> {
         let start = Instant::now();
         let mut buffer = [0; 4096];
         loop {
-            let left = self.timeout.limit.saturating_sub(start.elapsed());
+            let left = limit.saturating_sub(start.elapsed());
             let count = self.port.receive(&mut buffer, left).map_err(ClientError::Port)?;
             // What follows an answer is of no request that is still open.
             for byte in &buffer[..count] {

@@ -30,7 +30,7 @@ pub use counters::Counters;
 pub use endpoint::{Device, Endpoint, telemetry};
 pub use frame::{Damage, FRAME, Header, Kind, MESSAGE, VERSION};
 pub use message::{
-    Counted, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Stage, Status, WaveAction,
+    Counted, Health, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Stage, Status, WaveAction,
 };
 pub use receiver::Receiver;
 pub use silence::Silence;

@@ -77,6 +77,8 @@ pub enum Request<'a> {
     /// Ramp down, then end the program that serves the link. A board has no such end: [`Refusal::Unsupported`]. Answered by
     /// [`Reply::Done`], whoever asks; the connection is closed once the amplifiers are off.
     Stop,
+    /// Answered by [`Reply::Health`]; its events are then forgotten, and those of [`Reply::Status`] with them.
+    Health,
 }
 
 /// What a recorder is to do.
@@ -146,6 +148,8 @@ pub enum Reply<'a> {
         #[serde(borrow)]
         bytes: Bytes<'a>,
     },
+    /// What it noticed of itself.
+    Health(Health),
 }
 
 /// Why a request was not carried out.
@@ -220,12 +224,37 @@ pub struct Status {
     pub amplifier_on: bool,
     /// The controller's status word.
     pub status: u32,
-    /// Events seen since the status was asked for last.
+    /// Events seen since the host asked for [`Request::Health`] last. The status does not forget them.
     pub events: u32,
     /// Ticks that came late since power-up.
     pub late: u32,
     /// What the link has counted; filled in by the endpoint.
     pub link: Counters,
+}
+
+/// What a device noticed of itself since power-up. Times are in counts of [`Health::clock`], the last one and the longest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Health {
+    /// Events seen since the host asked last.
+    pub events: u32,
+    /// Faults of converters, and each kind that there was: bit `specgen_hal::Fault::number`.
+    pub converter_faults: u32,
+    /// See [`Health::converter_faults`]; 0 where kinds are not told apart.
+    pub faults: u32,
+    /// Ticks in which a gauge was not finite, out of range, stuck, or in disagreement.
+    pub gauge_faults: u32,
+    /// Ticks that ended after the next one was due.
+    pub overruns: u32,
+    /// Counts in a second; 0 where nothing is measured.
+    pub clock: u32,
+    /// A tick, from its beginning to its end.
+    pub tick: [u32; 2],
+    /// From the sampling of the gauges until the outputs changed.
+    pub output: [u32; 2],
+    /// Largest delay of a tick's beginning.
+    pub latest: u32,
+    /// Most bytes of the stack seen in use, and bytes there are; zeros where that is not measured.
+    pub stack: [u32; 2],
 }
 
 /// What a stage has cost.

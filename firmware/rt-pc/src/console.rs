@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 
 use controller::waves::{self, Wave};
 use controller::{Config, Real};
+use specgen_link::Health;
 use specgen_runtime::wave::Settings;
 
 use crate::capture::{CAPACITY, Capture};
@@ -26,6 +27,8 @@ pub struct Console {
     pub operator: Operator,
     pub capture: Capture,
     pub said: Option<Said>,
+    /// What the loop noticed of itself.
+    pub health: Health,
     /// Settings that are in force once all orders are taken.
     config: Config,
     /// Events that were not yet reported over the link.
@@ -40,7 +43,18 @@ pub struct Console {
 impl Console {
     /// At the start, with the settings of the run.
     pub fn new(operator: Operator, capture: Capture, config: Config) -> Self {
-        Self { operator, capture, said: None, config, events: 0, orders: VecDeque::new(), number: 0, wave: None }
+        let health = Health::default();
+        Self {
+            operator,
+            capture,
+            said: None,
+            health,
+            config,
+            events: 0,
+            orders: VecDeque::new(),
+            number: 0,
+            wave: None,
+        }
     }
 
     /// Takes what a tick gave.

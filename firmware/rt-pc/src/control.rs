@@ -17,6 +17,7 @@ use controller::{Config, LEGS, Real};
 use specgen_rt::account::{Account, Stamps};
 use specgen_rt::clock::{self, Usage};
 use specgen_rt::{allocation, scheduling};
+use specgen_runtime::supervisor::OF_GAUGES;
 
 use crate::devices::Device;
 use crate::handover::{Inner, Order, Row, Shared, Tape};
@@ -127,6 +128,9 @@ impl<D: Device> Loop<'_, D> {
                 self.shared.device_faults.fetch_add(1, Ordering::Relaxed);
             }
 
+            if machine.supervisor.conditions & OF_GAUGES != 0 {
+                self.shared.gauge_faults.fetch_add(1, Ordering::Relaxed);
+            }
             phase = output.phase;
             let digest = if keeper.wants_digest() { machine.digest() } else { 0 };
             keeper.keep(Row {
@@ -160,6 +164,7 @@ impl<D: Device> Loop<'_, D> {
             keeper.prepare(&machine, &self.config, count, configured);
             let usage = Usage::of_this_thread().since(usage);
             let done = clock::now();
+            self.shared.took([planned, woken, read, written, done], period, elastic);
             account.tick(&Stamps { planned, woken, read, computed, written, done }, &usage, suspended);
             planned += period;
             if elastic && planned < done {

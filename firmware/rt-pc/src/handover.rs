@@ -1,12 +1,13 @@
 //! What the real-time thread and the service hand to each other: by value, through rings that never wait.
 
-use core::sync::atomic::{AtomicBool, AtomicU64};
+use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 use controller::snapshot::MACHINE_STATE_WORDS;
 use controller::snapshot::recorder::{self, Recorder};
 use controller::supervised::{MachineInput, Request};
 use controller::{Config, Real};
 use rtrb::{Consumer, Producer, RingBuffer};
+use specgen_link::Health;
 use specgen_runtime::wave;
 
 use crate::words::Command;
@@ -93,6 +94,66 @@ pub struct Shared {
     pub lost_rows: AtomicU64,
     /// Readings or outputs that the device did not make.
     pub device_faults: AtomicU64,
+    /// Ticks in which the supervisor saw something wrong with a gauge.
+    pub gauge_faults: AtomicU32,
+    /// Of a tick, from waking up to its end.
+    pub tick: LastAndLongest,
+    /// From the readings to the outputs.
+    pub output: LastAndLongest,
+    /// Largest delay of waking up, ns.
+    pub latest: AtomicU32,
+    /// Ticks that ended after the next one was due.
+    pub overruns: AtomicU32,
+}
+
+impl Shared {
+    /// A tick that was planned, woken up for, read, written and done at these times. Where time waits for the loop nothing is late.
+    pub fn took(&self, [planned, woken, read, written, done]: [u64; 5], period: u64, elastic: bool) {
+        self.tick.add(done.saturating_sub(woken));
+        self.output.add(written.saturating_sub(read));
+        if !elastic {
+            let late = woken.saturating_sub(planned);
+            self.latest.fetch_max(u32::try_from(late).unwrap_or(u32::MAX), Ordering::Relaxed);
+            if done > planned + period {
+                self.overruns.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// What the link says of it; events are kept for each host on its own.
+    pub fn health(&self) -> Health {
+        let now = |count: &AtomicU32| count.load(Ordering::Relaxed);
+        Health {
+            events: 0,
+            converter_faults: u32::try_from(self.device_faults.load(Ordering::Relaxed)).unwrap_or(u32::MAX),
+            // A device says that it failed, not how; the stack of a thread has a guard.
+            faults: 0,
+            gauge_faults: now(&self.gauge_faults),
+            overruns: now(&self.overruns),
+            clock: 1_000_000_000,
+            tick: self.tick.get(),
+            output: self.output.get(),
+            latest: now(&self.latest),
+            stack: [0; 2],
+        }
+    }
+}
+
+/// A time of ticks, ns; the real-time thread alone writes it.
+#[derive(Debug, Default)]
+pub struct LastAndLongest([AtomicU32; 2]);
+
+impl LastAndLongest {
+    pub fn add(&self, time: u64) {
+        let time = u32::try_from(time).unwrap_or(u32::MAX);
+        let [last, longest] = &self.0;
+        last.store(time, Ordering::Relaxed);
+        longest.fetch_max(time, Ordering::Relaxed);
+    }
+
+    pub fn get(&self) -> [u32; 2] {
+        self.0.each_ref().map(|time| time.load(Ordering::Relaxed))
+    }
 }
 
 /// The loop's ends of the rings that lead out.

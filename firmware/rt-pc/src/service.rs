@@ -105,6 +105,7 @@ impl Service<'_> {
     /// Serves the hosts, and says whose silence the loop is to watch.
     fn serve(&mut self, now: u64) {
         if let Some(link) = &mut self.link {
+            self.console.health = self.shared.health();
             link.serve(&mut self.console, now);
         }
         let number = self.console.operator.link_number();

@@ -31,7 +31,8 @@ mod watch;
 pub use approach::Approach;
 pub use debounce::Debounce;
 pub use kinds::{
-    CONVERTER, Cause, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, Phase, RAMPS_DOWN, Request, STOP, SWITCHES_OFF,
+    CONVERTER, Cause, HOLDS, INTEGRITY, LINK_LOST, MISSED_TICK, OF_GAUGES, Phase, RAMPS_DOWN, Request, STOP,
+    SWITCHES_OFF,
 };
 pub use phases::Supervisor;
 pub use supervision::{Supervision, TIMED, TIMERS};

@@ -15,6 +15,7 @@ use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::{Ad7606, Window};
 
 use crate::CycleDelay;
+use crate::enable::Enable;
 
 /// AD7606 for gauges of up to 16 bits; the pin-compatible AD7608 or AD7606C-18 for up to 18.
 pub const ADC_BITS: usize = if GAUGE_BITS <= 16 { 16 } else { 18 };
@@ -33,7 +34,7 @@ pub type Adc<const CYCLES: u32> =
     Ad7606<ADC_BITS, AdcSpi<CYCLES>, Output<'static>, Input<'static>, Output<'static>, CycleDelay<CYCLES>>;
 /// The DACs.
 pub type Dacs<const CYCLES: u32> =
-    Ad5686rPair<DacSpi<CYCLES>, DacSpi<CYCLES>, Output<'static>, Output<'static>, CycleDelay<CYCLES>>;
+    Ad5686rPair<DacSpi<CYCLES>, DacSpi<CYCLES>, Output<'static>, Enable, CycleDelay<CYCLES>>;
 /// The machine on them.
 pub type OnBoard<const CYCLES: u32> = Board<'static, Adc<CYCLES>, Dacs<CYCLES>>;
 /// Where the bus of the DACs lives.
@@ -62,7 +63,7 @@ pub struct DacPins {
     /// LDAC of both parts, high.
     pub load: Output<'static>,
     /// Enable of the amplifiers, active high: low.
-    pub enable: Output<'static>,
+    pub enable: Enable,
 }
 
 /// SPI of the ADC: SCLK idles high, bits are taken on its falling edge.

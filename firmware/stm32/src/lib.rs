@@ -7,8 +7,11 @@
 pub mod converters;
 pub mod cycles;
 mod delay;
+pub mod enable;
 pub mod serial;
 mod silent;
+mod stack;
 pub mod timer;
 
 pub use delay::CycleDelay;
+pub use stack::used as stack_used;

@@ -1,15 +1,16 @@
 //! The wiring: which pin goes where. The table in docs/bring-up.md is this file in words.
 
 use embassy_stm32::Peripherals;
-use embassy_stm32::gpio::{Input, Level, Output, Pull, Speed};
+use embassy_stm32::gpio::{Flex, Input, Level, Output, Pull, Speed};
 pub use embassy_stm32::interrupt::USART3 as LINK;
 use embassy_stm32::mode::Async;
 pub use embassy_stm32::peripherals::IWDG1 as Watchdog;
 use embassy_stm32::peripherals::USART3;
 use embassy_stm32::spi::Spi;
 use embassy_stm32::usart::{ConfigError, Uart};
-use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals, usart};
+use embassy_stm32::{Peri, bind_interrupts, dma, peripherals, usart};
 use specgen_stm32::converters::{AdcPins, DacPins, adc_spi, dac_spi};
+use specgen_stm32::enable::{self, Stop};
 use specgen_stm32::serial;
 
 bind_interrupts!(
@@ -27,17 +28,17 @@ pub struct Wiring {
     pub adc: AdcPins,
     /// DACs and amplifiers.
     pub dac: DacPins,
-    /// Emergency stop: a closed contact to ground; open is stop.
-    pub stop: Input<'static>,
+    /// Emergency stop: a closed contact to ground, at the break input of TIM1; open is stop.
+    pub stop: Stop,
     /// Virtual COM port of the ST-LINK.
-    pub uart: Result<Uart<'static, Async>, ConfigError>,
+    pub link: Link,
     /// Watchdog.
     pub watchdog: Peri<'static, Watchdog>,
 }
 
-/// Takes the pins. The enable line comes first and is driven low.
+/// Takes the pins. The enable line comes first and is driven low: channel 2 of TIM1, with its break input.
 pub fn take(p: Peripherals) -> Wiring {
-    let enable = Output::new(p.PE11, Level::Low, Speed::Low);
+    let (enable, stop) = enable::guarded::<2>(Flex::new(p.PE11), Flex::new(p.PE15));
     let high = Level::High;
     Wiring {
         adc: AdcPins {
@@ -53,14 +54,23 @@ pub fn take(p: Peripherals) -> Wiring {
             load: Output::new(p.PG3, high, Speed::VeryHigh),
             enable,
         },
-        stop: Input::new(p.PG12, Pull::Up),
-        uart: Uart::new(p.USART3, p.PD9, p.PD8, p.DMA1_CH0, p.DMA1_CH1, Irqs, serial::config()),
+        stop,
+        link: Link { usart: p.USART3, pins: (p.PD9, p.PD8), channels: (p.DMA1_CH0, p.DMA1_CH1) },
         watchdog: p.IWDG1,
     }
 }
 
-/// Disables the amplifiers, whatever state the program is in.
-pub fn amplifiers_off() {
-    // PE11 low, by the register that needs no reading.
-    pac::GPIOE.bsrr().write(|w| w.set_br(11, true));
+/// The USART of the link, its pins RX and TX, its DMA for sending and receiving.
+pub struct Link {
+    usart: Peri<'static, USART3>,
+    pins: (Peri<'static, peripherals::PD9>, Peri<'static, peripherals::PD8>),
+    channels: (Peri<'static, peripherals::DMA1_CH0>, Peri<'static, peripherals::DMA1_CH1>),
+}
+
+impl serial::Line for Link {
+    fn open(&mut self) -> Result<Uart<'_, Async>, ConfigError> {
+        let Self { usart, pins: (rx, tx), channels: (send, receive) } = self;
+        let (rx, tx, send, receive) = (rx.reborrow(), tx.reborrow(), send.reborrow(), receive.reborrow());
+        Uart::new(usart.reborrow(), rx, tx, send, receive, Irqs, serial::config())
+    }
 }

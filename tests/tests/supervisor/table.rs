@@ -3,7 +3,7 @@
 use super::bench::*;
 use std::collections::BTreeMap;
 
-const NAMES: [&str; 15] = [
+const NAMES: [&str; 14] = [
     "none",
     "gauge not finite",
     "gauge range",
@@ -18,7 +18,6 @@ const NAMES: [&str; 15] = [
     "converter",
     "emergency stop",
     "host gone",
-    "converter silent",
 ];
 
 /// What is wrong from now on, tick by tick, for one cause.
@@ -77,7 +76,7 @@ fn inject(bench: &mut Bench, cause: u8, tick: u32, request: u64) -> u8 {
 /// Where a cause leads from a phase, and the cause that is shown then; `None` if it changes nothing.
 fn expected(cause: u8, phase: u8) -> Option<(u8, u8)> {
     let off = matches!(cause, 10 | 12);
-    let ramp = matches!(cause, 1..=4);
+    let ramp = matches!(cause, 1..=4 | 11);
     match phase {
         // Disarmed machines do not mind gauges or links: they only refuse to arm.
         DISARMED => off.then_some((FAULTED, cause)),
@@ -92,7 +91,6 @@ fn expected(cause: u8, phase: u8) -> Option<(u8, u8)> {
         _ if ramp => Some((FAULTED, cause)),
         // It holds, and once nobody is waited for any more it ramps down.
         _ if cause == 9 => Some((FAULTED, 13)),
-        _ if cause == 11 => Some((FAULTED, 14)),
         _ => Some((HOLDING, cause)),
     }
 }

@@ -1,6 +1,7 @@
 //! `specgen operate`: one session with a machine over the link, from the command line, a script, or line by line.
 
 mod answer;
+mod health;
 mod operator;
 
 use std::io::{BufRead, IsTerminal};

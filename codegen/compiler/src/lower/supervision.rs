@@ -23,7 +23,7 @@ const FEWEST_STEPS: f64 = 2.0;
 const DISAGREEMENT_SHARE: f64 = 0.2;
 /// Without `supervisor.arm_time`, s.
 const ARM_TIME: f64 = 0.1;
-/// Without `supervisor.host_lost`: silence of a host, or of a converter, after which the machine holds and ramps down, s.
+/// Without `supervisor.host_lost`: silence of a host after which the machine holds and ramps down, s.
 const HOST_LOST: [f64; 2] = [0.1, 10.0];
 /// Missed ticks are counted over this time, s.
 const MISSED_WINDOW: f64 = 1.0;
@@ -51,7 +51,7 @@ pub(super) fn lower(
     let stuck_samples = times.samples("stuck_time", spec.stuck_time, 0.05);
     let disagreement_samples = times.samples("disagreement_time", spec.disagreement_time, 0.1);
     let tracking_samples = times.samples("tracking_time", spec.tracking_time, 0.1);
-    let [host_ticks, host_gone, converter_silent] = times.host_lost(gauge);
+    let [host_ticks, host_gone] = times.host_lost();
     let window = whole(MISSED_WINDOW / period);
     let missed = window.saturating_mul(spec.missed_ticks - 1).saturating_add(1);
 
@@ -75,8 +75,8 @@ pub(super) fn lower(
         ramp_step,
         ramp_every,
         host_ticks,
-        timeout: [gauge, gauge, voltage, slew, missed, gauge, host_gone, converter_silent],
-        weight: [1, 1, 1, 1, window, 1, 1, 1],
+        timeout: [gauge, gauge, voltage, slew, missed, gauge, host_gone],
+        weight: [1, 1, 1, 1, window, 1, 1],
         stuck_motion: round(stuck_motion),
         stuck_samples,
         disagreement: round(disagreement),
@@ -103,39 +103,32 @@ impl Times<'_> {
         self.counted(key, given, otherwise, CHANNELS, FEWEST_SAMPLES)
     }
 
-    /// Ticks after which a host is lost, those with the event of it after which it is gone, and those after which a converter is
-    /// silent, which holds after `gauge` ticks.
-    fn host_lost(&mut self, gauge: u32) -> [u32; 3] {
+    /// Ticks after which a host is lost, and those with the event of it after which it is gone.
+    fn host_lost(&mut self) -> [u32; 2] {
         let given = self.model.supervisor.host_lost;
         let [hold, down] = given.unwrap_or(HOST_LOST);
         let hold_ticks = self.ticks("host_lost", None, hold);
-        let least = 1 + if hold_ticks > gauge { hold_ticks } else { gauge };
+        let least = 1 + hold_ticks;
         let mut down_ticks = self.ticks("host_lost", None, down);
         let period = self.model.timing.period;
         if down_ticks < least || hold < period * (1.0 - 1e-9) {
             down_ticks = if down_ticks < least { least } else { down_ticks };
             if given.is_some() {
-                let [hold, down, least_hold, least_down, gauge] = [
-                    hold,
-                    down,
-                    f64::from(hold_ticks) * period,
-                    f64::from(down_ticks) * period,
-                    f64::from(gauge) * period,
-                ]
-                .map(|time| time * 1e3);
+                let [hold, down, least_hold, least_down] =
+                    [hold, down, f64::from(hold_ticks) * period, f64::from(down_ticks) * period].map(|time| time * 1e3);
                 self.findings.push(finding(
                     self.model,
                     codes::SUPERVISOR_TIME,
                     "host_lost",
                     format!(
                         "a host is to be lost after {hold:.6} ms, at least a period, and the machine to ramp down after {down:.6} ms; \
-                         before that it holds, for a converter from {gauge:.6} ms on (gauge_time)"
+                         before that it holds"
                     ),
                     format!("write host_lost = [\"{least_hold:.6} ms\", \"{least_down:.6} ms\"] or more"),
                 ));
             }
         }
-        [hold_ticks, (down_ticks - hold_ticks).saturating_add(1), down_ticks]
+        [hold_ticks, (down_ticks - hold_ticks).saturating_add(1)]
     }
 
     /// How often something that is looked at every `every` ticks is seen in that time; a time that is given must let it be

@@ -37,7 +37,7 @@ section! {
         slew_time: Option<f64> = TIMEOUT, Rule("50 ms, at least a period"), "", "50 ms";
         /// Missed ticks within a second that are a fault.
         missed_ticks: u32 = integer(1, 1000), Default(3), "", 3;
-        /// How long a host that has the orders may be silent until the machine holds, and until it ramps down and switches off. A converter that stays silent holds after `gauge_time`, and ramps down after the second time.
+        /// How long a host that has the orders may be silent until the machine holds, and until it ramps down and switches off.
         host_lost: Option<[f64; 2]> = list(&[SILENCE; 2]), Rule(r#"["100 ms", "10 s"]"#), "", ["100 ms", "10 s"];
     }
 }

@@ -7,7 +7,8 @@ use std::rc::Rc;
 
 use controller::sensing;
 use controller::supervised::{
-    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Request, STOP, supervise,
+    CONVERTER, Cause, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, Request, STOP,
+    supervise,
 };
 use controller::{Command, CommandKind, Config, INPUT_WORDS, Real, Target, TickInput};
 use rand_chacha::ChaCha8Rng;
@@ -151,8 +152,14 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
             events |= if happened { event } else { 0 };
         }
         let gauge = if gauge_fails { [Real::NAN; 6] } else { codes.map(|code| sensing::CONVERTER.reading(code >> 1)) };
-        let output = by_hand.tick(&orders.command, gauge, orders.request, events);
+        let held = by_hand.machine.state.legs.each_ref().map(|leg| leg.code);
+        // What the supervisor is asked for with converters that were just started is nothing.
+        let request = if restarted { Request::None } else { orders.request };
+        let output = by_hand.tick(&orders.command, gauge, request, if restarted { events & !carried } else { events });
         let mut expected = if restarted { vec![Done::Enable(false), Done::Start] } else { Vec::new() };
+        if restarted && held != [0; 6] {
+            expected.push(Done::Write(held));
+        }
         if output.amplifier_on {
             expected.extend([Done::Write(output.tick.dac_code), Done::Enable(true)]);
             enabled += 1;
@@ -165,9 +172,9 @@ fn a_board_does_what_the_controller_says_whatever_happens() {
         assert_eq!(exchange.report.cause, output.cause);
         carried = if write_fails { CONVERTER } else { 0 };
         faults += u32::from(gauge_fails) + u32::from(write_fails);
-        assert_eq!(exchange.report.converter_faults, faults);
+        assert_eq!(exchange.report.health.converter_faults, faults);
     }
-    assert_eq!(exchange.report.faults, Fault::Blank.bit() | Fault::ReadBack.bit());
+    assert_eq!(exchange.report.health.faults, Fault::Blank.bit() | Fault::ReadBack.bit());
     assert!(enabled > 0, "the amplifiers were never on: this tested nothing");
 }
 
@@ -197,29 +204,29 @@ fn a_link_without_a_frame_or_that_fell_silent_is_an_event() {
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
     board.tick(&mut exchange, Noticed::default());
-    assert_eq!(exchange.report.events & LINK_LOST, LINK_LOST);
+    assert_eq!(exchange.report.health.events & LINK_LOST, LINK_LOST);
     exchange.silence.heard();
-    exchange.report.events = 0;
+    exchange.report.health.events = 0;
     // 0.1 s at the reference's 100 µs.
     for _ in 0..1000 {
         board.tick(&mut exchange, Noticed::default());
     }
-    assert_eq!(exchange.report.events & LINK_LOST, 0);
+    assert_eq!(exchange.report.health.events & LINK_LOST, 0);
     board.tick(&mut exchange, Noticed::default());
-    assert_eq!(exchange.report.events & LINK_LOST, LINK_LOST);
+    assert_eq!(exchange.report.health.events & LINK_LOST, LINK_LOST);
 }
 
 #[test]
 fn a_damaged_flash_is_an_event_of_every_tick() {
     let (_, mut board, mut exchange) = started(false);
     for _ in 0..3 {
-        exchange.report.events = 0;
+        exchange.report.health.events = 0;
         board.tick(&mut exchange, Noticed::default());
-        assert_eq!(exchange.report.events & INTEGRITY, INTEGRITY);
+        assert_eq!(exchange.report.health.events & INTEGRITY, INTEGRITY);
     }
     let (_, mut whole, mut exchange) = started(true);
     whole.tick(&mut exchange, Noticed::default());
-    assert_eq!(exchange.report.events & INTEGRITY, 0);
+    assert_eq!(exchange.report.health.events & INTEGRITY, 0);
 }
 
 #[test]
@@ -229,14 +236,14 @@ fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_sta
     let mut board = Board::new(parts.clone(), parts.clone(), at_reset(), true);
     let mut exchange = Exchange::new();
     board.start(&mut exchange.report);
-    assert_eq!(exchange.report.faults, Fault::ReadBack.bit());
+    assert_eq!(exchange.report.health.faults, Fault::ReadBack.bit());
     for request in [Request::Arm, Request::Run, Request::Acknowledge, Request::Acknowledge, Request::Run, Request::Run]
     {
         exchange.silence.heard();
-        exchange.report.events = 0;
+        exchange.report.health.events = 0;
         exchange.orders.request = request;
         board.tick(&mut exchange, Noticed::default());
-        assert_eq!(exchange.report.events & CONVERTER, CONVERTER);
+        assert_eq!(exchange.report.health.events & CONVERTER, CONVERTER);
     }
     let starts = |parts: &Parts| parts.0.borrow().done.iter().filter(|&&done| done == Done::Start).count();
     assert!(!parts.0.borrow().done.contains(&Done::Enable(true)));
@@ -253,9 +260,9 @@ fn converters_that_did_not_start_never_get_power_until_a_new_acknowledgement_sta
         }
     }
     assert_eq!(starts(&parts), before + 1);
-    exchange.report.events = 0;
+    exchange.report.health.events = 0;
     board.tick(&mut exchange, Noticed::default());
-    assert_eq!(exchange.report.events & CONVERTER, 0);
+    assert_eq!(exchange.report.health.events & CONVERTER, 0);
 }
 
 #[test]
@@ -265,4 +272,71 @@ fn the_command_stands_before_the_gauges() {
     assert_eq!(COMMAND_WORDS + 12, INPUT_WORDS);
     assert_eq!(GAUGE_BITS, 17);
     assert_eq!(specgen_board::PERIOD_NANOSECONDS, 100_000);
+}
+
+/// Whatever else took the amplifiers off: an acknowledgement starts converters that failed, and one is enough.
+#[test]
+fn a_converter_that_failed_names_the_cause_and_one_acknowledgement_is_enough_once_it_answers() {
+    for stop in [false, true] {
+        let (parts, mut board, mut exchange) = started(true);
+        let mut run = |exchange: &mut Exchange, request: Request, ticks: u32, stop: bool| {
+            exchange.orders.request = request;
+            for _ in 0..ticks {
+                exchange.silence.heard();
+                board.tick(exchange, Noticed { missed: 0, stop });
+            }
+        };
+        run(&mut exchange, Request::Arm, 1500, false);
+        assert_eq!(exchange.report.phase, Phase::Holding);
+        parts.0.borrow_mut().gauge_fault = Some(Fault::NotEnded);
+        run(&mut exchange, Request::Arm, 99, false);
+        assert_eq!((exchange.report.phase, exchange.report.cause), (Phase::Holding, Cause::None));
+        run(&mut exchange, Request::Arm, 1, stop);
+        let cause = if stop { Cause::EmergencyStop } else { Cause::Converter };
+        assert_eq!(exchange.report.cause, cause, "not the gauge, which nobody read");
+        run(&mut exchange, Request::None, 100, false);
+        assert_eq!(exchange.report.phase, Phase::Faulted);
+        parts.0.borrow_mut().done.clear();
+        run(&mut exchange, Request::Acknowledge, 100, false);
+        assert_eq!(exchange.report.phase, Phase::Faulted, "it still does not answer");
+        run(&mut exchange, Request::None, 1, false);
+        parts.0.borrow_mut().gauge_fault = None;
+        run(&mut exchange, Request::Acknowledge, 2, false);
+        assert_eq!(exchange.report.phase, Phase::Disarmed);
+        assert_eq!(parts.0.borrow().done.iter().filter(|&&done| done == Done::Start).count(), 2);
+        assert!(exchange.report.health.gauge_faults > 100);
+    }
+}
+
+#[test]
+fn without_its_background_a_board_ramps_down_whatever_was_asked_for() {
+    let (_, mut board, mut exchange) = started(true);
+    let mut ticks = |exchange: &mut Exchange, request: Request, count: u32| {
+        exchange.orders.request = request;
+        for _ in 0..count {
+            exchange.silence.heard();
+            board.tick(exchange, Noticed::default());
+        }
+        exchange.report.phase
+    };
+    ticks(&mut exchange, Request::Arm, 1500);
+    assert_eq!(ticks(&mut exchange, Request::Hold, 10), Phase::Holding);
+    exchange.orphaned = true;
+    assert_eq!(ticks(&mut exchange, Request::Run, 10), Phase::Disarmed);
+}
+
+/// What a counter of the target shows: each reading of the clock here is a count later than the last.
+#[test]
+fn times_of_a_tick_are_the_last_and_the_longest_and_overruns_are_counted() {
+    use std::sync::atomic::{AtomicU32, Ordering};
+    static COUNT: AtomicU32 = AtomicU32::new(u32::MAX - 1);
+    let (_, mut board, mut exchange) = started(true);
+    board.timed_tick(&mut exchange, Noticed::default(), || COUNT.fetch_add(3, Ordering::Relaxed));
+    assert_eq!(exchange.report.health.output, [3, 3], "over the end of the counter");
+    let report = &mut exchange.report;
+    for (late, duration, overruns) in [(0, 100, 0), (1, 99, 0), (1, 100, 1), (40, 20, 1), (0, u32::MAX, 2)] {
+        report.took(late, duration, 100);
+        assert_eq!((report.health.tick[0], report.health.overruns), (duration, overruns));
+    }
+    assert_eq!((report.health.tick[1], report.health.latest), (u32::MAX, 40));
 }

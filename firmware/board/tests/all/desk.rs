@@ -121,18 +121,25 @@ fn the_description_comes_in_pieces() {
     });
 }
 
-/// Events that come up after the status was given out are still there for the next one.
+/// A status, which a host asks for all the time, forgets no event; the host that asks for health has seen them.
 #[test]
 fn events_are_kept_until_the_host_has_them() {
     let mut bench = Bench::new();
-    bench.exchange.report.events = 0b0101;
+    bench.exchange.report.health.events = 0b0101;
     bench.ask(&Request::ReadConfig, |_| ());
-    assert_eq!(bench.exchange.report.events, 0b0101);
+    assert_eq!(bench.exchange.report.health.events, 0b0101);
     bench.ask(&Request::Status, |reply| {
         let Reply::Status(status) = reply else { unreachable!() };
         assert_eq!(status.events, 0b0101);
     });
-    bench.exchange.report.events |= 0b1000;
-    bench.ask(&Request::ReadConfig, |_| ());
-    assert_eq!(bench.exchange.report.events, 0b1000);
+    bench.exchange.report.health.events |= 0b1000;
+    bench.exchange.report.health.overruns = 7;
+    bench.exchange.probes.stack = || [100, 200];
+    for (events, expected) in [(0, 0b1101), (0b10, 0b10), (0, 0)] {
+        bench.exchange.report.health.events |= events;
+        bench.ask(&Request::Health, |reply| {
+            let Reply::Health(health) = reply else { unreachable!() };
+            assert_eq!((health.events, health.overruns, health.stack), (expected, 7, [100, 200]));
+        });
+    }
 }

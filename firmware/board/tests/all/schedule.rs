@@ -6,7 +6,7 @@ use std::num::NonZeroU32;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_board::{BACKGROUND_SILENCE, Due, Health, Schedule};
+use specgen_board::{BACKGROUND_SILENCE, Due, Health, RAMPED_DOWN, Schedule};
 
 /// Against a counter that never wraps: the grid of due times is never left, and every grid point is a tick or is counted.
 #[test]
@@ -51,16 +51,18 @@ fn a_tick_before_its_time_is_in_time_and_a_restart_counts_nothing() {
 }
 
 #[test]
-fn the_watchdog_is_starved_by_a_silent_background_but_not_while_the_amplifiers_are_on() {
+fn a_dead_background_ramps_down_and_then_starves_the_watchdog() {
     let mut health = Health::new();
     for beat in 0..3 * BACKGROUND_SILENCE {
         assert!(health.tick(1 + beat / 100, 0, false));
     }
     let beat = 77;
-    assert!(health.tick(beat, 0, true));
-    for _ in 0..2 * BACKGROUND_SILENCE {
-        assert!(health.tick(beat, 0, true));
+    assert!(health.tick(beat, 0, true) && !health.is_orphaned());
+    for silent in 1..RAMPED_DOWN {
+        assert!(health.tick(beat, 0, true), "{silent}");
+        assert_eq!(health.is_orphaned(), silent >= BACKGROUND_SILENCE);
     }
+    assert!(!health.tick(beat, 0, true), "a ramp that does not end is ended");
     assert!(!health.tick(beat, 0, false));
     assert!(health.tick(beat + 1, 0, false));
     for silent in 1..BACKGROUND_SILENCE {

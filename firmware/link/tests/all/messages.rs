@@ -6,8 +6,8 @@ use std::time::Duration;
 use crate::support::{IDENTITY, Tap, leaked};
 use specgen_link::client::{Client, ClientError, Timeout};
 use specgen_link::{
-    Bytes, Counters, Device, Endpoint, FRAME, MESSAGE, RecorderAction, RecorderStatus, Refusal, Reply, Request, Stage,
-    Status, WORDS, WaveAction,
+    Bytes, Counters, Device, Endpoint, FRAME, Health, MESSAGE, RecorderAction, RecorderStatus, Refusal, Reply, Request,
+    Stage, Status, WORDS, WaveAction,
 };
 
 const STATUS: Status = Status {
@@ -19,6 +19,19 @@ const STATUS: Status = Status {
     events: 31,
     late: 7,
     link: Counters::NONE,
+};
+
+const HEALTH: Health = Health {
+    events: 31,
+    converter_faults: u32::MAX,
+    faults: 0x1fe,
+    gauge_faults: 7,
+    overruns: 1,
+    clock: 400_000_000,
+    tick: [22_000, u32::MAX],
+    output: [16_000, 17_000],
+    latest: 80,
+    stack: [7_932, 8_192],
 };
 
 fn requests() -> Vec<Request<'static>> {
@@ -40,6 +53,7 @@ fn requests() -> Vec<Request<'static>> {
         Request::Wave { action: WaveAction::Start, words: leaked(9, 5) },
         Request::Wave { action: WaveAction::Stop, words: Bytes(&[]) },
         Request::Stop,
+        Request::Health,
     ]
 }
 
@@ -56,6 +70,7 @@ fn replies() -> Vec<Reply<'static>> {
     let mut all: Vec<Reply<'static>> = refusals.map(Reply::Refused).to_vec();
     all.extend([
         Reply::Done,
+        Reply::Health(HEALTH),
         Reply::Identity(IDENTITY),
         Reply::Config { words: leaked(WORDS, 6) },
         Reply::Stepped { cost: u32::MAX, digest: u64::MAX, output: leaked(WORDS, 7) },

@@ -3,8 +3,8 @@
 use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
 use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, Real};
 use specgen_link::{
-    Bytes, Counted, Counters, Device, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request, Status,
-    WaveAction, put_words,
+    Bytes, Counted, Counters, Device, Health, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request,
+    Status, WaveAction, put_words,
 };
 use specgen_runtime::wave::{self, Settings};
 
@@ -33,8 +33,7 @@ impl<'a> Desk<'a> {
         Self { console, host, events, now, words: [0; size_of::<[u64; CONFIG_WORDS]>()] }
     }
 
-    fn status(&mut self) -> Reply<'static> {
-        let events = core::mem::take(self.events);
+    fn status(&self) -> Reply<'static> {
         // Before the first tick it is as at power-up.
         let said = self.console.said.as_ref();
         Reply::Status(Status {
@@ -43,11 +42,15 @@ impl<'a> Desk<'a> {
             cause: said.map_or(Cause::None, |said| said.cause).word() as u8,
             amplifier_on: said.is_some_and(|said| said.on),
             status: said.map_or(0, |said| said.status),
-            events,
+            events: *self.events,
             late: said.map_or(0, |said| u32::try_from(said.late).unwrap_or(u32::MAX)),
             // The endpoint fills it in.
             link: Counters::NONE,
         })
+    }
+
+    fn health(&mut self) -> Reply<'static> {
+        Reply::Health(Health { events: core::mem::take(self.events), ..self.console.health })
     }
 
     /// Gives the orders to this host, then does `what`.
@@ -170,6 +173,7 @@ impl Device for Desk<'_> {
             }
             Request::Describe { offset } => piece(DESCRIPTION.as_bytes(), offset),
             Request::Status => self.status(),
+            Request::Health => self.health(),
             Request::Supervise { request } => self.supervise(request).map_or_else(Reply::Refused, |()| Reply::Done),
             Request::Setpoint { words } => self.ordered(|desk| desk.command(words)),
             Request::ReadConfig => match put_words(&self.console.config().to_words(), &mut self.words) {

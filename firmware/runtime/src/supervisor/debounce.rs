@@ -10,7 +10,6 @@ const AT_ONCE: u32 = Cause::LinkLost.bit() | Cause::Integrity.bit() | Cause::Eme
 const fn condition(cause: Cause) -> u32 {
     match cause {
         Cause::HostGone => Cause::LinkLost.bit(),
-        Cause::ConverterSilent => Cause::Converter.bit(),
         own => own.bit(),
     }
 }

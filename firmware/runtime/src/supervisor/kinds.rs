@@ -91,14 +91,12 @@ choice! {
         EmergencyStop = 12 => "emergency stop",
         /// [`LINK_LOST`] for so long that nobody is waited for any more.
         HostGone = 13 => "host gone",
-        /// [`CONVERTER`] for so long.
-        ConverterSilent = 14 => "converter silent",
     }
 }
 
 impl Cause {
     /// All but [`Cause::None`], in the order of their words.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 13] = [
         Self::GaugeNotFinite,
         Self::GaugeRange,
         Self::GaugeStuck,
@@ -112,7 +110,6 @@ impl Cause {
         Self::Converter,
         Self::EmergencyStop,
         Self::HostGone,
-        Self::ConverterSilent,
     ];
 
     /// 1 << word: its bit in conditions.
@@ -123,22 +120,19 @@ impl Cause {
     }
 }
 
+/// Causes that are about a gauge.
+pub const OF_GAUGES: u32 =
+    Cause::GaugeNotFinite.bit() | Cause::GaugeRange.bit() | Cause::GaugeStuck.bit() | Cause::GaugeDisagreement.bit();
 /// Causes that take the amplifiers off at once, in any phase.
 pub const SWITCHES_OFF: u32 = Cause::Integrity.bit() | Cause::EmergencyStop.bit();
 /// Causes that bring the codes to rest, then take the amplifiers off.
-pub const RAMPS_DOWN: u32 = Cause::GaugeNotFinite.bit()
-    | Cause::GaugeRange.bit()
-    | Cause::GaugeStuck.bit()
-    | Cause::GaugeDisagreement.bit()
-    | Cause::HostGone.bit()
-    | Cause::ConverterSilent.bit();
+pub const RAMPS_DOWN: u32 = OF_GAUGES | Cause::Converter.bit() | Cause::HostGone.bit();
 /// Causes that hold the codes.
 pub const HOLDS: u32 = Cause::TrackingError.bit()
     | Cause::VoltageSaturation.bit()
     | Cause::SlewSaturation.bit()
     | Cause::MissedTick.bit()
-    | Cause::LinkLost.bit()
-    | Cause::Converter.bit();
+    | Cause::LinkLost.bit();
 
 #[cfg(test)]
 mod tests {
@@ -150,13 +144,13 @@ mod tests {
             assert_eq!(Phase::from_word(word).map(Phase::word), Some(word));
             assert_eq!(Request::from_word(word).word(), word);
         }
-        for word in 0..15 {
+        for word in 0..14 {
             assert_eq!(Cause::from_word(word).map(Cause::word), Some(word));
         }
         for (index, cause) in (1..).zip(Cause::ALL) {
             assert_eq!(cause.word(), index);
         }
-        assert_eq!((Phase::from_word(6), Cause::from_word(15)), (None, None));
+        assert_eq!((Phase::from_word(6), Cause::from_word(14)), (None, None));
         assert_eq!((Request::from_word(6), Request::from_word(u64::MAX)), (Request::Hold, Request::Hold));
     }
 

@@ -12,10 +12,9 @@ pub const TIMED: [Cause; TIMERS] = [
     Cause::MissedTick,
     Cause::Converter,
     Cause::HostGone,
-    Cause::ConverterSilent,
 ];
 /// How many these are.
-pub const TIMERS: usize = 8;
+pub const TIMERS: usize = 7;
 
 /// Constants of the supervisor; from `supervisor`. Six gauges are looked at in turn, so what they show is counted in samples, one
 /// in six ticks.

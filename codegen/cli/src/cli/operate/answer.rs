@@ -72,13 +72,12 @@ impl Outcome for MachineStatus {
     fn text(&self) -> String {
         let on = if self.amplifiers_on { "on" } else { "off" };
         format!(
-            "tick {}, {:.4} s: {}, amplifiers {on}; status {:#x}: {}\n  events {:#x}, {} late ticks, {} damaged frames\n",
+            "tick {}, {:.4} s: {}, amplifiers {on}; status {:#x}: {}\n  {} late ticks, {} damaged frames\n",
             self.tick,
             self.tick as f64 * self.period,
             self.stands,
             self.status,
             if self.status_in_words.is_empty() { "-" } else { &self.status_in_words },
-            self.events,
             self.late,
             self.link_errors + self.damaged_frames
         )

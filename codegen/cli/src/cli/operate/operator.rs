@@ -11,6 +11,7 @@ use specgen_link::{RecorderStatus, Refusal, Status};
 use specgen_runtime::supervisor::{Phase, Request};
 
 use super::answer::{Answer, Downloaded, MachineStatus, Plain, RecorderState, Settings};
+use super::health::Standing;
 use crate::cli::file::{check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
@@ -135,7 +136,10 @@ impl<P: Port> Operator<P> {
         self.look()?;
         let line = format!("{order:?}");
         match order {
-            Order::Status => self.note(&line, &self.status(), ui),
+            Order::Status => {
+                let health = self.session.health()?.into();
+                self.note(&line, &Standing { status: self.status(), health }, ui);
+            }
             Order::Wait { until, limit } => {
                 self.wait(*until, *limit, ui)?;
                 self.note(&line, &Plain(self.stands()), ui);

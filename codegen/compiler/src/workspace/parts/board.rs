@@ -17,6 +17,7 @@ pub const PART: Part = Part {
         "src/health.rs",
         "src/lib.rs",
         "src/recording.rs",
+        "src/report.rs",
         "src/schedule.rs",
         "src/stepper.rs",
         "src/words.rs",

@@ -14,9 +14,11 @@ pub const PART: Part = Part {
         "src/converters.rs",
         "src/cycles.rs",
         "src/delay.rs",
+        "src/enable.rs",
         "src/lib.rs",
         "src/serial.rs",
         "src/silent.rs",
+        "src/stack.rs",
         "src/timer.rs",
     },
 };

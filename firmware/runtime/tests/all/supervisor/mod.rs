@@ -12,8 +12,8 @@ const SUPERVISION: Supervision<f64> = Supervision {
     rest: 0,
     ramp_step: 5,
     ramp_every: 1,
-    timeout: [5, 5, 10, 5, 201, 3, 40, 50],
-    weight: [1, 1, 1, 1, 100, 1, 1, 1],
+    timeout: [5, 5, 10, 5, 201, 3, 40],
+    weight: [1, 1, 1, 1, 100, 1, 1],
     stuck_motion: 1e-8,
     stuck_samples: 3,
     disagreement: 1e-6,
@@ -60,7 +60,6 @@ fn lasts(cause: Cause, shows: impl Fn(u32) -> bool) -> Option<u32> {
     (0..2000).find(|tick| {
         let shown = match cause {
             Cause::HostGone => Cause::LinkLost,
-            Cause::ConverterSilent => Cause::Converter,
             own => own,
         };
         let present = if shows(*tick) { shown.bit() } else { 0 };

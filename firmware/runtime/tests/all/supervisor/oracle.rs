@@ -25,8 +25,8 @@ pub struct Bounds {
     pub slew_ticks: i64,
     pub samples: i64,
     pub ticks_per_second: i64,
-    /// Ticks until a host that is lost is gone, and until a converter is silent.
-    pub gone_ticks: [i64; 2],
+    /// Ticks until a host that is lost is gone.
+    pub gone_ticks: i64,
     /// Of each axis, or of each leg: m, rad.
     pub tracking: [f64; 6],
     pub gauge_range: [f64; 2],
@@ -47,7 +47,7 @@ impl Bounds {
             samples: 3,
             ticks_per_second: 5000,
             // A host is lost after 2 ticks, in the third of silence; 7 ticks of silence are 1.4 ms.
-            gone_ticks: [6, 7],
+            gone_ticks: 6,
             tracking: [6e-6; 6],
             gauge_range: [-2e-6, 48e-6],
         }
@@ -62,7 +62,7 @@ impl Bounds {
             slew_ticks: 10,
             samples: 6,
             ticks_per_second: 10_000,
-            gone_ticks: [11, 14],
+            gone_ticks: 11,
             tracking: workspace.map(|full| 0.1 * full),
             gauge_range,
         }
@@ -80,7 +80,7 @@ enum Act {
 fn act(cause: u8) -> Act {
     match cause {
         10 | 12 => Act::Off,
-        1..=4 | 13 | 14 => Act::Ramp,
+        1..=4 | 11 | 13 => Act::Ramp,
         _ => Act::Hold,
     }
 }
@@ -110,7 +110,7 @@ pub struct Oracle {
     concerned: u64,
     /// Causes that the readings of the last tick showed, and their counts by cause.
     seen: Vec<u8>,
-    counts: [i64; 15],
+    counts: [i64; 14],
     channels: [Channel; 6],
     lasted: Vec<u8>,
     turn: usize,
@@ -129,7 +129,7 @@ impl Oracle {
             conditions: 0,
             concerned: 0,
             seen: Vec::new(),
-            counts: [0; 15],
+            counts: [0; 14],
             channels: Default::default(),
             lasted: Vec::new(),
             turn: 0,
@@ -156,16 +156,11 @@ impl Oracle {
             self.conditions |= u64::from(channel.present.contains(&true)) << (16 + gauge);
         }
         let mut lasted = std::mem::take(&mut self.lasted);
-        for cause in [1, 2, 6, 7, 8, 11, 13, 14_u8] {
-            // A host that is lost, a converter that does not answer: after a while nobody waits for them.
-            let shown = match cause {
-                13 => 9,
-                14 => 11,
-                other => other,
-            };
+        for cause in [1, 2, 6, 7, 8, 11, 13_u8] {
+            // A host that is lost: after a while nobody waits for it.
+            let shown = if cause == 13 { 9 } else { cause };
             let (limit, weight) = match cause {
-                13 => (self.bounds.gone_ticks[0], 1),
-                14 => (self.bounds.gone_ticks[1], 1),
+                13 => (self.bounds.gone_ticks, 1),
                 6 => (self.bounds.voltage_ticks, 1),
                 7 => (self.bounds.slew_ticks, 1),
                 8 => (self.bounds.ticks_per_second + 1, self.bounds.ticks_per_second),
@@ -236,7 +231,7 @@ impl Oracle {
         self.cause = cause;
         self.good = 0;
         if phase != HOLDING && phase != RAMPING {
-            self.counts = [0; 15];
+            self.counts = [0; 14];
             self.channels = Default::default();
             self.lasted.clear();
         }

@@ -1,0 +1,100 @@
+//! What the ticks have to say, and what they measure it with.
+
+use controller::supervised::{Cause, Phase};
+use specgen_hal::Fault;
+use specgen_link::Health;
+use specgen_runtime::supervisor::OF_GAUGES;
+
+/// What times and stack are measured with.
+#[derive(Debug, Clone, Copy)]
+pub struct Probes {
+    /// Counts in a second of the counter that ticks are timed with; 0 where nothing counts.
+    pub hertz: u32,
+    /// Most bytes of the stack seen in use, and bytes there are. Takes some µs: for the background.
+    pub stack: fn() -> [u32; 2],
+}
+
+impl Probes {
+    /// Where nothing is measured: on a host.
+    pub const NONE: Self = Self { hertz: 0, stack: || [0; 2] };
+}
+
+/// What the ticks have to say.
+#[derive(Debug, Clone, Copy)]
+pub struct Report {
+    /// Ticks since power-up.
+    pub tick: u64,
+    /// What the machine does.
+    pub phase: Phase,
+    /// Why.
+    pub cause: Cause,
+    /// Whether the amplifiers are enabled.
+    pub amplifier_on: bool,
+    /// The controller's status word.
+    pub status: u32,
+    /// Ticks that never came.
+    pub missed: u32,
+    /// All else. Its stack stands at zero until it is asked for.
+    pub health: Health,
+}
+
+impl Report {
+    /// At power-up.
+    pub const NONE: Self = Self {
+        tick: 0,
+        phase: Phase::Disarmed,
+        cause: Cause::None,
+        amplifier_on: false,
+        status: 0,
+        missed: 0,
+        health: Health {
+            events: 0,
+            converter_faults: 0,
+            faults: 0,
+            gauge_faults: 0,
+            overruns: 0,
+            clock: 0,
+            tick: [0; 2],
+            output: [0; 2],
+            latest: 0,
+            stack: [0; 2],
+        },
+    };
+
+    /// A tick has run: when it began after it was due, how long it took, and when after that the next one was due; counts.
+    pub const fn took(&mut self, late: u32, duration: u32, period: u32) {
+        let health = &mut self.health;
+        if late > health.latest {
+            health.latest = late;
+        }
+        last_and_longest(&mut health.tick, duration);
+        if late.saturating_add(duration) > period {
+            health.overruns = health.overruns.saturating_add(1);
+        }
+    }
+
+    /// The outputs changed so many counts after the gauges were sampled.
+    pub(crate) const fn gave_out(&mut self, after: u32) {
+        last_and_longest(&mut self.health.output, after);
+    }
+
+    /// A converter was not believed.
+    pub(crate) const fn converter(&mut self, fault: Fault) {
+        self.health.converter_faults = self.health.converter_faults.saturating_add(1);
+        self.health.faults |= fault.bit();
+    }
+
+    /// The supervisor saw these conditions.
+    pub(crate) const fn conditions(&mut self, conditions: u32) {
+        if conditions & OF_GAUGES != 0 {
+            self.health.gauge_faults = self.health.gauge_faults.saturating_add(1);
+        }
+    }
+}
+
+const fn last_and_longest([last, longest]: &mut [u32; 2], now: u32) {
+    *last = now;
+    if now > *longest {
+        *longest = now;
+    }
+}
