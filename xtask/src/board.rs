@@ -19,8 +19,12 @@ use session::{Host, Session};
 pub const MANIFEST: &str = "tests/board/Cargo.toml";
 /// Where `tests/tests/boards.rs` leaves image and spec of each target.
 const TESTED: &str = "target/tests/boards";
+/// Both; the tests build the second in the soak only, whose HAL is compiled for half a minute.
+const TARGETS: [&str; 2] = ["stm32h743", "stm32f4"];
 /// What is done against data sheets and manuals, and known.
 const KNOWN: [&str; 1] = ["RCC: PLLCKSELR written while a PLL runs"];
+/// In the answer to `status`.
+const STANDS: &str = "; status 0x";
 const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
 
 /// An image, what it was built from, and where its run leaves its files.
@@ -35,7 +39,8 @@ struct Trial {
     cycles: bool,
 }
 
-/// `cargo xtask board SPEC [--target stm32h743|stm32f4] [--cycles | --faults]`; none if the arguments are something else.
+/// `cargo xtask board SPEC [--target stm32h743|stm32f4] [--cycles | --faults]`, or `--tested [--faults]` for the images that the
+/// tests built; none if the arguments are something else.
 pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     let (arguments, with_faults, cycles) = match arguments {
         [rest @ .., "--faults"] => (rest, true, false),
@@ -43,6 +48,7 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
         all => (all, false, false),
     };
     let (spec, target) = match *arguments {
+        ["--tested"] => return Some(tested(root, with_faults)),
         [spec] | [spec, "--target", "stm32h743"] => (spec, "stm32h743"),
         [spec, "--target", "stm32f4"] => (spec, "stm32f4"),
         _ => return None,
@@ -60,7 +66,7 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     report.step("the tool, the engine and specgen", || built(root));
     report.step("the image", || image(&trial));
     if !report.has_failed() {
-        report.step("from boot to a record that replays", || outcome(run(&trial)));
+        report.step("from boot to a record that replays", || outcome(run(&trial, false)));
         if with_faults {
             report.step("faults", || outcome(faults::run(&trial)));
         }
@@ -68,14 +74,30 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     Some(report.finish())
 }
 
-/// For the soak: both images that its tests built, with faults, one after the other: a host does not wait long for a board that
-/// has half a processor.
+fn tested(root: &Path, with_faults: bool) -> ExitCode {
+    let mut report = Report::new(1);
+    report.step("images on the emulated board", || {
+        if with_faults { long(root) } else { each(root, &TARGETS, |trial| run(trial, true)) }
+    });
+    report.finish()
+}
+
+/// For the test run: from boot to a record that replays, of the one image that its tests build.
+pub fn short(root: &Path) -> Outcome {
+    each(root, &TARGETS[..1], |trial| run(trial, true))
+}
+
+/// For the soak: with faults, one image after the other: a host does not wait long for a board that has half a processor.
 pub fn long(root: &Path) -> Outcome {
+    each(root, &TARGETS, |trial| run(trial, false).and_then(|()| faults::run(trial)))
+}
+
+fn each(root: &Path, targets: &[&'static str], work: impl Fn(&Trial) -> Result<(), String>) -> Outcome {
     let prepared = built(root);
     if !matches!(prepared, Outcome::Passed) {
         return prepared;
     }
-    for target in ["stm32h743", "stm32f4"] {
+    for &target in targets {
         let folder = root.join(TESTED).join(target);
         let trial = Trial {
             spec: folder.join("platform.toml"),
@@ -88,7 +110,7 @@ pub fn long(root: &Path) -> Outcome {
         if !trial.image.is_file() {
             return setup::missing(format!("{} is not there; the tests of the boards build it", trial.image.display()));
         }
-        if let Err(why) = run(&trial).and_then(|()| faults::run(&trial)) {
+        if let Err(why) = work(&trial) {
             return Outcome::Failed(why);
         }
     }
@@ -121,7 +143,6 @@ fn built_in(root: &Path) -> PathBuf {
 }
 
 fn image(trial: &Trial) -> Outcome {
-    let _ = fs::remove_dir_all(&trial.folder);
     if let Err(error) = fs::create_dir_all(&trial.folder) {
         return Outcome::Failed(format!("{}: {error}", trial.folder.display()));
     }
@@ -131,13 +152,13 @@ fn image(trial: &Trial) -> Outcome {
     expect_success(build, "see above")
 }
 
-/// From reset to a record, which is replayed.
-fn run(trial: &Trial) -> Result<(), String> {
+/// From reset to a record, which is replayed; `brief` without wave and settings.
+fn run(trial: &Trial, brief: bool) -> Result<(), String> {
     let failed = |error: std::io::Error| format!("{}: {error}", trial.folder.display());
     fs::create_dir_all(&trial.folder).map_err(failed)?;
     fs::write(trial.folder.join("wave.toml"), WAVE).map_err(failed)?;
     let mut session = Session::begin(trial)?;
-    let operated = operate(trial, &mut session);
+    let operated = operate(trial, &mut session, brief);
     let report = session.report()?;
     println!("{}: {}", trial.target, report.text);
     operated.map_err(|why| format!("{}: {why}", trial.target))?;
@@ -157,18 +178,25 @@ fn run(trial: &Trial) -> Result<(), String> {
 }
 
 /// From arming to a record; times are the board's, ms. The record is short: what it holds has to go over the line.
-fn operate(trial: &Trial, session: &mut Session) -> Result<(), String> {
+fn operate(trial: &Trial, session: &mut Session, brief: bool) -> Result<(), String> {
     let settings = format!("config write {}\nstatus", trial.spec.display());
-    let stands = "; status 0x";
     let mut host = Host::of(session.host(trial))?;
-    for (orders, words, time) in [
+    let whole = [
         ("status\narm\nwait holding 60\nrun\nwait running 60\nset command=0\nstatus", ": running", 200.0),
-        ("record arm 300\nwave wave.toml\nstatus", stands, 60.0),
-        (&settings, stands, 20.0),
-        ("record trigger\nstatus", stands, 60.0),
+        ("record arm 300\nwave wave.toml\nstatus", STANDS, 60.0),
+        (&settings, STANDS, 20.0),
+        ("record trigger\nstatus", STANDS, 60.0),
+    ];
+    let short = [
+        ("status\narm\nwait holding 60\nrun\nwait running 60\nset command=0\nstatus", ": running", 0.0),
+        ("record arm 30\nrecord trigger\nstatus", STANDS, 10.0),
+    ];
+    let end = [
         ("record stop\nrecord download run.rec", "wrote ", 0.0),
         ("ramp-down\nwait disarmed 60\nstatus", "disarmed, amplifiers off", 0.0),
-    ] {
+    ];
+    let begin: &[(&str, &str, f64)] = if brief { &short } else { &whole };
+    for &(orders, words, time) in begin.iter().chain(&end) {
         host.order(orders, words)?;
         session.pass(time)?;
     }

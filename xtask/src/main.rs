@@ -25,7 +25,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   test    setup, then formatting, lints, every test, documentation, freshness of generated files, lock files and licences
   soak    every test at full length, mutants, and known defects of packages, for releases; writes tests/soak.txt
   mutants code changed one operator at a time, to see whether a test notices; a sample, `K/N` for another, `all` for all
-  board   SPEC [--target stm32h743|stm32f4] [--cycles | --faults]: a board's image on an emulated board, from boot to a record
+  board   SPEC [--target stm32h743|stm32f4] [--cycles | --faults], or --tested [--faults]: a board's image on an emulated board, from boot to a record
           that replays; with times by a model of the core, or with faults
   fuzz    SECONDS [TARGET]: what comes from outside, under a fuzzer guided by coverage; `fuzz keep` keeps what it found
   bless   writes the generated files that are committed anew

@@ -80,7 +80,7 @@ pub fn setup() -> ExitCode {
 
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
-    let mut report = Report::new(11 + LOCKED.len());
+    let mut report = Report::new(12 + LOCKED.len());
     report.step("cross compiler and QEMU", setup::microcontroller);
     let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
     report.step("formatting", || formatting(root));
@@ -94,6 +94,7 @@ pub fn test(root: &Path) -> ExitCode {
         binaries
     });
     report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
+    report.step("images on the emulated board", || board::short(root));
     report.step("examples in the documentation", || binaries::examples(root));
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
     report.step("orders of shared memory", || SHARED_MEMORY.unless_unchanged(root));

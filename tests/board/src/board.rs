@@ -5,12 +5,13 @@ use specgen_cycles::Cost;
 use crate::ad5686r::Ad5686r;
 use crate::ad7606::Ad7606;
 use crate::dma::Dma;
+use crate::enable::Enable;
 use crate::fault::Fault;
 use crate::gpio::{self, Gpio};
 use crate::line::Line;
 use crate::meter::Meter;
 use crate::nvic::Nvic;
-use crate::part::{DMA_INTERRUPTS, Part, Pin, SPI1, SPI3, TIM2, TIM2_INTERRUPT};
+use crate::part::{DMA_INTERRUPTS, Part, Pin, SPI1, SPI3, TIM1, TIM2, TIM2_INTERRUPT};
 use crate::plant::Plant;
 use crate::rcc::{self, Clocks};
 use crate::spi::Spi;
@@ -50,6 +51,7 @@ struct Devices {
     store: Store,
     gpio: Gpio,
     timer: Timer,
+    enable: Enable,
     /// SPI1 of the ADC, SPI3 of the DACs.
     spi: [Spi; 2],
     dma: Dma,
@@ -69,6 +71,7 @@ impl Devices {
             store,
             gpio: Gpio::default(),
             timer: Timer::default(),
+            enable: Enable::default(),
             spi: [Spi::new(part.family), Spi::new(part.family)],
             dma: Dma::default(),
             usart: Usart::new(part.family, part.usart),
@@ -169,7 +172,7 @@ impl Board {
         self.conditional = 0;
         self.meter = Meter::default();
         self.clocked();
-        self.pins();
+        self.contact();
     }
 
     pub fn say(&mut self, text: &str) {
@@ -196,7 +199,13 @@ impl Board {
         match fault {
             Fault::Adc(fault) => self.adc.fault = Some(fault),
             Fault::Dac(fault) => self.dacs[0].fault = Some(fault),
+            Fault::Stop => self.contact(),
+            Fault::HangStop => {
+                self.faults.extend([Fault::Hang, Fault::Stop]);
+                self.contact();
+            }
             Fault::Uart => self.devices.usart.damaged = true,
+            Fault::Noise => self.devices.usart.noise = true,
             _ => {}
         }
     }
@@ -207,6 +216,14 @@ impl Board {
         self.faults.clear();
         self.adc.heal();
         self.dacs[0].fault = None;
+        self.devices.usart.noise = false;
+        self.contact();
+    }
+
+    /// The emergency contact works on the enable line by itself.
+    fn contact(&mut self) {
+        self.devices.enable.contact(self.has(Fault::Stop));
+        self.pins();
     }
 
     /// The registers of the clocks changed.
@@ -333,7 +350,10 @@ impl Board {
             reset: level(part.adc_reset, false),
             sync: part.dac_select.map(|pin| level(pin, true)),
             ldac: level(part.ldac, true),
-            enable: level(part.enable, false),
+            enable: match part.enable {
+                (pin, channel) if gpio.is_alternate(pin) => self.devices.enable.level(channel),
+                (pin, _) => level(pin, false),
+            },
         };
         let before = std::mem::replace(&mut self.levels, levels);
         if before == levels {
@@ -432,10 +452,9 @@ impl Guest for Board {
             _ if Nvic::has(address) => return devices.nvic.read(address, size),
             _ if within(part.gpio, gpio::SPAN) => {
                 devices.gpio.drive(part.busy, self.adc.busy(self.now));
-                // Closed to ground; open the pull-up is left.
-                devices.gpio.drive(part.stop, self.faults.contains(&Fault::Stop));
                 devices.gpio.read(aligned - part.gpio)
             }
+            _ if within(TIM1, 0x400) => devices.enable.read(aligned - TIM1),
             _ if within(TIM2, 0x400) => {
                 devices.timer.advance(self.advanced, self.now);
                 self.advanced = self.now;
@@ -481,6 +500,10 @@ impl Guest for Board {
                 let offset = aligned - part.gpio;
                 let before = devices.gpio.read(offset);
                 devices.gpio.write(offset, store::merged(before, address, size, value));
+                self.pins();
+            }
+            _ if within(TIM1, 0x400) => {
+                devices.enable.write(aligned - TIM1, value);
                 self.pins();
             }
             _ if within(TIM2, 0x400) => devices.timer.write(aligned - TIM2, value, self.now),

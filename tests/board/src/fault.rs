@@ -12,10 +12,16 @@ pub enum Fault {
     Dac(ad5686r::Fault),
     /// One byte of the link with a framing error.
     Uart,
+    /// Every third one.
+    Noise,
+    /// Nothing is wrong with the board: the host is gone, for the time to be written down.
+    Host,
     /// The background does not come back from its sleep.
     Background,
     /// The core stands still.
     Hang,
+    /// It does, and then the emergency contact opens.
+    HangStop,
     /// The core takes a hard fault.
     Hard,
     /// The supply breaks down and comes back: a reset, with RAM that is no longer what it was.
@@ -23,7 +29,7 @@ pub enum Fault {
 }
 
 /// Names, for commands.
-pub const NAMES: [(&str, Fault); 13] = [
+pub const NAMES: [(&str, Fault); 16] = [
     ("stop", Fault::Stop),
     ("adc-dead", Fault::Adc(ad7606::Fault::Dead)),
     ("adc-endless", Fault::Adc(ad7606::Fault::Endless)),
@@ -33,8 +39,11 @@ pub const NAMES: [(&str, Fault); 13] = [
     ("dac-stuck", Fault::Dac(ad5686r::Fault::Stuck)),
     ("dac-mute", Fault::Dac(ad5686r::Fault::Mute)),
     ("uart", Fault::Uart),
+    ("uart-noise", Fault::Noise),
+    ("host-killed", Fault::Host),
     ("background", Fault::Background),
     ("hang", Fault::Hang),
+    ("hang-stop", Fault::HangStop),
     ("hard-fault", Fault::Hard),
     ("brown-out", Fault::BrownOut),
 ];

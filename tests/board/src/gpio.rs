@@ -37,6 +37,11 @@ impl Gpio {
         self.ports[port].settings[0] >> (2 * pin) & 3 == 1
     }
 
+    /// Whether a peripheral has the pin.
+    pub fn is_alternate(&self, (port, pin): Pin) -> bool {
+        self.ports[port].settings[0] >> (2 * pin) & 3 == 2
+    }
+
     /// The level of a pin.
     pub fn level(&self, pin: Pin) -> bool {
         let (port, number) = pin;

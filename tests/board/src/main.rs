@@ -7,6 +7,7 @@ mod ad7606;
 mod board;
 mod dma;
 mod elf;
+mod enable;
 mod fault;
 mod gpio;
 mod line;

@@ -27,11 +27,12 @@ pub struct Part {
     pub adc_reset: Pin,
     pub dac_select: [Pin; 2],
     pub ldac: Pin,
-    pub enable: Pin,
-    pub stop: Pin,
+    /// With its channel of TIM1.
+    pub enable: (Pin, usize),
 }
 
 /// The same on both.
+pub const TIM1: u32 = 0x4001_0000;
 pub const TIM2: u32 = 0x4000_0000;
 pub const TIM2_INTERRUPT: usize = 28;
 pub const SPI1: u32 = 0x4001_3000;
@@ -69,8 +70,7 @@ pub const H743: Part = Part {
     adc_reset: (E, 9),
     dac_select: [(D, 2), (G, 2)],
     ldac: (G, 3),
-    enable: (E, 11),
-    stop: (G, 12),
+    enable: ((E, 11), 2),
 };
 
 pub const F446: Part = Part {
@@ -91,6 +91,5 @@ pub const F446: Part = Part {
     adc_reset: (B, 10),
     dac_select: [(D, 2), (C, 8)],
     ldac: (C, 6),
-    enable: (C, 9),
-    stop: (A, 8),
+    enable: ((A, 8), 1),
 };
