@@ -6,6 +6,7 @@ mod board_support;
 mod boards;
 mod budgets;
 mod dynamics;
+mod dynamics_load;
 mod emitted;
 mod features;
 mod figures;

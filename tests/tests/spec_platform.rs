@@ -8,8 +8,8 @@ use std::fs;
 use crate::support::specs::{errors, folder_with_records, source};
 use specgen::diagnostic::{codes, render};
 use specgen::model::{
-    AdaptationMode, ControlMode, Environment, Frames, Gains, Interaction, Mcu, Model, PaperPath, Probe, Scalar,
-    SetpointKind, SetpointRules, TaskSpace, Trajectory, TrajectoryKind,
+    AdaptationMode, ControlMode, DynamicsChoice, Environment, Frames, Gains, Interaction, Mcu, Model, PaperPath, Probe,
+    Scalar, SetpointKind, SetpointRules, TaskSpace, Trajectory, TrajectoryKind,
 };
 use specgen::spec::{self, SpecSource};
 use specgen_tests::repository;
@@ -87,6 +87,8 @@ fn every_value_of_the_reference_is_in_si() {
         velocity_cutoff: 1.9e4,
         interaction: Interaction::None,
         environment: Environment { stiffness: [0.0; 6], rest: NO_POSE },
+        dynamics: DynamicsChoice::Cheapest,
+        dynamics_tolerance: None,
         lead: 1e-4,
         transfer_time: 0.05,
         setpoint: SetpointRules {

@@ -9,9 +9,9 @@ mod task_space;
 use serde::Serialize;
 
 pub use permitted::*;
-use specgen_runtime::Platform;
 use specgen_runtime::dynamics::Leg;
 use specgen_runtime::supervisor::TIMERS;
+use specgen_runtime::{Platform, Real};
 pub use task_space::*;
 
 /// Number of legs.
@@ -172,33 +172,35 @@ pub struct DynamicsLeg {
 }
 
 impl Dynamics {
-    /// As the runtime takes it.
+    /// As the runtime takes it, in numbers of any kind.
     #[must_use]
-    pub fn platform(&self) -> Platform<f64> {
+    pub fn platform<T: Real>(&self) -> Platform<T> {
+        let number = T::from_f64;
+        let vector = |values: [f64; 3]| values.map(number);
         Platform {
             legs: self.legs.each_ref().map(|leg| Leg {
-                base: leg.base,
-                joint: leg.joint,
-                arm: leg.arm,
-                rest: leg.rest,
-                length: leg.length,
-                inverse_length: leg.inverse_length,
-                half_inverse_square: leg.half_inverse_square,
+                base: vector(leg.base),
+                joint: vector(leg.joint),
+                arm: vector(leg.arm),
+                rest: vector(leg.rest),
+                length: number(leg.length),
+                inverse_length: number(leg.inverse_length),
+                half_inverse_square: number(leg.half_inverse_square),
             }),
             places: self.places,
             rows: self.rows,
             flat_base: self.flat_base,
             flat_platform: self.flat_platform,
-            base_depth: self.base_depth,
-            pole: self.pole,
-            mass: self.mass,
-            first_moment: self.first_moment,
-            pole_moment: self.pole_moment,
-            second_moment: self.second_moment,
-            extensible_moment: self.extensible_moment,
-            leg_inertia: self.leg_inertia,
-            leg_weight_moment: self.leg_weight_moment,
-            gravity: self.gravity,
+            base_depth: number(self.base_depth),
+            pole: vector(self.pole),
+            mass: number(self.mass),
+            first_moment: vector(self.first_moment),
+            pole_moment: vector(self.pole_moment),
+            second_moment: self.second_moment.map(vector),
+            extensible_moment: number(self.extensible_moment),
+            leg_inertia: number(self.leg_inertia),
+            leg_weight_moment: number(self.leg_weight_moment),
+            gravity: number(self.gravity),
         }
     }
 

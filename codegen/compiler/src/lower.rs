@@ -8,6 +8,7 @@ mod gauge_converter;
 mod integrity;
 mod kinematics;
 mod linear;
+mod load;
 mod permitted;
 mod rate;
 mod sensing;
@@ -18,10 +19,11 @@ mod task_space;
 pub use dynamics::{GRAVITY, platform};
 pub(crate) use integrity::digest;
 pub use kinematics::{inverse_jacobian, joint_positions, leg_jacobian};
+pub use load::describe as describe_load;
 pub(crate) use sensing::seen;
 pub use sensing::{PoseNoise, pose_noise};
 
-use crate::ir::{Bounds, Defaults, Hysteresis, Ir, Law, Scalar, Sensing, Setpoint, Setpoints, TaskSpace};
+use crate::ir::{Bounds, Defaults, Hysteresis, Ir, Law, Load, Scalar, Sensing, Setpoint, Setpoints, TaskSpace};
 use crate::stability::platform::{Design, RestDynamics};
 use specgen_identify::everett::EverettTable;
 use specgen_language::diagnostic::Diagnostic;
@@ -69,8 +71,12 @@ pub fn lower(
         period: model.timing.period,
         leg_gain: model.actuator.leg_gain(),
     };
+    let dynamics = dynamics::lower(model, scalar)?;
     let task_space = match (&model.task_space, task) {
-        (Some(task), Some((design, setpoints))) => Some(task_space(model, task, scalar, design, setpoints)?),
+        (Some(task), Some((design, setpoints))) => {
+            let load = load::lower(model, task, scalar, &dynamics, &setpoints, actuation.volts_per_code)?;
+            Some(task_space(model, task, scalar, design, setpoints, load)?)
+        }
         _ => None,
     };
     let integrity = integrity::lower(
@@ -92,7 +98,7 @@ pub fn lower(
         specgen_version: env!("CARGO_PKG_VERSION").to_owned(),
         scalar,
         kinematics: kinematics::lower(model, scalar)?,
-        dynamics: dynamics::lower(model, scalar)?,
+        dynamics,
         supervision: supervision::lower(model, &hysteresis, &actuation, max_step, scalar)?,
         hysteresis,
         bounds: Bounds {
@@ -133,6 +139,7 @@ fn task_space(
     scalar: Scalar,
     design: &Design,
     setpoints: Setpoints,
+    load: Load,
 ) -> Result<TaskSpace, Vec<Diagnostic>> {
     let platform = platform(model)?;
     let rest = RestDynamics::of(&platform);
@@ -140,6 +147,7 @@ fn task_space(
     Ok(TaskSpace {
         sensing: sensing::lower(model, task, scalar)?,
         setpoints,
+        load,
         law: task_space::law(model, task, scalar, &rest, &rest_force, design),
         defaults: task_space::defaults(model, task, scalar, design),
     })

@@ -26,8 +26,8 @@ pub use supervisor::{Robust, Supervisor};
 pub use target::{Budget, ControllerOptions, Lint, Requirements, Scalar, SetpointKind, Target, Timing, TrackingLimit};
 pub(crate) use task_space::unit;
 pub use task_space::{
-    ControlMode, Environment, Frames, Gains, Interaction, LARGEST_GAIN, PaperPath, Probe, SetpointRules, TaskSpace,
-    Trajectory, TrajectoryKind,
+    ControlMode, DynamicsChoice, Environment, Frames, Gains, Interaction, LARGEST_GAIN, PaperPath, Probe,
+    SetpointRules, TaskSpace, Trajectory, TrajectoryKind,
 };
 
 /// Every section, in the order of the reference. Sections that hold others come before them.

@@ -1,9 +1,9 @@
 //! The controller's kernels on the compiler's numbers. Generic code is compiled by the crate that names its types: named
 //! here, the kernels are compiled once, and optimised.
 
-use specgen_runtime::{Gauges, Legs, Platform, Real, Series};
+use specgen_runtime::{Gauges, Legs, Motion, Platform, Real, Series};
 
-use crate::{Double, Traced};
+use crate::{Double, Expansion, Taylor, Traced, expand};
 
 /// Displacements of the legs from rest at `pose` (m and rad), m: [`Platform::displacements`].
 #[must_use]
@@ -15,6 +15,16 @@ pub fn displacements(platform: &Platform<f64>, pose: &[f64; 6]) -> [f64; 6] {
 #[must_use]
 pub fn jacobian(platform: &Platform<f64>, pose: &[f64; 6]) -> [[f64; 6]; 6] {
     platform.jacobian(pose)
+}
+
+/// [`Platform::leg_forces`] of every motion up to ± `widths` (pose, rate, acceleration; m, rad, s), N: expanded at rest. Also the number
+/// of operations.
+#[must_use]
+pub fn leg_forces(platform: &Platform<Taylor>, widths: &[f64; 18]) -> ([Expansion; 6], usize) {
+    expand(widths, |variables| {
+        let six = |first: usize| core::array::from_fn(|k| variables[first + k]);
+        platform.leg_forces(&Motion { pose: six(0), rate: six(6), acceleration: six(12) })
+    })
 }
 
 /// A number with the controller's kinematics and gauges compiled for it.

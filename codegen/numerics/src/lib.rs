@@ -8,10 +8,11 @@
 //! | [`diagonalize`] | eigenvalues of a symmetric matrix of any size, by Jacobi rotations |
 //! | [`Double`] | numbers of 106 bits: the reference for rounding errors |
 //! | [`Traced`] | numbers that record every operation: bounds of rounding errors over a box of poses |
+//! | [`Taylor`] | numbers that are polynomials of a motion: expansion at rest, and a bound of what it leaves out |
 //! | [`ewma_limit`], [`pcc_limit`] | Jury limits of the run-to-run laws |
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
 //! | [`largest`] | where a condition ceases to hold, by bisection |
-//! | [`Kernels`], [`displacements`], [`jacobian`] | the controller's kernels on these numbers, compiled here |
+//! | [`Kernels`], [`displacements`], [`jacobian`], [`leg_forces`] | the controller's kernels on these numbers, compiled here |
 //!
 //! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
 
@@ -26,6 +27,7 @@ pub mod nnls;
 mod search;
 mod space;
 mod symmetric;
+mod taylor;
 mod traced;
 
 pub use double::Double;
@@ -33,9 +35,10 @@ pub use eigenvalues::{eigenvalues, spectral_radius};
 pub use exponential::exponential;
 pub use form::magnitude;
 pub use jury::{ewma_limit, pcc_limit};
-pub use kernels::{Kernels, displacements, jacobian};
+pub use kernels::{Kernels, displacements, jacobian, leg_forces};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
 pub use search::largest;
 pub use space::{cross, dot, norm, rotation};
 pub use symmetric::{diagonalize, generalized_modes, inverse_of_modes, symmetric_eigen};
+pub use taylor::{Expansion, Taylor, expand};
 pub use traced::{Trace, Traced, trace};

@@ -34,10 +34,10 @@ pub const STAGES: [Stage; STAGE_COUNT] = [
 pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
     crate::step::sense(config, state, &input.gauge);
     state.generator.tick(&SETPOINTS, &input.command);
-    let load = known_load(config, state);
+    let (demand, _) = known_load(config, state);
     let correction = correction(config, state);
     for (index, leg) in state.legs.iter_mut().enumerate() {
-        leg.excess = load.displacement[index] + correction[index];
+        leg.excess = demand[index] + correction[index];
     }
 }
 
@@ -67,11 +67,9 @@ extern "C" fn dynamics(_config: &Config, state: &mut State, _input: &TickInput, 
     state.error = leg_forces(state.generator.target());
 }
 
-/// The same with the interaction force, and with the leg displacements.
+/// Motion to leg displacements and to what the legs give way, as the tick takes it.
 extern "C" fn load(config: &Config, state: &mut State, _input: &TickInput, _leg: usize) {
-    let load = known_load(config, state);
-    state.error = load.displacement;
-    state.wrench = load.force;
+    (state.error, state.wrench) = known_load(config, state);
 }
 
 /// Γ⁻¹ of one leg: displacement to drive.

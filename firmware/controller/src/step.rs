@@ -25,17 +25,16 @@
 //! δ̂ and φ̂ are kept in modal coordinates, where N works: with the same weights on every leg the law commutes with the map
 //! between them, and one map takes feedback and estimates to the legs, J⁻ᵀF/k_a − δ̂ − φ̂ = J V (V⁻¹K⁻¹F − δ̂ − φ̂).
 
-use crate::dynamics::Load;
 use crate::hysteresis::{TABLES, Table};
 use crate::limits::DAC;
 use crate::notch::{modal_error, notch_error, notch_innovation};
 use crate::setpoint::SETPOINTS;
 use crate::task_space::{
-    CELLS_PER_METRE, COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, METRES_PER_CELL, MODES_TO_LEGS,
-    PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
+    AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, METRES_PER_CELL,
+    MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
 };
 use crate::tick::WRENCH_FAULT;
-use crate::{Config, LEGS, LegState, Real, State, TickInput, TickOutput, dynamics, sensing};
+use crate::{Config, LEGS, LegState, Real, State, TickInput, TickOutput, dynamics, kinematics, sensing};
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, transform};
 use specgen_runtime::setpoint::CommandKind;
@@ -57,12 +56,9 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
     let wrench_good = take_wrench(config, state, &input.wrench);
     let damping = damping(config, state);
     let setpoint_status = state.generator.tick_as(&SETPOINTS, kind, &input.command);
-    let Load { displacement: demand, force } = known_load(config, state);
+    let (demand, load) = known_load(config, state);
     let correction = correction(config, state);
-    state.load = each(|leg| {
-        let load = (force[leg] - REST_FORCE[leg]) * COMPLIANCE;
-        if LEAD == 0.0 { load } else { load + (demand[leg] - state.demand[leg]) * LEAD }
-    });
+    state.load = if LEAD == 0.0 { load } else { each(|leg| load[leg] + (demand[leg] - state.demand[leg]) * LEAD) };
     state.demand = demand;
     if let Some(damping) = &damping {
         state.load = each(|leg| state.load[leg] + damping[leg]);
@@ -236,19 +232,25 @@ fn damping(config: &Config, state: &State) -> Option<[Real; LEGS]> {
     Some(transform(&WRENCH_TO_LEGS, &force_of(&config.active_gains().derivative, &error)))
 }
 
-/// Leg displacements at the set-point, and the leg forces that the motion, gravity and the work piece take, (7).
+/// Leg displacements at the set-point, and by how much the legs give way to motion, gravity and the work piece there, (7); m.
 #[inline]
-pub(crate) fn known_load(config: &Config, state: &State) -> Load<Real> {
+pub(crate) fn known_load(config: &Config, state: &State) -> ([Real; LEGS], [Real; LEGS]) {
     let target = state.generator.target();
-    match config.interaction() {
-        Interaction::Neglected => dynamics::load(target, None),
-        Interaction::Measured => dynamics::load(target, Some(&state.wrench)),
+    let wrench = match config.interaction() {
+        Interaction::Neglected => {
+            if let Some(affine) = &AFFINE_LOAD {
+                return (kinematics::leg_displacements(&target.pose), affine.deflection(target));
+            }
+            None
+        }
+        Interaction::Measured => Some(state.wrench),
         Interaction::Modelled => {
             let environment = config.environment();
-            let compressed = difference(&environment.rest, &target.pose);
-            dynamics::load(target, Some(&force_of(&environment.stiffness, &compressed)))
+            Some(force_of(&environment.stiffness, &difference(&environment.rest, &target.pose)))
         }
-    }
+    };
+    let load = dynamics::load(target, wrench.as_ref());
+    (load.displacement, each(|leg| (load.force[leg] - REST_FORCE[leg]) * COMPLIANCE))
 }
 
 /// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂: m of each leg.

@@ -30,6 +30,7 @@
 //! pivot near zero: results are then wrong, and for absurd arguments not finite. Callers accept poses of the declared
 //! workspace only, over which the compiler checks lengths and pivots.
 
+mod affine;
 mod attitude;
 mod balance;
 mod lanes;
@@ -37,6 +38,7 @@ mod leg;
 
 pub use crate::motion::Motion;
 use crate::real::Real;
+pub use affine::Affine;
 use attitude::Attitude;
 use balance::Balance;
 use leg::{Common, Round};

@@ -38,11 +38,9 @@ impl<T: Real> Legs<'_, T> {
         let mut displacements = [T::ZERO; 6];
         for (leg, displacement) in displacements.iter_mut().enumerate() {
             let p = &self.platform_joint[leg];
-            let moved = [
-                x + turn[0][0] * p[0] + turn[0][1] * p[1] + turn[0][2] * p[2],
-                y + turn[1][0] * p[0] + turn[1][1] * p[1] + turn[1][2] * p[2],
-                z + turn[2][0] * p[0] + turn[2][1] * p[1] + turn[2][2] * p[2],
-            ];
+            let add = |sum: T, constant: T, value: T| if constant == T::ZERO { sum } else { sum + value * constant };
+            let by = |place: T, turn: &[T; 3]| add(add(add(place, p[0], turn[0]), p[1], turn[1]), p[2], turn[2]);
+            let moved = [by(x, &turn[0]), by(y, &turn[1]), by(z, &turn[2])];
             *displacement = extension(&self.rest_leg[leg], self.rest_length[leg], self.newton_steps, &moved);
         }
         displacements

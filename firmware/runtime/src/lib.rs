@@ -76,7 +76,7 @@ pub use creep::{Creep, CreepEverett, CreepMemory};
 pub use dac::{CodeLimits, Dac};
 pub use digest::Digest;
 pub use dynamic::{DynamicEverett, DynamicMemory};
-pub use dynamics::{Load, Platform};
+pub use dynamics::{Affine, Load, Platform};
 pub use everett::Everett;
 pub use feedback::{Gains, Integral};
 pub use kinematics::Legs;

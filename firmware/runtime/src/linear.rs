@@ -8,17 +8,15 @@ pub fn each<T>(f: impl Fn(usize) -> T) -> [T; 6] {
     [f(0), f(1), f(2), f(3), f(4), f(5)]
 }
 
-/// `matrix · vector`; every sum from the first column to the last. Entries that are zero are left out, so that with a matrix
-/// known to the compiler they cost nothing.
+/// `matrix · vector`; every sum from the first column to the last, all six side by side: none waits for its own last product. Entries
+/// that are zero are left out, so that with a matrix known to the compiler they cost nothing.
 #[inline(always)]
 #[must_use]
 pub fn transform<T: Real>(matrix: &[[T; 6]; 6], vector: &[T; 6]) -> [T; 6] {
-    each(|row| {
-        let [a, b, c, d, e, f] = matrix[row];
-        // −0 is what a sum begins with that adds nothing to its first term.
-        let half = plus(plus(plus(-T::ZERO, a, vector[0]), b, vector[1]), c, vector[2]);
-        plus(plus(plus(half, d, vector[3]), e, vector[4]), f, vector[5])
-    })
+    let add = |sums: [T; 6], column: usize| each(|row| plus(sums[row], matrix[row][column], vector[column]));
+    // −0 is what a sum begins with that adds nothing to its first term.
+    let half = add(add(add([-T::ZERO; 6], 0), 1), 2);
+    add(add(add(half, 3), 4), 5)
 }
 
 #[inline(always)]

@@ -7,7 +7,9 @@ use specgen::diagnostic::Diagnostic;
 use specgen::everett::EverettTable;
 use specgen::ir::{Ir, Sensing};
 use specgen::lower;
-use specgen::model::{ControlMode, Environment, Frames, Interaction, Model, Probe, Scalar, SetpointRules, TaskSpace};
+use specgen::model::{
+    ControlMode, DynamicsChoice, Environment, Frames, Interaction, Model, Probe, Scalar, SetpointRules, TaskSpace,
+};
 use specgen::stability::platform::{self, RestDynamics};
 use specgen_runtime::{Gauges, Legs, Real, Series};
 use specgen_tests::repository;
@@ -32,6 +34,8 @@ pub fn model(probes: [Probe; 6]) -> Model {
         velocity_cutoff: 2000.0,
         interaction: Interaction::None,
         environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
+        dynamics: DynamicsChoice::Cheapest,
+        dynamics_tolerance: None,
         lead: 0.0,
         transfer_time: 0.1,
         setpoint: SetpointRules {

@@ -11,8 +11,8 @@ use super::ui::{Failure, Outcome, Ui};
 use crate::{lint, precision, reach, stability};
 use specgen_compiler::compile::{Compiled, Refused};
 use specgen_compiler::lint::paths::PathDemand;
-use specgen_compiler::lower::PoseNoise;
 use specgen_compiler::lower::setpoint::{self, Stopping};
+use specgen_compiler::lower::{self, PoseNoise};
 use specgen_compiler::precision::Precision;
 use specgen_compiler::reach::Reach;
 use specgen_compiler::stability::Margins;
@@ -145,6 +145,9 @@ pub fn describe(compiled: &Compiled) -> String {
             compiled.model.actuator.slew_rate * 1e-3,
             demand.deflection * 1e9
         );
+    }
+    if let Some(task) = &compiled.ir.task_space {
+        text.push_str(&lower::describe_load(&task.load));
     }
     if !compiled.stops.is_empty() {
         text.push_str(&setpoint::describe_stops(&compiled.stops));

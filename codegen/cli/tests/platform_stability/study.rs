@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use specgen::model::{ControlMode, Environment, Frames, Interaction, Model, Probe, SetpointRules, TaskSpace};
+use specgen::model::{
+    ControlMode, DynamicsChoice, Environment, Frames, Interaction, Model, Probe, SetpointRules, TaskSpace,
+};
 use specgen::spec::{self, SpecSource};
 use specgen::stability::platform::RestDynamics;
 
@@ -70,6 +72,8 @@ pub fn model() -> (Model, TaskSpace) {
         velocity_cutoff: std::f64::consts::TAU * 3500.0,
         interaction: Interaction::None,
         environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
+        dynamics: DynamicsChoice::Cheapest,
+        dynamics_tolerance: None,
         lead: 0.0,
         transfer_time: 0.05,
         setpoint: SetpointRules {

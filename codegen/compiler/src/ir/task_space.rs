@@ -13,8 +13,54 @@ pub struct TaskSpace {
     pub setpoints: Setpoints,
     /// Constants of the control law.
     pub law: ControlLaw,
+    /// How the load of the legs is computed.
+    pub load: Load,
     /// Config at start-up.
     pub defaults: PlatformDefaults,
+}
+
+/// The load p of the legs under motion and gravity, (7), where no interaction force is fed forward.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Load {
+    /// To first order; none: by the whole kernel.
+    pub affine: Option<Affine>,
+    /// Largest error permitted within the limits of moves and trajectories, m of a leg.
+    pub tolerance: f64,
+    /// What is proven of the first order: for moves and trajectories; for stops from any declared speed; for whatever a stream may
+    /// state.
+    pub bounds: [LoadBound; 3],
+    /// Operations of the whole kernel and of the first order.
+    pub operations: [usize; 2],
+}
+
+/// p = P h + Q ḧ.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Affine {
+    /// P, a row by leg, m/m and m/rad.
+    pub pose: [[f64; 6]; LEGS],
+    /// Q, a row by leg, m/(m/s²) and m/(rad/s²).
+    pub acceleration: [[f64; 6]; LEGS],
+}
+
+impl Affine {
+    /// Terms that are not zero.
+    #[must_use]
+    pub fn terms(&self) -> usize {
+        self.pose.iter().chain(&self.acceleration).flatten().filter(|entry| **entry != 0.0).count()
+    }
+}
+
+/// No motion of a set takes a leg further.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoadBound {
+    /// Largest rate of each coordinate, m/s and rad/s.
+    pub rate: [f64; 6],
+    /// Largest acceleration, m/s² and rad/s².
+    pub acceleration: [f64; 6],
+    /// |p|, m.
+    pub load: f64,
+    /// What the first order leaves of it, m.
+    pub error: f64,
 }
 
 /// Constants of (7), at rest.

@@ -3,6 +3,7 @@
 
 mod check;
 mod declared;
+pub(super) mod motions;
 mod paper;
 mod poses;
 mod segments;

@@ -75,6 +75,16 @@ choice! {
     }
 }
 
+choice! {
+    /// How the load of the legs under motion and gravity is computed.
+    DynamicsChoice {
+        /// To first order where that is proven to do, else by the whole kernel.
+        Cheapest = "cheapest",
+        /// By the whole kernel.
+        Whole = "whole",
+    }
+}
+
 section! {
     /// The task-space controller of section 4. With it the six gauges see the platform ([[gauge]]); without it each leg has its own gauge and its own feed-forward.
     ///
@@ -92,6 +102,10 @@ section! {
         velocity_cutoff = BANDWIDTH, Rule("0.6 pi rad / period"), "" ["cutoff", "velocity_filter"], "9e3 rad/s";
         /// Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words.
         interaction: Interaction = one_of(Interaction::WORDS), Default("none"), "", "none";
+        /// How the load of the legs under motion and gravity, J^-T (M ddh + C dh + G) of (7), is computed: to first order in pose and acceleration if the error of that is proven to be within `dynamics_tolerance` for all moves and trajectories, or always by the whole kernel. With an interaction force it is always the whole.
+        dynamics: DynamicsChoice = one_of(DynamicsChoice::WORDS), Default("cheapest"), "", "whole";
+        /// Largest error of a leg's displacement that the first order may make, over the workspace and the limits of moves and trajectories.
+        dynamics_tolerance: Option<f64> = one(Dimension::LENGTH, Range::above(0.0, 1e-3), "nm"), Rule("a tenth of the converter's step, as displacement of a leg"), "", "0.1 nm";
         /// Time by which the leg displacements are asked for early, in proportion to their rate: about the amplifier lag less one period. Takes out part of the lag of fast motion; a set-point that steps is overshot by step x lead / period for one tick.
         lead: f64 = one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Default("0 ms"), "", "0.2 ms";
         /// Time constant with which the offset of a change of mode fades, where neither estimates nor an integral on every axis take it over, as in F with Invhys.

@@ -14,6 +14,18 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         quote! { [#([#rows]),*] }
     };
     let law = &task.law;
+    let load = task.load.affine.as_ref().map_or_else(
+        || quote! { None },
+        |affine| {
+            let (pose, acceleration) = (matrix(&affine.pose), matrix(&affine.acceleration));
+            quote! { Some(Affine { pose: #pose, acceleration: #acceleration }) }
+        },
+    );
+    let load_doc = format!(
+        " To first order the legs give way to inertia and gravity by P h + Q ḧ: at most {:.3e} m off in moves and trajectories, {:.1e} in stops; \
+         from `control.dynamics`. None: by the whole kernel.",
+        task.load.bounds[0].error, task.load.bounds[1].error
+    );
     let (period, compliance) = (real(law.period), real(law.compliance));
     let (wrench_to_legs, legs_to_wrench) = (matrix(&law.wrench_to_legs), matrix(&law.legs_to_wrench));
     let force_to_modes = matrix(&law.force_to_modes);
@@ -26,7 +38,7 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     quote! {
         #![doc = " Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics."]
 
-        use specgen_runtime::{Notch, Section};
+        use specgen_runtime::{Affine, Notch, Section};
 
         use crate::{LEGS, Real};
 
@@ -44,6 +56,8 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const LEGS_TO_MODES: [[Real; 6]; 6] = #legs_to_modes;
         /// J V: the modes as leg displacements.
         pub const MODES_TO_LEGS: [[Real; 6]; LEGS] = #modes_to_legs;
+        #[doc = #load_doc]
+        pub const AFFINE_LOAD: Option<Affine<Real>> = #load;
         /// Leg forces under which the gauges were zeroed: gravity at rest, N.
         pub const REST_FORCE: [Real; LEGS] = [#rest_force];
         /// Largest |component| of the measured wrench that is believed, N and N m; from `control.interaction`.

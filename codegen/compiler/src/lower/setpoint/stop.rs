@@ -26,7 +26,7 @@ const BENT: f64 = 0.05;
 /// Share of the time of a stop from the largest speed that the shortest one takes, over three.
 const SHORTEST_THIRDS: i32 = 2;
 /// Peak deceleration and peak jerk of a stop from a rate of 1 that takes a time of 1.
-const PEAK: f64 = 1.5;
+pub(super) const PEAK: f64 = 1.5;
 const SLOPE: f64 = 6.0;
 
 /// Limits of stops, per s² and s³, m and rad, along the user's axes.

@@ -19,6 +19,7 @@ pub const PART: Part = Part {
         "src/digest.rs",
         "src/dynamic.rs",
         "src/dynamics.rs",
+        "src/dynamics/affine.rs",
         "src/dynamics/attitude.rs",
         "src/dynamics/balance.rs",
         "src/dynamics/lanes.rs",
