@@ -252,6 +252,13 @@ fn build(
                     mcu.part().name
                 ));
             }
+            if compiled.model.sensor.lag == 0.0 {
+                made.notes.push(
+                    "the AD7606 of this board filters its inputs, and the spec has no `sensor.lag`: write \"15 us\" or more, so \
+                     that stability and margins contain it"
+                        .to_owned(),
+                );
+            }
             if measure {
                 made.measurement = emulate(compiled, folders, None, &mut made.notes, ui)?;
             }
