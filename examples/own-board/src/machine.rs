@@ -182,7 +182,7 @@ impl Link {
         let mut bytes = [0; 64];
         while self.uart.read_ready().unwrap_or(false) {
             // A frame in which a byte was lost has a wrong CRC, and the host asks again.
-            let count = self.uart.read(&mut bytes).unwrap_or(0);
+            let Ok(count) = self.uart.read(&mut bytes) else { break };
             for byte in bytes.iter().take(count) {
                 let mut visit = Visit { desk: &mut self.desk, with: &mut *with };
                 if let Some(answer) = self.endpoint.push(*byte, &mut visit) {
