@@ -265,6 +265,7 @@ fn a_recorded_run_stands_beside_the_simulation_of_its_commands() {
             "The run is whole",
             "the simulation of the same commands gives",
             "late ticks",
+            "at a limit",
             "equal over",
             "id=\"errors\"",
             "id=\"spectra\"",

@@ -205,9 +205,9 @@ fn margin_card(compiled: &Compiled, verdict: &Verdict, mode: u32) -> String {
     if let Some((own, settling)) = own.and_then(|own| Some((own, own.settling?))) {
         let least = own.modes.iter().min_by(|a, b| a.damping_ratio.total_cmp(&b.damping_ratio));
         let least = least.map_or_else(String::new, |mode| {
-            format!("; {:.0}\u{2009}Hz has ζ {:.3}", mode.frequency, mode.damping_ratio)
+            format!("; ζ {:.3} at {:.0}\u{2009}Hz", mode.damping_ratio, mode.frequency)
         });
-        let text = format!("{:.0}\u{2009}ms, {}{least}", settling * 1e3, margins::name(law));
+        let text = format!("{:.0}\u{2009}ms, {}{least}", settling * 1e3, margins::short_name(law));
         content += &text_row("settles in", &text, "none");
     }
     let stable = design.margins.iter().filter(|one| one.spectral_radius < 1.0).count();

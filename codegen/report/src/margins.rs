@@ -34,6 +34,12 @@ pub fn name(law: Law) -> String {
     }
 }
 
+/// The same in a narrow place.
+#[must_use]
+pub fn short_name(law: Law) -> String {
+    law.name().replace("invhys", "Invhys").replace("ewma", "EWMA").replace("pcc", "PCC")
+}
+
 /// A law of adaptation as people write it: `invhys`, `ewma` or `pcc`.
 #[must_use]
 pub fn adapting_name(word: &str) -> &'static str {
@@ -176,7 +182,7 @@ fn control_modes(compiled: &Compiled, design: &Design, own: Law) -> Rows {
         let end = if ends[0] > ends[1] { ends[0] } else { ends[1] };
         furthest = if end > furthest { end } else { furthest };
         rows.push(json!({
-            "name": one.law.name().replace("invhys", "Invhys").replace("ewma", "EWMA").replace("pcc", "PCC"),
+            "name": short_name(one.law),
             "line": [high, end], "marks": marks, "box": one.law == own,
             "note": format!("{} · {}", text(one.gain_ratio_limit, "> 10"), text(one.gain_margin, "–")),
         }));

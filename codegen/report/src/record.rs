@@ -16,7 +16,7 @@ use core::f64::consts::TAU;
 use specgen_compiler::stability::platform::Law;
 use specgen_toolchain::budget::group;
 
-const GAUGES: [&str; 6] = ["gauge 1", "gauge 2", "gauge 3", "gauge 4", "gauge 5", "gauge 6"];
+const GAUGES: [&str; 6] = ["gauge 0", "gauge 1", "gauge 2", "gauge 3", "gauge 4", "gauge 5"];
 /// Points of a loop, at most.
 const POINTS: usize = 500;
 const RECORDED: &str = "recorded";
@@ -43,6 +43,8 @@ pub struct Sample {
     pub voltage: [f64; 6],
     /// Event bit of a tick that was late or left out.
     pub late: bool,
+    /// Whether a leg was at the end of its stroke, voltage or slew rate.
+    pub limited: bool,
 }
 
 /// A recorded run.
@@ -184,9 +186,15 @@ fn first(compiled: &Compiled, run: &Run) -> Vec<Part> {
         &format!("{} blocks", run.damaged.len()),
         if run.damaged.is_empty() { "ok" } else { "warning" },
     );
+    let limited = run.recorded.iter().filter(|sample| sample.limited).count() as u64;
+    content += &text_row(
+        "at a limit",
+        &format!("{} ticks with a leg at its end", count(limited)),
+        if limited == 0 { "ok" } else { "warning" },
+    );
     content += &text_row("faults", &run.faults.to_string(), if run.faults == 0 { "ok" } else { "error" });
     content += &match &run.bits {
-        Ok(ticks) => text_row("bits", &format!("equal over {} ticks when run again", count(*ticks)), "ok"),
+        Ok(ticks) => text_row("bits", &format!("equal over {} ticks", count(*ticks)), "ok"),
         Err(why) => text_row("bits", why, "error"),
     };
     let whole = card("Is the run whole?", "", "", &content);

@@ -14,6 +14,7 @@ use specgen_runtime::record::Reason;
 use specgen_runtime::supervisor::MISSED_TICK;
 
 use super::beside;
+use crate::cli::sim::platform::LEG_LIMITED;
 use crate::cli::sim::{emitted, environment};
 use crate::cli::ui::{Failure, Ui};
 
@@ -74,6 +75,7 @@ pub(super) struct Words {
     pub(super) wrench: Option<[usize; 6]>,
     pub(super) events: usize,
     voltage: [usize; 6],
+    status: usize,
     /// Among the outputs, or among the inputs.
     target: Result<[usize; 6], [usize; 6]>,
     measured: Result<[usize; 6], [usize; 6]>,
@@ -106,6 +108,7 @@ impl Words {
             wrench: inputs("wrench"),
             events: names.iter().position(|name| name == "events").ok_or_else(lacking)?,
             voltage: description.outputs("voltage").map_err(environment)?,
+            status: description.output("status").map_err(environment)?,
             target: either("target", setpoint),
             measured: either("pose", gauge),
             jacobian,
@@ -145,6 +148,7 @@ impl Words {
             measured,
             leg,
             voltage: six(&self.voltage, output),
+            limited: output[self.status] & u64::from(LEG_LIMITED) != 0,
             late: input[self.events] & u64::from(MISSED_TICK) != 0,
         }
     }

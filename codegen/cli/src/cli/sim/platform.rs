@@ -43,7 +43,7 @@ const MACHINING: [(&str, u32); 3] = [PLATFORM_MODES[0], PLATFORM_MODES[3], PLATF
 /// Frequency of the machining path, Hz.
 const MACHINING_FREQUENCY: f64 = 1.0;
 /// Bits of the status that say that a leg was limited.
-const LEG_LIMITED: u32 = 0x3f;
+pub(in crate::cli) const LEG_LIMITED: u32 = 0x3f;
 /// A trajectory on board that does not end is followed for this long, s.
 pub(in crate::cli) const PLAYED: f64 = 60.0;
 
