@@ -33,8 +33,9 @@ pub(super) struct Round<'a, T, const B: usize, const P: usize> {
 
 impl<T: Real, const B: usize, const P: usize> Round<'_, T, B, P> {
     /// `N` legs: their shares; what else they ask for is taken off the wrench. `E` is 1 if their displacements are wanted,
-    /// else 0. Not inlined: that would be many times all other code.
-    #[inline(never)]
+    /// else 0. Inlined only where code costs nothing: on a PC the legs then overlap, which takes 0.6 of the time; the same bits.
+    #[cfg_attr(target_arch = "x86_64", inline(always))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(never))]
     pub fn shares<const N: usize, const E: usize>(&mut self, legs: [&Leg<T>; N]) -> [Share<T, E>; N] {
         let platform = self.platform;
         let common = self.common;
