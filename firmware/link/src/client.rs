@@ -313,3 +313,21 @@ impl<P: Port> Client<P> {
         &mut self.port
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_short_is_sent_again_sooner_but_given_up_no_earlier() {
+        let Timeout { limit, attempts } = Timeout::SERIAL;
+        let short = Timeout::SERIAL.of(&Request::Status);
+        assert_eq!((short.limit * 4, short.attempts), (limit, attempts * 4));
+        assert!(
+            short.limit < Duration::from_millis(80),
+            "with 20 ms between requests a host is not lost for one that is"
+        );
+        assert_eq!(Timeout::SERIAL.of(&Request::Download { offset: 0 }), Timeout::SERIAL);
+        assert_eq!(Timeout::PIPE.of(&Request::Status), Timeout::PIPE);
+    }
+}
