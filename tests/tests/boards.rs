@@ -23,8 +23,6 @@ use crate::porting::own_board_builds;
 const RAM: u64 = 24 * 1024;
 /// Bytes that memory.x reserves for the stack, below everything else.
 const STACK: u64 = 8 * 1024;
-/// An exception frame with the registers of the FPU, and its alignment.
-const EXCEPTION: u64 = 26 * 4 + 4;
 
 struct Board {
     name: &'static str,
@@ -33,8 +31,6 @@ struct Board {
     /// Bytes of flash that the image may take.
     flash: u64,
     edits: &'static [(&'static str, &'static str)],
-    /// Interrupts of the link: USART and both DMA streams.
-    link: [&'static str; 3],
 }
 
 /// What the emulation of these images is to wait for is short.
@@ -49,7 +45,6 @@ const H743: Board = Board {
     mcu: Mcu::Stm32H743Zi,
     flash: 96 * 1024,
     edits: &[("mcu = \"mps2-an500\"", "mcu = \"stm32h743zi\""), SHORT],
-    link: ["USART3", "DMA1_STREAM0", "DMA1_STREAM1"],
 };
 const F446: Board = Board {
     name: "board-f446",
@@ -65,7 +60,6 @@ const F446: Board = Board {
         ("velocity_cutoff = \"1.9e4 rad/s\"", "velocity_cutoff = \"9425 rad/s\""),
         ("stale_ticks  = 10", "stale_ticks  = 5"),
     ],
-    link: ["USART2", "DMA1_STREAM5", "DMA1_STREAM6"],
 };
 
 /// One build at a time.
@@ -116,23 +110,18 @@ fn check(board: &Board) {
     assert!(checked.faults.is_empty(), "{}: {:#?}", board.name, checked.faults);
     let tick = checked.stack.expect("a bound: nothing above says otherwise");
 
-    // Startup runs alone. After it: what is left of `main`, the link, an interrupt of the link and the tick, one on top of the
-    // other. Wakers are called through a register and are not in these bounds; they do nothing but set bits.
-    let deepest = |root: &str| stack::bound(&elf, root).unwrap();
-    let startup = deepest("main");
-    let idle = startup.path.first().map_or(0, |(_, frame)| *frame);
-    let interrupt = board.link.map(|name| deepest(name).bytes).into_iter().max().unwrap_or_default();
-    let running = idle + deepest("CEC").bytes + interrupt + tick + 3 * EXCEPTION;
+    let stack::Reserve { reserved, startup, running } = stack::Reserve::of(&elf).unwrap().unwrap();
     let footprint = image::footprint(&elf).unwrap();
     let ram = footprint.ram + STACK;
     println!(
         "{}: flash {} B, RAM {ram} B with {STACK} B of stack, {} B of recorder; tick: {} functions, {} B of code, \
          {tick} B of stack; stack at startup {} B, running {running} B",
-        board.name, footprint.flash, footprint.recorder, checked.functions, checked.code, startup.bytes
+        board.name, footprint.flash, footprint.recorder, checked.functions, checked.code, startup
     );
     assert!(ram <= RAM, "{}: {ram} B of RAM", board.name);
-    assert!(startup.bytes <= STACK, "{}: {:#?}", board.name, startup.path);
-    assert!(running <= STACK, "{}: {running} B of stack: {:#?}", board.name, deepest("CEC").path);
+    assert_eq!(reserved, STACK, "{}", board.name);
+    assert!(startup <= STACK, "{}: {startup} B of stack", board.name);
+    assert!(running <= STACK, "{}: {running} B of stack", board.name);
     assert!(footprint.flash <= board.flash, "{}: {} B of flash", board.name, footprint.flash);
     assert!(footprint.allocator_symbols.is_empty(), "{:?}", footprint.allocator_symbols);
 

@@ -7,6 +7,8 @@
 
 use super::callgraph::CallGraph;
 use super::error::TargetError;
+use object::{Object, ObjectSection, ObjectSymbol};
+use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The function that counts as one step: `firmware/qemu/src/main.rs` wraps `controller::step` in it.
@@ -48,11 +50,20 @@ impl StackBound {
 /// [`TargetError::MalformedImage`] if the file is damaged or has no such function.
 pub fn bound(elf: &[u8], root: &str) -> Result<StackBound, TargetError> {
     let graph = CallGraph::read(elf)?;
+    let start = start_of(&graph, root)?;
+    Ok(bound_in(&graph, start))
+}
+
+/// Where the function begins.
+fn start_of(graph: &CallGraph, root: &str) -> Result<u64, TargetError> {
     let demangled = || graph.functions.iter().find(|(_, function)| function.name == root).map(|(address, _)| *address);
-    let start = graph.symbols.get(root).copied().or_else(demangled).ok_or_else(|| TargetError::MalformedImage {
+    graph.symbols.get(root).copied().or_else(demangled).ok_or_else(|| TargetError::MalformedImage {
         text: format!("it has no function `{root}`; was it stripped, or made by another specgen?"),
-    })?;
-    let mut walk = Walk { graph: &graph, deepest: BTreeMap::new(), open: Vec::new(), cycles: BTreeSet::new() };
+    })
+}
+
+fn bound_in(graph: &CallGraph, start: u64) -> StackBound {
+    let mut walk = Walk { graph, deepest: BTreeMap::new(), open: Vec::new(), cycles: BTreeSet::new() };
     let bytes = walk.visit(start);
     let cycles = walk.cycles;
     let deepest = walk.deepest;
@@ -69,7 +80,7 @@ pub fn bound(elf: &[u8], root: &str) -> Result<StackBound, TargetError> {
     let which = |wanted: fn(&super::callgraph::Function) -> bool| {
         reached().filter(|f| wanted(f)).map(|f| f.name.clone()).collect::<Vec<_>>()
     };
-    Ok(StackBound {
+    StackBound {
         bytes,
         path,
         code_bytes: reached().map(|f| f.size).sum(),
@@ -77,8 +88,65 @@ pub fn bound(elf: &[u8], root: &str) -> Result<StackBound, TargetError> {
         indirect: which(|f| !f.indirect.is_empty()),
         unsized_functions: which(|f| f.frame.is_none()),
         strays: which(|f| !f.strays.is_empty()),
-    })
+    }
 }
+
+/// An exception frame with the registers of the FPU, and its alignment.
+const EXCEPTION: u64 = 26 * 4 + 4;
+/// Interrupts of a board's program (`firmware/stm32/program.rs`): the tick, above all others; what answers the host, below.
+const TICK: &str = "TIM2";
+const BACKGROUND: &str = "CEC";
+
+/// The stack of a board's whole program.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Reserve {
+    /// Bytes that its memory map gives the stack.
+    pub reserved: u64,
+    /// Bytes of initialisation, which runs alone.
+    pub startup: u64,
+    /// Bytes after it: the program, what answers the host, an interrupt of the link and the tick, one on top of the other.
+    pub running: u64,
+}
+
+impl Reserve {
+    /// Of an image; none if it has no board's memory map. Wakers, which the link's interrupts call through a register, set bits
+    /// and are not in it.
+    ///
+    /// # Errors
+    /// [`TargetError::MalformedImage`] if the file is damaged.
+    pub fn of(elf: &[u8]) -> Result<Option<Self>, TargetError> {
+        let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
+        let file = object::File::parse(elf).map_err(malformed)?;
+        let address =
+            |name: &str| file.symbols().find(|symbol| symbol.name() == Ok(name)).map(|symbol| symbol.address());
+        let (Some(top), Some(end)) = (address("_stack_start"), address("_stack_end")) else { return Ok(None) };
+        let graph = CallGraph::read(elf)?;
+        let depth = |address: u64| bound_in(&graph, address).bytes;
+        let startup = bound_in(&graph, start_of(&graph, "main")?);
+        let [tick, background] = [start_of(&graph, TICK)?, start_of(&graph, BACKGROUND)?];
+        let vectors =
+            file.section_by_name(".vector_table").map(|section| section.data()).transpose().map_err(malformed)?;
+        let handlers = vectors.unwrap_or_default().as_chunks().0.iter().skip(SYSTEM);
+        let others = handlers.map(|word| u64::from(u32::from_le_bytes(*word) & !1));
+        let others = others.filter(|address| ![tick, background].contains(address));
+        let link = others.map(depth).max().unwrap_or_default();
+        let idle = startup.path.first().map_or(0, |(_, frame)| *frame);
+        Ok(Some(Self {
+            reserved: top.saturating_sub(end),
+            startup: startup.bytes,
+            running: idle + depth(background) + link + depth(tick) + 3 * EXCEPTION,
+        }))
+    }
+
+    /// The larger of the two.
+    #[must_use]
+    pub fn needed(&self) -> u64 {
+        self.startup.max(self.running)
+    }
+}
+
+/// Vectors of the core, before those of interrupts.
+const SYSTEM: usize = 16;
 
 /// Depth-first walk of the call graph.
 struct Walk<'a> {

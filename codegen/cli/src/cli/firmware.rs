@@ -20,9 +20,10 @@ use specgen_compiler::compile::{Compiled, Refused};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{self, Mcu};
 use specgen_studies::verify::{self, Measurement};
-use specgen_toolchain::budget::{self, Used};
+use specgen_toolchain::budget::{self, Used, group};
 use specgen_toolchain::checks::{self, Checked, Rules};
 use specgen_toolchain::size::{Size, size as measure_size};
+use specgen_toolchain::stack::Reserve;
 use specgen_toolchain::targets::{Kind, NAMES, Target};
 use specgen_toolchain::{self as target, Image, TargetError};
 
@@ -77,6 +78,8 @@ struct Made {
     checks: Option<Checked>,
     measurement: Option<Measurement>,
     used: Option<Used>,
+    /// Of a board's whole program.
+    stack: Option<Reserve>,
     /// What differs from what the spec says, or was left out.
     notes: Vec<String>,
     /// What is over budget or must not be: nothing is flashed then.
@@ -212,6 +215,7 @@ fn build(
         checks: None,
         measurement: None,
         used: None,
+        stack: None,
         notes: Vec::new(),
         failures: Vec::new(),
         bits: compiled.ir.scalar.bits(),
@@ -245,6 +249,7 @@ fn build(
             let image =
                 target::build::build_folder(&toolchain, output, target.folder, mcu, target_dir, common.lockstep)?;
             examine(&mut made, &image, false, output)?;
+            made.stack = Reserve::of(&image.elf)?;
             if mcu != declared {
                 made.notes.push(format!(
                     "the spec declares {}; built for {} of the same core, whose memory is the limit where no budget is declared",
@@ -348,6 +353,15 @@ fn hold_against_budget(made: &mut Made, compiled: &Compiled, target: Target) {
         made.failures.extend(budget::over(&limits, used));
     }
     made.used = used;
+    if let Some(stack) = made.stack.as_ref().filter(|stack| stack.needed() > stack.reserved) {
+        made.failures.push(format!(
+            "the program's stack takes {} bytes ({}), its memory map gives it {}: make State and settings smaller \
+             (hysteresis.memory), or the STACK of memory.x larger",
+            group(stack.needed()),
+            if stack.startup > stack.running { "initialisation" } else { "tick and interrupts on top of each other" },
+            group(stack.reserved)
+        ));
+    }
     let faults = made.checks.iter().chain(measured.map(|m| &m.checks)).flat_map(|checks| &checks.faults);
     for text in faults.map(|fault| &fault.text) {
         if !made.failures.contains(text) {

@@ -29,6 +29,13 @@ impl Outcome for Made {
         if let Some(used) = &self.used {
             self.usage(used, &mut out);
         }
+        if let Some(stack) = &self.stack {
+            let [startup, running, reserved] = [stack.startup, stack.running, stack.reserved].map(group);
+            let _ = writeln!(
+                out,
+                "  stack in all  {startup} bytes of {reserved} to start, {running} with tick and interrupts on each other"
+            );
+        }
         if let Some(size) = &self.size {
             out.push_str(&owners(size));
         }
