@@ -278,9 +278,9 @@ fn the_cause_of_the_residual_is_named() {
     let mut moved = y.clone();
     moved[5..].copy_from_slice(&y[..y.len() - 5]);
     let record = Record::from_columns("fast.csv", fast.time(), fast.samples.clone(), moved).unwrap();
-    let judged = validate(&with(|_| {}).unwrap().table, &record, 0.0).unwrap();
-    assert_eq!(judged.cause.main, Source::DeadTime, "{:?}", judged.cause);
-    assert!((judged.cause.rate_delay - 5e-3).abs() < 1.5e-3, "{:?}", judged.cause);
+    let cause = validate(&with(|_| {}).unwrap().table, &record, 0.0).unwrap().compared.unwrap().cause;
+    assert_eq!(cause.main, Source::DeadTime, "{cause:?}");
+    assert!((cause.rate_delay - 5e-3).abs() < 1.5e-3, "{cause:?}");
     let noisy = with(|c| {
         let mut random = generator(2);
         c.displacement.iter_mut().for_each(|y| *y += 100e-9 * normal(&mut random));

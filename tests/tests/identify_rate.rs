@@ -165,7 +165,7 @@ fn two_runs_give_the_same_bits() {
     let truth = Truth { creep: vec![(0.06, 0.132)], dead_time: 3, ..PLAIN };
     let text = || {
         let found = found(&truth);
-        let lines = found.models.iter().map(|(o, m)| spec_lines(*o, m, "t.csv", "r.csv")).collect::<String>();
+        let lines = found.models.iter().map(|(o, m)| spec_lines(*o, m, 0.0, "t.csv", "r.csv")).collect::<String>();
         lines + &write_rate_csv(found.models[2].1.rate.as_ref().unwrap())
     };
     assert_eq!(text(), text());
@@ -212,8 +212,8 @@ fn a_second_table_reads_back_and_a_broken_one_is_named() {
 fn one_model_for_three_measured_rates() {
     let records: Vec<Record> =
         ["forc-20hz.csv", "forc-40hz.csv", "forc-100hz.csv"].into_iter().map_while(measured).collect();
-    let Some(triangle) = measured("validate-triangle-50hz.csv").filter(|_| records.len() == 3) else { return };
-    let found = identify_rate(&records, Some(&triangle), &Options::new(32, [-90.0, 90.0])).unwrap();
+    let Some(sine) = measured("validate-growing-sine-5hz.csv").filter(|_| records.len() == 3) else { return };
+    let found = identify_rate(&records, Some(&sine), &Options::new(32, [-90.0, 90.0])).unwrap();
     show(&found.report);
     let options = &found.report.options;
     let [plain, late, dynamic, creep] = [&options[0], &options[1], &options[2], &options[3]];

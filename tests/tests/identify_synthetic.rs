@@ -2,11 +2,14 @@
 
 use crate::identify_support::{Drive, generator, normal, random_table, uniform};
 use specgen::everett::EverettTable;
+use specgen::identify::rate::RateModel;
 use specgen::identify::regressor::{Plane, evaluate};
 use specgen::identify::{
-    Branches, DeadTime, Identified, Options, Record, Staircase, Start, identify, read_table_csv, validate,
-    write_table_csv,
+    Branches, DeadTime, Identified, Options, Record, Staircase, identify, parse_drive, parse_record, predict,
+    read_table_csv, validate, write_table_csv,
 };
+
+use std::time::Instant;
 
 const NM: f64 = 1e-9;
 
@@ -290,6 +293,7 @@ fn on_a_plant_with_creep_the_fit_agrees_with_the_table_read_at_the_nodes() {
     assert_monotone(&result.table);
 }
 
+/// Whatever the drive did before, not only three guesses: the state is found, and offset and drift are removed.
 #[test]
 fn validation_finds_the_start_and_removes_offset_and_drift() {
     let range = [-90.0, 90.0];
@@ -301,18 +305,136 @@ fn validation_finds_the_start_and_removes_offset_and_drift() {
         .ramp(50.0, 200.0)
         .ramp(-60.0, 200.0)
         .ramp(0.0, 200.0);
-    let mut history = Staircase::negative_saturation(range);
-    history.push(90.0);
-    let y: Vec<f64> =
-        response(&truth, history, &drive.samples).iter().zip(drive.time()).map(|(f, t)| f + 7e-6 - 1e-7 * t).collect();
-    let record = Record::from_columns("other.csv", drive.time(), drive.samples.clone(), y).unwrap();
-    let good = validate(&truth, &record, 0.0).unwrap();
-    println!("{:?}", good.starts);
-    assert_eq!(good.best.start, Start::PositiveSaturation);
-    assert!(good.best.rms < 0.01 * NM, "{}", good.best.rms);
+    let record = |history: &[f64]| {
+        let mut memory = Staircase::negative_saturation(range);
+        history.iter().for_each(|u| memory.push(*u));
+        let y = response(&truth, memory, &drive.samples);
+        let y = y.iter().zip(drive.time()).map(|(f, t)| f + 7e-6 - 1e-7 * t).collect();
+        Record::from_columns("other.csv", drive.time(), drive.samples.clone(), y).unwrap()
+    };
+    // History, share of the open weight that it leaves on, error that the straight parts leave, nm.
+    let histories: [(&[f64], [f64; 2], f64); 4] = [
+        (&[], [0.0, 0.001], 0.01),
+        (&[90.0], [0.999, 1.0], 0.01),
+        (&[42.0, -21.0], [0.1, 0.9], 10.0),
+        (&[90.0, -48.0, 33.0, -12.0, 20.0], [0.1, 0.9], 10.0),
+    ];
+    for (history, share, limit) in histories {
+        let found = validate(&truth, &record(history), 0.0).unwrap();
+        let compared = found.compared.unwrap();
+        println!(
+            "after {history:?}: {:.3} on, {:.3} nm rms of {:.1} µm",
+            found.start_on,
+            compared.rms / NM,
+            compared.range * 1e6
+        );
+        assert!((share[0]..=share[1]).contains(&found.start_on), "{}", found.start_on);
+        assert!(compared.rms < limit * NM, "{history:?}: {} nm", compared.rms / NM);
+        assert!((compared.drift / -1e-7 - 1.0).abs() < 0.2, "{}", compared.drift);
+    }
     let mut bent = truth.clone();
     bent.nodes.iter_mut().for_each(|e| *e *= 1.02);
-    assert!(validate(&bent, &record, 0.0).unwrap().best.rms_percent > 0.2, "a wrong table must show");
+    let wrong = validate(&bent, &record(&[90.0]), 0.0).unwrap().compared.unwrap();
+    assert!(wrong.rms_percent > 0.2, "a wrong table must show");
+}
+
+/// The search is in seconds: a record sampled faster has the same dead time.
+#[test]
+fn a_dead_time_of_many_samples_is_found() {
+    let range = [0.0, 100.0];
+    let truth = random_table(8, range, 40e-6, 0.3, 67);
+    let drive = Drive::at(0.0, 50e3).reversal_curves(8, range, 4e3).reversal_curves(8, range, 16e3);
+    let still = response(&truth, Staircase::negative_saturation(range), &drive.samples);
+    for late in [0, 10, 25] {
+        let y = (0..still.len()).map(|k| still[k.saturating_sub(late)]).collect();
+        let report = found(&drive, y, &Options::new(8, range)).report;
+        println!("{late} samples: {:.6} ms, {}", report.dead_time * 1e3, report.dead_time_basis);
+        assert!((report.dead_time - late as f64 / 50e3).abs() < 4e-6, "{late}: {}", report.dead_time);
+        assert!(report.fit_rms < 5.0 * NM, "{}", report.fit_rms);
+    }
+}
+
+/// A converter holds each sample of a command. An amplifier of first order behind it, sampled when the next command leaves:
+/// what is found is its time constant and half an interval, and the report says which half.
+#[test]
+fn of_a_command_half_an_interval_is_the_hold() {
+    let (interval, lag) = (1e-4, 4e-4);
+    let truth = random_table(8, [0.0, 100.0], 40e-6, 0.3, 68);
+    let drive =
+        Drive::at(0.0, 1.0 / interval).reversal_curves(8, [0.0, 100.0], 1e3).reversal_curves(8, [0.0, 100.0], 4e3);
+    let mut voltage = 0.0;
+    let mut stack: Vec<f64> = Vec::new();
+    for u in &drive.samples {
+        stack.push(voltage);
+        voltage += (u - voltage) * (1.0 - (-interval / lag).exp());
+    }
+    let y = response(&truth, Staircase::negative_saturation([0.0, 100.0]), &stack);
+    let text = |name: &str| {
+        let rows = drive.time().into_iter().zip(&drive.samples).zip(&y);
+        let rows: String = rows.map(|((t, u), y)| format!("{t:.5},{u:.6},{:.9}\n", y * 1e6)).collect();
+        format!("time_s,{name},displacement_um\n{rows}")
+    };
+    let report = |name: &str| {
+        let record = parse_record(&text(name), "r.csv").unwrap_or_else(|d| panic!("{d:#?}"));
+        identify(&record, &Options::new(8, [0.0, 100.0])).unwrap_or_else(|d| panic!("{d:#?}")).report
+    };
+    let (command, monitor) = (report("drive_V"), report("monitor_V"));
+    println!("{:.4} ms between the columns, of it {:.4} ms hold", command.dead_time * 1e3, command.held * 1e3);
+    assert_eq!((command.dead_time, monitor.held), (monitor.dead_time, 0.0));
+    assert!((command.held - 0.5 * interval).abs() < 1e-12);
+    assert!(((command.dead_time - command.held) / lag - 1.0).abs() < 0.15, "{}", command.dead_time);
+}
+
+/// A drive alone is predicted; a little beyond the table it is held and counted, far beyond it is refused; a record may end
+/// with a jump. Against the staircase run over the drive as it should be held.
+#[test]
+fn a_drive_is_predicted_with_and_without_displacement() {
+    let range = [0.0, 100.0];
+    let truth = random_table(8, range, 40e-6, 0.3, 69);
+    let beyond =
+        |end: f64| Drive::at(0.0, 1000.0).ramp(end, 200.0).ramp(20.0, 200.0).ramp(60.0, 200.0).jump(0.0).samples;
+    let drive = beyond(104.0);
+    let y = response(&truth, Staircase::negative_saturation(range), &drive);
+    let text = |samples: &[f64], y: Option<&[f64]>| {
+        let mut text = format!("time_s,drive_V{}\n", if y.is_some() { ",displacement_um" } else { "" });
+        for (k, u) in samples.iter().enumerate() {
+            let y = y.map(|y| format!(",{:?}", y[k] * 1e6)).unwrap_or_default();
+            text += &format!("{:?},{u:?}{y}\n", k as f64 * 1e-3);
+        }
+        text
+    };
+    let model = RateModel::of_table(truth, 0.0);
+    let alone = predict(&model, &parse_drive(&text(&drive, None), "d.csv").unwrap()).unwrap();
+    assert!(alone.compared.is_none() && alone.measured.is_none());
+    assert_eq!(alone.samples_clipped, drive.iter().filter(|u| **u > 100.0).count());
+    let worst = alone.displacement.iter().zip(&y).fold(0.0, |worst, (a, b)| f64::max(worst, (a - b).abs()));
+    assert!(alone.displacement.len() == y.len() && worst < 1e-6 * NM, "{worst}");
+    let compared = predict(&model, &parse_drive(&text(&drive, Some(&y)), "d.csv").unwrap()).unwrap().compared.unwrap();
+    assert_eq!((compared.samples, compared.samples_after_jumps), (y.len() - 1, 1));
+    assert!(compared.max < 1e-3 * NM, "{}", compared.max);
+    let far = parse_drive(&text(&beyond(106.0), None), "d.csv").unwrap();
+    assert_eq!(predict(&model, &far).unwrap_err()[0].code, "E0605");
+}
+
+/// The largest grids are solved in a few factorisations, with the certificate of the optimum.
+#[test]
+fn a_grid_of_64_from_64_curves_takes_few_factorisations() {
+    let range = [0.0, 100.0];
+    let truth = random_table(64, range, 40e-6, 0.9, 70);
+    let drive = Drive::at(0.0, 1000.0).reversal_curves(64, range, 400.0);
+    let mut random = generator(70);
+    let y = response(&truth, Staircase::negative_saturation(range), &drive.samples);
+    let y = y.iter().map(|f| f + 8.0 * NM * normal(&mut random)).collect();
+    let started = Instant::now();
+    let report = found(&drive, y, &Options::new(64, range)).report;
+    println!(
+        "{} of {} weights zero in {} factorisations, {:.2} s",
+        report.zero_weights,
+        report.weights,
+        report.solver_iterations,
+        started.elapsed().as_secs_f64()
+    );
+    assert!(report.zero_weights > 100 && report.solver_iterations < 20 && report.kkt_violation < 1e-10);
 }
 
 #[test]

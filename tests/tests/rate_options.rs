@@ -224,7 +224,7 @@ fn what_the_options_are_worth_on_the_reference_plant() {
         let model = option(found, wanted);
         let mut files = vec![("table.csv", write_table_csv(&model.still))];
         files.extend(model.rate.as_ref().map(|rate| ("mu1.csv", write_rate_csv(rate))));
-        let lines = spec_lines(wanted, model, "records/table.csv", "records/mu1.csv");
+        let lines = spec_lines(wanted, model, found.report.held, "records/table.csv", "records/mu1.csv");
         tracking(name, &lines, &files)
     };
     // What a user has without any of this: the table of the slowest record.

@@ -324,7 +324,7 @@ fn a_grid_that_cannot_be_is_refused_at_its_line() {
         let finding = document.finding("E0301");
         assert_eq!((document.code, &finding["line"], &finding["column"]), (1, &line.into(), &11.into()));
         assert_eq!(finding["key"], "hysteresis.grid");
-        for word in [grid, "2 to 64"] {
+        for word in [grid, "2 to 128"] {
             assert!(finding["message"].as_str().unwrap().contains(word), "{finding:#}");
         }
         let document = folder.json(&["identify", "records/leg1.csv", "--drive", "0:100", "--grid", grid]);

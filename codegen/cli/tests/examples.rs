@@ -109,7 +109,17 @@ fn examples_run_as_they_stand() {
         }
     }
     assert!(failed.is_empty(), "{}", failed.join("\n"));
-    for made in ["table.csv", "table.svg", "leg.toml", "run.csv", "legs.html", "forces.json", "specgen.bash"] {
+    for made in [
+        "table.csv",
+        "table.svg",
+        "predicted.csv",
+        "predicted.svg",
+        "leg.toml",
+        "run.csv",
+        "legs.html",
+        "forces.json",
+        "specgen.bash",
+    ] {
         assert!(folder.path(made).is_file(), "no {made}");
     }
 }

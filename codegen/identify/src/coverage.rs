@@ -28,7 +28,7 @@ pub(crate) fn plane(options: &Options, findings: &mut Findings) -> Option<Plane>
     let [low, high] = options.drive;
     if !(2..=MAX_GRID).contains(&options.grid) {
         let message = format!("a grid of {} cannot be identified", options.grid);
-        findings.add(codes::GRID_NOT_IDENTIFIABLE, None, message, "choose a grid from 2 to 64; 32 is usual");
+        findings.add(codes::GRID_NOT_IDENTIFIABLE, None, message, "choose a grid from 2 to 128; 32 is usual");
     }
     if !(low.is_finite() && high.is_finite() && low < high) {
         let message = format!("the declared drive range {low} V to {high} V is empty or not finite");

@@ -3,25 +3,32 @@
 //! A dead time widens the measured loop in proportion to the rate. It can be distinguished from hysteresis only when the
 //! record holds branches of different rates; on a record of one rate, creep and hysteresis would be mistaken for it,
 //! and the estimate is refused.
+//!
+//! Where the drive is a command, a converter holds each sample until the next, so that half a sampling interval of what is
+//! found is the hold's and not the actuator's: [`Record::held`].
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::DMatrix;
+use specgen_numerics::Factor;
 
 use super::branches::Branch;
 use super::normal::{Weighting, accumulate};
+use super::prior;
 use super::record::Record;
 use super::regressor::Plane;
-use super::{prior, statistics};
 
 /// Ratio of the fast to the slow branches (90 % and 10 % quantile of |du/dt|) from which a dead time can be identified.
 const RATE_RATIO: f64 = 2.0;
-/// Longest dead time tried, sampling intervals.
-const LONGEST: usize = 16;
-/// Dead times tried per sampling interval.
-const PER_INTERVAL: usize = 2;
+/// Longest dead time tried, s, and as a share of a fast branch: half a cycle later, a table of negative weights fits as well.
+const LONGEST: f64 = 8e-3;
+const OF_BRANCH: f64 = 0.5;
+/// Intervals of the first search over it, and of the second one between the neighbours of the best.
+const STEPS: usize = 32;
+/// Samples that a search is made on; a longer record is taken in even steps.
+const SAMPLES: usize = 100_000;
 /// The residual must fall by this share, or the dead time is zero.
 const WORTHWHILE: f64 = 0.1;
 
-/// Estimates the dead time in s, at most 16 sampling intervals; the text says how it was decided.
+/// Estimates the dead time between the columns in s, at most 8 ms; the text says how it was decided.
 #[must_use]
 pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch]) -> (f64, String) {
     let (slow, fast) = rates(record, branches);
@@ -31,50 +38,104 @@ pub fn estimate(plane: &Plane, record: &Record, first: usize, branches: &[Branch
         );
         return (0.0, why);
     }
-    let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
-    let step = statistics::median(&mut intervals) / PER_INTERVAL as f64;
-    let tried: Vec<f64> = (0..=LONGEST * PER_INTERVAL).map(|k| k as f64 * step).collect();
     let scale = 1.0 / record.displacement_range();
-    let mut shifts: Vec<Shift> = tried.iter().map(|&tau| Shift { tau, next: 0 }).collect();
-    let fill = |k: usize, values: &mut [f64]| {
-        for (value, shift) in values.iter_mut().zip(&mut shifts) {
-            *value = scale * shift.displacement(record, k);
-        }
-    };
-    let mut normal = accumulate(plane, record, first, branches, Weighting::Even, tried.len(), fill);
-    prior::add(plane.grid, &mut normal.gram);
-    let Some(residual) = residuals(normal.gram, &normal.rhs, &normal.energy) else {
+    let every = (record.time.len() - first).div_ceil(SAMPLES);
+    // A longer dead time leads behind the end of the record from there on.
+    let longest = longest(record, branches);
+    let end = within(record, longest);
+    let found = search(longest, |tried| {
+        let mut shifts = shifts(tried);
+        let fill = |k: usize, values: &mut [f64]| {
+            for (value, shift) in values.iter_mut().zip(&mut shifts) {
+                *value = scale * shift.displacement(record, k);
+            }
+        };
+        let weighting = Weighting::Every(every, end);
+        let mut normal = accumulate(plane, record, first, branches, weighting, tried.len(), fill);
+        prior::add(plane.grid, &mut normal.gram);
+        residuals(&normal.gram, &normal.rhs, &normal.energy)
+    });
+    let Some(found) = found else {
         return (0.0, "not identifiable: the record does not determine the table".to_owned());
     };
-    let best = smallest(&residual);
-    let gain = 1.0 - (residual[best] / residual[0]).sqrt();
-    if best + 1 == tried.len() {
-        return (0.0, format!("not credible: the fit still improves at {} s", tried[best]));
+    let gain = 1.0 - (found.least / found.none).sqrt();
+    if found.at_end {
+        return (0.0, format!("not credible: the fit still improves at {} ms", longest * 1e3));
     }
-    if best == 0 || gain.is_nan() || gain < WORTHWHILE {
+    if found.dead_time == 0.0 || gain.is_nan() || gain < WORTHWHILE {
         return (0.0, format!("none: the best one lowers the residual by less than {:.0} %", WORTHWHILE * 100.0));
     }
-    let tau = tried[best] + vertex([residual[best - 1], residual[best], residual[best + 1]], step);
-    (tau, format!("estimated: lowers the residual of the branches by {:.0} %", gain * 100.0))
+    (found.dead_time, format!("estimated: lowers the residual of the branches by {:.0} %", gain * 100.0))
+}
+
+/// Where a search ended.
+pub(super) struct Found {
+    /// s.
+    pub(super) dead_time: f64,
+    /// Σ of squares without dead time, and with the best one tried.
+    none: f64,
+    least: f64,
+    /// Whether the longest one tried is the best.
+    pub(super) at_end: bool,
+}
+
+/// The longest dead time tried in a record, s.
+pub(super) fn longest(record: &Record, branches: &[Branch]) -> f64 {
+    let mut durations: Vec<f64> = branches.iter().map(|b| record.time[b.end - 1] - record.time[b.first]).collect();
+    durations.sort_unstable_by(f64::total_cmp);
+    let fast = OF_BRANCH * durations.get(durations.len() / 10).copied().unwrap_or(0.0);
+    if fast < LONGEST { fast } else { LONGEST }
+}
+
+/// The dead time up to `longest` (s) of least `residual`, a function of those tried (s): coarse over all, then fine beside the best, then the
+/// vertex of a parabola. `None` where the residual is not known.
+pub(super) fn search(longest: f64, mut residual: impl FnMut(&[f64]) -> Option<Vec<f64>>) -> Option<Found> {
+    let between = |from: f64, to: f64| -> Vec<f64> {
+        (0..=STEPS).map(|k| from + (to - from) * k as f64 / STEPS as f64).collect()
+    };
+    let coarse = between(0.0, longest);
+    let left = residual(&coarse)?;
+    let best = smallest(&left);
+    let (low, high) = (coarse[best.saturating_sub(1)], coarse[(best + 1).min(STEPS)]);
+    let at_end = best == STEPS;
+    let fine = between(low, high);
+    let beside = residual(&fine)?;
+    let near = smallest(&beside);
+    let mut dead_time = fine[near];
+    if near > 0 && near < STEPS {
+        dead_time += vertex([beside[near - 1], beside[near], beside[near + 1]], fine[1] - fine[0]);
+    }
+    Some(Found { dead_time, none: left[0], least: beside[near], at_end })
+}
+
+/// Samples whose displacement `tau` (s) later is still in the record.
+pub(super) fn within(record: &Record, tau: f64) -> usize {
+    let last = record.time[record.time.len() - 1];
+    record.time.partition_point(|t| t + tau <= last)
+}
+
+fn shifts(tried: &[f64]) -> Vec<Shift> {
+    tried.iter().map(|&tau| Shift { tau, next: 0 }).collect()
 }
 
 /// What the best fit leaves of each target, Σ of squares; `None` if the Gram matrix is not positive definite.
-pub(super) fn residuals(gram: DMatrix<f64>, rhs: &[Vec<f64>], energy: &[f64]) -> Option<Vec<f64>> {
-    let factor = Cholesky::new(gram)?;
+pub(super) fn residuals(gram: &DMatrix<f64>, rhs: &[Vec<f64>], energy: &[f64]) -> Option<Vec<f64>> {
+    let factor = Factor::of(gram.nrows(), |row, column| gram[(column, row)])?;
     let left = rhs.iter().zip(energy).map(|(rhs, energy)| {
-        let rhs = DVector::from_column_slice(rhs);
-        energy - factor.solve(&rhs).dot(&rhs)
+        let mut solution = rhs.clone();
+        factor.solve(&mut solution);
+        solution.iter().zip(rhs).fold(*energy, |left, (w, b)| left - w * b)
     });
     Some(left.collect())
 }
 
 /// Place of the smallest.
-pub(super) fn smallest(residual: &[f64]) -> usize {
+fn smallest(residual: &[f64]) -> usize {
     (0..residual.len()).fold(0, |best, k| if residual[k] < residual[best] { k } else { best })
 }
 
 /// Vertex of the parabola through three values at a distance of `step`, from the middle one.
-pub(super) fn vertex([a, b, c]: [f64; 3], step: f64) -> f64 {
+fn vertex([a, b, c]: [f64; 3], step: f64) -> f64 {
     0.5 * step * (a - c) / (a - 2.0 * b + c)
 }
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::everett::EverettTable;
+use crate::rate::{CreepTerm, RateModel};
 use crate::{Options, Report, identify, is_table_csv, parse_record, rate, read_file, read_table_csv};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, RateDependence};
@@ -52,6 +53,20 @@ pub fn records(model: &Model, dir: &Path) -> Result<Declared, Vec<Diagnostic>> {
 }
 
 impl Declared {
+    /// The model of `leg`, 0 to 5, as `model` uses it; its dead time counts from the voltage. None without records.
+    #[must_use]
+    pub fn leg(&self, model: &Model, leg: usize) -> Option<RateModel> {
+        let of = |tables: &[EverettTable]| tables.get(leg).or(tables.first()).cloned();
+        let creep = match &model.hysteresis.rate {
+            RateDependence::Creep(terms) => {
+                terms.iter().map(|&[time_constant, weight]| CreepTerm { time_constant, weight }).collect()
+            }
+            _ => Vec::new(),
+        };
+        let dead_time = model.hysteresis.dead_time;
+        Some(RateModel { still: of(&self.tables)?, rate: of(&self.rate_tables), creep, dead_time })
+    }
+
     fn add_record(&mut self, model: &Model, name: &str, text: String) -> Result<(), Vec<Diagnostic>> {
         let table = if is_table_csv(&text) {
             let table = read_table_csv(&text, name)?;

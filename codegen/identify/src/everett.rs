@@ -8,7 +8,7 @@
 /// the triangles on the diagonal, so that the weight of a diagonal cell is reversible.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct EverettTable {
-    /// Number of intervals N, 2 to 64.
+    /// Number of intervals N, 2 to 128.
     pub grid: usize,
     /// Lowest threshold u_0, V.
     pub drive_min: f64,

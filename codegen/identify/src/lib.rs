@@ -25,6 +25,7 @@ mod least_squares;
 mod limits;
 pub mod linear;
 mod normal;
+mod predict;
 mod prior;
 pub mod rate;
 mod record;
@@ -36,13 +37,13 @@ mod sanity;
 mod selection;
 mod signals;
 mod staircase;
+mod start;
 pub mod states;
 mod statistics;
 pub mod stiffness;
 mod sweep;
 mod trace;
 mod trend;
-mod validate;
 pub mod waveform;
 
 use crate::everett::EverettTable;
@@ -56,13 +57,13 @@ pub use cause::{Cause, Source};
 pub use coverage::Region;
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
 pub use grid_choice::{GridChoice, Score, choose_grid};
+pub use predict::{Compared, Drive, Prediction, parse_drive, predict, read_drive, validate};
 pub use record::{MAX_FILE_BYTES, Record, parse_record, read_file, read_record};
 pub use report::{Branches, Report};
 pub use specgen_language::model::MAX_GRID;
 pub use staircase::Staircase;
 pub use statistics::extent;
 pub use trace::Trace;
-pub use validate::{Start, StartResult, Validation, validate};
 
 /// What to identify.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -138,11 +139,12 @@ fn identify_checked(
     if findings.any_error() {
         return None;
     }
-    let used = selection::usable(record, &plane, findings)?;
+    let mut used = selection::usable(record, &plane, findings)?;
     let (dead_time, dead_time_basis) = match options.dead_time {
         DeadTime::Estimate => dead_time::estimate(&plane, record, used.first, &used.branches),
         DeadTime::Fixed(tau) => (if tau > 0.0 { tau } else { 0.0 }, "given".to_owned()),
     };
+    used.until(dead_time::within(record, dead_time));
     let mut displacement = dead_time::delayed(record, dead_time);
     let (drift, drift_returns) = selection::drift_of_returns(record, &used.branches, &plane);
     if options.drift {
@@ -191,6 +193,7 @@ fn identify_checked(
         drift_returns,
         drift_removed: options.drift,
         dead_time,
+        held: record.held(),
         dead_time_basis,
         noise_floor,
         weightless: record.weightless[used.first..].iter().filter(|w| **w).count(),

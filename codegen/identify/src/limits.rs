@@ -8,8 +8,9 @@ use specgen_language::diagnostic::codes;
 /// Travel of the drive over which it is judged, as a share of its range, and least number of samples in it.
 const TRAVEL: f64 = 0.1;
 const SAMPLES: usize = 10;
-/// Samples behind a reversal that are not judged: a dead time holds the displacement there.
+/// Samples behind a reversal that are not judged, and least time, s: a dead time holds the displacement there.
 const SKIPPED: usize = 16;
+const SKIPPED_TIME: f64 = 1.6e-3;
 /// Share of the mean gain below which nothing of a piezo's motion is left; behind a reversal it moves by about half.
 const HARDLY: f64 = 0.08;
 /// Times that the travel's displacement must exceed the noise for a verdict.
@@ -33,7 +34,8 @@ pub(crate) fn check(lines: &[usize], time: &[f64], drive: &[f64], displacement: 
         .collect();
     for (first, end, rising) in runs(drive) {
         let sign = if rising { 1.0 } else { -1.0 };
-        let mut at = first + SKIPPED;
+        let after = time[first..end].iter().take_while(|t| **t - time[first] < SKIPPED_TIME).count();
+        let mut at = first + if after > SKIPPED { after } else { SKIPPED };
         let mut flat: Option<(usize, usize)> = None;
         while at < end {
             let Some(to) = (at..end).find(|&k| k >= at + SAMPLES && (drive[k] - drive[at]).abs() >= travel) else {

@@ -55,6 +55,8 @@ pub fn each_row_from(
 pub enum Weighting {
     /// Every sample counts the same.
     Even,
+    /// Every n-th sample before the second one counts the same, the others nothing.
+    Every(usize, usize),
     /// Most where the drive is at a threshold of the grid, see [`node_weight`].
     AtNodes,
 }
@@ -97,6 +99,7 @@ pub fn accumulate(
         let weight = match weighting {
             _ if record.weightless[k] => 0.0,
             Weighting::Even => 1.0,
+            Weighting::Every(n, end) => f64::from(u8::from(k < end && k.is_multiple_of(n))),
             Weighting::AtNodes => node_weight(plane, record.drive[k]),
         };
         while let Some(branch) = pending.peek() {

@@ -13,7 +13,7 @@
 mod creep;
 mod export;
 mod fit;
-mod forward;
+pub(crate) mod forward;
 mod mixed;
 mod normal;
 mod prepare;
@@ -79,8 +79,17 @@ pub struct RateModel {
     pub rate: Option<EverettTable>,
     /// Creep behind Γ₀, slowest first.
     pub creep: Vec<CreepTerm>,
-    /// s by which the displacement lags the drive, ≥ 0.
+    /// s by which the displacement lags the drive column of a record, ≥ 0. Of a command, half a sampling interval of it is the
+    /// converter's, see [`Record::held`].
     pub dead_time: f64,
+}
+
+impl RateModel {
+    /// The static model of a table behind `dead_time` (s).
+    #[must_use]
+    pub const fn of_table(still: EverettTable, dead_time: f64) -> Self {
+        Self { still, rate: None, creep: Vec::new(), dead_time }
+    }
 }
 
 /// What [`identify_rate`] found.

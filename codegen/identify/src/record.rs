@@ -22,6 +22,9 @@ pub(crate) const DISPLACEMENT: usize = 2;
 /// Header names in the order of [`TIME`], [`DRIVE`], [`DISPLACEMENT`].
 pub(crate) const NAMES: [&str; 3] = ["time_s", "drive_V", "displacement_um"];
 
+/// Name of the drive's column where it is the measured voltage.
+pub(crate) const MONITOR: &str = "monitor_V";
+
 /// Headers closer than this many edits to a wanted one are suggested.
 const NEAR: usize = 4;
 
@@ -40,6 +43,8 @@ pub struct Record {
     pub time: Vec<f64>,
     /// Drive, V.
     pub drive: Vec<f64>,
+    /// Whether the drive is the measured voltage (column `monitor_V`), not the command that a converter holds.
+    pub monitored: bool,
     /// Displacement, m.
     pub displacement: Vec<f64>,
     /// Samples that no fit believes: glitches, and what follows a jump of the drive.
@@ -73,6 +78,13 @@ impl Record {
         }
         let lines = (2..n + 2).collect();
         finish(findings, shown_as, lines, [time, drive, displacement])
+    }
+
+    /// Half the interval for which a converter holds each sample of the drive, s: by so much the voltage lags a command on the
+    /// mean. 0 where the drive is the measured voltage, or is sampled more slowly than at 1 kHz.
+    #[must_use]
+    pub fn held(&self) -> f64 {
+        if self.monitored { 0.0 } else { hold(&self.time) }
     }
 
     /// Difference of the largest and the smallest displacement, m.
@@ -111,7 +123,25 @@ pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic
     };
     let [time, drive, micrometres] = columns;
     let displacement = micrometres.into_iter().map(|y| y * 1e-6).collect();
-    finish(findings, shown_as, lines, [time, drive, displacement])
+    let record = finish(findings, shown_as, lines, [time, drive, displacement])?;
+    Ok(Record { monitored: is_monitored(text), ..record })
+}
+
+/// Whether the header of a file has the measured voltage, and no command.
+pub(crate) fn is_monitored(text: &str) -> bool {
+    let header = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or_default();
+    let has = |name: &str| header.split(',').any(|column| column.trim().eq_ignore_ascii_case(name));
+    has(MONITOR) && !has(NAMES[DRIVE])
+}
+
+/// Longest interval for which a converter is believed to hold a command, s: a record sampled more slowly leaves commands out.
+const LONGEST_HOLD: f64 = 1e-3;
+
+/// Half of the median sampling interval, s; 0 where that is too long for a converter's.
+pub(crate) fn hold(time: &[f64]) -> f64 {
+    let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    let interval = statistics::median(&mut intervals);
+    if interval > LONGEST_HOLD { 0.0 } else { 0.5 * interval }
 }
 
 fn finish(
@@ -130,7 +160,7 @@ fn finish(
     let [time, drive, displacement] = columns;
     let weightless = distrust::weightless(&lines, &time, &drive, &displacement, &mut findings);
     let warnings = findings.into_diagnostics();
-    Ok(Record { shown_as: shown_as.to_owned(), time, drive, displacement, weightless, warnings })
+    Ok(Record { shown_as: shown_as.to_owned(), time, drive, monitored: false, displacement, weightless, warnings })
 }
 
 /// The text of the file without a byte order mark, or `None` after the reason was reported.
@@ -187,7 +217,10 @@ fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 
 
 /// Places of the three columns, or `None` after every problem was reported.
 fn places(header: &Header, findings: &mut Findings) -> Option<[usize; 3]> {
-    let found = NAMES.map(|name| header.place(name, Some(&missing_column_help(&header.names, name)), findings));
+    let has = |name: &str| header.names.iter().any(|column| column.eq_ignore_ascii_case(name));
+    let drive = if has(MONITOR) && !has(NAMES[DRIVE]) { MONITOR } else { NAMES[DRIVE] };
+    let found = [NAMES[TIME], drive, NAMES[DISPLACEMENT]]
+        .map(|name| header.place(name, Some(&missing_column_help(&header.names, name)), findings));
     let [Some(time), Some(drive), Some(displacement)] = found else { return None };
     Some([time, drive, displacement])
 }

@@ -57,8 +57,11 @@ pub struct Report {
     pub drift_returns: usize,
     /// Whether the drift was removed from the branches too.
     pub drift_removed: bool,
-    /// Time by which the displacement lags the drive, s.
+    /// Time by which the displacement lags the drive column, s.
     pub dead_time: f64,
+    /// What of it is the converter's, which holds each sample of a command: half a sampling interval, s; 0 for `monitor_V` and below 1 kHz.
+    /// `hysteresis.dead_time` of a spec is the rest.
+    pub held: f64,
     /// How the dead time was decided.
     pub dead_time_basis: String,
     /// Standard deviation of white noise on the displacement.

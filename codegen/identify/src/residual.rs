@@ -30,18 +30,21 @@ impl Residual {
         });
         let believed = |values: &[f64]| -> Vec<f64> {
             let paired = values.iter().zip(&record.weightless[used.first..]);
-            paired.filter(|(_, weightless)| !**weightless).map(|(v, _)| *v).collect()
+            paired.take(used.end - used.first).filter(|(_, weightless)| !**weightless).map(|(v, _)| *v).collect()
         };
         let (time, kept) = (believed(&record.time[used.first..]), believed(&plain));
         let line = trend::Line::fit(&time, &kept);
         let detrended = kept.iter().zip(&time).map(|(r, t)| r - line.at(*t)).collect();
         let (low, high) = statistics::extent(&believed(&displacement[used.first..]));
+        // Behind the end the displacement is not known.
+        plain[used.end - used.first..].fill(f64::NAN);
         Self { plain, detrended, line, range: high - low }
     }
 
     /// What it consists of, given white noise `noise` (m) and the gain (m/V).
     pub(crate) fn cause(&self, record: &Record, first: usize, noise: f64, gain: f64) -> Cause {
-        let keep: Vec<bool> = record.weightless[first..].iter().map(|w| !w).collect();
+        let keep: Vec<bool> =
+            record.weightless[first..].iter().zip(&self.plain).map(|(w, r)| !w && !r.is_nan()).collect();
         cause::explain(&record.time[first..], &record.drive[first..], &self.plain, noise, gain, &keep)
     }
 

@@ -23,12 +23,24 @@ const FALLS_SUFFICE: f64 = 0.99;
 pub(crate) struct Used {
     /// First sample; the drive is at its minimum there and rises after it.
     pub(crate) first: usize,
+    /// One past the last sample.
+    pub(crate) end: usize,
     /// Between the reversals behind it, in order.
     pub(crate) branches: Vec<Branch>,
     /// Falls from a reversal.
     pub(crate) curves: usize,
     /// Whether the record consists of first-order reversal curves.
     first_order: bool,
+}
+
+impl Used {
+    /// Leaves out what lies behind sample `end`.
+    pub(crate) fn until(&mut self, end: usize) {
+        let end = if end > self.first { end } else { self.first };
+        self.end = end;
+        self.branches.iter_mut().filter(|b| b.end > end).for_each(|b| b.end = end);
+        self.branches.retain(|b| b.end > b.first + 1);
+    }
 }
 
 /// Finds the usable part; refuses a record with too few reversal curves.
@@ -53,7 +65,7 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
     let minimum = at_minimum(record, plane);
     let from_saturation = rises.clone().filter(|b| record.drive[b.first] <= minimum).count();
     let first_order = from_saturation as f64 >= FIRST_ORDER * rises.count() as f64;
-    Some(Used { first, branches, curves, first_order })
+    Some(Used { first, end: record.time.len(), branches, curves, first_order })
 }
 
 /// Normal equations over the falls of first-order reversal curves, if they excite the plane as well as all branches do,

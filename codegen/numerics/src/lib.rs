@@ -10,12 +10,14 @@
 //! | [`Traced`] | numbers that record every operation: bounds of rounding errors over a box of poses |
 //! | [`Taylor`] | numbers that are polynomials of a motion: expansion at rest, and a bound of what it leaves out |
 //! | [`ewma_limit`], [`pcc_limit`] | Jury limits of the run-to-run laws |
+//! | [`Factor`] | Cholesky factors of large matrices, by blocks |
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
 //! | [`largest`] | where a condition ceases to hold, by bisection |
 //! | [`Kernels`], [`displacements`], [`jacobian`], [`leg_forces`] | the controller's kernels on these numbers, compiled here |
 //!
 //! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
 
+mod cholesky;
 mod double;
 mod eigenvalues;
 mod exponential;
@@ -30,6 +32,7 @@ mod symmetric;
 mod taylor;
 mod traced;
 
+pub use cholesky::Factor;
 pub use double::Double;
 pub use eigenvalues::{eigenvalues, spectral_radius};
 pub use exponential::exponential;

@@ -4,9 +4,10 @@ use crate::chart::{Axis, Chart, Mark, Patch};
 use crate::plot::{BLUE, GREY, ORANGE, PURPLE, figure};
 use specgen_identify::gauge::GaugeReport;
 use specgen_identify::linear::LinearReport;
+use specgen_identify::rate::RateReport;
 use specgen_identify::response::ResponseReport;
 use specgen_identify::stiffness::StiffnessReport;
-use specgen_identify::{GridChoice, Identified, Record, Trace, Validation};
+use specgen_identify::{GridChoice, Identified, Prediction, Record, Trace};
 
 fn panel(title: &str, x: Axis, y: Axis) -> Chart {
     Chart::new("", title, x, y)
@@ -27,7 +28,7 @@ fn residual(title: &str, trace: &Trace) -> Chart {
 /// Loops against the model, residual, Preisach plane with what was not excited hatched, and the choice of the grid or the
 /// validation if there is one.
 #[must_use]
-pub fn everett(identified: &Identified, choice: Option<&GridChoice>, validation: Option<&Validation>) -> String {
+pub fn everett(identified: &Identified, choice: Option<&GridChoice>, validation: Option<&Prediction>) -> String {
     let (report, trace) = (&identified.report, &identified.trace);
     let loops = panel("Loops", Axis::linear("drive", "V"), Axis::linear("displacement", "µm"))
         .with("measured", Mark::Line(2.2), micrometres(trace, false))
@@ -44,10 +45,7 @@ pub fn everett(identified: &Identified, choice: Option<&GridChoice>, validation:
         panels.push(curve(choice));
     }
     if let Some(validation) = validation {
-        panels.push(residual(
-            &format!("Residual of {}: {:.3} % rms", shortened(&validation.record), validation.best.rms_percent),
-            &validation.trace,
-        ));
+        panels.extend(error(validation));
     }
     let subtitle = format!(
         "N = {}; fit {:.3} % of {:.2} µm; noise {:.2} nm; drift {:.3} nm/s; dead time {:.3} ms; {:.1} % of the plane excited",
@@ -60,6 +58,54 @@ pub fn everett(identified: &Identified, choice: Option<&GridChoice>, validation:
         report.excited_share * 100.0
     );
     figure(&format!("Everett table of {}", shortened(&report.record)), &subtitle, &panels, 2)
+}
+
+/// Measured minus predicted, if the record has the displacement.
+fn error(prediction: &Prediction) -> Option<Chart> {
+    let (compared, measured) = (prediction.compared.as_ref()?, prediction.measured.as_ref()?);
+    let name = format!("Residual of {}: {:.3} % rms", shortened(&prediction.record), compared.rms_percent);
+    let off = |k: usize| if prediction.keep[k] { measured[k] - prediction.displacement[k] } else { f64::NAN };
+    let residual_of = (0..measured.len()).map(off).collect();
+    let trace = Trace { time: prediction.time.clone(), residual: residual_of, ..Trace::default() };
+    Some(residual(&name, &trace))
+}
+
+/// Loops, the displacement over time, and the error, of what a model predicts for a drive.
+#[must_use]
+pub fn prediction(prediction: &Prediction) -> String {
+    let over = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| [*x, y * 1e6]).collect::<Vec<_>>();
+    let chart = |title: &str, axis: Axis, x: &[f64]| {
+        let mut chart = panel(title, axis, Axis::linear("displacement", "µm"));
+        if let Some(measured) = &prediction.measured {
+            chart = chart.with("measured", Mark::Line(2.2), over(x, measured));
+        }
+        chart.with("predicted", Mark::Line(0.9), over(x, &prediction.displacement))
+    };
+    let mut panels = vec![
+        chart("Loops", Axis::linear("drive", "V"), &prediction.drive),
+        chart("Over time", Axis::linear("time", "s"), &prediction.time),
+    ];
+    panels.extend(error(prediction));
+    let below =
+        format!("{} samples; {} held at the end of the table", prediction.time.len(), prediction.samples_clipped);
+    figure(&format!("Prediction for {}", shortened(&prediction.record)), &below, &panels, 2)
+}
+
+/// Errors of each option over the rates of the records, fitted to all and to the others.
+#[must_use]
+pub fn rate(report: &RateReport) -> String {
+    let chart = |title: &str, left_out: bool| {
+        let empty = panel(title, Axis::linear("curves per second", "Hz"), Axis::linear("error", "% of range, rms"));
+        report.options.iter().enumerate().fold(empty, |chart, (k, option)| {
+            let errors = if left_out { &option.left_out } else { &option.fitted };
+            let mut points: Vec<[f64; 2]> = report.records.iter().zip(errors).map(|(r, e)| [r.frequency, *e]).collect();
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            chart.with(option.option.name(), Mark::Line(1.6), points).colored(k)
+        })
+    };
+    let panels = [chart("Fitted to all records", false), chart("Each record by the fit to the others", true)];
+    let names: Vec<&str> = report.records.iter().map(|record| shortened(&record.record)).collect();
+    figure("Rate dependence", &format!("N = {}; {}", report.grid, names.join(", ")), &panels, 2)
 }
 
 /// The end of a long path.

@@ -8,7 +8,7 @@ use specgen_runtime::Crc32;
 use crate::{CONFIG_WORDS, hysteresis, setpoint};
 
 /// CRC-32 (ISO-HDLC) of [`IDENTITY`], the tables, the trajectories and [`SETTINGS`]; computed by specgen.
-pub const CRC: u32 = 0x1622b520;
+pub const CRC: u32 = 0x3f10594b;
 
 /// The spec's settings, in the order of [`crate::CONFIG_NAMES`]: what `Config::new().to_words()` gives.
 pub static SETTINGS: [u64; CONFIG_WORDS] = [

@@ -119,6 +119,15 @@ Examples:
   specgen pil platform.toml --port /dev/ttyACM0  # (board)
       a board instead of QEMU";
 
+pub const PREDICT: &str = "\
+Examples:
+  specgen identify predict table.csv 10hz.csv
+      how far off the table is on a record it was not fitted to
+  specgen identify predict legs.toml 10hz.csv -o predicted.csv --plot predicted.svg
+      the model of leg 0 of the spec, with its creep and dead time
+
+A drive without displacement_um is predicted above negative saturation.";
+
 pub const OPERATE: &str = "\
 Examples:
   specgen operate --port /dev/ttyACM0 platform.toml status  # (board)

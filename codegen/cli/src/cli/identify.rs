@@ -6,6 +6,7 @@
 mod everett;
 mod gauge;
 mod linear;
+mod predict;
 mod rate;
 mod response;
 mod stiffness;
@@ -42,6 +43,8 @@ enum Kind {
     Response(response::Arguments),
     /// Calibration of a gauge from its voltage and a reference.
     Gauge(gauge::Arguments),
+    /// Displacement that a table or a spec predicts for a drive, beside the measured one.
+    Predict(predict::Arguments),
     /// Axial stiffness from force and displacement at constant drive.
     Stiffness(stiffness::Arguments),
     /// Compare rate-dependent models on records of one leg at several rates.
@@ -54,6 +57,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Some(Kind::Response(arguments)) => response::run(arguments, ui),
         Some(Kind::Gauge(arguments)) => gauge::run(arguments, ui),
         Some(Kind::Stiffness(arguments)) => stiffness::run(arguments, ui),
+        Some(Kind::Predict(arguments)) => predict::run(arguments, ui),
         Some(Kind::Rate(arguments)) => rate::run(arguments, ui),
         None => everett::run(&arguments.everett, ui),
     }

@@ -32,9 +32,10 @@ pub fn read_rate_csv(text: &str, shown_as: &str) -> Result<EverettTable, Vec<Dia
     findings.conclude(table).map(|((table, _), _)| table)
 }
 
-/// The `[hysteresis]` lines of a spec that uses `model`; `table` and `rate_table` name the CSV files.
+/// The `[hysteresis]` lines of a spec that uses `model`; `table` and `rate_table` name the CSV files. `held` (s) is what of the
+/// dead time was the hold of the records' commands: the controller counts that of its own.
 #[must_use]
-pub fn spec_lines(option: RateOption, model: &RateModel, table: &str, rate_table: &str) -> String {
+pub fn spec_lines(option: RateOption, model: &RateModel, held: f64, table: &str, rate_table: &str) -> String {
     let mut text = format!("grid    = {}\nrecords = [\"{table}\"]\n", model.still.grid);
     // Writing to a String cannot fail.
     let _ = match option {
@@ -55,8 +56,8 @@ pub fn spec_lines(option: RateOption, model: &RateModel, table: &str, rate_table
             )
         }
     };
-    if model.dead_time > 0.0 {
-        let ms = shown(model.dead_time * 1e3);
+    if model.dead_time > held {
+        let ms = shown((model.dead_time - held) * 1e3);
         let _ = writeln!(text, "dead_time = \"{ms} ms\"    # of six legs; with [control] it is control.lead");
     }
     text

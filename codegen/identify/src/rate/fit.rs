@@ -9,10 +9,6 @@ use crate::{dead_time, normal, prior};
 use specgen_language::diagnostic::codes;
 use specgen_numerics::nnls::Failure;
 
-/// Longest dead time tried, sampling intervals of the fastest sampled record.
-const LONGEST: usize = 16;
-/// Dead times tried per sampling interval.
-const PER_INTERVAL: usize = 2;
 /// Smoothness of μ₁ against that of μ₀ ([`prior`]): μ₁ is a small difference between rates, and there are as many unknowns.
 const RATE_SMOOTHNESS: f64 = 1e3;
 
@@ -48,21 +44,18 @@ fn still(plane: &Plane, records: &[&Prepared], dead_time: f64) -> Result<RateMod
 
 /// The dead time (s) with which one table fits all records best, bounds of the weights aside; zero if none helps.
 fn dead_time(plane: &Plane, records: &[&Prepared]) -> Result<f64, Failure> {
-    let interval = records.iter().fold(f64::INFINITY, |least, p| if p.interval < least { p.interval } else { least });
-    let step = interval / PER_INTERVAL as f64;
-    let tried: Vec<f64> = (0..=LONGEST * PER_INTERVAL).map(|k| k as f64 * step).collect();
-    let each = records.iter().map(|p| {
-        let targets: Vec<Vec<f64>> = tried.iter().map(|tau| p.delayed(*tau)).collect();
-        accumulate(plane, p, &targets, None)
+    let longest = |p: &&Prepared| dead_time::longest(p.record, &p.branches);
+    let longest = records.iter().map(longest).fold(f64::INFINITY, |least, s| if s < least { s } else { least });
+    let found = dead_time::search(longest, |tried| {
+        let each = records.iter().map(|p| {
+            let targets: Vec<Vec<f64>> = tried.iter().map(|tau| p.delayed(*tau)).collect();
+            accumulate(plane, p, &targets, None)
+        });
+        let mut normal = each.reduce(|sum, more| sum.add(&more))?;
+        prior::add(plane.grid, &mut normal.gram);
+        dead_time::residuals(&normal.gram, &normal.rhs, &normal.energy)
     });
-    let mut normal = each.reduce(|sum, more| sum.add(&more)).ok_or(Failure::Singular)?;
-    prior::add(plane.grid, &mut normal.gram);
-    let residual = dead_time::residuals(normal.gram, &normal.rhs, &normal.energy).ok_or(Failure::Singular)?;
-    let best = dead_time::smallest(&residual);
-    if best == 0 || best + 1 == tried.len() {
-        return Ok(tried[best]);
-    }
-    Ok(tried[best] + dead_time::vertex([residual[best - 1], residual[best], residual[best + 1]], step))
+    found.map(|found| found.dead_time).ok_or(Failure::Singular)
 }
 
 /// (6): μ₀ ≥ 0 and μ₁ of either sign in one fit.

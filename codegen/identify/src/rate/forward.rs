@@ -9,28 +9,41 @@ use crate::staircase::Staircase;
 /// The displacement of the model at each sample from `first` on, m above negative saturation, without the dead time.
 ///
 /// `memory` is what came before that sample; creep has come to rest there.
-pub(super) fn predict(
+pub(super) fn predict(model: &RateModel, plane: &Plane, record: &Record, first: usize, memory: Staircase) -> Vec<f64> {
+    let (plain, rate) = still(model, plane, &record.time, &record.drive, first, memory);
+    let mut sum = creeping(model, &record.time[first..], &plain);
+    sum.iter_mut().zip(rate.into_iter().flatten()).for_each(|(y, r)| *y += r);
+    sum
+}
+
+/// Γ₀ at each sample from `first` on, m, and u̇ Γ₁ where the model has it; `memory` is what came before.
+pub(crate) fn still(
     model: &RateModel,
     plane: &Plane,
-    record: &Record,
-    slope: &[f64],
+    time: &[f64],
+    drive: &[f64],
     first: usize,
     memory: Staircase,
-) -> Vec<f64> {
-    let mut still = Vec::with_capacity(record.time.len() - first);
-    let mut rate_part = Vec::new();
-    normal::each_row_from(memory, plane, &record.drive, first, |k, row| {
+) -> (Vec<f64>, Option<Vec<f64>>) {
+    let mut still = Vec::with_capacity(drive.len() - first);
+    let mut rate_part = model.rate.as_ref().map(|_| Vec::with_capacity(drive.len() - first));
+    let slope = if model.rate.is_some() { super::prepare::slope(time, drive, plane.range) } else { Vec::new() };
+    normal::each_row_from(memory, plane, drive, first, |k, row| {
         still.push(regressor::evaluate(row, &model.still.nodes));
-        if let Some(rate) = &model.rate {
-            rate_part.push(slope[k] * regressor::evaluate(row, &rate.nodes));
+        if let (Some(rate), Some(part)) = (&model.rate, &mut rate_part) {
+            part.push(slope[k] * regressor::evaluate(row, &rate.nodes));
         }
     });
-    let mut sum = still.clone();
+    (still, rate_part)
+}
+
+/// f + Σ w_j x_j of a displacement f (m) at `time` (s).
+pub(crate) fn creeping(model: &RateModel, time: &[f64], f: &[f64]) -> Vec<f64> {
+    let mut sum = f.to_vec();
     for term in &model.creep {
-        let x = creep(term.time_constant, &record.time[first..], &still);
+        let x = creep(term.time_constant, time, f);
         sum.iter_mut().zip(x).for_each(|(y, x)| *y += term.weight * x);
     }
-    sum.iter_mut().zip(rate_part).for_each(|(y, r)| *y += r);
     sum
 }
 
@@ -56,7 +69,7 @@ pub(super) fn creep(time_constant: f64, time: &[f64], f: &[f64]) -> Vec<f64> {
 pub(super) fn parts(still: &RateModel, times: &[f64], plane: &Plane, p: &super::prepare::Prepared) -> Vec<Vec<f64>> {
     let plain = RateModel { creep: Vec::new(), rate: None, ..still.clone() };
     let memory = Staircase::negative_saturation(plane.range);
-    let f = predict(&plain, plane, p.record, &p.slope, p.first, memory);
+    let f = predict(&plain, plane, p.record, p.first, memory);
     let time = &p.record.time[p.first..];
     let states: Vec<Vec<f64>> = times.iter().map(|tau| creep(*tau, time, &f)).collect();
     core::iter::once(f).chain(states).collect()

@@ -3,8 +3,8 @@
 //! The free ones are eliminated (Schur complement), the rest is [`nnls`], and the free ones follow from it. The sums are
 //! written out, in order: their bits do not depend on the CPU.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
-
+use nalgebra::DMatrix;
+use specgen_numerics::Factor;
 use specgen_numerics::nnls::{self, Failure};
 
 /// Minimises ½ wᵀGw − bᵀw with the first `bounded` entries of w ≥ 0. `gram` is symmetric, both triangles filled.
@@ -13,38 +13,41 @@ pub(super) fn solve(gram: &DMatrix<f64>, rhs: &[f64], bounded: usize) -> Result<
     if free == 0 {
         return nnls::solve(gram, rhs).map(|solution| solution.weights);
     }
-    let block = DMatrix::from_fn(free, free, |r, c| gram[(bounded + r, bounded + c)]);
-    let factor = Cholesky::new(block).ok_or(Failure::Singular)?;
-    let free_rhs = factor.solve(&DVector::from_fn(free, |r, _| rhs[bounded + r]));
+    let factor = Factor::of(free, |r, c| gram[(bounded + c, bounded + r)]).ok_or(Failure::Singular)?;
+    let solved = |mut values: Vec<f64>| {
+        factor.solve(&mut values);
+        values
+    };
+    let free_rhs = solved(rhs[bounded..].to_vec());
     if bounded == 0 {
-        return Ok(free_rhs.iter().copied().collect());
+        return Ok(free_rhs);
     }
     // Column c: how the free ones answer to bounded unknown c.
     let cross: Vec<Vec<f64>> = (0..bounded).map(|c| (0..free).map(|r| gram[(bounded + r, c)]).collect()).collect();
-    let answer: Vec<DVector<f64>> =
-        cross.iter().map(|column| factor.solve(&DVector::from_column_slice(column))).collect();
+    let answer: Vec<Vec<f64>> = cross.iter().map(|column| solved(column.clone())).collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y);
     let mut reduced = DMatrix::zeros(bounded, bounded);
     for column in 0..bounded {
         for row in column..bounded {
-            let value = gram[(row, column)] - dot(&cross[row], answer[column].as_slice());
+            let value = gram[(row, column)] - dot(&cross[row], &answer[column]);
             reduced[(row, column)] = value;
             reduced[(column, row)] = value;
         }
     }
-    let reduced_rhs: Vec<f64> = (0..bounded).map(|k| rhs[k] - dot(&cross[k], free_rhs.as_slice())).collect();
+    let reduced_rhs: Vec<f64> = (0..bounded).map(|k| rhs[k] - dot(&cross[k], &free_rhs)).collect();
     let mut all = nnls::solve(&reduced, &reduced_rhs)?.weights;
     let mut rest = free_rhs;
     for (weight, answer) in all.iter().zip(&answer) {
-        rest -= answer * *weight;
+        rest.iter_mut().zip(answer).for_each(|(rest, answer)| *rest -= answer * weight);
     }
-    all.extend(rest.iter());
+    all.extend(rest);
     Ok(all)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::DVector;
     use rand_chacha::ChaCha8Rng;
     use rand_chacha::rand_core::{Rng, SeedableRng};
 

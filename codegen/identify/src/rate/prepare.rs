@@ -43,9 +43,9 @@ impl Prepared<'_> {
 }
 
 /// du/dt of each sample by backward difference, drives held within `range` (V), V/s; 0 for the first.
-pub(super) fn slope(record: &Record, range: [f64; 2]) -> Vec<f64> {
+pub(super) fn slope(time: &[f64], drive: &[f64], range: [f64; 2]) -> Vec<f64> {
     let held = |u: f64| crate::staircase::saturate(u, range);
-    let pairs = record.drive.windows(2).zip(record.time.windows(2));
+    let pairs = drive.windows(2).zip(time.windows(2));
     let slopes = pairs.map(|(u, t)| (held(u[1]) - held(u[0])) / (t[1] - t[0]));
     core::iter::once(0.0).chain(slopes).collect()
 }
@@ -57,7 +57,7 @@ pub(super) fn prepare<'a>(record: &'a Record, plane: &Plane, findings: &mut Find
         return None;
     }
     let used = selection::usable(record, plane, findings)?;
-    let slope = slope(record, plane.range);
+    let slope = slope(&record.time, &record.drive, plane.range);
     let mut speeds: Vec<f64> = used.branches.iter().flat_map(|b| &slope[b.first + 1..b.end]).map(|s| s.abs()).collect();
     let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
     let mut prepared = Prepared {

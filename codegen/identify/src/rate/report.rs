@@ -3,8 +3,9 @@
 use serde::Serialize;
 
 use super::prepare::Prepared;
-use super::score::{Unknown, on};
+use super::score::on;
 use super::{CreepTerm, RateModel, RateOption};
+use crate::predict::{Drive, predict};
 use crate::record::Record;
 use crate::regressor::Plane;
 use crate::statistics;
@@ -81,6 +82,8 @@ pub struct RateReport {
     pub grid: usize,
     /// The records, in the order given.
     pub records: Vec<Measured>,
+    /// What of each dead time is the hold of the records' commands, s: half a sampling interval, on the mean of the records.
+    pub held: f64,
     /// The record held out.
     pub hold_out: Option<HoldOut>,
     /// The options, plainest first.
@@ -97,24 +100,30 @@ pub(super) fn report(
     left_out: &[Vec<RateModel>],
     hold_out: Option<&Record>,
 ) -> Result<RateReport, Vec<Diagnostic>> {
-    let unknown = hold_out.map(|record| Unknown::new(record, plane)).transpose()?;
+    let held_out = |model: &RateModel| -> Result<Option<f64>, Vec<Diagnostic>> {
+        let Some(record) = hold_out else { return Ok(None) };
+        Ok(predict(model, &Drive::from(record))?.compared.map(|compared| compared.rms_percent))
+    };
+    let hold_outs = models.iter().map(held_out).collect::<Result<Vec<_>, _>>()?;
     let options: Vec<OptionReport> = RateOption::ALL
         .into_iter()
         .zip(models)
+        .zip(hold_outs)
         .enumerate()
-        .map(|(k, (option, model))| OptionReport {
+        .map(|(k, ((option, model), hold_out))| OptionReport {
             option,
             dead_time: model.dead_time,
             creep: model.creep.clone(),
             fitted: prepared.iter().map(|p| on(model, plane, p)).collect(),
             left_out: prepared.iter().zip(left_out).map(|(p, fits)| on(&fits[k], plane, p)).collect(),
-            hold_out: unknown.as_ref().map(|unknown| unknown.score(model, plane)),
+            hold_out,
         })
         .collect();
     let records: Vec<Measured> = prepared.iter().map(measured).collect();
     let verdict = verdict(&records, &options, hold_out);
     let hold_out = hold_out.map(|record| HoldOut { record: record.shown_as.clone() });
-    Ok(RateReport { grid: plane.grid, records, hold_out, options, verdict })
+    let held = mean(&prepared.iter().map(|p| p.record.held()).collect::<Vec<_>>());
+    Ok(RateReport { grid: plane.grid, records, held, hold_out, options, verdict })
 }
 
 fn measured(p: &Prepared) -> Measured {

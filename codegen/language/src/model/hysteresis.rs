@@ -2,8 +2,8 @@
 
 use crate::keys::declare::*;
 
-/// Most intervals per axis of an Everett table: the normal matrix of 64 has 2,080 × 2,080 entries.
-pub const MAX_GRID: usize = 64;
+/// Most intervals per axis of an Everett table: the normal matrix of 128 has 8,256 × 8,256 entries, half a gigabyte.
+pub const MAX_GRID: usize = 128;
 /// Most control ticks of a run.
 pub const LARGEST_RUN_INTERVAL: i32 = 1_000_000;
 

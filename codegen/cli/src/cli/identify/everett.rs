@@ -6,12 +6,13 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
+use super::predict;
 use super::refused;
 use crate::cli::file::write_file;
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::table::{right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
-use specgen_identify::{self as identify, Cause, DeadTime, GridChoice, Options, Report, Validation};
+use specgen_identify::{self as identify, Cause, DeadTime, GridChoice, Options, Prediction, Report};
 use specgen_language::diagnostic::Diagnostic;
 use specgen_report::identification as figure;
 
@@ -104,7 +105,7 @@ struct Table<'a> {
     #[serde(skip)]
     grid: usize,
     report: &'a Report,
-    validation: Option<&'a Validation>,
+    validation: Option<&'a Prediction>,
     grid_choice: Option<&'a GridChoice>,
     /// A line for each file that was written.
     #[serde(skip)]
@@ -118,23 +119,14 @@ impl Outcome for Table<'_> {
         let _ = writeln!(text, "{}: {}", self.record, summary(self.report));
         details(self.report, &mut text);
         if let Some(validation) = self.validation {
-            let _ = writeln!(
-                text,
-                "{}: predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm (start taken as {})",
-                validation.record,
-                validation.best.rms_percent,
-                validation.best.max_percent,
-                validation.displacement_range * 1e6,
-                validation.best.start.name()
-            );
-            let _ = writeln!(text, "  this residual: {}", account(&validation.cause));
+            let _ = writeln!(text, "{}: {}", validation.record, predict::summary(validation));
         }
         let _ = writeln!(text, "lines for the spec:\n[hysteresis]\ngrid = {}", self.grid);
         text + &self.files
     }
 }
 
-fn validate(path: &Path, identified: &identify::Identified) -> Result<Validation, Vec<Diagnostic>> {
+fn validate(path: &Path, identified: &identify::Identified) -> Result<Prediction, Vec<Diagnostic>> {
     let record = identify::read_record(path, &path.display().to_string())?;
     identify::validate(&identified.table, &record, identified.report.dead_time)
 }
@@ -167,6 +159,14 @@ fn curve(choice: &GridChoice) -> String {
 fn details(report: &Report, text: &mut String) {
     let _ = writeln!(text, "  residual: {}", account(&report.cause));
     let _ = writeln!(text, "  dead time {}", report.dead_time_basis);
+    if report.dead_time > report.held && report.held > 0.0 {
+        let _ = writeln!(
+            text,
+            "  of it {:.3} ms is the hold of a command, as `drive_V` is taken to be; from the voltage it is {:.3} ms (a measured voltage is named `monitor_V`)",
+            report.held * 1e3,
+            (report.dead_time - report.held) * 1e3
+        );
+    }
     if report.weightless > 0 {
         let _ = writeln!(text, "  {} samples got no weight (see the warnings)", report.weightless);
     }
@@ -187,7 +187,7 @@ fn details(report: &Report, text: &mut String) {
     }
 }
 
-fn account(cause: &Cause) -> String {
+pub(super) fn account(cause: &Cause) -> String {
     let shares: Vec<String> =
         cause.shares.iter().map(|(s, share)| format!("{} {:.0} %", short(*s), share * 100.0)).collect();
     format!(

@@ -8,12 +8,13 @@ use clap::Args;
 use super::Identified;
 use super::everett::{grid, range};
 use crate::cli::file::write_file;
-use crate::cli::plot::wrote;
+use crate::cli::plot::{Plot, wrote};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Refused;
 use specgen_identify::rate::{RateIdentified, RateOption, RateReport, identify_rate, spec_lines, write_rate_csv};
 use specgen_identify::{Options, read_record, write_table_csv};
+use specgen_report::identification as figure;
 
 /// Arguments of `identify rate`.
 #[derive(Args, Debug)]
@@ -34,6 +35,8 @@ pub struct Arguments {
     /// Write NAME.toml (lines of a spec) and the tables NAME-static.csv, NAME-mu0.csv and so on beside it.
     #[arg(short, long, value_name = "NAME")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
@@ -62,7 +65,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let identified = identify_rate(&records, hold_out.as_ref(), &options).map_err(refused)?;
     ui.findings(None, &identified.warnings);
     let files = arguments.output.as_ref().map(|output| write(output, &identified)).transpose()?.unwrap_or_default();
-    let files = files.iter().map(|path| wrote(path)).collect();
+    let plot = arguments.plot.write("Rate dependence", || figure::rate(&identified.report))?;
+    let files = files.iter().map(|path| wrote(path)).chain(plot).collect();
     ui.result(&Identified { record: String::new(), report: identified.report, files });
     Ok(())
 }
@@ -98,7 +102,7 @@ fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Fai
         if let Some(rate) = &model.rate {
             files.push((beside(&rate_table), write_rate_csv(rate)));
         }
-        let block = spec_lines(*option, model, &table, &rate_table);
+        let block = spec_lines(*option, model, identified.report.held, &table, &rate_table);
         let prefix = if *option == best { "" } else { "# " };
         let _ = writeln!(lines, "\n# {}", option.name());
         for line in block.lines() {
@@ -153,6 +157,13 @@ fn table(report: &RateReport) -> String {
             _ => String::new(),
         };
         let _ = writeln!(text, "{}: dead time {:.3} ms{creep}", option.option.name(), option.dead_time * 1e3);
+    }
+    if report.held > 0.0 {
+        let _ = writeln!(
+            text,
+            "of each dead time {:.3} ms is the hold of the commands; the lines of the spec have the rest",
+            report.held * 1e3
+        );
     }
     let _ = writeln!(text, "{}", report.verdict.text);
     let _ = writeln!(text, "lowest error on rates not fitted on: {}", report.verdict.best.name());

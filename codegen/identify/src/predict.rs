@@ -1,0 +1,274 @@
+//! What a model makes of a drive: the displacement at each of its samples, and how far off it is where the file has it.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::cause::{self, Cause};
+use super::distrust::{JUMP, SETTLING};
+use super::findings::Findings;
+use super::rate::{RateModel, forward};
+use super::record::{self, Record};
+use super::regressor::Plane;
+use super::signals::{self, Wanted};
+use super::staircase::Staircase;
+use super::trend::{Line, rms_and_max};
+use super::{branches, start, statistics};
+use crate::everett::EverettTable;
+use specgen_language::diagnostic::{Diagnostic, codes};
+
+/// The drive may leave the range of the table by this share of it; it is held at its end there.
+const BEYOND: f64 = 0.05;
+
+/// A drive record: reversal curves or anything else, with or without the displacement.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    /// Name of the file as its user knows it.
+    pub shown_as: String,
+    /// s, rising.
+    pub time: Vec<f64>,
+    /// V.
+    pub drive: Vec<f64>,
+    /// m.
+    pub displacement: Option<Vec<f64>>,
+    /// Samples that are not compared: glitches and what follows a jump.
+    weightless: Vec<bool>,
+    /// Half the interval for which a converter holds a command, s; 0 for a measured voltage.
+    pub held: f64,
+}
+
+impl From<&Record> for Drive {
+    fn from(record: &Record) -> Self {
+        Self {
+            shown_as: record.shown_as.clone(),
+            time: record.time.clone(),
+            drive: record.drive.clone(),
+            displacement: Some(record.displacement.clone()),
+            weightless: record.weightless.clone(),
+            held: record.held(),
+        }
+    }
+}
+
+/// Reads `time_s`, `drive_V` or `monitor_V`, and `displacement_um` if it is there.
+///
+/// # Errors
+/// All findings of the file.
+pub fn read_drive(path: &Path, shown_as: &str) -> Result<Drive, Vec<Diagnostic>> {
+    parse_drive(&record::read_file(path, shown_as)?, shown_as)
+}
+
+/// The same from the text of a file.
+///
+/// # Errors
+/// As [`read_drive`].
+pub fn parse_drive(text: &str, shown_as: &str) -> Result<Drive, Vec<Diagnostic>> {
+    const COLUMNS: [&str; 4] = ["time_s", "drive_V", record::MONITOR, "displacement_um"];
+    let monitored = record::is_monitored(text);
+    let required = [true, !monitored, monitored, false];
+    let wanted: Vec<Wanted> = COLUMNS.iter().zip(required).map(|(name, required)| Wanted { name, required }).collect();
+    let signals = signals::parse(text, shown_as, &wanted)?;
+    let time = signals.column(0).to_vec();
+    let drive = signals.column(if monitored { 2 } else { 1 }).to_vec();
+    let displacement = signals.columns[3].as_ref().map(|um| um.iter().map(|y| y * 1e-6).collect());
+    let held = if monitored { 0.0 } else { record::hold(&time) };
+    let weightless = vec![false; time.len()];
+    Ok(Drive { shown_as: shown_as.to_owned(), time, drive, displacement, weightless, held })
+}
+
+/// How far off a prediction is. Lengths in m; percentages are of `range`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    /// Samples compared.
+    pub samples: usize,
+    /// Samples behind a jump of the drive that are not: the actuator is still ringing.
+    pub samples_after_jumps: usize,
+    /// Of the compared displacement.
+    pub range: f64,
+    /// Root mean square error after one offset and one linear drift.
+    pub rms: f64,
+    /// Largest magnitude of that error.
+    pub max: f64,
+    /// `rms` in % of the range.
+    pub rms_percent: f64,
+    /// `max` in % of the range.
+    pub max_percent: f64,
+    /// The linear drift that was taken out, m/s.
+    pub drift: f64,
+    /// What the error consists of.
+    pub cause: Cause,
+}
+
+/// The displacement that a model predicts for a drive.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Prediction {
+    /// Name of the record.
+    pub record: String,
+    /// Samples at the beginning, before the drive first moves: the displacement is not predicted there.
+    pub samples_skipped: usize,
+    /// Samples whose drive is outside the range of the table and was held at its end.
+    pub samples_clipped: usize,
+    /// Time by which the displacement is taken to lag the drive column, s.
+    pub dead_time: f64,
+    /// Share of the weight that the first drive leaves open which was on before the record: 0 after a rise from the lowest
+    /// drive, 1 after a fall from the highest. From the displacement; ½ without one.
+    pub start_on: f64,
+    /// Against the displacement of the record, if it has one.
+    pub compared: Option<Compared>,
+    /// Time of each sample behind the skipped ones, s.
+    #[serde(skip)]
+    pub time: Vec<f64>,
+    /// Drive of each, V.
+    #[serde(skip)]
+    pub drive: Vec<f64>,
+    /// Prediction for each, m: above negative saturation, or with the offset and drift of the displacement.
+    #[serde(skip)]
+    pub displacement: Vec<f64>,
+    /// Displacement of each, m, if the record has it.
+    #[serde(skip)]
+    pub measured: Option<Vec<f64>>,
+    /// Whether each is compared.
+    #[serde(skip)]
+    pub keep: Vec<bool>,
+}
+
+/// Runs the static `table` over `record`, whose displacement lags its drive column by `dead_time` (s).
+///
+/// # Errors
+/// As [`predict`].
+pub fn validate(table: &EverettTable, record: &Record, dead_time: f64) -> Result<Prediction, Vec<Diagnostic>> {
+    predict(&RateModel::of_table(table.clone(), dead_time), &Drive::from(record))
+}
+
+/// Runs `model` over `drive`; `model.dead_time` counts from the drive column.
+///
+/// The state at the start is unknown and taken from the displacement, see [`Prediction::start_on`]. Samples before the drive
+/// first moves are skipped: they say nothing about hysteresis. Not compared are 200 samples from each jump of the drive by
+/// more than 10 % of the table's range in one sampling interval.
+///
+/// # Errors
+/// If the drive never moves, or leaves the range of the table by more than 5 %.
+pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagnostic>> {
+    let mut findings = Findings::new(&drive.shown_as);
+    let table = &model.still;
+    let plane = Plane { grid: table.grid, range: [table.drive_min, table.drive_max] };
+    let [bottom, top] = plane.range;
+    let (low, high) = statistics::extent(&drive.drive);
+    let allowed = BEYOND * (top - bottom);
+    if low < bottom - allowed || high > top + allowed {
+        let message = format!("the drive goes from {low} V to {high} V, outside the table's {bottom} V to {top} V");
+        findings.add(codes::DRIVE_RANGE, None, message, "name a record inside the range of the table");
+        return Err(findings.into_diagnostics());
+    }
+    let Some(first) = branches::branches(&drive.drive, 0, 0.5 * plane.interval()).first().map(|b| b.first) else {
+        let message = "the drive moves by less than half a grid interval".to_owned();
+        findings.add(codes::VALIDATION_IDLE, None, message, "name a record that moves the drive");
+        return Err(findings.into_diagnostics());
+    };
+    let samples_clipped = drive.drive[first..].iter().filter(|u| **u < bottom || **u > top).count();
+    let time = drive.time[first..].to_vec();
+    // Of a drive that begins later than it does: the model's displacements follow it by the dead time.
+    let run = |full: bool| {
+        let mut memory = Staircase::negative_saturation(plane.range);
+        if full {
+            memory.push(top);
+        }
+        memory.push(drive.drive[first]);
+        forward::still(model, &plane, &drive.time, &drive.drive, first, memory)
+    };
+    let (below, above) = (run(false), run(true));
+    let open: Vec<f64> = above.0.iter().zip(&below.0).map(|(a, b)| a - b).collect();
+    let finish = |values: &[f64]| later(&time, &forward::creeping(model, &time, values), model.dead_time);
+    let mut displacement = finish(&below.0);
+    if let Some(rate) = &below.1 {
+        displacement.iter_mut().zip(later(&time, rate, model.dead_time)).for_each(|(y, r)| *y += r);
+    }
+    let parts: Vec<Vec<f64>> = start::parts(&open).iter().map(|part| finish(part)).collect();
+    let measured = drive.displacement.as_ref().map(|y| y[first..].to_vec());
+    let settled = settled(&drive.drive, first, JUMP * (top - bottom));
+    let keep: Vec<bool> = settled.iter().zip(&drive.weightless[first..]).map(|(s, w)| *s && !w).collect();
+    let kept = |values: &[f64]| -> Vec<f64> {
+        values.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
+    };
+    let slopes = match &measured {
+        Some(y) => {
+            let rest: Vec<f64> = y.iter().zip(&displacement).map(|(y, p)| y - p).collect();
+            let parts: Vec<Vec<f64>> = parts.iter().map(|part| kept(part)).collect();
+            start::slopes(&kept(&time), &kept(&rest), &parts)
+        }
+        None => vec![0.5; parts.len()],
+    };
+    for (slope, part) in slopes.iter().zip(&parts) {
+        displacement.iter_mut().zip(part).for_each(|(y, p)| *y += slope * p);
+    }
+    let mean = |values: &[f64]| values.iter().fold(0.0, |sum, v| sum + v) / values.len().max(1) as f64;
+    let start_on = if slopes.is_empty() { 0.0 } else { mean(&slopes) };
+    let compared = measured.as_ref().map(|y| {
+        let errors: Vec<f64> = y.iter().zip(&displacement).map(|(y, p)| y - p).collect();
+        let (at, of) = (kept(&time), kept(&errors));
+        let line = Line::fit(&at, &of);
+        let left: Vec<f64> = of.iter().zip(&at).map(|(e, t)| e - line.at(*t)).collect();
+        displacement.iter_mut().zip(&time).for_each(|(p, t)| *p += line.at(*t));
+        let (bottom_y, top_y) = statistics::extent(&kept(y));
+        let range = top_y - bottom_y;
+        let (rms, max) = rms_and_max(&left);
+        let gain = table.node(table.grid, 0) / (top - bottom);
+        let noise = statistics::noise_floor(y);
+        Compared {
+            samples: of.len(),
+            samples_after_jumps: settled.iter().filter(|s| !**s).count(),
+            range,
+            rms,
+            max,
+            rms_percent: 100.0 * rms / range,
+            max_percent: 100.0 * max / range,
+            drift: line.slope,
+            cause: cause::explain(&time, &drive.drive[first..], &errors, noise, gain, &keep),
+        }
+    });
+    Ok(Prediction {
+        record: drive.shown_as.clone(),
+        samples_skipped: first,
+        samples_clipped,
+        dead_time: model.dead_time,
+        start_on,
+        compared,
+        time,
+        drive: drive.drive[first..].to_vec(),
+        displacement,
+        measured,
+        keep,
+    })
+}
+
+/// `values` at each `time` − `delay` (s), interpolated; the first value before the beginning.
+fn later(time: &[f64], values: &[f64], delay: f64) -> Vec<f64> {
+    let mut next = 0;
+    let at = |wanted: f64| {
+        while next < time.len() && time[next] <= wanted {
+            next += 1;
+        }
+        match next.checked_sub(1) {
+            None => values[0],
+            Some(before) if next < time.len() => {
+                let share = (wanted - time[before]) / (time[next] - time[before]);
+                values[before] + share * (values[next] - values[before])
+            }
+            Some(before) => values[before],
+        }
+    };
+    time.iter().map(|t| t - delay).map(at).collect()
+}
+
+/// Whether each sample from `first` on is clear of a step of the drive of more than `jump` (V).
+fn settled(drive: &[f64], first: usize, jump: f64) -> Vec<bool> {
+    let mut until = first;
+    (first..drive.len())
+        .map(|k| {
+            if k > first && (drive[k] - drive[k - 1]).abs() > jump {
+                until = k + SETTLING;
+            }
+            k >= until
+        })
+        .collect()
+}
