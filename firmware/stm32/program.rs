@@ -1,10 +1,13 @@
-// The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `RECORD` and `prepare`.
+// The program of an STM32 board, included by the `main.rs` of each: what is its own are `clocks`, `pins`, `spi`, `RECORD`,
+// `prepare` and `memory_intact`.
 
 use specgen_board::{Exchange, Noticed};
 use specgen_stm32::{converters, timer};
 
 /// The machine on this board's converters.
-type Board = converters::OnBoard<{ clocks::DELAY }>;
+type Board = converters::OnBoard<spi::Registers, { pins::OUTPUT }, { clocks::DELAY }>;
+
+const _: () = assert!(timer::period(clocks::TIMER).is_some(), "timing.period is nothing that the timer of this board counts");
 
 /// A tick without its timer, under a name that the analyses of the image know.
 #[unsafe(no_mangle)]
@@ -25,13 +28,12 @@ mod app {
     use embassy_stm32::wdg::IndependentWatchdog;
     use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, recorder};
     use specgen_link::Endpoint;
-    use specgen_stm32::converters::BusCell;
     use specgen_stm32::cycles::{self, CYCLES};
     use specgen_stm32::enable::Stop;
-    use specgen_stm32::{converters, serial, stack_used, timer};
+    use specgen_stm32::{converters, serial, stack_used, supply, timer};
 
     use crate::pins::{self, Link, Watchdog};
-    use crate::{Board, RECORD, WATCHDOG, clocks, prepare, safe};
+    use crate::{Board, RECORD, WATCHDOG, clocks, memory_intact, prepare, safe};
 
     #[shared]
     struct Shared {
@@ -50,7 +52,6 @@ mod app {
 
     // What is large is made where it stays: a move of some kilobytes would go over the stack.
     #[init(local = [
-        dac_bus: BusCell = MaybeUninit::uninit(),
         machine: MaybeUninit<Machine> = MaybeUninit::uninit(),
         exchange: Exchange = Exchange::new(),
         #[unsafe(link_section = ".record.memory")]
@@ -60,25 +61,31 @@ mod app {
         let core = &mut context.core;
         prepare(core);
         cycles::start(&mut core.DCB, &mut core.DWT);
-        let wiring = pins::take(embassy_stm32::init(clocks::config()));
+        let wiring = pins::take(clocks::start());
         let mut watchdog = IndependentWatchdog::new(wiring.watchdog, WATCHDOG);
         // From here on a start that does not come to its end is a reset.
         watchdog.unleash();
-
-        let intact = controller::integrity::intact();
-        let exchange = context.local.exchange;
-        exchange.recorder = recorder(context.local.record);
-        exchange.probes = Probes { hertz: clocks::TIMER * 1_000_000, stack: stack_used };
-        let machine = converters::at_reset(context.local.machine);
-        let board = converters::board(wiring.adc, wiring.dac, context.local.dac_bus, machine, intact);
-        let Some(mut board) = board else { safe::stop() };
-        board.start(&mut exchange.report);
-
-        pins::LINK.set_priority(Priority::P8);
-        let mut schedule = Schedule::new(timer::period(clocks::TIMER), 0);
-        if !timer::start(&mut schedule, clocks::TIMER) || link::spawn().is_err() {
+        // No handler of its own: what nobody handles stops with the amplifiers off.
+        if !supply::watch(pins::SUPPLY) {
             safe::stop();
         }
+
+        let intact = memory_intact() && controller::integrity::intact();
+        let exchange = context.local.exchange;
+        exchange.recorder = recorder(context.local.record);
+        exchange.probes = Probes { hertz: timer::hertz(), stack: stack_used };
+        let machine = converters::at_reset(context.local.machine);
+        let mut board = converters::board(wiring.adc, wiring.dac, machine, intact);
+        let Some(period) = timer::period(timer::hertz()) else { safe::stop() };
+        board.start(&mut exchange.report);
+        exchange.prepare(board.machine());
+
+        pins::LINK.set_priority(Priority::P8);
+        let mut schedule = Schedule::new(period, 0);
+        if link::spawn().is_err() {
+            safe::stop();
+        }
+        timer::start(&mut schedule);
         watchdog.pet();
         (
             Shared { exchange, board },
@@ -98,7 +105,7 @@ mod app {
             if crate::specgen_tick(board, exchange, noticed) {
                 timer::arm(local.schedule.restart(timer::now()));
             }
-            exchange.report.took(due.late, timer::now().wrapping_sub(begin), timer::period(clocks::TIMER).get());
+            exchange.report.took(due.late, timer::now().wrapping_sub(begin), local.schedule.period());
             exchange.orphaned = local.health.is_orphaned();
             if local.health.tick(exchange.beat, due.missed, exchange.report.amplifier_on) {
                 local.watchdog.pet();

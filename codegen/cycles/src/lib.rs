@@ -11,13 +11,17 @@
 //! | f64: add; multiply; both | alone in its cycle, result after 4; 7; 11 | not there |
 //! | f64: divide, root | 30, and nothing else meanwhile | not there |
 //! | result of a load into a floating-point register | after 2 | at once |
-//! | code in flash | lines of 32 bytes, cache of 16 KiB in two ways, LRU; a line that is missing costs 2 (wait states + 8) | lines of 16 bytes; each other line costs the wait states, unless the accelerator's 64 lines have it |
+//! | code in flash | lines of 32 bytes, cache of 16 KiB in two ways, LRU; a line that is missing costs 2 (wait states + 8) | lines of 16 bytes; each other line costs the wait states, unless the accelerator's 64 lines have it; one that follows, and is fetched ahead, what is left of them |
+//! | code in ITCM | 0 | not there |
+//! | data in flash | lines of 32 bytes, cache of 16 KiB in four ways, LRU; a line that is missing costs 2 (wait states + 8) | the wait states, unless the accelerator's 8 lines of 16 bytes have it |
+//! | data in DTCM (F4: SRAM) | 0 | 0 |
+//! | data in AXI SRAM, which no cache keeps: read, write | 16, 4 | not there |
 //! | constants beside the code, in flash | in the data cache | the wait states, unless the accelerator's data cache is on |
 //! | register of a device: read, write | 24, 8 | 6, 3 |
 //! | entering or leaving an exception | 29 | 29 |
 //!
-//! Not in it: integer registers that one instruction waits for, branches that are not foreseen, misses of the data cache, the
-//! buses to AXI SRAM, and the DMA on them. Latencies of the M7 are those of LLVM's scheduling model, of the M4 those of its manual.
+//! Not in it: integer registers that one instruction waits for, branches that are not foreseen, and the DMA on the buses.
+//! Latencies of the M7 are those of LLVM's scheduling model, of the M4 those of its manual.
 
 /// Which family, where cores and registers of peripherals differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,8 +34,14 @@ pub enum Family {
 
 /// Lines of the M7's instruction cache: two ways.
 const SETS: usize = 256;
-/// Lines of the F4's accelerator.
-const LINES: usize = 64;
+/// Lines of the F4's accelerator: code, data.
+const LINES: [usize; 2] = [64, 8];
+/// Lines of the M7's data cache: four ways.
+const DATA_SETS: usize = 128;
+/// Flash of both families; ITCM, flash and AXI SRAM of the H7: address bits from 24 on.
+const ITCM: u32 = 0x00;
+const FLASH: u32 = 0x08;
+const AXI_SRAM: u32 = 0x24;
 
 /// What has been executed so far, as far as it decides about what comes.
 #[derive(Debug)]
@@ -47,11 +57,16 @@ pub struct Cost {
     follows: u32,
     /// Lines by set, the one used last first.
     ways: [[u32; 2]; SETS],
-    lines: Vec<u32>,
+    /// Of the F4's accelerator: code, data.
+    lines: [Vec<u32>; 2],
+    data_ways: [[u32; 4]; DATA_SETS],
     line: u32,
+    /// When this line was come to.
+    entered: u64,
     wait_states: u64,
-    /// Instruction cache, and data cache of the F4's accelerator.
+    /// Caches of code and of data, or those of the F4's accelerator; whether that fetches ahead.
     cached: [bool; 2],
+    ahead: bool,
 }
 
 /// What decides about the issue of the next one.
@@ -102,20 +117,30 @@ impl Cost {
             ready: [0; 32],
             follows: 0,
             ways: [[u32::MAX; 2]; SETS],
-            lines: Vec::new(),
+            lines: [Vec::new(), Vec::new()],
+            data_ways: [[u32::MAX; 4]; DATA_SETS],
             line: u32::MAX,
+            entered: 0,
             wait_states: 0,
             cached: [false; 2],
+            ahead: false,
         }
+    }
+
+    /// Whether it counts by the table.
+    #[must_use]
+    pub const fn is_modelled(&self) -> bool {
+        self.modelled
     }
 
     /// FLASH_ACR and CCR of the core, as they are now.
     pub fn configure(&mut self, access: u32, control: u32) {
         self.wait_states = u64::from(access & 0xf);
         self.cached = match self.family {
-            Family::H7 => [control >> 17 & 1 == 1, true],
+            Family::H7 => [control >> 17 & 1 == 1, control >> 16 & 1 == 1],
             Family::F4 => [access >> 9 & 1 == 1, access >> 10 & 1 == 1],
         };
+        self.ahead = self.family == Family::F4 && access >> 8 & 1 == 1;
     }
 
     /// Of an instruction: its halves, the second where it has one.
@@ -131,7 +156,7 @@ impl Cost {
             self.time += self.fetched(address + 2);
         }
         let kind = kind(code, size);
-        if beside_code(code, size) && !self.cached[1] {
+        if self.family == Family::F4 && beside_code(code, size) && !self.cached[1] {
             self.time += self.wait_states;
         }
         match self.family {
@@ -201,15 +226,12 @@ impl Cost {
         match self.family {
             Family::H7 => {
                 let line = address >> 5;
-                if line == self.line {
+                if line == self.line || address >> 24 == ITCM {
+                    self.line = line;
                     return 0;
                 }
                 self.line = line;
-                let set = &mut self.ways[line as usize % SETS];
-                let there = self.cached[0] && set.contains(&line);
-                if set[0] != line {
-                    *set = [line, set[0]];
-                }
+                let there = self.cached[0] && used(&mut self.ways[line as usize % SETS], line);
                 if there { 0 } else { 2 * (self.wait_states + 8) }
             }
             Family::F4 => {
@@ -217,17 +239,45 @@ impl Cost {
                 if line == self.line {
                     return 0;
                 }
+                let follows = line == self.line.wrapping_add(1);
                 self.line = line;
-                let there = self.lines.iter().position(|known| *known == line);
-                if let Some(at) = there {
-                    self.lines.remove(at);
-                } else if self.lines.len() == LINES {
-                    self.lines.pop();
-                }
-                self.lines.insert(0, line);
-                if there.is_some() && self.cached[0] { 0 } else { self.wait_states }
+                let before = std::mem::replace(&mut self.entered, self.time);
+                let there = kept(&mut self.lines[0], LINES[0], line) && self.cached[0];
+                let cost = match (there, self.ahead && follows) {
+                    (true, _) => 0,
+                    (false, true) => self.wait_states.saturating_sub(self.time - before),
+                    (false, false) => self.wait_states,
+                };
+                self.entered += cost;
+                cost
             }
         }
+    }
+
+    /// Of an access to memory at this address, beyond its instruction.
+    pub fn data(&mut self, address: u32, write: bool) -> u64 {
+        let cost = match (self.family, address >> 24) {
+            _ if !self.modelled => 0,
+            (Family::H7, FLASH..=0x0b) => {
+                let line = address >> 5;
+                let there = self.cached[1] && used(&mut self.data_ways[line as usize % DATA_SETS], line);
+                if there { 0 } else { 2 * (self.wait_states + 8) }
+            }
+            (Family::H7, AXI_SRAM) => {
+                if write {
+                    4
+                } else {
+                    16
+                }
+            }
+            // Without its data cache the accelerator's wait states are those of `of`.
+            (Family::F4, FLASH) if self.cached[1] && !kept(&mut self.lines[1], LINES[1], address >> 4) => {
+                self.wait_states
+            }
+            _ => 0,
+        };
+        self.time += cost;
+        cost
     }
 
     /// Of an access to a register of a device, beyond its instruction.
@@ -241,6 +291,25 @@ impl Cost {
             (true, Family::F4, true) => 3,
         }
     }
+}
+
+/// Whether one of the ways has this line; it is the one used last from here on.
+fn used<const WAYS: usize>(ways: &mut [u32; WAYS], line: u32) -> bool {
+    let at = ways.iter().position(|known| *known == line);
+    ways[..=at.unwrap_or(WAYS - 1)].rotate_right(1);
+    ways[0] = line;
+    at.is_some()
+}
+
+/// The same of lines of which the least used one is given up when there are `most`.
+fn kept(lines: &mut Vec<u32>, most: usize, line: u32) -> bool {
+    let at = lines.iter().position(|known| *known == line);
+    match at {
+        Some(at) => drop(lines.remove(at)),
+        None => lines.truncate(most - 1),
+    }
+    lines.insert(0, line);
+    at.is_some()
 }
 
 impl Operation {
@@ -420,6 +489,32 @@ mod tests {
         assert_eq!(kind([0xeb00, 0x0001], 4), Kind::Integer);
         assert_eq!(kind([0xec90, 0x0b08], 4), Kind::Load(8));
         assert_eq!(kind([0xbd10, 0], 2), Kind::Load(2));
+    }
+
+    #[test]
+    fn the_cores_own_memories_cost_nothing_and_a_line_of_flash_once() {
+        let mut cost = Cost::new(Family::H7, true);
+        cost.configure(4, 3 << 16);
+        let mut fetch = |address| cost.of(address, 2, [0xbf00, 0]);
+        assert_eq!([0x20, 0x40, 0x0800_0000, 0x0800_0020, 0x0800_0000].map(&mut fetch), [1, 1, 25, 25, 1]);
+        let mut read = |address| cost.data(address, false);
+        assert_eq!([0x2000_4000, 0x0800_1000, 0x0800_101c, 0x2400_0000].map(&mut read), [0, 24, 0, 16]);
+        // Four ways: the fifth line of a set takes the place of the first.
+        for way in 1..=4 {
+            assert_eq!(cost.data(0x0800_1000 + 0x1000 * way, false), 24);
+        }
+        assert_eq!(cost.data(0x0800_1000, false), 24);
+    }
+
+    #[test]
+    fn a_line_that_is_fetched_ahead_costs_what_is_left() {
+        let mut cost = Cost::new(Family::F4, true);
+        cost.configure(5 | 7 << 8, 0);
+        let run: Vec<u64> = (0..16).map(|k| cost.of(0x0800_0000 + 2 * k, 2, [0xbf00, 0])).collect();
+        // Eight instructions take longer than the five wait states.
+        assert_eq!((run[0], run[8]), (8, 1));
+        // A jump to a line that is not there.
+        assert_eq!(cost.of(0x0800_0100, 2, [0xbf00, 0]), 8);
     }
 
     #[test]

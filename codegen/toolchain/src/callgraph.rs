@@ -49,12 +49,16 @@ impl CallGraph {
         let mut names: BTreeMap<u64, (BTreeSet<String>, u64)> = BTreeMap::new();
         let mut marks: BTreeMap<u64, bool> = BTreeMap::new();
         let mut symbols = BTreeMap::new();
+        let mut thunks = BTreeMap::new();
         for symbol in file.symbols() {
             let name = symbol.name().map_err(malformed)?;
             if let Some(is_code) = mapping(name) {
                 marks.insert(symbol.address(), is_code);
             } else if symbol.kind() == SymbolKind::Text && symbol.is_definition() && !name.is_empty() {
                 let address = symbol.address() & !1;
+                if let Some(target) = name.strip_prefix(THUNK) {
+                    thunks.insert(address, target.to_owned());
+                }
                 symbols.insert(name.to_owned(), address);
                 let entry = names.entry(address).or_default();
                 entry.0.insert(format!("{:#}", rustc_demangle::demangle(name)));
@@ -88,6 +92,10 @@ impl CallGraph {
                     function.add(instruction.place, branch, address..address + size, &names);
                 }
             }
+            // Its jump goes through a register, and leads to where its name says.
+            if let Some(target) = thunks.get(&address).and_then(|name| symbols.get(name)) {
+                function.calls = BTreeMap::from([(*target, std::mem::take(&mut function.indirect))]);
+            }
             functions.insert(address, function);
         }
         Ok(Self { functions, symbols })
@@ -113,6 +121,9 @@ impl Function {
         }
     }
 }
+
+/// What the linker calls a jump to a function that is too far away for a branch: one in a memory of its own.
+const THUNK: &str = "__Thumbv7ABSLongThunk_";
 
 fn malformed(error: object::Error) -> TargetError {
     TargetError::MalformedImage { text: error.to_string() }

@@ -104,6 +104,7 @@ pub fn start(
     // Times of ticks; the stack is not measured.
     exchange.probes = Probes { hertz: TIMER * 1_000_000, ..Probes::NONE };
     board.start(&mut exchange.report);
+    exchange.prepare(board.machine());
 
     let mut line = usart::Config::default();
     line.baudrate = BAUD;

@@ -107,7 +107,6 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
             self.stand_by(exchange, noticed);
             return false;
         }
-        exchange.advance_wave();
         let Exchange { orders, config, report, silence, recorder, orphaned, .. } = exchange;
         let acknowledged = orders.request == Request::Acknowledge && self.request != Request::Acknowledge;
         self.request = orders.request;
@@ -122,8 +121,12 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
             self.start(report);
         }
 
+        let sampled = now();
+        let begun = self.gauges.begin();
         let mut events = self.pending;
         self.pending = 0;
+        // While the gauges are converted.
+        self.done(report, A::ask);
         for (happened, event) in [
             (noticed.missed > 0, MISSED_TICK),
             (noticed.stop, STOP),
@@ -135,8 +138,12 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
                 events |= event;
             }
         }
-        let sampled = now();
-        let readings = match self.gauges.read() {
+        if let Some(recorder) = recorder
+            && recorder.is_cut()
+        {
+            begin_row(config, self.machine, recorder);
+        }
+        let readings = match begun.and_then(|()| self.gauges.read()) {
             Ok(codes) => codes.map(|code| sensing::CONVERTER.reading(code >> Self::SPARE_BITS)),
             Err(fault) => {
                 report.converter(fault);
@@ -147,13 +154,7 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         };
 
         let input = take(&mut self.input, orders, &readings, request, events);
-        if let Some(recorder) = recorder {
-            begin_row(config, self.machine, recorder);
-        }
         let output = exchange::step(config, self.machine, input);
-        if let Some(recorder) = recorder {
-            end_row(self.machine, input, &output, recorder);
-        }
 
         // Off before the codes change, on only after they are out.
         if !output.amplifier_on {
@@ -175,6 +176,11 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         report.health.events |= events;
         report.conditions(self.machine.supervisor.conditions);
         report.missed = report.missed.saturating_add(noticed.missed);
+        // What need not be done before the outputs change.
+        if let (Some(recorder), Some(input)) = (recorder, &self.input) {
+            end_row(self.machine, input, &output, recorder);
+        }
+        exchange.prepare(self.machine);
         restart
     }
 
@@ -228,9 +234,9 @@ fn take<'a>(
     slot.insert(MachineInput::measured(&orders.command, readings, &[Real::NAN; CHANNELS], request, events))
 }
 
-/// What the recorder keeps from before a tick. In a frame of its own, as [`take`].
+/// What the recorder keeps from before a tick, where a block begins. In a frame of its own, as [`take`].
 #[inline(never)]
-fn begin_row(config: &Config, machine: &Machine, recorder: &mut Recorder<'static>) {
+pub(crate) fn begin_row(config: &Config, machine: &Machine, recorder: &mut Recorder<'static>) {
     record_before(config, machine, recorder);
 }
 

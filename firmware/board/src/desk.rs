@@ -140,7 +140,7 @@ impl Visit<'_, '_> {
     #[inline(never)]
     fn config(&mut self) -> Reply<'_> {
         let mut config = None;
-        (self.with)(&mut |exchange, _| config = Some(exchange.config));
+        (self.with)(&mut |exchange, _| config = Some(*exchange.settings()));
         let words = config.map(|config| config.to_words()).unwrap_or([0; CONFIG_WORDS]);
         match self.desk.session.answer(&words) {
             Some(words) => Reply::Config { words },
@@ -198,7 +198,7 @@ impl Visit<'_, '_> {
     #[inline(never)]
     fn start_wave(&mut self, bytes: Bytes<'_>) -> Reply<'static> {
         let mut limits = None;
-        (self.with)(&mut |exchange, _| limits = Some(waves::limits(&exchange.config)));
+        (self.with)(&mut |exchange, _| limits = Some(waves::limits(exchange.settings())));
         let Some(limits) = limits else { return Reply::Refused(Refusal::State) };
         match &settings(bytes) {
             None => Reply::Refused(Refusal::Length { expected: wave::WORDS as u16 }),

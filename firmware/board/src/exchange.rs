@@ -8,6 +8,7 @@ use controller::{COMMAND_WORDS, Config};
 use specgen_link::Silence;
 use specgen_runtime::wave::Stage;
 
+use crate::cycle::begin_row;
 use crate::report::{Probes, Report};
 #[cfg(feature = "lockstep")]
 use crate::words::PERIOD_NANOSECONDS;
@@ -32,6 +33,8 @@ pub struct Exchange {
     pub orders: Orders,
     /// Settings in force.
     pub config: Config,
+    /// Settings that came: in force after the next tick, see [`Exchange::prepare`].
+    pub next: Option<Config>,
     /// How it stands.
     pub report: Report,
     /// What times and stack are measured with.
@@ -66,6 +69,7 @@ impl Exchange {
         Self {
             orders: Orders { command: [0; COMMAND_WORDS], request: Request::None },
             config: Config::new(),
+            next: None,
             report: Report::NONE,
             probes: Probes::NONE,
             beat: 0,
@@ -91,10 +95,37 @@ impl Exchange {
         self.wave.as_ref().is_some_and(|wave| wave.stage() != Stage::Idle)
     }
 
+    /// The newest settings, whether or not they are in force yet.
+    #[must_use]
+    pub const fn settings(&self) -> &Config {
+        match &self.next {
+            Some(next) => next,
+            None => &self.config,
+        }
+    }
+
+    /// What a tick leaves until its codes are out, and the first one needs to find done: settings that came, the block of the
+    /// recorder that begins with the next tick, the set-point of a wave for it.
+    pub fn prepare(&mut self, machine: &Machine) {
+        if let Some(next) = &self.next {
+            self.config = *next;
+            self.next = None;
+            if let Some(recorder) = &mut self.recorder {
+                recorder.settings_changed();
+            }
+        }
+        if let Some(recorder) = &mut self.recorder
+            && recorder.opens()
+        {
+            begin_row(&self.config, machine, recorder);
+        }
+        self.advance_wave();
+    }
+
     /// Writes the set-point of a wave into the command, from where it stays when the wave has ended; only a running machine
     /// follows one. Not inlined: what it works with is done with before the law needs the stack.
     #[inline(never)]
-    pub(crate) fn advance_wave(&mut self) {
+    fn advance_wave(&mut self) {
         let Some(wave) = &mut self.wave else { return };
         if self.report.phase != Phase::Running {
             self.wave = None;
@@ -129,7 +160,7 @@ impl Exchange {
     pub(crate) fn leave_lockstep(&mut self, machine: &mut Machine) {
         if self.in_lockstep() {
             self.lockstep = None;
-            self.config = Config::new();
+            (self.config, self.next) = (Config::new(), None);
             if let Some(recorder) = &mut self.recorder {
                 recorder.restarted();
             }

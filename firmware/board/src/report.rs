@@ -73,7 +73,7 @@ impl Report {
         }
     }
 
-    /// The outputs changed so many counts after the gauges were sampled.
+    /// The codes were written so many counts after the gauges were sampled.
     pub(crate) const fn gave_out(&mut self, after: u32) {
         last_and_longest(&mut self.health.output, after);
     }

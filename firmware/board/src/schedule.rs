@@ -33,6 +33,12 @@ impl Schedule {
         self.due
     }
 
+    /// Counts of a period.
+    #[must_use]
+    pub const fn period(&self) -> u32 {
+        self.period.get()
+    }
+
     /// The tick begins at counter value `now`.
     pub const fn begin(&mut self, now: u32) -> Due {
         // Before its time, by a spurious interrupt, counts as in time.

@@ -83,12 +83,8 @@ impl lockstep::Machine for Stepper<'_, '_> {
         let words = config.first_chunk().ok_or(CONFIG_WORDS)?;
         let config = Config::from_words(words).map_err(|error| error.word)?;
         (self.with)(&mut |exchange, _| {
-            exchange.config = config;
-            if exchange.lockstep.is_none()
-                && let Some(recorder) = &mut exchange.recorder
-            {
-                recorder.settings_changed();
-            }
+            // While the host steps the machine no tick takes them over.
+            if exchange.in_lockstep() { exchange.config = config } else { exchange.next = Some(config) }
         });
         Ok(())
     }

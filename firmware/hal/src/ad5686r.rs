@@ -6,7 +6,7 @@
 //! | --- | --- |
 //! | frame | 24 bits, MSB first: command C3–C0, address D C B A (one bit a channel), 16 data bits |
 //! | SPI | mode 1: data are taken on falling SCLK; SYNC low for the frame, high for 30 ns between frames |
-//! | SCLK | at most 50 MHz, 25 MHz with read-back at VLOGIC of 2.7 V and more: 12.5 MHz or less is used |
+//! | SCLK | at most 50 MHz, 25 MHz with read-back at VLOGIC of 2.7 V and more: 25 MHz or less is used |
 //! | LDAC | held high; a low pulse of 15 ns or more moves all input registers to the outputs of both parts at once |
 //! | read-back | command 1001 with one channel: the next frame brings out its DAC register in the lower 16 bits |
 //! | power-up | all channels on, at zero scale with RSTSEL low, internal reference on; RESET high, GAIN low 2.5 V or high 5 V |
@@ -24,22 +24,24 @@
 //! | read back | `0x9a0000` |
 //!
 //! Legs 0 to 2 are channels A, B, C of the first part, legs 3 to 5 those of the second. In every tick one channel of each
-//! part is read back, so each within three ticks: what it gives must be the code written in the tick before.
+//! part is read back, so each within three ticks: what it gives must be the code written in the tick before. The question goes
+//! out while the gauges are converted, the answer comes with the first code. Frames of a tick alternate between the parts: SYNC
+//! of one is high for as long as a frame of the other lasts.
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
 use embedded_hal::spi::SpiDevice;
 
-use crate::{Amplifiers, CHANNELS, Fault};
+use crate::{Amplifiers, CHANNELS, Edge, Fault};
 
 /// Channels of a part that drive legs: A, B, C.
 pub const LEGS_PER_PART: usize = 3;
 /// Largest code.
 pub const LARGEST: i32 = 0xffff;
-/// SYNC high between two frames, ns.
-pub const SYNC_HIGH: u32 = 50;
-/// LDAC low, ns.
-pub const LDAC_LOW: u32 = 50;
+/// SYNC high between two frames of a part that follow each other, and from the last frame to LDAC, ns.
+pub const SYNC_HIGH: u32 = 30;
+/// LDAC low where the program gives it ([`Pulse`](crate::Pulse)), ns.
+pub const LDAC_LOW: u32 = 30;
 /// Patterns that channel D, which drives nothing, must give back before a part is believed.
 pub const PATTERNS: [u16; 2] = [0xa55a, 0x5aa5];
 
@@ -57,8 +59,6 @@ pub enum Channel {
     D = 8,
 }
 
-/// The three that drive legs.
-const LEG_CHANNELS: [Channel; LEGS_PER_PART] = [Channel::A, Channel::B, Channel::C];
 const ALL: u8 = 0xf;
 
 /// Commands to a part.
@@ -115,10 +115,10 @@ struct Part<SPI> {
 
 impl<SPI: SpiDevice> Part<SPI> {
     /// Sends a frame and returns the lower 16 bits of what came back meanwhile.
-    fn send(&mut self, command: Command, delay: &mut impl DelayNs) -> Result<u16, Fault> {
+    #[inline]
+    fn send(&mut self, command: Command) -> Result<u16, Fault> {
         let mut frame = command.frame();
         self.spi.transfer_in_place(&mut frame).map_err(|_| Fault::Bus)?;
-        delay.delay_ns(SYNC_HIGH);
         let [_, high, low] = frame;
         Ok(u16::from_be_bytes([high, low]))
     }
@@ -133,39 +133,22 @@ impl<SPI: SpiDevice> Part<SPI> {
             Command::PowerUp,
             Command::WriteThroughAll(0),
         ];
+        let mut send = |command| {
+            let answer = self.send(command);
+            delay.delay_ns(SYNC_HIGH);
+            answer
+        };
         for command in SETTINGS {
-            self.send(command, delay)?;
+            send(command)?;
         }
         for pattern in PATTERNS.into_iter().chain([0]) {
-            self.send(Command::WriteThrough(Channel::D, pattern), delay)?;
-            self.send(Command::ReadBack(Channel::D), delay)?;
-            if self.send(Command::NoOperation, delay)? != pattern {
+            send(Command::WriteThrough(Channel::D, pattern))?;
+            send(Command::ReadBack(Channel::D))?;
+            if send(Command::NoOperation)? != pattern {
                 return Err(Fault::ReadBack);
             }
         }
         Ok(())
-    }
-
-    /// Three codes into the input registers. `check` says which channel is read back meanwhile, and what it must give.
-    fn write(
-        &mut self,
-        codes: [u16; LEGS_PER_PART],
-        check: Option<(Channel, u16)>,
-        delay: &mut impl DelayNs,
-    ) -> Result<(), Fault> {
-        if let Some((channel, _)) = check {
-            self.send(Command::ReadBack(channel), delay)?;
-        }
-        let mut came_back = None;
-        for (channel, code) in LEG_CHANNELS.into_iter().zip(codes) {
-            let answer = self.send(Command::WriteInput(channel, code), delay)?;
-            // The frame after the question brings the answer.
-            came_back = came_back.or(Some(answer));
-        }
-        match (check, came_back) {
-            (Some((_, expected)), Some(found)) if found != expected => Err(Fault::ReadBack),
-            _ => Ok(()),
-        }
     }
 }
 
@@ -177,9 +160,13 @@ pub struct Ad5686rPair<FIRST, SECOND, LDAC, ENABLE, DELAY> {
     ldac: LDAC,
     enable: ENABLE,
     delay: DELAY,
+    /// Whether the amplifiers are enabled.
+    on: bool,
     /// What stands in the DAC registers, as far as is known.
     written: Option<[u16; CHANNELS]>,
-    /// Which of the three channels is read back in the next write.
+    /// What both parts were asked for must give this.
+    asked: Option<[u16; 2]>,
+    /// Which of the three channels is asked for next.
     turn: usize,
 }
 
@@ -187,13 +174,23 @@ impl<FIRST, SECOND, LDAC, ENABLE, DELAY> Ad5686rPair<FIRST, SECOND, LDAC, ENABLE
 where
     FIRST: SpiDevice,
     SECOND: SpiDevice,
-    LDAC: OutputPin,
+    LDAC: Edge,
     ENABLE: OutputPin,
     DELAY: DelayNs,
 {
     /// Takes the pins; nothing is driven until [`Amplifiers::start`]. `enable` is active high.
     pub const fn new(first: FIRST, second: SECOND, ldac: LDAC, enable: ENABLE, delay: DELAY) -> Self {
-        Self { first: Part { spi: first }, second: Part { spi: second }, ldac, enable, delay, written: None, turn: 0 }
+        Self {
+            first: Part { spi: first },
+            second: Part { spi: second },
+            ldac,
+            enable,
+            delay,
+            on: false,
+            written: None,
+            asked: None,
+            turn: 0,
+        }
     }
 
     /// Gives the pins back, in the order of [`Self::new`].
@@ -201,23 +198,16 @@ where
         (self.first.spi, self.second.spi, self.ldac, self.enable, self.delay)
     }
 
-    /// Input registers to outputs.
-    fn load(&mut self) -> Result<(), Fault> {
-        self.ldac.set_low().map_err(|_| Fault::Pin)?;
-        self.delay.delay_ns(LDAC_LOW);
-        self.ldac.set_high().map_err(|_| Fault::Pin)
-    }
-
-    /// What channel to read back in this write, with what it must give: for each part. None where nothing is known.
-    fn check(&mut self) -> [Option<(Channel, u16)>; 2] {
-        let Some([a, b, c, d, e, f]) = self.written else { return [None; 2] };
-        let (channel, codes) = match self.turn {
+    /// The next channel to ask for, with what it must give: none where nothing is known.
+    fn question(&mut self) -> Option<(Channel, [u16; 2])> {
+        let [a, b, c, d, e, f] = self.written?;
+        let question = match self.turn {
             0 => (Channel::A, [a, d]),
             1 => (Channel::B, [b, e]),
             _ => (Channel::C, [c, f]),
         };
         self.turn = if self.turn < LEGS_PER_PART - 1 { self.turn + 1 } else { 0 };
-        codes.map(|code| Some((channel, code)))
+        Some(question)
     }
 }
 
@@ -225,7 +215,7 @@ impl<FIRST, SECOND, LDAC, ENABLE, DELAY> Amplifiers for Ad5686rPair<FIRST, SECON
 where
     FIRST: SpiDevice,
     SECOND: SpiDevice,
-    LDAC: OutputPin,
+    LDAC: Edge,
     ENABLE: OutputPin,
     DELAY: DelayNs,
 {
@@ -234,9 +224,9 @@ where
     /// Amplifiers disabled, both parts at power-up state with outputs at zero, and both proved to answer: channel D of each
     /// gives [`PATTERNS`] back.
     fn start(&mut self) -> Result<(), Fault> {
-        self.written = None;
-        self.enable.set_low().map_err(|_| Fault::Pin)?;
-        self.ldac.set_high().map_err(|_| Fault::Pin)?;
+        (self.written, self.asked) = (None, None);
+        self.enable(false)?;
+        self.ldac.hold();
         // Both, so that one part that does not answer leaves the other at zero.
         let first = self.first.start(&mut self.delay);
         let second = self.second.start(&mut self.delay);
@@ -245,26 +235,55 @@ where
         Ok(())
     }
 
-    /// Eight frames and LDAC. Codes go out even where a read-back differs: the other channels need theirs.
+    /// One frame to each part.
+    fn ask(&mut self) -> Result<(), Fault> {
+        // The codes of the last tick are out by now, and these are not to go out by halves.
+        self.ldac.hold();
+        self.asked = None;
+        let Some((channel, expected)) = self.question() else { return Ok(()) };
+        let first = self.first.send(Command::ReadBack(channel));
+        let second = self.second.send(Command::ReadBack(channel));
+        first.and(second)?;
+        self.asked = Some(expected);
+        Ok(())
+    }
+
+    /// Six frames and LDAC. Codes go out even where a read-back differs: the other channels need theirs.
     fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault> {
         if codes.iter().any(|&code| !(0..=LARGEST).contains(&code)) {
             return Err(Fault::Code);
         }
         // Checked: 16 bits.
         let [a, b, c, d, e, f] = codes.map(|code| code as u16);
-        let [first_check, second_check] = self.check();
+        let asked = self.asked.take();
         self.written = None;
-        let first = self.first.write([a, b, c], first_check, &mut self.delay);
-        let second = self.second.write([d, e, f], second_check, &mut self.delay);
-        self.load()?;
-        let sent = [first, second].iter().all(|result| matches!(result, Ok(()) | Err(Fault::ReadBack)));
-        if sent {
-            self.written = Some([a, b, c, d, e, f]);
+        // The frame after the question brings the answer.
+        let first = self.first.send(Command::WriteInput(Channel::A, a));
+        let second = self.second.send(Command::WriteInput(Channel::A, d));
+        let mut sent = [first.map(|_| ()), second.map(|_| ())];
+        for (channel, codes) in [(Channel::B, [b, e]), (Channel::C, [c, f])] {
+            let [first, second] = codes.map(|code| Command::WriteInput(channel, code));
+            let results = [self.first.send(first), self.second.send(second)];
+            for (sent, result) in sent.iter_mut().zip(results) {
+                *sent = sent.and(result.map(|_| ()));
+            }
         }
-        first.and(second)
+        self.delay.delay_ns(SYNC_HIGH);
+        self.ldac.give()?;
+        let [one, other] = sent;
+        one.and(other)?;
+        self.written = Some([a, b, c, d, e, f]);
+        match (asked, first, second) {
+            (Some(expected), Ok(one), Ok(other)) if [one, other] != expected => Err(Fault::ReadBack),
+            _ => Ok(()),
+        }
     }
 
     fn enable(&mut self, on: bool) -> Result<(), Fault> {
+        if on && !self.on {
+            self.ldac.settle();
+        }
+        self.on = on;
         let result = if on { self.enable.set_high() } else { self.enable.set_low() };
         result.map_err(|_| Fault::Pin)
     }

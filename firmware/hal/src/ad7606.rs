@@ -6,7 +6,7 @@
 //! | --- | --- |
 //! | interface | PAR/SER/BYTE SEL high, DB15/BYTE SEL low: serial; all channels on DOUTA, V1 first |
 //! | SPI | mode 2 (SCLK idles high): CS falling puts out the MSB, SCLK falling samples, rising brings the next bit |
-//! | SCLK | at most 23.5 MHz at VDRIVE above 4.75 V, 17 MHz at 3.3 V: 12.5 MHz or less is used |
+//! | SCLK | at most 23.5 MHz at VDRIVE above 4.75 V, 17 MHz at 3.3 V: 16.7 MHz or less is used |
 //! | start | CONVST A and B together: low for 25 ns or more, then the rising edge samples all channels |
 //! | BUSY | high within 45 ns of that edge, low when all are converted: 4.2 µs at most (AD7608: 4.2 µs) without oversampling |
 //! | code | two's complement of 16 or 18 bits, MSB first, no gap between the channels |
@@ -21,18 +21,18 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::{InputPin, OutputPin};
 use embedded_hal::spi::SpiDevice;
 
-use crate::{CHANNELS, Fault, Gauges};
+use crate::{CHANNELS, Edge, Fault, Gauges};
 
 /// Inputs of the part.
 pub const INPUTS: usize = 8;
-/// CONVST low, ns.
-pub const CONVST_LOW: u32 = 100;
+/// CONVST low where the program gives the edge ([`Pulse`](crate::Pulse)), ns.
+pub const CONVST_LOW: u32 = 30;
 /// From the rising edge of CONVST until BUSY is looked at first, ns.
-pub const BUSY_DELAY: u32 = 100;
+pub const BUSY_DELAY: u32 = 50;
 /// Between two looks at BUSY, ns.
-pub const POLL: u32 = 100;
-/// Looks at BUSY until it is given up: 10 µs, more than twice the longest conversion.
-pub const POLLS: u32 = 100;
+pub const POLL: u32 = 50;
+/// Looks at BUSY until it is given up: 10 µs and more, twice the longest conversion.
+pub const POLLS: u32 = 200;
 /// RESET high, ns.
 pub const RESET_HIGH: u32 = 4_000;
 /// From the end of RESET until the first start, ns.
@@ -75,26 +75,27 @@ pub struct Ad7606<const BITS: usize, SPI, START, BUSY, RESET, DELAY> {
 impl<const BITS: usize, SPI, START, BUSY, RESET, DELAY> Ad7606<BITS, SPI, START, BUSY, RESET, DELAY>
 where
     SPI: SpiDevice,
-    START: OutputPin,
+    START: Edge,
     BUSY: InputPin,
     RESET: OutputPin,
     DELAY: DelayNs,
 {
     const WIDTH: () = assert!(BITS == 16 || BITS == 18, "AD7606 family: codes of 16 or 18 bits");
 
-    /// Takes the pins. `start` is CONVST A and B; nothing is driven until [`Gauges::start`].
+    /// Takes the pins. `start` is CONVST A and B together; nothing is driven until [`Gauges::start`].
     pub const fn new(spi: SPI, start: START, busy: BUSY, reset: RESET, delay: DELAY, window: Window) -> Self {
         let () = Self::WIDTH;
         Self { spi, start, busy, reset, delay, window }
     }
 
-    /// Samples and reads all eight inputs: V1 to V8, 0 to 2^BITS − 1. Takes 4 µs and the transfer, 15 µs at most before it
-    /// gives up.
+    /// Reads all eight inputs as they were at the edge of CONVST that [`Gauges::begin`] gave: V1 to V8, 0 to 2^BITS − 1. Takes
+    /// what is left of 4 µs and the transfer; gives up after 10 µs without an end of the conversion.
     ///
     /// # Errors
-    /// Every [`Fault`] but [`Fault::ReadBack`] and [`Fault::Code`]; [`Fault::Reference`] only after the rest was found good.
-    pub fn sample(&mut self) -> Result<[i32; INPUTS], Fault> {
-        self.convert()?;
+    /// Every [`Fault`] but [`Fault::NotStarted`], [`Fault::ReadBack`] and [`Fault::Code`]; [`Fault::Reference`] only after the
+    /// rest was found good.
+    pub fn inputs(&mut self) -> Result<[i32; INPUTS], Fault> {
+        self.converted()?;
         // Zeros are sent: SDI of the parts that have one ignores them in hardware mode.
         let mut frame = [0; BITS];
         self.spi.transfer_in_place(&mut frame).map_err(|_| Fault::Bus)?;
@@ -109,20 +110,13 @@ where
         Ok(codes)
     }
 
-    /// From the start of the conversion to its end.
-    fn convert(&mut self) -> Result<(), Fault> {
-        self.start.set_low().map_err(|_| Fault::Pin)?;
-        self.delay.delay_ns(CONVST_LOW);
-        self.start.set_high().map_err(|_| Fault::Pin)?;
-        self.delay.delay_ns(BUSY_DELAY);
-        if !self.busy.is_high().map_err(|_| Fault::Pin)? {
-            return Err(Fault::NotStarted);
-        }
+    /// Waits for the end of the conversion.
+    fn converted(&mut self) -> Result<(), Fault> {
         for _ in 0..POLLS {
-            self.delay.delay_ns(POLL);
             if self.busy.is_low().map_err(|_| Fault::Pin)? {
                 return Ok(());
             }
+            self.delay.delay_ns(POLL);
         }
         Err(Fault::NotEnded)
     }
@@ -136,7 +130,7 @@ where
 impl<const BITS: usize, SPI, START, BUSY, RESET, DELAY> Gauges for Ad7606<BITS, SPI, START, BUSY, RESET, DELAY>
 where
     SPI: SpiDevice,
-    START: OutputPin,
+    START: Edge,
     BUSY: InputPin,
     RESET: OutputPin,
     DELAY: DelayNs,
@@ -145,16 +139,23 @@ where
 
     /// Resets the part, as it must be after power-up, and samples once. Takes 0.3 ms.
     fn start(&mut self) -> Result<(), Fault> {
-        self.start.set_high().map_err(|_| Fault::Pin)?;
+        self.start.hold();
         self.reset.set_high().map_err(|_| Fault::Pin)?;
         self.delay.delay_ns(RESET_HIGH);
         self.reset.set_low().map_err(|_| Fault::Pin)?;
         self.delay.delay_ns(RESET_WAIT);
-        self.sample().map(|_| ())
+        self.begin()?;
+        self.read().map(|_| ())
+    }
+
+    fn begin(&mut self) -> Result<(), Fault> {
+        self.start.give()?;
+        self.delay.delay_ns(BUSY_DELAY);
+        if self.busy.is_high().map_err(|_| Fault::Pin)? { Ok(()) } else { Err(Fault::NotStarted) }
     }
 
     fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {
-        let [v1, v2, v3, v4, v5, v6, _, _] = self.sample()?;
+        let [v1, v2, v3, v4, v5, v6, _, _] = self.inputs()?;
         Ok([v1, v2, v3, v4, v5, v6])
     }
 }

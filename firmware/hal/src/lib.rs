@@ -15,8 +15,10 @@
 
 pub mod ad5686r;
 pub mod ad7606;
+mod edge;
 mod fault;
 
+pub use edge::{Edge, Pulse};
 pub use fault::Fault;
 
 /// Legs of a platform, and gauges.
@@ -36,8 +38,16 @@ pub trait Gauges {
         Ok(())
     }
 
-    /// Samples all gauges at once and returns their codes, 0 to 2^[`Self::BITS`] − 1: 0 at the lowest input, not in two's
-    /// complement. Blocks until the codes are there, for a time that does not depend on what the part answers by more than
+    /// Samples all gauges at once, now or where a timer did in this tick, and returns while they are converted.
+    ///
+    /// # Errors
+    /// The [`Fault`] that leaves nothing to read.
+    fn begin(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    /// The codes of what [`Self::begin`] sampled, 0 to 2^[`Self::BITS`] − 1: 0 at the lowest input, not in two's
+    /// complement. Blocks until they are there, for a time that does not depend on what the part answers by more than
     /// its driver says.
     ///
     /// # Errors
@@ -59,13 +69,23 @@ pub trait Amplifiers {
         self.enable(false)
     }
 
-    /// Gives out six codes, 0 to 2^[`Self::BITS`] − 1; all outputs change at the same instant, after the last is written.
+    /// Asks the parts what can be asked while the gauges are converted; what comes back, [`Self::write`] looks at. At most once
+    /// between two writes.
+    ///
+    /// # Errors
+    /// [`Fault::Bus`] or [`Fault::Pin`]; the next write does not look then.
+    fn ask(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+
+    /// Gives out six codes, 0 to 2^[`Self::BITS`] − 1; all outputs change at the same instant, after the last is written:
+    /// at once, or at the instant of the tick that a timer keeps.
     ///
     /// # Errors
     /// A [`Fault`] says that an output may not be what was asked for. A code out of range is one, and then nothing is written.
     fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault>;
 
-    /// Enables (true) or disables the amplifiers. Disabled is the state after power-up and reset, before any call.
+    /// Enables (true) or disables the amplifiers; enables them only when the outputs have changed. Disabled is the state after power-up and reset, before any call.
     ///
     /// # Errors
     /// [`Fault::Pin`] if the line cannot be driven.
@@ -79,6 +99,10 @@ impl<G: Gauges> Gauges for &mut G {
         (**self).start()
     }
 
+    fn begin(&mut self) -> Result<(), Fault> {
+        (**self).begin()
+    }
+
     fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {
         (**self).read()
     }
@@ -89,6 +113,10 @@ impl<A: Amplifiers> Amplifiers for &mut A {
 
     fn start(&mut self) -> Result<(), Fault> {
         (**self).start()
+    }
+
+    fn ask(&mut self) -> Result<(), Fault> {
+        (**self).ask()
     }
 
     fn write(&mut self, codes: &[i32; CHANNELS]) -> Result<(), Fault> {

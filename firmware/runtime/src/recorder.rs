@@ -225,6 +225,13 @@ impl<'m> Recorder<'m> {
         self.records() && self.skip == 0 && (self.due.is_some() || !self.ring.has_room())
     }
 
+    /// Before a tick: whether the block that is open must not take its row, as it does not continue what the block holds.
+    #[inline]
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        self.due.is_some() && self.ring.has_room() && self.opens()
+    }
+
     /// Begins a block, before a tick, with the settings that the tick runs under, the digest of the machine as it is, and its
     /// state, which `save` writes.
     pub fn open(&mut self, config: &[u64], digest: u64, save: impl FnOnce(&mut [u64])) {

@@ -10,7 +10,7 @@ pub struct CycleDelay<const CYCLES: u32>;
 impl<const CYCLES: u32> DelayNs for CycleDelay<CYCLES> {
     #[inline]
     fn delay_ns(&mut self, ns: u32) {
-        // At 800 cycles a microsecond it saturates at 5 ms, more than any driver here asks for at once.
+        // At 960 cycles a microsecond it saturates at 4 ms, more than any driver here asks for at once.
         cortex_m::asm::delay(ns.saturating_mul(CYCLES) / 1000 + 1);
     }
 }

@@ -4,13 +4,16 @@
 #![deny(missing_docs)]
 #![deny(unsafe_code)]
 
+pub mod burst;
 pub mod converters;
 pub mod cycles;
 mod delay;
 pub mod enable;
+pub mod pulses;
 pub mod serial;
 mod silent;
 mod stack;
+pub mod supply;
 pub mod timer;
 
 pub use delay::CycleDelay;

@@ -1,4 +1,5 @@
-//! TIM2 as a free-running counter of 32 bits whose first compare channel says when a tick is due.
+//! TIM2 as a free-running counter of 32 bits whose first compare channel says when a tick is due: to the core by an interrupt, to
+//! the timer of CONVST and LDAC ([`pulses`]) by its trigger output.
 
 use core::num::NonZeroU32;
 
@@ -7,28 +8,31 @@ use embassy_stm32::peripherals;
 use embassy_stm32::rcc;
 use specgen_board::{PERIOD_NANOSECONDS, Schedule};
 
-/// Counts in a control period at a timer clock of so many MHz.
+use crate::pulses;
+
+/// Counts in a control period at a timer clock of so many Hz; none if they are no count of the timer.
 #[must_use]
-pub const fn period(megahertz: u32) -> NonZeroU32 {
-    let counts = PERIOD_NANOSECONDS as u64 * megahertz as u64 / 1000;
-    assert!(counts < 1 << 31, "timing.period is too long for the timer of this board");
-    match NonZeroU32::new(counts as u32) {
-        Some(counts) => counts,
-        None => panic!("timing.period is shorter than a count of the timer"),
-    }
+pub const fn period(hertz: u32) -> Option<NonZeroU32> {
+    let counts = PERIOD_NANOSECONDS as u64 * hertz as u64 / 1_000_000_000;
+    if counts < 1 << 31 { NonZeroU32::new(counts as u32) } else { None }
 }
 
-/// Starts the counter; the first interrupt comes one period later. False if the timer's clock is not `megahertz`.
-#[must_use]
-pub fn start(schedule: &mut Schedule, megahertz: u32) -> bool {
+/// Starts the counter; the first interrupt comes one period later.
+pub fn start(schedule: &mut Schedule) {
     rcc::enable_and_reset::<peripherals::TIM2>();
     TIM2.psc().write_value(0);
     TIM2.arr().write_value(u32::MAX);
+    TIM2.cr2().modify(|w| w.set_mms(pulses::LEADS));
     arm(schedule.restart(now()));
     acknowledge();
     TIM2.dier().write(|w| w.set_ccie(0, true));
     TIM2.cr1().write(|w| w.set_cen(true));
-    rcc::frequency::<peripherals::TIM2>().0 == megahertz * 1_000_000
+}
+
+/// Clock of the counter, Hz.
+#[must_use]
+pub fn hertz() -> u32 {
+    rcc::frequency::<peripherals::TIM2>().0
 }
 
 /// The counter.

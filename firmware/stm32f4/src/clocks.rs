@@ -1,19 +1,44 @@
 //! Clocks of the NUCLEO-F446RE: 8 MHz of the ST-LINK, 180 MHz core, 90 MHz timers, 45 and 90 MHz SPI.
 
-use embassy_stm32::Config;
 use embassy_stm32::interrupt::Priority;
+use embassy_stm32::pac::FLASH;
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
 };
 use embassy_stm32::time::Hertz;
+use embassy_stm32::{Config, Peripherals};
 
-/// Clock of TIM2, MHz.
-pub const TIMER: u32 = 90;
+/// Clock of TIM2 and TIM3, Hz.
+pub const TIMER: u32 = 90_000_000;
 /// What `cortex_m::asm::delay` gets through in a microsecond at most.
 pub const DELAY: u32 = 180;
+/// SCLK of the ADC: 17 MHz at most at 3.3 V, and 90 MHz can only be divided by powers of two.
+pub const ADC: Hertz = Hertz(11_250_000);
+/// SCLK of the DACs: 25 MHz at most where something is read back.
+pub const DAC: Hertz = Hertz(22_500_000);
+/// From sampling to the change of the outputs, ns: codes that are written by then are out at this instant, later ones when they are
+/// written.
+pub const OUTPUT: u32 = 95_000;
 
-/// Clocks, and all DMA below the tick.
-pub fn config() -> Config {
+/// Clocks as above, all DMA below the tick, and the accelerator of the flash, which the HAL leaves off: lines of code and constants are
+/// kept, and the next line is fetched ahead of time. What it keeps is emptied first, which is possible only while it is off (RM0390).
+pub fn start() -> Peripherals {
+    let peripherals = embassy_stm32::init(config());
+    FLASH.acr().modify(|w| {
+        w.set_icrst(true);
+        w.set_dcrst(true);
+    });
+    FLASH.acr().modify(|w| {
+        w.set_icrst(false);
+        w.set_dcrst(false);
+        w.set_prften(true);
+        w.set_icen(true);
+        w.set_dcen(true);
+    });
+    peripherals
+}
+
+fn config() -> Config {
     let mut config = Config::default();
     config.rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
     config.rcc.pll_src = PllSource::HSE;

@@ -12,11 +12,17 @@
 
 mod clocks;
 mod pins;
+mod spi;
 
 /// Words of the recorder: what the 128 KiB of RAM have besides the 24 KiB of the rest and some in reserve, 80 KiB.
 const RECORD: usize = 80 * 1024 / size_of::<u64>();
 
 /// This core has no caches.
-fn prepare(_: &mut cortex_m::Peripherals) {}
+const fn prepare(_: &mut cortex_m::Peripherals) {}
+
+/// Nothing is copied but the initial values of variables.
+const fn memory_intact() -> bool {
+    true
+}
 
 include!("../../stm32/program.rs");

@@ -1,17 +1,24 @@
 //! The wiring: which pin goes where. The table in docs/bring-up.md is this file in words.
 
 use embassy_stm32::Peripherals;
-use embassy_stm32::gpio::{Flex, Input, Level, Output, Pull, Speed};
+use embassy_stm32::gpio::{AnyPin, Flex, Input, Level, Output, OutputType, Pull, Speed};
 pub use embassy_stm32::interrupt::USART2 as LINK;
 use embassy_stm32::mode::Async;
 pub use embassy_stm32::peripherals::IWDG as Watchdog;
-use embassy_stm32::peripherals::USART2;
+use embassy_stm32::peripherals::{TIM3, USART2};
 use embassy_stm32::spi::Spi;
+use embassy_stm32::timer::simple_pwm::PwmPin;
+use embassy_stm32::timer::{Ch1, Ch2};
 use embassy_stm32::usart::{ConfigError, Uart};
-use embassy_stm32::{Peri, bind_interrupts, dma, peripherals, usart};
+use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals, rcc, usart};
+use specgen_stm32::burst::Device;
 use specgen_stm32::converters::{AdcPins, DacPins, adc_spi, dac_spi};
 use specgen_stm32::enable::{self, Stop};
+use specgen_stm32::pulses::Pulses;
 use specgen_stm32::serial;
+
+use crate::clocks::{self, DELAY};
+use crate::spi::Registers;
 
 bind_interrupts!(
     /// Interrupts of the link.
@@ -22,12 +29,19 @@ bind_interrupts!(
     }
 );
 
+/// Interrupt of the voltage detector.
+pub const SUPPLY: pac::Interrupt = pac::Interrupt::PVD;
+/// Channel of TIM3 that drives LDAC, counted from 0: CH1.
+pub const OUTPUT: usize = 0;
+/// That of CONVST: CH2.
+const SAMPLING: usize = 1;
+
 /// All that the program uses.
 pub struct Wiring {
     /// ADC.
-    pub adc: AdcPins,
+    pub adc: AdcPins<Registers, DELAY>,
     /// DACs and amplifiers.
-    pub dac: DacPins,
+    pub dac: DacPins<Registers, OUTPUT, DELAY>,
     /// Emergency stop: a closed contact to ground, at the break input of TIM1; open is stop.
     pub stop: Stop,
     /// Virtual COM port of the ST-LINK.
@@ -40,18 +54,28 @@ pub struct Wiring {
 pub fn take(p: Peripherals) -> Wiring {
     let (enable, stop) = enable::guarded::<1>(Flex::new(p.PA8), Flex::new(p.PB12));
     let high = Level::High;
+    rcc::enable_and_reset::<TIM3>();
+    let clock = rcc::frequency::<TIM3>().0;
+    // At rest before the pins are the timer's.
+    let (start, load) = Pulses::edges::<SAMPLING, OUTPUT>(pac::TIM3, clock, clocks::OUTPUT);
+    core::mem::forget(PwmPin::<TIM3, Ch2>::new(p.PC7, OutputType::PushPull));
+    core::mem::forget(PwmPin::<TIM3, Ch1>::new(p.PC6, OutputType::PushPull));
+    let adc = Registers::new(Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, adc_spi(clocks::ADC)), pac::SPI1);
+    let dac = Registers::new(Spi::new_blocking(p.SPI3, p.PC10, p.PC12, p.PC11, dac_spi(clocks::DAC)), pac::SPI3);
+    let select = |pin: Peri<'static, AnyPin>| Output::new(pin, high, Speed::VeryHigh);
     Wiring {
         adc: AdcPins {
-            spi: Spi::new_blocking(p.SPI1, p.PA5, p.PA7, p.PA6, adc_spi()),
-            select: Output::new(p.PB6, high, Speed::VeryHigh),
-            start: Output::new(p.PC7, high, Speed::VeryHigh),
+            spi: Device { bus: adc, select: select(p.PB6.into()) },
+            start,
             busy: Input::new(p.PA9, Pull::Up),
             reset: Output::new(p.PB10, Level::Low, Speed::Low),
         },
         dac: DacPins {
-            spi: Spi::new_blocking(p.SPI3, p.PC10, p.PC12, p.PC11, dac_spi()),
-            select: [Output::new(p.PD2, high, Speed::VeryHigh), Output::new(p.PC8, high, Speed::VeryHigh)],
-            load: Output::new(p.PC6, high, Speed::VeryHigh),
+            spi: [
+                Device { bus: dac.again(), select: select(p.PD2.into()) },
+                Device { bus: dac, select: select(p.PC8.into()) },
+            ],
+            load,
             enable,
         },
         stop,

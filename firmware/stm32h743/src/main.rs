@@ -13,11 +13,15 @@
 mod caches;
 mod clocks;
 mod pins;
+mod spi;
+mod tightly;
+
+use tightly::is_intact as memory_intact;
 
 /// Words of the recorder, in the AXI SRAM (512 KiB) that has only the buffers of the DMA besides: 448 KiB.
 const RECORD: usize = 448 * 1024 / size_of::<u64>();
 
-/// Caches before anything else.
+/// Memories and caches before anything else.
 fn prepare(core: &mut cortex_m::Peripherals) {
     caches::enable(&mut core.MPU, &mut core.SCB, &mut core.CPUID);
 }

@@ -1,17 +1,24 @@
 //! The wiring: which pin goes where. The table in docs/bring-up.md is this file in words.
 
 use embassy_stm32::Peripherals;
-use embassy_stm32::gpio::{Flex, Input, Level, Output, Pull, Speed};
+use embassy_stm32::gpio::{AnyPin, Flex, Input, Level, Output, OutputType, Pull, Speed};
 pub use embassy_stm32::interrupt::USART3 as LINK;
 use embassy_stm32::mode::Async;
 pub use embassy_stm32::peripherals::IWDG1 as Watchdog;
-use embassy_stm32::peripherals::USART3;
+use embassy_stm32::peripherals::{TIM4, USART3};
 use embassy_stm32::spi::Spi;
+use embassy_stm32::timer::simple_pwm::PwmPin;
+use embassy_stm32::timer::{Ch2, Ch4};
 use embassy_stm32::usart::{ConfigError, Uart};
-use embassy_stm32::{Peri, bind_interrupts, dma, peripherals, usart};
+use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals, rcc, usart};
+use specgen_stm32::burst::Device;
 use specgen_stm32::converters::{AdcPins, DacPins, adc_spi, dac_spi};
 use specgen_stm32::enable::{self, Stop};
+use specgen_stm32::pulses::Pulses;
 use specgen_stm32::serial;
+
+use crate::clocks::{self, DELAY};
+use crate::spi::Registers;
 
 bind_interrupts!(
     /// Interrupts of the link.
@@ -22,12 +29,19 @@ bind_interrupts!(
     }
 );
 
+/// Interrupt of the voltage detector.
+pub const SUPPLY: pac::Interrupt = pac::Interrupt::PVD_AVD;
+/// Channel of TIM4 that drives LDAC, counted from 0: CH2.
+pub const OUTPUT: usize = 1;
+/// That of CONVST: CH4.
+const SAMPLING: usize = 3;
+
 /// All that the program uses.
 pub struct Wiring {
     /// ADC.
-    pub adc: AdcPins,
+    pub adc: AdcPins<Registers, DELAY>,
     /// DACs and amplifiers.
-    pub dac: DacPins,
+    pub dac: DacPins<Registers, OUTPUT, DELAY>,
     /// Emergency stop: a closed contact to ground, at the break input of TIM1; open is stop.
     pub stop: Stop,
     /// Virtual COM port of the ST-LINK.
@@ -40,18 +54,28 @@ pub struct Wiring {
 pub fn take(p: Peripherals) -> Wiring {
     let (enable, stop) = enable::guarded::<2>(Flex::new(p.PE11), Flex::new(p.PE15));
     let high = Level::High;
+    rcc::enable_and_reset::<TIM4>();
+    let clock = rcc::frequency::<TIM4>().0;
+    // At rest before the pins are the timer's.
+    let (start, load) = Pulses::edges::<SAMPLING, OUTPUT>(pac::TIM4, clock, clocks::OUTPUT);
+    core::mem::forget(PwmPin::<TIM4, Ch4>::new(p.PD15, OutputType::PushPull));
+    core::mem::forget(PwmPin::<TIM4, Ch2>::new(p.PD13, OutputType::PushPull));
+    let adc = Registers::new(Spi::new_blocking(p.SPI1, p.PA5, p.PB5, p.PA6, adc_spi(clocks::ADC)), pac::SPI1);
+    let dac = Registers::new(Spi::new_blocking(p.SPI4, p.PE2, p.PE6, p.PE5, dac_spi(clocks::DAC)), pac::SPI4);
+    let select = |pin: Peri<'static, AnyPin>| Output::new(pin, high, Speed::VeryHigh);
     Wiring {
         adc: AdcPins {
-            spi: Spi::new_blocking(p.SPI1, p.PA5, p.PB5, p.PA6, adc_spi()),
-            select: Output::new(p.PD14, high, Speed::VeryHigh),
-            start: Output::new(p.PD15, high, Speed::VeryHigh),
+            spi: Device { bus: adc, select: select(p.PD14.into()) },
+            start,
             busy: Input::new(p.PF3, Pull::Up),
             reset: Output::new(p.PE9, Level::Low, Speed::Low),
         },
         dac: DacPins {
-            spi: Spi::new_blocking(p.SPI3, p.PC10, p.PC12, p.PC11, dac_spi()),
-            select: [Output::new(p.PD2, high, Speed::VeryHigh), Output::new(p.PG2, high, Speed::VeryHigh)],
-            load: Output::new(p.PG3, high, Speed::VeryHigh),
+            spi: [
+                Device { bus: dac.again(), select: select(p.PD2.into()) },
+                Device { bus: dac, select: select(p.PG2.into()) },
+            ],
+            load,
             enable,
         },
         stop,

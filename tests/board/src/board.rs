@@ -11,8 +11,9 @@ use crate::gpio::{self, Gpio};
 use crate::line::Line;
 use crate::meter::Meter;
 use crate::nvic::Nvic;
-use crate::part::{DMA_INTERRUPTS, Part, Pin, SPI1, SPI3, TIM1, TIM2, TIM2_INTERRUPT};
+use crate::part::{DMA_INTERRUPTS, PULSES_FUNCTION, Part, Pin, SPI1, TIM1, TIM2, TIM2_INTERRUPT};
 use crate::plant::Plant;
+use crate::pulses::Pulses;
 use crate::rcc::{self, Clocks};
 use crate::spi::Spi;
 use crate::store::{self, Store};
@@ -28,6 +29,11 @@ const LOOK: Time = 100 * MICROSECOND;
 const WFI: u32 = 0xbf30;
 /// Of the core: whether its caches are on.
 const CCR: u32 = 0xe000_ed14;
+/// Below this address is code that the program has copied.
+pub const TIGHTLY: u32 = 0x1_0000;
+/// SYSCFG_PWRCR of an H7, whose bit 0 is voltage scale 0, and what the core may have without it, Hz.
+const OVERDRIVE: u32 = 0x5800_042c;
+const WITHOUT_OVERDRIVE: u64 = 400_000_000;
 const CYCCNT: u32 = 0xe000_1004;
 
 /// Why the core stopped.
@@ -52,7 +58,8 @@ struct Devices {
     gpio: Gpio,
     timer: Timer,
     enable: Enable,
-    /// SPI1 of the ADC, SPI3 of the DACs.
+    pulses: Pulses,
+    /// Of the ADC and of the DACs.
     spi: [Spi; 2],
     dma: Dma,
     usart: Usart,
@@ -65,6 +72,9 @@ impl Devices {
         let mut store = Store::default();
         // HSI is on.
         store.set(part.rcc, 1);
+        if let Some([address, word]) = part.identity {
+            store.set(address, word);
+        }
         let clocks = rcc::clocks(part.family, part.rcc, &store);
         Self {
             nvic: Nvic::new(),
@@ -72,6 +82,7 @@ impl Devices {
             gpio: Gpio::default(),
             timer: Timer::default(),
             enable: Enable::default(),
+            pulses: Pulses::default(),
             spi: [Spi::new(part.family), Spi::new(part.family)],
             dma: Dma::default(),
             usart: Usart::new(part.family, part.usart),
@@ -95,8 +106,8 @@ struct Levels {
 pub struct Board {
     pub part: &'static Part,
     devices: Devices,
-    /// From `part.flash` on.
-    flash: Vec<u8>,
+    /// From `part.flash` on, and what is copied from it to address 0 and on.
+    code: [Vec<u8>; 2],
     pub now: Time,
     /// Of the core.
     cycle: Time,
@@ -130,14 +141,14 @@ pub struct Board {
 
 impl Board {
     /// `bits`: of the ADC and of a gauge; `modelled`: cycles by the model of [`Cost`].
-    pub fn new(part: &'static Part, flash: Vec<u8>, bits: [u32; 2], plant: Plant, modelled: bool) -> Self {
+    pub fn new(part: &'static Part, code: [Vec<u8>; 2], bits: [u32; 2], plant: Plant, modelled: bool) -> Self {
         let devices = Devices::new(part);
         let levels = Levels { convst: true, select: true, reset: false, sync: [true; 2], ldac: true, enable: false };
         let mut board = Self {
             part,
             cycle: cycle(devices.clocks.core),
             devices,
-            flash,
+            code,
             now: 0,
             advanced: 0,
             due: 0,
@@ -232,6 +243,10 @@ impl Board {
         self.devices.clocks = clocks;
         self.cycle = cycle(clocks.core.max(1));
         self.devices.timer.clock(self.now, clocks.timer.max(1));
+        self.devices.pulses.clock(clocks.timer.max(1));
+        if clocks.core > WITHOUT_OVERDRIVE && self.devices.store.word(OVERDRIVE) & 1 == 0 {
+            self.violations.note("PWR", "more than 400 MHz without voltage scale 0", self.now);
+        }
         for (spi, hertz) in self.devices.spi.iter_mut().zip(clocks.spi) {
             spi.clock(hertz.max(1));
         }
@@ -261,6 +276,11 @@ impl Board {
         self.faults.clear();
     }
 
+    /// Whether times are by the model of [`Cost`].
+    pub fn is_modelled(&self) -> bool {
+        self.cost.is_modelled()
+    }
+
     /// What entering or leaving an exception takes.
     pub fn entry(&self) -> Time {
         self.cycle * Cost::EXCEPTION
@@ -279,8 +299,14 @@ impl Board {
     }
 
     fn schedule(&mut self) {
-        let Devices { timer, usart, watchdog, dma, .. } = &self.devices;
-        let events = [timer.next(self.advanced), usart.next(self.now, dma), watchdog.due, Some(self.looked + LOOK)];
+        let Devices { timer, pulses, usart, watchdog, dma, .. } = &self.devices;
+        let events = [
+            timer.next(self.advanced),
+            pulses.next(),
+            usart.next(self.now, dma),
+            watchdog.due,
+            Some(self.looked + LOOK),
+        ];
         self.due = events.into_iter().flatten().min().unwrap_or(Time::MAX);
     }
 
@@ -292,15 +318,28 @@ impl Board {
 
     /// What is due by now happens.
     fn advance(&mut self, core: &Core<'_>) {
-        self.advance_timer();
+        self.advance_timers();
         self.devices.usart.advance(self.now, &mut self.devices.dma, core);
         self.lines();
         self.schedule();
     }
 
-    fn advance_timer(&mut self) {
+    /// TIM2, and the timer that it starts, whose edges come at their own times.
+    fn advance_timers(&mut self) {
+        let due = self.devices.timer.next(self.advanced).filter(|at| *at <= self.now);
         self.devices.timer.advance(self.advanced, self.now);
         self.advanced = self.now;
+        if let Some(at) = due.filter(|_| self.devices.timer.leads()) {
+            self.devices.pulses.trigger(at);
+        }
+        let now = self.now;
+        while let Some(at) = self.devices.pulses.next().filter(|at| *at <= now) {
+            self.now = at;
+            self.advance_spi();
+            self.devices.pulses.pass(at);
+            self.pins();
+        }
+        self.now = now;
     }
 
     /// Interrupt lines as the devices have them.
@@ -344,14 +383,19 @@ impl Board {
         let gpio = &self.devices.gpio;
         let level = |pin: Pin, floating: bool| if gpio.is_output(pin) { gpio.level(pin) } else { floating };
         let part = self.part;
+        let [convst, ldac] = [part.convst, part.ldac];
+        let timed = |pin: Pin, channel: usize| match gpio.alternate(pin) {
+            Some(PULSES_FUNCTION) => self.devices.pulses.level(channel, self.now),
+            _ => level(pin, true),
+        };
         let levels = Levels {
-            convst: level(part.convst, true),
+            convst: timed(convst, part.channels[0]),
             select: level(part.adc_select, true),
             reset: level(part.adc_reset, false),
             sync: part.dac_select.map(|pin| level(pin, true)),
-            ldac: level(part.ldac, true),
+            ldac: timed(ldac, part.channels[1]),
             enable: match part.enable {
-                (pin, channel) if gpio.is_alternate(pin) => self.devices.enable.level(channel),
+                (pin, channel) if gpio.alternate(pin).is_some() => self.devices.enable.level(channel),
                 (pin, _) => level(pin, false),
             },
         };
@@ -399,8 +443,10 @@ impl Board {
     }
 
     fn fetch(&self, address: u32) -> Option<u32> {
-        let at = address.checked_sub(self.part.flash)? as usize;
-        Some(u32::from(u16::from_le_bytes(self.flash.get(at..at + 2)?.try_into().ok()?)))
+        let [flash, copied] = &self.code;
+        let at = if address < TIGHTLY { address } else { address.checked_sub(self.part.flash)? } as usize;
+        let code = if address < TIGHTLY { copied } else { flash };
+        Some(u32::from(u16::from_le_bytes(code.get(at..at + 2)?.try_into().ok()?)))
     }
 }
 
@@ -440,6 +486,10 @@ impl Guest for Board {
         true
     }
 
+    fn data(&mut self, address: u32, write: bool) {
+        self.now += self.cycle * self.cost.data(address, write);
+    }
+
     fn read(&mut self, address: u32, size: u32) -> u32 {
         self.now += self.cycle * self.cost.access(false);
         self.advance_spi();
@@ -456,12 +506,15 @@ impl Guest for Board {
             }
             _ if within(TIM1, 0x400) => devices.enable.read(aligned - TIM1),
             _ if within(TIM2, 0x400) => {
-                devices.timer.advance(self.advanced, self.now);
-                self.advanced = self.now;
-                devices.timer.read(aligned - TIM2, self.now)
+                self.advance_timers();
+                self.devices.timer.read(aligned - TIM2, self.now)
+            }
+            _ if within(part.pulses, 0x400) => {
+                self.advance_timers();
+                self.devices.pulses.read(aligned - part.pulses, self.now)
             }
             _ if within(SPI1, 0x400) => devices.spi[0].read(aligned - SPI1),
-            _ if within(SPI3, 0x400) => devices.spi[1].read(aligned - SPI3),
+            _ if within(part.dac_spi, 0x400) => devices.spi[1].read(aligned - part.dac_spi),
             _ if within(part.dma, 0x400) => devices.dma.read(aligned - part.dma),
             _ if within(part.usart, 0x400) => {
                 let word = devices.usart.read(aligned - part.usart);
@@ -482,7 +535,7 @@ impl Guest for Board {
     fn write(&mut self, address: u32, size: u32, value: u32) {
         self.now += self.cycle * self.cost.access(true);
         self.advance_spi();
-        self.advance_timer();
+        self.advance_timers();
         let aligned = address & !3;
         let part = self.part;
         let within = |base: u32, length: u32| address.wrapping_sub(base) < length;
@@ -508,12 +561,18 @@ impl Guest for Board {
             }
             _ if within(TIM2, 0x400) => devices.timer.write(aligned - TIM2, value, self.now),
             _ if within(SPI1, 0x400) => devices.spi[0].write(aligned - SPI1, size, value, self.now),
-            _ if within(SPI3, 0x400) => devices.spi[1].write(aligned - SPI3, size, value, self.now),
+            _ if within(part.dac_spi, 0x400) => devices.spi[1].write(aligned - part.dac_spi, size, value, self.now),
+            _ if within(part.pulses, 0x400) => {
+                devices.pulses.write(aligned - part.pulses, value, self.now);
+                self.pins();
+            }
             _ if within(part.dma, 0x400) => devices.dma.write(aligned - part.dma, value),
             _ if within(part.usart, 0x400) => devices.usart.write(aligned - part.usart, value),
             _ if within(part.watchdog, 0x400) => devices.watchdog.write(aligned - part.watchdog, value, self.now),
-            _ if aligned == part.rcc + rcc::SOURCE && rcc::locked(part.family, devices.store.word(part.rcc)) => {
-                self.violations.note("RCC", "PLLCKSELR written while a PLL runs, which has no effect", self.now);
+            _ if aligned == part.rcc + rcc::SOURCE
+                && rcc::refused(part.family, devices.store.word(part.rcc), devices.store.word(aligned), value) =>
+            {
+                self.violations.note("RCC", "PLLCKSELR changed for a PLL that runs, which has no effect", self.now);
             }
             _ => {
                 devices.store.write(address, size, value);

@@ -1,8 +1,9 @@
 //! An image: what goes where in flash, and what its controller says of itself.
 
-/// A loaded part: address and bytes.
+/// A loaded part: where it is in flash, where it runs or is read, and its bytes.
 pub struct Segment {
     pub address: u32,
+    pub runs_at: u32,
     pub bytes: Vec<u8>,
 }
 
@@ -18,9 +19,10 @@ pub fn segments(file: &[u8]) -> Option<Vec<Segment>> {
     for header in (0..count).map(|k| table + k * size) {
         let (kind, offset, address, length) =
             (word(header)?, word(header + 4)?, word(header + 12)?, word(header + 16)?);
+        let runs_at = word(header + 8)?;
         if kind == 1 && length > 0 {
             let bytes = file.get(offset as usize..(offset + length) as usize)?.to_vec();
-            found.push(Segment { address, bytes });
+            found.push(Segment { address, runs_at, bytes });
         }
     }
     Some(found)

@@ -37,9 +37,11 @@ impl Gpio {
         self.ports[port].settings[0] >> (2 * pin) & 3 == 1
     }
 
-    /// Whether a peripheral has the pin.
-    pub fn is_alternate(&self, (port, pin): Pin) -> bool {
-        self.ports[port].settings[0] >> (2 * pin) & 3 == 2
+    /// The alternate function that drives the pin.
+    pub fn alternate(&self, (port, pin): Pin) -> Option<u32> {
+        let port = &self.ports[port];
+        let function = port.others[1 + (pin / 8) as usize] >> (4 * (pin % 8)) & 0xf;
+        (port.settings[0] >> (2 * pin) & 3 == 2).then_some(function)
     }
 
     /// The level of a pin.

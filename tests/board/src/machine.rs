@@ -28,8 +28,15 @@ impl Machine {
     /// A board with this image, at reset.
     pub fn new(library: &Path, board: Board, image: &[Segment]) -> Result<Self, String> {
         let memories = board.part.memories;
-        let engine = Engine::open(library, board, memories, &DEVICES)?;
-        for Segment { address, bytes } in image {
+        let modelled = board.is_modelled();
+        let mut engine = Engine::open(library, board, memories, &DEVICES)?;
+        if modelled {
+            // Flash and AXI SRAM: what is at the core costs nothing.
+            for memory in memories.iter().filter(|[base, _]| base >> 24 != 0 && base >> 24 != 0x20) {
+                engine.watch(*memory)?;
+            }
+        }
+        for Segment { address, bytes, .. } in image {
             if !engine.core().store(*address, bytes) {
                 return Err(format!(
                     "the image has {} bytes at {address:#x}, where this part has no memory",

@@ -16,6 +16,7 @@ mod meter;
 mod nvic;
 mod part;
 mod plant;
+mod pulses;
 mod rcc;
 mod spi;
 mod store;
@@ -114,8 +115,14 @@ fn serve(options: &Options) -> Result<(), String> {
         let place = flash.get_mut(at..at + segment.bytes.len());
         place.ok_or("the image is larger than the flash")?.copy_from_slice(&segment.bytes);
     }
+    // Code that runs elsewhere than in flash.
+    let mut tightly = Vec::new();
+    for segment in image.iter().filter(|segment| segment.runs_at < board::TIGHTLY) {
+        tightly.resize(segment.runs_at as usize, 0);
+        tightly.extend_from_slice(&segment.bytes);
+    }
     let adc_bits = if options.bits <= 16 { 16 } else { 18 };
-    let board = Board::new(options.part, flash, [adc_bits, options.bits], plant, options.cycles);
+    let board = Board::new(options.part, [flash, tightly], [adc_bits, options.bits], plant, options.cycles);
     let mut machine = Machine::new(&options.library, board, &image)?;
     let mut line = match &options.socket {
         Some(path) => Some(Line::listen(path).map_err(|error| format!("{}: {error}", path.display()))?),

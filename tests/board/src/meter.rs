@@ -31,7 +31,7 @@ impl Spread {
             return "none".to_owned();
         }
         let mean = of(self.sum) / self.count as f64;
-        format!("{:.1}/{:.1}/{:.1}", of(self.smallest), mean, of(self.largest))
+        format!("{:.2}/{:.2}/{:.2}", of(self.smallest), mean, of(self.largest))
     }
 }
 

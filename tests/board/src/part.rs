@@ -21,6 +21,13 @@ pub struct Part {
     pub usart: u32,
     pub usart_interrupt: usize,
     pub watchdog: u32,
+    /// SPI of the DACs; that of the ADC is [`SPI1`].
+    pub dac_spi: u32,
+    /// The timer that drives CONVST and LDAC, and its channels for them, counted from 0.
+    pub pulses: u32,
+    pub channels: [usize; 2],
+    /// DBGMCU_IDCODE, where the program reads it.
+    pub identity: Option<[u32; 2]>,
     pub convst: Pin,
     pub busy: Pin,
     pub adc_select: Pin,
@@ -36,7 +43,8 @@ pub const TIM1: u32 = 0x4001_0000;
 pub const TIM2: u32 = 0x4000_0000;
 pub const TIM2_INTERRUPT: usize = 28;
 pub const SPI1: u32 = 0x4001_3000;
-pub const SPI3: u32 = 0x4000_3c00;
+/// Alternate function of the pins of [`Part::pulses`].
+pub const PULSES_FUNCTION: u32 = 2;
 /// DMA1 streams 0 to 7.
 pub const DMA_INTERRUPTS: [usize; 8] = [11, 12, 13, 14, 15, 16, 17, 47];
 /// The crystal's clock from the ST-LINK, Hz.
@@ -54,7 +62,7 @@ const G: usize = 6;
 
 pub const H743: Part = Part {
     family: Family::H7,
-    memories: &[[0x0800_0000, 0x20_0000], [0x2000_0000, 0x2_0000], [0x2400_0000, 0x8_0000]],
+    memories: &[[0x0800_0000, 0x20_0000], [0, 0x1_0000], [0x2000_0000, 0x2_0000], [0x2400_0000, 0x8_0000]],
     flash: 0x0800_0000,
     flash_access: 0x5200_2000,
     gpio: 0x5802_0000,
@@ -64,12 +72,17 @@ pub const H743: Part = Part {
     usart: 0x4000_4800,
     usart_interrupt: 39,
     watchdog: 0x5800_4800,
+    dac_spi: 0x4001_3400,
+    pulses: 0x4000_0800,
+    channels: [3, 1],
+    // Revision V.
+    identity: Some([0x5c00_1000, 0x2003_6450]),
     convst: (D, 15),
     busy: (F, 3),
     adc_select: (D, 14),
     adc_reset: (E, 9),
     dac_select: [(D, 2), (G, 2)],
-    ldac: (G, 3),
+    ldac: (D, 13),
     enable: ((E, 11), 2),
 };
 
@@ -85,6 +98,10 @@ pub const F446: Part = Part {
     usart: 0x4000_4400,
     usart_interrupt: 38,
     watchdog: 0x4000_3000,
+    dac_spi: 0x4000_3c00,
+    pulses: 0x4000_0400,
+    channels: [1, 0],
+    identity: None,
     convst: (C, 7),
     busy: (A, 9),
     adc_select: (B, 6),

@@ -7,9 +7,9 @@ use crate::store::Store;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Clocks {
     pub core: u64,
-    /// Of TIM2.
+    /// Of TIM2 and the timer of CONVST and LDAC.
     pub timer: u64,
-    /// Of SPI1 and SPI3.
+    /// Of the SPI of the ADC, and that of the DACs.
     pub spi: [u64; 2],
     /// Of the link's USART.
     pub usart: u64,
@@ -25,11 +25,17 @@ pub fn clocks(family: Family, rcc: u32, registers: &Store) -> Clocks {
                 _ => 1,
             };
             let hsi = 64_000_000 >> (register(0) >> 3 & 3);
-            let pll = register(0x30);
             let source = if register(0x28) & 3 == 2 { HSE } else { hsi };
-            let oscillator = source * u64::from((pll & 0x1ff) + 1) / u64::from((register(0x28) >> 4 & 0x3f).max(1));
+            // Oscillator of a PLL, and what it gives by the divider at this place.
+            let oscillator = |number: u32| {
+                let times = u64::from((register(0x30 + 8 * number) & 0x1ff) + 1);
+                source * times / u64::from((register(0x28) >> (4 + 8 * number) & 0x3f).max(1))
+            };
+            let output = |number: u32, place: u32| {
+                oscillator(number) / u64::from((register(0x30 + 8 * number) >> place & 0x7f) + 1)
+            };
             let core = match register(0x10) & 7 {
-                3 => oscillator / u64::from((pll >> 9 & 0x7f) + 1),
+                3 => output(0, 9),
                 2 => HSE,
                 _ => hsi,
             };
@@ -39,8 +45,10 @@ pub fn clocks(family: Family, rcc: u32, registers: &Store) -> Clocks {
             };
             let first = bus / divider(0x1c, 4);
             let timer = if divider(0x1c, 4) == 1 { first } else { 2 * first };
-            let spi = oscillator / u64::from((pll >> 16 & 0x7f) + 1);
-            Clocks { core, timer, spi: [spi; 2], usart: first }
+            let chosen = register(0x50);
+            let adc = if chosen >> 12 & 7 == 1 { output(1, 9) } else { output(0, 16) };
+            let dac = if chosen >> 16 & 7 == 1 { output(1, 16) } else { bus / divider(0x1c, 8) };
+            Clocks { core, timer, spi: [adc, dac], usart: first }
         }
         Family::F4 => {
             let divider = |shift: u32| match register(8) >> shift & 7 {
@@ -65,9 +73,14 @@ pub fn clocks(family: Family, rcc: u32, registers: &Store) -> Clocks {
 /// PLLCKSELR of an H7.
 pub const SOURCE: u32 = 0x28;
 
-/// Whether [`SOURCE`] cannot be written, with CR as it stands: a PLL runs.
-pub fn locked(family: Family, control: u32) -> bool {
-    family == Family::H7 && control & 0x1500_0000 != 0
+/// Whether a write of [`SOURCE`] is not allowed, with CR as it stands: of the source while a PLL runs, or of the divider of one that
+/// does.
+pub fn refused(family: Family, control: u32, before: u32, after: u32) -> bool {
+    let runs = [0, 1, 2].map(|number| control >> (24 + 2 * number) & 1 == 1);
+    let changed = before ^ after;
+    let divider = |number: usize| changed >> (4 + 8 * number) & 0x3f != 0;
+    family == Family::H7
+        && (changed & 3 != 0 && runs.contains(&true) || (0..3).any(|number| runs[number] && divider(number)))
 }
 
 /// A register of RCC as it reads: each ready bit is its switch, and the clock in use the one that was chosen.
@@ -94,5 +107,19 @@ pub fn power(family: Family, offset: u32, word: u32) -> u32 {
         (Family::H7, 0x18) => word | 1 << 13,
         (Family::F4, 4) => word | 1 << 14 | 3 << 16,
         _ => word,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_source_is_locked_by_any_pll_and_a_divider_by_its_own() {
+        let refused = |control, before, after| refused(Family::H7, control, before, after);
+        assert!(refused(1 << 24, 2, 0));
+        assert!(refused(1 << 26, 0x1010, 0x2010));
+        assert!(!refused(1 << 24, 0x0012, 0x1012), "the divider of PLL2 while PLL1 runs");
+        assert!(!refused(0, 0, 0x12));
     }
 }

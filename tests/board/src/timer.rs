@@ -8,6 +8,8 @@ const CC1: u32 = 1 << 1;
 #[derive(Default)]
 pub struct Timer {
     control: u32,
+    /// CR2.
+    leads: u32,
     interrupts: u32,
     status: u32,
     /// Counter at `since`; it runs from there.
@@ -50,6 +52,11 @@ impl Timer {
         }
     }
 
+    /// Whether each match is its trigger output.
+    pub fn leads(&self) -> bool {
+        self.leads >> 4 & 7 == 3
+    }
+
     /// Its interrupt.
     pub fn line(&self) -> bool {
         self.status & self.interrupts & 0x1f != 0
@@ -58,6 +65,7 @@ impl Timer {
     pub fn read(&self, offset: u32, now: Time) -> u32 {
         match offset {
             0 => self.control,
+            4 => self.leads,
             0xc => self.interrupts,
             0x10 => self.status,
             0x24 => self.now(now),
@@ -74,6 +82,7 @@ impl Timer {
                 self.since = now;
                 self.control = value;
             }
+            4 => self.leads = value,
             0xc => self.interrupts = value,
             0x10 => self.status &= value,
             0x14 => self.status |= value & CC1,

@@ -39,6 +39,8 @@ impl Register {
 pub trait Guest {
     /// Called before each instruction. False: it is not run, and [`Engine::run`] returns.
     fn instruction(&mut self, core: &Core<'_>, address: u32, size: u32) -> bool;
+    /// An access to memory that [`Engine::watch`] watches.
+    fn data(&mut self, address: u32, write: bool);
     /// A read of `size` bytes where no memory is.
     fn read(&mut self, address: u32, size: u32) -> u32;
     /// A write of `size` bytes where no memory is.
@@ -47,6 +49,7 @@ pub trait Guest {
 
 type Uc = *mut c_void;
 type Hook<G> = unsafe extern "C" fn(Uc, u64, u32, *mut Attached<G>);
+type Data<G> = unsafe extern "C" fn(Uc, c_int, u64, c_int, i64, *mut Attached<G>);
 type Read<G> = unsafe extern "C" fn(Uc, u64, u32, *mut Region<G>) -> u64;
 type Write<G> = unsafe extern "C" fn(Uc, u64, u32, u64, *mut Region<G>);
 
@@ -56,6 +59,8 @@ const MODE_THUMB: c_int = 1 << 4;
 const WRITE_CPU_MODEL: c_int = 7 | 1 << 26 | 1 << 30;
 const CORTEX_M7: c_int = 10;
 const HOOK_CODE: c_int = 4;
+const HOOK_MEMORY: c_int = 1 << 10 | 1 << 11;
+const WRITES: c_int = 17;
 const ALL_RIGHTS: u32 = 7;
 
 /// The functions of the library that are used, as its header declares them.
@@ -68,6 +73,8 @@ struct Api {
     reg_write: unsafe extern "C" fn(Uc, c_int, *const c_void) -> c_int,
     mem_read: unsafe extern "C" fn(Uc, u64, *mut c_void, usize) -> c_int,
     mem_write: unsafe extern "C" fn(Uc, u64, *const c_void, usize) -> c_int,
+    /// `uc_hook_add` itself.
+    hook_add: *const c_void,
     /// Keeps the functions valid.
     _library: Library,
 }
@@ -131,6 +138,7 @@ impl<G: Guest> Engine<G> {
             reg_write: function!(b"uc_reg_write\0"),
             mem_read: function!(b"uc_mem_read\0"),
             mem_write: function!(b"uc_mem_write\0"),
+            hook_add: hook_add as *const c_void,
             _library: opened,
         };
         let mut uc: Uc = std::ptr::null_mut();
@@ -157,6 +165,22 @@ impl<G: Guest> Engine<G> {
         // SAFETY: as above for `attached`; begin 1 after end 0 means every address.
         checked(unsafe { hook_add(uc, &raw mut handle, HOOK_CODE, on_code, attached, 1, 0) }, "uc_hook_add")?;
         Ok(engine)
+    }
+
+    /// Has [`Guest::data`] called for every access to this memory (begin, length), which takes time.
+    ///
+    /// # Errors
+    /// In words: the engine refuses.
+    pub fn watch(&mut self, [base, length]: [u32; 2]) -> Result<(), String> {
+        type HookData<G> =
+            unsafe extern "C" fn(Uc, *mut usize, c_int, Data<G>, *mut Attached<G>, u64, u64, ...) -> c_int;
+        // SAFETY: `uc_hook_add`, whose third argument decides about the type of the fourth.
+        let hook_add: HookData<G> = unsafe { std::mem::transmute(self.api().hook_add) };
+        let (mut handle, end) = (0, u64::from(base) + u64::from(length) - 1);
+        // SAFETY: as in `open`.
+        let result =
+            unsafe { hook_add(self.uc, &raw mut handle, HOOK_MEMORY, on_data, self.attached, u64::from(base), end) };
+        checked(result, "uc_hook_add")
     }
 
     fn api(&self) -> &Api {
@@ -249,6 +273,11 @@ unsafe extern "C" fn on_code<G: Guest>(uc: Uc, address: u64, size: u32, attached
         // SAFETY: the core runs.
         unsafe { (api.stop)(uc) };
     }
+}
+
+unsafe extern "C" fn on_data<G: Guest>(_: Uc, kind: c_int, address: u64, _: c_int, _: i64, attached: *mut Attached<G>) {
+    // SAFETY: as in `on_code`.
+    unsafe { (*attached).guest.data(address as u32, kind == WRITES) };
 }
 
 unsafe extern "C" fn on_read<G: Guest>(_: Uc, offset: u64, size: u32, region: *mut Region<G>) -> u64 {

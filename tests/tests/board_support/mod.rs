@@ -93,6 +93,7 @@ impl Line {
         let mut exchange = Exchange::new();
         exchange.recorder = recorder(Box::leak(vec![0; record].into_boxed_slice()));
         board.start(&mut exchange.report);
+        exchange.prepare(board.machine());
         Self(Rc::new(RefCell::new(Rig {
             board,
             exchange,

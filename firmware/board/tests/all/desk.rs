@@ -72,13 +72,13 @@ fn what_is_refused_changes_nothing() {
         (Request::LockstepReset { config: Bytes(&good) }, Refusal::State),
         (Request::LockstepStep { input: Bytes(&[]) }, Refusal::State),
     ];
-    let (orders, settings) = (bench.exchange.orders, bench.exchange.config.to_words());
+    let (orders, settings) = (bench.exchange.orders, bench.exchange.settings().to_words());
     let digest = bench.machine.digest();
     for (request, refusal) in refused {
         bench.expect(&request, Reply::Refused(refusal));
         assert_eq!(bench.exchange.orders.command, orders.command);
         assert_eq!(bench.exchange.orders.request, orders.request);
-        assert_eq!(bench.exchange.config.to_words(), settings);
+        assert_eq!(bench.exchange.settings().to_words(), settings);
         assert!(bench.exchange.lockstep.is_none());
         assert_eq!(bench.machine.digest(), digest);
     }
@@ -87,16 +87,16 @@ fn what_is_refused_changes_nothing() {
     bench
         .expect(&Request::LockstepReset { config: Bytes(&bytes(&config)) }, Reply::Refused(Refusal::Word { index: 0 }));
     assert!(bench.exchange.lockstep.is_none());
-    assert_eq!((bench.exchange.config.to_words(), bench.machine.digest()), (settings, digest));
+    assert_eq!((bench.exchange.settings().to_words(), bench.machine.digest()), (settings, digest));
 }
 
 #[test]
 fn settings_go_in_and_come_out() {
     let mut bench = Bench::new();
     let mode = Config::new().with_mode(controller::ControlMode::from_word(0).unwrap()).to_words();
-    assert_ne!(mode, bench.exchange.config.to_words());
+    assert_ne!(mode, bench.exchange.settings().to_words());
     bench.expect(&Request::WriteConfig { words: Bytes(&bytes(&mode)) }, Reply::Done);
-    assert_eq!(bench.exchange.config.to_words(), mode);
+    assert_eq!(bench.exchange.settings().to_words(), mode);
     bench.expect(&Request::ReadConfig, Reply::Config { words: Bytes(&bytes(&mode)) });
 }
 

@@ -98,7 +98,7 @@ fn a_lock_step_computes_what_the_host_computes_and_moves_nothing() {
     line.tick(20);
     let input = bytes(&inputs(&mut random, 0));
     assert_eq!(refused(&mut client, &Request::LockstepStep { input: Bytes(&input) }), Refusal::State);
-    line.with(|rig| assert_eq!(rig.exchange.config.to_words(), Config::new().to_words()));
+    line.with(|rig| assert_eq!(rig.exchange.settings().to_words(), Config::new().to_words()));
     // So does a host that comes anew, and then the platform can be run; a host that wants a lock-step then cannot have it.
     done(&mut client, &Request::LockstepReset { config: Bytes(&words) });
     let mut client = line.client(4);

@@ -4,11 +4,12 @@ use embedded_hal::spi::ErrorKind;
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction as PinStep};
 use embedded_hal_mock::eh1::spi::{Mock as Spi, Transaction as SpiStep};
-use specgen_hal::ad5686r::{Ad5686rPair, Channel, Command};
-use specgen_hal::{Amplifiers, Fault};
+use specgen_hal::ad5686r::{Ad5686rPair, Channel, Command, LDAC_LOW};
+use specgen_hal::{Amplifiers, Fault, Pulse};
 
 type Word = [u8; 3];
-type Pair = Ad5686rPair<Spi<u8>, Spi<u8>, Pin, Pin, NoopDelay>;
+type Ldac = Pulse<Pin, NoopDelay, LDAC_LOW>;
+type Pair = Ad5686rPair<Spi<u8>, Spi<u8>, Ldac, Pin, NoopDelay>;
 
 /// A frame of the data sheet, and what the part sends back meanwhile.
 fn frames(pairs: &[(Word, Word)]) -> Vec<SpiStep<u8>> {
@@ -64,14 +65,24 @@ fn write_words(address: u8, answer: u16, codes: [u16; 3]) -> Vec<(Word, Word)> {
 }
 
 fn pair(first: &[(Word, Word)], second: &[(Word, Word)], ldac: &[PinStep], enable: &[PinStep]) -> Pair {
-    Ad5686rPair::new(Spi::new(&frames(first)), Spi::new(&frames(second)), Pin::new(ldac), Pin::new(enable), NoopDelay)
+    let (first, second) = (Spi::new(&frames(first)), Spi::new(&frames(second)));
+    Ad5686rPair::new(first, second, pulse(ldac), Pin::new(enable), NoopDelay)
+}
+
+fn pulse(ldac: &[PinStep]) -> Ldac {
+    Pulse { pin: Pin::new(ldac), delay: NoopDelay }
+}
+
+/// A tick: the question while the gauges are converted, then the codes.
+fn tick(dacs: &mut Pair, codes: [i32; 6]) -> Result<(), Fault> {
+    dacs.ask().and(dacs.write(&codes))
 }
 
 fn done(pair: Pair) {
     let (mut first, mut second, mut ldac, mut enable, _) = pair.release();
     first.done();
     second.done();
-    ldac.done();
+    ldac.pin.done();
     enable.done();
 }
 
@@ -108,7 +119,7 @@ fn words_are_those_of_the_data_sheet() {
 #[test]
 fn start_disables_the_amplifiers_first_and_proves_both_parts() {
     let words = start_words(GOOD);
-    let mut dacs = pair(&words, &words, &[high()], &[low()]);
+    let mut dacs = pair(&words, &words, &[], &[low()]);
     assert_eq!(dacs.start(), Ok(()));
     done(dacs);
 }
@@ -117,12 +128,12 @@ fn start_disables_the_amplifiers_first_and_proves_both_parts() {
 fn a_part_that_gives_nothing_back_is_found_at_start_and_the_other_is_at_zero_all_the_same() {
     // SDO open: all ones. The first pattern differs at once.
     let silent = &start_words([0xffff; 3])[..9];
-    let mut dacs = pair(silent, &start_words(GOOD), &[high()], &[low()]);
+    let mut dacs = pair(silent, &start_words(GOOD), &[], &[low()]);
     assert_eq!(dacs.start(), Err(Fault::ReadBack));
     done(dacs);
     // One bit of one pattern.
     let one_bit = &start_words([0xa55a, 0x5aa4, 0])[..12];
-    let mut dacs = pair(&start_words(GOOD), one_bit, &[high()], &[low()]);
+    let mut dacs = pair(&start_words(GOOD), one_bit, &[], &[low()]);
     assert_eq!(dacs.start(), Err(Fault::ReadBack));
     done(dacs);
 }
@@ -140,12 +151,12 @@ fn six_codes_and_one_ldac_and_each_channel_read_back_within_three_ticks() {
         second.extend(write_words(address, expected[3 + tick % 3], [d, e, f]));
         expected = codes(tick as u16);
     }
-    let ldac: Vec<PinStep> = std::iter::once(high()).chain((0..4).flat_map(|_| [low(), high()])).collect();
+    let ldac: Vec<PinStep> = (0..4).flat_map(|_| [low(), high()]).collect();
     let mut dacs = pair(&first, &second, &ldac, &[low(), high(), low()]);
     assert_eq!(dacs.start(), Ok(()));
     assert_eq!(dacs.enable(true), Ok(()));
-    for tick in 0..4 {
-        assert_eq!(dacs.write(&codes(tick).map(i32::from)), Ok(()));
+    for k in 0..4 {
+        assert_eq!(tick(&mut dacs, codes(k).map(i32::from)), Ok(()));
     }
     assert_eq!(dacs.enable(false), Ok(()));
     done(dacs);
@@ -163,12 +174,12 @@ fn a_code_that_comes_back_changed_is_a_fault_and_the_codes_go_out_all_the_same()
         second.extend(write_words(1, 0, [7, 7, 7]));
         second.extend(write_words(2, 7, [8, 8, 8]));
         second.extend(write_words(4, 8, [9, 9, 9]));
-        let ldac: Vec<PinStep> = std::iter::once(high()).chain((0..3).flat_map(|_| [low(), high()])).collect();
+        let ldac: Vec<PinStep> = (0..3).flat_map(|_| [low(), high()]).collect();
         let mut dacs = pair(&first, &second, &ldac, &[low()]);
         assert_eq!(dacs.start(), Ok(()));
-        assert_eq!(dacs.write(&[7; 6]), Ok(()));
-        assert_eq!(dacs.write(&[8; 6]), Err(Fault::ReadBack), "bit {bit}");
-        assert_eq!(dacs.write(&[9; 6]), Ok(()));
+        assert_eq!(tick(&mut dacs, [7; 6]), Ok(()));
+        assert_eq!(tick(&mut dacs, [8; 6]), Err(Fault::ReadBack), "bit {bit}");
+        assert_eq!(tick(&mut dacs, [9; 6]), Ok(()));
         done(dacs);
     }
 }
@@ -205,14 +216,14 @@ fn an_error_of_the_bus_is_a_fault_and_the_other_part_still_gets_its_codes() {
     let mut second = start_words(GOOD);
     // The registers of the first part are unknown, so nothing is read back.
     second.extend(write_words(0, 0, [4, 5, 6]).split_off(1));
-    let ldac = [high(), low(), high()];
-    let mut dacs =
-        Ad5686rPair::new(Broken(0), Spi::new(&frames(&second)), Pin::new(&ldac), Pin::new(&[low()]), NoopDelay);
+    let ldac = [low(), high()];
+    let mut dacs = Ad5686rPair::new(Broken(0), Spi::new(&frames(&second)), pulse(&ldac), Pin::new(&[low()]), NoopDelay);
     assert_eq!(dacs.start(), Err(Fault::Bus));
+    assert_eq!(dacs.ask(), Ok(()));
     assert_eq!(dacs.write(&[1, 2, 3, 4, 5, 6]), Err(Fault::Bus));
     let (first, mut second, mut ldac, mut enable, _) = dacs.release();
-    assert_eq!(first.0, 2);
+    assert_eq!(first.0, 4);
     second.done();
-    ldac.done();
+    ldac.pin.done();
     enable.done();
 }

@@ -3,8 +3,8 @@
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction as PinStep};
 use embedded_hal_mock::eh1::spi::{Mock as Spi, Transaction as SpiStep};
-use specgen_hal::ad7606::{Ad7606, POLLS, Window};
-use specgen_hal::{Fault, Gauges};
+use specgen_hal::ad7606::{Ad7606, CONVST_LOW, POLLS, Window};
+use specgen_hal::{Fault, Gauges, Pulse};
 
 /// Two's complement codes of 16 bits as the part sends them.
 fn frame16(codes: [i16; 8]) -> Vec<u8> {
@@ -25,6 +25,14 @@ fn window(bits: u32) -> Window {
     Window::around(2500, 50, 5000, bits)
 }
 
+type Start = Pulse<Pin, NoopDelay, CONVST_LOW>;
+
+/// A line that rests high and gets so many low pulses.
+fn pulses(count: usize) -> Start {
+    let steps: Vec<PinStep> = (0..count).flat_map(|_| [PinStep::set(State::Low), PinStep::set(State::High)]).collect();
+    Pulse { pin: Pin::new(&steps), delay: NoopDelay }
+}
+
 fn answer(frame: &[u8]) -> Vec<SpiStep<u8>> {
     vec![
         SpiStep::transaction_start(),
@@ -35,14 +43,13 @@ fn answer(frame: &[u8]) -> Vec<SpiStep<u8>> {
 
 /// One read: what BUSY shows at each look, what the SPI does.
 fn read<const BITS: usize>(busy: &[State], spi: &[SpiStep<u8>]) -> Result<[i32; 6], Fault> {
-    let start = [PinStep::set(State::Low), PinStep::set(State::High)];
     let looks: Vec<PinStep> = busy.iter().map(|&state| PinStep::get(state)).collect();
-    let (spi, start, busy, reset) = (Spi::new(spi), Pin::new(&start), Pin::new(&looks), Pin::new(&[]));
+    let (spi, start, busy, reset) = (Spi::new(spi), pulses(1), Pin::new(&looks), Pin::new(&[]));
     let mut adc: Ad7606<BITS, _, _, _, _, _> = Ad7606::new(spi, start, busy, reset, NoopDelay, window(BITS as u32));
-    let result = adc.read();
+    let result = adc.begin().and_then(|()| adc.read());
     let (mut spi, mut start, mut busy, mut reset, _) = adc.release();
     spi.done();
-    start.done();
+    start.pin.done();
     busy.done();
     reset.done();
     result
@@ -111,15 +118,14 @@ fn the_window_is_in_codes_of_the_part() {
 
 /// The start: reset, then one conversion that must be believable.
 fn start(busy: &[State], spi: &[SpiStep<u8>]) -> Result<(), Fault> {
-    let start = [PinStep::set(High), PinStep::set(Low), PinStep::set(High)];
     let reset = [PinStep::set(High), PinStep::set(Low)];
     let looks: Vec<PinStep> = busy.iter().map(|&state| PinStep::get(state)).collect();
-    let (spi, start, busy, reset) = (Spi::new(spi), Pin::new(&start), Pin::new(&looks), Pin::new(&reset));
+    let (spi, start, busy, reset) = (Spi::new(spi), pulses(1), Pin::new(&looks), Pin::new(&reset));
     let mut adc: Ad7606<16, _, _, _, _, _> = Ad7606::new(spi, start, busy, reset, NoopDelay, window(16));
     let result = adc.start();
     let (mut spi, mut start, mut busy, mut reset, _) = adc.release();
     spi.done();
-    start.done();
+    start.pin.done();
     busy.done();
     reset.done();
     result

@@ -12,6 +12,7 @@ pub const PART: Part = Part {
         "Cargo.toml",
         "src/ad5686r.rs",
         "src/ad7606.rs",
+        "src/edge.rs",
         "src/fault.rs",
         "src/lib.rs",
     },

@@ -11,14 +11,17 @@ pub const PART: Part = Part {
     files: files! { "stm32":
         "Cargo.toml",
         "program.rs",
+        "src/burst.rs",
         "src/converters.rs",
         "src/cycles.rs",
         "src/delay.rs",
         "src/enable.rs",
         "src/lib.rs",
+        "src/pulses.rs",
         "src/serial.rs",
         "src/silent.rs",
         "src/stack.rs",
+        "src/supply.rs",
         "src/timer.rs",
     },
 };

@@ -16,5 +16,6 @@ pub const PART: Part = Part {
         "src/clocks.rs",
         "src/main.rs",
         "src/pins.rs",
+        "src/spi.rs",
     },
 };

@@ -17,5 +17,7 @@ pub const PART: Part = Part {
         "src/clocks.rs",
         "src/main.rs",
         "src/pins.rs",
+        "src/spi.rs",
+        "src/tightly.rs",
     },
 };

@@ -1,0 +1,174 @@
+//! CONVST and LDAC by a timer: sampling and output keep their instants, whatever delays the program.
+//!
+//! TIM2 tells this timer when a tick is due ([`crate::timer`]): it counts once from 0 to its end and stops. CONVST rises with count
+//! 1 and rests low. LDAC is low from the output instant to the end, if the codes were written by then; if they are late, the
+//! program gives it.
+//!
+//! ```text
+//! TIM2   ──┤ due                                        interrupt: tick
+//! CONVST ___/‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾\_____
+//! LDAC   ‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾‾\__/‾‾‾‾‾   only where armed
+//!           1                            output end
+//! ```
+
+use cortex_m::asm;
+use embassy_stm32::pac::timer::TimGp16;
+use embassy_stm32::pac::timer::vals::{Mms, Sms, Ts};
+use specgen_board::PERIOD_NANOSECONDS;
+use specgen_hal::{Edge, Fault};
+
+/// LDAC low, ns: the AD5686R wants 15.
+const LOW: u32 = 50;
+/// With less left until the output instant the program gives LDAC itself, ns: arming takes as long.
+const MARGIN: u32 = 150;
+/// Looks at the timer until waiting for LDAC is given up: more than the longest way to the output instant.
+const LOOKS: u32 = 10_000;
+
+/// OCxM: the channel is inactive, active, active from its compare value on. By their numbers: the HAL has a type for each family.
+const INACTIVE: u32 = 4;
+const ACTIVE: u32 = 5;
+const FROM_COMPARE: u32 = 7;
+
+/// A timer of 16 bits whose trigger ITR1 is TIM2.
+#[derive(Clone, Copy)]
+pub struct Pulses(TimGp16);
+
+/// Gives the edge of CONVST.
+pub struct Sampling(Pulses);
+
+/// Gives LDAC, by this channel of the timer, counted from 0.
+pub struct Output<const CHANNEL: usize> {
+    pulses: Pulses,
+    /// Count of the output instant, and how many before it the program gives LDAC itself.
+    at: u16,
+    margin: u16,
+    /// The timer is to give it.
+    armed: bool,
+}
+
+impl Pulses {
+    /// A timer that runs at `hertz`, with outputs `nanoseconds` after sampling, sooner if the control period is too short for that:
+    /// an eighth of it is left. Both lines rest; the pins are handed over after this.
+    #[must_use]
+    pub fn edges<const SAMPLING: usize, const OUTPUT: usize>(
+        timer: TimGp16,
+        hertz: u32,
+        nanoseconds: u32,
+    ) -> (Sampling, Output<OUTPUT>) {
+        let longest = PERIOD_NANOSECONDS / 8 * 7;
+        let until = if nanoseconds < longest { nanoseconds } else { longest };
+        // One count for CONVST, with which the time begins.
+        let counts = |time: u32| u16::try_from(u64::from(time) * u64::from(hertz) / 1_000_000_000 + 1).unwrap_or(u16::MAX);
+        let (at, low) = (counts(until), counts(LOW));
+        let pulses = Self(timer);
+        timer.cr1().write(|w| w.set_opm(true));
+        timer.arr().write(|w| w.set_arr(at.saturating_add(low)));
+        timer.ccr(SAMPLING).write(|w| w.set_ccr(1));
+        timer.ccr(OUTPUT).write(|w| w.set_ccr(at));
+        pulses.mode::<SAMPLING>(FROM_COMPARE);
+        pulses.mode::<OUTPUT>(INACTIVE);
+        timer.ccer().write(|w| {
+            w.set_cce(SAMPLING, true);
+            w.set_cce(OUTPUT, true);
+            w.set_ccp(OUTPUT, true);
+        });
+        pulses.follow(true);
+        (Sampling(pulses), Output { pulses, at, margin: counts(MARGIN), armed: false })
+    }
+
+    #[inline]
+    fn mode<const CHANNEL: usize>(self, mode: u32) {
+        let place = if CHANNEL % 2 == 0 { 4 } else { 12 };
+        self.0.ccmr_output(CHANNEL / 2).modify(|w| w.0 = w.0 & !(7 << place) | mode << place);
+    }
+
+    /// Whether TIM2 starts it.
+    fn follow(self, follows: bool) {
+        self.0.smcr().write(|w| {
+            w.set_ts(Ts::ITR1);
+            w.set_sms(if follows { Sms::TRIGGER_MODE } else { Sms::DISABLED });
+        });
+    }
+
+    #[inline]
+    fn runs(self) -> bool {
+        self.0.cr1().read().cen()
+    }
+}
+
+impl Edge for Sampling {
+    /// Where TIM2 has not started the timer in this tick, the program does.
+    #[inline]
+    fn give(&mut self) -> Result<(), Fault> {
+        if !self.0.runs() {
+            self.0.follow(true);
+            self.0.0.cr1().write(|w| {
+                w.set_opm(true);
+                w.set_cen(true);
+            });
+        }
+        Ok(())
+    }
+
+    fn hold(&mut self) {
+        self.0.follow(false);
+        self.0.0.cr1().write(|w| w.set_opm(true));
+        self.0.0.cnt().write(|w| w.set_cnt(0));
+    }
+}
+
+impl<const CHANNEL: usize> Output<CHANNEL> {
+    /// Whether the output instant has passed since it was armed.
+    #[inline]
+    fn is_out(&self) -> bool {
+        self.pulses.0.sr().read().ccif(CHANNEL)
+    }
+
+    #[inline]
+    fn now(&mut self) {
+        self.pulses.mode::<CHANNEL>(ACTIVE);
+        asm::dsb();
+        // Reading the register back for this takes longer than the pulse has to be.
+        self.pulses.mode::<CHANNEL>(INACTIVE);
+    }
+}
+
+impl<const CHANNEL: usize> Edge for Output<CHANNEL> {
+    #[inline]
+    fn give(&mut self) -> Result<(), Fault> {
+        let timer = self.pulses.0;
+        // In this order: a count that has come round to 0 is one of a timer that no longer runs.
+        let count = timer.cnt().read().cnt();
+        self.armed = self.pulses.runs() && count.saturating_add(self.margin) < self.at;
+        if self.armed {
+            // Written zeros clear, ones leave alone.
+            timer.sr().write(|w| {
+                w.0 = u32::MAX;
+                w.set_ccif(CHANNEL, false);
+            });
+            self.pulses.mode::<CHANNEL>(FROM_COMPARE);
+        } else {
+            self.now();
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn hold(&mut self) {
+        if self.armed {
+            self.armed = false;
+            if self.is_out() { self.pulses.mode::<CHANNEL>(INACTIVE) } else { self.now() }
+        }
+    }
+
+    fn settle(&mut self) {
+        for _ in 0..LOOKS {
+            if !self.armed || self.is_out() {
+                return;
+            }
+        }
+    }
+}
+
+/// TIM2 tells when a tick is due.
+pub(crate) const LEADS: Mms = Mms::COMPARE_PULSE;

@@ -1,0 +1,62 @@
+//! The memories at the core: code of the tick in ITCM, constants in DTCM, both without wait states and without a cache that may
+//! miss. They are copied from flash before anything else runs; `memory.x` says what goes there.
+
+#![allow(unsafe_code)] // Reads of memory by its address.
+
+use core::ptr::{addr_of, read_volatile};
+
+// Called by cortex-m-rt before any variable has its value: nothing in Rust may run that early. ITCM is written in words; its reset
+// value of ITCMCR lets it (read-modify-write of the 64 bits that a check word covers).
+core::arch::global_asm!(
+    ".section .text.__pre_init,\"ax\",%progbits",
+    ".global __pre_init",
+    ".type __pre_init,%function",
+    ".thumb_func",
+    "__pre_init:",
+    "ldr r0, =__sitcm",
+    "ldr r1, =__eitcm",
+    "ldr r2, =__litcm",
+    "1:",
+    "cmp r0, r1",
+    "bhs 2f",
+    "ldmia r2!, {{r3}}",
+    "stmia r0!, {{r3}}",
+    "b 1b",
+    "2:",
+    "ldr r0, =__sconstants",
+    "ldr r1, =__econstants",
+    "ldr r2, =__lconstants",
+    "3:",
+    "cmp r0, r1",
+    "bhs 4f",
+    "ldmia r2!, {{r3}}",
+    "stmia r0!, {{r3}}",
+    "b 3b",
+    "4:",
+    "dsb",
+    "isb",
+    "bx lr",
+    ".pool",
+    ".size __pre_init, . - __pre_init",
+);
+
+unsafe extern "C" {
+    // Begin, end, and where it was copied from: symbols of memory.x, of which only the addresses mean something.
+    static __sitcm: u32;
+    static __eitcm: u32;
+    static __litcm: u32;
+    static __sconstants: u32;
+    static __econstants: u32;
+    static __lconstants: u32;
+}
+
+/// Whether both copies are as in flash.
+pub fn is_intact() -> bool {
+    let code = [addr_of!(__sitcm), addr_of!(__eitcm), addr_of!(__litcm)];
+    let constants = [addr_of!(__sconstants), addr_of!(__econstants), addr_of!(__lconstants)];
+    [code, constants].into_iter().all(|[begin, end, from]| {
+        let words = (end as usize - begin as usize) / size_of::<u32>();
+        // SAFETY: so many words lie at both, as memory.x has them; volatile, as the compiler knows of neither.
+        (0..words).all(|k| unsafe { read_volatile(begin.add(k)) == read_volatile(from.add(k)) })
+    })
+}
