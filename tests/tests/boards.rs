@@ -19,7 +19,6 @@ use specgen_tests::{compile_edited, image_target, kept, repository, scratch};
 
 use crate::porting::own_board_builds;
 
-
 struct Board {
     name: &'static str,
     folder: &'static str,
