@@ -9,6 +9,10 @@ type Board = converters::OnBoard<spi::Registers, { pins::OUTPUT }, { clocks::DEL
 
 const _: () = assert!(timer::period(clocks::TIMER).is_some(), "timing.period is nothing that the timer of this board counts");
 
+/// For specgen's estimate of the tick.
+#[unsafe(no_mangle)]
+static SPECGEN_TIMES: specgen_stm32::times::Times = clocks::TIMES;
+
 /// A tick without its timer, under a name that the analyses of the image know.
 #[unsafe(no_mangle)]
 #[inline(never)]
@@ -60,6 +64,8 @@ mod app {
     fn init(mut context: init::Context) -> (Shared, Local) {
         let core = &mut context.core;
         prepare(core);
+        // Or the linker leaves it out.
+        core::hint::black_box(&raw const crate::SPECGEN_TIMES);
         cycles::start(&mut core.DCB, &mut core.DWT);
         let wiring = pins::take(clocks::start());
         let mut watchdog = IndependentWatchdog::new(wiring.watchdog, WATCHDOG);

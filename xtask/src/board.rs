@@ -9,6 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
+use serde_json::Value;
 use specgen_toolchain::provision;
 
 use crate::run::{Outcome, Report, cargo, expect_success};
@@ -25,7 +26,11 @@ const TARGETS: [&str; 2] = ["stm32h743", "stm32f4"];
 const STANDS: &str = "; status 0x";
 const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
 
+/// The estimate of the longest tick over the longest that is seen.
+const BAND: [f64; 2] = [0.95, 1.5];
+
 /// An image, what it was built from, and where its run leaves its files.
+#[derive(Clone)]
 struct Trial {
     spec: PathBuf,
     target: &'static str,
@@ -85,9 +90,13 @@ pub fn short(root: &Path) -> Outcome {
     each(root, &TARGETS[..1], |trial| run(trial, true))
 }
 
-/// For the soak: with faults, one image after the other: a host does not wait long for a board that has half a processor.
+/// For the soak: with the estimate of a tick and faults, one image after the other: a host does not wait long for a board that has half a processor.
 pub fn long(root: &Path) -> Outcome {
-    each(root, &TARGETS, |trial| run(trial, false).and_then(|()| faults::run(trial)))
+    each(root, &TARGETS, |trial| {
+        run(trial, false)?;
+        run(&Trial { cycles: true, ..trial.clone() }, false)?;
+        faults::run(trial)
+    })
 }
 
 fn each(root: &Path, targets: &[&'static str], work: impl Fn(&Trial) -> Result<(), String>) -> Outcome {
@@ -150,6 +159,31 @@ fn image(trial: &Trial) -> Outcome {
     expect_success(build, "see above")
 }
 
+/// The longest tick as `specgen build` estimates it, µs.
+fn estimated(trial: &Trial) -> Result<f64, String> {
+    let mut build = Command::new(trial.programs.join("specgen"));
+    build.arg("build").arg(&trial.spec).args(["--json", "--target", trial.target]);
+    build.arg("-o").arg(trial.folder.join("estimated"));
+    let output = build.output().map_err(|error| format!("specgen build: {error}"))?;
+    // A tick that is too long is refused, with its time.
+    let answer: Value = serde_json::from_slice(&output.stdout).map_err(|error| format!("specgen build: {error}"))?;
+    let worst = answer["result"]["measurement"]["time"]["worst"].as_f64();
+    worst.ok_or_else(|| format!("specgen build estimates no tick: {}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// Holds the estimate against the longest tick that was seen, whose times are of the same table: it promises that none is
+/// longer, and is to be of use.
+fn hold(trial: &Trial, report: &session::Report) -> Result<(), String> {
+    let (worst, seen) = (estimated(trial)?, report.longest_tick().ok_or("the board reports no ticks")?);
+    println!("{}: longest tick {seen:.1} us, {worst:.1} us by specgen build", trial.target);
+    let [low, high] = BAND;
+    if (low..=high).contains(&(worst / seen)) {
+        Ok(())
+    } else {
+        Err(format!("{}: the estimate of a tick is {:.2} of what was seen", trial.target, worst / seen))
+    }
+}
+
 /// From reset to a record, which is replayed; `brief` without wave and settings.
 fn run(trial: &Trial, brief: bool) -> Result<(), String> {
     let failed = |error: std::io::Error| format!("{}: {error}", trial.folder.display());
@@ -165,6 +199,9 @@ fn run(trial: &Trial, brief: bool) -> Result<(), String> {
     }
     if report.value("resets") != Some(0.0) || report.value("enable") != Some(0.0) {
         return Err(format!("{}: expected amplifiers off and no reset", trial.target));
+    }
+    if trial.cycles {
+        hold(trial, &report)?;
     }
     drop(session);
     let mut replay = Command::new(trial.programs.join("specgen"));

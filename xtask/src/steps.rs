@@ -11,6 +11,8 @@ use crate::{board, fuzz, generated, mutants, packages, setup, soak};
 
 /// Its own workspace, built for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
+/// And this one, for the estimate of a board's tick.
+const TICK: &str = "firmware/tick/Cargo.toml";
 /// Built from an emitted workspace.
 const HOST_LIBRARY: &str = "firmware/host/Cargo.toml";
 /// Boards, each its own workspace; built from an emitted one.
@@ -20,12 +22,13 @@ const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 /// Its own workspace, because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
 /// Workspaces of their own with lock files of their own.
-const STANDING_ALONE: [&str; 8] =
-    [FIRMWARE, REAL_TIME, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM, BOARDS[0], BOARDS[1]];
+const STANDING_ALONE: [&str; 9] =
+    [FIRMWARE, TICK, REAL_TIME, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM, BOARDS[0], BOARDS[1]];
 /// Every lock file there is.
-const LOCKED: [&str; 10] = [
+const LOCKED: [&str; 11] = [
     "Cargo.toml",
     FIRMWARE,
+    TICK,
     REAL_TIME,
     SCHEMA,
     fuzz::MANIFEST,
@@ -189,9 +192,10 @@ fn formatting(root: &Path) -> Outcome {
     }
     // Not `--all`: the emitted controller is formatted by specgen itself.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
-    let excluded = [FIRMWARE, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM]
-        .into_iter()
-        .chain(BOARDS);
+    let excluded =
+        [FIRMWARE, TICK, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM]
+            .into_iter()
+            .chain(BOARDS);
     let excluded = excluded.map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
         let fix = format!("run: cargo fmt {}", scope.join(" "));

@@ -17,6 +17,7 @@ use specgen_identify::{self as identify, declared};
 use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::model::Model;
 use specgen_language::spec::{self, SpecSource};
+use specgen_toolchain::targets::Target;
 
 /// A spec that compiled.
 #[derive(Debug)]
@@ -99,7 +100,9 @@ fn phases(source: &SpecSource, findings: &mut Vec<Diagnostic>) -> Option<Compile
     let task = design.as_ref().zip(setpoints.setpoints);
     let ir = accepted(lower::lower(&model, task, &records.tables, &records.rate_tables, &digest), findings)?;
     let pose_noise = accepted(lower::pose_noise(&model), findings)?;
-    let files = workspace::files(&ir, &emit::emit(&ir));
+    // With the program of the spec's board, if it has one.
+    let target = Target::of(model.target.mcu);
+    let files = workspace::files_with(&ir, &emit::emit(&ir), &[target.folder]);
     lint::allow(&model, findings);
     findings.extend(lint::unused(&model, findings));
     debug_assert!(findings.iter().all(|finding| finding.severity < Severity::Error));

@@ -280,6 +280,16 @@ impl Cost {
         cost
     }
 
+    /// Words that an instruction writes to memory at most.
+    #[must_use]
+    pub fn stored(size: u32, code: [u32; 2]) -> u64 {
+        match kind(code, size) {
+            Kind::Memory(words) => words,
+            Kind::Float(Operation { class: Class::Out, double, .. }) => 1 + u64::from(double),
+            _ => 0,
+        }
+    }
+
     /// Of an access to a register of a device, beyond its instruction.
     #[must_use]
     pub fn access(&self, write: bool) -> u64 {

@@ -139,7 +139,17 @@ pub fn budget(target: &Target, measured: Result<&Measurement, &str>, command: &s
     }
     let budget =
         "target.budget.instructions is for the mean of a tick; the period has to hold the most expensive one, too.";
-    section.text(budget).table(table).table(stages)
+    let section = section.text(budget).table(table).table(stages);
+    let Some(time) = &m.time else { return section };
+    let heading = format!(
+        "Longest tick on {}, us, by a model of its core at {:.0} MHz: {:.1} of {:.1}",
+        time.board, time.core, time.worst, time.period
+    );
+    let mut parts = Grid::new(&heading, &["what", "us"]);
+    for (name, microseconds) in &time.parts {
+        parts.push(vec![(*name).to_owned(), format!("{microseconds:.1}")]);
+    }
+    section.table(parts)
 }
 
 /// What identifies the bits: digests of the exercise on this host, and whether the emulated machine agrees.

@@ -89,6 +89,10 @@ impl Verdict {
         if let Some(step) = measurement.stage("step") {
             self.push(Figure::new(Subject::Time, "longest tick", step.max as f64, "instructions"));
         }
+        if let Some(time) = &measurement.time {
+            let figure = Figure::new(Subject::Time, "longest tick of the board, modelled", time.worst, "us");
+            self.push(figure.at_most(time.period, "timing.period"));
+        }
         let machine = &measurement.machine;
         let (words, good) = match &measurement.first_difference {
             None => (format!("host and {machine} agree in every bit over {} ticks", group(measurement.ticks)), true),

@@ -4,6 +4,7 @@
 mod legs;
 mod platform;
 
+use std::path::Path;
 use std::time::Duration;
 
 use host_sim::closed_loop::RunError;
@@ -12,9 +13,11 @@ use host_sim::trace::{Trace, first_difference};
 use serde::Serialize;
 
 use specgen_compiler::ir::Ir;
-use specgen_language::model::Model;
+use specgen_language::model::{Mcu, Model};
 use specgen_toolchain::budget::Used;
 use specgen_toolchain::checks::{self, Checked, Rules};
+use specgen_toolchain::targets::{Kind, Target};
+use specgen_toolchain::time::{Clocks, Estimate};
 use specgen_toolchain::{self as target, Image, TargetError, image, size, stack};
 
 /// Seed of the noise in the exercise.
@@ -71,6 +74,8 @@ pub struct Measurement {
     pub checks: Checked,
     /// What a budget is held against.
     pub used: Used,
+    /// How long a tick takes on the spec's board, if it has one; see [`time_board`].
+    pub time: Option<Estimate>,
 }
 
 /// What an image shows without being run.
@@ -181,7 +186,49 @@ pub fn measure(image: &Image, config: &[u64], host: &Trace) -> Result<Measuremen
         first_difference: first_difference(host, &replayed).map(|difference| difference.to_string()),
         checks,
         used,
+        time: None,
     })
+}
+
+/// Ticks that are traced, from rest on.
+const TRACED: usize = 96;
+/// Folder of the image that is traced.
+const TICK: &str = "tick";
+
+/// Estimates how long a tick takes on a board, from what the workspace in `folder` builds into `cache`: its image, unless `elf`
+/// is that, and that of a tick on the emulated core. `host` is the exercise that was measured. Nothing for a spec without a board.
+///
+/// # Errors
+/// The images do not build, or the emulator fails.
+pub fn time_board(
+    model: &Model,
+    mcu: Mcu,
+    elf: Option<&[u8]>,
+    [folder, cache]: [&Path; 2],
+    host: &Trace,
+    measurement: &mut Measurement,
+) -> Result<(), TargetError> {
+    let board = Target::of(mcu);
+    if !matches!(board.kind, Kind::Board(_)) {
+        return Ok(());
+    }
+    let toolchain = target::toolchain::find()?;
+    let build = |what| target::build::build_folder(&toolchain, folder, what, mcu, cache, false);
+    let built;
+    let elf = match elf {
+        Some(elf) => elf,
+        None => {
+            built = build(board.folder)?.elf;
+            &built
+        }
+    };
+    let clocks = Clocks::of(elf, mcu)?;
+    let image = build(TICK)?;
+    let inputs: Vec<Vec<u64>> = inputs(host).into_iter().take(TRACED).collect();
+    let trace = target::trace::trace(&image, &inputs, clocks.buses(), LIMIT)?;
+    let spread = measurement.stage(WHOLE).map_or(1.0, |step| step.max as f64 / step.mean.max(1.0));
+    measurement.time = Some(Estimate::of(mcu, &clocks, &trace, model.timing.period, spread)?);
+    Ok(())
 }
 
 /// What the replay image uses, and who of it; without a run, neither Config and State nor instructions.
@@ -217,6 +264,13 @@ fn per_tick(stats: &target::replay::ReplayStats) -> Vec<(String, u64)> {
     stages().map(|stage| (stage.name.clone(), (stage.sum as f64 / ticks as f64).round() as u64)).collect()
 }
 
+/// The record's inputs, a row for each tick.
+#[must_use]
+pub fn inputs(host: &Trace) -> Vec<Vec<u64>> {
+    let per_row = host.description().input_names.len();
+    host.rows().map(|row| row[..per_row].to_vec()).collect()
+}
+
 /// The record's inputs on the emulated machine: its trace, and what was measured.
 ///
 /// # Errors
@@ -226,8 +280,7 @@ pub fn replay(
     config: &[u64],
     host: &Trace,
 ) -> Result<(Trace, target::replay::ReplayStats), TargetError> {
-    let inputs_per_row = host.description().input_names.len();
-    let inputs: Vec<Vec<u64>> = host.rows().map(|row| row[..inputs_per_row].to_vec()).collect();
+    let inputs = inputs(host);
     let result = target::replay(image, config, &inputs, LIMIT)?;
     let mut trace = Trace::new(host.description().clone());
     for ((input, output), digest) in inputs.iter().zip(&result.outputs).zip(&result.digests) {

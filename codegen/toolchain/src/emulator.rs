@@ -25,13 +25,14 @@ pub(super) const PROGRAM: &str = "qemu-system-arm";
 const MACHINE: &str = "mps2-an500";
 
 /// How the firmware says why it ended: the codes of `firmware/qemu/src/semihosting.rs`.
-const EXITS: [(i32, &str); 7] = [
+const EXITS: [(i32, &str); 8] = [
     (10, "the firmware cannot open config.bin"),
     (11, "config.bin does not hold as many words as the controller's Config"),
     (12, "the firmware cannot open input.bin"),
     (13, "input.bin ends within a row: rows must hold as many words as the controller's TickInput"),
     (14, "the firmware cannot write output.bin or stats.bin; is the disk full?"),
     (15, "the processor took a fault"),
+    (16, "the machine that is timed does not run on"),
     (20, "tables or settings in the image are not what specgen wrote: it was changed after the link"),
 ];
 /// Statuses from here on name the word of the configuration that the controller refuses.
@@ -78,13 +79,14 @@ impl Emulator {
 
     /// Runs the image to its end with `folder` as its working folder: semihosting files live there.
     ///
-    /// `-icount shift=10` makes the run repeatable and lets the firmware count instructions.
+    /// `-icount shift=10` makes the run repeatable and lets the firmware count instructions. `more` are arguments besides.
     ///
     /// # Errors
     /// [`TargetError::EmulatorTimeout`] at the limit, [`TargetError::EmulatorFailed`] for any other end than
     /// the firmware's own "done".
-    pub fn run(&self, image: &Image, folder: &Path, limit: Duration) -> Result<(), TargetError> {
+    pub fn run(&self, image: &Image, folder: &Path, more: &[&str], limit: Duration) -> Result<(), TargetError> {
         let mut command = self.command(image, folder)?;
+        command.args(more);
         let finished =
             process::run(&mut command, folder, limit).map_err(|e| TargetError::io("running", &self.program, e))?;
         let Some(status) = finished.status else {

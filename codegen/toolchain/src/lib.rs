@@ -31,7 +31,9 @@ pub mod size;
 pub mod stack;
 pub mod targets;
 mod thumb;
+pub mod time;
 pub mod toolchain;
+pub mod trace;
 pub mod unpacked;
 pub mod user_cache;
 

@@ -133,7 +133,7 @@ fn replay_from(
     let folder = Scratch::new().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
     write_words(&folder.path().join("config.bin"), config.iter().copied())?;
     write_words(&folder.path().join(file), inputs.iter().flatten().copied())?;
-    emulator.run(image, folder.path(), limit)?;
+    emulator.run(image, folder.path(), &[], limit)?;
     let stats = parse_stats(&read_words(&folder.path().join("stats.bin"))?)?;
     let words = read_words(&folder.path().join("output.bin"))?;
     let row = stats.output_words + 1;
@@ -156,12 +156,12 @@ fn replay_from(
     Ok(ReplayResult { outputs, digests, stats })
 }
 
-fn write_words(path: &Path, words: impl Iterator<Item = u64>) -> Result<(), TargetError> {
+pub(super) fn write_words(path: &Path, words: impl Iterator<Item = u64>) -> Result<(), TargetError> {
     let bytes: Vec<u8> = words.flat_map(u64::to_le_bytes).collect();
     fs::write(path, bytes).map_err(|e| TargetError::io("writing", path, e))
 }
 
-fn read_words(path: &Path) -> Result<Vec<u64>, TargetError> {
+pub(super) fn read_words(path: &Path) -> Result<Vec<u64>, TargetError> {
     let bytes = fs::read(path).map_err(|e| TargetError::io("reading", path, e))?;
     let (words, rest) = bytes.as_chunks::<8>();
     if !rest.is_empty() {

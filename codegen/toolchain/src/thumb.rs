@@ -46,6 +46,12 @@ pub fn decode(address: u64, code: &[u8], marks: &BTreeMap<u64, bool>) -> Vec<Ins
     found
 }
 
+/// The instruction at the beginning of `code`, which stands at `address`.
+pub fn one(address: u64, code: &[u8]) -> Option<Instruction> {
+    let length = if u16::from_le_bytes([*code.first()?, *code.get(1)?]) >> 11 < 0b11101 { 2 } else { 4 };
+    decode(address, code.get(..length)?, &BTreeMap::new()).pop()
+}
+
 /// Bytes of stack that a function with these instructions takes at most: all that it pushes, once each.
 /// `None` if the stack pointer is moved in a way that is only known in a run.
 ///
@@ -55,6 +61,35 @@ pub fn frame(instructions: &[Instruction]) -> Option<u64> {
 }
 
 impl Instruction {
+    /// Bytes.
+    pub fn size(&self) -> u32 {
+        if self.second.is_some() { 4 } else { 2 }
+    }
+
+    /// Its halves; 0 for the second of a short one.
+    pub fn halves(&self) -> [u32; 2] {
+        [u32::from(self.first), u32::from(self.second.unwrap_or(0))]
+    }
+
+    /// Whether anything but the next instruction may follow.
+    pub fn ends_block(&self) -> bool {
+        let op = self.first;
+        self.branch().is_some()
+            || match self.second {
+                // CBZ, CBNZ; POP with PC; BX LR, MOV PC, LR; BKPT; SVC.
+                None => {
+                    matches!(op >> 8, 0xb1 | 0xb3 | 0xb9 | 0xbb | 0xbd | 0xbe | 0xdf)
+                        || matches!(op, 0x4770..=0x4777 | 0x46f7)
+                }
+                // LDM with PC; LDR PC; TBB, TBH.
+                Some(second) => {
+                    op & 0xfe50 == 0xe810 && second >> 15 == 1
+                        || op & 0xff70 == 0xf850 && second >> 12 == 15
+                        || op & 0xfff0 == 0xe8d0 && second & 0xffe0 == 0xf000
+                }
+            }
+    }
+
     /// Where it may go, beside on.
     pub fn branch(&self) -> Option<Branch> {
         match self.second {

@@ -29,6 +29,8 @@ pub const INPUTS: usize = 8;
 pub const CONVST_LOW: u32 = 30;
 /// From the rising edge of CONVST until BUSY is looked at first, ns.
 pub const BUSY_DELAY: u32 = 50;
+/// From that edge until all are converted at most, ns.
+pub const CONVERSION: u64 = 4_200;
 /// Between two looks at BUSY, ns.
 pub const POLL: u32 = 50;
 /// Looks at BUSY until it is given up: 10 µs and more, twice the longest conversion.

@@ -64,6 +64,9 @@ pub enum Exit {
     CannotWrite,
     /// 15: the processor took a fault or an unexpected exception.
     Fault,
+    /// 16: the machine of `firmware/tick` does not run on.
+    #[allow(dead_code)] // Not of `replay`.
+    NotRunning,
     /// 20: tables or settings are not what specgen wrote.
     Corrupt,
     /// 64 and more: `Config::from_words` refuses the word of that index, 0 to 63.
@@ -80,6 +83,7 @@ impl Exit {
             Self::InputSize => 13,
             Self::CannotWrite => 14,
             Self::Fault => 15,
+            Self::NotRunning => 16,
             Self::Corrupt => 20,
             // An exit status of the host has eight bits.
             Self::ConfigRefused(word) => 64 + word % 64,

@@ -15,6 +15,7 @@ mod silent;
 mod stack;
 pub mod supply;
 pub mod timer;
+pub mod times;
 
 pub use delay::CycleDelay;
 pub use stack::used as stack_used;

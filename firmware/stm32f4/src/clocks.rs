@@ -7,6 +7,7 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
+use specgen_stm32::times::Times;
 
 /// Clock of TIM2 and TIM3, Hz.
 pub const TIMER: u32 = 90_000_000;
@@ -19,6 +20,9 @@ pub const DAC: Hertz = Hertz(22_500_000);
 /// From sampling to the change of the outputs, ns: codes that are written by then are out at this instant, later ones when they are
 /// written.
 pub const OUTPUT: u32 = 95_000;
+
+/// For the estimate of a tick: 180 MHz; five wait states of the flash, its accelerator on.
+pub const TIMES: Times = Times::new(180_000_000, [0b111 << 8 | 5, 0], [ADC, DAC]);
 
 /// Clocks as above, all DMA below the tick, and the accelerator of the flash, which the HAL leaves off: lines of code and constants are
 /// kept, and the next line is fetched ahead of time. What it keeps is emptied first, which is possible only while it is off (RM0390).

@@ -9,6 +9,7 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
+use specgen_stm32::times::Times;
 
 /// Clock of TIM2 and TIM4 at most, Hz.
 pub const TIMER: u32 = 240_000_000;
@@ -21,6 +22,9 @@ pub const DAC: Hertz = Hertz(25_000_000);
 /// From sampling to the change of the outputs, ns: codes that are written by then are out at this instant, later ones when they are
 /// written.
 pub const OUTPUT: u32 = 48_000;
+
+/// For the estimate of a tick: 480 MHz; four wait states of the flash, both caches.
+pub const TIMES: Times = Times::new(480_000_000, [4, 1 << 17 | 1 << 16], [ADC, DAC]);
 
 /// REV_ID of revision V, the first with voltage scale 0 and so 480 MHz (ES0392).
 const REVISION_V: u16 = 0x2003;

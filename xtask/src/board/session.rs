@@ -45,6 +45,14 @@ impl Report {
     }
 }
 
+impl Report {
+    /// Of all ticks, µs: the last of smallest, mean and largest.
+    pub fn longest_tick(&self) -> Option<f64> {
+        let times = self.text.split(' ').find_map(|word| word.strip_prefix("tick_us="))?;
+        times.rsplit('/').next()?.parse().ok()
+    }
+}
+
 impl Session {
     pub fn begin(trial: &Trial) -> Result<Self, String> {
         static BEGUN: AtomicU32 = AtomicU32::new(0);

@@ -8,6 +8,7 @@ use host_sim::controller::{Controller, TickController};
 use serde::Serialize;
 
 use super::check::describe;
+use super::firmware::{self, late};
 use super::spec;
 use super::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile::Compiled;
@@ -131,6 +132,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         Err(failure) => return Err(failure),
     };
     summary.over_budget = over_budget(&compiled, &summary);
+    summary.over_budget.extend(late(&compiled, summary.measurement.as_ref(), ui));
     match (&summary.measurement, &summary.image) {
         (Some(measurement), _) => summary.verdict.measured(&compiled, measurement),
         (None, Some(image)) => summary.verdict.inspected(&compiled, image),
@@ -160,7 +162,10 @@ fn build(compiled: &Compiled, output: &Path, summary: &mut Summary, ui: &Ui) -> 
     ui.progress(&format!("building and measuring for {}", mcu.part().emulated));
     let image = target::build::build_image_with(&toolchain, output, mcu, &target_dir)?;
     match verify::measure(&image, &controller.default_config(), &host) {
-        Ok(measurement) => summary.measurement = Some(measurement),
+        Ok(mut measurement) => {
+            verify::time_board(&compiled.model, mcu, None, [output, &target_dir], &host, &mut measurement)?;
+            summary.measurement = Some(measurement);
+        }
         Err(error) => {
             summary.image = Some(verify::inspect(&image)?);
             return Err(error.into());
@@ -288,6 +293,9 @@ impl Summary {
                     group(stage.max),
                     group(stage.calls)
                 );
+            }
+            if let Some(estimate) = &m.time {
+                let _ = writeln!(out, "  {}:\n{}", estimate.board, firmware::time::text(estimate).trim_end());
             }
             match &m.first_difference {
                 None => {

@@ -3,6 +3,7 @@
 mod flash;
 mod size;
 mod text;
+pub mod time;
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use host_sim::controller::{Controller, TickController};
+use host_sim::trace::Trace;
 use serde::Serialize;
 
 use super::build::TICKS;
@@ -17,7 +19,7 @@ use super::spec;
 use super::ui::{Failure, Ui};
 use crate::{emit, workspace};
 use specgen_compiler::compile::{Compiled, Refused};
-use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::diagnostic::{Diagnostic, Severity, codes};
 use specgen_language::model::{self, Mcu};
 use specgen_studies::verify::{self, Measurement};
 use specgen_toolchain::budget::{self, Used, group};
@@ -198,7 +200,7 @@ fn build(
     target: Target,
     folders: &Folders<'_>,
     common: &Common,
-    ui: &Ui,
+    ui: &mut Ui,
 ) -> Result<Made, Failure> {
     let Folders { output, target: target_dir } = *folders;
     let measure = !common.no_measure;
@@ -239,7 +241,8 @@ fn build(
             let image = target::build::build_image_with(&toolchain, output, declared, target_dir)?;
             examine(&mut made, &image, true, output)?;
             if measure {
-                made.measurement = emulate(compiled, folders, Some(&image), &mut made.notes, ui)?;
+                let measured = emulate(compiled, folders, Some(&image), &mut made.notes, ui)?;
+                made.measurement = measured.map(|(measurement, _)| measurement);
             }
         }
         Kind::Board(mcu) => {
@@ -264,13 +267,29 @@ fn build(
                         .to_owned(),
                 );
             }
-            if measure {
-                made.measurement = emulate(compiled, folders, None, &mut made.notes, ui)?;
+            if measure && let Some((mut measurement, host)) = emulate(compiled, folders, None, &mut made.notes, ui)? {
+                ui.progress(&format!("estimating a tick of {}", made.board));
+                let folders = [output, target_dir];
+                verify::time_board(&compiled.model, mcu, Some(&image.elf), folders, &host, &mut measurement)?;
+                made.measurement = Some(measurement);
+            } else {
+                let why = if measure { "see above" } else { "--no-measure" };
+                made.notes.push(format!("the time of a tick was not estimated: {why}"));
             }
+            made.failures.extend(late(compiled, made.measurement.as_ref(), ui));
         }
     }
     hold_against_budget(&mut made, compiled, target);
     Ok(made)
+}
+
+/// Says what is to be said about the time of a tick; why the controller must not be used, if it is too long.
+pub(super) fn late(compiled: &Compiled, measurement: Option<&Measurement>, ui: &mut Ui) -> Option<String> {
+    let finding = time::finding(compiled, measurement?.time.as_ref()?)?;
+    let failure = format!("{}: {}; {}", finding.code, finding.message, finding.help);
+    let fails = finding.severity == Severity::Error;
+    ui.findings(Some(&compiled.source), &[finding]);
+    fails.then_some(failure)
 }
 
 /// Size and checks of an image, and the image under a name that stays.
@@ -294,7 +313,7 @@ fn emulate(
     image: Option<&Image>,
     notes: &mut Vec<String>,
     ui: &Ui,
-) -> Result<Option<Measurement>, Failure> {
+) -> Result<Option<(Measurement, Trace)>, Failure> {
     let tools = match target::available() {
         Ok(tools) => tools,
         Err(error) if error.is_of_a_tool() => {
@@ -319,7 +338,8 @@ fn emulate(
             &built
         }
     };
-    Ok(Some(verify::measure(image, &controller.default_config(), &host)?))
+    let measurement = verify::measure(image, &controller.default_config(), &host)?;
+    Ok(Some((measurement, host)))
 }
 
 /// Fills in what fails: budget, checks, bits.

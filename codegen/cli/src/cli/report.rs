@@ -322,7 +322,11 @@ fn build(compiled: &Compiled, no_target: bool, ui: &Ui) -> Result<Built, Failure
         ui.progress(&format!("building and measuring for {}", mcu.part().emulated));
         let measured = target::available()
             .and_then(|_| target::build_image(&folder, mcu, &cache))
-            .and_then(|image| verify::measure(&image, &controller.default_config(), &host));
+            .and_then(|image| verify::measure(&image, &controller.default_config(), &host))
+            .and_then(|mut measurement| {
+                verify::time_board(&compiled.model, mcu, None, [&folder, &cache], &host, &mut measurement)?;
+                Ok(measurement)
+            });
         match measured {
             Ok(measurement) => Ok(measurement),
             Err(error) if error.is_of_a_tool() => Err(error.to_string()),

@@ -12,6 +12,7 @@ mod runtime;
 mod stm32;
 mod stm32f4;
 mod stm32h743;
+mod tick;
 
 use std::collections::BTreeSet;
 
@@ -54,6 +55,7 @@ pub const PARTS: &[&Part] = &[
     &stm32::PART,
     &stm32h743::PART,
     &stm32f4::PART,
+    &tick::PART,
     &rt::PART,
     &rt_pc::PART,
 ];

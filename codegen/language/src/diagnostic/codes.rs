@@ -129,6 +129,8 @@ codes! {
     BUDGET_BEYOND_PART = "E0331";
     TOO_FEW_BITS = "E0332";
     WRONG_PART = "E0333";
+    TICK_TOO_LONG = "E0334";
+    TICK_TIGHT = "W0335";
 
     // Stability, reach, set-points, gauges, supervisor.
     UNSTABLE_STATIC = "E0401";

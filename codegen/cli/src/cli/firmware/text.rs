@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::Made;
+use super::{Made, time};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::Outcome;
 use specgen_toolchain::budget::{Used, group};
@@ -35,6 +35,9 @@ impl Outcome for Made {
                 out,
                 "  stack in all  {startup} bytes of {reserved} to start, {running} with tick and interrupts on each other"
             );
+        }
+        if let Some(estimate) = self.measurement.as_ref().and_then(|m| m.time.as_ref()) {
+            out.push_str(&time::text(estimate));
         }
         if let Some(size) = &self.size {
             out.push_str(&owners(size));

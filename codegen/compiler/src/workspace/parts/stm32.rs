@@ -23,5 +23,6 @@ pub const PART: Part = Part {
         "src/stack.rs",
         "src/supply.rs",
         "src/timer.rs",
+        "src/times.rs",
     },
 };

@@ -7,7 +7,7 @@ pub const PART: Part = Part {
     member: false,
     what: "firmware of the NUCLEO-F446RE (Cortex-M4F, `f32`)",
     needs: "target `thumbv7em-none-eabihf`",
-    with: &["board", "hal", "link", "stm32"],
+    with: &["board", "hal", "link", "stm32", "tick"],
     files: files! { "stm32f4":
         "Cargo.lock",
         "Cargo.toml",

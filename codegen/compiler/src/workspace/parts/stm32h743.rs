@@ -7,7 +7,7 @@ pub const PART: Part = Part {
     member: false,
     what: "firmware of the NUCLEO-H743ZI2 (Cortex-M7)",
     needs: "target `thumbv7em-none-eabihf`",
-    with: &["board", "hal", "link", "stm32"],
+    with: &["board", "hal", "link", "stm32", "tick"],
     files: files! { "stm32h743":
         "Cargo.lock",
         "Cargo.toml",

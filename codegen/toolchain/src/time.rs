@@ -1,0 +1,265 @@
+//! How long a tick takes on a board: what it computes, by the model of cycles ([`specgen_cycles`]); what it waits for, by the
+//! clocks that stand in the board's image; how the interrupt begins and ends.
+//!
+//! | what | how |
+//! |---|---|
+//! | law, recorder, wave, the drivers | every instruction of `firmware/tick` on the emulated core, priced; worst tick seen |
+//! | law | besides: by how much the longest tick of the exercise has more instructions than the mean one |
+//! | buses | bytes and frames that the drivers moved, by SCLK and by the registers that a byte and a frame take |
+//! | waits | what the drivers waited: the conversion, and what data sheets ask for |
+//! | interrupt | entry and return, the timer; what holds the tick off: a copy of the settings |
+//! | caches | empty when a tick begins; constants are there |
+//!
+//! Interrupts of the link are below the tick and do not delay it.
+
+use object::{Object, ObjectSection, ObjectSymbol};
+use serde::Serialize;
+use specgen_cycles::{Cost, Family};
+use specgen_language::model::Mcu;
+
+use super::checks;
+use super::error::TargetError;
+use super::image::RECORDER;
+use super::trace::{Computed, Memory, Moved, Share, Trace};
+
+/// The symbol of a board's [`Clocks`]: `firmware/stm32/src/times.rs`.
+const SYMBOL: &str = "SPECGEN_TIMES";
+/// Where the flash begins; memory of the core lies below.
+const FLASH: u64 = 0x0800_0000;
+/// Of its layout.
+const VERSION: u32 = 1;
+const WORDS: usize = 15;
+/// A tick that leaves less of its period has little room.
+const ROOM: f64 = 0.2;
+/// The period that would do has so much room: other set-points come with another period.
+const MARGIN: f64 = 1.02;
+
+/// Registers that are read and written, and instructions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Work {
+    reads: u64,
+    writes: u64,
+    instructions: u64,
+}
+
+/// A look at a pin.
+const LOOK: Work = Work { reads: 1, writes: 0, instructions: 0 };
+
+/// What a board's image says of itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Clocks {
+    /// Hz.
+    core: u64,
+    /// FLASH_ACR and CCR.
+    registers: [u32; 2],
+    /// Hz: of ADC and DACs.
+    sclk: [u64; 2],
+    byte: Work,
+    frame: Work,
+    /// Around the tick, in its interrupt.
+    interrupt: Work,
+    family: Family,
+    tightly_coupled: bool,
+    /// Address of the recorder's memory.
+    recorder: u32,
+}
+
+impl Clocks {
+    /// Those of a board's image.
+    ///
+    /// # Errors
+    /// [`TargetError::MalformedImage`] if the file is damaged, or no board's image of this specgen.
+    pub fn of(elf: &[u8], mcu: Mcu) -> Result<Self, TargetError> {
+        let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
+        let file = object::File::parse(elf).map_err(malformed)?;
+        let strange = || TargetError::MalformedImage { text: format!("it has no {SYMBOL} of this specgen") };
+        let named = |name: &str| file.symbols().find(|symbol| symbol.name() == Ok(name)).ok_or_else(strange);
+        let (symbol, tick) = (named(SYMBOL)?, named(checks::TICKS[0])?.address());
+        let index = symbol.section_index().ok_or_else(strange)?;
+        let section = file.section_by_index(index).map_err(malformed)?;
+        let bytes = section.data_range(symbol.address(), 4 * WORDS as u64).map_err(malformed)?.ok_or_else(strange)?;
+        let words: Vec<u32> = bytes.as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+        let [version, core, access, control, adc, dac, rest @ ..] = words.first_chunk::<WORDS>().ok_or_else(strange)?;
+        let work = |at: usize| Work {
+            reads: u64::from(rest[at]),
+            writes: u64::from(rest[at + 1]),
+            instructions: u64::from(rest[at + 2]),
+        };
+        if *version != VERSION || *core == 0 || *adc == 0 || *dac == 0 {
+            return Err(strange());
+        }
+        Ok(Self {
+            core: u64::from(*core),
+            registers: [*access, *control],
+            sclk: [u64::from(*adc), u64::from(*dac)],
+            byte: work(0),
+            frame: work(3),
+            interrupt: work(6),
+            family: if mcu.part().double { Family::H7 } else { Family::F4 },
+            tightly_coupled: tick < FLASH,
+            recorder: file.section_by_name(RECORDER).map_or(0, |section| section.address() as u32),
+        })
+    }
+
+    /// Where the code of a tick lies.
+    #[must_use]
+    pub fn memory(&self) -> Memory {
+        Memory {
+            family: self.family,
+            flash: FLASH,
+            recorder: self.recorder,
+            registers: self.registers,
+            tightly_coupled: self.tightly_coupled,
+        }
+    }
+
+    /// Of a byte and a frame on the buses of ADC and DACs, and of a look at a pin, ns; 1 if the recorder's memory is not the
+    /// core's own, so that it has a faster one beside it.
+    #[must_use]
+    pub fn buses(&self) -> [u64; 6] {
+        let nanoseconds = |cycles: u64| cycles * 1_000_000_000 / self.core;
+        let [byte, frame] = [self.byte, self.frame].map(|work| nanoseconds(self.cycles(work)));
+        let [adc, dac] = self.sclk.map(|hertz| byte.max(8_000_000_000 / hertz));
+        [adc, frame, dac, frame, nanoseconds(self.cycles(LOOK)), u64::from(self.family == Family::H7)]
+    }
+
+    fn cycles(&self, work: Work) -> u64 {
+        let cost = Cost::new(self.family, true);
+        work.reads * cost.access(false) + work.writes * cost.access(true) + work.instructions
+    }
+}
+
+/// A tick's time, µs, modelled.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Estimate {
+    /// Which board.
+    pub board: &'static str,
+    /// The period of the spec.
+    pub period: f64,
+    /// Clock of the core, MHz.
+    pub core: f64,
+    /// The worst tick.
+    pub worst: f64,
+    /// What it is made of: name and time.
+    pub parts: Vec<(&'static str, f64)>,
+    /// What the law takes of a core: most instructions and cycles of a tick that was seen.
+    pub law: Share,
+    /// Bytes, frames, waits of the tick with the most of them.
+    pub moved: Moved,
+    /// The shortest period that leaves a little, in steps of 1 µs.
+    pub shortest: f64,
+}
+
+impl Estimate {
+    /// Of the traced ticks. `spread`: most instructions of the law in a long run over its mean.
+    ///
+    /// # Errors
+    /// As [`Trace::price`].
+    pub fn of(mcu: Mcu, clocks: &Clocks, trace: &Trace<'_>, period: f64, spread: f64) -> Result<Self, TargetError> {
+        let ticks = trace.price(&clocks.memory())?;
+        let microseconds = |cycles: u64| cycles as f64 * 1e6 / clocks.core as f64;
+        let most = |of: fn(&Computed) -> u64| ticks.iter().map(of).max().unwrap_or(0);
+        let mean = ticks.iter().map(|tick| tick.law.cycles).sum::<u64>() as f64 / ticks.len().max(1) as f64;
+        let law = most(|tick| tick.law.cycles).max((mean * spread) as u64);
+        // The wave and the recorder's block do not come in every tick; a worst one has them all.
+        let sum = |moved: &Moved| -> (f64, f64, f64) {
+            let [adc_byte, adc_frame, dac_byte, dac_frame, ..] = clocks.buses();
+            let pins = clocks.cycles(Work { reads: moved.looks, writes: moved.edges, instructions: 0 });
+            (
+                (moved.adc_bytes * adc_byte + moved.adc_frames * adc_frame) as f64 / 1e3,
+                (moved.dac_bytes * dac_byte + moved.dac_frames * dac_frame) as f64 / 1e3,
+                moved.waits as f64 / 1e3 + microseconds(pins),
+            )
+        };
+        let whole = |moved: &Moved| {
+            let (adc, dac, waits) = sum(moved);
+            adc + dac + waits
+        };
+        let moved = trace.moved.iter().max_by(|a, b| whole(a).total_cmp(&whole(b))).copied().unwrap_or_default();
+        let (adc, dac, waits) = sum(&moved);
+        let parts = vec![
+            ("interrupt", microseconds(2 * Cost::EXCEPTION + clocks.cycles(clocks.interrupt))),
+            ("conversion and waits", waits),
+            ("ADC", adc),
+            ("law", microseconds(law)),
+            ("DACs", dac),
+            ("recorder", microseconds(most(|tick| tick.recorder.cycles))),
+            ("wave", microseconds(most(|tick| tick.wave.cycles))),
+            ("board", microseconds(most(|tick| tick.board.cycles))),
+        ];
+        let worst = parts.iter().fold(0.0, |sum, (_, time)| sum + time);
+        let law = Share { instructions: most(|tick| tick.law.instructions), cycles: law };
+        let core = clocks.core as f64 / 1e6;
+        Ok(Self {
+            board: mcu.part().board,
+            period: period * 1e6,
+            core,
+            worst,
+            parts,
+            law,
+            moved,
+            shortest: up(worst * MARGIN),
+        })
+    }
+
+    /// The worst tick is longer than the period.
+    #[must_use]
+    pub fn too_long(&self) -> bool {
+        self.worst > self.period
+    }
+
+    /// The period that leaves enough, in steps of 1 µs.
+    #[must_use]
+    pub fn roomy(&self) -> f64 {
+        up(self.worst * MARGIN / (1.0 - ROOM))
+    }
+
+    /// It fits, and leaves less than a fifth of the period.
+    #[must_use]
+    pub fn tight(&self) -> bool {
+        !self.too_long() && self.worst > (1.0 - ROOM) * self.period
+    }
+}
+
+/// The next whole number; times of ticks are far below 2^53 µs.
+fn up(value: f64) -> f64 {
+    let whole = value as u64 as f64;
+    if whole < value { whole + 1.0 } else { whole }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn estimate(worst: f64, period: f64) -> Estimate {
+        Estimate {
+            board: "",
+            period,
+            core: 400.0,
+            worst,
+            parts: Vec::new(),
+            law: Share::default(),
+            moved: Moved::default(),
+            shortest: up(worst * MARGIN),
+        }
+    }
+
+    /// What the findings say to write is accepted, and nothing much shorter would be.
+    #[test]
+    fn the_periods_that_are_named_fit() {
+        for worst in [0.01, 19.99, 20.0, 49.1, 147.8, 999.9] {
+            let one = estimate(worst, worst * 0.999);
+            assert!(one.too_long() && !one.tight(), "{worst}");
+            assert!(!estimate(worst, one.shortest).too_long() && one.shortest <= worst * MARGIN + 1.0, "{worst}");
+            let other = estimate(worst, worst);
+            assert!(other.tight() && !other.too_long(), "{worst}");
+            let roomy = estimate(worst, other.roomy());
+            assert!(!roomy.tight() && !roomy.too_long(), "{worst}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_image_of_a_board_is_refused() {
+        assert!(Clocks::of(b"no image", Mcu::Stm32H743Zi).is_err());
+    }
+}

@@ -1,0 +1,363 @@
+//! Which instructions a board's tick takes, as the emulator writes them down, and what they cost by the model of cycles.
+//!
+//! The image is that of `firmware/tick`: the board's tick between stand-ins for its converters. The emulator names the blocks
+//! that it executes; what lies between two of them is decoded here, and has to end in a branch that leads from one to the next.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::time::Duration;
+
+use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
+use serde::Serialize;
+use specgen_cycles::{Cost, Family};
+use specgen_language::interrupt::Scratch;
+
+use super::build::Image;
+use super::emulator::Emulator;
+use super::error::TargetError;
+use super::panics::{self, DebugInfo};
+use super::replay::{read_words, write_words};
+use super::thumb::{self, Branch, Instruction};
+
+/// Where a tick begins, and where it is over; where what is no part of it begins, and where that is over.
+const MARKS: [&str; 4] = ["specgen_timed_tick", "specgen_timed_end", "specgen_aside_begin", "specgen_aside_end"];
+/// A block ends with its page, the smallest of which has so many bytes.
+const PAGE: u64 = 1024;
+
+/// What a part of a tick takes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Share {
+    /// Instructions.
+    pub instructions: u64,
+    /// Cycles of the core, modelled.
+    pub cycles: u64,
+}
+
+/// What a tick takes, by who takes it.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct Computed {
+    /// The law under its supervisor.
+    pub law: Share,
+    /// The recorder: row, digest, settings, snapshot.
+    pub recorder: Share,
+    /// The wave.
+    pub wave: Share,
+    /// What the board does between them.
+    pub board: Share,
+}
+
+impl Computed {
+    /// All of it.
+    #[must_use]
+    pub fn whole(&self) -> Share {
+        let all = [self.law, self.recorder, self.wave, self.board];
+        all.iter().fold(Share::default(), |sum, share| Share {
+            instructions: sum.instructions + share.instructions,
+            cycles: sum.cycles + share.cycles,
+        })
+    }
+}
+
+/// Where a part keeps the code of a tick, and how fast it gets it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Memory {
+    /// The core and its flash interface.
+    pub family: Family,
+    /// First address of the flash.
+    pub flash: u64,
+    /// Where the recorder writes.
+    pub recorder: u32,
+    /// FLASH_ACR and CCR, as the model of cycles reads them.
+    pub registers: [u32; 2],
+    /// The tick's code does not lie in flash but in memory without waits.
+    pub tightly_coupled: bool,
+}
+
+/// What a tick did with its converters, as `firmware/tick` counts it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Moved {
+    /// Bytes from the ADC.
+    pub adc_bytes: u64,
+    /// In so many frames.
+    pub adc_frames: u64,
+    /// Bytes to the DACs.
+    pub dac_bytes: u64,
+    /// In so many frames.
+    pub dac_frames: u64,
+    /// Waits, ns: the conversion, and what data sheets ask for.
+    pub waits: u64,
+    /// Looks at pins.
+    pub looks: u64,
+    /// Edges of pins.
+    pub edges: u64,
+}
+
+impl Moved {
+    fn of(words: &[u64; 7]) -> Self {
+        let [adc_bytes, adc_frames, dac_bytes, dac_frames, waits, looks, edges] = *words;
+        Self { adc_bytes, adc_frames, dac_bytes, dac_frames, waits, looks, edges }
+    }
+}
+
+/// The blocks of every tick, by their addresses, and what it did with its converters.
+#[derive(Debug)]
+pub struct Trace<'a> {
+    elf: &'a [u8],
+    /// Runs of blocks that follow each other.
+    ticks: Vec<Vec<Vec<u64>>>,
+    /// By tick.
+    pub moved: Vec<Moved>,
+}
+
+/// Runs the image on `inputs`, rows as for [`replay`](super::replay()), with the words that `firmware/tick` reads from `rates.bin`.
+///
+/// # Errors
+/// As [`replay`](super::replay()).
+pub fn trace<'a>(
+    image: &'a Image,
+    inputs: &[Vec<u64>],
+    buses: [u64; 6],
+    limit: Duration,
+) -> Result<Trace<'a>, TargetError> {
+    let emulator = Emulator::find()?;
+    let folder = Scratch::new().map_err(|e| TargetError::io("creating a folder in", std::env::temp_dir(), e))?;
+    write_words(&folder.path().join("input.bin"), inputs.iter().flatten().copied())?;
+    write_words(&folder.path().join("rates.bin"), buses.into_iter())?;
+    let log = folder.path().join("blocks.log");
+    emulator.run(image, folder.path(), &["-d", "exec,nochain", "-D", "blocks.log"], limit)?;
+    let counts = read_words(&folder.path().join("counts.bin"))?;
+    let moved: Vec<Moved> = counts.as_chunks().0.iter().map(Moved::of).collect();
+
+    let mut reader = Reader { marks: marks(&image.elf)?, ticks: Vec::new(), within: false, aside: false };
+    let reading = |error| TargetError::io("reading", &log, error);
+    for line in BufReader::new(File::open(&log).map_err(reading)?).split(b'\n') {
+        if let Some((executed, address)) = block(&line.map_err(reading)?) {
+            reader.take(executed, address);
+        }
+    }
+    let Reader { ticks, within, .. } = reader;
+    if ticks.len() != inputs.len() || moved.len() != inputs.len() || within {
+        return Err(misread(format!("{} ticks of {} are written down", ticks.len(), inputs.len())));
+    }
+    Ok(Trace { elf: &image.elf, ticks, moved })
+}
+
+/// Puts blocks into ticks.
+struct Reader {
+    marks: [u64; 4],
+    ticks: Vec<Vec<Vec<u64>>>,
+    within: bool,
+    aside: bool,
+}
+
+impl Reader {
+    fn take(&mut self, executed: bool, address: u64) {
+        let [begin, end, aside, back] = self.marks;
+        if address == begin && executed {
+            self.within = true;
+            self.ticks.push(vec![Vec::new()]);
+        }
+        let Some(tick) = self.ticks.last_mut().filter(|_| self.within) else { return };
+        let Some(run) = tick.last_mut() else { return };
+        if !executed {
+            // It was written down and did not run.
+            if run.last() == Some(&address) {
+                run.pop();
+            }
+            return;
+        }
+        if !self.aside {
+            run.push(address);
+        }
+        if address == aside {
+            self.aside = true;
+        } else if address == back {
+            self.aside = false;
+            tick.push(vec![address]);
+        }
+        self.within = address != end;
+    }
+}
+
+/// `Trace 0: 0x7f0c4c000100 [00400000/0000012c/00000110/ff000201] name`: a block and its address; `Stopped execution of TB chain
+/// before 0x7f0c4c000100 [0000012c] name`: one that did not run.
+fn block(line: &[u8]) -> Option<(bool, u64)> {
+    let text = std::str::from_utf8(line).ok()?;
+    let inside = text.split_once('[')?.1.split_once(']')?.0;
+    let executed = text.starts_with("Trace ");
+    let address = if executed { inside.split('/').nth(1)? } else { inside };
+    (executed || text.starts_with("Stopped ")).then_some(())?;
+    Some((executed, u64::from_str_radix(address, 16).ok()?))
+}
+
+impl Trace<'_> {
+    /// What each tick takes. Before each one the background has been through the caches: they are empty.
+    ///
+    /// # Errors
+    /// [`TargetError::MalformedImage`] if blocks do not follow each other as the image says.
+    pub fn price(&self, memory: &Memory) -> Result<Vec<Computed>, TargetError> {
+        let code = Code::of(self.elf)?;
+        let debug = panics::debug_info(self.elf)?;
+        let mut places = BTreeMap::new();
+        self.ticks
+            .iter()
+            .map(|blocks| {
+                let mut cost = Cost::new(memory.family, true);
+                let [access, control] = memory.registers;
+                cost.configure(access, control);
+                let mut computed = Computed::default();
+                for pair in blocks.iter().flat_map(|run| run.windows(2)) {
+                    code.walk(pair[0], pair[1], |instruction| {
+                        let address = instruction.place + if memory.tightly_coupled { 0 } else { memory.flash };
+                        // Addresses of these parts have 32 bits.
+                        let mut cycles = cost.of(address as u32, instruction.size(), instruction.halves());
+                        let (who, far) =
+                            places.entry(instruction.place).or_insert_with(|| who(&debug, instruction.place));
+                        if *far {
+                            let words = Cost::stored(instruction.size(), instruction.halves());
+                            cycles += (0..words).map(|_| cost.data(memory.recorder, true)).sum::<u64>();
+                        }
+                        let share = match who {
+                            Who::Law => &mut computed.law,
+                            Who::Recorder => &mut computed.recorder,
+                            Who::Wave => &mut computed.wave,
+                            Who::Board => &mut computed.board,
+                        };
+                        share.instructions += 1;
+                        share.cycles += cycles;
+                    })?;
+                }
+                Ok(computed)
+            })
+            .collect()
+    }
+}
+
+/// For whom an instruction was written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Who {
+    Law,
+    Recorder,
+    Wave,
+    Board,
+}
+
+/// By the file of its line, and of those that it was inlined into; whether what it stores goes to the recorder's memory.
+fn who(debug: &DebugInfo<'_>, address: u64) -> (Who, bool) {
+    let mut found = (Who::Board, false);
+    let Ok(mut frames) = debug.find_frames(address).skip_all_loads() else { return found };
+    while let Ok(Some(frame)) = frames.next() {
+        let file = frame.location.and_then(|location| location.file).unwrap_or_default();
+        let name = file.rsplit('/').next().unwrap_or_default();
+        match name {
+            "ring.rs" => return (Who::Recorder, true),
+            "recorder.rs" | "record.rs" | "recording.rs" | "snapshot.rs" | "digest.rs" => {
+                return (Who::Recorder, false);
+            }
+            "wave.rs" | "waves.rs" => return (Who::Wave, false),
+            _ if file.contains("/snapshot/") => return (Who::Recorder, false),
+            _ if file.contains("/wave/") => return (Who::Wave, false),
+            _ if file.contains("controller/") || file.contains("runtime/") => found = (Who::Law, false),
+            _ => {}
+        }
+    }
+    found
+}
+
+/// The code of an image, section by section.
+struct Code<'a> {
+    sections: Vec<(u64, &'a [u8])>,
+}
+
+impl<'a> Code<'a> {
+    fn of(elf: &'a [u8]) -> Result<Self, TargetError> {
+        let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
+        let file = object::File::parse(elf).map_err(malformed)?;
+        let texts = file.sections().filter(|section| section.kind() == SectionKind::Text);
+        let sections = texts.map(|section| Ok((section.address(), section.data().map_err(malformed)?)));
+        Ok(Self { sections: sections.collect::<Result<_, _>>()? })
+    }
+
+    fn at(&self, address: u64) -> Option<Instruction> {
+        self.sections.iter().find_map(|(start, bytes)| {
+            let at = usize::try_from(address.checked_sub(*start)?).ok()?;
+            thumb::one(address, bytes.get(at..)?)
+        })
+    }
+
+    /// Every instruction of a block, up to where the next one begins.
+    fn walk(&self, block: u64, next: u64, mut each: impl FnMut(&Instruction)) -> Result<(), TargetError> {
+        let astray = |at: u64| misread(format!("from {block:#x} the emulator went to {next:#x}, past {at:#x}"));
+        let mut at = block;
+        loop {
+            let instruction = self.at(at).ok_or_else(|| astray(at))?;
+            each(&instruction);
+            at += u64::from(instruction.size());
+            if instruction.ends_block() {
+                let leads = match instruction.branch() {
+                    Some(Branch::Call(target) | Branch::Jump(target)) => next == target || next == at,
+                    _ => true,
+                };
+                return if leads { Ok(()) } else { Err(astray(at)) };
+            }
+            // A page may end here, or within the next instruction.
+            if at == next && (at / PAGE != block / PAGE || (at + 2) / PAGE != block / PAGE) {
+                return Ok(());
+            }
+        }
+    }
+}
+
+fn misread(text: String) -> TargetError {
+    TargetError::MalformedStats { text: format!("the emulator's list of blocks is not understood: {text}") }
+}
+
+/// Addresses of the [`MARKS`].
+fn marks(elf: &[u8]) -> Result<[u64; 4], TargetError> {
+    let malformed = |error: object::Error| TargetError::MalformedImage { text: error.to_string() };
+    let file = object::File::parse(elf).map_err(malformed)?;
+    let mut found = [0; 4];
+    for (slot, name) in found.iter_mut().zip(MARKS) {
+        let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
+        let missing = || TargetError::MalformedImage { text: format!("it has no function {name}") };
+        *slot = symbol.ok_or_else(missing)?.address() & !1;
+    }
+    if (1..MARKS.len()).any(|k| found[..k].contains(&found[k])) {
+        return Err(TargetError::MalformedImage { text: format!("some of {} are one function", MARKS.join(", ")) });
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_read_from_the_lines_of_several_versions() {
+        let line = b"Trace 0: 0x7f0c4c000100 [00400000/0000012c/00000110/ff000201] specgen_timed_tick".as_slice();
+        assert_eq!(block(line), Some((true, 0x12c)));
+        let wide = b"Trace 0: 0x7f0c4c000100 [0000000000400000/000000000000012c/00000110/ff000201]".as_slice();
+        assert_eq!(block(wide), Some((true, 0x12c)));
+        assert_eq!(block(b"Stopped execution of TB chain before 0x7f [0000012c] x"), Some((false, 0x12c)));
+        assert_eq!(block(b"Linking TBs 0x7f0c [00000110] index 0"), None);
+        assert_eq!(block(b""), None);
+    }
+
+    #[test]
+    fn a_block_ends_in_a_branch_that_leads_to_the_next() {
+        // movs r0, #1; subs r0, #1; bne .-2; bx lr
+        let bytes = [0x01, 0x20, 0x01, 0x38, 0xfd, 0xd1, 0x70, 0x47];
+        let code = Code { sections: vec![(0x1000, &bytes)] };
+        let count = |from, to| {
+            let mut count = 0;
+            code.walk(from, to, |_| count += 1).map(|()| count).ok()
+        };
+        // The loop's head within the block is no end of it.
+        assert_eq!(count(0x1000, 0x1002), Some(3));
+        assert_eq!(count(0x1002, 0x1006), Some(2));
+        assert_eq!(count(0x1006, 0x2000), Some(1));
+        assert_eq!(count(0x1000, 0x1004), None);
+        assert_eq!(count(0x3000, 0x3002), None);
+    }
+}

@@ -1,0 +1,50 @@
+//! What decides about the time of a tick, for specgen, which reads it from the image.
+
+use embassy_stm32::time::Hertz;
+
+/// Registers that are read and written, and instructions.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct Work {
+    /// Reads of registers of devices.
+    pub reads: u32,
+    /// Writes to them.
+    pub writes: u32,
+    /// Instructions besides.
+    pub instructions: u32,
+}
+
+/// Words in this order; `codegen/toolchain/src/time.rs` of specgen reads them.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct Times {
+    version: u32,
+    /// Clock of the core, Hz.
+    core: u32,
+    /// FLASH_ACR and CCR, as they are while ticks run.
+    registers: [u32; 2],
+    /// SCLK of ADC and DACs, Hz.
+    sclk: [u32; 2],
+    /// What a byte on a bus takes of the core, while the next one is on the wires.
+    byte: Work,
+    /// A frame beside its bytes: select, the first bytes, the end of the last one.
+    frame: Work,
+    /// The interrupt around the tick: the timer, the watchdog, the stop contact.
+    interrupt: Work,
+}
+
+impl Times {
+    /// Clock of the core, Hz; FLASH_ACR and CCR; SCLK of ADC and DACs.
+    #[must_use]
+    pub const fn new(core: u32, registers: [u32; 2], sclk: [Hertz; 2]) -> Self {
+        Self {
+            version: 1,
+            core,
+            registers,
+            sclk: [sclk[0].0, sclk[1].0],
+            byte: Work { reads: 3, writes: 1, instructions: 16 },
+            frame: Work { reads: 3, writes: 6, instructions: 60 },
+            interrupt: Work { reads: 6, writes: 4, instructions: 150 },
+        }
+    }
+}

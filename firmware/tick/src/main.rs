@@ -1,0 +1,169 @@
+//! A board's tick, its drivers included, between stand-ins for its converters: the emulator writes down which instructions it
+//! takes, specgen prices them. Wave, recorder and new settings are there as on a board that has everything to do at once.
+//!
+//! Reads rows of INPUT_WORDS words, a closed loop from rest, from `input.bin` in the emulator's working folder, and what the
+//! board's buses take from `rates.bin`; writes what each tick did with them into `counts.bin` ([`parts::COUNTS`] words). A tick
+//! begins at `specgen_timed_tick` and is over at `specgen_timed_end`; what lies between `specgen_aside_begin` and
+//! `specgen_aside_end` is the stand-ins' own.
+
+#![no_std]
+#![no_main]
+
+#[path = "../../qemu/src/panic.rs"]
+mod panic;
+mod parts;
+#[allow(dead_code)] // It writes no file.
+#[path = "../../qemu/src/semihosting.rs"]
+mod semihosting;
+#[path = "../../qemu/src/start.rs"]
+mod start;
+
+use controller::sensing::CONVERTER;
+use controller::supervised::{Machine, Phase, Request};
+use controller::waves::{self, Wave};
+use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real};
+use parts::{ADC_BITS, Bench, Bus, Delay, Line, Pin, REFERENCE, Rates, Role};
+use semihosting::{Exit, File, exit};
+use specgen_board::{Board, Exchange, MACHINE_STATE_WORDS, Noticed, recorder};
+use specgen_hal::CHANNELS;
+use specgen_hal::ad5686r::Ad5686rPair;
+use specgen_hal::ad7606::Ad7606;
+use specgen_runtime::Real as _;
+
+/// Words of the recorder: some blocks, so that a tick that begins one is among those that are seen.
+const RECORD: usize = 32 * 1024;
+/// Settings change at every so manieth tick.
+const SETTINGS_EVERY: usize = 16;
+
+/// The converters' drivers on stand-ins.
+type Adc<'b> = Ad7606<ADC_BITS, Bus<'b>, Line<'b>, Pin<'b>, Pin<'b>, Delay<'b>>;
+type Dacs<'b> = Ad5686rPair<Bus<'b>, Bus<'b>, Line<'b>, Pin<'b>, Delay<'b>>;
+
+/// What a tick works on.
+struct Timed<'m> {
+    board: Board<'m, Adc<'m>, Dacs<'m>>,
+    exchange: Exchange,
+    /// Settings that a host wrote.
+    settings: Config,
+    /// Beside the exchange, whose commands are those of the rows.
+    wave: Wave,
+    waved: [u64; COMMAND_WORDS],
+}
+
+extern "C" fn main() -> ! {
+    exit(match run() {
+        Ok(()) => Exit::Done,
+        Err(code) => code,
+    })
+}
+
+fn run() -> Result<(), Exit> {
+    let input = File::open(b"input.bin\0").ok_or(Exit::NoInput)?;
+    let output = File::create(b"counts.bin\0").ok_or(Exit::CannotWrite)?;
+    let mut machine = Machine::new();
+    // It begins to run with the first tick, as after arming.
+    machine.supervisor.phase = Phase::Holding;
+    let mut exchange = Exchange::new();
+    let (rates, staged) = rates()?;
+    exchange.recorder = recorder(memory()).map(|recorder| recorder.staged(if staged { stage() } else { &mut [] }));
+    exchange.orders.request = Request::Run;
+    let wave = Wave::new(waves::limits(&exchange.config));
+    let bench = &Bench::new(rates);
+    let board = Board::new(adc(bench), dacs(bench), &mut machine, true);
+    let mut timed = Timed { board, exchange, settings: Config::new(), wave, waved: [0; COMMAND_WORDS] };
+    bench.codes.set(codes_of(&[0; INPUT_WORDS]));
+    timed.board.start(&mut timed.exchange.report);
+    bench.take();
+    timed.wave.start();
+    let mut row = [0; INPUT_WORDS];
+    let mut ticks = 0_usize;
+    loop {
+        match input.read(&mut row) {
+            0 => break,
+            bytes if bytes == size_of_val(&row) => {}
+            _ => return Err(Exit::InputSize),
+        }
+        bench.codes.set(codes_of(&row));
+        for (slot, word) in timed.exchange.orders.command.iter_mut().zip(row) {
+            *slot = word;
+        }
+        timed.exchange.host_alive();
+        if ticks.is_multiple_of(SETTINGS_EVERY) {
+            timed.exchange.next = Some(timed.settings);
+        }
+        specgen_timed_tick(&mut timed);
+        specgen_timed_end();
+        if !output.write(&bench.take()) {
+            return Err(Exit::CannotWrite);
+        }
+        ticks += 1;
+    }
+    // Ticks of a machine that stopped are not those that are asked about.
+    if timed.board.machine().supervisor.phase == Phase::Running { Ok(()) } else { Err(Exit::NotRunning) }
+}
+
+fn adc(bench: &Bench) -> Adc<'_> {
+    let bus = Bus { bench, dac: None };
+    Ad7606::new(bus, Line { bench, role: Role::Convst }, Pin { bench }, Pin { bench }, Delay(bench), REFERENCE)
+}
+
+fn dacs(bench: &Bench) -> Dacs<'_> {
+    let [first, second] = [0, 1].map(|part| Bus { bench, dac: Some(part) });
+    Ad5686rPair::new(first, second, Line { bench, role: Role::Ldac }, Pin { bench }, Delay(bench))
+}
+
+/// What the buses of the board take, ns, and whether its recorder has a faster memory for the state.
+fn rates() -> Result<(Rates, bool), Exit> {
+    let mut words = [0; 6];
+    let file = File::open(b"rates.bin\0").ok_or(Exit::NoInput)?;
+    if file.read(&mut words) != size_of_val(&words) {
+        return Err(Exit::InputSize);
+    }
+    let [adc_byte, adc_frame, dac_byte, dac_frame, look, staged] = words;
+    Ok((Rates { adc: [adc_byte, adc_frame], dac: [dac_byte, dac_frame], look }, staged != 0))
+}
+
+/// What the gauges' converter gave.
+fn codes_of(row: &[u64; INPUT_WORDS]) -> [i32; CHANNELS] {
+    let mut codes = [0; CHANNELS];
+    for (code, word) in codes.iter_mut().zip(row.iter().skip(COMMAND_WORDS)) {
+        *code = ((Real::from_word(*word) - CONVERTER.at_zero) / CONVERTER.per_code + 0.5) as i32;
+    }
+    codes
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+#[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
+fn specgen_timed_tick(timed: &mut Timed<'_>) {
+    // What holds a tick off longest is that the host's settings are copied.
+    timed.exchange.config = *core::hint::black_box(&timed.settings);
+    if let Some(motion) = timed.wave.advance() {
+        waves::write(&motion, timed.wave.sequence(), &mut timed.waved);
+    }
+    timed.board.tick(&mut timed.exchange, Noticed::default());
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+#[allow(unsafe_code)] // As above.
+extern "C" fn specgen_timed_end() {
+    // SAFETY: it does nothing.
+    unsafe { core::arch::asm!("nop") };
+}
+
+/// The recorder's memory, for the one call that there is.
+#[allow(unsafe_code)] // A static that is written.
+fn memory() -> &'static mut [u64] {
+    static mut MEMORY: [u64; RECORD] = [0; RECORD];
+    // SAFETY: called once, by `run`; no interrupt is enabled.
+    unsafe { &mut *(&raw mut MEMORY) }
+}
+
+/// That for the state, the same way.
+#[allow(unsafe_code)] // As above.
+fn stage() -> &'static mut [u64] {
+    static mut STAGE: [u64; MACHINE_STATE_WORDS] = [0; MACHINE_STATE_WORDS];
+    // SAFETY: as above.
+    unsafe { &mut *(&raw mut STAGE) }
+}

@@ -1,0 +1,273 @@
+//! Stand-ins for what the drivers of `../hal` talk to: buses, pins, waits, and the parts behind them as far as the drivers look.
+//! They count what a board would spend its time on.
+
+use core::cell::Cell;
+use core::convert::Infallible;
+
+use embedded_hal::delay::DelayNs;
+use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
+use embedded_hal::spi::{self, Operation, SpiDevice};
+use specgen_board::GAUGE_BITS;
+use specgen_hal::ad7606::{CONVERSION, INPUTS, Window};
+use specgen_hal::{CHANNELS, Edge, Fault};
+
+/// As `../stm32` has it: what a part of 16 bits cannot give, one of 18 does.
+pub const ADC_BITS: usize = if GAUGE_BITS <= 16 { 16 } else { 18 };
+/// The reference that V8 shows.
+pub const REFERENCE: Window = Window::around(2500, 50, 5000, ADC_BITS as u32);
+
+/// A board's buses, ns.
+#[derive(Clone, Copy)]
+pub struct Rates {
+    /// Of a byte on the ADC's bus, and of a frame beside its bytes.
+    pub adc: [u64; 2],
+    /// The same of the DACs'.
+    pub dac: [u64; 2],
+    /// Of a look at a pin.
+    pub look: u64,
+}
+
+/// What a tick did: bytes and frames of the ADC, of the DACs, ns of waits, looks at pins and edges of pins.
+pub const COUNTS: usize = 7;
+const ADC: usize = 0;
+const DAC: usize = 2;
+const WAITS: usize = 4;
+const LOOKS: usize = 5;
+const EDGES: usize = 6;
+
+/// All of it, shared by the stand-ins.
+pub struct Bench {
+    rates: Cell<Rates>,
+    /// ns that went by.
+    now: Cell<u64>,
+    converted: Cell<u64>,
+    counts: Cell<[u64; COUNTS]>,
+    /// What the gauges' converter gives.
+    pub codes: Cell<[i32; CHANNELS]>,
+    /// Input and DAC registers of both parts, and the answer that comes with the next frame.
+    registers: Cell<[[[u16; 4]; 2]; 2]>,
+    answers: Cell<[u16; 2]>,
+}
+
+impl Bench {
+    /// Nothing done yet.
+    pub const fn new(rates: Rates) -> Self {
+        Self {
+            rates: Cell::new(rates),
+            now: Cell::new(0),
+            converted: Cell::new(0),
+            counts: Cell::new([0; COUNTS]),
+            codes: Cell::new([0; CHANNELS]),
+            registers: Cell::new([[[0; 4]; 2]; 2]),
+            answers: Cell::new([0; 2]),
+        }
+    }
+
+    /// What was counted since the last call.
+    pub fn take(&self) -> [u64; COUNTS] {
+        self.counts.replace([0; COUNTS])
+    }
+
+    fn count(&self, what: usize, by: u64) {
+        let mut counts = self.counts.get();
+        if let Some(count) = counts.get_mut(what) {
+            *count += by;
+        }
+        self.counts.set(counts);
+    }
+
+    fn pass(&self, time: u64) {
+        self.now.set(self.now.get() + time);
+    }
+
+    fn frame(&self, bus: usize, bytes: usize) {
+        let rates = self.rates.get();
+        let [byte, frame] = if bus == ADC { rates.adc } else { rates.dac };
+        self.count(bus, bytes as u64);
+        self.count(bus + 1, 1);
+        self.pass(bytes as u64 * byte + frame);
+    }
+
+    /// What a DAC answers, and what it takes.
+    fn exchange(&self, part: usize, frame: &mut [u8]) {
+        let [command, high, low] = frame else { return };
+        let (mut registers, mut answers) = (self.registers.get(), self.answers.get());
+        if let (Some([input, output]), Some(answer)) = (registers.get_mut(part), answers.get_mut(part)) {
+            let data = u16::from_be_bytes([*high, *low]);
+            let asked = *answer;
+            let channel = (*command & 0xf).trailing_zeros() as usize;
+            match *command >> 4 {
+                1 => input.iter_mut().skip(channel).take(1).for_each(|slot| *slot = data),
+                // To one channel at once, or to all.
+                3 if *command & 0xf == 0xf => (*input, *output) = ([data; 4], [data; 4]),
+                3 => output.iter_mut().skip(channel).take(1).for_each(|slot| *slot = data),
+                9 => *answer = output.get(channel).copied().unwrap_or(0),
+                _ => {}
+            }
+            [*high, *low] = asked.to_be_bytes();
+        }
+        self.registers.set(registers);
+        self.answers.set(answers);
+    }
+
+    /// LDAC.
+    fn load(&self) {
+        let mut registers = self.registers.get();
+        for [input, output] in &mut registers {
+            let [a, b, c, _] = *input;
+            let [.., kept] = *output;
+            *output = [a, b, c, kept];
+        }
+        self.registers.set(registers);
+    }
+
+    /// The codes as the ADC sends them: two's complement, without a gap; the reference last.
+    fn sample(&self, frame: &mut [u8]) {
+        let middle = 1 << (ADC_BITS - 1);
+        let mut inputs = [(REFERENCE.low + REFERENCE.high) / 2; INPUTS];
+        for (input, code) in inputs.iter_mut().zip(self.codes.get()) {
+            *input = code << (ADC_BITS as u32 - GAUGE_BITS);
+        }
+        let bit = |at: usize| {
+            let code = inputs.get(at / ADC_BITS).copied().unwrap_or(0) ^ middle;
+            (code >> (ADC_BITS - 1 - at % ADC_BITS) & 1) as u8
+        };
+        for (index, byte) in frame.iter_mut().enumerate() {
+            *byte = (0..8).fold(0, |bits, k| bits << 1 | bit(8 * index + k));
+        }
+    }
+}
+
+/// The bus of the ADC, or of a DAC by its number.
+pub struct Bus<'b> {
+    pub bench: &'b Bench,
+    pub dac: Option<usize>,
+}
+
+impl spi::ErrorType for Bus<'_> {
+    type Error = Infallible;
+}
+
+impl SpiDevice for Bus<'_> {
+    // What a stand-in does is no work of a tick: these are left out when it is priced.
+    #[inline(never)]
+    fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), Infallible> {
+        specgen_aside(|| {
+            for operation in operations {
+                let Operation::TransferInPlace(frame) = operation else { continue };
+                match self.dac {
+                    None => {
+                        self.bench.frame(ADC, frame.len());
+                        self.bench.sample(frame);
+                    }
+                    Some(part) => {
+                        self.bench.frame(DAC, frame.len());
+                        self.bench.exchange(part, frame);
+                    }
+                }
+            }
+        });
+        Ok(())
+    }
+}
+
+/// An edge that a timer gives: one write.
+pub struct Line<'b> {
+    pub bench: &'b Bench,
+    pub role: Role,
+}
+
+/// What it does.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// It samples.
+    Convst,
+    /// Outputs change.
+    Ldac,
+}
+
+impl Edge for Line<'_> {
+    fn give(&mut self) -> Result<(), Fault> {
+        specgen_aside(|| {
+            self.bench.count(EDGES, 1);
+            match self.role {
+                Role::Convst => self.bench.converted.set(self.bench.now.get() + CONVERSION),
+                Role::Ldac => self.bench.load(),
+            }
+        });
+        Ok(())
+    }
+}
+
+/// A pin: BUSY, or one that leads nowhere.
+pub struct Pin<'b> {
+    pub bench: &'b Bench,
+}
+
+impl ErrorType for Pin<'_> {
+    type Error = Infallible;
+}
+
+impl OutputPin for Pin<'_> {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        specgen_aside(|| self.bench.count(EDGES, 1));
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        self.set_low()
+    }
+}
+
+impl InputPin for Pin<'_> {
+    fn is_high(&mut self) -> Result<bool, Infallible> {
+        let mut high = false;
+        specgen_aside(|| {
+            self.bench.count(LOOKS, 1);
+            self.bench.pass(self.bench.rates.get().look);
+            high = self.bench.now.get() < self.bench.converted.get();
+        });
+        Ok(high)
+    }
+
+    fn is_low(&mut self) -> Result<bool, Infallible> {
+        Ok(!self.is_high()?)
+    }
+}
+
+/// Waits.
+pub struct Delay<'b>(pub &'b Bench);
+
+impl DelayNs for Delay<'_> {
+    fn delay_ns(&mut self, ns: u32) {
+        specgen_aside(|| {
+            self.0.count(WAITS, u64::from(ns));
+            self.0.pass(u64::from(ns));
+        });
+    }
+}
+
+/// Calls what is no part of a tick, between two functions that the list of blocks shows.
+#[inline(always)]
+fn specgen_aside(action: impl FnOnce()) {
+    specgen_aside_begin();
+    action();
+    specgen_aside_end();
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+#[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
+extern "C" fn specgen_aside_begin() {
+    // As many as no other of the marks has: what is equal the compiler may make one.
+    // SAFETY: it does nothing.
+    unsafe { core::arch::asm!("nop", "nop") };
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+#[allow(unsafe_code)] // As above.
+extern "C" fn specgen_aside_end() {
+    // SAFETY: it does nothing.
+    unsafe { core::arch::asm!("nop", "nop", "nop") };
+}
