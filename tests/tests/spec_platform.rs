@@ -61,7 +61,7 @@ fn every_value_of_the_reference_is_in_si() {
     assert_eq!((model.target.mcu, model.target.budget.instructions), (Mcu::Mps2An500, Some(4500)));
     assert_eq!(
         (model.target.budget.flash, model.target.budget.ram, model.target.budget.stack),
-        (Some(131_072), Some(32_768), Some(2048))
+        (Some(131_072), Some(32_768), Some(3072))
     );
 
     let paper = |name: &str, path| Trajectory {

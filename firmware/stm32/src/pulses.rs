@@ -58,7 +58,8 @@ impl Pulses {
         let longest = PERIOD_NANOSECONDS / 8 * 7;
         let until = if nanoseconds < longest { nanoseconds } else { longest };
         // One count for CONVST, with which the time begins.
-        let counts = |time: u32| u16::try_from(u64::from(time) * u64::from(hertz) / 1_000_000_000 + 1).unwrap_or(u16::MAX);
+        let counts =
+            |time: u32| u16::try_from(u64::from(time) * u64::from(hertz) / 1_000_000_000 + 1).unwrap_or(u16::MAX);
         let (at, low) = (counts(until), counts(LOW));
         let pulses = Self(timer);
         timer.cr1().write(|w| w.set_opm(true));
