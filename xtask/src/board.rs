@@ -27,7 +27,7 @@ const STANDS: &str = "; status 0x";
 const WAVE: &str = "ramp = 0.05\nseconds = 0.4\n[[axis]]\naxis = \"z\"\nshape = { kind = \"sine\", amplitude = 1e-6, frequency = 5.0 }\n";
 
 /// The estimate of the longest tick over the longest that is seen.
-const BAND: [f64; 2] = [0.95, 1.5];
+const BAND: [f64; 2] = [1.0, 1.5];
 
 /// An image, what it was built from, and where its run leaves its files.
 #[derive(Clone)]

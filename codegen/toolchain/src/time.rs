@@ -113,14 +113,13 @@ impl Clocks {
         }
     }
 
-    /// Of a byte and a frame on the buses of ADC and DACs, and of a look at a pin, ns; 1 if the recorder's memory is not the
-    /// core's own, so that it has a faster one beside it.
+    /// Of a byte and a frame on the buses of ADC and DACs, and of a look at a pin, ns.
     #[must_use]
-    pub fn buses(&self) -> [u64; 6] {
+    pub fn buses(&self) -> [u64; 5] {
         let nanoseconds = |cycles: u64| cycles * 1_000_000_000 / self.core;
         let [byte, frame] = [self.byte, self.frame].map(|work| nanoseconds(self.cycles(work)));
         let [adc, dac] = self.sclk.map(|hertz| byte.max(8_000_000_000 / hertz));
-        [adc, frame, dac, frame, nanoseconds(self.cycles(LOOK)), u64::from(self.family == Family::H7)]
+        [adc, frame, dac, frame, nanoseconds(self.cycles(LOOK))]
     }
 
     fn cycles(&self, work: Work) -> u64 {

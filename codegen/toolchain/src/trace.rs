@@ -117,7 +117,7 @@ pub struct Trace<'a> {
 pub fn trace<'a>(
     image: &'a Image,
     inputs: &[Vec<u64>],
-    buses: [u64; 6],
+    buses: [u64; 5],
     limit: Duration,
 ) -> Result<Trace<'a>, TargetError> {
     let emulator = Emulator::find()?;
@@ -251,12 +251,11 @@ fn who(debug: &DebugInfo<'_>, address: u64) -> (Who, bool) {
         let file = frame.location.and_then(|location| location.file).unwrap_or_default();
         let name = file.rsplit('/').next().unwrap_or_default();
         match name {
-            "ring.rs" => return (Who::Recorder, true),
-            "recorder.rs" | "record.rs" | "recording.rs" | "snapshot.rs" | "digest.rs" => {
-                return (Who::Recorder, false);
-            }
+            // A block begins with the state, which the snapshot writes where the block lies.
+            "ring.rs" | "snapshot.rs" => return (Who::Recorder, true),
+            "recorder.rs" | "record.rs" | "recording.rs" | "digest.rs" => return (Who::Recorder, false),
             "wave.rs" | "waves.rs" => return (Who::Wave, false),
-            _ if file.contains("/snapshot/") => return (Who::Recorder, false),
+            _ if file.contains("/snapshot/") => return (Who::Recorder, true),
             _ if file.contains("/wave/") => return (Who::Wave, false),
             _ if file.contains("controller/") || file.contains("runtime/") => found = (Who::Law, false),
             _ => {}

@@ -24,7 +24,7 @@ use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real};
 use parts::{ADC_BITS, Bench, Bus, Delay, Line, Pin, REFERENCE, Rates, Role};
 use semihosting::{Exit, File, exit};
-use specgen_board::{Board, Exchange, MACHINE_STATE_WORDS, Noticed, recorder};
+use specgen_board::{Board, Exchange, Noticed, recorder};
 use specgen_hal::CHANNELS;
 use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::Ad7606;
@@ -64,11 +64,10 @@ fn run() -> Result<(), Exit> {
     // It begins to run with the first tick, as after arming.
     machine.supervisor.phase = Phase::Holding;
     let mut exchange = Exchange::new();
-    let (rates, staged) = rates()?;
-    exchange.recorder = recorder(memory()).map(|recorder| recorder.staged(if staged { stage() } else { &mut [] }));
+    exchange.recorder = recorder(memory());
     exchange.orders.request = Request::Run;
     let wave = Wave::new(waves::limits(&exchange.config));
-    let bench = &Bench::new(rates);
+    let bench = &Bench::new(rates()?);
     let board = Board::new(adc(bench), dacs(bench), &mut machine, true);
     let mut timed = Timed { board, exchange, settings: Config::new(), wave, waved: [0; COMMAND_WORDS] };
     bench.codes.set(codes_of(&[0; INPUT_WORDS]));
@@ -112,15 +111,15 @@ fn dacs(bench: &Bench) -> Dacs<'_> {
     Ad5686rPair::new(first, second, Line { bench, role: Role::Ldac }, Pin { bench }, Delay(bench))
 }
 
-/// What the buses of the board take, ns, and whether its recorder has a faster memory for the state.
-fn rates() -> Result<(Rates, bool), Exit> {
-    let mut words = [0; 6];
+/// What the buses of the board take, ns.
+fn rates() -> Result<Rates, Exit> {
+    let mut words = [0; 5];
     let file = File::open(b"rates.bin\0").ok_or(Exit::NoInput)?;
     if file.read(&mut words) != size_of_val(&words) {
         return Err(Exit::InputSize);
     }
-    let [adc_byte, adc_frame, dac_byte, dac_frame, look, staged] = words;
-    Ok((Rates { adc: [adc_byte, adc_frame], dac: [dac_byte, dac_frame], look }, staged != 0))
+    let [adc_byte, adc_frame, dac_byte, dac_frame, look] = words;
+    Ok(Rates { adc: [adc_byte, adc_frame], dac: [dac_byte, dac_frame], look })
 }
 
 /// What the gauges' converter gave.
@@ -158,12 +157,4 @@ fn memory() -> &'static mut [u64] {
     static mut MEMORY: [u64; RECORD] = [0; RECORD];
     // SAFETY: called once, by `run`; no interrupt is enabled.
     unsafe { &mut *(&raw mut MEMORY) }
-}
-
-/// That for the state, the same way.
-#[allow(unsafe_code)] // As above.
-fn stage() -> &'static mut [u64] {
-    static mut STAGE: [u64; MACHINE_STATE_WORDS] = [0; MACHINE_STATE_WORDS];
-    // SAFETY: as above.
-    unsafe { &mut *(&raw mut STAGE) }
 }
