@@ -93,7 +93,7 @@ impl<D: Device> Loop<'_, D> {
                 events |= LINK_LOST;
             }
 
-            self.device.begin(tick);
+            self.device.tick(tick);
             let mut broken = false;
             match self.device.read() {
                 Ok(fresh) => codes = fresh,

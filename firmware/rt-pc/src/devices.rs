@@ -9,7 +9,7 @@ use specgen_hal::{Amplifiers, CHANNELS, Gauges};
 /// A machine as the loop sees it.
 pub trait Device: Gauges + Amplifiers {
     /// Tick `tick`, counted from 0, begins. Called once before its [`Gauges::read`]; numbers rise, and leave out skipped ticks.
-    fn begin(&mut self, tick: u64);
+    fn tick(&mut self, tick: u64);
 
     /// Force and torque on the platform that were read with the gauges, N and N m; zeros without a sensor.
     fn wrench(&self) -> [f64; CHANNELS];

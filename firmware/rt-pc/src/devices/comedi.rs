@@ -162,7 +162,7 @@ impl Amplifiers for Comedi<'_> {
 }
 
 impl Device for Comedi<'_> {
-    fn begin(&mut self, _tick: u64) {}
+    fn tick(&mut self, _tick: u64) {}
 
     fn wrench(&self) -> [f64; CHANNELS] {
         [0.0; CHANNELS]

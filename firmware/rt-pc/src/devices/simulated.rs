@@ -95,7 +95,7 @@ impl Amplifiers for Simulated {
 }
 
 impl Device for Simulated {
-    fn begin(&mut self, tick: u64) {
+    fn tick(&mut self, tick: u64) {
         self.tick = tick;
     }
 
