@@ -178,8 +178,8 @@ fn a_record_replays_from_wherever_it_begins_and_a_changed_bit_is_found_and_named
     let codes = first_row + 1 + inputs;
     let tick = at(3);
     let cases = [
-        // A gauge by some nanometres: the first tick already comes out differently.
-        ("input", first_row + 1 + gauge, 40, "dac_code"),
+        // A gauge by some hundred nanometres: the first tick already comes out differently.
+        ("input", first_row + 1 + gauge, 46, "dac_code"),
         ("code of leg 0", codes, 3, "dac_code[0]"),
         ("code of leg 5", codes + 2, 32 + 3, "dac_code[5]"),
         ("status", codes + 3, 17, "status"),

@@ -16,6 +16,7 @@ mod fit;
 pub(crate) mod forward;
 mod mixed;
 mod normal;
+pub(crate) mod predict;
 mod prepare;
 mod report;
 mod score;

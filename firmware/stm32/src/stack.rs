@@ -4,7 +4,7 @@
 
 use core::ptr::{self, addr_of};
 
-// Of the memory map.
+// SAFETY: symbols of the memory map, of which only the addresses are used.
 unsafe extern "C" {
     static _stack_end: u32;
     static _stack_start: u32;

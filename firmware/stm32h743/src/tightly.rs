@@ -40,6 +40,7 @@ core::arch::global_asm!(
     ".size __pre_init, . - __pre_init",
 );
 
+// SAFETY: symbols of the linker, whose types say no more than that they are aligned.
 unsafe extern "C" {
     // Begin, end, and where it was copied from: symbols of memory.x, of which only the addresses mean something.
     static __sitcm: u32;

@@ -106,8 +106,8 @@ impl Session {
 
     /// When the board wrote down last that this happened, ms.
     pub fn logged(&self, what: &str) -> Option<f64> {
-        let lines = self.log.iter().filter_map(|line| line.split_once(" ms: "));
-        lines.filter(|(_, text)| text.starts_with(what)).next_back()?.0.parse().ok()
+        let mut lines = self.log.iter().filter_map(|line| line.split_once(" ms: "));
+        lines.rfind(|(_, text)| text.starts_with(what))?.0.parse().ok()
     }
 
     pub fn report(&mut self) -> Result<Report, String> {

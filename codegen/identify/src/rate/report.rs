@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
+use super::predict::{Drive, predict};
 use super::prepare::Prepared;
 use super::score::on;
 use super::{CreepTerm, RateModel, RateOption};
-use crate::predict::{Drive, predict};
 use crate::record::Record;
 use crate::regressor::Plane;
 use crate::statistics;

@@ -4,17 +4,17 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::cause::{self, Cause};
-use super::distrust::{JUMP, SETTLING};
-use super::findings::Findings;
-use super::rate::{RateModel, forward};
-use super::record::{self, Record};
-use super::regressor::Plane;
-use super::signals::{self, Wanted};
-use super::staircase::Staircase;
-use super::trend::{Line, rms_and_max};
-use super::{branches, start, statistics};
+use super::{RateModel, forward};
+use crate::cause::{self, Cause};
+use crate::distrust::{JUMP, SETTLING};
 use crate::everett::EverettTable;
+use crate::findings::Findings;
+use crate::record::{self, Record};
+use crate::regressor::Plane;
+use crate::signals::{self, Wanted};
+use crate::staircase::Staircase;
+use crate::trend::{Line, rms_and_max};
+use crate::{branches, start, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// The drive may leave the range of the table by this share of it; it is held at its end there.
