@@ -1,16 +1,13 @@
 //! One control tick on real converters.
 
+use controller::Real;
 use controller::sensing;
-use controller::snapshot::recorder::Recorder;
-use controller::snapshot::{record_after, record_before};
-use controller::supervised::{
-    CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Request, STOP,
-};
-use controller::{Config, Real};
+use controller::supervised::{CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STOP};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
 use specgen_link::Silence;
 
 use crate::exchange::{self, Exchange, Orders};
+use crate::recording::{begin_row, end_row};
 use crate::report::Report;
 use crate::words::GAUGE_BITS;
 
@@ -232,16 +229,4 @@ fn take<'a>(
     events: u32,
 ) -> &'a MachineInput {
     slot.insert(MachineInput::measured(&orders.command, readings, &[Real::NAN; CHANNELS], request, events))
-}
-
-/// What the recorder keeps from before a tick, where a block begins. In a frame of its own, as [`take`].
-#[inline(never)]
-pub(crate) fn begin_row(config: &Config, machine: &Machine, recorder: &mut Recorder<'static>) {
-    record_before(config, machine, recorder);
-}
-
-/// What it keeps from after it.
-#[inline(never)]
-fn end_row(machine: &Machine, input: &MachineInput, output: &MachineOutput, recorder: &mut Recorder<'static>) {
-    record_after(machine, input, output, recorder);
 }

@@ -8,7 +8,7 @@ use controller::{COMMAND_WORDS, Config};
 use specgen_link::Silence;
 use specgen_runtime::wave::Stage;
 
-use crate::cycle::begin_row;
+use crate::recording::begin_row;
 use crate::report::{Probes, Report};
 #[cfg(feature = "lockstep")]
 use crate::words::PERIOD_NANOSECONDS;

@@ -1,7 +1,9 @@
 //! The recorder of a board: how its memory is cut, and what it does from power-up on.
 
-use controller::snapshot::RECORD_LAYOUT;
+use controller::Config;
 use controller::snapshot::recorder::{Activity, Recorder, Settings, Trigger};
+use controller::snapshot::{RECORD_LAYOUT, record_after, record_before};
+use controller::supervised::{Machine, MachineInput, MachineOutput};
 use specgen_link::{RecorderAction, RecorderStatus};
 
 /// Most blocks. The oldest is given up when a new one begins, so many of them keep more of what was before the trigger.
@@ -53,4 +55,22 @@ pub(crate) fn act(recorder: &mut Recorder<'static>, action: RecorderAction) -> R
 /// Whether what it holds stays as it is.
 pub(crate) fn is_stopped(recorder: &Recorder<'static>) -> bool {
     matches!(recorder.activity(), Activity::Stopped | Activity::Complete)
+}
+
+/// What the recorder keeps from before a tick, where a block begins. In a frame of its own, which is done with before the law needs the
+/// stack.
+#[inline(never)]
+pub(crate) fn begin_row(config: &Config, machine: &Machine, recorder: &mut Recorder<'static>) {
+    record_before(config, machine, recorder);
+}
+
+/// What it keeps from after it.
+#[inline(never)]
+pub(crate) fn end_row(
+    machine: &Machine,
+    input: &MachineInput,
+    output: &MachineOutput,
+    recorder: &mut Recorder<'static>,
+) {
+    record_after(machine, input, output, recorder);
 }
