@@ -77,15 +77,3 @@ pub fn expect_success(mut command: Command, fix: &str) -> Outcome {
         Err(error) => Outcome::Failed(format!("{}: {error}", command.get_program().display())),
     }
 }
-
-/// Runs it unseen, beside what is in view, and shows what it printed if it fails; `fix` says what to do then.
-pub fn silent_success(mut command: Command, fix: &str) -> Outcome {
-    match command.output() {
-        Ok(output) if output.status.success() => Outcome::Passed,
-        Ok(output) => {
-            let text = [output.stdout, output.stderr].concat();
-            Outcome::Failed(format!("{}; {fix}:\n{}", output.status, String::from_utf8_lossy(&text).trim()))
-        }
-        Err(error) => Outcome::Failed(format!("{}: {error}", command.get_program().display())),
-    }
-}

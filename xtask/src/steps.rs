@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use crate::binaries::{self, Binary, Mode, Ran};
 use crate::judged::Trial;
-use crate::run::{Outcome, Report, cargo, expect_success, silent_success};
+use crate::run::{Outcome, Report, cargo, expect_success};
 use crate::{board, fuzz, generated, mutants, packages, setup, soak};
 
 /// Its own workspace, built for another machine.
@@ -87,18 +87,11 @@ pub fn test(root: &Path) -> ExitCode {
     report.step("cross compiler and QEMU", setup::microcontroller);
     let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
     report.step("formatting", || formatting(root));
-    // Both wait for one crate after the other most of the time: side by side they keep the processors busy.
-    let binaries = std::thread::scope(|scope| {
-        let lints = scope.spawn(|| lints(root));
-        let binaries = compiled(root, &mut report);
-        report.step("lints, begun with the compiling", || {
-            lints.join().unwrap_or_else(|_| Outcome::Failed("the thread that runs them panicked".to_owned()))
-        });
-        binaries
-    });
+    let binaries = compiled(root, &mut report);
     report.step("tests", || binaries::test(root, &binaries, mode, &mut Ran::default()));
     report.step("images on the emulated board", || board::short(root));
     report.step("examples in the documentation", || binaries::examples(root));
+    report.step("lints", || lints(root));
     report.step("published schema", || PUBLISHED_SCHEMA.unless_unchanged(root));
     report.step("orders of shared memory", || SHARED_MEMORY.unless_unchanged(root));
     report.step("documentation", || {
@@ -238,13 +231,11 @@ fn lints(root: &Path) -> Outcome {
     // In release, so that build scripts and macros are those of the tests. Boards are built from an emitted workspace by their
     // tests.
     let own: &[&str] = &["--workspace", "--all-targets"];
-    let alone = |manifest| ["--manifest-path", manifest, "--all-targets", "--locked"];
+    // Into the same folder: most of its dependencies are those of the workspace.
+    let alone = |manifest| ["--manifest-path", manifest, "--all-targets", "--locked", "--target-dir", "target"];
     for scope in [own, &alone(REAL_TIME), &alone(board::MANIFEST)] {
-        // All into one folder, as most dependencies are those of the workspace; not into that of the tests, whose lock would
-        // make the lints wait.
-        let options = ["clippy", "--release", "--quiet", "--target-dir", "target/lints"];
-        let clippy = [&options[..], scope, &["--", "-D", "warnings"]].concat();
-        let outcome = silent_success(cargo(root, &clippy), "fix what it reports");
+        let clippy = [&["clippy", "--release", "--quiet"], scope, &["--", "-D", "warnings"]].concat();
+        let outcome = expect_success(cargo(root, &clippy), "fix what is reported above");
         if !matches!(outcome, Outcome::Passed) {
             return outcome;
         }
