@@ -93,7 +93,11 @@ fn what_the_first_order_leaves_is_within_its_bound_and_near_it() {
         Case::new("reference", "reference.toml", &[]),
         Case::new("f32", "reference.toml", &f32),
         Case::new("joints", "features/platform-joints.toml", &[]),
-        Case::new("loose", "reference.toml", &[("lead            =", "dynamics_tolerance = \"3 nm\"\nlead =")]),
+        Case::new(
+            "loose",
+            "reference.toml",
+            &[("transfer_time   =", "dynamics_tolerance = \"3 nm\"\ntransfer_time =")],
+        ),
     ];
     let mut terms = Vec::new();
     for case in &cases {
@@ -164,8 +168,8 @@ fn what_is_not_proven_is_not_taken() {
         "acceleration = [\"10 mm/s^2\", \"10 mm/s^2\", \"10 mm/s^2\",",
         "acceleration = [\"1 m/s^2\", \"1 m/s^2\", \"1 m/s^2\",",
     );
-    let asked = ("lead            =", "dynamics = \"whole\"\nlead =");
-    let strict = ("lead            =", "dynamics_tolerance = \"0.01 nm\"\nlead =");
+    let asked = ("transfer_time   =", "dynamics = \"whole\"\ntransfer_time =");
+    let strict = ("transfer_time   =", "dynamics_tolerance = \"0.01 nm\"\ntransfer_time =");
     for (name, edit, proven) in [("fast", fast, false), ("asked", asked, true), ("strict", strict, false)] {
         let case = Case::new(name, "reference.toml", &[edit]);
         let load = case.load();

@@ -89,7 +89,7 @@ fn every_value_of_the_reference_is_in_si() {
         environment: Environment { stiffness: [0.0; 6], rest: NO_POSE },
         dynamics: DynamicsChoice::Cheapest,
         dynamics_tolerance: None,
-        lead: 1e-4,
+        lead: None,
         transfer_time: 0.05,
         setpoint: SetpointRules {
             bias: [0.0, 0.0, 10e-6, 0.0, 0.0, 0.0],

@@ -91,7 +91,7 @@ impl Comparison {
         settings.tables = std::array::from_fn(|_| Table::from_record(&table, hysteresis.grid, 100.0));
         settings.drive.lsb = 150.0 / f64::from((1 << 24) - 1);
         (settings.bias, settings.bias_time) = ([0.0; 6], 0.0);
-        settings.lead = emitted.compiled.model.task_space.as_ref().expect("a spec with [control]").lead;
+        settings.lead = emitted.compiled.design.as_ref().expect("a spec with [control]").lead;
         let oracle = PlatformOracle::new(&settings).expect("a regular platform");
 
         let options = RunOptions { record: Record::Trace, settle: 0.0, ..RunOptions::new(PERIOD, [0.0; 6]) };

@@ -36,7 +36,7 @@ pub fn model(probes: [Probe; 6]) -> Model {
         environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
         dynamics: DynamicsChoice::Cheapest,
         dynamics_tolerance: None,
-        lead: 0.0,
+        lead: Some(0.0),
         transfer_time: 0.1,
         setpoint: SetpointRules {
             bias: [0.0; 6],

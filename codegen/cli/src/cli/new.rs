@@ -39,8 +39,6 @@ const GAUGE_RADIUS: f64 = 0.8;
 const GAUGE_ROOM: f64 = 1.06;
 /// Declared workspace beside what an axis alone reaches.
 const SHARE: f64 = 0.9;
-/// Lead beside the lag of the amplifiers: what is best for the reference.
-const LEAD: f64 = 0.3;
 /// Speed of streams: bounds of the workspace in a second.
 const STREAM: f64 = 20.0;
 /// Most that a stream covers in a tick, in bounds of the workspace.
@@ -289,8 +287,6 @@ fn compute(draft: &mut Draft) {
     }
     draft.compute("actuator.resonance", &[MASS, STIFFNESS], resonance);
     draft.compute("dac.range", &[VOLTAGE], dac_range);
-    let lead = format!("\"{} ms\"", figures(LEAD * value("amplifier.lag") * 1e3, 1));
-    draft.compute("control.lead", &["amplifier.lag"], lead);
     let radius = GAUGE_RADIUS * platform;
     let (half, side) = (-radius / 2.0, radius * 0.75_f64.sqrt());
     let places = [[radius, 0.0], [half, side], [half, -side], [radius, 0.0], [-radius, 0.0], [0.0, radius]];

@@ -74,7 +74,7 @@ pub fn model() -> (Model, TaskSpace) {
         environment: Environment { stiffness: [0.0; 6], rest: [0.0; 6] },
         dynamics: DynamicsChoice::Cheapest,
         dynamics_tolerance: None,
-        lead: 0.0,
+        lead: Some(0.0),
         transfer_time: 0.05,
         setpoint: SetpointRules {
             bias: [0.0, 0.0, 1e-5, 0.0, 0.0, 0.0],

@@ -23,7 +23,7 @@ const MOST_TICKS: f64 = 3000.0;
 pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
     let model = facts.model;
     let tick = model.timing.period;
-    let lead = model.task_space.as_ref().map_or(0.0, |task| task.lead);
+    let lead = model.task_space.as_ref().and_then(|task| task.lead).unwrap_or(0.0);
     for (key, time) in [
         ("amplifier.lag", model.amplifier.lag),
         ("sensor.lag", model.sensor.lag),
@@ -50,9 +50,9 @@ pub(super) fn times_that_do_nothing(facts: &Facts, found: &mut Found) {
 /// A lead takes out the lag, no more.
 pub(super) fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
     let model = facts.model;
-    let Some(task) = &model.task_space else { return };
+    let Some(lead) = model.task_space.as_ref().and_then(|task| task.lead) else { return };
     let lag = model.amplifier.lag + model.timing.period;
-    if task.lead <= LARGEST_LEAD * lag {
+    if lead <= LARGEST_LEAD * lag {
         return;
     }
     found.add(
@@ -60,10 +60,10 @@ pub(super) fn lead_of_the_lag(facts: &Facts, found: &mut Found) {
         "control.lead",
         format!(
             "legs are asked for {} ms early, but amplifier and tick together lag {} ms",
-            figure(task.lead * 1e3),
+            figure(lead * 1e3),
             figure(lag * 1e3)
         ),
-        "about the amplifier's lag less one period takes the lag out: check the units of `control.lead` and `amplifier.lag`",
+        "leave `control.lead` out, and the compiler takes the lag out; or check its unit and that of `amplifier.lag`",
     );
 }
 

@@ -57,7 +57,7 @@ pub(super) fn law(
         modes_to_legs: round_all(multiply6(&rest.jacobian, &from_modal)),
         rest_force: rest_force.map(round),
         wrench_limit: largest_wrench(model).map(round),
-        lead: round(task.lead / model.timing.period),
+        lead: round(design.lead / model.timing.period),
         transfer_keep: round(libm::exp(-model.timing.period / task.transfer_time)),
         transfer_negligible: round(TRANSFER_NEGLIGIBLE),
         cells_per_metre: round(1.0 / metres_per_cell),

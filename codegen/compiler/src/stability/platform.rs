@@ -68,6 +68,10 @@ pub struct Design {
     pub modes: [Mode; 6],
     /// c_a of a leg, N s/m.
     pub leg_damping: f64,
+    /// τ by which legs are asked for early, s: given, or [`lead`].
+    pub lead: f64,
+    /// Whether it is the spec's own.
+    pub lead_given: bool,
     /// On feedback, if the spec has one.
     pub notch: Option<Notch>,
     /// Ω, rad/s: level bandwidth at which EWMA alone becomes unstable.
@@ -128,6 +132,8 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
             shape: core::array::from_fn(|axis| basis.from_modal[axis][i]),
         }),
         leg_damping: 2.0 * task.modal_damping / basis.frequencies[0] * model.actuator.axial_stiffness,
+        lead: lead(model, task, basis),
+        lead_given: task.lead.is_some(),
         notch: closed_loop.notch.clone(),
         bandwidth_limit: limit,
         combined,
@@ -135,6 +141,18 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         touching: closed_loop.environment != [0.0; 6],
         margins,
         findings,
+    })
+}
+
+/// τ of the spec, or else the delay of the pose behind a slow command, s, not below zero.
+///
+/// The amplifier is late by its lag, and every mode by 2 ζ/ω, the slope of its phase, which is the same for all with c_a = β k_a. A voltage
+/// is held over a period, on average half of it late, but asks for the pose at the end of it: half a period early.
+#[must_use]
+pub fn lead(model: &Model, task: &TaskSpace, basis: &ModalBasis) -> f64 {
+    task.lead.unwrap_or_else(|| {
+        let late = model.amplifier.lag + 2.0 * task.modal_damping / basis.frequencies[0] - 0.5 * model.timing.period;
+        if late > 0.0 { late } else { 0.0 }
     })
 }
 

@@ -106,8 +106,8 @@ section! {
         dynamics: DynamicsChoice = one_of(DynamicsChoice::WORDS), Default("cheapest"), "", "whole";
         /// Largest error of a leg's displacement that the first order may make, over the workspace and the limits of moves and trajectories.
         dynamics_tolerance: Option<f64> = one(Dimension::LENGTH, Range::above(0.0, 1e-3), "nm"), Rule("a tenth of the converter's step, as displacement of a leg"), "", "0.1 nm";
-        /// Time by which the leg displacements are asked for early, in proportion to their rate: about the amplifier lag less one period. Takes out part of the lag of fast motion; a set-point that steps is overshot by step x lead / period for one tick.
-        lead: f64 = one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Default("0 ms"), "", "0.2 ms";
+        /// Time by which the leg displacements are asked for early, in proportion to their rate. Takes out the lag of fast motion; a set-point that steps is overshot by step x lead / period for one tick, which paths with corners may ask to be less.
+        lead: Option<f64> = one(Dimension::TIME, Range::closed(0.0, 1e-2), "ms"), Rule("the delay from command to pose: `amplifier.lag` and what the modes add, less half a period"), "", "0.2 ms";
         /// Time constant with which the offset of a change of mode fades, where neither estimates nor an integral on every axis take it over, as in F with Invhys.
         transfer_time: f64 = one(Dimension::TIME, Range::closed(1e-6, 100.0), "ms"), Default("50 ms"), "", "50 ms";
     }

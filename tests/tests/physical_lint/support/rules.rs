@@ -172,7 +172,12 @@ pub const RULES: &[Rule] = &[
     of("W0829", "control.environment.stiffness[0]", ["[\"2.4e6 N/m\"", "[\"1.0e4 N/m\"", "[\"1.02e4 N/m\""])
         .on("features/platform-environment.toml"),
     of("W0830", "amplifier.lag", ["\"0.35 ms\"", "\"0.99 us\"", "\"1.01 us\""]),
-    of("W0831", "control.lead", ["\"0.1 ms\"", "\"0.57 ms\"", "\"0.56 ms\""]),
+    of(
+        "W0831",
+        "control.lead",
+        ["transfer_time   =", "lead = \"0.57 ms\"\ntransfer_time   =", "lead = \"0.56 ms\"\ntransfer_time   ="],
+    )
+    .at("lead = "),
     of("W0832", "control.transfer_time", ["\"50 ms\"", "\"99 us\"", "\"100 us\""]),
     of("W0833", "control.velocity_cutoff", ["\"1.9e4 rad/s\"", "\"226 rad/s\"", "\"227 rad/s\""]),
     of("W0834", "timing.period", ["\"200 us\"", "\"0.7 ms\"", "\"0.69 ms\""])

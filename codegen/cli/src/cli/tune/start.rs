@@ -101,7 +101,7 @@ fn relay_test(job: &Job, ui: &Ui) -> Result<Option<[Option<Ultimate>; 6]>, Failu
     let mut scenario = machine::scenario(model, task, &specimen, &Noise::of(&specimen), seed);
     scenario.options.latency = job.arguments.latency as usize;
     let radius = model.geometry.joint_radius();
-    let lead = task.lead / model.timing.period;
+    let lead = job.compiled.design.as_ref().map_or(0.0, |design| design.lead) / model.timing.period;
     relay::test(&scenario, &job.controller, closed_loop, [radius, lead]).map(Some).map_err(environment)
 }
 

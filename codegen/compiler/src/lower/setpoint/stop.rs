@@ -12,7 +12,7 @@ use specgen_runtime::setpoint::StopLimits;
 
 use super::User;
 use crate::lower;
-use crate::stability::platform::{ModalBasis, RestDynamics};
+use crate::stability::platform::{ModalBasis, RestDynamics, lead};
 use specgen_language::model::{Model, TaskSpace};
 
 /// Share of the period of the lowest mode that a stop takes at least.
@@ -89,9 +89,9 @@ fn shortest_time(model: &Model, task: &TaskSpace, user: &User, speed: &[f64; 6])
     // A platform that has no dynamics is refused elsewhere.
     let Ok(platform) = lower::platform(model) else { return time };
     let rest = RestDynamics::of(&platform);
-    if let Some(basis) = ModalBasis::of(&rest, model.actuator.axial_stiffness) {
-        time = larger(time, PERIODS * core::f64::consts::TAU / basis.frequencies[0]);
-    }
+    let Some(basis) = ModalBasis::of(&rest, model.actuator.axial_stiffness) else { return time };
+    time = larger(time, PERIODS * core::f64::consts::TAU / basis.frequencies[0]);
+    let lead = lead(model, task, &basis);
     let Some(inverse) = lower::inverse_jacobian(&model.geometry) else { return time };
     let slew = SLEW * model.actuator.slew_rate * model.actuator.leg_gain();
     let bent = BENT * model.actuator.stroke;
@@ -107,7 +107,7 @@ fn shortest_time(model: &Model, task: &TaskSpace, user: &User, speed: &[f64; 6])
             bend += force.abs() * v / model.actuator.axial_stiffness;
         }
         // slew = lead · acceleration + bending by the jerk.
-        let (once, twice) = (PEAK * task.lead * rate, SLOPE * bend);
+        let (once, twice) = (PEAK * lead * rate, SLOPE * bend);
         time = larger(time, (once + libm::sqrt(once * once + 4.0 * slew * twice)) / (2.0 * slew));
         time = larger(time, PEAK * bend / bent);
     }

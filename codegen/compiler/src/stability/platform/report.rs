@@ -19,6 +19,8 @@ pub fn describe(design: &Design) -> String {
         design.modes[0].damping_ratio,
         design.modes[5].damping_ratio
     );
+    let whose = if design.lead_given { "as the spec says" } else { "the delay from command to pose" };
+    let _ = writeln!(text, "  lead: {:.4} ms, {whose}", design.lead * 1e3);
     let notch = if design.notch.is_some() { "with the modal notch" } else { "without a notch" };
     let _ = writeln!(
         text,
