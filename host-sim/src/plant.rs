@@ -1,5 +1,6 @@
 //! What the simulator drives: one leg, from amplifier input to displacement.
 
+mod bouc_wen;
 mod creep;
 mod filter;
 pub(crate) mod lanes;
@@ -8,10 +9,11 @@ mod parameters;
 mod play;
 mod stack;
 
+pub use bouc_wen::{BoucWen, BoucWenParameters};
 pub(crate) use filter::SmoothLag;
 pub use leg::LegPlant;
 pub(crate) use parameters::{Bound, checked};
-pub use parameters::{LegParameters, NoiseParameters, ParameterError, REFERENCE_LEG};
+pub use parameters::{LegParameters, NoiseParameters, ParameterError, REFERENCE_LEG, SHIPPED};
 pub use stack::Stack;
 
 /// One leg that takes a held voltage and moves.

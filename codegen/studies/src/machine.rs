@@ -89,12 +89,13 @@ pub fn leg(model: &Model, leg: &LegParameters) -> LegParameters {
     let stretch = (high - low) / leg.u_max;
     let volts = |values: &[f64]| values.iter().map(|v| v * stretch).collect();
     let steps = libm::exp2(f64::from(model.sensor.bits));
+    let mut stretched = leg.clone();
+    stretched.widen(stretch);
     LegParameters {
         name: model.name.clone(),
         u_max: high - low,
         gain_um_per_v: leg.gain_um_per_v * model.actuator.leg_gain() / REFERENCE_GAIN,
         v0_v_per_s: leg.v0_v_per_s * stretch,
-        play_thresholds_v: volts(&leg.play_thresholds_v),
         creep_thresholds_v: volts(&leg.creep_thresholds_v),
         forc_rate_v_per_s: leg.forc_rate_v_per_s * stretch,
         tau_amp_s: model.amplifier.lag,
@@ -107,7 +108,7 @@ pub fn leg(model: &Model, leg: &LegParameters) -> LegParameters {
             amplifier_mv_rms: model.amplifier.noise * 1e3,
             ..leg.noise
         },
-        ..leg.clone()
+        ..stretched
     }
 }
 

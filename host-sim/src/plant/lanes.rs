@@ -39,12 +39,12 @@ pub(crate) fn lane(of: impl Fn(usize) -> f64) -> Lane {
 }
 
 impl StackLanes {
-    /// Six stacks as they are, for steps of `step` (s). None if they have different numbers of operators.
+    /// Six stacks as they are, for steps of `step` (s). None if they have different numbers of operators, or not of plays.
     pub(crate) fn of(stacks: &[&Stack; 6], step: f64) -> Option<Self> {
         let first = stacks[0];
         let operators = |s: &Stack| [s.plays.states.len(), s.creep.rates.len(), s.creep.thresholds.len()];
         let [plays, rates, thresholds] = operators(first);
-        if !stacks.iter().all(|stack| operators(stack) == operators(first)) {
+        if !stacks.iter().all(|stack| stack.bouc_wen.is_none() && operators(stack) == operators(first)) {
             return None;
         }
         let play = |k: usize| {

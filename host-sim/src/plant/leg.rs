@@ -11,6 +11,8 @@
 //! gauge        τ_gauge ṁ = y − m                 shows m
 //! ```
 //!
+//! With `bouc_wen` in its file a leg has x = v − h in place of the plays, dh = α dv − β |dv| h − γ dv |h|: another class of loop.
+//!
 //! The creep makes the loop depend on rate and on minutes of history, and the quadratic term breaks congruency:
 //! an Everett table cannot hold either. The feasibility study that calibrated the parameters gives the chain in words;
 //! this reading of it (weights shared by the thresholds, asymmetry on the plays alone, reversal curves taken from the leg

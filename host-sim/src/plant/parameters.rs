@@ -6,6 +6,8 @@ use std::path::Path;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
+use super::bouc_wen::BoucWenParameters;
+
 /// Parameters of [`super::LegPlant`], field for field as in the file. Its module has the equations.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -22,9 +24,9 @@ pub struct LegParameters {
     pub gain_um_per_v: f64,
     /// s2 of the quadratic asymmetry, −1 < s2 < 1.
     pub s2: f64,
-    /// κ of the rate-dependent thresholds, ≥ 0.
+    /// κ of the rate-dependent thresholds of the plays, ≥ 0.
     pub kappa: f64,
-    /// v0 of the rate-dependent thresholds, V/s.
+    /// v0 of these, V/s.
     #[serde(rename = "v0_V_per_s")]
     pub v0_v_per_s: f64,
     /// Lag of the rate that widens the thresholds, s.
@@ -39,10 +41,14 @@ pub struct LegParameters {
     /// Damping ratio of that resonance, below 1.
     pub zeta: f64,
     /// r_i of the plays, V.
-    #[serde(rename = "play_thresholds_V")]
+    #[serde(rename = "play_thresholds_V", default)]
     pub play_thresholds_v: Vec<f64>,
     /// w_i of the plays.
+    #[serde(default)]
     pub play_weights: Vec<f64>,
+    /// Bouc-Wen hysteresis; there are no plays then.
+    #[serde(default)]
+    pub bouc_wen: Option<BoucWenParameters>,
     /// a_j of the creep, 1/s.
     pub creep_rates_per_s: Vec<f64>,
     /// w_j of the creep, one per rate, shared by the thresholds.
@@ -111,14 +117,47 @@ impl std::error::Error for ParameterError {}
 /// The reference leg's parameter file, as shipped.
 pub const REFERENCE_LEG: &str = include_str!("../../plants/reference-leg.json");
 
+/// The shipped legs, a file for each class: name, text.
+pub const SHIPPED: [(&str, &str); 2] =
+    [("plays", REFERENCE_LEG), ("bouc-wen", include_str!("../../plants/bouc-wen-leg.json"))];
+
 impl LegParameters {
-    /// The reference leg.
+    /// The reference leg, whose hysteresis is plays.
     #[must_use]
     pub fn reference() -> Self {
-        match Self::from_json(REFERENCE_LEG, "reference-leg.json") {
+        let [(name, text), _] = SHIPPED;
+        Self::known(name, text)
+    }
+
+    /// The shipped leg with Bouc-Wen hysteresis and creep alike over five decades of time.
+    #[must_use]
+    pub fn bouc_wen() -> Self {
+        let [_, (name, text)] = SHIPPED;
+        Self::known(name, text)
+    }
+
+    fn known(name: &str, text: &str) -> Self {
+        match Self::from_json(text, name) {
             Ok(parameters) => parameters,
-            // The text is part of the crate and a test parses it; no input of a user leads here.
+            // The texts are part of the crate and a test parses them; no input of a user leads here.
             Err(error) => unreachable!("{error}"),
+        }
+    }
+
+    /// The shipped leg of that name, or what a file of it says, see [`LegParameters::load`].
+    ///
+    /// # Errors
+    /// As [`LegParameters::load`].
+    pub fn named(name: &Path) -> Result<Self, ParameterError> {
+        let shipped = SHIPPED.iter().find(|(shipped, _)| name.as_os_str() == *shipped);
+        shipped.map_or_else(|| Self::load(name), |(name, text)| Self::from_json(text, name))
+    }
+
+    /// Makes its hysteresis `factor` (> 0) times as wide, V for V.
+    pub fn widen(&mut self, factor: f64) {
+        self.play_thresholds_v.iter_mut().for_each(|threshold| *threshold *= factor);
+        if let Some(bouc_wen) = &mut self.bouc_wen {
+            bouc_wen.widen(factor);
         }
     }
 
@@ -131,7 +170,9 @@ impl LegParameters {
         match std::fs::read_to_string(path) {
             Ok(text) => Self::from_json(&text, &file),
             Err(error) => {
-                let finding = format!("cannot be read as text: {error}; name a JSON file of a leg plant");
+                let finding = format!(
+                    "cannot be read as text: {error}; name a JSON file of a leg plant, or `plays` or `bouc-wen`"
+                );
                 Err(ParameterError { file, findings: vec![finding] })
             }
         }
@@ -184,10 +225,15 @@ impl LegParameters {
             }
         }
         for (field, values, ..) in lists {
+            let least = usize::from(!field.starts_with("play") || self.bouc_wen.is_none());
             let count = values.len();
-            if !(1..=1000).contains(&count) {
-                out.push(format!("`{field}` has {count} values; expected 1 to 1000"));
+            let most = if least == 0 { 0 } else { 1000 };
+            if !(least..=most).contains(&count) {
+                out.push(format!("`{field}` has {count} values; expected {least} to {most}"));
             }
+        }
+        if let Some(bouc_wen) = &self.bouc_wen {
+            out.extend(bouc_wen.findings());
         }
         let pairs = [
             ("play_weights", self.play_weights.len(), "play_thresholds_V", self.play_thresholds_v.len()),
@@ -268,6 +314,23 @@ mod tests {
         let reference = LegParameters::reference();
         assert_eq!(reference.play_weights.len(), 24);
         assert_eq!(reference.noise.sensor_nm_rms, 2.2);
+    }
+
+    #[test]
+    fn a_leg_of_bouc_wen_has_no_plays_and_never_shortens_while_its_voltage_rises() {
+        let shipped = SHIPPED[1].1;
+        assert!(LegParameters::bouc_wen().bouc_wen.is_some());
+        assert_eq!(LegParameters::named(Path::new("bouc-wen")).unwrap(), LegParameters::bouc_wen());
+        let refused = |from: &str, to: &str| {
+            let text = shipped.replacen(from, to, 1);
+            assert_ne!(text, shipped, "{from}");
+            LegParameters::from_json(&text, "leg.json").unwrap_err().to_string()
+        };
+        let plays = refused("\"fn_hz\"", "\"play_thresholds_V\": [0.0], \"play_weights\": [1.0], \"fn_hz\"");
+        assert!(plays.contains("`play_weights` has 1 values; expected 0 to 0"), "{plays}");
+        assert!(refused("0.43", "1.2").contains("`bouc_wen.alpha` is 1.2; expected a number > 0 and < 1"));
+        assert!(refused("0.016", "-0.04").contains("would shorten while its voltage rises"));
+        assert!(refused("0.016", "-0.06").contains("`bouc_wen.gamma_per_V` is -0.06; expected a number > -0.05"));
     }
 
     #[test]

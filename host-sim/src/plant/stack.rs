@@ -1,15 +1,18 @@
 //! The piezo stacks of a leg: from their voltage to the displacement of a free, massless leg.
 
 use super::LegParameters;
+use super::bouc_wen::BoucWen;
 use super::creep::CreepBank;
 use super::filter::Lag;
 use super::play::PlayBank;
 
-/// Plays, creep and asymmetry of a leg: the equations of the reference leg between amplifier and structure.
+/// Plays or Bouc-Wen hysteresis, creep and asymmetry of a leg: the equations of a leg between amplifier and structure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stack {
     pub(super) rate: Lag,
     pub(super) plays: PlayBank,
+    /// In place of the plays.
+    pub(super) bouc_wen: Option<BoucWen>,
     pub(super) creep: CreepBank,
     pub(super) asymmetry: f64,
     pub(super) drive_max: f64,
@@ -26,6 +29,7 @@ impl Stack {
         Self {
             rate: Lag::new(p.tau_rate_s),
             plays: PlayBank::new(&p.play_thresholds_v, &p.play_weights, p.kappa, p.v0_v_per_s),
+            bouc_wen: p.bouc_wen.map(BoucWen::new),
             creep: CreepBank::new(&p.creep_rates_per_s, &p.creep_weights, &p.creep_thresholds_v),
             asymmetry: p.s2,
             drive_max: p.u_max,
@@ -57,7 +61,10 @@ impl Stack {
     }
 
     fn displacement(&mut self, v: f64) -> f64 {
-        let x = self.plays.advance(v, self.widening);
+        let x = match &mut self.bouc_wen {
+            Some(hysteresis) => hysteresis.advance(v),
+            None => self.plays.advance(v, self.widening),
+        };
         let c = self.creep.advance(v);
         let bent = x + self.asymmetry * x * (1.0 - x / self.drive_max);
         self.gain * (bent + c)

@@ -82,7 +82,7 @@ impl PlatformPlant {
 
     /// From here on intervals of `interval` (s) are one step each, some ten times as fast and not of the same bits. Second
     /// order as well: at 100 µs half a nanometre at the peak of 56 µm at 10 Hz, a thousandth of what a kick makes ring. Contact, [`PlatformPlant::prepare`] and other intervals
-    /// end it. Legs that differ in the number of their operators are left as they are.
+    /// end it. Legs that differ in the number of their operators, or have Bouc-Wen hysteresis, are left as they are.
     pub fn step_whole_ticks(&mut self, interval: f64) {
         self.step_small();
         if self.structure.contact().is_none() {

@@ -47,7 +47,7 @@ impl Specimen {
         }
     }
 
-    /// Every leg's gain, asymmetry, play thresholds, creep and amplifier lag within ±10 %, each on its own; its stiffness
+    /// Every leg's gain, asymmetry, width of hysteresis, creep and amplifier lag within ±10 %, each on its own; its stiffness
     /// within ±5 %.
     #[must_use]
     pub fn within_tolerances(nominal: &PlatformParameters, leg: &LegParameters, seed: u64) -> Self {
@@ -60,7 +60,7 @@ impl Specimen {
             own.s2 *= factor(LEG_TOLERANCE);
             own.tau_amp_s *= factor(LEG_TOLERANCE);
             let (thresholds, creep) = (factor(LEG_TOLERANCE), factor(LEG_TOLERANCE));
-            own.play_thresholds_v.iter_mut().for_each(|r| *r *= thresholds);
+            own.widen(thresholds);
             own.creep_weights.iter_mut().for_each(|w| *w *= creep);
             own
         });

@@ -32,7 +32,7 @@ pub(super) struct WholeTick {
 
 impl WholeTick {
     /// The plant as it is, for intervals of `interval` (s). `rest` is the free displacement at rest of each leg, µm.
-    /// None if the legs have different numbers of operators.
+    /// None if the legs have different numbers of operators, or not of plays.
     pub(super) fn of(
         amplifiers: &[&Amplifier; 6],
         stacks: &[&Stack; 6],

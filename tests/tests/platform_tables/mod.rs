@@ -4,6 +4,7 @@
 
 mod behaviour;
 pub mod bench;
+mod classes;
 mod limits;
 mod oracle;
 mod tables;

@@ -98,9 +98,9 @@ pub(super) fn frequency(text: &str) -> Result<f64, String> {
 /// Which leg is simulated.
 #[derive(Args, Debug)]
 pub struct PlantArguments {
-    /// Leg parameters (JSON), of which the shape of the hysteresis is taken and scaled to the legs of the spec; the reference
-    /// leg's if not given. The paper's experiments with six legs take them as they are.
-    #[arg(long, value_name = "FILE")]
+    /// Leg whose shape of hysteresis is taken and scaled to the legs of the spec: `plays`, as if not given, `bouc-wen`, or a file
+    /// of leg parameters (JSON). The paper's experiments with six legs take them as they are.
+    #[arg(long, value_name = "LEG")]
     pub(super) plant: Option<PathBuf>,
     /// Without noise and quantisation of gauge and amplifier.
     #[arg(long)]
@@ -113,7 +113,7 @@ pub struct PlantArguments {
 impl PlantArguments {
     pub(super) fn leg(&self) -> Result<LegParameters, Failure> {
         match &self.plant {
-            Some(path) => LegParameters::load(path).map_err(|error| Failure::Gate(error.to_string())),
+            Some(path) => LegParameters::named(path).map_err(|error| Failure::Gate(error.to_string())),
             None => Ok(LegParameters::reference()),
         }
     }

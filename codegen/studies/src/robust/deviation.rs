@@ -120,7 +120,7 @@ impl Deviation {
     fn leg_of(&self, leg: &LegParameters, deviation: &LegDeviation) -> LegParameters {
         let mut own = leg.clone();
         own.gain_um_per_v *= deviation.gain;
-        own.play_thresholds_v.iter_mut().for_each(|threshold| *threshold *= deviation.hysteresis);
+        own.widen(deviation.hysteresis);
         own.creep_weights.iter_mut().for_each(|weight| *weight *= deviation.creep);
         own.tau_amp_s *= deviation.lag;
         own.gauge_lag_s *= deviation.lag;
