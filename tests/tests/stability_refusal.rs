@@ -95,3 +95,13 @@ fn weights_beyond_jury_are_refused_as_such() {
     ];
     verdict(&fixed).unwrap();
 }
+
+/// A weight that the mode in force does not use is told from one in force, and taking it out is accepted.
+#[test]
+fn a_weight_that_is_not_in_force_may_be_taken_out() {
+    let mode = || ("mode         = \"pcc\"", "mode         = \"invhys\"".to_owned());
+    let no_lag = || (LAG, "lag   = \"0 ms\"".to_owned());
+    let (code, help) = verdict(&[no_lag(), mode()]).unwrap_err();
+    assert!(code == "E0402" && help.starts_with("take the weights of level and drift out"), "{help}");
+    verdict(&[no_lag(), mode(), (LEVEL, String::new()), (DRIFT, String::new())]).unwrap();
+}

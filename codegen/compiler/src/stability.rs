@@ -13,7 +13,7 @@ pub mod platform;
 mod sampled;
 
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
-use specgen_language::model::{Adaptation, Model};
+use specgen_language::model::{Adaptation, AdaptationMode, Model};
 
 pub use phase::phase_margin;
 pub use sampled::{LegDynamics, spectral_radius, transition};
@@ -59,6 +59,15 @@ impl Adapting {
         match self {
             Self::Ewma => "EWMA",
             Self::Pcc => "PCC",
+        }
+    }
+
+    /// What of the spec is there for a later change to this law alone, if `mode` is not it.
+    fn unused(self, mode: AdaptationMode) -> Option<&'static str> {
+        match (mode, self) {
+            (AdaptationMode::Invhys, _) => Some("the weights of level and drift"),
+            (AdaptationMode::Ewma, Self::Pcc) => Some("the weight of the drift"),
+            _ => None,
         }
     }
 
@@ -110,7 +119,7 @@ fn check_law(
              but gain_ratio goes up to {highest_ratio} (Jury, {source})",
             law.name()
         );
-        return Err(vec![refusal(model, codes::UNSTABLE_STATIC, message, largest)]);
+        return Err(vec![refusal(model, codes::UNSTABLE_STATIC, law, message, largest)]);
     }
     let radius = worst_radius(dynamics, adaptation, law, 1.0);
     if radius > LARGEST_RADIUS {
@@ -125,7 +134,7 @@ fn check_law(
             gauge_lag_text(dynamics.gauge_lag),
             adaptation.gain_ratio
         );
-        return Err(vec![refusal(model, codes::UNSTABLE_SAMPLED, message, largest)]);
+        return Err(vec![refusal(model, codes::UNSTABLE_SAMPLED, law, message, largest)]);
     }
     Ok((static_limit, radius))
 }
@@ -179,7 +188,7 @@ fn largest_level_weight(dynamics: &LegDynamics, adaptation: &Adaptation, law: Ad
 }
 
 /// `largest` is rounded down to what the message shows, so that the number shown is itself accepted.
-fn refusal(model: &Model, code: Code, message: String, largest: f64) -> Diagnostic {
+fn refusal(model: &Model, code: Code, law: Adapting, mut message: String, largest: f64) -> Diagnostic {
     let bandwidth = model.spans.contains_key("adaptation.level_bandwidth");
     let key = if bandwidth { "adaptation.level_bandwidth" } else { "adaptation.level_weight" };
     let run = model.timing.period * f64::from(model.adaptation.run_interval);
@@ -204,5 +213,11 @@ fn refusal(model: &Model, code: Code, message: String, largest: f64) -> Diagnost
             "the largest stable {name} is {level}{unit}{drift}; or lengthen the run, or narrow `adaptation.gain_ratio`, or check `amplifier.lag`, `actuator.resonance` and `timing.period`, which make the loop"
         )
     };
+    let unused = law.unused(model.adaptation.mode);
+    if unused.is_some() {
+        message += "; the mode in force does not use it, but a running controller can be switched to it";
+    }
+    let help = unused
+        .map_or_else(|| help.clone(), |weights| format!("take {weights} out, and it cannot be switched to; or {help}"));
     Diagnostic::at(&model.spans, &[key], code, message, help)
 }
