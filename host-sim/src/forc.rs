@@ -37,6 +37,32 @@ impl ReversalExperiment {
         self.drive_max * (n + 1.0) / self.rate
     }
 
+    /// The same with even rows, `sampling` (Hz) of them a second: the slope changes by less than half a row of an interval.
+    #[must_use]
+    pub fn sampled(self, sampling: f64) -> Self {
+        let interval = self.drive_max / f64::from(self.intervals);
+        let rows = (sampling * interval / self.rate).round().clamp(1.0, 1e7);
+        Self { rows_per_interval: rows as u32, rate: sampling * interval / rows, ..self }
+    }
+
+    /// The drive of every row, V, above `lowest`: before the curves it goes there from 0 V at the same slope, and rests for
+    /// `rest` (s).
+    #[must_use]
+    pub fn drive(&self, lowest: f64, rest: f64) -> Vec<f64> {
+        let levels = self.intervals * self.rows_per_interval;
+        let step = self.drive_max / f64::from(levels);
+        let approach = (lowest.abs() / step).ceil();
+        let resting = (rest * self.rate / step).ceil();
+        let mut drive: Vec<f64> = (0..approach as u32).map(|k| lowest * f64::from(k) / approach).collect();
+        drive.extend(std::iter::repeat_n(lowest, resting as usize + 1));
+        for curve in 1..=self.intervals {
+            let peak = curve * self.rows_per_interval;
+            let at = |level: u32| lowest + f64::from(level) * self.drive_max / f64::from(levels);
+            drive.extend((1..=peak).chain((0..peak).rev()).map(at));
+        }
+        drive
+    }
+
     /// Runs on `leg` from its present state, which is to be at 0 V; the first row is that state at time 0.
     ///
     /// The reference figures come from a leg as built: a saturating pre-cycle before the curves leaves creep in them and
@@ -107,7 +133,8 @@ impl ReversalRecord {
 }
 
 /// Decimal with at most `digits` after the point and no trailing zeros; −0 becomes 0.
-fn trimmed(value: f64, digits: usize) -> String {
+#[must_use]
+pub fn trimmed(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
@@ -149,6 +176,19 @@ mod tests {
         assert_eq!(node(32), 1);
         assert_eq!(node(31), 3);
         assert_eq!(node(1), 63);
+    }
+
+    #[test]
+    fn the_drive_alone_goes_to_the_lowest_voltage_and_then_along_the_curves() {
+        let experiment = ReversalExperiment { drive_max: 180.0, ..ReversalExperiment::reference(8) }.sampled(1000.0);
+        let drive = experiment.drive(-90.0, 1.0);
+        assert!((experiment.rate / 20.0 - 1.0).abs() < 1e-3);
+        let steepest = drive.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+        assert!(steepest <= experiment.rate / 1000.0 * (1.0 + 1e-9), "{steepest}");
+        assert_eq!(drive.iter().filter(|u| **u == 90.0).count(), 1);
+        assert!((drive[0], drive.last()) == (0.0, Some(&-90.0)) && drive.iter().all(|u| (-90.0..=90.0).contains(u)));
+        let rest = drive.windows(2).filter(|w| w == &[-90.0, -90.0]).count();
+        assert_eq!(rest, 1000);
     }
 
     #[test]

@@ -1,9 +1,11 @@
-//! `specgen forc`: the experiment that records reversal curves, on a simulated leg that is not of the controller's model class.
+//! `specgen forc`: the experiment that records reversal curves, on a simulated leg that is not of the controller's model class;
+//! or its drive alone, for a generator.
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::forc::{ReversalExperiment, ReversalRecord};
+use host_sim::forc::{ReversalExperiment, ReversalRecord, trimmed};
 use host_sim::noise::Gauge;
 use host_sim::plant::{LegParameters, LegPlant, NoiseParameters};
 use serde::Serialize;
@@ -12,6 +14,7 @@ use specgen_report::chart::{Axis, Chart, LINE};
 use specgen_studies::machine;
 
 use super::file::write_file;
+use super::identify::range;
 use super::plot::Plot;
 use super::sim::PlantArguments;
 use super::spec;
@@ -29,7 +32,7 @@ pub struct Arguments {
     /// Simulate a leg of this spec: its stroke, voltages, amplifier and gauge noise. Without it, the reference leg. The records
     /// that the spec names need not be there.
     spec: Option<PathBuf>,
-    /// File to write: CSV with time_s, drive_V, displacement_um.
+    /// File to write: CSV with time_s, drive_V, displacement_um; without displacement for --drive-only.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Reversal curves, and cells per axis of the grid that they identify; 32, or the grid of the spec.
@@ -39,6 +42,15 @@ pub struct Arguments {
     /// needs.
     #[arg(long, value_name = "V/S", allow_negative_numbers = true, value_parser = slope)]
     rate: Option<f64>,
+    /// Write the drive alone, for a generator: from 0 V to the lowest voltage, a second there, then the curves.
+    #[arg(long, conflicts_with_all = ["plot", "seed", "no_noise"])]
+    drive_only: bool,
+    /// Voltages of --drive-only, such as -90:90; those of the spec, or 0:100, if not given.
+    #[arg(long, value_name = "MIN:MAX", value_parser = range, allow_hyphen_values = true, requires = "drive_only")]
+    drive: Option<[f64; 2]>,
+    /// Samples per second of --drive-only, Hz.
+    #[arg(long, value_name = "HZ", requires = "drive_only", default_value_t = 10_000.0, value_parser = sampling, allow_negative_numbers = true)]
+    sampling: f64,
     #[command(flatten)]
     plot: Plot,
     #[command(flatten)]
@@ -49,6 +61,11 @@ pub struct Arguments {
 fn slope(text: &str) -> Result<f64, String> {
     let expected = || format!("expected a slope from 0.1 to 100000 V/s, found `{text}`");
     text.parse().ok().filter(|rate| (0.1..=1e5).contains(rate)).ok_or_else(expected)
+}
+
+fn sampling(text: &str) -> Result<f64, String> {
+    let expected = || format!("expected 1 to 1000000 samples per second, found `{text}`");
+    text.parse().ok().filter(|rate| (1.0..=1e6).contains(rate)).ok_or_else(expected)
 }
 
 /// The record of reversal curves that was written.
@@ -75,6 +92,9 @@ impl Outcome for Curves {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    if arguments.drive_only {
+        return drive_alone(arguments, ui);
+    }
     let experiment = Experiment {
         grid: arguments.grid,
         rate: arguments.rate,
@@ -90,6 +110,41 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     write_file(&arguments.output, record.to_csv().as_bytes())?;
     let plot = arguments.plot.charts("reversal curves", "displacement over drive", &[chart(&record)])?;
     ui.result(&Curves { rows, file: arguments.output.display().to_string(), plot });
+    Ok(())
+}
+
+/// Samples of a drive for a generator are at most so many.
+const MOST_SAMPLES: f64 = 1e7;
+
+/// Writes the drive of the experiment.
+fn drive_alone(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let model = arguments.spec.as_deref().map(spec::model).transpose()?;
+    let of_spec = model.as_ref().map(|model| (model.actuator.voltage, model.hysteresis.grid as u32));
+    let (voltage, grid) = of_spec.unwrap_or(([0.0, 100.0], CURVES));
+    let [lowest, highest] = arguments.drive.unwrap_or(voltage);
+    let span = highest - lowest;
+    let reference = ReversalExperiment::reference(arguments.grid.unwrap_or(grid));
+    let rate = arguments.rate.unwrap_or(span / CROSSING);
+    let experiment = ReversalExperiment { drive_max: span, rate, ..reference }.sampled(arguments.sampling);
+    let rows = experiment.duration() * arguments.sampling;
+    if rows > MOST_SAMPLES {
+        let most = arguments.sampling * MOST_SAMPLES / rows;
+        return Err(Failure::Usage(format!(
+            "the drive goes on for {:.0} s, {rows:.1e} samples at {} Hz: give --sampling {:.0}, or a higher --rate",
+            experiment.duration(),
+            arguments.sampling,
+            most.floor()
+        )));
+    }
+    let drive = experiment.drive(lowest, 1.0);
+    let rows = drive.len();
+    let mut text = String::from("time_s,drive_V\n");
+    for (k, u) in drive.iter().enumerate() {
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "{},{}", trimmed(k as f64 / arguments.sampling, 8), trimmed(*u, 6));
+    }
+    write_file(&arguments.output, text.as_bytes())?;
+    ui.result(&Curves { rows, file: arguments.output.display().to_string(), plot: None });
     Ok(())
 }
 

@@ -8,6 +8,7 @@ mod gauge;
 mod linear;
 mod predict;
 mod rate;
+mod reading;
 mod response;
 mod stiffness;
 
@@ -18,6 +19,7 @@ use super::ui::{Failure, Ui};
 use specgen_compiler::compile::Refused;
 use specgen_language::diagnostic::Diagnostic;
 
+pub(super) use everett::range;
 pub use everett::summary;
 
 /// Arguments of `identify`.
