@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::identify_support::{Drive, generator};
 use rand_chacha::rand_core::Rng;
 use specgen::diagnostic::{Diagnostic, Place, Severity};
-use specgen::identify::{Options, Record, identify, read_record};
+use specgen::identify::{Options, Reading, Record, identify, read_file, read_record};
 
 const RANGE: [f64; 2] = [0.0, 100.0];
 
@@ -32,7 +32,7 @@ fn read(bytes: &[u8]) -> Result<Record, Vec<Diagnostic>> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("record.csv");
     std::fs::write(&path, bytes).unwrap();
-    read_record(&path, "record.csv")
+    read_record(&path, "record.csv", &Reading::default())
 }
 
 /// Errors of reading, or of identification if reading succeeds.
@@ -84,8 +84,16 @@ fn byte_order_mark_windows_lines_comments_and_column_order_are_accepted() {
 
 #[test]
 fn files_that_are_no_text() {
-    expect(&read_record(Path::new("no/such/file.csv"), "record.csv").unwrap_err(), "E0501", "cannot be read");
-    expect(&read_record(&std::env::temp_dir(), "record.csv").unwrap_err(), "E0501", "cannot be read");
+    expect(
+        &read_record(Path::new("no/such/file.csv"), "record.csv", &Reading::default()).unwrap_err(),
+        "E0501",
+        "cannot be read",
+    );
+    expect(
+        &read_record(&std::env::temp_dir(), "record.csv", &Reading::default()).unwrap_err(),
+        "E0501",
+        "cannot be read",
+    );
     expect(&errors(b""), "E0504", "is empty");
     expect(&errors(b"\n\n"), "E0504", "is empty");
     assert_eq!(expect(&errors(b"time_s,drive_V,displacement_um\n0,1,\xff\n"), "E0503", "0xff"), Some(2));
@@ -94,24 +102,26 @@ fn files_that_are_no_text() {
 }
 
 #[test]
-fn a_huge_file_is_refused_without_reading_it_whole() {
+fn a_huge_file_that_is_no_text_is_refused_without_reading_it_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("huge.csv");
     // A sparse file: a length, but no blocks.
     std::fs::File::create(&path).unwrap().set_len(1 << 40).unwrap();
-    let all = read_record(&path, "record.csv").unwrap_err();
-    expect(&all, "E0502", "larger than 256 MiB");
+    let all = read_record(&path, "record.csv", &Reading::default()).unwrap_err();
+    expect(&all, "E0503", "0x00");
+    let table = read_file(&path, "table.csv").unwrap_err();
+    assert!(table[0].code == "E0502" && table[0].message.contains("larger than 256 MiB"), "{table:?}");
 }
 
 #[test]
 fn columns() {
     let text = csv(&good());
     expect(&errors(text.replacen("drive_V", "drve_V", 1).as_bytes()), "E0504", "`drive_V` is missing");
-    let all = errors(text.replacen("displacement_um", "displacement_nm", 1).as_bytes());
-    assert!(all[0].help.contains("another unit"), "{all:?}");
-    let all = errors(text.replace(',', ";").as_bytes());
+    let all = errors(text.replacen("displacement_um", "displacement_inch", 1).as_bytes());
+    assert!(all[0].help.contains("`displacement_nm`"), "{all:?}");
+    let all = errors(text.replacen("time_s,drive_V,displacement_um", "a,b,c", 1).as_bytes());
     assert_eq!(all.len(), 3, "all three columns are reported: {all:?}");
-    assert!(all[0].help.contains("commas"));
+    assert!(all[0].help.contains("--columns time_s=COLUMN"));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::fs;
 const RECORD: &str = "specs/records/leg1.csv";
 
 fn table(grid: usize, drive: [f64; 2]) -> String {
-    let record = identify::read_record(&repository().join(RECORD), "leg1.csv").unwrap();
+    let record = identify::read_record(&repository().join(RECORD), "leg1.csv", &identify::Reading::default()).unwrap();
     identify::write_table_csv(&identify::identify(&record, &Options::new(grid, drive)).unwrap().table)
 }
 

@@ -127,12 +127,23 @@ fn a_missing_column_is_named() {
     refused(text_changed(two), &expect(1, "E0504", missing, "displacement_um"));
     let headless = text_changed(|text| text.split_once('\n').unwrap().1.to_owned());
     refused(headless, &expect(1, "E0504", &["`time_s` is missing"], "the first line must be the header"));
-    let other = text_changed(|text| text.replace("drive_V", "drive_mV"));
-    refused(other, &expect(1, "E0504", &["`drive_V` is missing", "`drive_mV`"], "drive"));
-    let semicolons = text_changed(|text| text.replace(',', ";"));
-    refused(semicolons, &expect(1, "E0504", &["`time_s` is missing"], "separate the columns by commas"));
+    let other = text_changed(|text| text.replace("drive_V", "drive_A"));
+    refused(other, &expect(1, "E0504", &["`drive_V` is missing", "`drive_A`"], "`drive_mV`"));
+    let commas = text_changed(|text| {
+        text.lines()
+            .enumerate()
+            .map(|(k, line)| if k == 0 { line.to_owned() } else { in_comma_decimals(line) } + "\n")
+            .collect()
+    });
+    refused(commas, &expect(2, "E0506", &["has 6 numbers for 3 columns"], "`0,0;0,0;"));
     let twice = text_changed(|text| text.replace("displacement_um", "drive_V"));
     refused(twice, &expect(1, "E0505", &["`drive_V` appears twice", "columns 2 and 3"], "keep one"));
+}
+
+/// A line of numbers, each with a decimal comma.
+fn in_comma_decimals(line: &str) -> String {
+    let number = |field: &str| if field.contains('.') { field.replace('.', ",") } else { format!("{field},0") };
+    line.split(',').map(number).collect::<Vec<_>>().join(",")
 }
 
 #[test]

@@ -1,8 +1,23 @@
-//! Reads columns of numbers from CSV text: a header that names them, values between commas, comments behind `#`. How the
-//! mistakes of a kind of file are called stands in its [`Format`].
+//! Reads columns of numbers from text files: names, then values. How a file of the bench separates its columns, writes its
+//! decimals and what it has above the names is found in its first lines; text behind `#` or `%` at the beginning of a line is
+//! a comment. How the mistakes of a kind of file are called stands in its [`Format`]. Lines are read one after the other, so
+//! that only the numbers are kept.
+
+mod dialect;
+pub(crate) mod foreign;
+mod head;
+mod input;
+mod line_numbers;
+pub(crate) mod names;
+
+use std::io::Read;
 
 use super::findings::Findings;
+use dialect::{decoded, is_blank, is_comment, split};
+use input::Input;
 use specgen_language::diagnostic::{Code, codes};
+
+pub(crate) use line_numbers::LineNumbers;
 
 /// What a kind of file calls its mistakes.
 #[derive(Debug)]
@@ -17,6 +32,8 @@ pub(crate) struct Format {
     pub(crate) longer_lines: bool,
     /// Message and help for any line without a finite number in every column, instead of what is wrong with each value.
     pub(crate) whole_line: Option<[&'static str; 2]>,
+    /// Whether a preamble may stand above the names.
+    pub(crate) preamble: bool,
 }
 
 /// Records of the bench.
@@ -26,129 +43,224 @@ pub(crate) const RECORD: Format = Format {
     not_finite: (codes::RECORD_NOT_FINITE, "delete the sample, or record again"),
     longer_lines: true,
     whole_line: None,
+    preamble: true,
 };
+
+/// More samples are refused: a few columns of so many take a gigabyte.
+const MAX_SAMPLES: usize = 1 << 25;
 
 /// The header of a file.
 #[derive(Debug)]
 pub(crate) struct Header {
-    /// Names of the columns, without white space around them.
+    /// Names of the columns, without white space around them; none where the file begins with numbers.
     pub(crate) names: Vec<String>,
     /// Its line, counted from 1.
     pub(crate) line: usize,
+    /// Time between the samples that a preamble states, s.
+    pub(crate) interval: Option<f64>,
+}
+
+/// A column that is read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Column<'a> {
+    /// Its place, from 0.
+    pub(crate) at: usize,
+    /// Its name for messages.
+    pub(crate) name: &'a str,
+    /// How many of its unit are one of what is wanted.
+    pub(crate) per: f64,
 }
 
 /// The lines behind the header.
 pub(crate) struct Lines<'a> {
     format: &'a Format,
     names: usize,
-    reader: csv::Reader<&'a [u8]>,
+    separator: u8,
+    /// Decimal sign of the file, once a number has one.
+    decimal: Option<char>,
+    input: Input<'a>,
 }
 
 /// Reads the header; `None` after the problem was reported.
-pub(crate) fn open<'a>(text: &'a str, format: &'a Format, findings: &mut Findings) -> Option<(Header, Lines<'a>)> {
-    let mut reader =
-        csv::ReaderBuilder::new().flexible(true).comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
-    let header = reader.headers().map(|header| Header {
-        names: header.iter().map(str::to_owned).collect(),
-        line: header.position().map_or(1, |p| p.line() as usize),
-    });
-    match header {
-        Ok(header) => {
-            let names = header.names.len();
-            Some((header, Lines { format, names, reader }))
-        }
+pub(crate) fn open<'a>(
+    source: impl Read + 'a,
+    format: &'a Format,
+    findings: &mut Findings,
+) -> Option<(Header, Lines<'a>)> {
+    let mut input = Input::new(source);
+    let mut lines = match input.head(head::LINES) {
+        Ok(lines) => lines,
         Err(e) => {
-            findings.add(format.header, Some(1), format!("the header cannot be read: {e}"), "write plain CSV");
-            None
+            findings.add(format.header, None, format!("cannot be read: {e}"), "write plain CSV");
+            return None;
+        }
+    };
+    if let Some((number, line)) = lines.first() {
+        if foreign::report(line, findings) {
+            return None;
+        }
+        if let Some(at) = line.iter().position(|byte| *byte == 0) {
+            not_text(Some(*number), at, 0, findings);
+            return None;
         }
     }
+    let found = if format.preamble { head::of_record(&lines) } else { head::plain(&lines) };
+    let Some(found) = found else {
+        if format.preamble {
+            findings.add(format.header, None, "is empty".to_owned(), EMPTY);
+            return None;
+        }
+        let header = Header { names: Vec::new(), line: 1, interval: None };
+        return Some((header, Lines { format, names: 0, separator: b',', decimal: None, input }));
+    };
+    lines.drain(..found.next);
+    if format.preamble && check_decimal_commas(&found, &lines, format, findings) {
+        return None;
+    }
+    input.put_back(lines);
+    let lines = Lines { format, names: found.names.len(), separator: found.separator, decimal: None, input };
+    Some((Header { names: found.names, line: found.line, interval: found.interval }, lines))
 }
 
-impl Header {
-    /// The place of the column `name`, in upper or lower case; `None` after two of that name were reported. If there is none
-    /// and a help is given, it is reported, too.
-    pub(crate) fn place(&self, name: &str, help: Option<&str>, findings: &mut Findings) -> Option<usize> {
-        let same = |k: &usize| self.names[*k].eq_ignore_ascii_case(name);
-        let matching: Vec<usize> = (0..self.names.len()).filter(same).collect();
-        match (&matching[..], help) {
-            ([only], _) => return Some(*only),
-            ([first, second, ..], _) => {
-                let message = format!("column `{name}` appears twice, as columns {} and {}", first + 1, second + 1);
-                findings.add(codes::RECORD_COLUMN_TWICE, Some(self.line), message, "keep one of them");
-            }
-            ([], Some(help)) => {
-                let present: Vec<String> = self.names.iter().map(|name| format!("`{name}`")).collect();
-                let message = format!("column `{name}` is missing; the header has {}", present.join(", "));
-                findings.add(codes::RECORD_HEADER, Some(self.line), message, help);
-            }
-            ([], None) => {}
-        }
-        None
+const EMPTY: &str = "the first line must be the header `time_s,drive_V,displacement_um`";
+
+/// Reports a byte of value `byte` that no text has, at `at` of its line.
+fn not_text(line: Option<usize>, at: usize, byte: u8, findings: &mut Findings) {
+    let message = format!("is not a text file in UTF-8: byte {at} of the line is 0x{byte:02x}");
+    findings.add(codes::RECORD_NOT_TEXT, line, message, "export the record as CSV text in UTF-8");
+}
+
+/// Rows that are looked at for decimal commas.
+const ROWS: usize = 10;
+
+/// Reports commas that are decimal signs and separators at once; whether there are.
+fn check_decimal_commas(
+    head: &head::Head,
+    lines: &[(usize, Vec<u8>)],
+    format: &Format,
+    findings: &mut Findings,
+) -> bool {
+    let rows = || lines.iter().filter(|(_, line)| !is_blank(line) && !is_comment(line)).take(ROWS);
+    let is_longer = |line: &[u8]| split(line, b',').len() > head.names.len() + 1;
+    let Some((number, line)) = rows().next() else { return false };
+    let no_points = rows().all(|(_, line)| dialect::is_row(line, b',') && !line.contains(&b'.'));
+    if head.separator != b',' || head.names.len() < 2 || !no_points || !rows().all(|(_, line)| is_longer(line)) {
+        return false;
     }
+    let fields: Vec<String> = split(line, b',').into_iter().map(decoded).collect();
+    let mended: Vec<String> = fields.chunks(2).map(|pair| pair.join(",")).collect();
+    let example = if fields.len() == 2 * head.names.len() {
+        format!("; this line is then `{}`", mended.join(";"))
+    } else {
+        String::new()
+    };
+    let message = format!(
+        "has {} numbers for {} columns: a comma seems to be the decimal sign, and the separator, too",
+        fields.len(),
+        head.names.len()
+    );
+    let help = format!("export with semicolons or tabs between the columns, or with decimal points{example}");
+    findings.add(format.value, Some(*number), message, &help);
+    true
 }
 
 impl Lines<'_> {
-    /// Line numbers, and the values of the columns at `wanted`, each with its name for messages; NaN after the problem with a
-    /// value was reported.
-    pub(crate) fn read(mut self, wanted: &[(usize, &str)], findings: &mut Findings) -> (Vec<usize>, Vec<Vec<f64>>) {
-        let format = self.format;
-        let mut lines = Vec::new();
+    /// Line numbers, and the values of the columns `wanted`; NaN after the problem with a value was reported.
+    pub(crate) fn read(mut self, wanted: &[Column], findings: &mut Findings) -> (LineNumbers, Vec<Vec<f64>>) {
+        let mut lines = LineNumbers::default();
         let mut columns = vec![Vec::new(); wanted.len()];
-        for row in self.reader.records() {
-            let row = match row {
-                Ok(row) => row,
+        let mut text = Vec::new();
+        loop {
+            let line = match self.input.next(&mut text) {
+                Ok(Some(line)) => line,
+                Ok(None) => break,
                 Err(e) => {
-                    let line = e.position().map(|p| p.line() as usize);
-                    findings.add(format.value, line, format!("cannot be read as CSV: {e}"), "write plain CSV");
-                    continue;
+                    findings.add(self.format.value, None, format!("cannot be read on: {e}"), "write plain CSV");
+                    break;
                 }
             };
-            let line = row.position().map_or(0, |p| p.line() as usize);
+            if is_blank(&text) || is_comment(&text) {
+                continue;
+            }
+            if lines.len() == MAX_SAMPLES {
+                let message = format!("has more than {MAX_SAMPLES} samples");
+                let help = "record at a lower rate, or keep every n-th sample";
+                findings.add(codes::RECORD_TOO_LARGE, Some(line), message, help);
+                break;
+            }
             lines.push(line);
-            if let Some([message, help]) = format.whole_line {
-                let number = |field: &str| field.parse().is_ok_and(f64::is_finite);
-                if row.len() != self.names || !row.iter().all(number) {
-                    findings.add(format.value, Some(line), message.to_owned(), help);
+            let fields = split(&text, self.separator);
+            if let Some([message, help]) = self.format.whole_line {
+                let number = |field: &&[u8]| self.finite(field).is_some();
+                if fields.len() != self.names || !fields.iter().all(number) {
+                    findings.add(self.format.value, Some(line), message.to_owned(), help);
                     columns.iter_mut().for_each(|column| column.push(f64::NAN));
                     continue;
                 }
             }
-            for (column, (at, name)) in columns.iter_mut().zip(wanted) {
-                column.push(format.number(row.get(*at), line, name, findings));
+            for (column, wanted) in columns.iter_mut().zip(wanted) {
+                let value = self.number(fields.get(wanted.at).copied(), line, wanted.name, findings);
+                column.push(value / wanted.per);
             }
-            if row.len() > self.names && !format.longer_lines {
-                let message = format!("has {} values, expected {}", row.len(), self.names);
-                findings.add(format.value, Some(line), message, "one value to each column, a point as decimal sign");
+            if fields.len() > self.names && !self.format.longer_lines {
+                let message = format!("has {} values, expected {}", fields.len(), self.names);
+                let help = "one value to each column, a point as decimal sign";
+                findings.add(self.format.value, Some(line), message, help);
             }
         }
         (lines, columns)
     }
-}
 
-impl Format {
+    fn finite(&self, field: &[u8]) -> Option<f64> {
+        let (value, _) = dialect::number(std::str::from_utf8(field).ok()?, self.separator)?;
+        Some(value).filter(|value| value.is_finite())
+    }
+
     /// The number in a field, or NaN after the problem was reported.
-    fn number(&self, field: Option<&str>, line: usize, name: &str, findings: &mut Findings) -> f64 {
+    fn number(&mut self, field: Option<&[u8]>, line: usize, name: &str, findings: &mut Findings) -> f64 {
+        let format = self.format;
         let Some(field) = field else {
             let message = format!("`{name}` is missing: the line is too short");
-            findings.add(self.value, Some(line), message, "complete or delete the line");
+            findings.add(format.value, Some(line), message, "complete or delete the line");
             return f64::NAN;
         };
-        match field.parse::<f64>() {
-            Ok(x) if x.is_finite() => return x,
-            Ok(_) => self.report_not_finite(line, name, field, findings),
-            Err(_) => {
-                let shown: String = field.chars().take(40).collect();
+        let bad = std::str::from_utf8(field).err().map(|e| e.valid_up_to());
+        if let Some(at) = bad.or_else(|| field.iter().position(|byte| *byte == 0)) {
+            not_text(Some(line), at, field[at], findings);
+            return f64::NAN;
+        }
+        let text = decoded(field);
+        match dialect::number(&text, self.separator) {
+            Some((value, _)) if !value.is_finite() => format.report_not_finite(line, name, &text, findings),
+            Some((value, sign)) => {
+                if sign.is_none() || *self.decimal.get_or_insert(sign.unwrap_or('.')) == sign.unwrap_or('.') {
+                    return value;
+                }
+                let message = format!("`{name}` is `{text}`: the numbers above have another decimal sign");
+                findings.add(format.value, Some(line), message, "write all numbers with the same decimal sign");
+            }
+            None => {
+                let shown: String = text.chars().take(40).collect();
                 let message = format!("`{name}` is `{shown}`, which is not a number");
                 let help = "write a plain number with a decimal point, such as -12.5e-3";
-                findings.add(self.value, Some(line), message, help);
+                findings.add(format.value, Some(line), message, help);
             }
         }
         f64::NAN
     }
+}
 
+impl Format {
     /// Reports NaN or infinity.
     pub(crate) fn report_not_finite(&self, line: usize, name: &str, shown: &str, findings: &mut Findings) {
         let (code, help) = self.not_finite;
         findings.add(code, Some(line), format!("`{name}` is `{shown}`, not a finite number"), help);
+    }
+}
+
+impl<'a> Column<'a> {
+    /// A column in the unit that is wanted.
+    pub(crate) const fn plain(at: usize, name: &'a str) -> Self {
+        Self { at, name, per: 1.0 }
     }
 }

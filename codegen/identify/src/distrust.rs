@@ -1,5 +1,6 @@
 //! Samples that a record holds but that a fit must not believe: they get no weight, and a finding says when they were.
 
+use super::columns::LineNumbers;
 use super::findings::Findings;
 use super::statistics::{extent, median, noise_floor};
 use specgen_language::diagnostic::codes;
@@ -20,7 +21,7 @@ pub(crate) const SETTLING: usize = 200;
 
 /// Which samples get no weight: glitches of the displacement, and what follows a jump of the drive.
 pub(crate) fn weightless(
-    lines: &[usize],
+    lines: &LineNumbers,
     time: &[f64],
     drive: &[f64],
     displacement: &[f64],
@@ -33,7 +34,7 @@ pub(crate) fn weightless(
 }
 
 fn glitches(
-    lines: &[usize],
+    lines: &LineNumbers,
     time: &[f64],
     drive: &[f64],
     displacement: &[f64],
@@ -69,14 +70,14 @@ fn glitches(
         );
         findings.add(
             codes::RECORD_GLITCH,
-            Some(lines[k]),
+            Some(lines.at(k)),
             message,
             "look for interference or a loose contact, or record again",
         );
     }
 }
 
-fn jumps(lines: &[usize], time: &[f64], drive: &[f64], weightless: &mut [bool], findings: &mut Findings) {
+fn jumps(lines: &LineNumbers, time: &[f64], drive: &[f64], weightless: &mut [bool], findings: &mut Findings) {
     let (low, high) = extent(drive);
     let mut k = 1;
     while k < drive.len() {
@@ -95,7 +96,7 @@ fn jumps(lines: &[usize], time: &[f64], drive: &[f64], weightless: &mut [bool], 
         );
         findings.add(
             codes::RECORD_JUMP,
-            Some(lines[k]),
+            Some(lines.at(k)),
             message,
             "drive by ramps or sines: a jump excites the resonance, which hides the hysteresis",
         );

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::columns::{self, Format};
+use super::columns::{self, Column, Format, LineNumbers};
 use super::findings::Findings;
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::{Code, Diagnostic, codes};
@@ -57,20 +57,26 @@ pub(crate) fn read_nodes(
     line: [&'static str; 2],
     largest: f64,
     findings: &mut Findings,
-) -> Option<(EverettTable, Vec<usize>)> {
+) -> Option<(EverettTable, LineNumbers)> {
     let [message, help] = line;
     if text.lines().next().is_none_or(|first| first.trim() != header) {
         findings.add(code, Some(1), format!("the header must be `{header}`"), help);
         return None;
     }
-    let format =
-        Format { header: code, value: code, not_finite: (code, help), longer_lines: false, whole_line: Some(line) };
-    let (_, lines) = columns::open(text, &format, findings)?;
-    let (lines, values) = lines.read(&[(0, ""), (1, ""), (2, "")], findings);
+    let format = Format {
+        header: code,
+        value: code,
+        not_finite: (code, help),
+        longer_lines: false,
+        whole_line: Some(line),
+        preamble: false,
+    };
+    let (_, lines) = columns::open(text.as_bytes(), &format, findings)?;
+    let (lines, values) = lines.read(&[0, 1, 2].map(|at| Column::plain(at, "")), findings);
     let [ups, downs, values] = <[Vec<f64>; 3]>::try_from(values).ok()?;
     let nodes: Vec<f64> = values.iter().map(|value| value * 1e-6).collect();
     for (line, _) in lines.iter().zip(&nodes).filter(|(_, node)| node.abs() > largest) {
-        findings.add(code, Some(*line), message.to_owned(), help);
+        findings.add(code, Some(line), message.to_owned(), help);
     }
     if findings.any_error() {
         return None;
@@ -94,7 +100,7 @@ pub(crate) fn read_nodes(
             if (ups[at] - wanted[0]).abs() > tolerance || (downs[at] - wanted[1]).abs() > tolerance {
                 let message =
                     format!("thresholds {} V, {} V; expected {} V, {} V", ups[at], downs[at], wanted[0], wanted[1]);
-                findings.add(code, Some(lines[at]), message, help);
+                findings.add(code, Some(lines.at(at)), message, help);
             }
         }
     }
@@ -102,7 +108,7 @@ pub(crate) fn read_nodes(
 }
 
 /// A table with a negative weight is not monotone, so that its inverse is not unique. Rounding is let pass.
-fn check_weights(table: &EverettTable, lines: &[usize], findings: &mut Findings) {
+fn check_weights(table: &EverettTable, lines: &LineNumbers, findings: &mut Findings) {
     let rounding = 1e-9 * table.node(table.grid, 0).abs();
     for up in 1..=table.grid {
         for down in 0..up {
@@ -116,7 +122,7 @@ fn check_weights(table: &EverettTable, lines: &[usize], findings: &mut Findings)
                 );
                 findings.add(
                     codes::TABLE_FILE,
-                    Some(lines[EverettTable::index(up, down)]),
+                    Some(lines.at(EverettTable::index(up, down))),
                     message,
                     "identify the record again",
                 );

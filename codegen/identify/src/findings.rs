@@ -21,6 +21,11 @@ impl Findings {
         Self { path: path.to_owned(), found: Vec::new(), count: BTreeMap::new() }
     }
 
+    /// The file as the user knows it.
+    pub(crate) fn path(&self) -> &str {
+        &self.path
+    }
+
     /// Adds a finding about `line`, or about the whole file, as bad as its code.
     pub(crate) fn add(&mut self, code: Code, line: Option<usize>, message: String, help: &str) {
         let (_, count) = self.count.entry(code.id).or_insert((code, 0));

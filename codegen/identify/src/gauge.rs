@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::findings::Findings;
 use super::least_squares::{Fit, fit, mean_square};
+use super::reading::Reading;
 use super::signals::{self, Signals, Wanted};
 use super::statistics::{extent, median};
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -78,8 +79,13 @@ const COLUMNS: [Wanted; 3] = [
 /// # Errors
 /// All findings if the record cannot be read or calibrated: E0512 and E0513 for a gauge that does not move, E0635 for a
 /// calibration that is not monotone, E0636 for too few samples or a wrong unit.
-pub fn calibrate(path: &Path, shown_as: &str, degree: Option<usize>) -> Result<GaugeReport, Vec<Diagnostic>> {
-    of_signals(&signals::read(path, shown_as, &COLUMNS)?, degree)
+pub fn calibrate(
+    path: &Path,
+    shown_as: &str,
+    degree: Option<usize>,
+    reading: &Reading,
+) -> Result<GaugeReport, Vec<Diagnostic>> {
+    of_signals(&signals::read(path, shown_as, &COLUMNS, reading)?, degree)
 }
 
 /// The same from the text of a record.
@@ -160,7 +166,7 @@ fn calibrate_checked(signals: &Signals, degree: Option<usize>, findings: &mut Fi
         );
         findings.add(
             codes::GAUGE_NOT_MONOTONE,
-            Some(signals.lines[near]),
+            Some(signals.lines.at(near)),
             message,
             "use the gauge where its voltage rises or falls all the way, or look for a fault there",
         );
@@ -406,7 +412,7 @@ fn glitches(signals: &Signals, residual: &[f64], findings: &mut Findings) {
         );
         findings.add(
             codes::GAUGE_GLITCH,
-            Some(signals.lines[k]),
+            Some(signals.lines.at(k)),
             message,
             "delete the point if the reading was disturbed, or record again",
         );

@@ -27,6 +27,7 @@ pub mod linear;
 mod normal;
 mod prior;
 pub mod rate;
+mod reading;
 mod record;
 pub mod regressor;
 mod report;
@@ -41,6 +42,7 @@ pub mod states;
 mod statistics;
 pub mod stiffness;
 mod sweep;
+mod time_unit;
 mod trace;
 mod trend;
 pub mod waveform;
@@ -57,6 +59,7 @@ pub use coverage::Region;
 pub use export::{is_table_csv, read_table_csv, write_table_csv};
 pub use grid_choice::{GridChoice, Score, choose_grid};
 pub use rate::predict::{Compared, Drive, Prediction, parse_drive, predict, read_drive, validate};
+pub use reading::Reading;
 pub use record::{MAX_FILE_BYTES, Record, parse_record, read_file, read_record};
 pub use report::{Branches, Report};
 pub use specgen_language::model::MAX_GRID;
@@ -191,6 +194,7 @@ fn identify_checked(
         drift,
         drift_returns,
         drift_removed: options.drift,
+        fastest: sweep::fastest(record, &used).0,
         dead_time,
         held: record.held(),
         dead_time_basis,

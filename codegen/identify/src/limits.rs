@@ -1,6 +1,7 @@
 //! Finds where a displacement hardly moves while the drive does: a gauge at the end of its range or stuck, with noise
 //! still on it, or an amplifier at its limit.
 
+use super::columns::LineNumbers;
 use super::findings::Findings;
 use super::statistics::{extent, median, noise_floor};
 use specgen_language::diagnostic::codes;
@@ -17,7 +18,7 @@ const HARDLY: f64 = 0.08;
 const ABOVE_NOISE: f64 = 30.0;
 
 /// Reports every stretch on which the displacement hardly moves.
-pub(crate) fn check(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
+pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
     let (low, high) = extent(drive);
     let (bottom, top) = extent(displacement);
     let gain = (top - bottom) / (high - low);
@@ -67,7 +68,7 @@ pub(crate) fn check(lines: &[usize], time: &[f64], drive: &[f64], displacement: 
             );
             findings.add(
                 codes::RECORD_LIMITED,
-                Some(lines[from]),
+                Some(lines.at(from)),
                 message,
                 "check the range of the gauge, the limit of the amplifier and the preload; record again within them",
             );

@@ -1,14 +1,17 @@
-//! Reads a measured record: a CSV file with the columns `time_s`, `drive_V`, `displacement_um`.
+//! Reads a measured record: a text file with the columns `time_s`, `drive_V`, `displacement_um`, or what they are called.
 //!
 //! Every problem of the file is reported in one run. What depends on the declared drive range is checked
 //! later, by [`super::coverage`].
 
+use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::columns::{self, Header, RECORD};
+use super::columns::{LineNumbers, RECORD, foreign};
 use super::distrust;
 use super::findings::Findings;
+use super::reading::Reading;
+use super::signals::{self, Wanted};
 use super::{sanity, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -22,13 +25,7 @@ pub(crate) const DISPLACEMENT: usize = 2;
 /// Header names in the order of [`TIME`], [`DRIVE`], [`DISPLACEMENT`].
 pub(crate) const NAMES: [&str; 3] = ["time_s", "drive_V", "displacement_um"];
 
-/// Name of the drive's column where it is the measured voltage.
-pub(crate) const MONITOR: &str = "monitor_V";
-
-/// Headers closer than this many edits to a wanted one are suggested.
-const NEAR: usize = 4;
-
-/// Larger files are refused before they are read.
+/// Larger files whose text is kept, tables and what a spec names, are refused before they are read.
 pub const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// A measured record in SI units, checked sample by sample.
@@ -76,8 +73,8 @@ impl Record {
                 RECORD.report_not_finite(k + 2, name, &x.to_string(), &mut findings);
             }
         }
-        let lines = (2..n + 2).collect();
-        finish(findings, shown_as, lines, [time, drive, displacement])
+        let lines = LineNumbers::consecutive(2, n);
+        finish(findings, shown_as, &lines, [time, drive, displacement])
     }
 
     /// Half the interval for which a converter holds each sample of the drive, s: by so much the voltage lags a command on the
@@ -95,12 +92,16 @@ impl Record {
     }
 }
 
-/// Reads a record. `shown_as` is how messages name the file.
+/// Reads a record. `shown_as` is how messages name the file, `reading` what the user says about it.
 ///
 /// # Errors
 /// All findings of the file, warnings included, if at least one refuses it.
-pub fn read_record(path: &Path, shown_as: &str) -> Result<Record, Vec<Diagnostic>> {
-    parse_record(&read_file(path, shown_as)?, shown_as)
+pub fn read_record(path: &Path, shown_as: &str, reading: &Reading) -> Result<Record, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    match open_file(path, &mut findings) {
+        Some(file) => of_source(file, reading, findings),
+        None => Err(findings.into_diagnostics()),
+    }
 }
 
 /// The text of a data file, record or table, without a byte order mark.
@@ -117,21 +118,32 @@ pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>>
 /// # Errors
 /// As [`read_record`].
 pub fn parse_record(text: &str, shown_as: &str) -> Result<Record, Vec<Diagnostic>> {
-    let mut findings = Findings::new(shown_as);
-    let Some((lines, columns)) = parse(text, &mut findings) else {
-        return Err(findings.into_diagnostics());
-    };
-    let [time, drive, micrometres] = columns;
-    let displacement = micrometres.into_iter().map(|y| y * 1e-6).collect();
-    let record = finish(findings, shown_as, lines, [time, drive, displacement])?;
-    Ok(Record { monitored: is_monitored(text), ..record })
+    of_source(text.as_bytes(), &Reading::default(), Findings::new(shown_as))
 }
 
-/// Whether the header of a file has the measured voltage, and no command.
-pub(crate) fn is_monitored(text: &str) -> bool {
-    let header = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#')).unwrap_or_default();
-    let has = |name: &str| header.split(',').any(|column| column.trim().eq_ignore_ascii_case(name));
-    has(MONITOR) && !has(NAMES[DRIVE])
+/// Columns of a record; the displacement may be missing in one that is only predicted.
+pub(crate) const fn wanted(displacement: bool) -> [Wanted; 4] {
+    [
+        Wanted { name: NAMES[TIME], required: true },
+        Wanted { name: NAMES[DRIVE], required: true },
+        Wanted { name: signals::MONITOR, required: false },
+        Wanted { name: NAMES[DISPLACEMENT], required: displacement },
+    ]
+}
+
+fn of_source(source: impl Read, reading: &Reading, mut findings: Findings) -> Result<Record, Vec<Diagnostic>> {
+    let Some(mut signals) = signals::columns_of(source, &wanted(true), reading, &mut findings) else {
+        return Err(findings.into_diagnostics());
+    };
+    let shown_as = signals.shown_as.clone();
+    let monitored = signals.columns[DRIVE].is_none();
+    let mut take = |k: usize| signals.columns[k].take();
+    let (time, drive, monitor, micrometres) = (take(0), take(1), take(2), take(3));
+    let (time, drive) = (time.unwrap_or_default(), drive.or(monitor).unwrap_or_default());
+    let mut displacement = micrometres.unwrap_or_default();
+    displacement.iter_mut().for_each(|y| *y *= 1e-6);
+    let record = finish(findings, &shown_as, &signals.lines, [time, drive, displacement])?;
+    Ok(Record { monitored, ..record })
 }
 
 /// Longest interval for which a converter is believed to hold a command, s: a record sampled more slowly leaves commands out.
@@ -147,39 +159,41 @@ pub(crate) fn hold(time: &[f64]) -> f64 {
 fn finish(
     mut findings: Findings,
     shown_as: &str,
-    lines: Vec<usize>,
+    lines: &LineNumbers,
     columns: [Vec<f64>; 3],
 ) -> Result<Record, Vec<Diagnostic>> {
     // A value that could not be read would only cause a trail of follow-up findings.
     if !findings.any_error() {
-        sanity::check(&lines, &columns, &mut findings);
+        sanity::check(lines, &columns, &mut findings);
     }
     if findings.any_error() {
         return Err(findings.into_diagnostics());
     }
     let [time, drive, displacement] = columns;
-    let weightless = distrust::weightless(&lines, &time, &drive, &displacement, &mut findings);
+    let weightless = distrust::weightless(lines, &time, &drive, &displacement, &mut findings);
     let warnings = findings.into_diagnostics();
     Ok(Record { shown_as: shown_as.to_owned(), time, drive, monitored: false, displacement, weightless, warnings })
 }
 
 /// The text of the file without a byte order mark, or `None` after the reason was reported.
 fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
-    let unreadable = |e: std::io::Error| (format!("cannot be read: {e}"), "name an existing CSV file");
     let bytes = match read_limited(path) {
         Ok(bytes) => bytes,
         Err(e) => {
-            let (message, help) = unreadable(e);
-            findings.add(codes::RECORD_IO, None, message, help);
+            unreadable(&e, findings);
             return None;
         }
     };
     if bytes.len() as u64 > MAX_FILE_BYTES {
         let message = format!("is larger than {} MiB", MAX_FILE_BYTES >> 20);
-        findings.add(codes::RECORD_TOO_LARGE, None, message, "record at a lower rate, or keep every n-th sample");
+        let help = "name the table that `specgen identify RECORD -o table.csv` makes of a record of any size";
+        findings.add(codes::RECORD_TOO_LARGE, None, message, help);
         return None;
     }
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+    if foreign::report(bytes, findings) {
+        return None;
+    }
     let end_of_text = bytes.iter().position(|&b| b == 0);
     let bad = std::str::from_utf8(bytes).err().map(|e| e.valid_up_to());
     if let Some(at) = end_of_text.or(bad) {
@@ -193,103 +207,27 @@ fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
 
 /// At most one byte more than the limit, so that a huge file or a device costs neither time nor memory.
 fn read_limited(path: &Path) -> std::io::Result<Vec<u8>> {
-    let file = std::fs::File::open(path)?;
-    if !file.metadata()?.is_file() {
-        return Err(std::io::Error::other("it is not a regular file"));
-    }
     let mut bytes = Vec::new();
-    file.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+    regular(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
-/// Line numbers and the three columns in the file's units; `None` if there is no usable header.
-fn parse(text: &str, findings: &mut Findings) -> Option<(Vec<usize>, [Vec<f64>; 3])> {
-    if text.trim().is_empty() {
-        let help = format!("the first line must be the header `{}`", NAMES.join(","));
-        findings.add(codes::RECORD_HEADER, None, "is empty".to_owned(), &help);
-        return None;
+fn regular(path: &Path) -> std::io::Result<File> {
+    let file = File::open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
     }
-    let (header, lines) = columns::open(text, &RECORD, findings)?;
-    let places = places(&header, findings)?;
-    let (lines, values) = lines.read(&[0, 1, 2].map(|k| (places[k], NAMES[k])), findings);
-    Some((lines, values.try_into().ok()?))
+    Ok(file)
 }
 
-/// Places of the three columns, or `None` after every problem was reported.
-fn places(header: &Header, findings: &mut Findings) -> Option<[usize; 3]> {
-    let has = |name: &str| header.names.iter().any(|column| column.eq_ignore_ascii_case(name));
-    let drive = if has(MONITOR) && !has(NAMES[DRIVE]) { MONITOR } else { NAMES[DRIVE] };
-    let found = [NAMES[TIME], drive, NAMES[DISPLACEMENT]]
-        .map(|name| header.place(name, Some(&missing_column_help(&header.names, name)), findings));
-    let [Some(time), Some(drive), Some(displacement)] = found else { return None };
-    Some([time, drive, displacement])
+/// A data file to read from, or `None` after the reason was reported.
+pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<File> {
+    regular(path).map_err(|e| unreadable(&e, findings)).ok()
 }
 
-fn missing_column_help(header: &[String], name: &str) -> String {
-    if header.len() == 1 && (header[0].contains(';') || header[0].contains('\t')) {
-        return "separate the columns by commas and write numbers with a decimal point".to_owned();
-    }
-    if header.iter().any(|h| h.parse::<f64>().is_ok()) {
-        return format!("the first line must be the header `{}`", NAMES.join(","));
-    }
-    let quantity = name.split('_').next().unwrap_or(name);
-    let lower = name.to_ascii_lowercase();
-    let near = header
-        .iter()
-        .filter(|h| !NAMES.iter().any(|other| h.eq_ignore_ascii_case(other)))
-        .map(|h| (strsim::damerau_levenshtein(&h.to_ascii_lowercase(), &lower), h))
-        .filter(|(distance, h)| *distance < NEAR || h.to_ascii_lowercase().starts_with(quantity))
-        .min();
-    match near {
-        Some((_, h)) if other_unit(h, name) => {
-            format!("`{h}` seems to be in another unit: convert it and name the column `{name}`")
-        }
-        Some((_, h)) => format!("rename `{h}` to `{name}` if that is what it holds"),
-        None => format!("name the column that holds it `{name}`; the unit is part of the name"),
-    }
-}
-
-/// Whether `header` names the same quantity as `name` with another unit behind the underscore.
-fn other_unit(header: &str, name: &str) -> bool {
-    match (header.rsplit_once('_'), name.rsplit_once('_')) {
-        (Some((quantity, unit)), Some((wanted, wanted_unit))) => {
-            quantity.eq_ignore_ascii_case(wanted) && !unit.eq_ignore_ascii_case(wanted_unit)
-        }
-        _ => false,
-    }
+fn unreadable(e: &std::io::Error, findings: &mut Findings) {
+    findings.add(codes::RECORD_IO, None, format!("cannot be read: {e}"), "name an existing CSV file");
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn help(header: &[&str]) -> Vec<String> {
-        let mut findings = Findings::new("r.csv");
-        let text = header.join(",");
-        let (header, _) = columns::open(&text, &RECORD, &mut findings).unwrap();
-        let found = places(&header, &mut findings);
-        let all = findings.into_diagnostics();
-        assert_eq!(found.is_none(), !all.is_empty());
-        all.into_iter().map(|d| format!("{} / {}", d.message, d.help)).collect()
-    }
-
-    #[test]
-    fn order_case_and_extra_columns_do_not_matter() {
-        let mut findings = Findings::new("r.csv");
-        let (header, _) = columns::open("note,Displacement_UM, TIME_S,drive_v", &RECORD, &mut findings).unwrap();
-        assert_eq!(places(&header, &mut findings), Some([2, 3, 1]));
-    }
-
-    #[test]
-    fn near_misses_units_and_wrong_separators_get_their_own_advice() {
-        assert!(help(&["tme_s", "drive_V", "displacement_um"])[0].contains("rename `tme_s` to `time_s`"));
-        assert!(
-            help(&["time_s", "drive_V", "displacement_nm"])[0]
-                .contains("`displacement_nm` seems to be in another unit")
-        );
-        assert!(help(&["time_s;drive_V;displacement_um"])[0].contains("separate the columns by commas"));
-        assert!(help(&["0.0", "1.0", "2.0"])[0].contains("first line must be the header"));
-        assert!(help(&["time_s", "time_s", "drive_V", "displacement_um"])[0].contains("appears twice"));
-        assert!(help(&["time_s", "drive_V"])[0].contains("column `displacement_um` is missing"));
-    }
-}
+mod files;

@@ -14,6 +14,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::findings::Findings;
+use super::reading::Reading;
 use super::signals::{self, Signals, Wanted};
 use super::statistics::{extent, median};
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -95,8 +96,13 @@ const COLUMNS: [Wanted; 3] = [
 /// # Errors
 /// E0630 for a record that is not sampled evenly or too short, E0631 where the coherence is too low (the bands are named),
 /// E0632 if the model cannot be fitted, and those of reading.
-pub fn respond(path: &Path, shown_as: &str, segment: Option<usize>) -> Result<ResponseReport, Vec<Diagnostic>> {
-    of_signals(&signals::read(path, shown_as, &COLUMNS)?, segment)
+pub fn respond(
+    path: &Path,
+    shown_as: &str,
+    segment: Option<usize>,
+    reading: &Reading,
+) -> Result<ResponseReport, Vec<Diagnostic>> {
+    of_signals(&signals::read(path, shown_as, &COLUMNS, reading)?, segment)
 }
 
 /// The same from the text of a record.
@@ -219,7 +225,7 @@ fn sampling_rate(signals: &Signals, findings: &mut Findings) -> Option<f64> {
         );
         findings.add(
             codes::RESPONSE_SAMPLES,
-            Some(signals.lines[worst]),
+            Some(signals.lines.at(worst)),
             message,
             "record with a fixed sampling interval, without lost samples",
         );
@@ -254,7 +260,7 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
                 );
                 findings.add(
                     codes::RECORD_STUCK,
-                    Some(signals.lines[first]),
+                    Some(signals.lines.at(first)),
                     message,
                     "the gauge or its converter is at the end of its range: drive less, or shift the range",
                 );
@@ -278,7 +284,7 @@ fn check_limits(signals: &Signals, findings: &mut Findings) {
             );
             findings.add(
                 codes::RECORD_STUCK,
-                Some(signals.lines[first]),
+                Some(signals.lines.at(first)),
                 message,
                 "check the connection of the gauge and record again",
             );

@@ -1,5 +1,6 @@
 //! Is a record plausible as a measurement, whatever it was meant for?
 
+use super::columns::LineNumbers;
 use super::findings::Findings;
 use super::limits;
 use super::statistics::{extent, median, micrometres};
@@ -18,8 +19,8 @@ const COMMANDED_NOISE: f64 = 3e-6;
 /// A displacement range outside these bounds (m) is unusual for a piezo actuator and suggests another unit.
 pub(crate) const PLAUSIBLE_RANGE: [f64; 2] = [50e-9, 2e-3];
 
-/// Checks columns of finite numbers in s, V, m; `lines[k]` is where sample k stands in the file.
-pub(crate) fn check(lines: &[usize], columns: &[Vec<f64>; 3], findings: &mut Findings) {
+/// Checks columns of finite numbers in s, V, m; `lines` tells each sample stands in the file.
+pub(crate) fn check(lines: &LineNumbers, columns: &[Vec<f64>; 3], findings: &mut Findings) {
     let [time, drive, displacement] = columns;
     if time.len() < MIN_SAMPLES {
         let until = time.last().map_or_else(String::new, |t| format!(" and ends at {t} s"));
@@ -50,10 +51,10 @@ fn check_duration(time: &[f64], findings: &mut Findings) {
         return;
     }
     let message = format!("goes on for {:.1} hours, by its column `time_s`", duration / 3600.0);
-    findings.add(codes::RECORD_LONG, None, message, "check that `time_s` is in seconds, not in ms");
+    findings.add(codes::RECORD_LONG, None, message, "if the column of times is in ms, name it `time_ms`");
 }
 
-pub(crate) fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings) {
+pub(crate) fn check_time(lines: &LineNumbers, time: &[f64], findings: &mut Findings) {
     let mut intervals: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
     let mut increasing = true;
     for (k, dt) in intervals.iter().enumerate().filter(|(_, dt)| **dt <= 0.0) {
@@ -64,7 +65,7 @@ pub(crate) fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings)
         } else {
             "sort or re-record; is the time column the right one?"
         };
-        findings.add(codes::RECORD_TIME, Some(lines[k + 1]), message, help);
+        findings.add(codes::RECORD_TIME, Some(lines.at(k + 1)), message, help);
     }
     if !increasing {
         return;
@@ -79,7 +80,7 @@ pub(crate) fn check_time(lines: &[usize], time: &[f64], findings: &mut Findings)
         );
         findings.add(
             codes::RECORD_GAP,
-            Some(lines[k + 1]),
+            Some(lines.at(k + 1)),
             message,
             "record without gaps: a reversal of the drive may be missing",
         );
@@ -103,10 +104,10 @@ fn check_not_constant(time: &[f64], column: &[f64], name: &str, unit: f64, findi
     false
 }
 
-fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
+fn check_stuck(lines: &LineNumbers, time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
     let (low, high) = extent(drive);
     let (bottom, top) = extent(displacement);
-    let swapped = is_commanded(displacement) && !is_commanded(drive);
+    let swapped = look_swapped(drive, displacement);
     let mut first = 0;
     while first < drive.len() {
         let value = displacement[first];
@@ -121,7 +122,7 @@ fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64
                     time[first + run - 1]
                 );
                 let help = "the columns `drive_V` and `displacement_um` seem to be swapped";
-                findings.add(codes::COLUMNS_SWAPPED, Some(lines[first]), message, help);
+                findings.add(codes::COLUMNS_SWAPPED, Some(lines.at(first)), message, help);
                 return;
             }
             let what = if value == bottom || value == top { "is limited at" } else { "is stuck at" };
@@ -132,13 +133,18 @@ fn check_stuck(lines: &[usize], time: &[f64], drive: &[f64], displacement: &[f64
             );
             findings.add(
                 codes::RECORD_STUCK,
-                Some(lines[first]),
+                Some(lines.at(first)),
                 message,
                 "check the range and the connection of the displacement sensor",
             );
         }
         first += run;
     }
+}
+
+/// Whether the displacement has the look of a command, and the drive of a measurement.
+pub(crate) fn look_swapped(drive: &[f64], displacement: &[f64]) -> bool {
+    is_commanded(displacement) && !is_commanded(drive)
 }
 
 /// Whether a column has the look of a command, not of a measurement: next to no noise. From fourth differences, which see
@@ -153,6 +159,13 @@ fn is_commanded(column: &[f64]) -> bool {
 
 /// Displacement must grow with the drive: a Preisach model with non-negative weights cannot do otherwise.
 fn check_sign(time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
+    let correlation = correlation(drive, displacement);
+    if correlation < 0.5 {
+        relation(time, drive, displacement, correlation, findings);
+    }
+}
+
+fn correlation(drive: &[f64], displacement: &[f64]) -> f64 {
     let count = drive.len() as f64;
     let mean = |x: &[f64]| x.iter().fold(0.0, |sum, v| sum + v) / count;
     let (mean_u, mean_y) = (mean(drive), mean(displacement));
@@ -162,10 +175,7 @@ fn check_sign(time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut 
         yy += (y - mean_y) * (y - mean_y);
         uy += (u - mean_u) * (y - mean_y);
     }
-    let correlation = uy / (uu * yy).sqrt();
-    if correlation < 0.5 {
-        relation(time, drive, displacement, correlation, findings);
-    }
+    uy / (uu * yy).sqrt()
 }
 
 /// Reports a relation that no actuator has, with the stretch of the record that shows it best.
@@ -185,6 +195,12 @@ fn relation(time: &[f64], drive: &[f64], displacement: &[f64], correlation: f64,
     if correlation < -0.5 {
         let message = format!("the displacement falls when the drive rises (correlation {correlation:.2}): {shown}");
         findings.add(codes::RECORD_RELATION, None, message, "change the sign of one of the two columns");
+    } else if is_butterfly(drive, displacement) {
+        let message = format!(
+            "the displacement falls and then rises with the drive, a butterfly loop: the drive goes beyond the coercive voltage, where the polarisation turns over; {shown}"
+        );
+        let help = "record again with a drive that stays on one side of the coercive voltage, such as --drive 0:100; a table cannot hold a butterfly";
+        findings.add(codes::RECORD_RELATION, None, message, help);
     } else {
         let message = format!(
             "the displacement hardly follows the drive (correlation {correlation:.2}; a piezo actuator shows more than 0.9): {shown}"
@@ -196,6 +212,18 @@ fn relation(time: &[f64], drive: &[f64], displacement: &[f64], correlation: f64,
             "check that `drive_V` and `displacement_um` hold what their names say",
         );
     }
+}
+
+/// Whether the displacement falls with the drive on one part of its range and rises on the other.
+fn is_butterfly(drive: &[f64], displacement: &[f64]) -> bool {
+    let (low, high) = extent(drive);
+    let middle = 0.5 * (low + high);
+    let side = |upper: bool| {
+        let (u, y): (Vec<f64>, Vec<f64>) =
+            drive.iter().zip(displacement).filter(|(u, _)| (**u > middle) == upper).map(|(u, y)| (*u, *y)).unzip();
+        correlation(&u, &y)
+    };
+    side(true) * side(false) < -0.25
 }
 
 fn check_displacement_unit(time: &[f64], displacement: &[f64], findings: &mut Findings) {

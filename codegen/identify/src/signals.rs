@@ -1,10 +1,14 @@
 //! Reads records of other kinds than reversal curves: named columns, some of which may be left out.
 
+mod places;
+
+use std::io::Read;
 use std::path::Path;
 
-use super::columns::{self, RECORD};
+use super::columns::{self, Column, LineNumbers, RECORD};
 use super::findings::Findings;
-use super::record::read_file;
+use super::reading::Reading;
+use super::record::open_file;
 use super::{sanity, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -23,51 +27,78 @@ pub(crate) struct Signals {
     /// Name of the file as its user knows it.
     pub(crate) shown_as: String,
     /// Line of each sample.
-    pub(crate) lines: Vec<usize>,
+    pub(crate) lines: LineNumbers,
     /// Values; none for a column that the file does not have.
     pub(crate) columns: Vec<Option<Vec<f64>>>,
 }
+
+pub(crate) use places::MONITOR;
+
+/// The column of times.
+pub(crate) const TIME: &str = "time_s";
 
 /// Fewer samples are no record.
 const MIN_SAMPLES: usize = 8;
 
 /// Reads the `wanted` columns. Time, if wanted, is the first one; it must rise.
-pub(crate) fn read(path: &Path, shown_as: &str, wanted: &[Wanted]) -> Result<Signals, Vec<Diagnostic>> {
-    parse(&read_file(path, shown_as)?, shown_as, wanted)
+pub(crate) fn read(
+    path: &Path,
+    shown_as: &str,
+    wanted: &[Wanted],
+    reading: &Reading,
+) -> Result<Signals, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    let signals = open_file(path, &mut findings).and_then(|file| checked(file, wanted, reading, &mut findings));
+    findings.conclude(signals).map(|(signals, _)| signals)
 }
 
 /// The same from the text of a file.
 pub(crate) fn parse(text: &str, shown_as: &str, wanted: &[Wanted]) -> Result<Signals, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
-    let parsed = parse_into(text, shown_as, wanted, &mut findings);
-    match parsed {
-        Some(signals) if !findings.any_error() => Ok(signals),
-        _ => Err(findings.into_diagnostics()),
-    }
+    let signals = checked(text.as_bytes(), wanted, &Reading::default(), &mut findings);
+    findings.conclude(signals).map(|(signals, _)| signals)
 }
 
-fn parse_into(text: &str, shown_as: &str, wanted: &[Wanted], findings: &mut Findings) -> Option<Signals> {
-    let (header, lines) = columns::open(text, &RECORD, findings)?;
-    let names: Vec<&str> = wanted.iter().map(|w| w.name).collect();
-    let help = format!("name the columns with their units: {}", names.join(","));
-    let places: Vec<Option<usize>> =
-        wanted.iter().map(|w| header.place(w.name, w.required.then_some(&help), findings)).collect();
-    if findings.any_error() {
-        return None;
-    }
-    let there: Vec<(usize, &str)> =
-        places.iter().zip(names).filter_map(|(place, name)| Some(((*place)?, name))).collect();
-    let (lines, values) = lines.read(&there, findings);
-    let mut values = values.into_iter();
-    let columns: Vec<Option<Vec<f64>>> = places.iter().map(|place| place.and_then(|_| values.next())).collect();
+pub(crate) fn checked(
+    source: impl Read,
+    wanted: &[Wanted],
+    reading: &Reading,
+    findings: &mut Findings,
+) -> Option<Signals> {
+    let signals = columns_of(source, wanted, reading, findings)?;
+    let lines = &signals.lines;
     if lines.len() < MIN_SAMPLES {
         let message = format!("has {} samples; at least {MIN_SAMPLES} are needed", lines.len());
         findings.add(codes::RECORD_TOO_SHORT, None, message, "record more samples");
-    } else if let (Some(Some(time)), true, false) = (columns.first(), wanted[0].name == "time_s", findings.any_error())
-    {
-        sanity::check_time(&lines, time, findings);
+    } else if let (Some(Some(time)), TIME, false) = (signals.columns.first(), wanted[0].name, findings.any_error()) {
+        sanity::check_time(lines, time, findings);
     }
-    Some(Signals { shown_as: shown_as.to_owned(), lines, columns })
+    Some(signals)
+}
+
+/// The `wanted` columns without any check of their values; `None` after every problem of the header was reported.
+pub(crate) fn columns_of(
+    source: impl Read,
+    wanted: &[Wanted],
+    reading: &Reading,
+    findings: &mut Findings,
+) -> Option<Signals> {
+    let (header, lines) = columns::open(source, &RECORD, findings)?;
+    let places = places::find(&header, wanted, reading, findings)?;
+    let there: Vec<Column> = places.columns.iter().flatten().copied().collect();
+    let (lines, values) = lines.read(&there, findings);
+    let mut values = values.into_iter();
+    let mut columns: Vec<Option<Vec<f64>>> =
+        places.columns.iter().map(|place| place.and_then(|_| values.next())).collect();
+    if let Some(interval) = places.interval {
+        let time = &mut columns[0];
+        match time {
+            // Sample numbers.
+            Some(numbers) => numbers.iter_mut().for_each(|number| *number *= interval),
+            None => *time = Some((0..lines.len()).map(|k| k as f64 * interval).collect()),
+        }
+    }
+    Some(Signals { shown_as: findings.path().to_owned(), lines, columns })
 }
 
 impl Signals {
@@ -80,7 +111,7 @@ impl Signals {
     pub(crate) fn place(&self, k: usize) -> String {
         match self.columns.first().and_then(Option::as_ref).and_then(|t| t.get(k)) {
             Some(t) => format!("{t} s"),
-            None => format!("line {}", self.lines.get(k).copied().unwrap_or(0)),
+            None => format!("line {}", self.lines.at(k)),
         }
     }
 
@@ -122,7 +153,7 @@ impl Signals {
                 );
                 findings.add(
                     codes::RECORD_STUCK,
-                    Some(self.lines[first]),
+                    Some(self.lines.at(first)),
                     message,
                     "check the range and the connection of that channel; record again within its range",
                 );

@@ -1,12 +1,13 @@
 //! Reads states of a platform: a CSV file of eighteen columns with a line of names, in SI units.
 
-use crate::columns::{self, RECORD};
+use crate::columns::{self, Column, Format, RECORD};
 use crate::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// Pose, rate and acceleration of the six coordinates: m and rad, per s, per s².
 pub type State = [[f64; 6]; 3];
 
+const FORMAT: Format = Format { preamble: false, ..RECORD };
 const COLUMNS: usize = 18;
 const HELP: &str =
     "write 18 names, of pose, rate and acceleration in x, y, z, θx, θy, θz, such as `x,y,z,rx,ry,rz,vx,…`";
@@ -17,8 +18,8 @@ const HELP: &str =
 /// All findings of the file.
 pub fn parse(text: &str, shown_as: &str) -> Result<Vec<State>, Vec<Diagnostic>> {
     let mut findings = Findings::new(shown_as);
-    let states = columns::open(text, &RECORD, &mut findings).and_then(|(header, lines)| {
-        let names: Vec<(usize, &str)> = header.names.iter().map(String::as_str).enumerate().collect();
+    let states = columns::open(text.as_bytes(), &FORMAT, &mut findings).and_then(|(header, lines)| {
+        let names: Vec<Column> = header.names.iter().enumerate().map(|(at, name)| Column::plain(at, name)).collect();
         let is_number = |name: &&String| name.parse::<f64>().is_ok();
         let wrong = if let Some(number) = header.names.iter().find(is_number) {
             format!("the first line names the columns, but `{number}` is a number")

@@ -10,6 +10,7 @@ use std::path::Path;
 use super::cause::lagging;
 use super::findings::Findings;
 use super::least_squares::{Fit, fit, independent_samples, mean_square};
+use super::reading::Reading;
 use super::signals::{self, Signals, Wanted};
 use super::statistics::extent;
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -82,8 +83,8 @@ struct Creep {
 /// # Errors
 /// E0644 if displacement falls with force, E0645 if the drive moves, E0646 if the force does not move the actuator or the
 /// unit is wrong, and those of reading.
-pub fn measure(path: &Path, shown_as: &str) -> Result<StiffnessReport, Vec<Diagnostic>> {
-    of_signals(&signals::read(path, shown_as, &COLUMNS)?)
+pub fn measure(path: &Path, shown_as: &str, reading: &Reading) -> Result<StiffnessReport, Vec<Diagnostic>> {
+    of_signals(&signals::read(path, shown_as, &COLUMNS, reading)?)
 }
 
 /// The same from the text of a record.
@@ -237,7 +238,7 @@ fn check_drive(signals: &Signals, findings: &mut Findings) {
         let message = format!("at {} the drive is {} V, while it began with {start} V", signals.place(k), drive[k]);
         findings.add(
             codes::STIFFNESS_DRIVE,
-            Some(signals.lines[k]),
+            Some(signals.lines.at(k)),
             message,
             "hold the drive constant while the force changes",
         );

@@ -61,14 +61,16 @@ enum Column {
 }
 
 fn parse_rows(text: &str, shown_as: &str, period: f64, findings: &mut Findings) -> Option<Waveform> {
-    let (header, lines) = columns::open(text, &FORMAT, findings)?;
+    let (header, lines) = columns::open(text.as_bytes(), &FORMAT, findings)?;
     if header.names.iter().all(String::is_empty) {
         findings.add(codes::WAVEFORM_HEADER, None, "is empty".to_owned(), EXPECTED);
         return None;
     }
     let columns = meanings(&header, findings)?;
-    let all: Vec<(usize, &str)> = header.names.iter().map(String::as_str).enumerate().collect();
+    let all: Vec<columns::Column> =
+        header.names.iter().enumerate().map(|(at, name)| columns::Column::plain(at, name)).collect();
     let (lines, values) = lines.read(&all, findings);
+    let lines: Vec<usize> = lines.iter().collect();
     let mut rows = vec![[0.0; 6]; lines.len()];
     for (column, values) in columns.iter().zip(&values) {
         match *column {
@@ -94,6 +96,7 @@ const FORMAT: Format = Format {
     not_finite: (codes::WAVEFORM_VALUE, "give every row a value"),
     longer_lines: false,
     whole_line: None,
+    preamble: false,
 };
 
 const EXPECTED: &str = "name the columns by axis and unit in the first line, such as `x_um,y_um,z_um,theta_x_urad`";

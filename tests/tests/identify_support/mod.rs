@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use specgen::everett::EverettTable;
-use specgen::identify::{Record, read_record};
+use specgen::identify::{Reading, Record, read_record};
 use std::path::Path;
 
 pub fn generator(seed: u64) -> ChaCha8Rng {
@@ -25,7 +25,7 @@ pub fn normal(random: &mut ChaCha8Rng) -> f64 {
 pub fn measured(name: &str) -> Option<Record> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/piezo-forc").join(name);
     if path.exists() {
-        return Some(read_record(&path, name).unwrap_or_else(|d| panic!("{d:#?}")));
+        return Some(read_record(&path, name, &Reading::default()).unwrap_or_else(|d| panic!("{d:#?}")));
     }
     println!("skipped: ../shared/data/piezo-forc/{name} is not here");
     None

@@ -165,6 +165,8 @@ Examples:
       grid by cross-validation; fit, noise, drift
   specgen identify record.csv --drive 0:100 --grid 16 --plot table.svg
   specgen identify record.csv --drive 0:100 --grid 16 -o table.csv
+  specgen identify record.csv --drive 0:100 --columns drive_V=2 --rate 51.2
+      the drive by its column, times counted
   specgen identify linear 1hz.csv 10hz.csv       # records of one frequency each";
 
 pub const LINEAR: &str = "\
@@ -196,7 +198,9 @@ Examples:
   specgen forc -o record.csv            # the reference leg, 32 curves at 20 V/s
   specgen forc platform.toml -o leg.csv                    # a leg of this spec
   specgen forc -o fast.csv --rate 2000 --grid 16
-      a second rate, for `identify rate`";
+      a second rate, for `identify rate`
+  specgen forc --drive-only --drive -90:90 --sampling 1000 -o drive.csv
+      what a generator plays on the bench";
 
 pub const PLANT: &str = "\
 Examples:

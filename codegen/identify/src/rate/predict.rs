@@ -9,9 +9,10 @@ use crate::cause::{self, Cause};
 use crate::distrust::{JUMP, SETTLING};
 use crate::everett::EverettTable;
 use crate::findings::Findings;
+use crate::reading::Reading;
 use crate::record::{self, Record};
 use crate::regressor::Plane;
-use crate::signals::{self, Wanted};
+use crate::signals::{self, Signals};
 use crate::staircase::Staircase;
 use crate::trend::{Line, rms_and_max};
 use crate::{branches, start, statistics};
@@ -54,8 +55,8 @@ impl From<&Record> for Drive {
 ///
 /// # Errors
 /// All findings of the file.
-pub fn read_drive(path: &Path, shown_as: &str) -> Result<Drive, Vec<Diagnostic>> {
-    parse_drive(&record::read_file(path, shown_as)?, shown_as)
+pub fn read_drive(path: &Path, shown_as: &str, reading: &Reading) -> Result<Drive, Vec<Diagnostic>> {
+    signals::read(path, shown_as, &record::wanted(false), reading).map(of_signals)
 }
 
 /// The same from the text of a file.
@@ -63,17 +64,20 @@ pub fn read_drive(path: &Path, shown_as: &str) -> Result<Drive, Vec<Diagnostic>>
 /// # Errors
 /// As [`read_drive`].
 pub fn parse_drive(text: &str, shown_as: &str) -> Result<Drive, Vec<Diagnostic>> {
-    const COLUMNS: [&str; 4] = ["time_s", "drive_V", record::MONITOR, "displacement_um"];
-    let monitored = record::is_monitored(text);
-    let required = [true, !monitored, monitored, false];
-    let wanted: Vec<Wanted> = COLUMNS.iter().zip(required).map(|(name, required)| Wanted { name, required }).collect();
-    let signals = signals::parse(text, shown_as, &wanted)?;
-    let time = signals.column(0).to_vec();
-    let drive = signals.column(if monitored { 2 } else { 1 }).to_vec();
-    let displacement = signals.columns[3].as_ref().map(|um| um.iter().map(|y| y * 1e-6).collect());
+    signals::parse(text, shown_as, &record::wanted(false)).map(of_signals)
+}
+
+fn of_signals(signals: Signals) -> Drive {
+    let Signals { shown_as, columns, .. } = signals;
+    let mut columns = columns.into_iter();
+    let mut take = || columns.next().flatten();
+    let (time, command, monitor, micrometres) = (take().unwrap_or_default(), take(), take(), take());
+    let monitored = command.is_none();
+    let drive = command.or(monitor).unwrap_or_default();
+    let displacement = micrometres.map(|um| um.iter().map(|y| y * 1e-6).collect());
     let held = if monitored { 0.0 } else { record::hold(&time) };
     let weightless = vec![false; time.len()];
-    Ok(Drive { shown_as: shown_as.to_owned(), time, drive, displacement, weightless, held })
+    Drive { shown_as, time, drive, displacement, weightless, held }
 }
 
 /// How far off a prediction is. Lengths in m; percentages are of `range`.

@@ -7,6 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::predict;
+use super::reading::ReadingArguments;
 use super::refused;
 use crate::cli::file::write_file;
 use crate::cli::plot::{Plot, wrote};
@@ -34,6 +35,8 @@ pub struct EverettArguments {
     /// Write the table (CSV: up_V, down_V, everett_um) here.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArguments,
     #[command(flatten)]
     plot: Plot,
 }
@@ -68,7 +71,8 @@ pub fn run(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
         ));
     };
     let shown = path.display().to_string();
-    let record = identify::read_record(path, &shown).map_err(refused)?;
+    let reading = arguments.reading.reading()?;
+    let record = identify::read_record(path, &shown, &reading).map_err(refused)?;
     let choice = match arguments.grid {
         Some(_) => None,
         None => Some(identify::choose_grid(&record, drive, DeadTime::Estimate).map_err(refused)?),
@@ -77,7 +81,7 @@ pub fn run(arguments: &EverettArguments, ui: &mut Ui) -> Result<(), Failure> {
     let identified = identify::identify(&record, &Options::new(grid, drive)).map_err(refused)?;
     ui.findings(None, &identified.warnings);
     let validation = match &arguments.validate {
-        Some(path) => Some(validate(path, &identified).map_err(refused)?),
+        Some(path) => Some(validate(path, &identified, &reading).map_err(refused)?),
         None => None,
     };
     if let Some(output) = &arguments.output {
@@ -126,8 +130,12 @@ impl Outcome for Table<'_> {
     }
 }
 
-fn validate(path: &Path, identified: &identify::Identified) -> Result<Prediction, Vec<Diagnostic>> {
-    let record = identify::read_record(path, &path.display().to_string())?;
+fn validate(
+    path: &Path,
+    identified: &identify::Identified,
+    reading: &identify::Reading,
+) -> Result<Prediction, Vec<Diagnostic>> {
+    let record = identify::read_record(path, &path.display().to_string(), reading)?;
     identify::validate(&identified.table, &record, identified.report.dead_time)
 }
 
@@ -190,8 +198,13 @@ fn details(report: &Report, text: &mut String) {
 pub(super) fn account(cause: &Cause) -> String {
     let shares: Vec<String> =
         cause.shares.iter().map(|(s, share)| format!("{} {:.0} %", short(*s), share * 100.0)).collect();
+    let which = match (cause.main, cause.hum) {
+        (identify::Source::DeadTime, _) => format!(" of {:.3} ms", cause.rate_delay * 1e3),
+        (identify::Source::Hum, Some(frequency)) => format!(" at {frequency:.1} Hz"),
+        _ => String::new(),
+    };
     format!(
-        "mainly {} (of its mean square: {}); linear drift taken out: {:.2} nm rms",
+        "mainly {}{which} (of its mean square: {}); linear drift taken out: {:.2} nm rms",
         cause.main.name(),
         shares.join(", "),
         cause.drift_rms * 1e9
@@ -202,7 +215,9 @@ fn short(source: identify::Source) -> &'static str {
     match source {
         identify::Source::Drift => "drift",
         identify::Source::DeadTime => "dead time",
+        identify::Source::BentDrift => "bent drift",
         identify::Source::Creep => "creep",
+        identify::Source::Hum => "hum",
         identify::Source::Noise => "noise",
         identify::Source::Model => "model",
     }

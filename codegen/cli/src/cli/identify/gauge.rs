@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
+use super::reading::ReadingArguments;
 use super::refused;
 use crate::cli::file::write_file;
 use crate::cli::plot::{Plot, wrote};
@@ -27,12 +28,16 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
     #[command(flatten)]
+    reading: ReadingArguments,
+    #[command(flatten)]
     plot: Plot,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.record.display().to_string();
-    let report = gauge::calibrate(&arguments.record, &shown, arguments.degree.map(usize::from)).map_err(refused)?;
+    let report =
+        gauge::calibrate(&arguments.record, &shown, arguments.degree.map(usize::from), &arguments.reading.reading()?)
+            .map_err(refused)?;
     ui.findings(None, &report.warnings);
     let mut files = String::new();
     if let Some(path) = &arguments.table {

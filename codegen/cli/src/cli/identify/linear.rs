@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
+use super::reading::ReadingArguments;
 use super::refused;
 use crate::cli::plot::Plot;
 use crate::cli::table::{left, right, row};
@@ -40,6 +41,8 @@ pub struct Arguments {
     #[arg(long, value_name = "SPEC")]
     spec: Option<PathBuf>,
     #[command(flatten)]
+    reading: ReadingArguments,
+    #[command(flatten)]
     plot: Plot,
 }
 
@@ -59,12 +62,13 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             records.len()
         )));
     }
+    let reading = arguments.reading.reading()?;
     let mut read = Vec::new();
     let mut relations = Vec::new();
     let mut bad = Vec::new();
     for (k, path) in records.iter().enumerate() {
         let shown = path.display().to_string();
-        let found = identify::read_record(path, &shown).and_then(|record| {
+        let found = identify::read_record(path, &shown, &reading).and_then(|record| {
             let relation = linear::relation(&record, frequencies.get(k).copied())?;
             Ok((record, relation))
         });

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::everett::account;
+use super::reading::ReadingArguments;
 use super::{Identified, refused};
 use crate::cli::file::write_file;
 use crate::cli::plot::{Plot, wrote};
@@ -35,6 +36,8 @@ pub struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]
+    reading: ReadingArguments,
+    #[command(flatten)]
     plot: Plot,
 }
 
@@ -46,7 +49,7 @@ fn milliseconds(text: &str) -> Result<f64, String> {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.drive.display().to_string();
-    let drive = read_drive(&arguments.drive, &shown).map_err(refused)?;
+    let drive = read_drive(&arguments.drive, &shown, &arguments.reading.reading()?).map_err(refused)?;
     let mut model = model(&arguments.model, usize::from(arguments.leg), ui)?;
     // In a spec it counts from the voltage; a command is held on its way there.
     model.dead_time = arguments.dead_time.unwrap_or(model.dead_time) + drive.held;
@@ -97,8 +100,12 @@ pub(super) fn summary(prediction: &Prediction) -> String {
     let Some(compared) = &prediction.compared else {
         return format!("{} samples predicted; the file has no displacement_um to compare with", prediction.time.len());
     };
+    let clipped = match prediction.samples_clipped {
+        0 => String::new(),
+        clipped => format!("; {clipped} samples outside the table's range are held at its end"),
+    };
     format!(
-        "predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm ({start})\n  this residual: {}",
+        "predicted to {:.3} % rms, {:.3} % at worst, of {:.3} µm ({start}{clipped})\n  this residual: {}",
         compared.rms_percent,
         compared.max_percent,
         compared.range * 1e6,
@@ -116,7 +123,7 @@ impl Outcome for Identified<Prediction> {
             report.dead_time * 1e3,
             report.samples_skipped
         );
-        if report.samples_clipped > 0 {
+        if report.compared.is_none() && report.samples_clipped > 0 {
             let _ = write!(text, "; {} samples outside the table's range are held at its end", report.samples_clipped);
         }
         text + "\n" + &self.files

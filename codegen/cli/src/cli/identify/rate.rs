@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::Identified;
 use super::everett::{grid, range};
+use super::reading::ReadingArguments;
 use crate::cli::file::write_file;
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::table::{left, right, row};
@@ -36,12 +37,15 @@ pub struct Arguments {
     #[arg(short, long, value_name = "NAME")]
     output: Option<PathBuf>,
     #[command(flatten)]
+    reading: ReadingArguments,
+    #[command(flatten)]
     plot: Plot,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let refused = |findings| Failure::from(Refused { source: None, findings });
-    let read = |path: &PathBuf| read_record(path, &path.display().to_string());
+    let reading = arguments.reading.reading()?;
+    let read = |path: &PathBuf| read_record(path, &path.display().to_string(), &reading);
     let mut records = Vec::new();
     let mut errors = Vec::new();
     for path in &arguments.records {

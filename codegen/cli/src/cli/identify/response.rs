@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::reading::ReadingArguments;
 use super::{Identified, refused};
 use crate::cli::plot::Plot;
 use crate::cli::ui::{Failure, Outcome, Ui};
@@ -22,12 +23,15 @@ pub struct Arguments {
     #[arg(long, value_name = "N")]
     segment: Option<usize>,
     #[command(flatten)]
+    reading: ReadingArguments,
+    #[command(flatten)]
     plot: Plot,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.record.display().to_string();
-    let report = response::respond(&arguments.record, &shown, arguments.segment).map_err(refused)?;
+    let report = response::respond(&arguments.record, &shown, arguments.segment, &arguments.reading.reading()?)
+        .map_err(refused)?;
     ui.findings(None, &report.warnings);
     let files = arguments.plot.write("Frequency response", || figure::response(&report))?.unwrap_or_default();
     ui.result(&Identified { record: shown, report, files });

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::reading::ReadingArguments;
 use super::{Identified, refused};
 use crate::cli::plot::Plot;
 use crate::cli::ui::{Failure, Outcome, Ui};
@@ -19,12 +20,14 @@ pub struct Arguments {
     /// there is one, which must be constant.
     record: PathBuf,
     #[command(flatten)]
+    reading: ReadingArguments,
+    #[command(flatten)]
     plot: Plot,
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.record.display().to_string();
-    let report = stiffness::measure(&arguments.record, &shown).map_err(refused)?;
+    let report = stiffness::measure(&arguments.record, &shown, &arguments.reading.reading()?).map_err(refused)?;
     ui.findings(None, &report.warnings);
     let files = arguments.plot.write("Stiffness", || figure::stiffness(&report))?.unwrap_or_default();
     ui.result(&Identified { record: shown, report, files });

@@ -1,0 +1,171 @@
+//! Names of columns: a quantity and a unit, such as `drive_V`, `Drive [mV]` or `displacement (µm)`.
+
+/// A quantity that a column may hold.
+#[derive(Debug)]
+pub(crate) struct Quantity {
+    /// As records of this project name it, in its unit.
+    pub(crate) name: &'static str,
+    /// What else it is called, in lower case letters and digits.
+    also: &'static [&'static str],
+    units: &'static [Unit],
+}
+
+/// Name of a unit, and how many of it are one of the unit of [`Quantity::name`].
+type Unit = (&'static str, f64);
+
+const TIME: &[Unit] = &[("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)];
+const VOLTAGE: &[Unit] = &[("V", 1.0), ("mV", 1e3), ("uV", 1e6), ("kV", 1e-3)];
+const LENGTH: &[Unit] = &[("um", 1.0), ("nm", 1e3), ("pm", 1e6), ("mm", 1e-3), ("m", 1e-6)];
+const FORCE: &[Unit] = &[("N", 1.0), ("mN", 1e3), ("kN", 1e-3)];
+
+/// Everything that a record may hold.
+const QUANTITIES: [Quantity; 7] = [
+    Quantity { name: "time_s", also: &["t", "zeit"], units: TIME },
+    Quantity { name: "drive_V", also: &["command"], units: VOLTAGE },
+    Quantity { name: "monitor_V", also: &[], units: VOLTAGE },
+    Quantity { name: "displacement_um", also: &["position", "disp", "auslenkung"], units: LENGTH },
+    Quantity { name: "force_N", also: &["kraft"], units: FORCE },
+    Quantity { name: "gauge_V", also: &[], units: VOLTAGE },
+    Quantity { name: "reference_um", also: &["ref"], units: LENGTH },
+];
+
+/// Names of a column that counts samples.
+const SAMPLE: [&str; 5] = ["sample", "samples", "index", "samplenumber", "n"];
+/// Time in s as LabVIEW names it.
+const X_VALUE: &str = "xvalue";
+
+/// The quantity of a column such as `time_s`.
+pub(crate) fn quantity(name: &str) -> Option<&'static Quantity> {
+    QUANTITIES.iter().find(|quantity| quantity.name == name)
+}
+
+/// Every quantity.
+pub(crate) fn all() -> impl Iterator<Item = &'static Quantity> {
+    QUANTITIES.iter()
+}
+
+/// How well a header fits, the best first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Fit {
+    Exact,
+    OtherUnit,
+    OtherName,
+}
+
+impl Quantity {
+    /// How `header` names this quantity, and how many of its unit are one of ours; `None` if it does not, or without a unit.
+    pub(crate) fn fits(&self, header: &str) -> Option<(Fit, f64)> {
+        if header.eq_ignore_ascii_case(self.name) {
+            return Some((Fit::Exact, 1.0));
+        }
+        let (name, unit) = parts(header);
+        if self.name == "time_s" && plain(header) == X_VALUE {
+            return Some((Fit::OtherName, 1.0));
+        }
+        let per = self.per(&unit?)?;
+        match name.as_str() {
+            name if name == self.plain() => Some((Fit::OtherUnit, per)),
+            name if self.also.contains(&name) => Some((Fit::OtherName, per)),
+            _ => None,
+        }
+    }
+
+    /// How many of `unit` are one of ours.
+    fn per(&self, unit: &str) -> Option<f64> {
+        self.units.iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|(_, per)| *per)
+    }
+
+    /// The same, of a name such as `drive_mV`; `None` if that is another quantity, or has no unit of it.
+    pub(crate) fn per_of(&self, name: &str) -> Option<f64> {
+        let (quantity, unit) = parts(name);
+        if quantity == self.plain() { self.per(&unit?) } else { None }
+    }
+
+    /// Its name without the unit.
+    pub(crate) fn plain(&self) -> &'static str {
+        self.name.split('_').next().unwrap_or(self.name)
+    }
+
+    /// Names with the units that are read.
+    pub(crate) fn all_names(&self) -> String {
+        let name = |(unit, _): &Unit| format!("`{}_{unit}`", self.plain());
+        self.units.iter().map(name).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Whether a header counts samples.
+pub(crate) fn is_sample_number(header: &str) -> bool {
+    SAMPLE.contains(&plain(header).as_str())
+}
+
+/// Whether a header names anything that a record may hold.
+pub(crate) fn is_known(header: &str) -> bool {
+    is_sample_number(header) || QUANTITIES.iter().any(|quantity| quantity.fits(header).is_some())
+}
+
+/// Whether a field of a line below the names is a unit.
+pub(crate) fn is_unit(field: &str) -> bool {
+    let unit = unit(field.trim_matches(['[', ']', '(', ')']));
+    QUANTITIES.iter().any(|quantity| quantity.per(&unit).is_some())
+}
+
+/// Lower case letters and digits of a name.
+fn plain(name: &str) -> String {
+    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
+}
+
+/// The quantity of a header, and its unit in lower case with `u` for µ; none if nothing looks like one.
+fn parts(header: &str) -> (String, Option<String>) {
+    let header = header.trim();
+    for (open, close) in [('(', ')'), ('[', ']')] {
+        if let Some((name, inner)) = header.strip_suffix(close).and_then(|rest| rest.rsplit_once(open)) {
+            return (plain(name), Some(unit(inner)));
+        }
+    }
+    match header.rsplit_once(['_', '/', ' ']) {
+        Some((name, inner)) => (plain(name), Some(unit(inner))),
+        None => (plain(header), None),
+    }
+}
+
+fn unit(text: &str) -> String {
+    // `Â` is the first half of a µ in UTF-8 that a program took for Latin-1.
+    let text = text.trim().replace('Â', "").to_lowercase().replace(['µ', 'μ'], "u");
+    match text.as_str() {
+        "volt" | "volts" => "v".to_owned(),
+        "sec" | "seconds" => "s".to_owned(),
+        "micron" | "microns" => "um".to_owned(),
+        _ => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_is_a_quantity_in_a_unit() {
+        for (header, name, expected) in [
+            ("time_s", "time_s", Some((Fit::Exact, 1.0))),
+            ("TIME_S", "time_s", Some((Fit::Exact, 1.0))),
+            ("Time (ms)", "time_s", Some((Fit::OtherUnit, 1e3))),
+            ("t/s", "time_s", Some((Fit::OtherName, 1.0))),
+            ("X_Value", "time_s", Some((Fit::OtherName, 1.0))),
+            ("Zeit [s]", "time_s", Some((Fit::OtherName, 1.0))),
+            ("Drive_mV", "drive_V", Some((Fit::OtherUnit, 1e3))),
+            ("drive", "drive_V", None),
+            ("drive_A", "drive_V", None),
+            ("displacement_µm", "displacement_um", Some((Fit::OtherUnit, 1.0))),
+            ("displacement [μm]", "displacement_um", Some((Fit::OtherUnit, 1.0))),
+            ("displacement_Âµm", "displacement_um", Some((Fit::OtherUnit, 1.0))),
+            ("Position nm", "displacement_um", Some((Fit::OtherName, 1e3))),
+            ("monitor_V", "drive_V", None),
+            ("force_kN", "force_N", Some((Fit::OtherUnit, 1e-3))),
+        ] {
+            assert_eq!(quantity(name).unwrap().fits(header), expected, "{header}");
+        }
+        assert!(is_unit("[µm]") && is_unit("Volts") && !is_unit("1") && is_sample_number("Sample"));
+        assert_eq!(quantity("drive_V").unwrap().all_names(), "`drive_V`, `drive_mV`, `drive_uV`, `drive_kV`");
+        assert_eq!(quantity("force_N").unwrap().all_names(), "`force_N`, `force_mN`, `force_kN`");
+    }
+}

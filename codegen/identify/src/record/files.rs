@@ -1,0 +1,211 @@
+//! Small files as the programs of the bench write them: each is read as the same record, or refused with a fix that is taken.
+
+use super::*;
+
+/// Time (s), drive (V), displacement (µm) of three loops of a play.
+fn rows() -> Vec<[f64; 3]> {
+    let mut play = 0.0_f64;
+    let row = |k: u32| {
+        let phase = f64::from(k % 80);
+        let drive = 2.5 * if phase < 40.0 { phase } else { 80.0 - phase } - 20.0;
+        play = play.clamp(drive - 4.0, drive + 4.0);
+        [f64::from(k) * 1e-3, drive, 0.25 * drive + 0.125 * play + 0.5]
+    };
+    (0..240).map(row).collect()
+}
+
+/// A file of `header` and a line for each sample.
+fn file(header: &str, line: impl Fn([f64; 3]) -> String) -> String {
+    rows().into_iter().fold(format!("{header}\n"), |text, row| text + &line(row) + "\n")
+}
+
+fn comma(value: f64) -> String {
+    format!("{value:.6}").replace('.', ",")
+}
+
+fn read(bytes: &[u8], columns: &[&str], rate: Option<f64>) -> Result<Record, Vec<Diagnostic>> {
+    let columns: Vec<String> = columns.iter().map(|text| (*text).to_owned()).collect();
+    of_source(bytes, &Reading::new(&columns, rate).unwrap(), Findings::new("r.csv"))
+}
+
+fn assert_same(name: &str, found: Result<Record, Vec<Diagnostic>>) -> Record {
+    let record = found.unwrap_or_else(|found| panic!("{name}: {found:#?}"));
+    assert_eq!(record.time.len(), rows().len(), "{name}");
+    for (k, [t, u, y]) in rows().into_iter().enumerate() {
+        let off = [record.time[k] - t, record.drive[k] - u, 1e6 * record.displacement[k] - y];
+        assert!(off.iter().all(|off| off.abs() < 1e-9), "{name}, sample {k}: off by {off:?}");
+    }
+    record
+}
+
+const LABVIEW: &str = "LabVIEW Measurement\t\nSeparator\tTab\nDecimal_Separator\t,\nTime\t10:11:12,3\n***End_of_Header***\t\n\t\n\
+    Channels\t2\nSamples\t240\t240\nY_Unit_Label\tVolts\tVolts\nX0\t0\t0\nDelta_X\t0,001\t0,001\n***End_of_Header***\t";
+
+#[test]
+fn every_kind_of_text_gives_the_same_record() {
+    let names = "X_Value\tVoltage\tVoltage (Filtered)\tComment";
+    let by_name: &[&str] = &["drive_V=Voltage", "displacement_um=Voltage (Filtered)"];
+    let lines: [(&str, String, &[&str], Option<f64>); 12] = [
+        ("plain", file("time_s,drive_V,displacement_um", |[t, u, y]| format!("{t},{u},{y}")), &[], None),
+        (
+            "semicolons, decimal commas, other units and order",
+            file("Position [nm];Zeit [ms];Drive (mV)", |[t, u, y]| {
+                [comma(1e3 * y), comma(1e3 * t), comma(1e3 * u)].join(";")
+            }),
+            &[],
+            None,
+        ),
+        (
+            "blanks",
+            file("# time_s drive_V displacement_um", |[t, u, y]| format!(" {t:.6e}  {u:.6e} {y:.9e}")),
+            &[],
+            None,
+        ),
+        (
+            "quotes",
+            file("\"time_s\",\"drive_V\",\"displacement_um\"", |[t, u, y]| format!("\"{t}\",{u},\"{y}\"")),
+            &[],
+            None,
+        ),
+        (
+            "a line of units",
+            file("time\tdrive\tdisplacement\ns\tV\tµm", |[t, u, y]| format!("{t}\t{u}\t{y}")),
+            &[],
+            None,
+        ),
+        (
+            "a spreadsheet's first line",
+            file("sep=;\nt (s);drive_V;displacement_µm", |row| row.map(comma).join(";")),
+            &[],
+            None,
+        ),
+        ("LabVIEW", file(&format!("{LABVIEW}\n{names}"), |row| row.map(comma).join("\t")), by_name, None),
+        (
+            "LabVIEW without times",
+            file(&format!("{LABVIEW}\n{names}"), |[_, u, y]| format!("\t{}\t{}", comma(u), comma(y))),
+            by_name,
+            None,
+        ),
+        (
+            "no names",
+            file("", |[t, u, y]| format!("{y};{u};{t}")),
+            &["displacement_um=1", "drive_V=2", "time_s=3"],
+            None,
+        ),
+        ("no times", file("drive_V,displacement_um", |[_, u, y]| format!("{u},{y}")), &[], Some(1e3)),
+        (
+            "sample numbers",
+            file("Sample,drive_V,displacement_um", |[t, u, y]| format!("{:.0},{u},{y}", 1e3 * t)),
+            &[],
+            Some(1e3),
+        ),
+        ("a note", file("time_s,note,drive_V,displacement_um", |[t, u, y]| format!("{t},a,{u},{y},b")), &[], None),
+    ];
+    for (name, text, columns, rate) in lines {
+        let record = assert_same(name, read(text.as_bytes(), columns, rate));
+        assert!(!record.monitored && record.warnings.is_empty(), "{name}: {:?}", record.warnings);
+        let windows = text.replace('\n', "\r\n");
+        assert_same(name, read(windows.as_bytes(), columns, rate));
+    }
+    let latin: Vec<u8> = file("time_s,monitor_V,displacement_?m", |[t, u, y]| format!("{t},{u},{y}"))
+        .bytes()
+        .map(|byte| if byte == b'?' { 0xb5 } else { byte })
+        .collect();
+    assert!(assert_same("Latin-1", read(&latin, &[], None)).monitored);
+}
+
+/// A file, the code and a word of the help of its refusal, and with what it is then taken.
+type Refused<'a> = (&'a str, &'a str, &'a str, String, &'a [&'a str], Option<f64>);
+
+/// Each with the code, a word of the help, and the file as the help would have it.
+#[test]
+fn what_is_refused_says_what_is_then_taken() {
+    let plain = |header: &str| file(header, |[t, u, y]| format!("{t},{u},{y}"));
+    let commas = file("time_s,drive_V,displacement_um", |row| row.map(comma).join(","));
+    let mended = file("time_s,drive_V,displacement_um", |row| row.map(comma).join(";"));
+    let first = mended.lines().nth(1).unwrap();
+    let mixed = file("time_s;drive_V;displacement_um", |[t, u, y]| format!("{};{u:.3};{}", comma(t), comma(y)));
+    let cases: [Refused; 7] = [
+        (&commas, "E0506", first, mended.clone(), &[], None),
+        (&mixed, "E0506", "same decimal sign", mixed.replace(',', "."), &[], None),
+        (
+            &plain("time_s,drive,displacement_um"),
+            "E0504",
+            "rename `drive` to `drive_V`",
+            plain("time_s,drive_V,displacement_um"),
+            &[],
+            None,
+        ),
+        (
+            &plain("time_s,U,displacement_um"),
+            "E0504",
+            "--columns drive_V=COLUMN",
+            plain("time_s,U,displacement_um"),
+            &["drive_V=U"],
+            None,
+        ),
+        (
+            &plain("time_s,drive_V,displacement_inch"),
+            "E0504",
+            "`displacement_um`",
+            plain("time_s,drive_V,displacement_um"),
+            &[],
+            None,
+        ),
+        (
+            &plain("sample,drive_V,displacement_um"),
+            "E0504",
+            "--rate HZ",
+            plain("note,drive_V,displacement_um"),
+            &[],
+            Some(1e3),
+        ),
+        (
+            &plain(""),
+            "E0504",
+            "--columns time_s=1,drive_V=2,displacement_um=3",
+            plain(""),
+            &["time_s=1", "drive_V=2", "displacement_um=3"],
+            None,
+        ),
+    ];
+    for (text, code, help, fixed, columns, rate) in cases {
+        let found = read(text.as_bytes(), &[], None).unwrap_err();
+        assert!(found[0].code == code && found[0].help.contains(help), "{help}: {found:#?}");
+        assert_same(help, read(fixed.as_bytes(), columns, rate));
+    }
+    let found = read(b"time_s,drive_V,displacement_um\n0,0,0\n", &["drive_V=7"], None).unwrap_err();
+    assert!(found[0].message.contains("names `7` for `drive_V`"), "{found:?}");
+    for (magic, word) in [
+        (&b"MATLAB 5.0 MAT-file, Platform"[..], "loadmat('r.csv')"),
+        (b"MATLAB 7.3 MAT-file, Platform", "h5py"),
+        (b"\x89HDF\r\n\x1a\n", "h5py"),
+        (b"TDSm\x0e\0\0\0", "nptdms"),
+        (b"\x93NUMPY\x01\0", "n.load"),
+        (b"PK\x03\x04", "as CSV"),
+        (b"\x1f\x8b\x08", "gunzip"),
+        (b"\xff\xfet\0", "iconv"),
+    ] {
+        let found = read(magic, &[], None).unwrap_err();
+        assert!(found[0].code == "E0503" && found[0].help.contains(word), "{found:?}");
+    }
+}
+
+/// A butterfly loop, and a gauge in the column of the drive, are called what they are.
+#[test]
+fn loops_that_no_table_holds_are_named() {
+    let butterfly =
+        file("time_s,drive_V,displacement_um", |[t, u, _]| format!("{t},{u},{}", 0.1 * (u - 30.0).abs() + 1e-3 * u));
+    let found = read(butterfly.as_bytes(), &[], None).unwrap_err();
+    assert!(found[0].code == "E0514" && found[0].message.contains("butterfly"), "{found:?}");
+}
+
+/// Rows cost their numbers, not their text; a line without end is not waited for.
+#[test]
+fn endless_lines_and_files_are_cut_short() {
+    let endless = std::io::repeat(b'1');
+    let found = of_source(endless, &Reading::default(), Findings::new("r.csv")).unwrap_err();
+    assert!(found[0].message.contains("longer than 64 KiB"), "{found:?}");
+    let found = of_source(std::io::repeat(0), &Reading::default(), Findings::new("r.csv")).unwrap_err();
+    assert_eq!(found[0].code, "E0503");
+}
