@@ -1,10 +1,13 @@
 //! Names what a residual consists of: an ordered account of its mean square.
 //!
 //! Taken out one after the other, each by least squares on what the ones before it left: a linear drift; what is
-//! proportional to the drive's rate (dead time, lag); what first-order creep of the drive explains. White noise is known
+//! proportional to the drive's rate (dead time, lag); a drift that bends, where it leaves less than half of what creep does; what
+//! first-order creep of the drive explains; hum of the mains. White noise is known
 //! from second differences. The rest is the model's: cells of finite size, and hysteresis that is not a Preisach model's.
 
 use serde::Serialize;
+
+mod mains;
 
 use super::least_squares::{fit, mean_square};
 use super::trend::Line;
@@ -17,8 +20,12 @@ pub enum Source {
     Drift,
     /// Proportional to the rate of the drive.
     DeadTime,
+    /// Quadratic in time, without regard to the drive.
+    BentDrift,
     /// Slow answer to the drive.
     Creep,
+    /// At the frequency of the mains, which the drive does not have.
+    Hum,
     /// White noise of gauge and converter.
     Noise,
     /// Everything else.
@@ -32,7 +39,9 @@ impl Source {
         match self {
             Self::Drift => "drift",
             Self::DeadTime => "dead time or lag",
+            Self::BentDrift => "drift that bends",
             Self::Creep => "creep",
+            Self::Hum => "hum of the mains",
             Self::Noise => "noise",
             Self::Model => "model (cells of finite size, hysteresis that no Preisach model has)",
         }
@@ -44,13 +53,19 @@ impl Source {
 pub struct Cause {
     /// The largest share of what is left without the drift.
     pub main: Source,
-    /// Shares without the drift, in the order dead time, creep, noise, model; they sum to 1.
+    /// Shares without the drift, in the order dead time, bent drift, creep, hum, noise, model; they sum to 1. Bent drift and
+    /// hum are there only where they are found.
     pub shares: Vec<(Source, f64)>,
     /// Root mean square that the removed linear drift had, m.
     pub drift_rms: f64,
     /// Dead time that the part proportional to the rate would mean, s; its sign shows a dead time taken too short (+) or too long (−).
     pub rate_delay: f64,
+    /// Frequency of the hum, Hz, where there is any.
+    pub hum: Option<f64>,
 }
+
+/// A bent drift or a hum of a smaller share is none.
+const FOUND: f64 = 0.05;
 
 /// Creep time constants tried, as shares of the record's duration.
 const CREEP: [f64; 4] = [0.003, 0.02, 0.1, 0.5];
@@ -78,39 +93,80 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
         left = found.residual;
     }
     let after_rate = mean_square(&left);
-    let duration = t.last().copied().unwrap_or(0.0) - t.first().copied().unwrap_or(0.0);
+    let (creep, bend) = (creep_of(time, drive, &pick, &t, &left), bend_of(&t, &left));
+    let bend =
+        bend.filter(|bend| 2.0 * mean_square(&bend.left) < mean_square(&creep.left) && bend.explained > FOUND * total);
+    let bent = bend.as_ref().map(|bend| bend.explained);
+    let creep = match bend {
+        Some(bend) => creep_of(time, drive, &pick, &t, &bend.left),
+        None => creep,
+    };
+    let creeping = creep.explained;
+    let hum = mains::take(&t, &pick(drive), &creep.left)
+        .map(|(frequency, left)| (frequency, mean_square(&creep.left) - mean_square(&left)));
+    let hum = hum.filter(|(_, explained)| *explained > FOUND * total);
+    let delay = total - after_rate;
+    let rest = after_rate - bent.unwrap_or_default() - creeping - hum.map_or(0.0, |(_, explained)| explained);
+    let noise = if noise * noise < rest { noise * noise } else { rest };
+    let share = |part: f64| if total > 0.0 { if part > 0.0 { part / total } else { 0.0 } } else { 0.0 };
+    let shares: Vec<(Source, f64)> = [
+        (Source::DeadTime, Some(delay)),
+        (Source::BentDrift, bent),
+        (Source::Creep, Some(creeping)),
+        (Source::Hum, hum.map(|(_, explained)| explained)),
+        (Source::Noise, Some(noise)),
+        (Source::Model, Some(rest - noise)),
+    ]
+    .into_iter()
+    .filter_map(|(source, part)| Some((source, share(part?))))
+    .collect();
+    let main = shares.iter().fold(shares[0], |best, s| if s.1 > best.1 { *s } else { best }).0;
+    let drift_rms = if removed > 0.0 { removed.sqrt() } else { 0.0 };
+    Cause { main, shares, drift_rms, rate_delay, hum: hum.map(|(frequency, _)| frequency) }
+}
+
+/// A part that was taken out.
+struct Taken {
+    /// Mean square by which it lowered the residual.
+    explained: f64,
+    left: Vec<f64>,
+}
+
+/// What a parabola over time explains.
+fn bend_of(time: &[f64], left: &[f64]) -> Option<Taken> {
+    let middle = 0.5 * (time.first()? + time.last()?);
+    let line = centred(time.to_vec());
+    let bent = centred(time.iter().map(|t| (t - middle) * (t - middle)).collect());
+    let found = fit(&[&line, &bent], left)?;
+    Some(Taken { explained: mean_square(left) - mean_square(&found.residual), left: found.residual })
+}
+
+/// What creep explains beside the drive itself, so that a wrong gain is not taken for it; one time constant after the other
+/// keeps every fit solvable. `pick` takes the samples at `chosen` out of all.
+fn creep_of(time: &[f64], drive: &[f64], pick: &impl Fn(&[f64]) -> Vec<f64>, chosen: &[f64], left: &[f64]) -> Taken {
+    let duration = chosen.last().copied().unwrap_or(0.0) - chosen.first().copied().unwrap_or(0.0);
     let states: Vec<Vec<f64>> =
         CREEP.iter().map(|share| centred(pick(&lagging(time, drive, share * duration)))).collect();
-    // Beside the drive itself, so that a wrong gain is not taken for creep; one after the other keeps every fit solvable.
     let level = centred(pick(drive));
-    let mut columns: Vec<&[f64]> = Vec::new();
-    let mut after_creep = after_rate;
-    let mut gain_part = 0.0;
-    if let Some(found) = fit(&[&level], &left) {
-        gain_part = after_rate - mean_square(&found.residual);
-        columns.push(&level);
-        after_creep = after_rate - gain_part;
-    }
+    let Some(gain) = fit(&[&level], left) else {
+        return Taken { explained: 0.0, left: left.to_vec() };
+    };
+    let mut columns: Vec<&[f64]> = vec![&level];
+    let before = mean_square(&gain.residual);
+    // The gain's own part stays with the model.
+    let mut best = Vec::new();
+    let mut explained = 0.0;
     for state in &states {
         columns.push(state);
-        match fit(&columns, &left) {
-            Some(found) => after_creep = mean_square(&found.residual),
+        match fit(&columns, left) {
+            Some(found) => {
+                explained = before - mean_square(&found.residual);
+                best = found.residual;
+            }
             None => drop(columns.pop()),
         }
     }
-    let delay = total - after_rate;
-    let creep = after_rate - gain_part - after_creep;
-    let rest = after_creep + gain_part;
-    let noise = if noise * noise < rest { noise * noise } else { rest };
-    let share = |part: f64| if total > 0.0 { if part > 0.0 { part / total } else { 0.0 } } else { 0.0 };
-    let shares = vec![
-        (Source::DeadTime, share(delay)),
-        (Source::Creep, share(creep)),
-        (Source::Noise, share(noise)),
-        (Source::Model, share(rest - noise)),
-    ];
-    let main = shares.iter().fold(shares[0], |best, s| if s.1 > best.1 { *s } else { best }).0;
-    Cause { main, shares, drift_rms: if removed > 0.0 { removed.sqrt() } else { 0.0 }, rate_delay }
+    Taken { explained, left: if best.is_empty() { left.to_vec() } else { best } }
 }
 
 /// Central differences, V/s.
@@ -176,6 +232,11 @@ mod tests {
         assert_eq!(explain(&time, &drive, &steps, 0.0, 1e-7, &keep).main, Source::Model);
         let rms = mean_square(&steps).sqrt();
         assert_eq!(explain(&time, &drive, &steps, rms, 1e-7, &keep).main, Source::Noise);
+        let hum: Vec<f64> = time.iter().map(|t| 1e-9 * libm::sin(core::f64::consts::TAU * 49.98 * t)).collect();
+        let found = explain(&time, &drive, &hum, 0.0, 1e-7, &keep);
+        assert!(found.main == Source::Hum && found.hum.is_some_and(|f| (f - 49.98).abs() < 0.1), "{found:?}");
+        let bent: Vec<f64> = time.iter().map(|t| 1e-9 * t * t).collect();
+        assert_eq!(explain(&time, &drive, &bent, 0.0, 1e-7, &keep).main, Source::BentDrift);
         let drift: Vec<f64> = time.iter().map(|t| 1e-8 * t).collect();
         let found = explain(&time, &drive, &drift, 0.0, 1e-7, &keep);
         assert!(found.drift_rms > 1e-8, "{}", found.drift_rms);

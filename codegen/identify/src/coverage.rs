@@ -8,7 +8,7 @@ use super::branches::Branch;
 use super::findings::Findings;
 use super::record::Record;
 use super::regressor::Plane;
-use super::sanity::PLAUSIBLE_RANGE;
+use super::sanity::{self, PLAUSIBLE_RANGE};
 use super::statistics::{extent, micrometres};
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::codes;
@@ -59,8 +59,11 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
         );
         return;
     }
-    if (ratio - 1.0).abs() > 0.2 && (um / span - 1.0).abs() < 0.02 {
-        let message = format!("{found}, and the displacement covers {um:.3}, the span of the drive");
+    if (ratio - 1.0).abs() > 0.2
+        && ((um / span - 1.0).abs() < 0.02 || sanity::look_swapped(&record.drive, &record.displacement))
+    {
+        let message =
+            format!("{found}, and the displacement covers {um:.3}, as the drive should, or has no noise on it");
         findings.add(
             codes::COLUMNS_SWAPPED,
             None,
@@ -81,13 +84,22 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
             codes::NOT_EXCITED,
             None,
             message,
-            "let the drive fall to the lower end of its range between the curves",
+            &format!("let the drive fall to the lower end of its range between the curves; {}", such_a_drive(plane)),
         );
     }
     if top < high - interval {
         let message = format!("{found}: no cell with an up_threshold above {top} V was ever excited");
-        findings.add(codes::NOT_EXCITED, None, message, "let the last curves rise to the upper end of the drive range");
+        let help = format!("let the last curves rise to the upper end of the drive range; {}", such_a_drive(plane));
+        findings.add(codes::NOT_EXCITED, None, message, &help);
     }
+}
+
+/// The command that writes a drive which identifies the plane.
+pub(crate) fn such_a_drive(plane: &Plane) -> String {
+    let ([low, high], grid) = (plane.range, plane.grid);
+    format!(
+        "`specgen forc --drive-only --drive {low}:{high} --grid {grid} -o drive.csv` writes such a drive for a generator"
+    )
 }
 
 /// Time of the first sample whose drive fits, s.
@@ -117,18 +129,21 @@ fn check_displacement_unit(record: &Record, findings: &mut Findings) {
 /// Number of reversal curves: falls from a reversal. Refuses a record with too few of them for the grid.
 pub(crate) fn check_curves(branches: &[Branch], plane: &Plane, findings: &mut Findings) -> usize {
     let curves = branches.iter().filter(|b| !b.rising).count();
-    let help = "let the drive rise to a reversal, fall back, and repeat with one reversal per grid interval";
+    let help = format!(
+        "let the drive rise to a reversal, fall back, and repeat with one reversal per grid interval; {}",
+        such_a_drive(plane)
+    );
     if curves < MIN_CURVES.max(plane.grid / 4) {
         let message = format!(
             "has {curves} reversal curves; a grid of {} needs at least {}",
             plane.grid,
             MIN_CURVES.max(plane.grid / 4)
         );
-        findings.add(codes::TOO_FEW_CURVES, None, message, help);
+        findings.add(codes::TOO_FEW_CURVES, None, message, &help);
     } else if curves < plane.grid / 2 {
         let message =
             format!("has {curves} reversal curves for a grid of {}: weights between them are interpolated", plane.grid);
-        findings.add(codes::FEW_CURVES, None, message, help);
+        findings.add(codes::FEW_CURVES, None, message, &help);
     }
     curves
 }

@@ -80,6 +80,7 @@ impl Declared {
                 self.warnings.push(static_table_with_creep(model, name));
             }
             self.warnings.extend(identified.warnings);
+            self.warnings.extend(faster_than_amplifier(model, name, identified.report.fastest));
             self.reports.push(Some(identified.report));
             identified.table
         };
@@ -169,6 +170,22 @@ fn rate_not_in_stability(model: &Model) -> Diagnostic {
             2.0 * model.adaptation.gain_ratio[1]
         ),
     )
+}
+
+/// A record that is faster than the amplifier (times `SLEW`) has another unit of time, or another amplifier.
+fn faster_than_amplifier(model: &Model, record: &str, rate: f64) -> Option<Diagnostic> {
+    const SLEW: f64 = 1.2;
+    let limit = model.actuator.slew_rate;
+    (rate > SLEW * limit).then(|| {
+        Diagnostic::at(
+            &model.spans,
+            &["hysteresis.records"],
+            codes::RECORD_LONG,
+            format!("the drive of `{record}` runs at {rate:.0} V/s, and actuator.slew_rate is {limit:.0} V/s"),
+            "if its column of times is in s, name it `time_s`, if in ms, `time_ms`; or correct actuator.slew_rate"
+                .to_owned(),
+        )
+    })
 }
 
 fn static_table_with_creep(model: &Model, record: &str) -> Diagnostic {

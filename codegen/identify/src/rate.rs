@@ -27,7 +27,7 @@ use specgen_language::diagnostic::Diagnostic;
 
 use super::findings::Findings;
 use super::record::Record;
-use super::{Options, coverage};
+use super::{Options, coverage, time_unit};
 
 pub use export::{read_rate_csv, spec_lines, write_rate_csv};
 pub use report::{HoldOut, Measured, OptionReport, RateReport, Verdict};
@@ -147,6 +147,8 @@ pub fn identify_rate(
         all.extend(findings.into_diagnostics());
         return Err(all);
     };
+    let longest = models.iter().map(|model| model.dead_time).max_by(f64::total_cmp);
+    time_unit::check_dead_time(longest.unwrap_or_default(), &mut findings);
     let report = match report::report(&plane, &prepared, &models, &left_out, hold_out) {
         Ok(report) => report,
         Err(found) => {

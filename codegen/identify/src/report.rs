@@ -57,6 +57,8 @@ pub struct Report {
     pub drift_returns: usize,
     /// Whether the drift was removed from the branches too.
     pub drift_removed: bool,
+    /// Mean rate of the drive in the fastest branch that is no jump, V/s.
+    pub fastest: f64,
     /// Time by which the displacement lags the drive column, s.
     pub dead_time: f64,
     /// What of it is the converter's, which holds each sample of a command: half a sampling interval, s; 0 for `monitor_V` and below 1 kHz.

@@ -52,7 +52,10 @@ pub(crate) fn usable(record: &Record, plane: &Plane, findings: &mut Findings) ->
             codes::TOO_FEW_CURVES,
             None,
             message,
-            "start at the lowest drive, then rise to each reversal and fall back",
+            &format!(
+                "start at the lowest drive, then rise to each reversal and fall back; {}",
+                coverage::such_a_drive(plane)
+            ),
         );
         return None;
     };

@@ -6,6 +6,7 @@ use super::regressor::Plane;
 use super::report::Report;
 use super::selection::Used;
 use super::statistics::median;
+use super::time_unit;
 use specgen_language::diagnostic::codes;
 
 /// A lag that widens the loop by this share of the range is worth a warning.
@@ -23,20 +24,8 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
     let gain = report.displacement_range / span;
     let mut intervals: Vec<f64> = record.time.windows(2).map(|w| w[1] - w[0]).collect();
     let interval = median(&mut intervals);
-    let mut fastest = (0.0, 0);
-    for branch in &used.branches {
-        let last = branch.end - 1;
-        // A jump is no sweep; its samples have no weight.
-        if record.weightless[branch.first + 1..branch.end].iter().all(|w| *w) {
-            continue;
-        }
-        let rate =
-            ((record.drive[last] - record.drive[branch.first]) / (record.time[last] - record.time[branch.first])).abs();
-        if rate > fastest.0 {
-            fastest = (rate, branch.first);
-        }
-    }
-    let (rate, at) = fastest;
+    let (rate, at) = fastest(record, used);
+    time_unit::check(report, span, findings);
     let lag = if interval < LONGEST_LAG { interval } else { LONGEST_LAG };
     let unknown = !report.dead_time_basis.starts_with("estimated") && report.dead_time == 0.0;
     if rate * interval > plane.interval() {
@@ -84,4 +73,22 @@ pub(crate) fn check(plane: &Plane, record: &Record, used: &Used, report: &Report
             "record fewer curves with more samples each, or average several sweeps",
         );
     }
+}
+
+/// Mean rate of the drive in the fastest branch (V/s), and that branch's first sample.
+pub(crate) fn fastest(record: &Record, used: &Used) -> (f64, usize) {
+    let mut fastest = (0.0, 0);
+    for branch in &used.branches {
+        let last = branch.end - 1;
+        // A jump is no sweep; its samples have no weight.
+        if record.weightless[branch.first + 1..branch.end].iter().all(|w| *w) {
+            continue;
+        }
+        let rate =
+            ((record.drive[last] - record.drive[branch.first]) / (record.time[last] - record.time[branch.first])).abs();
+        if rate > fastest.0 {
+            fastest = (rate, branch.first);
+        }
+    }
+    fastest
 }
