@@ -1,13 +1,14 @@
 //! Names what a residual consists of: an ordered account of its mean square.
 //!
 //! Taken out one after the other, each by least squares on what the ones before it left: a linear drift; what is
-//! proportional to the drive's rate (dead time, lag); a drift that bends, where it leaves less than half of what creep does; what
+//! proportional to the drive's rate (dead time, lag); what a lightly damped mode adds to the drive; a drift that bends, where it leaves less than half of what creep does; what
 //! first-order creep of the drive explains; hum of the mains. White noise is known
 //! from second differences. The rest is the model's: cells of finite size, and hysteresis that is not a Preisach model's.
 
 use serde::Serialize;
 
 mod mains;
+mod resonance;
 
 use super::least_squares::{fit, mean_square};
 use super::trend::Line;
@@ -20,6 +21,8 @@ pub enum Source {
     Drift,
     /// Proportional to the rate of the drive.
     DeadTime,
+    /// What a lightly damped mode adds to the drive.
+    Resonance,
     /// Quadratic in time, without regard to the drive.
     BentDrift,
     /// Slow answer to the drive.
@@ -39,6 +42,7 @@ impl Source {
         match self {
             Self::Drift => "drift",
             Self::DeadTime => "dead time or lag",
+            Self::Resonance => "resonance",
             Self::BentDrift => "drift that bends",
             Self::Creep => "creep",
             Self::Hum => "hum of the mains",
@@ -53,8 +57,8 @@ impl Source {
 pub struct Cause {
     /// The largest share of what is left without the drift.
     pub main: Source,
-    /// Shares without the drift, in the order dead time, bent drift, creep, hum, noise, model; they sum to 1. Bent drift and
-    /// hum are there only where they are found.
+    /// Shares without the drift, in the order dead time, resonance, bent drift, creep, hum, noise, model; they sum to 1. Resonance,
+    /// bent drift and hum are there only where they are found.
     pub shares: Vec<(Source, f64)>,
     /// Root mean square that the removed linear drift had, m.
     pub drift_rms: f64,
@@ -62,6 +66,8 @@ pub struct Cause {
     pub rate_delay: f64,
     /// Frequency of the hum, Hz, where there is any.
     pub hum: Option<f64>,
+    /// Frequency of the resonance, to one step of the search, Hz, where there is any.
+    pub resonance: Option<f64>,
 }
 
 /// A bent drift or a hum of a smaller share is none.
@@ -92,6 +98,11 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
         rate_delay = -found.coefficients[0] / gain;
         left = found.residual;
     }
+    let delay = total - mean_square(&left);
+    let rung = resonance::take(time, drive, &chosen, &left);
+    let rings = rung.as_ref().map(|found| mean_square(&left) - mean_square(&found.left));
+    let resonance = rung.as_ref().map(|found| found.frequency);
+    left = rung.map_or(left, |found| found.left);
     let after_rate = mean_square(&left);
     let (creep, bend) = (creep_of(time, drive, &pick, &t, &left), bend_of(&t, &left));
     let bend =
@@ -105,12 +116,12 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
     let hum = mains::take(&t, &pick(drive), &creep.left)
         .map(|(frequency, left)| (frequency, mean_square(&creep.left) - mean_square(&left)));
     let hum = hum.filter(|(_, explained)| *explained > FOUND * total);
-    let delay = total - after_rate;
     let rest = after_rate - bent.unwrap_or_default() - creeping - hum.map_or(0.0, |(_, explained)| explained);
     let noise = if noise * noise < rest { noise * noise } else { rest };
     let share = |part: f64| if total > 0.0 { if part > 0.0 { part / total } else { 0.0 } } else { 0.0 };
     let shares: Vec<(Source, f64)> = [
         (Source::DeadTime, Some(delay)),
+        (Source::Resonance, rings),
         (Source::BentDrift, bent),
         (Source::Creep, Some(creeping)),
         (Source::Hum, hum.map(|(_, explained)| explained)),
@@ -122,7 +133,7 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
     .collect();
     let main = shares.iter().fold(shares[0], |best, s| if s.1 > best.1 { *s } else { best }).0;
     let drift_rms = if removed > 0.0 { removed.sqrt() } else { 0.0 };
-    Cause { main, shares, drift_rms, rate_delay, hum: hum.map(|(frequency, _)| frequency) }
+    Cause { main, shares, drift_rms, rate_delay, hum: hum.map(|(frequency, _)| frequency), resonance }
 }
 
 /// A part that was taken out.
@@ -237,6 +248,11 @@ mod tests {
         assert!(found.main == Source::Hum && found.hum.is_some_and(|f| (f - 49.98).abs() < 0.1), "{found:?}");
         let bent: Vec<f64> = time.iter().map(|t| 1e-9 * t * t).collect();
         assert_eq!(explain(&time, &drive, &bent, 0.0, 1e-7, &keep).main, Source::BentDrift);
+        let rings = crate::mode::Mode { frequency: 90.0, damping: 0.02 }.behind(&time, &drive);
+        let rings: Vec<f64> = rings.iter().zip(&drive).map(|(y, u)| 1e-8 * (y - u)).collect();
+        let found = explain(&time, &drive, &rings, 0.0, 1e-7, &keep);
+        assert_eq!(found.main, Source::Resonance, "{found:?}");
+        assert!((found.resonance.unwrap() / 90.0 - 1.0).abs() < 0.1, "{found:?}");
         let drift: Vec<f64> = time.iter().map(|t| 1e-8 * t).collect();
         let found = explain(&time, &drive, &drift, 0.0, 1e-7, &keep);
         assert!(found.drift_rms > 1e-8, "{}", found.drift_rms);

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use crate::everett::EverettTable;
-use crate::rate::{CreepTerm, RateModel};
+use crate::mode::Mode;
+use crate::rate::period::{INVERTED, Invertible};
+use crate::rate::{CreepTerm, Inertia, RateModel};
 use crate::{Options, Report, identify, is_table_csv, parse_record, rate, read_file, read_table_csv};
 use specgen_language::diagnostic::{Code, Diagnostic, Place, codes};
 use specgen_language::model::{Model, RateDependence};
@@ -44,6 +46,7 @@ pub fn records(model: &Model, dir: &Path) -> Result<Declared, Vec<Diagnostic>> {
             errors.extend(added.err().unwrap_or_default());
         }
         all.warnings.push(rate_not_in_stability(model));
+        errors.extend(all.not_invertible(model));
     }
     if errors.is_empty() {
         return Ok(all);
@@ -64,7 +67,21 @@ impl Declared {
             _ => Vec::new(),
         };
         let dead_time = model.hysteresis.dead_time;
-        Some(RateModel { still: of(&self.tables)?, rate: of(&self.rate_tables), creep, dead_time })
+        let still = of(&self.tables)?;
+        let inertia = Some(Inertia { mode: mode_of(model), gain: still.mean_gain() });
+        Some(RateModel { still, rate: of(&self.rate_tables), creep, inertia, dead_time })
+    }
+
+    /// A controller of so short a period that most ticks would get the static inverse is not the one that was asked for.
+    fn not_invertible(&self, model: &Model) -> Option<Diagnostic> {
+        let pairs = (0..6).filter_map(|leg| {
+            let of = |tables: &[EverettTable]| tables.get(leg).or(tables.first()).cloned();
+            Some(Invertible::of(&of(&self.tables)?, &of(&self.rate_tables)?))
+        });
+        let worst = pairs.reduce(|a, b| if b.period() > a.period() { b } else { a })?;
+        let period = model.timing.period;
+        let share = worst.share(period);
+        (share < INVERTED).then(|| not_invertible(model, share, worst.period()))
     }
 
     fn add_record(&mut self, model: &Model, name: &str, text: String) -> Result<(), Vec<Diagnostic>> {
@@ -97,6 +114,11 @@ impl Declared {
         self.texts.push((name.to_owned(), text));
         Ok(())
     }
+}
+
+/// The leg's resonance as the spec has it.
+fn mode_of(model: &Model) -> Mode {
+    Mode { frequency: model.actuator.resonance, damping: model.actuator.damping_ratio }
 }
 
 /// A displacement that stack gain and voltage do not explain is one in another unit, and the controller would be off by it.
@@ -186,6 +208,32 @@ fn faster_than_amplifier(model: &Model, record: &str, rate: f64) -> Option<Diagn
                 .to_owned(),
         )
     })
+}
+
+fn not_invertible(model: &Model, share: f64, needed: f64) -> Diagnostic {
+    // To two digits, upwards.
+    let digit = libm::pow(10.0, libm::floor(libm::log10(needed * 1e3)) - 1.0);
+    let milliseconds = libm::ceil(needed * 1e3 / digit) * digit;
+    Diagnostic::at(
+        &model.spans,
+        &["hysteresis.rate"],
+        codes::RATE_NOT_INVERTIBLE,
+        format!(
+            "at a period of {} ms the dynamic Preisach model (6) can be inverted on {:.0} % of the travel only; elsewhere ticks get the static inverse",
+            micro(model.timing.period * 1e3),
+            100.0 * share
+        ),
+        format!(
+            "with timing.period = \"{} ms\" it can be on {:.0} %; or write rate = \"creep\" or \"static\"; or identify the tables again with a dead time, which a controller leads by at any period",
+            micro(milliseconds),
+            100.0 * INVERTED
+        ),
+    )
+}
+
+/// Without the rounding of the last digits.
+fn micro(milliseconds: f64) -> f64 {
+    libm::round(milliseconds * 1e6) / 1e6
 }
 
 fn static_table_with_creep(model: &Model, record: &str) -> Diagnostic {

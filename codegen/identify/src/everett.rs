@@ -37,6 +37,12 @@ impl EverettTable {
         self.drive_min + k as f64 * (self.drive_max - self.drive_min) / self.grid as f64
     }
 
+    /// Displacement of the whole range over its voltage, m/V.
+    #[must_use]
+    pub fn mean_gain(&self) -> f64 {
+        self.node(self.grid, 0) / (self.drive_max - self.drive_min)
+    }
+
     /// Preisach weight of the cell between thresholds `up`−1..`up` and `down`..`down`+1, in metres.
     ///
     /// For `down` = `up` − 1 this is the (reversible) weight of the diagonal triangle.

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::branches::Branch;
 use super::findings::Findings;
-use super::normal::{Normal, Weighting, accumulate};
+use super::normal::{Normal, Step, Sums, Weighting, walk, weight};
 use super::record::Record;
 use super::regressor::Plane;
 use super::{DeadTime, Options, coverage, dead_time, prior, selection};
@@ -25,6 +25,8 @@ pub const TRIED: [usize; 9] = [6, 8, 12, 16, 20, 24, 32, 40, 48];
 const PROBE: usize = 16;
 /// Folds, if there are as many groups of curves below the highest.
 const FOLDS: usize = 5;
+/// Samples that the grids are compared on; a longer record is taken in even steps.
+const SAMPLES: usize = 1_000_000;
 /// Fewer folds say nothing about the spread.
 const FEWEST_FOLDS: usize = 3;
 /// Curves that turn back within this share of the range of each other are one group.
@@ -120,28 +122,22 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
         );
         return None;
     }
-    let branches_of = |fold: Option<usize>| -> Vec<Branch> {
-        let chosen = used.branches.iter().zip(&fold_of).filter(|(b, f)| **f == fold && !(falls_only && b.rising));
-        chosen.map(|(b, _)| *b).collect()
-    };
+    let chosen = used.branches.iter().zip(fold_of).filter(|(b, _)| !(falls_only && b.rising));
+    let (branches, fold_of): (Vec<Branch>, Vec<Option<usize>>) = chosen.map(|(b, fold)| (*b, fold)).unzip();
     let weighting = if falls_only { Weighting::AtNodes } else { Weighting::Even };
     let mut errors = Vec::new();
     for grid in TRIED.into_iter().filter(|grid| *grid <= finest.grid) {
         let plane = Plane { grid, range: drive };
-        let sums = |fold: Option<usize>, weighting: Weighting| {
-            accumulate(&plane, record, used.first, &branches_of(fold), weighting, 1, |k, values| values[0] = target[k])
-        };
-        let parts: Vec<Normal> = (0..folds).map(|fold| sums(Some(fold), weighting)).collect();
-        let always = sums(None, weighting);
+        let (always, parts) = sums(&plane, record, used.first, (&branches, &fold_of, folds), weighting, &target);
         let mut whole = always.gram;
         let mut whole_rhs = always.rhs[0].clone();
-        for part in &parts {
+        for (part, _) in &parts {
             whole += &part.gram;
             whole_rhs.iter_mut().zip(&part.rhs[0]).for_each(|(sum, b)| *sum += b);
         }
         let mut near: Option<Vec<f64>> = None;
         let mut squares = Vec::new();
-        for (fold, part) in parts.iter().enumerate() {
+        for (part, held_out) in &parts {
             let mut gram = &whole - &part.gram;
             prior::add(grid, &mut gram);
             let rhs: Vec<f64> = whole_rhs.iter().zip(&part.rhs[0]).map(|(sum, b)| sum - b).collect();
@@ -150,7 +146,7 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
                 None => nnls::solve(&gram, &rhs),
             };
             let Ok(solution) = solved else { break };
-            squares.push(mean_square(&sums(Some(fold), Weighting::Even), &solution.weights));
+            squares.push(mean_square(held_out, &solution.weights));
             near = Some(solution.weights);
         }
         if squares.len() == folds {
@@ -168,6 +164,50 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
     }
     let (bottom, top) = super::statistics::extent(&record.displacement[used.first..]);
     Some(decide(&errors, folds, levels, 1.0 / scale, top - bottom))
+}
+
+/// Normal equations of the branches that are always fitted, and of each fold: weighted as they are fitted, and evenly as they are
+/// scored. All in one walk, over at most [`SAMPLES`] samples.
+fn sums(
+    plane: &Plane,
+    record: &Record,
+    first: usize,
+    (branches, fold_of, folds): (&[Branch], &[Option<usize>], usize),
+    weighting: Weighting,
+    target: &[f64],
+) -> (Normal, Vec<(Normal, Normal)>) {
+    let new = || Sums::new(plane.nodes(), 1);
+    let mut always = new();
+    let mut parts: Vec<(Sums, Sums)> = (0..folds).map(|_| (new(), new())).collect();
+    let every = (record.time.len() - first).div_ceil(SAMPLES);
+    walk(
+        plane,
+        record,
+        first,
+        branches,
+        |k| k.is_multiple_of(every),
+        |step| match step {
+            Step::Sample(branch, k, row) => {
+                let (y, weight) = ([target[k]], weight(weighting, plane, record, k));
+                match fold_of[branch] {
+                    None => always.add(row, &y, weight),
+                    Some(fold) => {
+                        parts[fold].0.add(row, &y, weight);
+                        parts[fold].1.add(row, &y, 1.0);
+                    }
+                }
+            }
+            Step::End(branch) => match fold_of[branch] {
+                None => always.close_branch(),
+                Some(fold) => {
+                    parts[fold].0.close_branch();
+                    parts[fold].1.close_branch();
+                }
+            },
+        },
+    );
+    let over = |(fitted, scored): (Sums, Sums)| (fitted.over_weights(plane), scored.over_weights(plane));
+    (always.over_weights(plane), parts.into_iter().map(over).collect())
 }
 
 /// Mean square of the held-out samples, each branch with its own offset, in units of the target squared.

@@ -24,6 +24,7 @@ mod grid_choice;
 mod least_squares;
 mod limits;
 pub mod linear;
+pub mod mode;
 mod normal;
 mod prior;
 pub mod rate;
@@ -49,6 +50,7 @@ pub mod waveform;
 
 use crate::everett::EverettTable;
 use findings::Findings;
+use mode::Mode;
 use normal::Normal;
 use residual::Residual;
 use specgen_language::diagnostic::{Diagnostic, codes};
@@ -79,13 +81,15 @@ pub struct Options {
     pub drift: bool,
     /// How the time by which the displacement lags the drive is found.
     pub dead_time: DeadTime,
+    /// The mode behind the table, if it is known otherwise than from the ring of a record.
+    pub mode: Option<Mode>,
 }
 
 impl Options {
     /// Usual choices: no drift within a branch, dead time estimated where the record allows it.
     #[must_use]
     pub const fn new(grid: usize, drive: [f64; 2]) -> Self {
-        Self { grid, drive, drift: false, dead_time: DeadTime::Estimate }
+        Self { grid, drive, drift: false, dead_time: DeadTime::Estimate, mode: None }
     }
 }
 

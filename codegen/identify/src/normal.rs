@@ -77,6 +77,60 @@ fn node_weight(plane: &Plane, drive: f64) -> f64 {
     BETWEEN + (1.0 - BETWEEN) * cubed * cubed
 }
 
+/// What [`walk`] comes by.
+pub enum Step<'a> {
+    /// A sample of the branch of that number, and its row.
+    Sample(usize, usize, &'a [Term]),
+    /// The end of the branch of that number.
+    End(usize),
+}
+
+/// Walks over `branches` (in ascending order; neighbours may share one sample), with negative saturation before sample `first`.
+/// Rows are made of the samples that are `wanted`.
+pub fn walk(
+    plane: &Plane,
+    record: &Record,
+    first: usize,
+    branches: &[Branch],
+    wanted: impl Fn(usize) -> bool,
+    mut visit: impl FnMut(Step),
+) {
+    let mut memory = Staircase::negative_saturation(plane.range);
+    let mut row = Vec::new();
+    let mut at = 0;
+    for (k, &u) in record.drive.iter().enumerate().skip(first) {
+        memory.push(u);
+        let Some(branch) = branches.get(at) else { break };
+        if k < branch.first {
+            continue;
+        }
+        let counts = !record.weightless[k] && wanted(k);
+        if counts {
+            plane.row(&memory, &mut row);
+        }
+        // The sample of a reversal ends one branch and starts the next.
+        while let Some(branch) = branches.get(at).filter(|branch| k >= branch.first) {
+            if counts {
+                visit(Step::Sample(at, k, &row));
+            }
+            if k + 1 < branch.end {
+                break;
+            }
+            visit(Step::End(at));
+            at += 1;
+        }
+    }
+}
+
+/// How much sample `k` counts.
+pub fn weight(weighting: Weighting, plane: &Plane, record: &Record, k: usize) -> f64 {
+    match weighting {
+        Weighting::Even => 1.0,
+        Weighting::Every(n, end) => f64::from(u8::from(k < end && k.is_multiple_of(n))),
+        Weighting::AtNodes => node_weight(plane, record.drive[k]),
+    }
+}
+
 /// Normal equations over `branches` (in ascending order; neighbours may share one sample).
 ///
 /// `fill` writes the targets of a sample, `targets` in number; it is called with samples in ascending order, and again
@@ -91,32 +145,15 @@ pub fn accumulate(
     targets: usize,
     mut fill: impl FnMut(usize, &mut [f64]),
 ) -> Normal {
-    let nodes = plane.nodes();
-    let mut sums = Sums::new(nodes, targets);
+    let mut sums = Sums::new(plane.nodes(), targets);
     let mut values = vec![0.0; targets];
-    let mut pending = branches.iter().peekable();
-    each_row(plane, &record.drive, first, |k, row| {
-        let weight = match weighting {
-            _ if record.weightless[k] => 0.0,
-            Weighting::Even => 1.0,
-            Weighting::Every(n, end) => f64::from(u8::from(k < end && k.is_multiple_of(n))),
-            Weighting::AtNodes => node_weight(plane, record.drive[k]),
-        };
-        while let Some(branch) = pending.peek() {
-            if k >= branch.first && weight > 0.0 {
-                fill(k, &mut values);
-                sums.add(row, &values, weight);
-            }
-            if k + 1 < branch.end {
-                break;
-            }
-            sums.close_branch();
-            pending.next();
-            // The sample of a reversal ends one branch and starts the next.
-            if pending.peek().is_none_or(|next| next.first > k) {
-                break;
-            }
+    let counts = |k| weight(weighting, plane, record, k) > 0.0;
+    walk(plane, record, first, branches, counts, |step| match step {
+        Step::Sample(_, k, row) => {
+            fill(k, &mut values);
+            sums.add(row, &values, weight(weighting, plane, record, k));
         }
+        Step::End(_) => sums.close_branch(),
     });
     sums.over_weights(plane)
 }

@@ -3,10 +3,12 @@
 //! ```text
 //! static           y = Γ₀[u]
 //! dead time        y(t + τ) = Γ₀[u]
-//! dynamic Preisach y = Γ₀[u] + u̇ Γ₁[u]                               paper, (6); μ₁ of either sign
+//! dynamic Preisach y(t + τ) = Γ₀[u] + u̇ Γ₁[u]                        paper, (6); μ₁ of either sign
 //! creep            y(t + τ) = f + Σ w_j x_j,  τ_j ẋ_j = f − x_j,  f = Γ₀[u],  w_j ≥ 0
+//! creep, one weight    the same with all w_j equal and τ_j evenly spaced in their logarithm
+//! creep and mode   the same as creep, behind a second-order mode ([`crate::mode`])
 //! ```
-//! All four are fitted to the same samples of all records, every record with the same weight, with a free offset for each
+//! All are fitted to the same samples of all records, every record with the same weight, with a free offset for each
 //! branch while a table is fitted. What tells them apart is the error at a rate that they were not fitted on: each is fitted
 //! again without each of the records in turn. Errors are those of the whole record after one offset and one line.
 
@@ -14,18 +16,22 @@ mod creep;
 mod export;
 mod fit;
 pub(crate) mod forward;
+mod joint;
 mod mixed;
 mod normal;
+pub mod period;
 pub(crate) mod predict;
 mod prepare;
 mod report;
 mod score;
+pub(crate) mod start;
 mod table;
 
 use crate::everett::EverettTable;
 use specgen_language::diagnostic::Diagnostic;
 
 use super::findings::Findings;
+use super::mode::{self, Mode, Ring};
 use super::record::Record;
 use super::{Options, coverage, time_unit};
 
@@ -44,11 +50,22 @@ pub enum RateOption {
     DynamicPreisach,
     /// Table, creep and dead time.
     Creep,
+    /// The same with one weight for all its time constants.
+    EvenCreep,
+    /// Table, creep, dead time and a mode behind them, where a record rings or the mode is given.
+    CreepMode,
 }
 
 impl RateOption {
     /// Every option, the plainest first.
-    pub const ALL: [Self; 4] = [Self::Static, Self::DeadTime, Self::DynamicPreisach, Self::Creep];
+    pub const ALL: [Self; 6] =
+        [Self::Static, Self::DeadTime, Self::DynamicPreisach, Self::Creep, Self::EvenCreep, Self::CreepMode];
+
+    /// Whether the controller can run it. No controller takes a mode out of its demand: that one predicts.
+    #[must_use]
+    pub const fn runs(self) -> bool {
+        !matches!(self, Self::CreepMode)
+    }
 
     /// What it is called in a report.
     #[must_use]
@@ -58,6 +75,8 @@ impl RateOption {
             Self::DeadTime => "static, dead time",
             Self::DynamicPreisach => "dynamic Preisach",
             Self::Creep => "creep, dead time",
+            Self::EvenCreep => "creep, one weight",
+            Self::CreepMode => "creep and mode",
         }
     }
 }
@@ -71,6 +90,18 @@ pub struct CreepTerm {
     pub weight: f64,
 }
 
+/// What a mode adds to the displacement: its answer to `gain` · drive, less gain · drive itself.
+///
+/// Not to the displacement of the table: that has an edge at each of its nodes, and every edge would make a lightly damped mode
+/// ring, which the actuator does not.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Inertia {
+    /// The mode.
+    pub mode: Mode,
+    /// m/V, ≥ 0.
+    pub gain: f64,
+}
+
 /// A fitted option. What it does not have is empty or zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RateModel {
@@ -80,6 +111,8 @@ pub struct RateModel {
     pub rate: Option<EverettTable>,
     /// Creep behind Γ₀, slowest first.
     pub creep: Vec<CreepTerm>,
+    /// What a mode adds.
+    pub inertia: Option<Inertia>,
     /// s by which the displacement lags the drive column of a record, ≥ 0. Of a command, half a sampling interval of it is the
     /// converter's, see [`Record::held`].
     pub dead_time: f64,
@@ -89,7 +122,7 @@ impl RateModel {
     /// The static model of a table behind `dead_time` (s).
     #[must_use]
     pub const fn of_table(still: EverettTable, dead_time: f64) -> Self {
-        Self { still, rate: None, creep: Vec::new(), dead_time }
+        Self { still, rate: None, creep: Vec::new(), inertia: None, dead_time }
     }
 }
 
@@ -106,7 +139,8 @@ pub struct RateIdentified {
 
 /// Fits every option to `records`, at least two at different rates, and tries each at the rate it was not fitted on.
 ///
-/// `hold_out` takes no part in any fit. `options.drift` and `options.dead_time` are not used.
+/// `hold_out` takes no part in any fit. `options.drift` and `options.dead_time` are not used; without
+/// `options.mode` the mode is that of the clearest ring in a record.
 ///
 /// # Errors
 /// All findings if a record cannot identify the table, or if the records have one rate only.
@@ -136,12 +170,13 @@ pub fn identify_rate(
         all.extend(findings.into_diagnostics());
         return Err(all);
     }
+    let mode = options.mode.or_else(|| rings(records));
     let everything: Vec<usize> = (0..prepared.len()).collect();
-    let fitted = fit::all(&plane, &prepared, &everything, &mut findings);
+    let fitted = fit::all(&plane, &prepared, &everything, mode, &mut findings);
     let mut left_out = Vec::new();
     for out in 0..prepared.len() {
         let others: Vec<usize> = everything.iter().copied().filter(|k| *k != out).collect();
-        left_out.push(fit::all(&plane, &prepared, &others, &mut findings));
+        left_out.push(fit::all(&plane, &prepared, &others, mode, &mut findings));
     }
     let (Some(models), Some(left_out)) = (fitted, left_out.into_iter().collect::<Option<Vec<_>>>()) else {
         all.extend(findings.into_diagnostics());
@@ -149,7 +184,7 @@ pub fn identify_rate(
     };
     let longest = models.iter().map(|model| model.dead_time).max_by(f64::total_cmp);
     time_unit::check_dead_time(longest.unwrap_or_default(), &mut findings);
-    let report = match report::report(&plane, &prepared, &models, &left_out, hold_out) {
+    let report = match report::report(&plane, &prepared, &models, &left_out, mode, hold_out) {
         Ok(report) => report,
         Err(found) => {
             all.extend(found);
@@ -158,4 +193,14 @@ pub fn identify_rate(
     };
     all.extend(findings.into_diagnostics());
     Ok(RateIdentified { models: RateOption::ALL.into_iter().zip(models).collect(), report, warnings: all })
+}
+
+/// The mode of the clearest ring in any of the records.
+fn rings(records: &[Record]) -> Option<Mode> {
+    let clear = |ring: &Ring| ring.amplitude / ring.left;
+    records
+        .iter()
+        .filter_map(|r| mode::ring(&r.time, &r.drive, &r.displacement))
+        .reduce(|a, b| if clear(&b) > clear(&a) { b } else { a })
+        .map(|ring| ring.mode)
 }

@@ -4,11 +4,11 @@
 //! all are on. D = y₊ − y₋ is the weight of those that the drive has not switched since: it falls as the drive reaches
 //! further than before, and they are switched in one order. So whatever came before, the displacement is y₋ + A(D) with
 //! A(0) = 0 and a slope of A from 0 (those relays were off) to 1 (on). A is taken as straight in [`PARTS`] equal parts of D,
-//! and its slopes are least squares within these bounds, with the offset and the line that the record has anyway.
+//! and its slopes are least squares within these bounds, with the offset and the line that the record has anyway, and with the start of creep and mode.
 //! Negative and positive saturation are the slopes 0 and 1, a demagnetised actuator is about ½.
 
+use super::rate::start::Own;
 use super::staircase::saturate;
-use super::trend::Line;
 
 /// Parts of A.
 const PARTS: usize = 16;
@@ -29,18 +29,18 @@ pub(crate) fn parts(open: &[f64]) -> Vec<Vec<f64>> {
     (0..PARTS).map(part).collect()
 }
 
-/// The slopes with which `rest` ≈ Σ slope·part + a line, over samples at `time` (s).
-pub(crate) fn slopes(time: &[f64], rest: &[f64], parts: &[Vec<f64>]) -> Vec<f64> {
-    let without_line = |values: &[f64]| -> Vec<f64> {
-        let line = Line::fit(time, values);
-        values.iter().zip(time).map(|(y, t)| y - line.at(*t)).collect()
+/// The slopes with which `rest` ≈ Σ slope·part + what the record has of its `own`.
+pub(crate) fn slopes(rest: &[f64], parts: &[Vec<f64>], own: &Own) -> Vec<f64> {
+    let without_own = |values: &[f64]| -> Vec<f64> {
+        let mut values = values.to_vec();
+        own.take_out(&mut values);
+        values
     };
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y);
-    let columns: Vec<Vec<f64>> = parts.iter().map(|part| without_line(part)).collect();
-    let target = without_line(rest);
+    let columns: Vec<Vec<f64>> = parts.iter().map(|part| without_own(part)).collect();
+    let target = without_own(rest);
     let count = columns.len();
-    let mut gram: Vec<Vec<f64>> = columns.iter().map(|a| columns.iter().map(|b| dot(a, b)).collect()).collect();
-    let mut rhs: Vec<f64> = columns.iter().map(|column| dot(column, &target)).collect();
+    let mut gram: Vec<Vec<f64>> = columns.iter().map(|a| columns.iter().map(|b| own.dot(a, b)).collect()).collect();
+    let mut rhs: Vec<f64> = columns.iter().map(|column| own.dot(column, &target)).collect();
     let pull = PULL * (0..count).fold(f64::MIN_POSITIVE, |sum, k| sum + gram[k][k] / count as f64);
     for k in 0..count {
         gram[k][k] += pull;
@@ -50,7 +50,8 @@ pub(crate) fn slopes(time: &[f64], rest: &[f64], parts: &[Vec<f64>]) -> Vec<f64>
     for _ in 0..SWEEPS {
         let mut change = 0.0;
         for k in 0..count {
-            let wanted = slopes[k] + (rhs[k] - dot(&gram[k], &slopes)) / gram[k][k];
+            let wanted =
+                slopes[k] + (rhs[k] - gram[k].iter().zip(&slopes).fold(0.0, |sum, (g, s)| sum + g * s)) / gram[k][k];
             let next = saturate(wanted, [0.0, 1.0]);
             let moved = (next - slopes[k]).abs();
             change = if moved > change { moved } else { change };
@@ -76,7 +77,8 @@ mod tests {
         let rest: Vec<f64> = (0..2000)
             .map(|k| 7.0 - 0.2 * time[k] + (0..PARTS).fold(0.0, |sum, part| sum + wanted(part) * parts[part][k]))
             .collect();
-        let found = slopes(&time, &rest, &parts);
+        let own = Own::of(&time, vec![true; 2000], core::iter::empty(), None);
+        let found = slopes(&rest, &parts, &own);
         // The lowest quarter of D is never reached.
         assert!(found[..3].iter().all(|s| (s - 0.5).abs() < 1e-3), "{found:?}");
         for (k, slope) in found.iter().enumerate().skip(5) {

@@ -28,7 +28,7 @@ const WORTHWHILE: f64 = 2e-4;
 
 /// Fits creep behind the table and dead time of `start`.
 pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Result<RateModel, Failure> {
-    let times = time_constants(records);
+    let times = time_constants(records, false);
     let mut model = start.clone();
     let mut before = f64::INFINITY;
     for _ in 0..TURNS {
@@ -57,12 +57,12 @@ pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Re
     Ok(model)
 }
 
-/// Evenly spaced in their logarithm, slowest first, s.
-fn time_constants(records: &[&Prepared]) -> Vec<f64> {
+/// Evenly spaced in their logarithm, slowest first, s; of one weight, as many as a controller takes.
+pub(super) fn time_constants(records: &[&Prepared], even: bool) -> Vec<f64> {
     let longest = records.iter().map(|p| p.duration()).fold(0.0, |a, b| if b > a { b } else { a }) * LONGEST;
     let shortest = records.iter().map(|p| p.interval).fold(longest, |a, b| if b < a { b } else { a }) * SHORTEST;
     let shortest = if shortest < longest { shortest } else { 0.1 * longest };
-    let wanted = libm::ceil(libm::log10(longest / shortest)) + 1.0;
+    let wanted = if even { TERMS[1] } else { libm::ceil(libm::log10(longest / shortest)) + 1.0 };
     let terms = crate::staircase::saturate(wanted, TERMS) as usize;
     let ratio = libm::log(shortest / longest) / (terms - 1) as f64;
     (0..terms).map(|k| rounded(longest * libm::exp(ratio * k as f64))).collect()

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{RateModel, RateOption};
+use super::{Inertia, RateModel, RateOption};
 use crate::everett::EverettTable;
 use crate::export::{read_nodes, write_nodes};
 use crate::findings::Findings;
@@ -43,8 +43,8 @@ pub fn spec_lines(option: RateOption, model: &RateModel, held: f64, table: &str,
         RateOption::DynamicPreisach => {
             writeln!(text, "rate    = \"dynamic-preisach\"\nrate_tables = [\"{rate_table}\"]")
         }
-        RateOption::Creep if model.creep.is_empty() => Ok(()),
-        RateOption::Creep => {
+        _ if model.creep.is_empty() => Ok(()),
+        RateOption::Creep | RateOption::EvenCreep | RateOption::CreepMode => {
             let times: Vec<String> =
                 model.creep.iter().map(|c| format!("\"{} ms\"", shown(c.time_constant * 1e3))).collect();
             let weights: Vec<String> = model.creep.iter().map(|c| shown(c.weight)).collect();
@@ -59,6 +59,10 @@ pub fn spec_lines(option: RateOption, model: &RateModel, held: f64, table: &str,
     if model.dead_time > held {
         let ms = shown((model.dead_time - held) * 1e3);
         let _ = writeln!(text, "dead_time = \"{ms} ms\"    # of six legs; with [control] it is control.lead");
+    }
+    if let Some(Inertia { mode, .. }) = model.inertia {
+        let (frequency, damping) = (shown(mode.frequency), shown(mode.damping));
+        let _ = writeln!(text, "[actuator]\nresonance     = \"{frequency} Hz\"\ndamping_ratio = {damping}");
     }
     text
 }

@@ -1,9 +1,11 @@
 //! Fits of the options to several records at once.
 
+use super::joint::Shape;
 use super::normal::accumulate;
 use super::prepare::Prepared;
-use super::{RateModel, creep, mixed, table};
+use super::{RateModel, creep, joint, mixed, table};
 use crate::findings::Findings;
+use crate::mode::Mode;
 use crate::regressor::Plane;
 use crate::{dead_time, normal, prior};
 use specgen_language::diagnostic::codes;
@@ -12,11 +14,12 @@ use specgen_numerics::nnls::Failure;
 /// Smoothness of μ₁ against that of μ₀ ([`prior`]): μ₁ is a small difference between rates, and there are as many unknowns.
 const RATE_SMOOTHNESS: f64 = 1e3;
 
-/// Every option fitted to the records `chosen`, in the order of [`super::RateOption::ALL`].
+/// Every option fitted to the records `chosen`, in the order of [`super::RateOption::ALL`]; the last one if there is a `mode`.
 pub(super) fn all(
     plane: &Plane,
     prepared: &[Prepared],
     chosen: &[usize],
+    mode: Option<Mode>,
     findings: &mut Findings,
 ) -> Option<Vec<RateModel>> {
     let records: Vec<&Prepared> = chosen.iter().map(|k| &prepared[*k]).collect();
@@ -24,9 +27,12 @@ pub(super) fn all(
         let still = still(plane, &records, 0.0)?;
         let dead_time = dead_time(plane, &records)?;
         let late = self::still(plane, &records, dead_time)?;
-        let dynamic = dynamic(plane, &records)?;
+        let dynamic = dynamic(plane, &records, [0.0, dead_time])?;
         let creep = creep::fit(plane, &records, &late)?;
-        Ok(vec![still, late, dynamic, creep])
+        let shaped = |even, mode| joint::fit(plane, &records, &late, Shape { even, mode });
+        let even = shaped(true, None)?;
+        let moved = mode.map(|mode| shaped(true, Some(mode))).transpose()?;
+        Ok([still, late, dynamic, creep, even].into_iter().chain(moved).collect())
     };
     fitted()
         .map_err(|failure| {
@@ -39,7 +45,13 @@ pub(super) fn all(
 /// One table for all records behind `dead_time` (s).
 fn still(plane: &Plane, records: &[&Prepared], dead_time: f64) -> Result<RateModel, Failure> {
     let targets: Vec<Vec<f64>> = records.iter().map(|p| p.delayed(dead_time)).collect();
-    Ok(RateModel { still: table::fit(plane, records, &targets)?, rate: None, creep: Vec::new(), dead_time })
+    Ok(RateModel {
+        still: table::fit(plane, records, &targets)?,
+        rate: None,
+        creep: Vec::new(),
+        inertia: None,
+        dead_time,
+    })
 }
 
 /// The dead time (s) with which one table fits all records best, bounds of the weights aside; zero if none helps.
@@ -58,11 +70,12 @@ fn dead_time(plane: &Plane, records: &[&Prepared]) -> Result<f64, Failure> {
     found.map(|found| found.dead_time).ok_or(Failure::Singular)
 }
 
-/// (6): μ₀ ≥ 0 and μ₁ of either sign in one fit.
-fn dynamic(plane: &Plane, records: &[&Prepared]) -> Result<RateModel, Failure> {
+/// (6) behind that of the dead times (s) with which it fits better: μ₀ ≥ 0 and μ₁ of either sign in one fit. What all loops lag by is
+/// the dead time's, which a controller leads by; of what is left little is too much for the inverse.
+fn dynamic(plane: &Plane, records: &[&Prepared], dead_times: [f64; 2]) -> Result<RateModel, Failure> {
     // Rates of order one, so that both halves of the normal matrix are of one size.
     let unit = records.iter().fold(f64::MIN_POSITIVE, |most, p| if p.speed > most { p.speed } else { most });
-    let each = records.iter().map(|p| accumulate(plane, p, &[p.delayed(0.0)], Some(unit)));
+    let each = records.iter().map(|p| accumulate(plane, p, &dead_times.map(|tau| p.delayed(tau)), Some(unit)));
     let mut normal = each.reduce(|sum, more| sum.add(&more)).ok_or(Failure::Singular)?;
     let nodes = plane.nodes();
     for (from, factor) in [(0, 1.0), (nodes, RATE_SMOOTHNESS)] {
@@ -76,14 +89,20 @@ fn dynamic(plane: &Plane, records: &[&Prepared]) -> Result<RateModel, Failure> {
             }
         }
     }
-    let scale = 1.0 / table::size(&normal.rhs[0]);
-    let rhs: Vec<f64> = normal.rhs[0].iter().map(|b| b * scale).collect();
-    let weights = mixed::solve(&normal.gram, &rhs, nodes)?;
-    let (still, rate) = weights.split_at(nodes);
-    Ok(RateModel {
-        still: normal::table_of(plane, still, 1.0 / scale),
-        rate: Some(normal::table_of(plane, rate, 1.0 / (scale * unit))),
-        creep: Vec::new(),
-        dead_time: 0.0,
-    })
+    let mut best: Option<(f64, RateModel)> = None;
+    for (k, dead_time) in dead_times.into_iter().enumerate() {
+        let scale = 1.0 / table::size(&normal.rhs[k]);
+        let rhs: Vec<f64> = normal.rhs[k].iter().map(|b| b * scale).collect();
+        let weights = mixed::solve(&normal.gram, &rhs, nodes)?;
+        // What is explained, by the normal equations: wᵀGw = wᵀb but for weights at their bound, which are zero.
+        let explained = weights.iter().zip(&rhs).fold(0.0, |sum, (w, b)| sum + w * b) / (scale * scale);
+        let left = normal.energy[k] - explained;
+        if best.as_ref().is_none_or(|(least, _)| left < *least) {
+            let (still, rate) = weights.split_at(nodes);
+            let still = normal::table_of(plane, still, 1.0 / scale);
+            let rate = Some(normal::table_of(plane, rate, 1.0 / (scale * unit)));
+            best = Some((left, RateModel { still, rate, creep: Vec::new(), inertia: None, dead_time }));
+        }
+    }
+    best.map(|(_, model)| model).ok_or(Failure::Singular)
 }

@@ -1,6 +1,6 @@
 //! A rate-dependent model run forward over a record.
 
-use super::{CreepTerm, RateModel};
+use super::{CreepTerm, Inertia, RateModel};
 use crate::normal;
 use crate::record::Record;
 use crate::regressor::{self, Plane};
@@ -11,7 +11,9 @@ use crate::staircase::Staircase;
 /// `memory` is what came before that sample; creep has come to rest there.
 pub(super) fn predict(model: &RateModel, plane: &Plane, record: &Record, first: usize, memory: Staircase) -> Vec<f64> {
     let (plain, rate) = still(model, plane, &record.time, &record.drive, first, memory);
-    let mut sum = creeping(model, &record.time[first..], &plain);
+    let time = &record.time[first..];
+    let mut sum = creeping(model, time, &plain);
+    inertia(model, time, &record.drive[first..], &mut sum);
     sum.iter_mut().zip(rate.into_iter().flatten()).for_each(|(y, r)| *y += r);
     sum
 }
@@ -47,6 +49,14 @@ pub(crate) fn creeping(model: &RateModel, time: &[f64], f: &[f64]) -> Vec<f64> {
     sum
 }
 
+/// Adds to `sum` (m) at `time` (s) what the mode does under `drive` (V), at rest before.
+pub(crate) fn inertia(model: &RateModel, time: &[f64], drive: &[f64], sum: &mut [f64]) {
+    let Some(Inertia { mode, gain }) = model.inertia else { return };
+    for ((y, moved), u) in sum.iter_mut().zip(mode.behind(time, drive)).zip(drive) {
+        *y += gain * (moved - u);
+    }
+}
+
 /// x of one creep operator behind `f`, exact for an f that is straight between samples. It starts at rest.
 pub(super) fn creep(time_constant: f64, time: &[f64], f: &[f64]) -> Vec<f64> {
     let mut x = f.first().copied().unwrap_or(0.0);
@@ -65,15 +75,49 @@ pub(super) fn creep(time_constant: f64, time: &[f64], f: &[f64]) -> Vec<f64> {
     all
 }
 
+/// Static displacement over the used part, m.
+pub(super) fn static_part(model: &RateModel, plane: &Plane, p: &super::prepare::Prepared) -> Vec<f64> {
+    let memory = Staircase::negative_saturation(plane.range);
+    still(model, plane, &p.record.time, &p.record.drive, p.first, memory).0
+}
+
 /// Static displacement and every creep state of `times` over the used part, m.
 pub(super) fn parts(still: &RateModel, times: &[f64], plane: &Plane, p: &super::prepare::Prepared) -> Vec<Vec<f64>> {
-    let plain = RateModel { creep: Vec::new(), rate: None, ..still.clone() };
-    let memory = Staircase::negative_saturation(plane.range);
-    let f = predict(&plain, plane, p.record, p.first, memory);
+    let f = static_part(still, plane, p);
     let time = &p.record.time[p.first..];
     let states: Vec<Vec<f64>> = times.iter().map(|tau| creep(*tau, time, &f)).collect();
     core::iter::once(f).chain(states).collect()
 }
+
+/// The f whose [`creeping`] is `y`, at rest at the first sample.
+pub(super) fn without_creep(model: &RateModel, time: &[f64], y: &[f64]) -> Vec<f64> {
+    let total = model.creep.iter().fold(1.0, |sum, term| sum + term.weight);
+    let mut f = y.first().copied().unwrap_or(0.0) / total;
+    let mut states = vec![f; model.creep.len()];
+    let mut all = Vec::with_capacity(y.len());
+    for (k, y) in y.iter().enumerate() {
+        if k > 0 {
+            // x = kept·x + known·f of the last sample + direct·f, as [`creep`] has it.
+            let step = time[k] - time[k - 1];
+            let (mut carried, mut direct) = (0.0, 1.0);
+            let mut parts = [[0.0; 2]; MOST_TERMS];
+            for ((term, x), part) in model.creep.iter().zip(&states).zip(&mut parts) {
+                let decay = libm::exp(-step / term.time_constant);
+                let lag = term.time_constant / step * (1.0 - decay);
+                *part = [decay * x + (lag - decay) * f, 1.0 - lag];
+                carried += term.weight * part[0];
+                direct += term.weight * part[1];
+            }
+            f = (y - carried) / direct;
+            states.iter_mut().zip(parts).for_each(|(x, [known, of_f])| *x = known + of_f * f);
+        }
+        all.push(f);
+    }
+    all
+}
+
+/// Most creep operators of a model.
+pub(super) const MOST_TERMS: usize = 6;
 
 /// The same terms without those of no weight.
 pub(super) fn kept(terms: Vec<CreepTerm>) -> Vec<CreepTerm> {

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::{RateModel, forward};
+use super::start::Own;
+use super::{Inertia, RateModel, forward};
 use crate::cause::{self, Cause};
 use crate::distrust::{JUMP, SETTLING};
 use crate::everett::EverettTable;
@@ -114,6 +115,8 @@ pub struct Prediction {
     pub samples_clipped: usize,
     /// Time by which the displacement is taken to lag the drive column, s.
     pub dead_time: f64,
+    /// What a mode was taken to add.
+    pub inertia: Option<Inertia>,
     /// Share of the weight that the first drive leaves open which was on before the record: 0 after a rise from the lowest
     /// drive, 1 after a fall from the highest. From the displacement; ½ without one.
     pub start_on: f64,
@@ -184,6 +187,9 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     let open: Vec<f64> = above.0.iter().zip(&below.0).map(|(a, b)| a - b).collect();
     let finish = |values: &[f64]| later(&time, &forward::creeping(model, &time, values), model.dead_time);
     let mut displacement = finish(&below.0);
+    let mut moved = vec![0.0; time.len()];
+    forward::inertia(model, &time, &drive.drive[first..], &mut moved);
+    displacement.iter_mut().zip(later(&time, &moved, model.dead_time)).for_each(|(y, x)| *y += x);
     if let Some(rate) = &below.1 {
         displacement.iter_mut().zip(later(&time, rate, model.dead_time)).for_each(|(y, r)| *y += r);
     }
@@ -194,12 +200,10 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     let kept = |values: &[f64]| -> Vec<f64> {
         values.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
     };
+    let times = model.creep.iter().map(|term| term.time_constant);
+    let own = Own::of(&time, keep.clone(), times, model.inertia.map(|inertia| inertia.mode));
     let slopes = match &measured {
-        Some(y) => {
-            let rest: Vec<f64> = y.iter().zip(&displacement).map(|(y, p)| y - p).collect();
-            let parts: Vec<Vec<f64>> = parts.iter().map(|part| kept(part)).collect();
-            start::slopes(&kept(&time), &kept(&rest), &parts)
-        }
+        Some(y) => start::slopes(&y.iter().zip(&displacement).map(|(y, p)| y - p).collect::<Vec<_>>(), &parts, &own),
         None => vec![0.5; parts.len()],
     };
     for (slope, part) in slopes.iter().zip(&parts) {
@@ -208,7 +212,10 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     let mean = |values: &[f64]| values.iter().fold(0.0, |sum, v| sum + v) / values.len().max(1) as f64;
     let start_on = if slopes.is_empty() { 0.0 } else { mean(&slopes) };
     let compared = measured.as_ref().map(|y| {
-        let errors: Vec<f64> = y.iter().zip(&displacement).map(|(y, p)| y - p).collect();
+        let before: Vec<f64> = y.iter().zip(&displacement).map(|(y, p)| y - p).collect();
+        let mut errors = before.clone();
+        own.take_out_start(&mut errors);
+        displacement.iter_mut().zip(before.iter().zip(&errors)).for_each(|(p, (all, left))| *p += all - left);
         let (at, of) = (kept(&time), kept(&errors));
         let line = Line::fit(&at, &of);
         let left: Vec<f64> = of.iter().zip(&at).map(|(e, t)| e - line.at(*t)).collect();
@@ -235,6 +242,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
         samples_skipped: first,
         samples_clipped,
         dead_time: model.dead_time,
+        inertia: model.inertia,
         start_on,
         compared,
         time,

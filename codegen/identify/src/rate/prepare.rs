@@ -1,7 +1,9 @@
 //! Records ready for the fits: the usable part, its branches and its rate.
 
+use super::start::Own;
 use crate::branches::Branch;
 use crate::findings::Findings;
+use crate::mode::Mode;
 use crate::record::Record;
 use crate::regressor::Plane;
 use crate::{coverage, dead_time, selection, statistics};
@@ -34,6 +36,12 @@ impl Prepared<'_> {
     /// Duration of the used part, s.
     pub(super) fn duration(&self) -> f64 {
         self.record.time[self.record.time.len() - 1] - self.record.time[self.first]
+    }
+
+    /// What the record has of its own beside a model with creep of `times` (s) and a mode.
+    pub(super) fn own(&self, times: &[f64], mode: Option<Mode>) -> Own {
+        let keep = self.record.weightless[self.first..].iter().map(|w| !w).collect();
+        Own::of(&self.record.time[self.first..], keep, times.iter().copied(), mode)
     }
 
     /// y(t + `tau`) of the used part, m.

@@ -2,10 +2,12 @@
 
 use serde::Serialize;
 
+use super::period::Invertible;
 use super::predict::{Drive, predict};
 use super::prepare::Prepared;
 use super::score::on;
 use super::{CreepTerm, RateModel, RateOption};
+use crate::mode::Mode;
 use crate::record::Record;
 use crate::regressor::Plane;
 use crate::statistics;
@@ -49,6 +51,8 @@ pub struct OptionReport {
     pub dead_time: f64,
     /// Creep terms that were fitted; empty for options without creep.
     pub creep: Vec<CreepTerm>,
+    /// Dynamic Preisach: the shortest period at which a controller can invert it, s. At a shorter one `check` refuses it.
+    pub period: Option<f64>,
     /// Fitted to all records.
     pub fitted: Vec<f64>,
     /// Each record by the fit to the others.
@@ -67,7 +71,7 @@ pub struct HoldOut {
 /// Whether an option predicts a rate that it was not fitted on better than the static table.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
-    /// The option with the lowest mean error on rates it was not fitted on.
+    /// Of the options that a controller can run, the one with the lowest mean error on rates it was not fitted on.
     pub best: RateOption,
     /// Options that beat the static table on every such rate, and on the held-out record if there is one.
     pub beats_static: Vec<RateOption>,
@@ -84,6 +88,8 @@ pub struct RateReport {
     pub records: Vec<Measured>,
     /// What of each dead time is the hold of the records' commands, s: half a sampling interval, on the mean of the records.
     pub held: f64,
+    /// The mode behind the last option, given or from a ring.
+    pub mode: Option<Mode>,
     /// The record held out.
     pub hold_out: Option<HoldOut>,
     /// The options, plainest first.
@@ -98,6 +104,7 @@ pub(super) fn report(
     prepared: &[Prepared],
     models: &[RateModel],
     left_out: &[Vec<RateModel>],
+    mode: Option<Mode>,
     hold_out: Option<&Record>,
 ) -> Result<RateReport, Vec<Diagnostic>> {
     let held_out = |model: &RateModel| -> Result<Option<f64>, Vec<Diagnostic>> {
@@ -114,6 +121,7 @@ pub(super) fn report(
             option,
             dead_time: model.dead_time,
             creep: model.creep.clone(),
+            period: model.rate.as_ref().map(|rate| Invertible::of(&model.still, rate).period()),
             fitted: prepared.iter().map(|p| on(model, plane, p)).collect(),
             left_out: prepared.iter().zip(left_out).map(|(p, fits)| on(&fits[k], plane, p)).collect(),
             hold_out,
@@ -123,7 +131,7 @@ pub(super) fn report(
     let verdict = verdict(&records, &options, hold_out);
     let hold_out = hold_out.map(|record| HoldOut { record: record.shown_as.clone() });
     let held = mean(&prepared.iter().map(|p| p.record.held()).collect::<Vec<_>>());
-    Ok(RateReport { grid: plane.grid, records, held, hold_out, options, verdict })
+    Ok(RateReport { grid: plane.grid, records, held, mode, hold_out, options, verdict })
 }
 
 fn measured(p: &Prepared) -> Measured {
@@ -149,7 +157,7 @@ fn verdict(records: &[Measured], options: &[OptionReport], hold_out: Option<&Rec
     let mut beats_static = Vec::new();
     let mut lines = Vec::new();
     for option in &options[1..] {
-        if mean(&option.left_out) < mean(&best.left_out) {
+        if option.option.runs() && mean(&option.left_out) < mean(&best.left_out) {
             best = option;
         }
         let beaten = |ours: f64, theirs: f64| ours < theirs * (1.0 - BEATS);

@@ -1,4 +1,4 @@
-//! How far a model is off on a record: % of the displacement's range, after one offset and one line.
+//! How far a model is off on a record: % of the displacement's range, after what each record has of its own.
 
 use super::RateModel;
 use super::forward::predict;
@@ -6,22 +6,18 @@ use super::prepare::Prepared;
 use crate::regressor::Plane;
 use crate::staircase::Staircase;
 use crate::statistics;
-use crate::trend::{Line, rms_and_max};
 
-/// Root mean square error in % of the range, on a record whose start is known.
+/// Root mean square error in % of the range, on a record whose start is known but for creep and mode.
 pub(super) fn on(model: &RateModel, plane: &Plane, p: &Prepared) -> f64 {
     let memory = Staircase::negative_saturation(plane.range);
     let predicted = predict(model, plane, p.record, p.first, memory);
     let y = p.delayed(model.dead_time);
-    let compared: Vec<usize> = (0..y.len()).filter(|k| !p.record.weightless[p.first + k]).collect();
-    percent(&p.record.time[p.first..], &y, &predicted, &compared)
-}
-
-fn percent(time: &[f64], y: &[f64], predicted: &[f64], compared: &[usize]) -> f64 {
-    let at: Vec<f64> = compared.iter().map(|k| time[*k]).collect();
-    let mut errors: Vec<f64> = compared.iter().map(|k| y[*k] - predicted[*k]).collect();
-    let (low, high) = statistics::extent(&compared.iter().map(|k| y[*k]).collect::<Vec<_>>());
-    let line = Line::fit(&at, &errors);
-    errors.iter_mut().zip(&at).for_each(|(e, t)| *e -= line.at(*t));
-    100.0 * rms_and_max(&errors).0 / (high - low)
+    let weightless = &p.record.weightless[p.first..];
+    let compared: Vec<f64> = y.iter().zip(weightless).filter(|(_, w)| !**w).map(|(y, _)| *y).collect();
+    let times: Vec<f64> = model.creep.iter().map(|term| term.time_constant).collect();
+    let own = p.own(&times, model.inertia.map(|inertia| inertia.mode));
+    let mut errors: Vec<f64> = y.iter().zip(&predicted).map(|(y, p)| y - p).collect();
+    own.take_out(&mut errors);
+    let (low, high) = statistics::extent(&compared);
+    100.0 * (own.dot(&errors, &errors) / compared.len() as f64).sqrt() / (high - low)
 }

@@ -215,6 +215,7 @@ fn short(source: identify::Source) -> &'static str {
     match source {
         identify::Source::Drift => "drift",
         identify::Source::DeadTime => "dead time",
+        identify::Source::Resonance => "resonance",
         identify::Source::BentDrift => "bent drift",
         identify::Source::Creep => "creep",
         identify::Source::Hum => "hum",

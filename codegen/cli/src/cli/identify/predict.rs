@@ -12,8 +12,9 @@ use crate::cli::file::write_file;
 use crate::cli::plot::{Plot, wrote};
 use crate::cli::spec;
 use crate::cli::ui::{Failure, Outcome, Ui};
-use specgen_identify::rate::RateModel;
-use specgen_identify::{Prediction, declared, predict, read_drive, read_file, read_table_csv};
+use specgen_identify::mode::{self, Mode};
+use specgen_identify::rate::{Inertia, RateModel};
+use specgen_identify::{Drive, Prediction, declared, predict, read_drive, read_file, read_table_csv};
 use specgen_report::identification as figure;
 
 /// Arguments of `identify predict`.
@@ -32,6 +33,10 @@ pub struct Arguments {
     /// Time by which the displacement lags the voltage, ms; that of the spec, or none, if not given.
     #[arg(long, value_name = "MS", value_parser = milliseconds, allow_negative_numbers = true)]
     dead_time: Option<f64>,
+    /// Resonance behind the model, frequency in Hz and damping ratio, such as 735:0.015, or `none`; if not given that of the
+    /// spec, or with a table that of a ring in the record.
+    #[arg(long, value_name = "HZ:ZETA", value_parser = mode)]
+    mode: Option<Given>,
     /// Write time_s, drive_V, displacement_um (predicted) and, where it was measured, measured_um and error_um here.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -47,12 +52,43 @@ fn milliseconds(text: &str) -> Result<f64, String> {
     text.parse::<f64>().ok().filter(|ms| (0.0..=10.0).contains(ms)).map(|ms| ms * 1e-3).ok_or_else(expected)
 }
 
+/// A mode, or that there is none.
+#[derive(Debug, Clone, Copy)]
+struct Given(Option<Mode>);
+
+fn mode(text: &str) -> Result<Given, String> {
+    if text == "none" {
+        return Ok(Given(None));
+    }
+    let found = text.split_once(':').and_then(|(hz, zeta)| Some((hz.parse::<f64>().ok()?, zeta.parse::<f64>().ok()?)));
+    match found {
+        Some((frequency, damping)) if (0.1..=1e7).contains(&frequency) && damping > 0.0 && damping < 1.0 => {
+            Ok(Given(Some(Mode { frequency, damping })))
+        }
+        _ => Err(format!(
+            "expected a frequency in Hz and a damping ratio below 1, such as 735:0.015, or none; found `{text}`"
+        )),
+    }
+}
+
+/// What a mode adds: that given, else that of the model, else that of a ring in the record.
+fn inertia(arguments: &Arguments, model: &RateModel, drive: &Drive) -> Option<Inertia> {
+    let ring = || mode::ring(&drive.time, &drive.drive, drive.displacement.as_ref()?).map(|ring| ring.mode);
+    let found = match (arguments.mode, model.inertia) {
+        (Some(Given(mode)), _) => mode,
+        (None, Some(own)) => Some(own.mode),
+        (None, None) => ring(),
+    };
+    found.map(|mode| Inertia { mode, gain: model.still.mean_gain() })
+}
+
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let shown = arguments.drive.display().to_string();
     let drive = read_drive(&arguments.drive, &shown, &arguments.reading.reading()?).map_err(refused)?;
     let mut model = model(&arguments.model, usize::from(arguments.leg), ui)?;
     // In a spec it counts from the voltage; a command is held on its way there.
     model.dead_time = arguments.dead_time.unwrap_or(model.dead_time) + drive.held;
+    model.inertia = inertia(arguments, &model, &drive);
     let prediction = predict(&model, &drive).map_err(refused)?;
     if let Some(output) = &arguments.output {
         write_file(output, csv(&prediction).as_bytes())?;
@@ -123,6 +159,10 @@ impl Outcome for Identified<Prediction> {
             report.dead_time * 1e3,
             report.samples_skipped
         );
+        if let Some(inertia) = report.inertia {
+            let _ =
+                write!(text, "\n  mode at {:.1} Hz, damping ratio {:.4}", inertia.mode.frequency, inertia.mode.damping);
+        }
         if report.compared.is_none() && report.samples_clipped > 0 {
             let _ = write!(text, "; {} samples outside the table's range are held at its end", report.samples_clipped);
         }

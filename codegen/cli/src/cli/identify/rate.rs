@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     if !errors.is_empty() {
         return Err(refused(errors));
     }
-    ui.progress(&format!("{} fits of {} records", 4 * (records.len() + 1), records.len()));
+    ui.progress(&format!("{} fits of {} records", RateOption::ALL.len() * (records.len() + 1), records.len()));
     let options = Options::new(arguments.grid, arguments.drive);
     let identified = identify_rate(&records, hold_out.as_ref(), &options).map_err(refused)?;
     ui.findings(None, &identified.warnings);
@@ -100,6 +100,8 @@ fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Fai
             RateOption::DeadTime => format!("{name}-dead-time.csv"),
             RateOption::DynamicPreisach => format!("{name}-mu0.csv"),
             RateOption::Creep => format!("{name}-creep.csv"),
+            RateOption::EvenCreep => format!("{name}-creep-one.csv"),
+            RateOption::CreepMode => format!("{name}-creep-mode.csv"),
         };
         let rate_table = format!("{name}-mu1.csv");
         files.push((beside(&table), write_table_csv(&model.still)));
@@ -108,7 +110,12 @@ fn write(output: &Path, identified: &RateIdentified) -> Result<Vec<PathBuf>, Fai
         }
         let block = spec_lines(*option, model, identified.report.held, &table, &rate_table);
         let prefix = if *option == best { "" } else { "# " };
-        let _ = writeln!(lines, "\n# {}", option.name());
+        let only = if option.runs() {
+            ""
+        } else {
+            ": for `specgen identify predict`; the controller does not take the mode out"
+        };
+        let _ = writeln!(lines, "\n# {}{only}", option.name());
         for line in block.lines() {
             let _ = writeln!(lines, "{prefix}{line}");
         }
@@ -156,11 +163,31 @@ fn table(report: &RateReport) -> String {
         let creep: Vec<String> =
             option.creep.iter().map(|c| format!("{:.4} at {:.4} s", c.weight, c.time_constant)).collect();
         let creep = match option.option {
-            RateOption::Creep if creep.is_empty() => "; no creep weight helps".to_owned(),
-            RateOption::Creep => format!("; creep {}", creep.join(", ")),
-            _ => String::new(),
+            _ if option.creep.is_empty() && option.option >= RateOption::Creep => "; no creep weight helps".to_owned(),
+            _ if creep.is_empty() => String::new(),
+            RateOption::EvenCreep => format!(
+                "; creep {:.4} at each of {} time constants from {:.4} to {:.4} s",
+                option.creep[0].weight,
+                creep.len(),
+                option.creep[creep.len() - 1].time_constant,
+                option.creep[0].time_constant
+            ),
+            _ => format!("; creep {}", creep.join(", ")),
         };
         let _ = writeln!(text, "{}: dead time {:.3} ms{creep}", option.option.name(), option.dead_time * 1e3);
+    }
+    for (option, period) in
+        report.options.iter().filter_map(|o| Some((o, o.period?))).filter(|(_, period)| *period > 0.0)
+    {
+        let _ = writeln!(
+            text,
+            "{}: a controller inverts it at periods of {:.3} ms and longer; at shorter ones check refuses it",
+            option.option.name(),
+            period * 1e3
+        );
+    }
+    if let Some(mode) = report.mode {
+        let _ = writeln!(text, "mode: {:.1} Hz, damping ratio {:.4}", mode.frequency, mode.damping);
     }
     if report.held > 0.0 {
         let _ = writeln!(

@@ -1,0 +1,57 @@
+//! Resonance in a residual: what a mode makes of the drive beyond a wrong gain, searched over its frequency.
+
+use super::{centred, rates};
+use crate::least_squares::{fit, mean_square};
+use crate::mode::Mode;
+
+/// Frequencies tried for a resonance, from [`SLOWEST`] over the duration to [`FASTEST`] over the sampling interval, and its damping.
+const MODES: usize = 48;
+const SLOWEST: f64 = 20.0;
+const FASTEST: f64 = 0.25;
+const DAMPING: f64 = 0.02;
+/// Share of what is left that a resonance explains at least to be called one.
+const NOTABLE: f64 = 0.1;
+/// Samples that a resonance is looked for in.
+const STRETCH: usize = 200_000;
+
+/// A resonance that was taken out of a residual.
+pub(super) struct Resonance {
+    /// Hz.
+    pub(super) frequency: f64,
+    /// The residual without it.
+    pub(super) left: Vec<f64>,
+}
+
+/// The mode whose answer to the drive explains most of `left`, a residual at the samples `chosen`, beyond a wrong gain.
+pub(super) fn take(time: &[f64], drive: &[f64], chosen: &[usize], left: &[f64]) -> Option<Resonance> {
+    let end = if time.len() < STRETCH { time.len() } else { STRETCH };
+    let count = chosen.partition_point(|k| *k < end);
+    let (chosen, left_there) = (&chosen[..count], &left[..count]);
+    let duration = time.get(end.checked_sub(1)?)? - time[0];
+    let (lowest, highest) = (SLOWEST / duration, FASTEST * (end - 1) as f64 / duration);
+    if count < MODES || highest <= lowest {
+        return None;
+    }
+    let pick = |values: &[f64]| centred(chosen.iter().map(|&k| values[k]).collect());
+    let level = pick(&drive[..end]);
+    let before = mean_square(&fit(&[&level], left_there)?.residual);
+    let step = libm::log(highest / lowest) / (MODES - 1) as f64;
+    let tried = (0..MODES).filter_map(|k| {
+        let frequency = lowest * libm::exp(step * k as f64);
+        let moved = Mode { frequency, damping: DAMPING }.behind(&time[..end], &drive[..end]);
+        // Both phases, since neither the frequency nor a dead time before it is known to its period.
+        let (answer, speed) = (pick(&moved), pick(&rates(&time[..end], &moved)));
+        let found = fit(&[&level, &answer, &speed], left_there)?;
+        Some((frequency, before - mean_square(&found.residual), [answer, speed], found.coefficients))
+    });
+    let best = tried.reduce(|a, b| if b.1 > a.1 { b } else { a })?;
+    if best.1 < NOTABLE * mean_square(left_there) {
+        return None;
+    }
+    let mut rest = left.to_vec();
+    for (k, rest) in rest.iter_mut().take(count).enumerate() {
+        let gain_and_answer = best.3[1] * best.2[0][k] + best.3[2] * best.2[1][k];
+        *rest -= gain_and_answer + (best.3[0] * level[k]);
+    }
+    (mean_square(&rest) < mean_square(left)).then_some(Resonance { frequency: best.0, left: rest })
+}

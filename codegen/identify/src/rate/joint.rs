@@ -1,0 +1,177 @@
+//! Creep of one weight or of several, dead time and a known mode behind a table, all fitted at once (variable projection).
+//!
+//! For weights and dead time that are tried, the table is the one that fits what creep and mode leave; so the error of the
+//! whole record is a function of these few numbers alone, and Gauss-Newton steps lower it. Differences are taken with the
+//! table fitted anew, so that what the table takes over is not counted for creep.
+
+use nalgebra::DMatrix;
+
+use super::forward::{self, kept};
+use super::prepare::Prepared;
+use super::start::Own;
+use super::{CreepTerm, Inertia, RateModel, creep, mixed, table};
+use crate::mode::Mode;
+use crate::regressor::Plane;
+use specgen_numerics::nnls::Failure;
+
+/// What stands behind the table.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shape {
+    /// Whether all time constants have one weight.
+    pub(super) even: bool,
+    /// A known mode.
+    pub(super) mode: Option<Mode>,
+}
+
+const STEPS: usize = 12;
+/// A step that lowers the error by less than this share is the last.
+const WORTHWHILE: f64 = 1e-3;
+/// Differences are taken over this weight, and this dead time (s).
+const WEIGHT: f64 = 2e-3;
+const LATER: f64 = 5e-6;
+/// Weight that is drawn to zero by as much as a ten thousandth of the range draws: what the records do not show stays small.
+const PULL: f64 = 1e-4;
+/// Passes in which the table and the state at the start meet.
+const PASSES: usize = 2;
+
+/// Weights, gain and dead time that were tried, their model, and what it leaves.
+type Tried = (Vec<f64>, RateModel, Vec<f64>);
+
+struct Fit<'a> {
+    plane: &'a Plane,
+    records: &'a [&'a Prepared<'a>],
+    own: Vec<Own>,
+    times: Vec<f64>,
+    shape: Shape,
+    /// Mean gain of the table, m/V.
+    gain: f64,
+}
+
+/// Fits what `shape` says behind a table, from the table and dead time of `start` on.
+pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel, shape: Shape) -> Result<RateModel, Failure> {
+    let times = creep::time_constants(records, shape.even);
+    let own = records.iter().map(|p| p.own(&times, shape.mode)).collect();
+    let fit = Fit { plane, records, own, times, shape, gain: start.still.mean_gain() };
+    let weights = if shape.even { 1 } else { fit.times.len() };
+    let mut at = vec![0.0; weights];
+    at.extend(shape.mode.map(|_| 1.0));
+    at.push(start.dead_time);
+    let mut model = fit.table(&at, start)?;
+    let mut left = fit.left(&model);
+    for _ in 0..STEPS {
+        let step = fit.step(&at, &model, &left)?;
+        let Some((next, found, rest)) = fit.along(&at, &step, &model, square(&left, &at))? else { break };
+        let before = square(&left, &at);
+        (at, model, left) = (next, found, rest);
+        if square(&left, &at) > before * (1.0 - WORTHWHILE) {
+            break;
+        }
+    }
+    Ok(RateModel { creep: kept(model.creep), ..model })
+}
+
+impl Fit<'_> {
+    /// The model of weights and dead time `at`; `near` is one beside it.
+    fn table(&self, at: &[f64], near: &RateModel) -> Result<RateModel, Failure> {
+        let (dead_time, weights) = at.split_last().map_or((0.0, at), |(last, weights)| (*last, weights));
+        let weight = |k: usize| weights[if self.shape.even { 0 } else { k }];
+        let share = weights.last().copied().unwrap_or(0.0);
+        let inertia = self.shape.mode.map(|mode| Inertia { mode, gain: share * self.gain });
+        let terms = self.times.iter().enumerate().map(|(k, tau)| CreepTerm { time_constant: *tau, weight: weight(k) });
+        let creep: Vec<CreepTerm> = terms.collect();
+        let total = |creep: &[CreepTerm]| creep.iter().fold(1.0, |sum, term| sum + term.weight);
+        let mut still = near.still.clone();
+        let factor = total(&near.creep) / total(&creep);
+        still.nodes.iter_mut().for_each(|node| *node *= factor);
+        let mut model = RateModel { still, rate: None, creep, inertia, dead_time };
+        for pass in 0..PASSES {
+            let target = |(p, own): (&&Prepared, &Own)| self.target(&model, p, own, pass > 0);
+            let targets: Vec<Vec<f64>> = self.records.iter().zip(&self.own).map(target).collect();
+            model.still = table::fit(self.plane, self.records, &targets)?;
+        }
+        Ok(model)
+    }
+
+    /// What the table is to give for the rest of the model to meet the record, m.
+    fn target(&self, model: &RateModel, p: &Prepared, own: &Own, started: bool) -> Vec<f64> {
+        let time = &p.record.time[p.first..];
+        let plain = forward::static_part(model, self.plane, p);
+        let mut moved = vec![0.0; time.len()];
+        forward::inertia(model, time, &p.record.drive[p.first..], &mut moved);
+        let whole = forward::creeping(model, time, &plain);
+        let mut target = p.delayed(model.dead_time);
+        target.iter_mut().zip(moved).for_each(|(y, moved)| *y -= moved);
+        if started {
+            target.iter_mut().zip(&whole).for_each(|(y, f)| *y -= f);
+            own.take_out_start(&mut target);
+            target.iter_mut().zip(&whole).for_each(|(y, f)| *y += f);
+        }
+        forward::without_creep(model, time, &target)
+    }
+
+    /// Error of each sample as a share of its record's range and size.
+    fn left(&self, model: &RateModel) -> Vec<f64> {
+        let each = self.records.iter().zip(&self.own).flat_map(|(p, own)| {
+            let time = &p.record.time[p.first..];
+            let mut y = forward::creeping(model, time, &forward::static_part(model, self.plane, p));
+            forward::inertia(model, time, &p.record.drive[p.first..], &mut y);
+            let mut left = p.delayed(model.dead_time);
+            left.iter_mut().zip(y).for_each(|(left, y)| *left -= y);
+            own.take_out(&mut left);
+            let share = 1.0 / (p.record.displacement_range() * (p.samples() as f64).sqrt());
+            let weightless = &p.record.weightless[p.first..];
+            left.into_iter().zip(weightless).map(move |(x, w)| if *w { 0.0 } else { share * x }).collect::<Vec<_>>()
+        });
+        each.collect()
+    }
+
+    /// Where the linearised error is least, weights ≥ 0.
+    fn step(&self, at: &[f64], model: &RateModel, left: &[f64]) -> Result<Vec<f64>, Failure> {
+        let unknowns = at.len();
+        let mut columns = Vec::with_capacity(unknowns);
+        for k in 0..unknowns {
+            let width = if k + 1 < unknowns { WEIGHT } else { LATER };
+            let mut beside = at.to_vec();
+            beside[k] += width;
+            let moved = self.left(&self.table(&beside, model)?);
+            columns.push(moved.iter().zip(left).map(|(a, b)| (b - a) / width).collect::<Vec<f64>>());
+        }
+        // left − Σ column·(next − at): of the next values themselves, so that they have their bounds.
+        let mut target = left.to_vec();
+        for (column, value) in columns.iter().zip(at) {
+            target.iter_mut().zip(column).for_each(|(y, x)| *y += value * x);
+        }
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0, |sum, (x, y)| sum + x * y);
+        let unit: Vec<f64> = (0..unknowns).map(|k| if k + 1 < unknowns { 1.0 } else { 1e-3 }).collect();
+        let mut gram =
+            DMatrix::<f64>::from_fn(unknowns, unknowns, |a, b| unit[a] * unit[b] * dot(&columns[a], &columns[b]));
+        for k in 0..unknowns {
+            gram[(k, k)] += if k + 1 < unknowns { PULL * PULL } else { 1e-12 };
+        }
+        let rhs: Vec<f64> = (0..unknowns).map(|k| unit[k] * dot(&columns[k], &target)).collect();
+        let next = mixed::solve(&gram, &rhs, unknowns - 1)?;
+        Ok(next.iter().zip(&unit).map(|(x, unit)| x * unit).collect())
+    }
+
+    /// The first of the whole way, a half, a quarter … to `wanted` that lowers the error.
+    fn along(&self, at: &[f64], wanted: &[f64], model: &RateModel, before: f64) -> Result<Option<Tried>, Failure> {
+        for share in [1.0, 0.5, 0.25] {
+            let mut next: Vec<f64> = at.iter().zip(wanted).map(|(a, b)| a + share * (b - a)).collect();
+            if let Some(dead_time) = next.last_mut() {
+                *dead_time = if *dead_time > 0.0 { *dead_time } else { 0.0 };
+            }
+            let found = self.table(&next, model)?;
+            let left = self.left(&found);
+            if square(&left, &next) < before {
+                return Ok(Some((next, found, left)));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Of errors, and of the weights that are drawn to zero.
+fn square(left: &[f64], at: &[f64]) -> f64 {
+    let weights = &at[..at.len() - 1];
+    left.iter().fold(0.0, |sum, x| sum + x * x) + weights.iter().fold(0.0, |sum, w| sum + PULL * PULL * w * w)
+}
