@@ -17,6 +17,12 @@ pub fn jacobian(platform: &Platform<f64>, pose: &[f64; 6]) -> [[f64; 6]; 6] {
     platform.jacobian(pose)
 }
 
+/// How near elimination comes to a pivot of zero at `pose` (m and rad), moments in units of `reach` (m): [`Platform::pivot_ratio`].
+#[must_use]
+pub fn pivot_ratio(platform: &Platform<f64>, pose: &[f64; 6], reach: f64) -> f64 {
+    platform.pivot_ratio(pose, reach)
+}
+
 /// [`Platform::leg_forces`] of every motion up to ± `widths` (pose, rate, acceleration; m, rad, s), N: expanded at rest. Also the number
 /// of operations.
 #[must_use]

@@ -13,7 +13,7 @@
 //! | [`Factor`] | Cholesky factors of large matrices, by blocks |
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
 //! | [`largest`] | where a condition ceases to hold, by bisection |
-//! | [`Kernels`], [`displacements`], [`jacobian`], [`leg_forces`] | the controller's kernels on these numbers, compiled here |
+//! | [`Kernels`], [`displacements`], [`jacobian`], [`leg_forces`], [`pivot_ratio`] | the controller's kernels on these numbers, compiled here |
 //!
 //! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
 
@@ -38,7 +38,7 @@ pub use eigenvalues::{eigenvalues, spectral_radius};
 pub use exponential::exponential;
 pub use form::magnitude;
 pub use jury::{ewma_limit, pcc_limit};
-pub use kernels::{Kernels, displacements, jacobian, leg_forces};
+pub use kernels::{Kernels, displacements, jacobian, leg_forces, pivot_ratio};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
 pub use search::largest;
 pub use space::{cross, dot, norm, rotation};

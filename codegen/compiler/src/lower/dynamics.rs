@@ -9,7 +9,7 @@ use super::kinematics::joint_positions;
 use crate::ir::{Dynamics, DynamicsLeg, LEGS, Scalar};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::Model;
-use specgen_numerics::{cross, dot};
+use specgen_numerics::{cross, dot, pivot_ratio};
 
 /// Standard gravity of the project's reference data, m/s², along −z of {B}.
 pub const GRAVITY: f64 = 9.81;
@@ -44,10 +44,9 @@ fn constants(model: &Model) -> Result<Dynamics, Vec<Diagnostic>> {
     for first in 0..LEGS {
         let (order, rows) = elimination(model, first, reach);
         let mut candidate = assemble(model, order, rows);
-        let platform = candidate.platform();
-        let ratios = poses.iter().map(|pose| platform.pivot_ratio(pose, reach));
-        candidate.pivot_ratio = ratios.fold(f64::INFINITY, |a, b| if b < a { b } else { a });
-        if best.as_ref().is_none_or(|best| candidate.pivot_ratio > best.pivot_ratio) {
+        let beaten = best.as_ref().map_or(-1.0, |best| best.pivot_ratio);
+        candidate.pivot_ratio = smallest_pivot_ratio(&candidate.platform(), &poses, reach, beaten);
+        if candidate.pivot_ratio > beaten {
             best = Some(candidate);
         }
     }
@@ -55,6 +54,21 @@ fn constants(model: &Model) -> Result<Dynamics, Vec<Diagnostic>> {
         Some(best) if best.pivot_ratio >= SMALLEST_PIVOT_RATIO => Ok(best),
         best => Err(vec![ill_conditioned(model, best.map_or(0.0, |best| best.pivot_ratio))]),
     }
+}
+
+/// Over `poses`, or as soon as it is no more than `beaten`: a choice that is no better is not looked at any further.
+fn smallest_pivot_ratio(platform: &Platform<f64>, poses: &[[f64; 6]], reach: f64, beaten: f64) -> f64 {
+    let mut smallest = f64::INFINITY;
+    for pose in poses {
+        let ratio = pivot_ratio(platform, pose, reach);
+        if ratio < smallest {
+            smallest = ratio;
+        }
+        if smallest <= beaten {
+            break;
+        }
+    }
+    smallest
 }
 
 /// All constants for an order of elimination.
