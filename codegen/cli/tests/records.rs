@@ -172,6 +172,21 @@ fn time_that_does_not_rise_is_named_by_its_line_and_time() {
     refused(restarted, &expect(302, "E0510", &["23.359375 s to 3.4375 s"], "time column"));
 }
 
+/// A sweep of 5 s a branch that is said to be one of 5 µs.
+#[test]
+fn a_record_in_another_unit_of_time_is_named() {
+    let folder = prepared();
+    folder.write(BAD, text_changed(|text| text.replace("time_s", "time_us")));
+    let [spec, identify] = met(&folder);
+    let says = |document: &Document, word: &str| {
+        let mut findings = document.findings().iter().filter(|finding| finding["code"] == "W0519");
+        findings.any(|finding| finding["message"].as_str().unwrap().contains(word))
+    };
+    assert_eq!((spec.code, identify.code), (0, 0), "{:#}", spec.value);
+    assert!(says(&spec, "crosses its range") && says(&spec, "actuator.slew_rate"), "{:#}", spec.value);
+    assert!(says(&identify, "crosses its range"), "{:#}", identify.value);
+}
+
 #[test]
 fn a_gap_is_named_by_its_times() {
     let gap = changed(|rows| {

@@ -1,9 +1,10 @@
 //! Names what a residual consists of: an ordered account of its mean square.
 //!
 //! Taken out one after the other, each by least squares on what the ones before it left: a linear drift; what is
-//! proportional to the drive's rate (dead time, lag); what a lightly damped mode adds to the drive; a drift that bends, where it leaves less than half of what creep does; what
-//! first-order creep of the drive explains; hum of the mains. White noise is known
-//! from second differences. The rest is the model's: cells of finite size, and hysteresis that is not a Preisach model's.
+//! proportional to the drive's rate (dead time, lag); what a lightly damped mode adds to the drive; a drift that bends,
+//! where it leaves less than half of what creep does; what first-order creep of the drive explains; hum of the mains.
+//! White noise is known from second differences. The rest is the model's: cells of finite size, and hysteresis that is not
+//! a Preisach model's.
 
 use serde::Serialize;
 
@@ -72,6 +73,8 @@ pub struct Cause {
 
 /// A bent drift or a hum of a smaller share is none.
 const FOUND: f64 = 0.05;
+/// Share of the sampling frequency up to which a hum is looked for.
+const RESOLVED: f64 = 0.4;
 
 /// Creep time constants tried, as shares of the record's duration.
 const CREEP: [f64; 4] = [0.003, 0.02, 0.1, 0.5];
@@ -92,7 +95,7 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
     let total = mean_square(&left);
     let removed = before - total;
 
-    let rate = centred(pick(&rates(time, drive)));
+    let rate = centred(pick(&rates(time, drive, keep)));
     let mut rate_delay = 0.0;
     if let Some(found) = fit(&[&rate], &left) {
         rate_delay = -found.coefficients[0] / gain;
@@ -113,7 +116,9 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
         None => creep,
     };
     let creeping = creep.explained;
-    let hum = mains::take(&t, &pick(drive), &creep.left)
+    let all = time.last().copied().unwrap_or(0.0) - time.first().copied().unwrap_or(0.0);
+    let highest = RESOLVED * time.len() as f64 / all;
+    let hum = mains::take(&t, &pick(drive), &creep.left, highest)
         .map(|(frequency, left)| (frequency, mean_square(&creep.left) - mean_square(&left)));
     let hum = hum.filter(|(_, explained)| *explained > FOUND * total);
     let rest = after_rate - bent.unwrap_or_default() - creeping - hum.map_or(0.0, |(_, explained)| explained);
@@ -180,12 +185,13 @@ fn creep_of(time: &[f64], drive: &[f64], pick: &impl Fn(&[f64]) -> Vec<f64>, cho
     Taken { explained, left: if best.is_empty() { left.to_vec() } else { best } }
 }
 
-/// Central differences, V/s.
-fn rates(time: &[f64], drive: &[f64]) -> Vec<f64> {
+/// Central differences, V/s, without the samples that do not count: a jump behind a sample is not its rate.
+fn rates(time: &[f64], drive: &[f64], keep: &[bool]) -> Vec<f64> {
     let last = time.len() - 1;
     (0..=last)
         .map(|k| {
             let (a, b) = (k.saturating_sub(1), if k < last { k + 1 } else { last });
+            let (a, b) = (if keep[a] { a } else { k }, if keep[b] { b } else { k });
             if b > a { (drive[b] - drive[a]) / (time[b] - time[a]) } else { 0.0 }
         })
         .collect()
@@ -230,12 +236,16 @@ mod tests {
     fn each_source_is_named_when_it_is_the_only_one() {
         let (time, drive) = triangle(4000);
         let keep = vec![true; 4000];
-        let rate = rates(&time, &drive);
+        let rate = rates(&time, &drive, &keep);
         let lagged: Vec<f64> = rate.iter().map(|r| -1e-7 * 2e-4 * r).collect();
         let found = explain(&time, &drive, &lagged, 0.0, 1e-7, &keep);
         assert_eq!(found.main, Source::DeadTime);
         // To one per cent: the drift that is taken out first takes a little of it along.
         assert!((found.rate_delay - 2e-4).abs() < 2e-6, "{}", found.rate_delay);
+        // A jump at the end does not count, and is no rate of the sample before it.
+        let (mut jumping, mut kept) = (drive.clone(), keep.clone());
+        (jumping[3999], kept[3999]) = (1e4, false);
+        assert_eq!(explain(&time, &jumping, &lagged, 0.0, 1e-7, &kept).main, Source::DeadTime);
         // Slow against the cycle of 0.2 s: a faster one looks like a lag, which the account takes out first.
         let creep: Vec<f64> = lagging(&time, &drive, 1.0).iter().map(|x| 1e-9 * x).collect();
         assert_eq!(explain(&time, &drive, &creep, 0.0, 1e-7, &keep).main, Source::Creep);

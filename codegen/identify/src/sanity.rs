@@ -199,7 +199,8 @@ fn relation(time: &[f64], drive: &[f64], displacement: &[f64], correlation: f64,
         let message = format!(
             "the displacement falls and then rises with the drive, a butterfly loop: the drive goes beyond the coercive voltage, where the polarisation turns over; {shown}"
         );
-        let help = "record again with a drive that stays on one side of the coercive voltage, such as --drive 0:100; a table cannot hold a butterfly";
+        let help =
+            "record again with a drive that stays on one side of the coercive voltage; a table cannot hold a butterfly";
         findings.add(codes::RECORD_RELATION, None, message, help);
     } else {
         let message = format!(

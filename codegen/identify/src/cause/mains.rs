@@ -14,8 +14,8 @@ const HARMONICS: f64 = 8.0;
 /// Share of a drive from which on a frequency is the drive's own.
 const DRIVEN: f64 = 0.001;
 
-/// The strongest hum in `left` that is none of the drive's own frequencies: Hz, and what is left without it.
-pub(super) fn take(time: &[f64], drive: &[f64], left: &[f64]) -> Option<(f64, Vec<f64>)> {
+/// The strongest hum up to `highest` (Hz) in `left` that is none of the drive's own frequencies: Hz, and what is left without it.
+pub(super) fn take(time: &[f64], drive: &[f64], left: &[f64], highest: f64) -> Option<(f64, Vec<f64>)> {
     let duration = time.last()? - time.first()?;
     let step = time.len().div_ceil(SAMPLES);
     let thin = |values: &[f64]| -> Vec<f64> { values.iter().step_by(step).copied().collect() };
@@ -34,7 +34,7 @@ pub(super) fn take(time: &[f64], drive: &[f64], left: &[f64]) -> Option<(f64, Ve
         (1.0..=HARMONICS).contains(&order) && (frequency - order * cycles).abs() * duration < 1.5
     };
     let best = tried
-        .filter(|frequency| frequency * duration > 3.0 && !harmonic(*frequency))
+        .filter(|frequency| frequency * duration > 3.0 && *frequency < highest && !harmonic(*frequency))
         .filter(|frequency| explained(*frequency, &u).is_some_and(|share| share < DRIVEN))
         .filter_map(|frequency| Some((frequency, explained(frequency, &few)?)))
         .fold(

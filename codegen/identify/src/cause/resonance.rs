@@ -36,11 +36,13 @@ pub(super) fn take(time: &[f64], drive: &[f64], chosen: &[usize], left: &[f64]) 
     let level = pick(&drive[..end]);
     let before = mean_square(&fit(&[&level], left_there)?.residual);
     let step = libm::log(highest / lowest) / (MODES - 1) as f64;
+    // Its answer has no jumps.
+    let all = vec![true; end];
     let tried = (0..MODES).filter_map(|k| {
         let frequency = lowest * libm::exp(step * k as f64);
         let moved = Mode { frequency, damping: DAMPING }.behind(&time[..end], &drive[..end]);
         // Both phases, since neither the frequency nor a dead time before it is known to its period.
-        let (answer, speed) = (pick(&moved), pick(&rates(&time[..end], &moved)));
+        let (answer, speed) = (pick(&moved), pick(&rates(&time[..end], &moved, &all)));
         let found = fit(&[&level, &answer, &speed], left_there)?;
         Some((frequency, before - mean_square(&found.residual), [answer, speed], found.coefficients))
     });

@@ -22,6 +22,9 @@ use specgen_language::diagnostic::{Diagnostic, codes};
 /// The drive may leave the range of the table by this share of it; it is held at its end there.
 const BEYOND: f64 = 0.05;
 
+/// Fewer samples are not compared.
+const LEAST: usize = 8;
+
 /// A drive record: reversal curves or anything else, with or without the displacement.
 #[derive(Debug, Clone)]
 pub struct Drive {
@@ -200,6 +203,14 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     let kept = |values: &[f64]| -> Vec<f64> {
         values.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(value, _)| *value).collect()
     };
+    if let Some(y) = &measured {
+        let (low, high) = statistics::extent(&kept(y));
+        if low >= high || kept(y).len() < LEAST {
+            let message = "the drive moves by a jump alone, or the displacement stands still".to_owned();
+            findings.add(codes::VALIDATION_IDLE, None, message, "name a record that moves the drive");
+            return Err(findings.into_diagnostics());
+        }
+    }
     let times = model.creep.iter().map(|term| term.time_constant);
     let own = Own::of(&time, keep.clone(), times, model.inertia.map(|inertia| inertia.mode));
     let slopes = match &measured {
