@@ -1,8 +1,8 @@
 //! Names what a residual consists of: an ordered account of its mean square.
 //!
 //! Taken out one after the other, each by least squares on what the ones before it left: a linear drift; what is
-//! proportional to the drive's rate (dead time, lag); what a lightly damped mode adds to the drive; a drift that bends,
-//! where it leaves less than half of what creep does; what first-order creep of the drive explains; hum of the mains.
+//! proportional to the drive's rate (dead time, lag); hum of the mains; what a lightly damped mode adds to the drive; a
+//! drift that bends, where it leaves less than half of what creep does; what first-order creep of the drive explains.
 //! White noise is known from second differences. The rest is the model's: cells of finite size, and hysteresis that is not
 //! a Preisach model's.
 
@@ -58,7 +58,7 @@ impl Source {
 pub struct Cause {
     /// The largest share of what is left without the drift.
     pub main: Source,
-    /// Shares without the drift, in the order dead time, resonance, bent drift, creep, hum, noise, model; they sum to 1. Resonance,
+    /// Shares without the drift, in the order dead time, hum, resonance, bent drift, creep, noise, model; they sum to 1. Resonance,
     /// bent drift and hum are there only where they are found.
     pub shares: Vec<(Source, f64)>,
     /// Root mean square that the removed linear drift had, m.
@@ -102,6 +102,15 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
         left = found.residual;
     }
     let delay = total - mean_square(&left);
+    let all = time.last().copied().unwrap_or(0.0) - time.first().copied().unwrap_or(0.0);
+    let highest = RESOLVED * time.len() as f64 / all;
+    let hum = mains::take(&t, &pick(drive), &left, highest)
+        .map(|(frequency, rest)| (frequency, mean_square(&left) - mean_square(&rest), rest))
+        .filter(|(_, explained, _)| *explained > FOUND * total);
+    let hum = hum.map(|(frequency, explained, rest)| {
+        left = rest;
+        (frequency, explained)
+    });
     let rung = resonance::take(time, drive, &chosen, &left);
     let rings = rung.as_ref().map(|found| mean_square(&left) - mean_square(&found.left));
     let resonance = rung.as_ref().map(|found| found.frequency);
@@ -116,20 +125,15 @@ pub(crate) fn explain(time: &[f64], drive: &[f64], residual: &[f64], noise: f64,
         None => creep,
     };
     let creeping = creep.explained;
-    let all = time.last().copied().unwrap_or(0.0) - time.first().copied().unwrap_or(0.0);
-    let highest = RESOLVED * time.len() as f64 / all;
-    let hum = mains::take(&t, &pick(drive), &creep.left, highest)
-        .map(|(frequency, left)| (frequency, mean_square(&creep.left) - mean_square(&left)));
-    let hum = hum.filter(|(_, explained)| *explained > FOUND * total);
-    let rest = after_rate - bent.unwrap_or_default() - creeping - hum.map_or(0.0, |(_, explained)| explained);
+    let rest = after_rate - bent.unwrap_or_default() - creeping;
     let noise = if noise * noise < rest { noise * noise } else { rest };
     let share = |part: f64| if total > 0.0 { if part > 0.0 { part / total } else { 0.0 } } else { 0.0 };
     let shares: Vec<(Source, f64)> = [
         (Source::DeadTime, Some(delay)),
+        (Source::Hum, hum.map(|(_, explained)| explained)),
         (Source::Resonance, rings),
         (Source::BentDrift, bent),
         (Source::Creep, Some(creeping)),
-        (Source::Hum, hum.map(|(_, explained)| explained)),
         (Source::Noise, Some(noise)),
         (Source::Model, Some(rest - noise)),
     ]

@@ -113,6 +113,8 @@ const SAMPLES_A_PERIOD: f64 = 4.0;
 /// Damping ratios tried at each frequency, before both are refined.
 const DAMPING: [f64; 4] = [0.004, 0.015, 0.05, 0.15];
 const LARGEST_DAMPING: f64 = 0.5;
+/// A ring that hardly decays is a hum.
+const LEAST_DAMPING: f64 = 1e-3;
 /// A ring explains this share of what moves in the rest at least, and stands this far out of what it leaves.
 const EXPLAINED: f64 = 0.8;
 const ABOVE_LEFT: f64 = 5.0;
@@ -179,7 +181,7 @@ fn ring_of_rest(time: &[f64], y: &[f64]) -> Option<Ring> {
     let mode = refined(best?.1, 0.125 / duration, |mode| left(mode).map(|found| found.0));
     let (rest, amplitude) = left(mode)?;
     let rings = rest < (1.0 - EXPLAINED) * plain && amplitude > ABOVE_LEFT * rest.sqrt();
-    rings.then_some(Ring { mode, time: time[0], amplitude, left: rest.sqrt() })
+    (rings && mode.damping > LEAST_DAMPING).then_some(Ring { mode, time: time[0], amplitude, left: rest.sqrt() })
 }
 
 /// The mode of least `left` near `mode`: steps in both directions, halved where none helps.
