@@ -30,7 +30,7 @@ mod app {
     use controller::supervised::Machine;
     use embassy_stm32::interrupt::{InterruptExt, Priority};
     use embassy_stm32::wdg::IndependentWatchdog;
-    use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, recorder};
+    use specgen_board::{Desk, Exchange, Health, Noticed, Probes, Schedule, Kept, catch_up};
     use specgen_link::Endpoint;
     use specgen_stm32::cycles::{self, CYCLES};
     use specgen_stm32::enable::Stop;
@@ -60,6 +60,7 @@ mod app {
         exchange: Exchange = Exchange::new(),
         #[unsafe(link_section = ".record.memory")]
         record: [u64; RECORD] = [0; RECORD],
+        kept: MaybeUninit<Kept> = MaybeUninit::uninit(),
     ])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let core = &mut context.core;
@@ -78,13 +79,13 @@ mod app {
 
         let intact = memory_intact() && controller::integrity::intact();
         let exchange = context.local.exchange;
-        exchange.recorder = recorder(context.local.record);
         exchange.probes = Probes { hertz: timer::hertz(), stack: stack_used };
         let machine = converters::at_reset(context.local.machine);
+        exchange.record(context.local.record, converters::kept(context.local.kept, machine));
         let mut board = converters::board(wiring.adc, wiring.dac, machine, intact);
         let Some(period) = timer::period(timer::hertz()) else { safe::stop() };
         board.start(&mut exchange.report);
-        exchange.prepare(board.machine());
+        exchange.prepare();
 
         pins::LINK.set_priority(Priority::P8);
         let mut schedule = Schedule::new(period, 0);
@@ -142,10 +143,12 @@ mod app {
         .await;
     }
 
-    #[idle(shared = [exchange])]
-    fn idle(mut context: idle::Context) -> ! {
+    #[idle(shared = [exchange, board])]
+    fn idle(context: idle::Context) -> ! {
+        let mut shared = (context.shared.exchange, context.shared.board);
         loop {
-            context.shared.exchange.lock(|exchange| exchange.beat = exchange.beat.wrapping_add(1));
+            shared.0.lock(|exchange| exchange.beat = exchange.beat.wrapping_add(1));
+            catch_up(&mut |action| shared.lock(|exchange, board| action(exchange, board.machine_mut())));
             cortex_m::asm::wfi();
         }
     }

@@ -217,18 +217,18 @@ fn operate(trial: &Trial, session: &mut Session, brief: bool) -> Result<(), Stri
     let settings = format!("config write {}\nstatus", trial.spec.display());
     let mut host = Host::of(session.host(trial))?;
     let whole = [
-        ("status\narm\nwait holding 60\nrun\nwait running 60\nset command=0\nstatus", ": running", 200.0),
+        ("status\narm\nwait holding 600\nrun\nwait running 600\nset command=0\nstatus", ": running", 200.0),
         ("record arm 300\nwave wave.toml\nstatus", STANDS, 60.0),
         (&settings, STANDS, 20.0),
         ("record trigger\nstatus", STANDS, 60.0),
     ];
     let short = [
-        ("status\narm\nwait holding 60\nrun\nwait running 60\nset command=0\nstatus", ": running", 0.0),
+        ("status\narm\nwait holding 600\nrun\nwait running 600\nset command=0\nstatus", ": running", 0.0),
         ("record arm 30\nrecord trigger\nstatus", STANDS, 10.0),
     ];
     let end = [
         ("record stop\nrecord download run.rec", "wrote ", 0.0),
-        ("ramp-down\nwait disarmed 60\nstatus", "disarmed, amplifiers off", 0.0),
+        ("ramp-down\nwait disarmed 600\nstatus", "disarmed, amplifiers off", 0.0),
     ];
     let begin: &[(&str, &str, f64)] = if brief { &short } else { &whole };
     for &(orders, words, time) in begin.iter().chain(&end) {

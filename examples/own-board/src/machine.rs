@@ -16,7 +16,7 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal_bus::spi::ExclusiveDevice;
 use embedded_io::{Read, ReadReady, Write};
 use specgen_board::{
-    Access, Board, Desk, Exchange, Health, Noticed, PERIOD_NANOSECONDS, Probes, Schedule, Stopwatch, Visit, recorder,
+    Access, Board, Desk, Exchange, Health, Noticed, PERIOD_NANOSECONDS, Probes, Schedule, Kept, Stopwatch, Visit, catch_up,
 };
 use specgen_link::Endpoint;
 
@@ -83,6 +83,7 @@ pub struct Link {
 pub fn start(
     machine: &'static mut Machine,
     record: &'static mut [u64; RECORD],
+    kept: &'static mut Kept,
     buffers: &'static mut [[u8; 512]; 2],
 ) -> Option<(Running, Link)> {
     let p = embassy_stm32::init(clocks());
@@ -100,11 +101,11 @@ pub fn start(
     let dac = ExclusiveDevice::new(dac, Output::new(p.PE4, Level::High, Speed::VeryHigh), Cycles).ok()?;
     let mut board = Board::new(gauges, Dac80508::new(dac, enable, Cycles), machine, controller::integrity::intact());
     let mut exchange = Exchange::new();
-    exchange.recorder = recorder(record);
+    exchange.record(record, kept);
     // Times of ticks; the stack is not measured.
     exchange.probes = Probes { hertz: TIMER * 1_000_000, ..Probes::NONE };
     board.start(&mut exchange.report);
-    exchange.prepare(board.machine());
+    exchange.prepare();
 
     let mut line = usart::Config::default();
     line.baudrate = BAUD;
@@ -180,6 +181,8 @@ impl Link {
     /// Shows the tick that the background is alive, and answers what has come in.
     pub fn serve(&mut self, with: &mut Access<'_>) {
         with(&mut |exchange, _| exchange.beat = exchange.beat.wrapping_add(1));
+        // What the recorder's blocks begin with is written here, not in the tick.
+        catch_up(with);
         let mut bytes = [0; 64];
         while self.uart.read_ready().unwrap_or(false) {
             // A frame in which a byte was lost has a wrong CRC, and the host asks again.

@@ -2,12 +2,12 @@
 
 use controller::Real;
 use controller::sensing;
+use controller::snapshot::record_after;
 use controller::supervised::{CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, Request, STOP};
 use specgen_hal::{Amplifiers, CHANNELS, Fault, Gauges};
 use specgen_link::Silence;
 
 use crate::exchange::{self, Exchange, Orders};
-use crate::recording::{begin_row, end_row};
 use crate::report::Report;
 use crate::words::GAUGE_BITS;
 
@@ -135,11 +135,6 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
                 events |= event;
             }
         }
-        if let Some(recorder) = recorder
-            && recorder.is_cut()
-        {
-            begin_row(config, self.machine, recorder);
-        }
         let readings = match begun.and_then(|()| self.gauges.read()) {
             Ok(codes) => codes.map(|code| sensing::CONVERTER.reading(code >> Self::SPARE_BITS)),
             Err(fault) => {
@@ -175,9 +170,9 @@ impl<'m, G: Gauges, A: Amplifiers> Board<'m, G, A> {
         report.missed = report.missed.saturating_add(noticed.missed);
         // What need not be done before the outputs change.
         if let (Some(recorder), Some(input)) = (recorder, &self.input) {
-            end_row(self.machine, input, &output, recorder);
+            record_after(self.machine, input, &output, recorder);
         }
-        exchange.prepare(self.machine);
+        exchange.prepare();
         restart
     }
 

@@ -11,7 +11,7 @@ use specgen_runtime::wave::{self, Settings};
 
 use crate::download::{self, Download};
 use crate::exchange::{Access, Exchange};
-use crate::recording;
+use crate::recording::{self, catch_up};
 use crate::report::Probes;
 use crate::stepper::{Costs, Stepper, Stopwatch};
 
@@ -161,6 +161,8 @@ impl Visit<'_, '_> {
     #[inline(never)]
     fn download(&mut self, offset: u32) -> Reply<'_> {
         let with = &mut *self.with;
+        // What it stopped with.
+        catch_up(with);
         let mut refusal = Refusal::Unsupported;
         let Desk { download, session, .. } = &mut *self.desk;
         let found = download.read(offset, session.buffer(), |action: &mut dyn FnMut(&_)| {

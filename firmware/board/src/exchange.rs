@@ -8,7 +8,7 @@ use controller::{COMMAND_WORDS, Config};
 use specgen_link::Silence;
 use specgen_runtime::wave::Stage;
 
-use crate::recording::begin_row;
+use crate::recording::{Kept, recorder};
 use crate::report::{Probes, Report};
 #[cfg(feature = "lockstep")]
 use crate::words::PERIOD_NANOSECONDS;
@@ -47,6 +47,8 @@ pub struct Exchange {
     pub silence: Silence,
     /// Keeps what the ticks do, where a memory was given for it.
     pub recorder: Option<Recorder<'static>>,
+    /// What it owes is written from this, see [`catch_up`](crate::catch_up); none while the background has it.
+    pub(crate) kept: Option<&'static mut Kept>,
     /// Makes the set-points while it is under way.
     pub wave: Option<Wave>,
     /// The host steps the machine, and the ticks do not: how long it has been silent.
@@ -76,9 +78,18 @@ impl Exchange {
             orphaned: false,
             silence: Silence::new(HOST_TICKS),
             recorder: None,
+            kept: None,
             wave: None,
             lockstep: None,
         }
+    }
+
+    /// Records into this memory from here on, waiting for a fault; then as much is kept after it as before. Nothing is recorded
+    /// if not even two blocks fit, which a controller of very long memory may do to a small part. The background has to call
+    /// [`catch_up`](crate::catch_up).
+    pub fn record(&mut self, memory: &'static mut [u64], kept: &'static mut Kept) {
+        self.recorder = recorder(memory);
+        self.kept = Some(kept);
     }
 
     /// A request of the host was carried out or refused.
@@ -104,20 +115,19 @@ impl Exchange {
         }
     }
 
-    /// What a tick leaves until its codes are out, and the first one needs to find done: settings that came, the block of the
-    /// recorder that begins with the next tick, the set-point of a wave for it.
-    pub fn prepare(&mut self, machine: &Machine) {
-        if let Some(next) = &self.next {
+    /// What a tick leaves until its codes are out, and the first one needs to find done: settings that came, the set-point of a wave
+    /// for the next tick.
+    pub fn prepare(&mut self) {
+        // A block begins with settings: not before the one that is owed is written.
+        let owes = self.recorder.as_ref().is_some_and(Recorder::owes);
+        if let Some(next) = &self.next
+            && !owes
+        {
             self.config = *next;
             self.next = None;
             if let Some(recorder) = &mut self.recorder {
                 recorder.settings_changed();
             }
-        }
-        if let Some(recorder) = &mut self.recorder
-            && recorder.opens()
-        {
-            begin_row(&self.config, machine, recorder);
         }
         self.advance_wave();
     }

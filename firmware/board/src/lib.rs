@@ -30,7 +30,7 @@ pub use cycle::{Board, Noticed};
 pub use desk::{Desk, Visit};
 pub use exchange::{Access, Exchange, Orders};
 pub use health::{BACKGROUND_SILENCE, Health, RAMPED_DOWN};
-pub use recording::recorder;
+pub use recording::{Kept, catch_up};
 pub use report::{Probes, Report};
 pub use schedule::{Due, Schedule};
 pub use stepper::Stopwatch;

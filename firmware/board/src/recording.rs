@@ -1,10 +1,12 @@
 //! The recorder of a board: how its memory is cut, and what it does from power-up on.
 
-use controller::Config;
+use controller::snapshot::RECORD_LAYOUT;
 use controller::snapshot::recorder::{Activity, Recorder, Settings, Trigger};
-use controller::snapshot::{RECORD_LAYOUT, record_after, record_before};
-use controller::supervised::{Machine, MachineInput, MachineOutput};
+use controller::supervised::Machine;
+use controller::{CONFIG_WORDS, Config};
 use specgen_link::{RecorderAction, RecorderStatus};
+
+use crate::exchange::{Access, Exchange};
 
 /// Most blocks. The oldest is given up when a new one begins, so many of them keep more of what was before the trigger.
 const BLOCKS: usize = 8;
@@ -17,10 +19,10 @@ const DIGEST_EVERY: u32 = 16;
 /// A recorder in this memory that waits for a fault, and then keeps as much after it as before. None if not even two blocks fit,
 /// which a controller of very long memory may do to a small part.
 #[must_use]
-pub fn recorder(memory: &'static mut [u64]) -> Option<Recorder<'static>> {
+pub(crate) fn recorder(memory: &'static mut [u64]) -> Option<Recorder<'static>> {
     let most = memory.len() / (PREAMBLES * RECORD_LAYOUT.preamble());
     let blocks = most.clamp(2, BLOCKS);
-    let mut recorder = Recorder::new(memory, blocks, RECORD_LAYOUT).ok()?;
+    let mut recorder = Recorder::new(memory, blocks, RECORD_LAYOUT).ok()?.owing();
     recorder.start(settings((recorder.capacity() / 2) as u32));
     Some(recorder)
 }
@@ -54,23 +56,96 @@ pub(crate) fn act(recorder: &mut Recorder<'static>, action: RecorderAction) -> R
 
 /// Whether what it holds stays as it is.
 pub(crate) fn is_stopped(recorder: &Recorder<'static>) -> bool {
-    matches!(recorder.activity(), Activity::Stopped | Activity::Complete)
+    matches!(recorder.activity(), Activity::Stopped | Activity::Complete) && !recorder.owes()
 }
 
-/// What the recorder keeps from before a tick, where a block begins. In a frame of its own, which is done with before the law needs the
-/// stack.
-#[inline(never)]
-pub(crate) fn begin_row(config: &Config, machine: &Machine, recorder: &mut Recorder<'static>) {
-    record_before(config, machine, recorder);
+/// A machine and its settings as they were after a tick: what the recorder owes is written from it, while ticks go on.
+#[derive(Debug)]
+pub struct Kept {
+    config: Config,
+    machine: Machine,
 }
 
-/// What it keeps from after it.
-#[inline(never)]
-pub(crate) fn end_row(
-    machine: &Machine,
-    input: &MachineInput,
-    output: &MachineOutput,
-    recorder: &mut Recorder<'static>,
-) {
-    record_after(machine, input, output, recorder);
+impl Default for Kept {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Kept {
+    /// Nothing in it yet.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { config: Config::new(), machine: Machine::new() }
+    }
+
+    /// Of this machine, under the settings of the spec.
+    #[must_use]
+    pub fn of(machine: &Machine) -> Self {
+        Self { config: Config::new(), machine: *machine }
+    }
+
+    /// Takes a copy: what holds a tick off longest.
+    pub fn keep(&mut self, config: &Config, machine: &Machine) {
+        self.config = *config;
+        self.machine = *machine;
+    }
+
+    /// Words of what a block begins with, settings and state, from the `first`-th on.
+    #[inline(never)]
+    fn words(&self, first: usize, words: &mut [u64; PIECE]) -> usize {
+        let left = PREAMBLE.saturating_sub(first);
+        if first < CONFIG_WORDS {
+            let config = self.config.to_words();
+            let from = config.get(first..).unwrap_or_default();
+            for (slot, word) in words.iter_mut().zip(from) {
+                *slot = *word;
+            }
+            return if from.len() < PIECE { from.len() } else { PIECE };
+        }
+        self.machine.save_piece(first - CONFIG_WORDS, words);
+        if left < PIECE { left } else { PIECE }
+    }
+}
+
+/// Words of what a block begins with besides its header, and of a piece that is written while the tick is held off.
+const PREAMBLE: usize = RECORD_LAYOUT.config + RECORD_LAYOUT.state;
+const PIECE: usize = 32;
+
+/// Work of the background, best after each tick: keeps the machine where the recorder wants one, and writes down what is owed then.
+/// The tick is held off for the copy and for each piece that is written; blocks are whole, and can be fetched, after it.
+pub fn catch_up(with: &mut Access<'_>) {
+    let (mut taken, mut block) = (None, false);
+    with(&mut |exchange, machine| {
+        let Exchange { recorder: Some(recorder), kept, config, .. } = exchange else { return };
+        if let (Some(want), Some(kept)) = (recorder.wants(), &mut *kept) {
+            kept.keep(config, machine);
+            recorder.owe(want);
+        }
+        if recorder.owes() {
+            block = recorder.owes_block();
+            taken = kept.take();
+        }
+    });
+    // Nothing owed; or another one is at it, whom this one has interrupted.
+    let Some(kept) = taken else { return };
+    let digest = kept.machine.digest();
+    let mut first = if block { 0 } else { PREAMBLE };
+    while first < PREAMBLE {
+        let mut words = [0; PIECE];
+        let count = kept.words(first, &mut words);
+        with(&mut |exchange, _| {
+            if let (Some(recorder), Some(words)) = (&mut exchange.recorder, words.get(..count)) {
+                recorder.hand_in(first, words);
+            }
+        });
+        first += count;
+    }
+    let mut kept = Some(kept);
+    with(&mut |exchange, _| {
+        exchange.kept = kept.take();
+        if let Some(recorder) = &mut exchange.recorder {
+            recorder.settle(digest);
+        }
+    });
 }

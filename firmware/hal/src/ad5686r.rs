@@ -164,6 +164,8 @@ pub struct Ad5686rPair<FIRST, SECOND, LDAC, ENABLE, DELAY> {
     on: bool,
     /// What stands in the DAC registers, as far as is known.
     written: Option<[u16; CHANNELS]>,
+    /// Whether the codes that were written last are others than those before them, which are out.
+    changed: bool,
     /// What both parts were asked for must give this.
     asked: Option<[u16; 2]>,
     /// Which of the three channels is asked for next.
@@ -188,6 +190,7 @@ where
             delay,
             on: false,
             written: None,
+            changed: true,
             asked: None,
             turn: 0,
         }
@@ -256,7 +259,7 @@ where
         // Checked: 16 bits.
         let [a, b, c, d, e, f] = codes.map(|code| code as u16);
         let asked = self.asked.take();
-        self.written = None;
+        self.changed = self.written.take() != Some([a, b, c, d, e, f]);
         // The frame after the question brings the answer.
         let first = self.first.send(Command::WriteInput(Channel::A, a));
         let second = self.second.send(Command::WriteInput(Channel::A, d));
@@ -280,7 +283,7 @@ where
     }
 
     fn enable(&mut self, on: bool) -> Result<(), Fault> {
-        if on && !self.on {
+        if on && !self.on && self.changed {
             self.ldac.settle();
         }
         self.on = on;

@@ -9,12 +9,17 @@
 //!
 //! A target calls [`Recorder::opens`] before a tick and, if it says so, [`Recorder::open`] with the machine as it is then;
 //! after the tick [`Recorder::push`]. The emitted controller does all three (`snapshot::supervise_recorded`).
+//!
+//! Snapshot and digest take longer than a row. Where that is too long for a tick, they are the work of the background
+//! ([`Recorder::owing`]): between two ticks it keeps a copy of the machine, if the recorder [wants](Recorder::wants) one, and hands in
+//! what is then owed while ticks go on. Until that is done no other block begins, no other row gets a digest, and what it holds is not
+//! to be fetched. A background that is late leaves rows out, and never a row in a block that it does not continue.
 
 mod ring;
 
-use crate::record::{HAS_DIGEST, LARGEST_INPUT, Layout, Reason};
+use crate::record::{HAS_DIGEST, HEADER_WORDS, LARGEST_INPUT, Layout, Reason};
 use crate::supervisor::Phase;
-use ring::Ring;
+use ring::{DIGEST, Place, Ring};
 
 /// What makes a recorder keep what it has, besides [`Recorder::trigger`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -114,6 +119,32 @@ pub struct Recorder<'m> {
     last: [u64; LARGEST_INPUT],
     /// Digest of the machine as it is, where the last row has it.
     digest: Option<u64>,
+    /// Snapshots and digests come later, and which does.
+    owing: bool,
+    owed: Option<Owed>,
+}
+
+/// For what a machine is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Want {
+    /// A block begins with it, after the settings that are in force.
+    Block,
+    /// Its digest ends the last row.
+    Digest,
+}
+
+/// Rows that a block has left when the next is to begin.
+const AHEAD: usize = 8;
+
+/// Where what comes later goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Owed {
+    /// Settings, state and digest that a block begins with.
+    Block(Place),
+    /// The digest of a row.
+    Digest(Place),
+    /// Nowhere: what it was for is forgotten.
+    Nothing,
 }
 
 impl<'m> Recorder<'m> {
@@ -143,7 +174,15 @@ impl<'m> Recorder<'m> {
             phase: 0,
             last: [0; LARGEST_INPUT],
             digest: None,
+            owing: false,
+            owed: None,
         })
+    }
+
+    /// The same, whose snapshots and digests are the work of a background: see [`Recorder::wants`].
+    #[must_use]
+    pub fn owing(self) -> Self {
+        Self { owing: true, ..self }
     }
 
     /// Forgets what it has and records from the next tick on.
@@ -156,6 +195,7 @@ impl<'m> Recorder<'m> {
         self.asked = false;
         self.due = Some(Reason::Started);
         self.digest = None;
+        self.owed = self.owed.map(|_| Owed::Nothing);
     }
 
     /// Ends the recording; what there is stays to be fetched.
@@ -225,13 +265,6 @@ impl<'m> Recorder<'m> {
         self.records() && self.skip == 0 && (self.due.is_some() || !self.ring.has_room())
     }
 
-    /// Before a tick: whether the block that is open must not take its row, as it does not continue what the block holds.
-    #[inline]
-    #[must_use]
-    pub fn is_cut(&self) -> bool {
-        self.due.is_some() && self.ring.has_room() && self.opens()
-    }
-
     /// Begins a block, before a tick, with the settings that the tick runs under, the digest of the machine as it is, and its
     /// state, which `save` writes.
     pub fn open(&mut self, config: &[u64], digest: u64, save: impl FnOnce(&mut [u64])) {
@@ -248,6 +281,77 @@ impl<'m> Recorder<'m> {
         // What the block begins with is as good as a digest of its first row.
         if self.settings.digest_every > 1 {
             self.digest_in = self.settings.digest_every - 1;
+        }
+    }
+
+    // Cold, as what follows: small before fast.
+    /// Between two ticks: for what the machine as it is now is to be kept, if for anything. Then [`Recorder::owe`].
+    #[cold]
+    #[must_use]
+    pub fn wants(&self) -> Option<Want> {
+        let records = self.owing && self.records() && self.skip == 0 && !self.owes();
+        let every = self.settings.digest_every;
+        match () {
+            // Before the open block is full, so that no row is without one.
+            () if records && (self.due.is_some() || !self.ring.has_room_for(AHEAD)) => Some(Want::Block),
+            // Of the last row, which is that of the last tick.
+            () if records
+                && self.settings.decimation <= 1
+                && every > 0
+                && self.digest_in == 0
+                && self.ring.may_add() =>
+            {
+                Some(Want::Digest)
+            }
+            () => None,
+        }
+    }
+
+    /// It is kept: a block begins with the next row, or the last row ends with a digest. Both are owed.
+    #[cold]
+    pub fn owe(&mut self, want: Want) {
+        self.owed = match want {
+            Want::Block => {
+                self.open_with(&[], || 0, |_| {});
+                self.ring.newest_place().map(Owed::Block)
+            }
+            Want::Digest => {
+                self.digest_in = self.settings.digest_every;
+                self.ring.add(HAS_DIGEST).map(Owed::Digest)
+            }
+        };
+    }
+
+    /// Whether something is owed.
+    #[inline]
+    #[must_use]
+    pub fn owes(&self) -> bool {
+        self.owed.is_some()
+    }
+
+    /// Whether that is a whole block, settings and state and all, or the digest alone.
+    #[must_use]
+    pub fn owes_block(&self) -> bool {
+        matches!(self.owed, Some(Owed::Block(_)))
+    }
+
+    /// Words of what an owed block begins with, settings and then state, from the `first`-th on.
+    #[cold]
+    pub fn hand_in(&mut self, first: usize, words: &[u64]) {
+        if let Some(Owed::Block(place)) = self.owed
+            && first + words.len() <= self.layout.config + self.layout.state
+        {
+            self.ring.write(place, HEADER_WORDS + first, words);
+        }
+    }
+
+    /// The digest, which is the last that is owed.
+    #[cold]
+    pub fn settle(&mut self, digest: u64) {
+        match self.owed.take() {
+            Some(Owed::Block(place)) => self.ring.write(place, DIGEST, &[digest]),
+            Some(Owed::Digest(place)) => self.ring.write(place, 0, &[digest]),
+            Some(Owed::Nothing) | None => {}
         }
     }
 
@@ -294,9 +398,14 @@ impl<'m> Recorder<'m> {
 
     #[inline]
     fn write(&mut self, input: &[u64], row: &Row, digest: impl FnOnce() -> u64) {
+        if self.owing && (self.due.is_some() || !self.ring.has_room()) {
+            // No block has begun with it: the next one does not continue what is there.
+            self.due = Some(Reason::Started);
+            return;
+        }
         let every = self.settings.digest_every;
         let full = !self.ring.has_room_for(2);
-        let has_digest = every > 0 && (self.digest_in == 0 || full);
+        let has_digest = every > 0 && (self.digest_in == 0 || full) && !self.owing;
         self.digest_in = if has_digest { every - 1 } else { self.digest_in.saturating_sub(1) };
         let Some(mut slots) = self.ring.row() else { return };
         let mut which = if has_digest { HAS_DIGEST } else { 0 };

@@ -134,6 +134,39 @@ impl<'a> Writer<'a> {
     }
 }
 
+/// Some words of a state, from the `first`-th on: a state that is written piece by piece, where there is time for a walk each.
+#[derive(Debug)]
+pub struct Piece<'a> {
+    words: &'a mut [u64],
+    first: usize,
+    count: usize,
+}
+
+impl<'a> Piece<'a> {
+    /// As many words as have room.
+    #[must_use]
+    pub fn new(words: &'a mut [u64], first: usize) -> Self {
+        Self { words, first, count: 0 }
+    }
+
+    /// The next word. Not inlined: a walk calls it for every field.
+    #[inline(never)]
+    fn word(&mut self, word: u64) {
+        // One before the first has a place beyond all.
+        if let Some(slot) = self.words.get_mut(self.count.wrapping_sub(self.first)) {
+            *slot = word;
+        }
+        self.count += 1;
+    }
+
+    #[inline(never)]
+    fn stored<T: Real>(&mut self, values: &[T], count: usize) {
+        for (k, value) in values.iter().enumerate() {
+            self.word(if k < count { value.to_word() } else { 0 });
+        }
+    }
+}
+
 /// Zeros. Most of a state is the room behind its staircases, and `fill` would become a call of `memset`, which takes some eight
 /// instructions a word on a Cortex-M; with a zero that the compiler does not know, and eight words at a time, it is one and a half.
 #[inline]

@@ -6,7 +6,7 @@ use controller::supervised::Machine;
 use embassy_stm32::gpio::{Input, Output};
 use embassy_stm32::spi;
 use embassy_stm32::time::Hertz;
-use specgen_board::{Board, GAUGE_BITS};
+use specgen_board::{Board, GAUGE_BITS, Kept};
 use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::{Ad7606, Window};
 
@@ -77,6 +77,12 @@ fn spi_config(mode: spi::Mode, frequency: Hertz) -> spi::Config {
 #[inline(never)]
 pub fn at_reset(memory: &'static mut MaybeUninit<Machine>) -> &'static mut Machine {
     memory.write(Machine::new())
+}
+
+/// What the recorder's background copies the machine into, made where it stays.
+#[inline(never)]
+pub fn kept(memory: &'static mut MaybeUninit<Kept>, machine: &Machine) -> &'static mut Kept {
+    memory.write(Kept::of(machine))
 }
 
 /// Puts machine (at reset) and converters together. `intact`: what `controller::integrity` found.

@@ -9,6 +9,7 @@ pub mod converters;
 pub mod cycles;
 mod delay;
 pub mod enable;
+mod memory;
 pub mod pulses;
 pub mod serial;
 mod silent;

@@ -9,6 +9,8 @@
 #![no_std]
 #![no_main]
 
+#[path = "../../stm32/src/memory.rs"]
+mod memory;
 #[path = "../../qemu/src/panic.rs"]
 mod panic;
 mod parts;
@@ -24,7 +26,7 @@ use controller::waves::{self, Wave};
 use controller::{COMMAND_WORDS, Config, INPUT_WORDS, Real};
 use parts::{ADC_BITS, Bench, Bus, Delay, Line, Pin, REFERENCE, Rates, Role};
 use semihosting::{Exit, File, exit};
-use specgen_board::{Board, Exchange, Noticed, recorder};
+use specgen_board::{Board, Exchange, Kept, Noticed, catch_up};
 use specgen_hal::CHANNELS;
 use specgen_hal::ad5686r::Ad5686rPair;
 use specgen_hal::ad7606::Ad7606;
@@ -45,6 +47,8 @@ struct Timed<'m> {
     exchange: Exchange,
     /// Settings that a host wrote.
     settings: Config,
+    /// What a background copies while it holds the tick off.
+    held: &'m mut Kept,
     /// Beside the exchange, whose commands are those of the rows.
     wave: Wave,
     waved: [u64; COMMAND_WORDS],
@@ -64,12 +68,13 @@ fn run() -> Result<(), Exit> {
     // It begins to run with the first tick, as after arming.
     machine.supervisor.phase = Phase::Holding;
     let mut exchange = Exchange::new();
-    exchange.recorder = recorder(memory());
+    let (words, [kept, held]) = memories();
+    exchange.record(words, kept);
     exchange.orders.request = Request::Run;
     let wave = Wave::new(waves::limits(&exchange.config));
     let bench = &Bench::new(rates()?);
     let board = Board::new(adc(bench), dacs(bench), &mut machine, true);
-    let mut timed = Timed { board, exchange, settings: Config::new(), wave, waved: [0; COMMAND_WORDS] };
+    let mut timed = Timed { board, exchange, settings: Config::new(), held, wave, waved: [0; COMMAND_WORDS] };
     bench.codes.set(codes_of(&[0; INPUT_WORDS]));
     timed.board.start(&mut timed.exchange.report);
     bench.take();
@@ -92,6 +97,9 @@ fn run() -> Result<(), Exit> {
         }
         specgen_timed_tick(&mut timed);
         specgen_timed_end();
+        // As the background.
+        let Timed { board, exchange, .. } = &mut timed;
+        catch_up(&mut |action| action(exchange, board.machine_mut()));
         if !output.write(&bench.take()) {
             return Err(Exit::CannotWrite);
         }
@@ -135,8 +143,8 @@ fn codes_of(row: &[u64; INPUT_WORDS]) -> [i32; CHANNELS] {
 #[inline(never)]
 #[allow(unsafe_code)] // `no_mangle`: specgen looks this symbol up in the image.
 fn specgen_timed_tick(timed: &mut Timed<'_>) {
-    // What holds a tick off longest is that the host's settings are copied.
-    timed.exchange.config = *core::hint::black_box(&timed.settings);
+    // What holds a tick off longest is that the machine is kept for the recorder.
+    timed.held.keep(core::hint::black_box(&timed.settings), timed.board.machine());
     if let Some(motion) = timed.wave.advance() {
         waves::write(&motion, timed.wave.sequence(), &mut timed.waved);
     }
@@ -151,10 +159,12 @@ extern "C" fn specgen_timed_end() {
     unsafe { core::arch::asm!("nop") };
 }
 
-/// The recorder's memory, for the one call that there is.
-#[allow(unsafe_code)] // A static that is written.
-fn memory() -> &'static mut [u64] {
+/// The recorder's memories, for the one call that there is.
+#[allow(unsafe_code)] // Statics that are written.
+fn memories() -> (&'static mut [u64], [&'static mut Kept; 2]) {
     static mut MEMORY: [u64; RECORD] = [0; RECORD];
+    static mut KEPT: Kept = Kept::new();
+    static mut HELD: Kept = Kept::new();
     // SAFETY: called once, by `run`; no interrupt is enabled.
-    unsafe { &mut *(&raw mut MEMORY) }
+    unsafe { (&mut *(&raw mut MEMORY), [&mut *(&raw mut KEPT), &mut *(&raw mut HELD)]) }
 }

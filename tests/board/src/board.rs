@@ -117,8 +117,10 @@ pub struct Board {
     looked: Time,
     cost: Cost,
     pub instructions: u64,
-    /// Instructions that still belong to an IT block.
+    /// Instructions that still belong to an IT block; whether this one does, and whether one that did has used memory.
     conditional: u32,
+    in_block: bool,
+    used_in_block: bool,
     levels: Levels,
     pub adc: Ad7606,
     pub dacs: [Ad5686r; 2],
@@ -156,6 +158,8 @@ impl Board {
             cost: Cost::new(part.family, modelled),
             instructions: 0,
             conditional: 0,
+            in_block: false,
+            used_in_block: false,
             levels,
             adc: Ad7606::new(bits[0]),
             dacs: [Ad5686r::new("DAC 1"), Ad5686r::new("DAC 2")],
@@ -259,7 +263,7 @@ impl Board {
         self.looked = self.now;
         let usart = &mut self.devices.usart;
         if let Some(line) = line {
-            line.exchange(&mut usart.incoming, &mut usart.outgoing);
+            line.exchange(self.now, &mut usart.incoming, &mut usart.outgoing);
         }
         self.schedule();
     }
@@ -463,7 +467,11 @@ impl Guest for Board {
                 return false;
             }
         }
-        if self.conditional > 0 {
+        self.in_block = self.conditional > 0;
+        if !self.in_block && std::mem::take(&mut self.used_in_block) {
+            core.end_block();
+        }
+        if self.in_block {
             self.conditional -= 1;
         } else if self.devices.nvic.next().is_some() {
             let masks = [Register::PRIMASK, Register::BASEPRI].map(|register| core.get(register));
@@ -487,6 +495,7 @@ impl Guest for Board {
     }
 
     fn data(&mut self, address: u32, write: bool) {
+        self.used_in_block |= self.in_block;
         self.now += self.cycle * self.cost.data(address, write);
     }
 

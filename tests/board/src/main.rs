@@ -148,6 +148,12 @@ fn serve(options: &Options) -> Result<(), String> {
         if line.is_none() && machine.board().now >= until {
             continue;
         }
+        let now = machine.board().now;
+        if let Some(line) = line.as_mut().filter(|line| line.holds(now)) {
+            std::thread::sleep(Duration::from_millis(1));
+            machine.board().look(Some(line));
+            continue;
+        }
         machine.run();
         let board = machine.board();
         for text in board.log.drain(..) {

@@ -14,8 +14,12 @@ use libloading::Library;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Register(c_int);
 
+/// IT[7:2] and IT[1:0] of CPSR.
+const BLOCK: u32 = 0x3f << 10 | 3 << 25;
+
 impl Register {
     pub const APSR: Self = Self(1);
+    const CPSR: Self = Self(3);
     pub const FPSCR: Self = Self(6);
     pub const LR: Self = Self(10);
     pub const PC: Self = Self(11);
@@ -228,6 +232,12 @@ impl<G> Drop for Engine<G> {
 }
 
 impl Core<'_> {
+    /// No instruction from here on belongs to an IT block. A callback for memory leaves the engine with the block of the instruction that
+    /// it was called for; where it comes to its next jump it would skip what the block's condition skips.
+    pub fn end_block(&self) {
+        self.set(Register::CPSR, self.get(Register::CPSR) & !BLOCK);
+    }
+
     /// A register.
     pub fn get(&self, register: Register) -> u32 {
         let mut value = 0_u32;

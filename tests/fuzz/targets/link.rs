@@ -11,7 +11,7 @@ use controller::supervised::Machine;
 use controller::supervision::READINGS_PER_LEG;
 use controller::{Config, LEGS, LegState};
 use specgen::operate::Session;
-use specgen_board::{Board, Desk, Exchange, Noticed, Stopwatch, Visit, recorder};
+use specgen_board::{Board, Desk, Exchange, Noticed, Kept, Stopwatch, Visit, catch_up};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::client::{Port, Timeout};
 use specgen_link::{Endpoint, Kind, Receiver, RecorderAction, VERSION};
@@ -118,19 +118,19 @@ impl Amplifiers for Parts {
     }
 }
 
-/// Memory of a recorder. A board has it for ever; here it is given back after each input, of which there are millions.
-struct Tape(*mut [u64]);
+/// Memories of a recorder. A board has them for ever; here they are given back after each input, of which there are millions.
+struct Tape(*mut [u64], *mut Kept);
 
 #[allow(unsafe_code)]
 impl Tape {
     fn new() -> Self {
-        Self(Box::into_raw(vec![0; 4000].into_boxed_slice()))
+        Self(Box::into_raw(vec![0; 4000].into_boxed_slice()), Box::into_raw(Box::new(Kept::new())))
     }
 
     /// To be called once, by what is dropped before this is.
-    fn words(&self) -> &'static mut [u64] {
-        // SAFETY: it is there until this is dropped, and nobody else has it.
-        unsafe { &mut *self.0 }
+    fn memories(&self) -> (&'static mut [u64], &'static mut Kept) {
+        // SAFETY: they are there until this is dropped, and nobody else has them.
+        unsafe { (&mut *self.0, &mut *self.1) }
     }
 }
 
@@ -138,7 +138,7 @@ impl Tape {
 impl Drop for Tape {
     fn drop(&mut self) {
         // SAFETY: made by `Box::into_raw`, and given back once.
-        drop(unsafe { Box::from_raw(self.0) });
+        drop(unsafe { (Box::from_raw(self.0), Box::from_raw(self.1)) });
     }
 }
 
@@ -149,7 +149,8 @@ fn device(mut script: &[u8]) {
     let mut machine = Box::new(Machine::new());
     let mut board = Board::new(parts.clone(), parts.clone(), &mut machine, true);
     let mut exchange = Exchange::new();
-    exchange.recorder = recorder(tape.words());
+    let (words, kept) = tape.memories();
+    exchange.record(words, kept);
     board.start(&mut exchange.report);
     let (mut desk, mut endpoint, mut host) = (Desk::new(Stopwatch::NONE), Endpoint::new(), Receiver::new());
     let (mut sequence, mut ticks) = (0, 0);
@@ -171,6 +172,7 @@ fn device(mut script: &[u8]) {
                     parts.read(&board.machine().state.legs, off, fails == 1);
                     board.tick(&mut exchange, Noticed::default());
                 }
+                catch_up(&mut |action| action(&mut exchange, board.machine_mut()));
                 continue;
             }
         };

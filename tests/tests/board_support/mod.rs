@@ -16,7 +16,7 @@ use controller::supervised::{Machine, Phase};
 use controller::supervision::READINGS_PER_LEG;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use specgen_board::{Board, Desk, Exchange, Noticed, Stopwatch, Visit, recorder};
+use specgen_board::{Board, Desk, Exchange, Kept, Noticed, Stopwatch, Visit, catch_up};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::Endpoint;
 use specgen_link::client::{Client, ClientError, Port, Timeout};
@@ -91,9 +91,9 @@ impl Line {
         let machine = Box::leak(Box::new(Machine::new()));
         let mut board = Board::new(parts.clone(), parts.clone(), machine, true);
         let mut exchange = Exchange::new();
-        exchange.recorder = recorder(Box::leak(vec![0; record].into_boxed_slice()));
+        exchange.record(Box::leak(vec![0; record].into_boxed_slice()), Box::leak(Box::new(Kept::new())));
         board.start(&mut exchange.report);
-        exchange.prepare(board.machine());
+        exchange.prepare();
         Self(Rc::new(RefCell::new(Rig {
             board,
             exchange,
@@ -136,7 +136,10 @@ impl Line {
 impl Rig {
     /// One tick; the gauges then read what the legs' models say, with a little noise.
     pub fn tick(&mut self) {
-        self.board.tick(&mut self.exchange, Noticed::default());
+        let Self { board, exchange, .. } = self;
+        board.tick(exchange, Noticed::default());
+        // The background, as after every tick.
+        catch_up(&mut |action| action(exchange, board.machine_mut()));
         let legs = self.board.machine().state.legs;
         let mut state = self.parts.0.borrow_mut();
         for (code, row) in state.gauges.iter_mut().zip(READINGS_PER_LEG) {

@@ -95,7 +95,7 @@ pub fn run(trial: &Trial) -> Result<(), String> {
 fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, String> {
     let mut session = Session::begin(trial)?;
     let mut host = Host::of(session.host(trial))?;
-    host.order("arm\nwait holding 60\nrun\nwait running 60\nset command=0\nstatus", ": running, ")?;
+    host.order("arm\nwait holding 600\nrun\nwait running 600\nset command=0\nstatus", ": running, ")?;
     session.pass(RUNS)?;
     // The board writes both down with their times.
     session.log.clear();
@@ -147,7 +147,7 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
 /// A new host acknowledges once and arms.
 fn arms_again(trial: &Trial, session: &Session) -> Result<(), String> {
     let mut again = session.host(trial);
-    again.args(["acknowledge", "wait 0.2", "arm", "wait holding 20", "ramp-down", "wait disarmed 20"]);
+    again.args(["acknowledge", "wait 0.2", "arm", "wait holding 600", "ramp-down", "wait disarmed 600"]);
     match again.stdout(Stdio::null()).stderr(Stdio::null()).status() {
         Ok(status) if status.success() => Ok(()),
         _ => Err("a new host cannot arm it again".to_owned()),

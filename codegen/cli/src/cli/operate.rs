@@ -80,7 +80,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         }
         (None, Some(path)) => {
             let line = SocketLine::open(path).map_err(Failure::Environment)?;
-            operate(line, Timeout::SERIAL, &path.display().to_string(), digest, source, ui)
+            operate(line, Timeout::SOCKET, &path.display().to_string(), digest, source, ui)
         }
         // One of the two is required.
         (None, None) => Err(Failure::Usage("name the device with --port or --socket".to_owned())),

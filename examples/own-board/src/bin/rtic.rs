@@ -10,6 +10,7 @@ mod app {
     use controller::supervised::Machine;
     use embassy_stm32::interrupt::{self, InterruptExt, Priority};
     use own_board::machine::{Link, RECORD, Running, start, stop};
+    use specgen_board::Kept;
 
     #[shared]
     struct Shared {
@@ -24,6 +25,7 @@ mod app {
     #[init(local = [
         machine: Machine = Machine::new(),
         record: [u64; RECORD] = [0; RECORD],
+        kept: Kept = Kept::new(),
         buffers: [[u8; 512]; 2] = [[0; 512]; 2],
     ])]
     fn init(mut context: init::Context) -> (Shared, Local) {
@@ -31,7 +33,7 @@ mod app {
         core.SCB.enable_icache();
         core.SCB.enable_dcache(&mut core.CPUID);
         let local = context.local;
-        let Some((running, link)) = start(local.machine, local.record, local.buffers) else { stop() };
+        let Some((running, link)) = start(local.machine, local.record, local.kept, local.buffers) else { stop() };
         interrupt::USART3.set_priority(Priority::P8);
         (Shared { running }, Local { link })
     }

@@ -10,6 +10,7 @@ use critical_section::Mutex;
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
 use own_board::machine::{RECORD, Running, start, stop};
+use specgen_board::Kept;
 
 static RUNNING: Mutex<RefCell<Option<Running>>> = Mutex::new(RefCell::new(None));
 
@@ -28,11 +29,12 @@ fn with(action: impl FnOnce(&mut Running)) {
 fn main() -> ! {
     static mut MACHINE: Machine = Machine::new();
     static mut RECORDED: [u64; RECORD] = [0; RECORD];
+    static mut KEPT: Kept = Kept::new();
     static mut BUFFERS: [[u8; 512]; 2] = [[0; 512]; 2];
     let Some(mut core) = cortex_m::Peripherals::take() else { stop() };
     core.SCB.enable_icache();
     core.SCB.enable_dcache(&mut core.CPUID);
-    let Some((running, mut link)) = start(MACHINE, RECORDED, BUFFERS) else { stop() };
+    let Some((running, mut link)) = start(MACHINE, RECORDED, KEPT, BUFFERS) else { stop() };
     critical_section::with(|section| RUNNING.borrow(section).replace(Some(running)));
 
     interrupt::USART3.set_priority(Priority::P8);

@@ -10,7 +10,7 @@ use crate::supervised::supervise;
 use crate::{CONFIG_WORDS, Config, permitted};
 use specgen_runtime::record::Layout;
 use specgen_runtime::recorder::{Recorder, Row};
-use specgen_runtime::snapshot::{Field, Reader, Snapshot, Writer};
+use specgen_runtime::snapshot::{Field, Piece, Reader, Snapshot, Writer};
 
 /// Words of a [`Machine`].
 pub const MACHINE_STATE_WORDS: usize = Machine::WORDS;
@@ -27,6 +27,12 @@ impl Machine {
     /// The same into a slice of that length.
     pub fn save_into(&self, words: &mut [u64]) {
         Snapshot::save(self, &mut Writer::new(words));
+    }
+
+    /// Words of it from the `first`-th on, as many as have room.
+    #[cold]
+    pub fn save_piece(&self, first: usize, words: &mut [u64]) {
+        let Ok(()) = self.show(&mut Piece::new(words, first));
     }
 
     /// The machine that [`Machine::save`] wrote.
@@ -75,8 +81,8 @@ pub fn record_before(config: &Config, machine: &Machine, recorder: &mut Recorder
     }
 }
 
-/// What it keeps after the tick.
-#[inline]
+/// What it keeps after the tick. Compiled here, for speed, and in a frame of its own, which is done with before the law needs the stack.
+#[inline(never)]
 pub fn record_after(machine: &Machine, input: &MachineInput, output: &MachineOutput, recorder: &mut Recorder<'_>) {
     let row = Row {
         codes: output.tick.dac_code,

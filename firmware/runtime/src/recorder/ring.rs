@@ -5,7 +5,12 @@ use crate::record::{BLOCK_MAGIC, HEADER_WORDS, Layout, NO_TRIGGER};
 /// Places in a block's header.
 const WORDS: usize = 1;
 const ROWS: usize = 2;
+pub(super) const DIGEST: usize = 5;
 const TRIGGER: usize = 7;
+
+/// Of a word in the memory of a ring.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Place(usize);
 
 #[derive(Debug)]
 pub(super) struct Ring<'m> {
@@ -20,6 +25,8 @@ pub(super) struct Ring<'m> {
     /// Words used of the open block; none is open if there are none.
     used: usize,
     rows: u64,
+    /// Where its last row begins.
+    row: usize,
     lost: u32,
 }
 
@@ -35,7 +42,7 @@ pub(super) struct Slots<'a> {
 
 impl<'m> Ring<'m> {
     pub(super) fn new(memory: &'m mut [u64], size: usize, blocks: usize, layout: Layout) -> Self {
-        Self { memory, size, blocks, layout, oldest: 0, held: 0, used: 0, rows: 0, lost: 0 }
+        Self { memory, size, blocks, layout, oldest: 0, held: 0, used: 0, rows: 0, row: 0, lost: 0 }
     }
 
     pub(super) fn clear(&mut self) {
@@ -132,6 +139,37 @@ impl<'m> Ring<'m> {
         }
     }
 
+    /// Of the newest block.
+    pub(super) fn newest_place(&self) -> Option<Place> {
+        (self.held > 0).then(|| Place(self.place(self.held - 1) * self.size))
+    }
+
+    /// Writes words so many behind a place.
+    pub(super) fn write(&mut self, Place(place): Place, offset: usize, words: &[u64]) {
+        for (slot, word) in self.memory.iter_mut().skip(place + offset).zip(words) {
+            *slot = *word;
+        }
+    }
+
+    /// Whether the last row of the open block can have one more word.
+    pub(super) fn may_add(&self) -> bool {
+        self.used > 0 && self.rows > 0 && self.used < self.size
+    }
+
+    /// One more word, for the last row; `which` says so in its first.
+    pub(super) fn add(&mut self, which: u64) -> Option<Place> {
+        if !self.may_add() {
+            return None;
+        }
+        let (row, used) = (self.row, self.used);
+        let block = self.newest()?;
+        *block.get_mut(row)? |= which;
+        *block.get_mut(WORDS)? = used as u64 + 1;
+        self.used = used + 1;
+        let Place(first) = self.newest_place()?;
+        Some(Place(first + used))
+    }
+
     /// Marks the tick of the trigger.
     pub(super) fn mark(&mut self, tick: u64) {
         if self.used > 0
@@ -147,8 +185,9 @@ impl<'m> Ring<'m> {
         if !self.has_room() {
             return None;
         }
-        let start = self.place(self.held.saturating_sub(1)) * self.size;
-        let block = self.memory.get_mut(start..start + self.size)?;
+        let first = self.place(self.held.saturating_sub(1)) * self.size;
+        let block = self.memory.get_mut(first..first + self.size)?;
+        self.row = self.used;
         Some(Slots { block, start: self.used, end: self.used + 1, used: &mut self.used, rows: &mut self.rows })
     }
 

@@ -2,7 +2,7 @@
 
 use core::convert::Infallible;
 
-use super::{Choice, Invalid, LARGEST, Reader, Sizes, Snapshot, Writer};
+use super::{Choice, Invalid, LARGEST, Piece, Reader, Sizes, Snapshot, Writer};
 use crate::digest::Digest;
 use crate::real::Real;
 
@@ -216,6 +216,17 @@ impl Words for Writer<'_> {
     #[inline]
     fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
         self.first_reals(values, count);
+        Ok(())
+    }
+}
+
+impl Words for Piece<'_> {
+    fn put(&mut self, word: u64) {
+        self.word(word);
+    }
+
+    fn stored<T: Real>(&mut self, values: &[T], count: usize, _largest: f64) -> Result<(), Infallible> {
+        self.stored(values, count);
         Ok(())
     }
 }

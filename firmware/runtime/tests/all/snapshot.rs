@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 
 use specgen_runtime::setpoint::{Generator, LONGEST, Profile, Stop};
-use specgen_runtime::snapshot::{Field, Invalid, LARGEST, LARGEST_PLACE, Reader, Sizes, Snapshot, Writer};
+use specgen_runtime::snapshot::{Field, Invalid, LARGEST, LARGEST_PLACE, Piece, Reader, Sizes, Snapshot, Writer};
 use specgen_runtime::supervisor::{Approach, Supervisor, TIMERS};
 use specgen_runtime::{
     CreepMemory, Digest, DynamicMemory, Estimate, Integral, Motion, NotchState, Rate, ReversalMemory, Transfer,
@@ -328,6 +328,27 @@ fn a_way_to_a_set_point_reads_back_from_its_words_and_nothing_else_does() {
         let mut words = words().0;
         words[0] = stage;
         assert_eq!(restore(&fresh, &words).unwrap().is_done(), stage == 0);
+    }
+}
+
+#[test]
+fn pieces_of_a_state_make_the_whole() {
+    fn show(words: &mut impl specgen_runtime::snapshot::Words) {
+        words.put(9);
+        let Ok(()) = words.numbers(&[1.0_f64, 2.0, 3.0], 1.0);
+        let Ok(()) = words.stored(&[5.0_f32, 6.0, 7.0, 8.0], 2, 1.0);
+        words.put(1);
+    }
+    let mut whole = [GARBAGE; 9];
+    show(&mut Writer::new(&mut whole));
+    for length in 1..=10 {
+        let mut found = Vec::new();
+        for first in (0..whole.len()).step_by(length) {
+            let mut piece = vec![GARBAGE; length.min(whole.len() - first)];
+            show(&mut Piece::new(&mut piece, first));
+            found.extend(piece);
+        }
+        assert_eq!(found, whole, "in pieces of {length}");
     }
 }
 

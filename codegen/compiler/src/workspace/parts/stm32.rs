@@ -17,6 +17,7 @@ pub const PART: Part = Part {
         "src/delay.rs",
         "src/enable.rs",
         "src/lib.rs",
+        "src/memory.rs",
         "src/pulses.rs",
         "src/serial.rs",
         "src/silent.rs",

@@ -7,7 +7,7 @@ pub const PART: Part = Part {
     member: false,
     what: "a board's tick between stand-ins for its converters, on an emulated Cortex-M: what its time is estimated from",
     needs: "target `thumbv7em-none-eabihf`, QEMU",
-    with: &["board", "hal", "link", "qemu"],
+    with: &["board", "hal", "link", "qemu", "stm32"],
     files: files! { "tick":
         "Cargo.lock",
         "Cargo.toml",
