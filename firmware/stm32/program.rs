@@ -148,7 +148,10 @@ mod app {
         let mut shared = (context.shared.exchange, context.shared.board);
         loop {
             shared.0.lock(|exchange| exchange.beat = exchange.beat.wrapping_add(1));
-            catch_up(&mut |action| shared.lock(|exchange, board| action(exchange, board.machine_mut())));
+            catch_up(
+                &mut |action| shared.lock(|exchange, board| action(exchange, board.machine_mut())),
+                timer::is_calm::<{ clocks::COPY }>,
+            );
             cortex_m::asm::wfi();
         }
     }

@@ -162,7 +162,7 @@ impl Visit<'_, '_> {
     fn download(&mut self, offset: u32) -> Reply<'_> {
         let with = &mut *self.with;
         // What it stopped with.
-        catch_up(with);
+        catch_up(with, || false);
         let mut refusal = Refusal::Unsupported;
         let Desk { download, session, .. } = &mut *self.desk;
         let found = download.read(offset, session.buffer(), |action: &mut dyn FnMut(&_)| {

@@ -113,12 +113,15 @@ const PREAMBLE: usize = RECORD_LAYOUT.config + RECORD_LAYOUT.state;
 const PIECE: usize = 32;
 
 /// Work of the background, best after each tick: keeps the machine where the recorder wants one, and writes down what is owed then.
-/// The tick is held off for the copy and for each piece that is written; blocks are whole, and can be fetched, after it.
-pub fn catch_up(with: &mut Access<'_>) {
+/// The tick is held off for each piece that is written, and for the copy: one that begins late finds the conversion over, which is a
+/// fault. So nothing is copied unless `calm` says that no tick is due meanwhile. Blocks are whole, and can be fetched, after it.
+pub fn catch_up(with: &mut Access<'_>, calm: impl Fn() -> bool) {
     let (mut taken, mut block) = (None, false);
     with(&mut |exchange, machine| {
         let Exchange { recorder: Some(recorder), kept, config, .. } = exchange else { return };
-        if let (Some(want), Some(kept)) = (recorder.wants(), &mut *kept) {
+        if let (Some(want), Some(kept)) = (recorder.wants(), &mut *kept)
+            && calm()
+        {
             kept.keep(config, machine);
             recorder.owe(want);
         }

@@ -49,9 +49,9 @@ impl Timeout {
     /// quarter of the limit: a machine whose host asks every 20 ms has it before it takes the host for lost
     /// (`supervisor.host_lost`, 100 ms).
     pub const SERIAL: Self = Self { limit: Duration::from_millis(250), attempts: 8 };
-    /// For a socket of this computer, with a serial line or none behind it: who serves it may be slow, as an emulated board on a loaded
-    /// computer is, and who is gone closes it.
-    pub const SOCKET: Self = Self { limit: Duration::from_millis(250), attempts: 240 };
+    /// For a socket of this computer: nothing is lost on it, who is gone closes it, and who serves it may be slow, as an emulated board
+    /// on a loaded computer is. What is sent again too early only waits in line there.
+    pub const SOCKET: Self = Self { limit: Duration::from_secs(1), attempts: 60 };
     /// For a pipe, which loses nothing: an answer comes, or the other side hangs.
     pub const PIPE: Self = Self { limit: Duration::from_secs(10), attempts: 1 };
 }

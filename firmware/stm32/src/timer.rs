@@ -42,6 +42,13 @@ pub fn now() -> u32 {
     TIM2.cnt().read()
 }
 
+/// Whether the next interrupt is more than so many counts away.
+#[must_use]
+pub fn is_calm<const COUNTS: u32>() -> bool {
+    let left = TIM2.ccr(0).read().wrapping_sub(now());
+    left > COUNTS && left < u32::MAX / 2
+}
+
 /// The next interrupt comes at this counter value, or at once if it has passed.
 #[inline]
 pub fn arm(next: u32) {

@@ -11,6 +11,8 @@ use specgen_stm32::times::Times;
 
 /// Clock of TIM2 and TIM3, Hz.
 pub const TIMER: u32 = 90_000_000;
+/// Counts of TIM2 that a copy of the machine takes at most, with as much again: 40 µs.
+pub const COPY: u32 = TIMER / 1_000_000 * 40;
 /// What `cortex_m::asm::delay` gets through in a microsecond at most.
 pub const DELAY: u32 = 180;
 /// SCLK of the ADC: 17 MHz at most at 3.3 V, and 90 MHz can only be divided by powers of two.

@@ -13,6 +13,8 @@ use specgen_stm32::times::Times;
 
 /// Clock of TIM2 and TIM4 at most, Hz.
 pub const TIMER: u32 = 240_000_000;
+/// Counts of TIM2 that a copy of the machine takes at most, with as much again: 12 µs.
+pub const COPY: u32 = TIMER / 1_000_000 * 12;
 /// What `cortex_m::asm::delay` gets through in a microsecond at most: two a cycle.
 pub const DELAY: u32 = 960;
 /// SCLK of the ADC: 17 MHz at most at 3.3 V.

@@ -99,7 +99,7 @@ fn run() -> Result<(), Exit> {
         specgen_timed_end();
         // As the background.
         let Timed { board, exchange, .. } = &mut timed;
-        catch_up(&mut |action| action(exchange, board.machine_mut()));
+        catch_up(&mut |action| action(exchange, board.machine_mut()), || true);
         if !output.write(&bench.take()) {
             return Err(Exit::CannotWrite);
         }

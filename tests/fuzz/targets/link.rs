@@ -172,7 +172,7 @@ fn device(mut script: &[u8]) {
                     parts.read(&board.machine().state.legs, off, fails == 1);
                     board.tick(&mut exchange, Noticed::default());
                 }
-                catch_up(&mut |action| action(&mut exchange, board.machine_mut()));
+                catch_up(&mut |action| action(&mut exchange, board.machine_mut()), || true);
                 continue;
             }
         };

@@ -139,7 +139,7 @@ impl Rig {
         let Self { board, exchange, .. } = self;
         board.tick(exchange, Noticed::default());
         // The background, as after every tick.
-        catch_up(&mut |action| action(exchange, board.machine_mut()));
+        catch_up(&mut |action| action(exchange, board.machine_mut()), || true);
         let legs = self.board.machine().state.legs;
         let mut state = self.parts.0.borrow_mut();
         for (code, row) in state.gauges.iter_mut().zip(READINGS_PER_LEG) {
