@@ -209,3 +209,34 @@ fn endless_lines_and_files_are_cut_short() {
     let found = of_source(std::io::repeat(0), &Reading::default(), Findings::new("r.csv")).unwrap_err();
     assert_eq!(found[0].code, "E0503");
 }
+
+/// Bytes changed, cut and repeated in files of every kind: any answer is right, as long as there is one.
+#[test]
+fn damaged_files_are_answered() {
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+    let files = [
+        file(&format!("{LABVIEW}\nX_Value\tdrive_V\tdisplacement_um"), |row| row.map(comma).join("\t")),
+        file("Zeit [ms];Drive (mV);Position [nm]\ns;V;m", |row| row.map(comma).join(";")),
+        file("# time_s drive_V displacement_um", |[t, u, y]| format!("{t} {u} {y}")),
+        file("", |row| row.map(comma).join(",")),
+    ];
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let mut below = |n: usize| (random.next_u64() % n as u64) as usize;
+    for round in 0..150 {
+        let mut bytes = files[round % files.len()].clone().into_bytes();
+        for _ in 0..=below(12) {
+            let reach = if below(2) == 0 { 300 } else { bytes.len() };
+            let place = below(reach).min(bytes.len() - 1);
+            match below(4) {
+                0 => bytes[place] = below(256) as u8,
+                1 => bytes[place] = b"0123456789.,;-e\t\n#\"_"[below(20)],
+                2 => bytes.truncate(place.max(1)),
+                _ => bytes.extend_from_within(place..(place + 40).min(bytes.len())),
+            }
+        }
+        let columns: &[&str] = if round % 3 == 0 { &["drive_V=2", "sample=1"] } else { &[] };
+        if let Err(found) = read(&bytes, columns, (round % 2 == 0).then_some(1e3)) {
+            assert!(found.iter().all(|d| !d.message.is_empty() && !d.help.is_empty()), "{found:?}");
+        }
+    }
+}
