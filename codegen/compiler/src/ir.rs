@@ -105,9 +105,11 @@ pub struct Kinematics {
     pub sine: Vec<f64>,
     /// Taylor coefficients of (1 − cos x) / x² in x².
     pub versine: Vec<f64>,
-    /// Newton steps for the root of Δl² + 2 l₀ Δl = s.
+    /// Taylor coefficients of the root of Δl² + 2 l₀ Δl = s over s/(2 l₀), in s/(2 l₀²), after the leading 1.
+    pub root: Vec<f64>,
+    /// Newton steps from there.
     pub newton_steps: u32,
-    /// Largest |Δl| over the accepted poses, m (bound; sizes the Newton steps).
+    /// Largest |Δl| over the accepted poses, m (bound; sizes series and steps).
     pub largest_displacement: f64,
     /// J⁻¹ of the legs at rest: pose coordinates (rows) per leg displacement (columns), m/m and rad/m.
     pub inverse_jacobian: [[f64; 6]; LEGS],

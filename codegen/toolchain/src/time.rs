@@ -128,6 +128,17 @@ impl Clocks {
     }
 }
 
+/// What the law takes, tick by tick.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Law {
+    /// Ticks that were priced, each with empty caches: the first ones of the exercise.
+    pub ticks: u64,
+    /// Of them all, rounded down.
+    pub mean: Share,
+    /// Most instructions, and most cycles or what the longest tick of the exercise would take.
+    pub longest: Share,
+}
+
 /// A tick's time, µs, modelled.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Estimate {
@@ -141,8 +152,8 @@ pub struct Estimate {
     pub worst: f64,
     /// What it is made of: name and time.
     pub parts: Vec<(&'static str, f64)>,
-    /// What the law takes of a core: most instructions and cycles of a tick that was seen.
-    pub law: Share,
+    /// What the law takes of a core.
+    pub law: Law,
     /// Bytes, frames, waits of the tick with the most of them.
     pub moved: Moved,
     /// The shortest period that leaves a little, in steps of 1 µs.
@@ -158,8 +169,10 @@ impl Estimate {
         let ticks = trace.price(&clocks.memory())?;
         let microseconds = |cycles: u64| cycles as f64 * 1e6 / clocks.core as f64;
         let most = |of: fn(&Computed) -> u64| ticks.iter().map(of).max().unwrap_or(0);
-        let mean = ticks.iter().map(|tick| tick.law.cycles).sum::<u64>() as f64 / ticks.len().max(1) as f64;
-        let law = most(|tick| tick.law.cycles).max((mean * spread) as u64);
+        let count = ticks.len().max(1) as u64;
+        let mean = |of: fn(&Share) -> u64| ticks.iter().map(|tick| of(&tick.law)).sum::<u64>() / count;
+        let mean = Share { instructions: mean(|law| law.instructions), cycles: mean(|law| law.cycles) };
+        let law = most(|tick| tick.law.cycles).max((mean.cycles as f64 * spread) as u64);
         // The wave and the recorder's block do not come in every tick; a worst one has them all.
         let sum = |moved: &Moved| -> (f64, f64, f64) {
             let [adc_byte, adc_frame, dac_byte, dac_frame, ..] = clocks.buses();
@@ -187,7 +200,8 @@ impl Estimate {
             ("board", microseconds(most(|tick| tick.board.cycles))),
         ];
         let worst = parts.iter().fold(0.0, |sum, (_, time)| sum + time);
-        let law = Share { instructions: most(|tick| tick.law.instructions), cycles: law };
+        let longest = Share { instructions: most(|tick| tick.law.instructions), cycles: law };
+        let law = Law { ticks: ticks.len() as u64, mean, longest };
         let core = clocks.core as f64 / 1e6;
         Ok(Self {
             board: mcu.part().board,
@@ -237,7 +251,7 @@ mod tests {
             core: 400.0,
             worst,
             parts: Vec::new(),
-            law: Share::default(),
+            law: Law::default(),
             moved: Moved::default(),
             shortest: up(worst * MARGIN),
         }

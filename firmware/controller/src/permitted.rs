@@ -84,7 +84,7 @@ pub const SETTINGS: [(Permitted<Real>, usize); 8] = [
 
 /// Largest numbers of a state, under any of these settings.
 pub const STATE: Sizes = Sizes {
-    request: 1.4479036934480133e28,
+    request: 1.4479036934480131e28,
     reading: 5.5e-5,
     stiffness: 1000000000000000.0,
 };

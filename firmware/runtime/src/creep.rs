@@ -140,6 +140,17 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
         false
     }
 
+    /// The short way of [`ReversalMemory::track`](crate::ReversalMemory::track): there is none, and nothing has changed.
+    #[inline]
+    pub fn track<const N: usize, const NODES: usize>(
+        &mut self,
+        _table: &CreepEverett<T, N, NODES, K>,
+        _displacement: T,
+        _permitted: impl FnOnce(T) -> Option<T>,
+    ) -> bool {
+        false
+    }
+
     /// One tick that ends as near to `displacement` (m, finite) as `permitted` lets its drive; returns whether it is out of reach.
     #[inline]
     pub fn follow_within<const N: usize, const NODES: usize>(

@@ -37,11 +37,27 @@ impl<T: Real> Dac<T> {
     #[inline]
     #[must_use]
     pub fn code(&self, drive: T, previous: i32, limits: CodeLimits) -> (i32, bool) {
-        let wanted = ((drive - self.cells_at_zero) * self.codes_per_cell + T::HALF).truncate();
+        let wanted = self.nearest(drive);
         let permitted = within(wanted, limits.min, limits.max);
         let code =
             within(permitted, previous.saturating_sub(limits.max_step), previous.saturating_add(limits.max_step));
         (code, code != wanted)
+    }
+
+    /// The code nearest to `drive` (cells) if no limit holds it back: [`Dac::code`] where that is all.
+    #[inline(always)]
+    #[must_use]
+    pub fn free_code(&self, drive: T, previous: i32, limits: CodeLimits) -> Option<i32> {
+        let wanted = self.nearest(drive);
+        // Places in a range, of which those below it are large: one comparison each. Codes are far from the ends of their type.
+        let within = wanted.wrapping_sub(limits.min) as u32 <= limits.max.wrapping_sub(limits.min) as u32;
+        let place = wanted.wrapping_sub(previous).wrapping_add(limits.max_step) as u32;
+        (within && place <= 2 * limits.max_step as u32).then_some(wanted)
+    }
+
+    #[inline(always)]
+    fn nearest(&self, drive: T) -> i32 {
+        ((drive - self.cells_at_zero) * self.codes_per_cell + T::HALF).truncate()
     }
 
     /// Drive of `code`, cells.

@@ -147,6 +147,17 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
         found.unwrap_or(still)
     }
 
+    /// The short way of [`ReversalMemory::track`](crate::ReversalMemory::track): there is none, and nothing has changed.
+    #[inline]
+    pub fn track<const N: usize, const NODES: usize>(
+        &mut self,
+        _table: &DynamicEverett<T, N, NODES>,
+        _displacement: T,
+        _permitted: impl FnOnce(T) -> Option<T>,
+    ) -> bool {
+        false
+    }
+
     /// One tick that ends as near to `displacement` (m, finite) as `permitted` lets its drive; returns whether it is out of reach.
     #[inline]
     pub fn follow_within<const N: usize, const NODES: usize>(

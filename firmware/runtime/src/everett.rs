@@ -46,6 +46,13 @@ impl<T: Real> Line<T> {
         drive.truncate() as usize == self.cell
     }
 
+    /// Where E is `value`, if that is in the cell of a stretch that is not flat.
+    #[inline(always)]
+    pub(crate) fn within<const RISING: bool>(&self, value: T) -> Option<T> {
+        let drive = self.solve::<RISING>(value);
+        (self.slope > T::ZERO && self.holds(drive)).then_some(drive)
+    }
+
     /// Where E is `value`; the origin if the stretch is flat.
     #[inline(always)]
     fn solve<const RISING: bool>(&self, value: T) -> T {
@@ -99,7 +106,7 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
     pub fn rising(&self, down: T, cell: usize) -> Line<T> {
         let d = Self::place(down);
         if cell == d.cell {
-            return Line { cell, origin: down, base: T::ZERO, slope: self.node(cell + 1, cell) };
+            return Line { cell, origin: down, base: T::ZERO, slope: self.diagonal(cell) };
         }
         let [below, above] = self.corners(cell, d.cell);
         let (low, high) = (between(below, d.part), between(above, d.part));
@@ -112,7 +119,7 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
     pub fn falling(&self, up: T, cell: usize) -> Line<T> {
         let u = Self::place(up);
         if cell == u.cell {
-            return Line { cell, origin: up, base: T::ZERO, slope: self.node(cell + 1, cell) };
+            return Line { cell, origin: up, base: T::ZERO, slope: self.diagonal(cell) };
         }
         let [below, above] = self.corners(u.cell, cell);
         let (low, high) = (between([below[0], above[0]], u.part), between([below[1], above[1]], u.part));
@@ -129,8 +136,10 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
     #[must_use]
     pub fn rise(&self, down: T, least: T, gain: T) -> (T, Line<T>) {
         let line = self.rising(down, Self::cell(least));
-        let drive = line.solve::<true>(gain);
-        if line.slope > T::ZERO && line.holds(drive) { (drive, line) } else { self.rise_beyond(down, line, gain) }
+        match line.within::<true>(gain) {
+            Some(drive) => (drive, line),
+            None => self.rise_beyond(down, line, gain),
+        }
     }
 
     /// The same where the solution is no drive within the cell of `first`: at the end of a stretch, flat, or beyond.
@@ -172,8 +181,10 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
     #[must_use]
     pub fn fall(&self, up: T, most: T, loss: T) -> (T, Line<T>) {
         let line = self.falling(up, Self::cell(most));
-        let drive = line.solve::<false>(loss);
-        if line.slope > T::ZERO && line.holds(drive) { (drive, line) } else { self.fall_beyond(up, line, loss) }
+        match line.within::<false>(loss) {
+            Some(drive) => (drive, line),
+            None => self.fall_beyond(up, line, loss),
+        }
     }
 
     /// The same where the solution is no drive within the cell of `first`.
@@ -240,6 +251,14 @@ impl<T: Real, const N: usize, const NODES: usize> Everett<T, N, NODES> {
         let whole = if whole > last { last } else { whole };
         let whole = if whole < 0 { 0 } else { whole };
         whole as usize
+    }
+
+    /// E over a diagonal cell: that at `up` node `cell` + 1 and `down` node `cell`.
+    #[inline(always)]
+    fn diagonal(&self, cell: usize) -> T {
+        // (cell + 1)(cell + 2)/2 + cell
+        let index = cell * (cell + 5) / 2 + 1;
+        self.nodes[if index < NODES { index } else { NODES - 1 }]
     }
 
     #[inline]

@@ -1,14 +1,19 @@
 //! Leg kinematics in difference form: leg displacements from rest, without the cancellation of |r| − l₀, and back.
 //!
 //! ```text
-//! d_i  = t + (R − I) P_i                    how far platform joint i moved
-//! Δl_i = |r₀_i + d_i| − l₀_i                the root of Δl² + 2 l₀ Δl = (2 r₀ + d)·d
+//! d_i  = t + E P_i,  E = R − I               how far platform joint i moved
+//! Δl_i = |r₀_i + d_i| − l₀_i                the root of Δl² + 2 l₀ Δl = s,  s = (2 r₀ + d)·d
+//! s/2  = r₀·t + |t|²/2 + (r₀ − P + t)·E P    as |E P|² = −2 P·E P for a rotation: linear in numbers that all legs share
+//! Δl   = u (1 − τ/2 + τ²/2 − 5/8 τ³ + …)     u = s/(2 l₀), τ = u/l₀
 //! h ← h + J⁻¹ (Δl − Δl(h)),  J = ∂l/∂h at rest      forward kinematics, a fixed number of times
 //! ```
 
 use crate::attitude::Series;
 use crate::linear::{difference, each, transform};
 use crate::real::Real;
+
+/// Terms of u that legs may share.
+const TERMS: usize = 14;
 
 /// The legs of a platform.
 #[derive(Debug, Clone, Copy)]
@@ -21,7 +26,9 @@ pub struct Legs<'a, T> {
     pub rest_length: [T; 6],
     /// Sine and versine over the angles that occur.
     pub series: Series<'a, T>,
-    /// Newton steps from s / (2 l₀) to the root.
+    /// Coefficients of the root in τ after the leading 1: −1/2, 1/2, −5/8, … None: s / (2 l₀).
+    pub root: &'a [T],
+    /// Newton steps from there to the root; each takes a division.
     pub newton_steps: usize,
 }
 
@@ -30,20 +37,66 @@ impl<T: Real> Legs<'_, T> {
     ///
     /// `pose` is [x y z θx θy θz] from rest: translation t of P_C in {B} (m) and rotation R = Rz(θz) Ry(θy) Rx(θx) about
     /// fixed axes (AI.1) (rad), within the bounds that series and steps are made for.
-    #[inline]
+    // Its many constants are folded where it is inlined.
+    #[inline(always)]
     #[must_use]
     pub fn displacements(&self, pose: &[T; 6]) -> [T; 6] {
         let [x, y, z, tilt_x, tilt_y, tilt_z] = *pose;
         let turn = self.series.attitude([tilt_x, tilt_y, tilt_z]).rotation_less_identity();
-        let mut displacements = [T::ZERO; 6];
-        for (leg, displacement) in displacements.iter_mut().enumerate() {
-            let p = &self.platform_joint[leg];
-            let add = |sum: T, constant: T, value: T| if constant == T::ZERO { sum } else { sum + value * constant };
-            let by = |place: T, turn: &[T; 3]| add(add(add(place, p[0], turn[0]), p[1], turn[1]), p[2], turn[2]);
-            let moved = [by(x, &turn[0]), by(y, &turn[1]), by(z, &turn[2])];
-            *displacement = extension(&self.rest_leg[leg], self.rest_length[leg], self.newton_steps, &moved);
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = turn;
+        let inverse = each(|leg| T::ONE / self.rest_length[leg]);
+        let height = self.rest_leg[0][2] - self.platform_joint[0][2];
+        let level = z + height;
+        let swept = [x * ax + y * bx + level * cx, x * ay + y * by + level * cy, x * az + y * bz + level * cz];
+        let values = [ax, ay, az, bx, by, bz, cx, cy, cz, swept[0], swept[1], swept[2], x, y];
+        let shift = T::HALF * (x * x + y * y + z * z);
+        // u of all legs side by side, term by term: none waits for its own last product. The small terms come first.
+        let start = each(|leg| (shift + z * self.rest_leg[leg][2]) * inverse[leg]);
+        let factors = each(|leg| self.factors(leg, inverse[leg], height));
+        self.extensions(&sums(&factors, &values, start), &inverse)
+    }
+
+    /// What the terms of u = s/(2 l₀) are multiplied by: those of E row by row, of tᵀE with `height` in it, of x and y.
+    #[inline(always)]
+    fn factors(&self, leg: usize, inverse: T, height: T) -> [T; TERMS] {
+        let ([rx, ry, rz], [px, py, pz]) = (self.rest_leg[leg], self.platform_joint[leg]);
+        // r₀ − P: from the base joint to P_C at rest. The height is mostly that of all legs.
+        let (fx, fy, fz) = ((rx - px) * inverse, (ry - py) * inverse, (rz - pz - height) * inverse);
+        [
+            fx * px,
+            fx * py,
+            fx * pz,
+            fy * px,
+            fy * py,
+            fy * pz,
+            fz * px,
+            fz * py,
+            fz * pz,
+            px * inverse,
+            py * inverse,
+            pz * inverse,
+            rx * inverse,
+            ry * inverse,
+        ]
+    }
+
+    /// Δl of each leg for u = s/(2 l₀), m.
+    #[inline(always)]
+    fn extensions(&self, way: &[T; 6], inverse: &[T; 6]) -> [T; 6] {
+        let ratio = each(|leg| way[leg] * inverse[leg]);
+        let mut root = *way;
+        if let Some((last, rest)) = self.root.split_last() {
+            let mut tail = [*last; 6];
+            for c in rest.iter().rev() {
+                tail = each(|leg| *c + ratio[leg] * tail[leg]);
+            }
+            root = each(|leg| way[leg] + way[leg] * ratio[leg] * tail[leg]);
         }
-        displacements
+        for _ in 0..self.newton_steps {
+            let length = &self.rest_length;
+            root = each(|leg| (way[leg] * length[leg] + T::HALF * (root[leg] * root[leg])) / (length[leg] + root[leg]));
+        }
+        root
     }
 
     /// The pose at which the legs have these displacements (m): forward kinematics.
@@ -63,16 +116,17 @@ impl<T: Real> Legs<'_, T> {
     }
 }
 
-/// |r₀ + d| − l₀ for a joint that moved by d: the root Δl of Δl² + 2 l₀ Δl = s with s = (2 r₀ + d)·d.
-#[inline]
-fn extension<T: Real>(rest: &[T; 3], length: T, newton_steps: usize, moved: &[T; 3]) -> T {
-    let two = T::ONE + T::ONE;
-    let s = (two * rest[0] + moved[0]) * moved[0]
-        + (two * rest[1] + moved[1]) * moved[1]
-        + (two * rest[2] + moved[2]) * moved[2];
-    let mut root = s / (two * length);
-    for _ in 0..newton_steps {
-        root = (s + root * root) / (two * (length + root));
-    }
-    root
+/// `start` and what the terms add, term by term. What a factor of zero would add is left out.
+#[inline(always)]
+fn sums<T: Real>(factors: &[[T; TERMS]; 6], values: &[T; TERMS], start: [T; 6]) -> [T; 6] {
+    let [a, b, c, d, e, f] = factors;
+    let mut sums = start;
+    let add = |sums: [T; 6], k: usize| {
+        let plus = |sum: T, factor: T| if factor == T::ZERO { sum } else { sum + factor * values[k] };
+        let [u, v, w, x, y, z] = sums;
+        [plus(u, a[k]), plus(v, b[k]), plus(w, c[k]), plus(x, d[k]), plus(y, e[k]), plus(z, f[k])]
+    };
+    sums = add(add(add(add(add(sums, 0), 1), 2), 3), 4);
+    sums = add(add(add(add(add(sums, 5), 6), 7), 8), 9);
+    add(add(add(add(sums, 10), 11), 12), 13)
 }

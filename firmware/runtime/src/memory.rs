@@ -182,16 +182,52 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     }
 
     /// [`ReversalMemory::follow`] for a displacement (m, finite) that the table may not reach; returns whether it did not.
-    #[inline]
+    #[inline(always)]
     pub fn follow_within<const N: usize, const NODES: usize>(
         &mut self,
         table: &Everett<T, N, NODES>,
         displacement: T,
         permitted: impl FnOnce(T) -> T,
     ) -> bool {
-        let within = table.within_reach(displacement);
-        self.follow(table, within, permitted);
-        within != displacement
+        let reached = self.reaches(table, displacement);
+        self.follow(table, if reached { displacement } else { table.within_reach(displacement) }, permitted);
+        !reached
+    }
+
+    /// [`ReversalMemory::follow_within`] where nothing is unusual: the table reaches `displacement` (m, finite), the solution lies in the
+    /// cell of the present drive, and `permitted` lets it through. Then that has been done; else nothing has changed. Returns which.
+    #[inline(always)]
+    pub fn track<const N: usize, const NODES: usize>(
+        &mut self,
+        table: &Everett<T, N, NODES>,
+        displacement: T,
+        permitted: impl FnOnce(T) -> Option<T>,
+    ) -> bool {
+        if !self.reaches(table, displacement) {
+            return false;
+        }
+        let cell = Everett::<T, N, NODES>::cell(self.drive);
+        if displacement > self.displacement {
+            let (start, at_start, top) = self.start::<true>(displacement);
+            let branch = Branch { top, at_start, line: table.rising(start, cell) };
+            match branch.line.within::<true>(displacement - at_start) {
+                Some(drive) => {
+                    permitted(drive).is_some_and(|drive| self.take_or_apply::<true, N, NODES>(table, &branch, drive))
+                }
+                None => false,
+            }
+        } else if displacement < self.displacement {
+            let (start, at_start, top) = self.start::<false>(displacement);
+            let branch = Branch { top, at_start, line: table.falling(start, cell) };
+            match branch.line.within::<false>(at_start - displacement) {
+                Some(drive) => {
+                    permitted(drive).is_some_and(|drive| self.take_or_apply::<false, N, NODES>(table, &branch, drive))
+                }
+                None => false,
+            }
+        } else {
+            false
+        }
     }
 
     /// Γ⁻¹ and Γ in one: solves for `displacement`, which must be within the reach of the table, and applies the drive that
@@ -200,7 +236,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
     /// The same to the bit as [`ReversalMemory::solve`] and [`ReversalMemory::apply`]. A drive that is permitted differs from
     /// the solution by a fraction of a cell: mostly it lies on the stretch of the branch that the solution was found on, and
     /// then nothing is looked up twice.
-    #[inline]
+    #[inline(always)]
     pub fn follow<const N: usize, const NODES: usize>(
         &mut self,
         table: &Everett<T, N, NODES>,
@@ -227,15 +263,43 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.apply(table, drive);
     }
 
-    /// Applies a drive if it lies on the stretch of a branch that [`ReversalMemory::find`] gave, and wipes nothing out;
+    /// Applies a drive, which mostly lies on the branch; true.
+    #[inline(always)]
+    fn take_or_apply<const RISING: bool, const N: usize, const NODES: usize>(
+        &mut self,
+        table: &Everett<T, N, NODES>,
+        branch: &Branch<T>,
+        drive: T,
+    ) -> bool {
+        if !self.take::<RISING>(branch, drive) {
+            self.apply_anew(table, drive);
+        }
+        true
+    }
+
+    /// [`ReversalMemory::apply`], out of the way.
+    #[cold]
+    #[inline(never)]
+    fn apply_anew<const N: usize, const NODES: usize>(&mut self, table: &Everett<T, N, NODES>, drive: T) {
+        self.apply(table, drive);
+    }
+
+    /// Applies a drive if it lies on the stretch of a branch that [`ReversalMemory::find`] gave, and wipes out what the solution does;
     /// returns whether it does.
     #[inline(always)]
     fn take<const RISING: bool>(&mut self, branch: &Branch<T>, drive: T) -> bool {
         let Branch { top, at_start, line } = *branch;
         let onward = if RISING { drive > self.drive } else { drive < self.drive };
         // Full, a new extremum may cost another.
-        if !onward || !line.holds(drive) || top + 1 < self.len || self.len >= CAP {
+        if !onward || !line.holds(drive) || self.len >= CAP {
             return drive == self.drive;
+        }
+        // Loops that the solution leaves are wiped out if the drive leaves them, too: the outermost of them tells.
+        if top + 1 < self.len {
+            let inner = self.extremum(top + 1);
+            if if RISING { drive < inner } else { drive > inner } {
+                return false;
+            }
         }
         // Falling from the first maximum ends at p₀, which wipes everything out.
         if top >= if RISING { 2 } else { 1 } {
@@ -245,24 +309,21 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
             }
         }
         if top == self.len {
-            let k = if top < CAP { top } else { CAP - 1 };
+            let k = Self::bounded(top);
             self.extrema[k] = self.drive;
             self.displacements[k] = self.displacement;
-            self.len = top + 1;
         }
+        self.len = top + 1;
         self.drive = drive;
         let moved = line.at::<RISING>(drive);
         self.displacement = if RISING { at_start + moved } else { at_start - moved };
         true
     }
 
-    /// The drive for a displacement above the present one, or below it, and the branch that leads there.
+    /// Where the branch to a displacement above the present one, or below it, starts: drive, displacement, and the number of extrema
+    /// below it.
     #[inline(always)]
-    fn find<const RISING: bool, const N: usize, const NODES: usize>(
-        &self,
-        table: &Everett<T, N, NODES>,
-        wanted: T,
-    ) -> (T, Branch<T>) {
+    fn start<const RISING: bool>(&self, wanted: T) -> (T, T, usize) {
         // The branch starts at the last extremum if the direction stays, else where the drive is now; `top` is the
         // number of extrema below that start.
         let (mut start, mut at_start, mut top) = if RISING == self.is_rising() {
@@ -282,6 +343,17 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
             start = self.extremum(top);
             at_start = self.displacement_at(top);
         }
+        (start, at_start, top)
+    }
+
+    /// The drive for a displacement above the present one, or below it, and the branch that leads there.
+    #[inline(always)]
+    fn find<const RISING: bool, const N: usize, const NODES: usize>(
+        &self,
+        table: &Everett<T, N, NODES>,
+        wanted: T,
+    ) -> (T, Branch<T>) {
+        let (start, at_start, top) = self.start::<RISING>(wanted);
         let (drive, line) = if RISING {
             table.rise(start, self.drive, wanted - at_start)
         } else {
@@ -325,15 +397,26 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         self.len % 2 == 1
     }
 
-    /// Bounded reads: `k` < `len` ≤ CAP always holds, the comparison shows it to the compiler.
     #[inline]
     fn extremum(&self, k: usize) -> T {
-        self.extrema[if k < CAP { k } else { CAP - 1 }]
+        self.extrema[Self::bounded(k)]
     }
 
     #[inline]
     fn displacement_at(&self, k: usize) -> T {
-        self.displacements[if k < CAP { k } else { CAP - 1 }]
+        self.displacements[Self::bounded(k)]
+    }
+
+    /// `k`: it always is below CAP, and this shows it to the compiler.
+    #[inline(always)]
+    const fn bounded(k: usize) -> usize {
+        if CAP.is_power_of_two() {
+            k & (CAP - 1)
+        } else if k < CAP {
+            k
+        } else {
+            CAP - 1
+        }
     }
 
     /// Makes the present point the newest extremum.

@@ -204,6 +204,7 @@ pub fn legs<T: Real>(ir: &Ir) -> (Legs<'static, T>, [[T; 6]; 6]) {
         platform_joint: k.platform_joint.map(|row| row.map(real)),
         rest_length: k.rest_length.map(real),
         series: series(ir),
+        root: leak(&k.root),
         newton_steps: k.newton_steps as usize,
     };
     (legs, k.inverse_jacobian.map(|row| row.map(real)))

@@ -260,13 +260,7 @@ fn build(
                     mcu.part().name
                 ));
             }
-            if compiled.model.sensor.lag == 0.0 {
-                made.notes.push(
-                    "the AD7606 of this board filters its inputs, and the spec has no `sensor.lag`: write \"15 us\" or more, so \
-                     that stability and margins contain it"
-                        .to_owned(),
-                );
-            }
+            made.notes.extend(unknown_filter(&compiled.model).map(str::to_owned));
             if measure && let Some((mut measurement, host)) = emulate(compiled, folders, None, &mut made.notes, ui)? {
                 ui.progress(&format!("estimating a tick of {}", made.board));
                 let folders = [output, target_dir];
@@ -290,6 +284,14 @@ pub(super) fn late(compiled: &Compiled, measurement: Option<&Measurement>, ui: &
     let fails = finding.severity == Severity::Error;
     ui.findings(Some(&compiled.source), &[finding]);
     fails.then_some(failure)
+}
+
+/// The boards' converter has a filter that a spec may not know of.
+fn unknown_filter(model: &model::Model) -> Option<&'static str> {
+    (model.sensor.lag == 0.0).then_some(
+        "the AD7606 of this board filters its inputs, and the spec has no `sensor.lag`: write, in [sensor]: lag = \"15 us\" or more, \
+         so that stability and margins contain it",
+    )
 }
 
 /// Size and checks of an image, and the image under a name that stays.
@@ -390,5 +392,24 @@ fn hold_against_budget(made: &mut Made, compiled: &Compiled, target: Target) {
     }
     if let Some(difference) = measured.and_then(|m| m.first_difference.as_ref()) {
         made.failures.push(format!("the emulated machine computes other bits than the host: {difference}"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use specgen_compiler::compile::compile_source;
+    use specgen_language::SpecSource;
+
+    #[test]
+    fn who_has_an_ad7606_is_told_of_its_filter_until_the_spec_has_it() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml");
+        let plain = SpecSource::read(&path).unwrap();
+        let mut filtered = plain.clone();
+        filtered.text = plain.text.replacen("[sensor]\n", "[sensor]\nlag = \"15 us\"\n", 1);
+        assert_ne!(plain.text, filtered.text);
+        let note = |source| unknown_filter(&compile_source(source).unwrap().model);
+        assert!(note(plain).is_some_and(|note| note.contains("write, in [sensor]: lag = \"15 us\"")));
+        assert_eq!(note(filtered), None);
     }
 }

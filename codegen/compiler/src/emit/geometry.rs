@@ -16,11 +16,12 @@ pub fn emit(ir: &Ir) -> TokenStream {
     let sine = literal::reals(ir.scalar, &k.sine);
     let versine = literal::reals(ir.scalar, &k.versine);
     let inverse = literal::matrix(ir.scalar, &k.inverse_jacobian);
+    let root = literal::reals(ir.scalar, &k.root);
     let newton_steps = literal::count(k.newton_steps as usize);
     let corrections = literal::count(k.corrections as usize);
     let steps_doc = format!(
-        " Joints, rest lengths and series; the Newton steps bring |Δl| ≤ {:.3e} m to the last bit of the scalar. From \
-         `geometry` and `workspace`.",
+        " Joints, rest lengths and series; that of the root, and Newton's steps, bring |Δl| ≤ {:.3e} m to the last bit of the \
+         scalar. From `geometry` and `workspace`.",
         k.largest_displacement
     );
     quote! {
@@ -36,6 +37,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
             platform_joint: #platform_joint,
             rest_length: [#rest_length],
             series: SERIES,
+            root: &[#root],
             newton_steps: #newton_steps,
         };
         /// Sine and versine to the last bit over the declared workspace.

@@ -2,7 +2,7 @@
 
 use specgen_runtime::{Legs, Series};
 
-use super::linear::{self, Matrix, cross, norm};
+use super::linear::{self, Matrix, alike, cross, norm};
 use crate::ir::{Kinematics, LEGS, Scalar};
 use specgen_language::diagnostic::{Diagnostic, codes};
 use specgen_language::model::{Geometry, Model};
@@ -11,6 +11,10 @@ use specgen_language::model::{Geometry, Model};
 const LARGEST_RATIO: f64 = 0.25;
 /// More corrections than this mean that the forward kinematics does not converge.
 const MOST_CORRECTIONS: u32 = 40;
+/// Relative difference of coordinates that are one but for rounding.
+const SAME_JOINT: f64 = 4e-15;
+/// More terms of a root than this take longer than a Newton step.
+const MOST_TERMS: usize = 8;
 
 /// B_i in the base frame and P_i in the platform frame, m.
 #[must_use]
@@ -33,23 +37,32 @@ pub(super) fn lower(model: &Model, scalar: Scalar) -> Result<Kinematics, Vec<Dia
     let jacobian = jacobian_at_rest(&rest_leg, &rest_length, &platform);
     let inverse = linear::inverse(&jacobian).ok_or_else(|| vec![degenerate(model)])?;
     let (sine, versine) = series_of(largest_angle, Scalar::F64);
+    let (root, newton_steps) = root_of(largest_displacement / shortest, Scalar::F64);
     let legs = Legs {
         rest_leg,
         platform_joint: platform,
         rest_length,
         series: Series { sine: &sine, versine: &versine },
-        newton_steps: newton_steps(largest_displacement / shortest, Scalar::F64) as usize,
+        root: &root,
+        newton_steps: newton_steps as usize,
     };
     let corrections = corrections(&legs, &inverse, model.workspace.bounds(), scalar)
         .ok_or_else(|| vec![too_large(model, largest_displacement, shortest)])?;
-    let round3 = |v: [f64; 3]| v.map(|x| scalar.round(x));
+    let (root, newton_steps) = root_of(largest_displacement / shortest, scalar);
+    let three = |mut rows: [[f64; 3]; LEGS]| {
+        alike(rows.as_flattened_mut(), SAME_JOINT);
+        rows.map(|row| row.map(|x| scalar.round(x)))
+    };
+    let mut lengths = rest_length;
+    alike(&mut lengths, SAME_JOINT);
     Ok(Kinematics {
-        rest_leg: rest_leg.map(round3),
-        platform_joint: platform.map(round3),
-        rest_length: rest_length.map(|l| scalar.round(l)),
+        rest_leg: three(rest_leg),
+        platform_joint: three(platform),
+        rest_length: lengths.map(|l| scalar.round(l)),
         sine: series_of(largest_angle, scalar).0,
         versine: series_of(largest_angle, scalar).1,
-        newton_steps: newton_steps(largest_displacement / shortest, scalar),
+        root,
+        newton_steps,
         largest_displacement,
         inverse_jacobian: inverse.map(|row| row.map(|x| scalar.round(x))),
         corrections,
@@ -156,15 +169,27 @@ fn series(largest: f64, scalar: Scalar, leading: f64, first: u32) -> Vec<f64> {
     }
 }
 
-/// Steps of Δl ← (s + Δl²) / (2 (l₀ + Δl)) from Δl = s / (2 l₀).
+/// Coefficients of the root Δl of Δl² + 2 l₀ Δl = s over u = s/(2 l₀) after the leading 1, in τ = u/l₀, and Newton steps from there,
+/// which take a division each: so many that what is left is below a quarter ulp.
 ///
-/// With r = |Δl| / l₀ the first guess is off by r/2 of Δl, and a step turns a relative error ε into ε² r / (2 (1 − r)).
-fn newton_steps(ratio: f64, scalar: Scalar) -> u32 {
-    let mut error = ratio / 2.0;
+/// With r = |Δl| / l₀, |τ| ≤ r + r²/2. A step turns a relative error ε into ε² r / (2 (1 − r)).
+fn root_of(ratio: f64, scalar: Scalar) -> (Vec<f64>, u32) {
+    let small = scalar.epsilon() / 4.0;
+    let largest = ratio + 0.5 * ratio * ratio;
+    let mut terms = Vec::new();
+    let (mut left, mut power) = (0.5 * largest / (1.0 - 2.0 * largest), 1.0);
+    let mut coefficient = 1.0;
+    while left > small && terms.len() < MOST_TERMS {
+        power *= largest;
+        let k = f64::from(terms.len() as u32 + 1);
+        coefficient *= (1.0 - 2.0 * k) / (k + 1.0);
+        terms.push(scalar.round(coefficient));
+        left = coefficient.abs() * power * 2.0 * largest / (1.0 - 2.0 * largest);
+    }
     let mut steps = 0;
-    while error > scalar.epsilon() / 4.0 && steps < 8 {
-        error = error * error * ratio / (2.0 * (1.0 - ratio));
+    while left > small && steps < 8 {
+        left = left * left * ratio / (2.0 * (1.0 - ratio));
         steps += 1;
     }
-    steps
+    (terms, steps)
 }

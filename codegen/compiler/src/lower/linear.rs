@@ -65,6 +65,27 @@ pub(super) fn dusted(value: f64, size: f64) -> f64 {
     if value.abs() < 1e-13 * size { 0.0 } else { value }
 }
 
+/// Numbers that agree but for their sign and a share of `tolerance` are given one magnitude: what rounding left of the symmetry of a
+/// platform. A core then keeps one constant for all of them.
+pub(super) fn alike(values: &mut [f64], tolerance: f64) {
+    for k in 1..values.len() {
+        let (before, rest) = values.split_at_mut(k);
+        if let Some(value) = rest.first_mut() {
+            let size = value.abs();
+            let same = |other: &&f64| (other.abs() - size).abs() <= tolerance * size;
+            if let Some(other) = before.iter().find(same) {
+                *value = if *value < 0.0 { -other.abs() } else { other.abs() };
+            }
+        }
+    }
+}
+
+/// The same of a matrix that is made of others.
+pub(super) fn with_alike(mut matrix: Matrix) -> Matrix {
+    alike(matrix.as_flattened_mut(), 1e-13);
+    matrix
+}
+
 /// The 3⁶ poses whose coordinates are at their bound, its negative, or zero.
 pub(super) fn grid(bound: [f64; 6]) -> impl Iterator<Item = [f64; 6]> {
     (0..729_u32).map(move |index| {
@@ -80,6 +101,13 @@ pub(super) fn grid(bound: [f64; 6]) -> impl Iterator<Item = [f64; 6]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_agrees_but_for_rounding_gets_one_magnitude() {
+        let mut values = [0.5, -0.500_000_000_000_000_1, 0.0, 0.500_000_1, -0.0, 0.499_999_999_999_999_94];
+        alike(&mut values, 1e-15);
+        assert_eq!(values, [0.5, -0.5, 0.0, 0.500_000_1, 0.0, 0.5]);
+    }
 
     #[test]
     fn the_inverse_times_the_matrix_is_one_also_where_plain_elimination_meets_a_zero() {

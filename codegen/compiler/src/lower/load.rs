@@ -8,6 +8,7 @@
 //! sampled. Terms of P that the tolerance has room for are left out, the smallest first. Q is kept whole: its error would grow with
 //! the acceleration of stops and streams.
 
+use super::linear::with_alike;
 use super::setpoint::motions::{self, Motions};
 use crate::figure::figure;
 use crate::ir::{Affine, Dynamics, LEGS, Load, LoadBound, Scalar, Setpoints};
@@ -113,7 +114,7 @@ impl Space {
                 affine.pose[leg][k] = 0.0;
             }
         }
-        affine
+        Affine { pose: with_alike(affine.pose), acceleration: with_alike(affine.acceleration) }
     }
 
     /// What `affine` leaves of the load of a leg, m.

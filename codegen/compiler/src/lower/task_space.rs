@@ -28,7 +28,7 @@ pub(super) fn law(
     design: &Design,
 ) -> ControlLaw {
     let round = |value: f64| scalar.round(value);
-    let round_all = |matrix: Matrix6| without_dust(matrix).map(|row| row.map(round));
+    let round_all = |matrix: Matrix6| linear::with_alike(without_dust(matrix)).map(|row| row.map(round));
     let compliance = 1.0 / model.actuator.axial_stiffness;
     // Lowering of the dynamics has refused a singular geometry.
     let legs_to_pose = linear::inverse(&rest.jacobian).unwrap_or([[0.0; 6]; 6]);

@@ -49,6 +49,7 @@ impl Exact {
             platform_joint: self.platform_joint,
             rest_length: self.rest_length,
             series: self.series(),
+            root: &[],
             newton_steps: STEPS,
         };
         Double::displacements(&legs, &pose.map(Double::from))
@@ -75,11 +76,13 @@ where
     let of = T::from_f64;
     let sine: Vec<T> = constants.sine.iter().map(|c| of(*c)).collect();
     let versine: Vec<T> = constants.versine.iter().map(|c| of(*c)).collect();
+    let root: Vec<T> = constants.root.iter().map(|c| of(*c)).collect();
     let legs = Legs {
         rest_leg: constants.rest_leg.map(|leg| leg.map(of)),
         platform_joint: constants.platform_joint.map(|joint| joint.map(of)),
         rest_length: constants.rest_length.map(of),
         series: Series { sine: &sine, versine: &versine },
+        root: &root,
         newton_steps: constants.newton_steps as usize,
     };
     T::displacements(&legs, &pose.map(of)).map(f64::from_real)
@@ -127,6 +130,7 @@ pub(super) fn cut<const SINGLE: bool>(coefficients: &[f64], exact: &[Double], sq
 pub(super) struct TracedLegs<const SINGLE: bool> {
     sine: Vec<Traced<SINGLE>>,
     versine: Vec<Traced<SINGLE>>,
+    root: Vec<Traced<SINGLE>>,
 }
 
 impl<const SINGLE: bool> TracedLegs<SINGLE> {
@@ -136,6 +140,8 @@ impl<const SINGLE: bool> TracedLegs<SINGLE> {
         Self {
             sine: cut(&constants.sine, &exact.sine, square),
             versine: cut(&constants.versine, &exact.versine, square),
+            // Over powers of two: exact.
+            root: constants.root.iter().map(|c| Traced::constant(*c, [0.0; 2])).collect(),
         }
     }
 
@@ -188,7 +194,7 @@ where
     let (mut of_legs, mut of_pose) = ([0.0; 6], [0.0; 6]);
     for corner in boxes(&bounds) {
         let (found, record) = trace(|| {
-            let series = TracedLegs::<SINGLE>::of(constants, exact, largest);
+            let numbers = TracedLegs::<SINGLE>::of(constants, exact, largest);
             let three = |kept_rows: &[[f64; 3]; 6], exact: &[[Double; 3]; 6]| {
                 core::array::from_fn(|leg| core::array::from_fn(|k| kept(kept_rows[leg][k], exact[leg][k])))
             };
@@ -196,13 +202,14 @@ where
                 rest_leg: three(&constants.rest_leg, &exact.rest_leg),
                 platform_joint: three(&constants.platform_joint, &exact.platform_joint),
                 rest_length: core::array::from_fn(|leg| kept(constants.rest_length[leg], exact.rest_length[leg])),
-                series: series.series(),
+                series: numbers.series(),
+                root: &numbers.root,
                 newton_steps: constants.newton_steps as usize,
             };
             let pose = core::array::from_fn(|axis| Traced::coordinate(axis, corner[axis][0], corner[axis][1]));
             let found = Traced::displacements(&legs, &pose);
             core::array::from_fn::<_, 6, _>(|leg| {
-                let left = left_by_newton(constants.newton_steps, found[leg].magnitude(), constants.rest_length[leg]);
+                let left = left_by_root(constants, found[leg].magnitude(), constants.rest_length[leg]);
                 found[leg].off_by([-left, left])
             })
         });
@@ -215,9 +222,14 @@ where
     (of_legs, of_pose)
 }
 
-/// What Newton's steps leave of a displacement, m: of the first guess s/(2 l) = Δ + Δ²/(2 l), each step leaves its square over
-/// 2 (l + Δ).
-fn left_by_newton(steps: u32, displacement: f64, length: f64) -> f64 {
+/// What the series of the root and Newton's steps leave of a displacement, m. Of u = s/(2 l) = Δ + Δ²/(2 l) the series leaves less than
+/// twice its last term times τ and the geometric sum of what follows; a step leaves its square over 2 (l + Δ).
+fn left_by_root(constants: &Kinematics, displacement: f64, length: f64) -> f64 {
     let twice = 2.0 * (length - displacement);
-    (0..steps).fold(displacement * displacement / twice, |left, _| left * left / (twice - 2.0 * left))
+    let way = displacement + displacement * displacement / (2.0 * length);
+    let ratio = way / length;
+    let last = constants.root.last().map_or(0.25, |c| c.abs());
+    let power = constants.root.iter().fold(1.0, |power, _| power * ratio);
+    let series = way * last * power * 2.0 * ratio / (1.0 - 2.0 * ratio);
+    (0..constants.newton_steps).fold(series, |left, _| left * left / (twice - 2.0 * left))
 }

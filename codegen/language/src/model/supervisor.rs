@@ -59,8 +59,10 @@ section! {
         hysteresis: Option<[f64; 2]> = FACTORS, Rule("[0.9, 1.1]"), "", [0.9, 1.1];
         /// On the creep of a leg.
         creep: Option<[f64; 2]> = FACTORS, Rule("[0.9, 1.1]"), "", [0.9, 1.1];
-        /// On the lag of an amplifier, and of the gauges.
+        /// On the lag of an amplifier.
         lag: Option<[f64; 2]> = FACTORS, Rule("[0.8, 1.2]"), "", [0.8, 1.2];
+        /// On the lag of the gauges, `sensor.lag`.
+        gauge_lag: Option<[f64; 2]> = FACTORS, Rule("[0.8, 1.2]; 1 where there is no `sensor.lag`"), "" ["sensor_lag"], [0.8, 1.2];
         /// On the noise of gauges, amplifiers and force sensor.
         noise: Option<[f64; 2]> = FACTORS, Rule("[0.5, 1.5]"), "", [0.5, 1.5];
         /// Control intervals by which voltages come late, at most: none to so many are tried.

@@ -126,7 +126,7 @@ section! {
 section! {
     /// What it may use there; a build that needs more is refused.
     ///
-    /// In bytes; none where the spec does not say.
+    /// In bytes and s; none where the spec does not say.
     "target.budget", Plain => Budget {
         /// Flash.
         flash: Option<u64> = BYTES, Optional, "", "128 KiB";
@@ -136,12 +136,14 @@ section! {
         stack: Option<u64> = BYTES, Optional, "", "2 KiB";
         /// Mean instructions per tick.
         instructions: Option<u64> = integer(1, 1_000_000_000), Optional, "", 3000;
+        /// Longest tick of a board, as `specgen build` estimates it: what the rest of the period is kept free for. The period where the spec does not say.
+        time: Option<f64> = one(Dimension::TIME, Range::closed(1e-6, 10.0), "us"), Optional, "" ["duration", "tick"], "80 us";
     }
 }
 
 impl Budget {
     /// No limits but those of the part.
-    pub const NONE: Self = Self { flash: None, ram: None, stack: None, instructions: None };
+    pub const NONE: Self = Self { flash: None, ram: None, stack: None, instructions: None, time: None };
 }
 
 impl Value for Mcu {

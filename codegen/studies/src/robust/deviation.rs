@@ -28,8 +28,10 @@ pub struct LegDeviation {
     pub hysteresis: f64,
     /// On its creep.
     pub creep: f64,
-    /// On the lag of its amplifier and of its gauge; the gauges of a platform have that of the first leg.
+    /// On the lag of its amplifier.
     pub lag: f64,
+    /// On the lag of its gauge; the gauges of a platform have that of the first leg.
+    pub gauge_lag: f64,
 }
 
 /// Factors of one machine.
@@ -57,6 +59,7 @@ impl Deviation {
             hysteresis: of(Factor::Hysteresis),
             creep: of(Factor::Creep),
             lag: of(Factor::Lag),
+            gauge_lag: of(Factor::GaugeLag),
         };
         Self {
             mass: of(Factor::Mass),
@@ -78,15 +81,21 @@ impl Deviation {
             low + (high - low) * unit(&mut rng)
         };
         let (mass, damping, noise) = (within(Factor::Mass), within(Factor::Damping), within(Factor::Noise));
-        let legs = std::array::from_fn(|_| LegDeviation {
+        let mut legs: [LegDeviation; LEGS] = std::array::from_fn(|_| LegDeviation {
             stiffness: within(Factor::Stiffness),
             gain: within(Factor::Gain),
             hysteresis: within(Factor::Hysteresis),
             creep: within(Factor::Creep),
             lag: within(Factor::Lag),
+            gauge_lag: Factor::GaugeLag.nominal(),
         });
         let [low, high] = factors.range(Factor::DelayTicks);
         let delay_ticks = (low + libm::floor(unit(&mut rng) * (high - low + 1.0))) as u32;
+        // Last, so that a seed means the machine that it meant before there was this factor.
+        let [low, high] = factors.range(Factor::GaugeLag);
+        for leg in &mut legs {
+            leg.gauge_lag = low + (high - low) * unit(&mut rng);
+        }
         Self { mass, damping, noise, delay_ticks, legs }
     }
 
@@ -123,7 +132,7 @@ impl Deviation {
         own.widen(deviation.hysteresis);
         own.creep_weights.iter_mut().for_each(|weight| *weight *= deviation.creep);
         own.tau_amp_s *= deviation.lag;
-        own.gauge_lag_s *= deviation.lag;
+        own.gauge_lag_s *= deviation.gauge_lag;
         own.noise.sensor_nm_rms *= self.noise;
         own.noise.amplifier_mv_rms *= self.noise;
         own
@@ -140,13 +149,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_lag_is_of_amplifier_and_gauge() {
+    fn amplifier_and_gauge_have_lags_of_their_own() {
         let leg = LegParameters { gauge_lag_s: 15e-6, ..LegParameters::reference() };
-        let longer =
-            Deviation::common(|factor| if factor == Factor::Lag { 1.5 } else { factor.nominal() }).legs_of(&leg);
-        for (found, nominal) in longer.iter().flat_map(|own| [(own.gauge_lag_s, 15e-6), (own.tau_amp_s, leg.tau_amp_s)])
-        {
-            assert!((found / nominal - 1.5).abs() < 1e-12, "{found} {nominal}");
+        for (factor, expected) in [(Factor::Lag, [1.5, 1.0]), (Factor::GaugeLag, [1.0, 1.5])] {
+            let longer = Deviation::common(|one| if one == factor { 1.5 } else { one.nominal() }).legs_of(&leg);
+            for own in longer {
+                let found = [own.tau_amp_s / leg.tau_amp_s, own.gauge_lag_s / 15e-6];
+                assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12), "{factor}: {found:?}");
+            }
         }
     }
 }

@@ -22,8 +22,10 @@ pub enum Factor {
     Hysteresis,
     /// On its creep.
     Creep,
-    /// On the lag of an amplifier, and of the gauges.
+    /// On the lag of an amplifier.
     Lag,
+    /// On the lag of the gauges.
+    GaugeLag,
     /// On the noise of gauges, amplifiers and force sensor.
     Noise,
     /// Control intervals by which voltages come late: no factor but a whole number.
@@ -32,7 +34,7 @@ pub enum Factor {
 
 impl Factor {
     /// All, in the order of reports.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Mass,
         Self::Stiffness,
         Self::Damping,
@@ -40,6 +42,7 @@ impl Factor {
         Self::Hysteresis,
         Self::Creep,
         Self::Lag,
+        Self::GaugeLag,
         Self::Noise,
         Self::DelayTicks,
     ];
@@ -55,6 +58,7 @@ impl Factor {
             Self::Hysteresis => "hysteresis",
             Self::Creep => "creep",
             Self::Lag => "lag",
+            Self::GaugeLag => "gauge_lag",
             Self::Noise => "noise",
             Self::DelayTicks => "delay_ticks",
         }
@@ -63,7 +67,7 @@ impl Factor {
     /// Whether each leg has its own value in a draw.
     #[must_use]
     pub fn of_each_leg(self) -> bool {
-        matches!(self, Self::Stiffness | Self::Gain | Self::Hysteresis | Self::Creep | Self::Lag)
+        matches!(self, Self::Stiffness | Self::Gain | Self::Hysteresis | Self::Creep | Self::Lag | Self::GaugeLag)
     }
 
     /// The value of a machine as its data sheet.
@@ -199,6 +203,9 @@ impl Factors {
                 Factor::Hysteresis => (declared.hysteresis, about(0.1)),
                 Factor::Creep => (declared.creep, about(0.1)),
                 Factor::Lag => (declared.lag, about(0.2)),
+                // What is not there does not vary.
+                Factor::GaugeLag if model.sensor.lag == 0.0 => (declared.gauge_lag, about(0.0)),
+                Factor::GaugeLag => (declared.gauge_lag, about(0.2)),
                 Factor::Noise => (declared.noise, about(0.5)),
                 Factor::DelayTicks => (declared.delay_ticks.map(|ticks| [0.0, f64::from(ticks)]), [0.0, 1.0]),
             };

@@ -141,7 +141,7 @@ mod tests {
 
     #[test]
     fn draws_fill_their_ranges_leg_by_leg_and_are_drawn_alone_as_in_a_plan() {
-        let factors = factors(&["delay_ticks=2"]);
+        let factors = factors(&["delay_ticks=2", "gauge_lag=20%"]);
         let plan = Plan::new(&factors, 300, 7);
         let draws: Vec<&Member> = plan.members.iter().filter(|member| member.drawn).collect();
         assert_eq!(draws.len(), 300);
@@ -165,6 +165,7 @@ mod tests {
             fills(Factor::Hysteresis, &|d| d.legs[leg].hysteresis);
             fills(Factor::Creep, &|d| d.legs[leg].creep);
             fills(Factor::Lag, &|d| d.legs[leg].lag);
+            fills(Factor::GaugeLag, &|d| d.legs[leg].gauge_lag);
         }
         for (index, member) in draws.iter().enumerate() {
             assert!(draws[..index].iter().all(|other| other.seed != member.seed));

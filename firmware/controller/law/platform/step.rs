@@ -266,8 +266,34 @@ pub(crate) fn correction(config: &Config, state: &mut State) -> [Real; LEGS] {
 
 /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,
 /// voltage or slew rate held the leg back.
-#[inline]
+#[inline(never)]
 pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
+    if config.mode().inverts() && track(config, leg, table, request) {
+        return false;
+    }
+    actuate_limited(config, leg, table, request)
+}
+
+/// The short way of a leg that tracks; where it is none, nothing has changed. Returns whether it was one.
+#[inline(always)]
+fn track(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
+    let previous = leg.code;
+    let mut code = previous;
+    let tracked = leg.memory.track(table, request, |drive| {
+        code = DAC.free_code(drive, previous, config.code_limits())?;
+        Some(DAC.drive(code))
+    });
+    if tracked {
+        leg.code = code;
+        leg.requested = leg.memory.displacement();
+        leg.excess = 0.0;
+    }
+    tracked
+}
+
+/// [`actuate`] whatever the request.
+#[inline(never)]
+fn actuate_limited(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
     let LegState { memory, code, .. } = leg;
     let mut limited = false;
     let mut permitted = |drive: Real| {

@@ -58,8 +58,14 @@ fn legs() -> ([Vector; 6], [Vector; 6]) {
 fn leg_displacements_are_differences_of_lengths_and_lead_back_to_the_pose() {
     let (joint, rest) = legs();
     let length = |v: Vector| dot(v, v).sqrt();
-    let kernel =
-        Legs { rest_leg: rest, platform_joint: joint, rest_length: rest.map(length), series: SERIES, newton_steps: 5 };
+    let kernel = Legs {
+        rest_leg: rest,
+        platform_joint: joint,
+        rest_length: rest.map(length),
+        series: SERIES,
+        root: &[],
+        newton_steps: 5,
+    };
     // At rest: directions and their moments.
     let jacobian: [Six; 6] = std::array::from_fn(|leg| {
         let s = rest[leg].map(|x| x / length(rest[leg]));
@@ -87,6 +93,12 @@ fn leg_displacements_are_differences_of_lengths_and_lead_back_to_the_pose() {
         let s = 2.0 * rest[leg][2] * 1e-3 + 1e-6;
         assert!((rough - s / (2.0 * length(rest[leg]))).abs() < 1e-18 && (rough - exact).abs() > 1e-7, "leg {leg}");
     }
+    // The series does without them, and they end where it began.
+    let series = Legs { root: &[-0.5, 0.5, -0.625, 0.875], ..rough };
+    let both = Legs { newton_steps: 1, ..series };
+    let exact = kernel.displacements(&pose);
+    assert!(apart(&series.displacements(&pose), &exact) < 3e-15 && apart(&rough.displacements(&pose), &exact) > 1e-7);
+    assert!(apart(&both.displacements(&pose), &exact) < 1e-18);
 }
 
 /// A gauge as a drawing has it: where its line pierces the plane at rest, from P_C, along which direction, and the plane.

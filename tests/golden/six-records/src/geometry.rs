@@ -6,7 +6,7 @@
 use specgen_runtime::{Legs, Series};
 use crate::{LEGS, Real};
 
-/// Joints, rest lengths and series; the Newton steps bring |Δl| ≤ 1.423e-4 m to the last bit of the scalar. From `geometry` and `workspace`.
+/// Joints, rest lengths and series; that of the root, and Newton's steps, bring |Δl| ≤ 1.423e-4 m to the last bit of the scalar. From `geometry` and `workspace`.
 pub const GEOMETRY: Legs<'static, Real> = Legs {
     rest_leg: [
         [0.022547076, -0.12658225, 0.18],
@@ -28,7 +28,8 @@ pub const GEOMETRY: Legs<'static, Real> = Legs {
         0.22120452, 0.22120452, 0.22120452, 0.22120452, 0.22120452, 0.22120452,
     ],
     series: SERIES,
-    newton_steps: 1,
+    root: &[-0.5, 0.5],
+    newton_steps: 0,
 };
 
 /// Sine and versine to the last bit over the declared workspace.

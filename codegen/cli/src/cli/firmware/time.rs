@@ -8,7 +8,21 @@ use specgen_toolchain::time::Estimate;
 
 /// What is to be said about it.
 pub fn finding(compiled: &Compiled, estimate: &Estimate) -> Option<Diagnostic> {
-    let Estimate { board, worst, period, shortest, .. } = estimate;
+    let Estimate { board, worst, period, shortest, parts, .. } = estimate;
+    let most = parts.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let most = most.map_or(String::new(), |(name, time)| format!("; most of it: {name}, {time:.1} us"));
+    let budget = compiled.model.target.budget.time.map(|seconds| seconds * 1e6);
+    if let Some(budget) = budget.filter(|budget| worst > budget && !estimate.too_long()) {
+        return Some(Diagnostic::at(
+            &compiled.model.spans,
+            &["target.budget.time"],
+            codes::TICK_TOO_LONG,
+            format!(
+                "a tick on {board} takes {worst:.1} us (modelled), which is longer than its budget of {budget:.1} us{most}"
+            ),
+            format!("write, in [target.budget]: time = \"{shortest} us\" or more, or give the tick less to do"),
+        ));
+    }
     let (code, verdict) = if estimate.too_long() {
         (codes::TICK_TOO_LONG, "is longer than")
     } else if estimate.tight() {
@@ -16,8 +30,6 @@ pub fn finding(compiled: &Compiled, estimate: &Estimate) -> Option<Diagnostic> {
     } else {
         return None;
     };
-    let most = estimate.parts.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    let most = most.map_or(String::new(), |(name, time)| format!("; most of it: {name}, {time:.1} us"));
     Some(Diagnostic::at(
         &compiled.model.spans,
         &["timing.period", "timing"],
@@ -41,11 +53,51 @@ pub fn text(estimate: &Estimate) -> String {
     );
     for (name, time) in &estimate.parts {
         let more = match *name {
-            "law" => format!(", {} cycles of {} instructions", law.cycles, law.instructions),
+            "law" => format!(
+                ", {} cycles; mean of {} ticks: {} instructions, {} cycles",
+                law.longest.cycles, law.ticks, law.mean.instructions, law.mean.cycles
+            ),
             _ => String::new(),
         };
         // Writing to a String cannot fail.
         let _ = writeln!(out, "    {name:<22} {time:>6.1} us{more}");
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use specgen_compiler::compile::compile_source;
+    use specgen_language::SpecSource;
+    use specgen_language::diagnostic::Severity;
+    use specgen_toolchain::time::Law;
+    use specgen_toolchain::trace::Moved;
+
+    fn spec(budget: &str) -> Compiled {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../specs/reference.toml");
+        let mut source = SpecSource::read(&path).unwrap();
+        source.text = source.text.replace("[target.budget]\n", &format!("[target.budget]\n{budget}\n"));
+        compile_source(source).unwrap()
+    }
+
+    fn estimate(worst: f64, shortest: f64) -> Estimate {
+        let parts = vec![("law", worst)];
+        let (law, moved) = (Law::default(), Moved::default());
+        Estimate { board: "board", period: 100.0, core: 400.0, worst, parts, law, moved, shortest }
+    }
+
+    #[test]
+    fn a_budget_of_time_below_the_period_is_held_and_what_is_said_to_write_is_accepted() {
+        let (tight, tick) = (spec("time = \"40 us\""), estimate(47.3, 49.0));
+        let found = finding(&tight, &tick).unwrap();
+        assert_eq!((found.key.as_str(), found.severity), ("target.budget.time", Severity::Error));
+        assert!(found.message.contains("47.3 us") && found.message.contains("budget of 40.0 us"), "{}", found.message);
+        assert!(found.help.contains("time = \"49 us\""), "{}", found.help);
+        assert!(finding(&spec("time = \"49 us\""), &tick).is_none());
+        assert!(finding(&spec(""), &tick).is_none());
+        // Beyond the period, that is what counts.
+        let late = finding(&tight, &estimate(101.0, 104.0)).unwrap();
+        assert!(late.message.contains("the period of 100.0 us"), "{}", late.message);
+    }
 }

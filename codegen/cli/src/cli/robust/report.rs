@@ -382,7 +382,8 @@ fn quoted(text: &str) -> String {
 }
 
 /// Factors of each leg, in the order of the CSV.
-const EACH: [Factor; 5] = [Factor::Stiffness, Factor::Gain, Factor::Hysteresis, Factor::Creep, Factor::Lag];
+const EACH: [Factor; 6] =
+    [Factor::Stiffness, Factor::Gain, Factor::Hysteresis, Factor::Creep, Factor::Lag, Factor::GaugeLag];
 
 fn each(deviation: &Deviation, factor: Factor) -> [f64; 6] {
     deviation.legs.map(|leg| match factor {
@@ -390,6 +391,7 @@ fn each(deviation: &Deviation, factor: Factor) -> [f64; 6] {
         Factor::Gain => leg.gain,
         Factor::Hysteresis => leg.hysteresis,
         Factor::Creep => leg.creep,
+        Factor::GaugeLag => leg.gauge_lag,
         _ => leg.lag,
     })
 }

@@ -89,8 +89,8 @@ pub(super) fn check(model: &Model, probes: &[Probe; 6]) -> Result<Layout, Vec<Di
         skew,
         pierced,
         jacobian,
-        inverse: linear::without_dust(inverse, rows(1.0, 1.0 / lever)),
-        curvature: linear::without_dust(curvature, rows(lever, 1.0)),
+        inverse: linear::with_alike(linear::without_dust(inverse, rows(1.0, 1.0 / lever))),
+        curvature: linear::with_alike(linear::without_dust(curvature, rows(lever, 1.0))),
     })
 }
 

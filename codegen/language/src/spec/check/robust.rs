@@ -4,7 +4,7 @@ use super::in_order;
 use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 
-const RANGES: [&str; 8] = [
+const RANGES: [&str; 9] = [
     "robust.mass",
     "robust.stiffness",
     "robust.damping",
@@ -12,6 +12,7 @@ const RANGES: [&str; 8] = [
     "robust.hysteresis",
     "robust.creep",
     "robust.lag",
+    "robust.gauge_lag",
     "robust.noise",
 ];
 
