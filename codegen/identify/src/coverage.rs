@@ -59,11 +59,10 @@ pub(crate) fn check_range(record: &Record, plane: &Plane, findings: &mut Finding
         );
         return;
     }
-    if (ratio - 1.0).abs() > 0.2
-        && ((um / span - 1.0).abs() < 0.02 || sanity::look_swapped(&record.drive, &record.displacement))
-    {
-        let message =
-            format!("{found}, and the displacement covers {um:.3}, as the drive should, or has no noise on it");
+    let as_drive = (um / span - 1.0).abs() < 0.02;
+    if (ratio - 1.0).abs() > 0.2 && (as_drive || sanity::look_swapped(&record.drive, &record.displacement)) {
+        let why = if as_drive { "the span of the drive" } else { "without noise, as a command does" };
+        let message = format!("{found}, and the displacement covers {um:.3}, {why}");
         findings.add(
             codes::COLUMNS_SWAPPED,
             None,
