@@ -16,7 +16,8 @@ use embedded_hal::delay::DelayNs;
 use embedded_hal_bus::spi::ExclusiveDevice;
 use embedded_io::{Read, ReadReady, Write};
 use specgen_board::{
-    Access, Board, Desk, Exchange, Health, Noticed, PERIOD_NANOSECONDS, Probes, Schedule, Kept, Stopwatch, Visit, catch_up,
+    Access, Board, Desk, Exchange, Health, Kept, Noticed, PERIOD_NANOSECONDS, Probes, Schedule, Stopwatch, Visit,
+    catch_up,
 };
 use specgen_link::Endpoint;
 

@@ -11,7 +11,7 @@ use controller::supervised::Machine;
 use controller::supervision::READINGS_PER_LEG;
 use controller::{Config, LEGS, LegState};
 use specgen::operate::Session;
-use specgen_board::{Board, Desk, Exchange, Noticed, Kept, Stopwatch, Visit, catch_up};
+use specgen_board::{Board, Desk, Exchange, Kept, Noticed, Stopwatch, Visit, catch_up};
 use specgen_hal::{Amplifiers, Fault, Gauges};
 use specgen_link::client::{Port, Timeout};
 use specgen_link::{Endpoint, Kind, Receiver, RecorderAction, VERSION};
