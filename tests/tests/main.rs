@@ -16,6 +16,8 @@ mod identify_bad_input;
 mod identify_faults;
 mod identify_kinds;
 mod identify_measured;
+mod identify_mode;
+mod identify_open_loop;
 mod identify_rate;
 mod identify_support;
 mod identify_synthetic;

@@ -8,7 +8,7 @@ use crate::regressor::{Plane, Term};
 
 /// Running sums over Everett nodes, of one table or of several behind each other.
 pub struct Sums {
-    /// Lower triangle.
+    /// Lower triangle; empty if it is not asked for.
     gram: DMatrix<f64>,
     rhs: Vec<Vec<f64>>,
     energy: Vec<f64>,
@@ -30,6 +30,11 @@ struct BranchSums {
 impl Sums {
     /// None yet, over so many unknowns.
     pub fn new(unknowns: usize, targets: usize) -> Self {
+        Self { gram: DMatrix::zeros(unknowns, unknowns), ..Self::without_gram(unknowns, targets) }
+    }
+
+    /// The same of right-hand sides alone.
+    pub fn without_gram(unknowns: usize, targets: usize) -> Self {
         let branch = BranchSums {
             samples: 0,
             weight: 0.0,
@@ -39,7 +44,7 @@ impl Sums {
             target: vec![0.0; targets],
         };
         Self {
-            gram: DMatrix::zeros(unknowns, unknowns),
+            gram: DMatrix::zeros(0, 0),
             rhs: vec![vec![0.0; unknowns]; targets],
             energy: vec![0.0; targets],
             samples: 0,
@@ -68,7 +73,7 @@ impl Sums {
                 branch.touched.push(a);
             }
             branch.row[a] += weight * ca;
-            for &(b, cb) in row {
+            for &(b, cb) in if self.gram.is_empty() { &[] } else { row } {
                 if a >= b {
                     self.gram[(a, b)] += weight * ca * cb;
                 }
@@ -91,7 +96,7 @@ impl Sums {
                 self.rhs[k][node] -= branch.row[node] * sum * share;
             }
         }
-        for &a in &branch.touched {
+        for &a in if self.gram.is_empty() { &[] } else { branch.touched.as_slice() } {
             for &b in branch.touched.iter().take_while(|b| **b <= a) {
                 self.gram[(a, b)] -= branch.row[a] * branch.row[b] * share;
             }

@@ -11,8 +11,8 @@ use nalgebra::DMatrix;
 
 use super::forward::{kept, parts};
 use super::prepare::Prepared;
-use super::{CreepTerm, RateModel, mixed, table};
-use crate::regressor::Plane;
+use super::table::Tables;
+use super::{CreepTerm, RateModel, mixed};
 use crate::trend::Line;
 use specgen_numerics::nnls::Failure;
 
@@ -27,7 +27,8 @@ const TURNS: usize = 60;
 const WORTHWHILE: f64 = 2e-4;
 
 /// Fits creep behind the table and dead time of `start`.
-pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Result<RateModel, Failure> {
+pub(super) fn fit(tables: &Tables, start: &RateModel) -> Result<RateModel, Failure> {
+    let (plane, records) = (tables.plane, tables.records);
     let times = time_constants(records, false);
     let mut model = start.clone();
     let mut before = f64::INFINITY;
@@ -50,7 +51,7 @@ pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel) -> Re
                 target
             })
             .collect();
-        model.still = table::fit(plane, records, &targets)?;
+        model.still = tables.fit(&targets)?;
         let terms = times.iter().zip(&linear.weights);
         model.creep = kept(terms.map(|(tau, w)| CreepTerm { time_constant: *tau, weight: w / linear.scale }).collect());
     }

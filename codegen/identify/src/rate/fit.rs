@@ -3,6 +3,7 @@
 use super::joint::Shape;
 use super::normal::accumulate;
 use super::prepare::Prepared;
+use super::table::Tables;
 use super::{RateModel, creep, joint, mixed, table};
 use crate::findings::Findings;
 use crate::mode::Mode;
@@ -24,12 +25,13 @@ pub(super) fn all(
 ) -> Option<Vec<RateModel>> {
     let records: Vec<&Prepared> = chosen.iter().map(|k| &prepared[*k]).collect();
     let fitted = || -> Result<Vec<RateModel>, Failure> {
-        let still = still(plane, &records, 0.0)?;
+        let tables = Tables::new(plane, &records)?;
+        let still = still(&tables, 0.0)?;
         let dead_time = dead_time(plane, &records)?;
-        let late = self::still(plane, &records, dead_time)?;
+        let late = self::still(&tables, dead_time)?;
         let dynamic = dynamic(plane, &records, [0.0, dead_time])?;
-        let creep = creep::fit(plane, &records, &late)?;
-        let shaped = |even, mode| joint::fit(plane, &records, &late, Shape { even, mode });
+        let creep = creep::fit(&tables, &late)?;
+        let shaped = |even, mode| joint::fit(&tables, &late, Shape { even, mode });
         let even = shaped(true, None)?;
         let moved = mode.map(|mode| shaped(true, Some(mode))).transpose()?;
         Ok([still, late, dynamic, creep, even].into_iter().chain(moved).collect())
@@ -43,15 +45,9 @@ pub(super) fn all(
 }
 
 /// One table for all records behind `dead_time` (s).
-fn still(plane: &Plane, records: &[&Prepared], dead_time: f64) -> Result<RateModel, Failure> {
-    let targets: Vec<Vec<f64>> = records.iter().map(|p| p.delayed(dead_time)).collect();
-    Ok(RateModel {
-        still: table::fit(plane, records, &targets)?,
-        rate: None,
-        creep: Vec::new(),
-        inertia: None,
-        dead_time,
-    })
+fn still(tables: &Tables, dead_time: f64) -> Result<RateModel, Failure> {
+    let targets: Vec<Vec<f64>> = tables.records.iter().map(|p| p.delayed(dead_time)).collect();
+    Ok(RateModel { still: tables.fit(&targets)?, rate: None, creep: Vec::new(), inertia: None, dead_time })
 }
 
 /// The dead time (s) with which one table fits all records best, bounds of the weights aside; zero if none helps.

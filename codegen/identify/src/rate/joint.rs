@@ -9,9 +9,9 @@ use nalgebra::DMatrix;
 use super::forward::{self, kept};
 use super::prepare::Prepared;
 use super::start::Own;
-use super::{CreepTerm, Inertia, RateModel, creep, mixed, table};
+use super::table::Tables;
+use super::{CreepTerm, Inertia, RateModel, creep, mixed};
 use crate::mode::Mode;
-use crate::regressor::Plane;
 use specgen_numerics::nnls::Failure;
 
 /// What stands behind the table.
@@ -38,8 +38,7 @@ const PASSES: usize = 2;
 type Tried = (Vec<f64>, RateModel, Vec<f64>);
 
 struct Fit<'a> {
-    plane: &'a Plane,
-    records: &'a [&'a Prepared<'a>],
+    tables: &'a Tables<'a>,
     own: Vec<Own>,
     times: Vec<f64>,
     shape: Shape,
@@ -48,10 +47,11 @@ struct Fit<'a> {
 }
 
 /// Fits what `shape` says behind a table, from the table and dead time of `start` on.
-pub(super) fn fit(plane: &Plane, records: &[&Prepared], start: &RateModel, shape: Shape) -> Result<RateModel, Failure> {
+pub(super) fn fit(tables: &Tables, start: &RateModel, shape: Shape) -> Result<RateModel, Failure> {
+    let records = tables.records;
     let times = creep::time_constants(records, shape.even);
     let own = records.iter().map(|p| p.own(&times, shape.mode)).collect();
-    let fit = Fit { plane, records, own, times, shape, gain: start.still.mean_gain() };
+    let fit = Fit { tables, own, times, shape, gain: start.still.mean_gain() };
     let weights = if shape.even { 1 } else { fit.times.len() };
     let mut at = vec![0.0; weights];
     at.extend(shape.mode.map(|_| 1.0));
@@ -86,8 +86,8 @@ impl Fit<'_> {
         let mut model = RateModel { still, rate: None, creep, inertia, dead_time };
         for pass in 0..PASSES {
             let target = |(p, own): (&&Prepared, &Own)| self.target(&model, p, own, pass > 0);
-            let targets: Vec<Vec<f64>> = self.records.iter().zip(&self.own).map(target).collect();
-            model.still = table::fit(self.plane, self.records, &targets)?;
+            let targets: Vec<Vec<f64>> = self.tables.records.iter().zip(&self.own).map(target).collect();
+            model.still = self.tables.fit(&targets)?;
         }
         Ok(model)
     }
@@ -95,7 +95,7 @@ impl Fit<'_> {
     /// What the table is to give for the rest of the model to meet the record, m.
     fn target(&self, model: &RateModel, p: &Prepared, own: &Own, started: bool) -> Vec<f64> {
         let time = &p.record.time[p.first..];
-        let plain = forward::static_part(model, self.plane, p);
+        let plain = forward::static_part(model, self.tables.plane, p);
         let mut moved = vec![0.0; time.len()];
         forward::inertia(model, time, &p.record.drive[p.first..], &mut moved);
         let whole = forward::creeping(model, time, &plain);
@@ -111,9 +111,9 @@ impl Fit<'_> {
 
     /// Error of each sample as a share of its record's range and size.
     fn left(&self, model: &RateModel) -> Vec<f64> {
-        let each = self.records.iter().zip(&self.own).flat_map(|(p, own)| {
+        let each = self.tables.records.iter().zip(&self.own).flat_map(|(p, own)| {
             let time = &p.record.time[p.first..];
-            let mut y = forward::creeping(model, time, &forward::static_part(model, self.plane, p));
+            let mut y = forward::creeping(model, time, &forward::static_part(model, self.tables.plane, p));
             forward::inertia(model, time, &p.record.drive[p.first..], &mut y);
             let mut left = p.delayed(model.dead_time);
             left.iter_mut().zip(y).for_each(|(left, y)| *left -= y);

@@ -1,26 +1,51 @@
 //! One static table for several records at once.
 
-use super::normal::{Normal, accumulate};
+use core::cell::RefCell;
+
+use nalgebra::DMatrix;
+
+use super::normal::{accumulate, right_sides};
 use super::prepare::Prepared;
 use crate::everett::EverettTable;
 use crate::regressor::Plane;
 use crate::{normal, prior};
 use specgen_numerics::nnls::{self, Failure};
 
-/// The table that fits `targets` (m, one for each record) best.
-pub(super) fn fit(plane: &Plane, records: &[&Prepared], targets: &[Vec<f64>]) -> Result<EverettTable, Failure> {
-    let mut normal = sum(plane, records, targets).ok_or(Failure::Singular)?;
-    prior::add(plane.grid, &mut normal.gram);
-    // To order one: the tolerances of the solver are relative, and so small weights keep their digits.
-    let scale = 1.0 / size(&normal.rhs[0]);
-    let rhs: Vec<f64> = normal.rhs[0].iter().map(|b| b * scale).collect();
-    Ok(normal::table_of(plane, &nnls::solve(&normal.gram, &rhs)?.weights, 1.0 / scale))
+/// Tables for the same drives and one displacement after the other: what only depends on the drives is kept.
+pub(super) struct Tables<'a> {
+    pub(super) plane: &'a Plane,
+    pub(super) records: &'a [&'a Prepared<'a>],
+    gram: DMatrix<f64>,
+    /// The weights found last.
+    near: RefCell<Vec<f64>>,
 }
 
-/// Sum of the normal equations of the records, with one target each and none of the second table.
-fn sum(plane: &Plane, records: &[&Prepared], targets: &[Vec<f64>]) -> Option<Normal> {
-    let each = records.iter().zip(targets).map(|(p, y)| accumulate(plane, p, core::slice::from_ref(y), None));
-    each.reduce(|sum, more| sum.add(&more))
+impl<'a> Tables<'a> {
+    /// Of these records.
+    pub(super) fn new(plane: &'a Plane, records: &'a [&'a Prepared<'a>]) -> Result<Self, Failure> {
+        let each = records.iter().map(|p| accumulate(plane, p, &[], None));
+        let mut gram = each.reduce(|sum, more| sum.add(&more)).ok_or(Failure::Singular)?.gram;
+        prior::add(plane.grid, &mut gram);
+        Ok(Self { plane, records, gram, near: RefCell::default() })
+    }
+
+    /// The table that fits `targets` (m, one for each record) best.
+    pub(super) fn fit(&self, targets: &[Vec<f64>]) -> Result<EverettTable, Failure> {
+        let mut sum = vec![0.0; self.plane.nodes()];
+        for (p, y) in self.records.iter().zip(targets) {
+            let [rhs] = &right_sides(self.plane, p, core::slice::from_ref(y))[..] else {
+                return Err(Failure::Singular);
+            };
+            sum.iter_mut().zip(rhs).for_each(|(sum, b)| *sum += b);
+        }
+        // To order one: the tolerances of the solver are relative, and so small weights keep their digits.
+        let scale = 1.0 / size(&sum);
+        sum.iter_mut().for_each(|b| *b *= scale);
+        let weights = nnls::solve_from(&self.gram, &sum, &self.near.borrow())?.weights;
+        let table = normal::table_of(self.plane, &weights, 1.0 / scale);
+        self.near.replace(weights);
+        Ok(table)
+    }
 }
 
 /// Largest absolute value, not zero.

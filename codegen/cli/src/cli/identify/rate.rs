@@ -176,15 +176,12 @@ fn table(report: &RateReport) -> String {
         };
         let _ = writeln!(text, "{}: dead time {:.3} ms{creep}", option.option.name(), option.dead_time * 1e3);
     }
-    for (option, period) in
-        report.options.iter().filter_map(|o| Some((o, o.period?))).filter(|(_, period)| *period > 0.0)
-    {
-        let _ = writeln!(
-            text,
-            "{}: a controller inverts it at periods of {:.3} ms and longer; at shorter ones check refuses it",
-            option.option.name(),
-            period * 1e3
-        );
+    for (option, period) in report.options.iter().filter_map(|o| Some((o.option, o.period?))) {
+        let when = match period > 0.0 {
+            true => format!("at periods of {:.3} ms and longer; at shorter ones check refuses it", period * 1e3),
+            false => "at any period".to_owned(),
+        };
+        let _ = writeln!(text, "{}: a controller inverts it {when}", option.name());
     }
     if let Some(mode) = report.mode {
         let _ = writeln!(text, "mode: {:.1} Hz, damping ratio {:.4}", mode.frequency, mode.damping);
