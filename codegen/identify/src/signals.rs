@@ -6,9 +6,9 @@ use std::io::Read;
 use std::path::Path;
 
 use super::columns::{self, Column, LineNumbers, RECORD};
+use super::file::open_file;
 use super::findings::Findings;
 use super::reading::Reading;
-use super::record::open_file;
 use super::{sanity, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 

@@ -1,0 +1,75 @@
+//! Opens the data files that are named: as text that is kept, or to be read line by line.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::columns::foreign;
+use super::findings::Findings;
+use specgen_language::diagnostic::{Diagnostic, codes};
+
+/// Larger files whose text is kept, tables and what a spec names, are refused before they are read.
+pub const MAX_FILE_BYTES: u64 = 256 << 20;
+
+/// The text of a data file, record or table, without a byte order mark.
+///
+/// # Errors
+/// A finding if it is no regular file, cannot be read, is larger than [`MAX_FILE_BYTES`] or not UTF-8.
+pub fn read_file(path: &Path, shown_as: &str) -> Result<String, Vec<Diagnostic>> {
+    let mut findings = Findings::new(shown_as);
+    read_text(path, &mut findings).ok_or_else(|| findings.into_diagnostics())
+}
+
+/// The text of the file without a byte order mark, or `None` after the reason was reported.
+fn read_text(path: &Path, findings: &mut Findings) -> Option<String> {
+    let bytes = match read_limited(path) {
+        Ok(bytes) => bytes,
+        Err(e) => {
+            unreadable(&e, findings);
+            return None;
+        }
+    };
+    if bytes.len() as u64 > MAX_FILE_BYTES {
+        let message = format!("is larger than {} MiB", MAX_FILE_BYTES >> 20);
+        let help = "name the table that `specgen identify RECORD -o table.csv` makes of a record of any size";
+        findings.add(codes::RECORD_TOO_LARGE, None, message, help);
+        return None;
+    }
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+    if foreign::report(bytes, findings) {
+        return None;
+    }
+    let end_of_text = bytes.iter().position(|&b| b == 0);
+    let bad = std::str::from_utf8(bytes).err().map(|e| e.valid_up_to());
+    if let Some(at) = end_of_text.or(bad) {
+        let line = 1 + bytes[..at].iter().filter(|&&b| b == b'\n').count();
+        let message = format!("is not a text file in UTF-8: byte {at} is 0x{:02x}", bytes[at]);
+        findings.add(codes::RECORD_NOT_TEXT, Some(line), message, "export the record as CSV text in UTF-8");
+        return None;
+    }
+    Some(String::from_utf8_lossy(bytes).into_owned())
+}
+
+/// At most one byte more than the limit, so that a huge file or a device costs neither time nor memory.
+fn read_limited(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    regular(path)?.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+fn regular(path: &Path) -> std::io::Result<File> {
+    let file = File::open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
+    Ok(file)
+}
+
+/// A data file to read from, or `None` after the reason was reported.
+pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<File> {
+    regular(path).map_err(|e| unreadable(&e, findings)).ok()
+}
+
+fn unreadable(e: &std::io::Error, findings: &mut Findings) {
+    findings.add(codes::RECORD_IO, None, format!("cannot be read: {e}"), "name an existing CSV file");
+}
