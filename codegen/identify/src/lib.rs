@@ -39,7 +39,6 @@ mod sanity;
 mod selection;
 mod signals;
 mod staircase;
-mod start;
 pub mod states;
 mod statistics;
 pub mod stiffness;

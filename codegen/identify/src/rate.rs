@@ -19,6 +19,7 @@ pub(crate) mod forward;
 mod joint;
 mod mixed;
 mod normal;
+mod open_weight;
 pub mod period;
 pub(crate) mod predict;
 mod prepare;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::open_weight;
 use super::start::Own;
 use super::{Inertia, RateModel, forward};
 use crate::cause::{self, Cause};
@@ -16,7 +17,7 @@ use crate::regressor::Plane;
 use crate::signals::{self, Signals};
 use crate::staircase::Staircase;
 use crate::trend::{Line, rms_and_max};
-use crate::{branches, start, statistics};
+use crate::{branches, statistics};
 use specgen_language::diagnostic::{Diagnostic, codes};
 
 /// The drive may leave the range of the table by this share of it; it is held at its end there.
@@ -196,7 +197,7 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     if let Some(rate) = &below.1 {
         displacement.iter_mut().zip(later(&time, rate, model.dead_time)).for_each(|(y, r)| *y += r);
     }
-    let parts: Vec<Vec<f64>> = start::parts(&open).iter().map(|part| finish(part)).collect();
+    let parts: Vec<Vec<f64>> = open_weight::parts(&open).iter().map(|part| finish(part)).collect();
     let measured = drive.displacement.as_ref().map(|y| y[first..].to_vec());
     let settled = settled(&drive.drive, first, JUMP * (top - bottom));
     let keep: Vec<bool> = settled.iter().zip(&drive.weightless[first..]).map(|(s, w)| *s && !w).collect();
@@ -214,7 +215,9 @@ pub fn predict(model: &RateModel, drive: &Drive) -> Result<Prediction, Vec<Diagn
     let times = model.creep.iter().map(|term| term.time_constant);
     let own = Own::of(&time, keep.clone(), times, model.inertia.map(|inertia| inertia.mode));
     let slopes = match &measured {
-        Some(y) => start::slopes(&y.iter().zip(&displacement).map(|(y, p)| y - p).collect::<Vec<_>>(), &parts, &own),
+        Some(y) => {
+            open_weight::slopes(&y.iter().zip(&displacement).map(|(y, p)| y - p).collect::<Vec<_>>(), &parts, &own)
+        }
         None => vec![0.5; parts.len()],
     };
     for (slope, part) in slopes.iter().zip(&parts) {

@@ -7,8 +7,8 @@
 //! and its slopes are least squares within these bounds, with the offset and the line that the record has anyway, and with the start of creep and mode.
 //! Negative and positive saturation are the slopes 0 and 1, a demagnetised actuator is about ½.
 
-use super::rate::start::Own;
-use super::staircase::saturate;
+use super::start::Own;
+use crate::staircase::saturate;
 
 /// Parts of A.
 const PARTS: usize = 16;
