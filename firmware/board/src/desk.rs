@@ -9,9 +9,10 @@ use specgen_link::{
 };
 use specgen_runtime::wave::{self, Settings};
 
+use crate::catch_up::catch_up;
 use crate::download::{self, Download};
 use crate::exchange::{Access, Exchange};
-use crate::recording::{self, catch_up};
+use crate::recording;
 use crate::report::Probes;
 use crate::stepper::{Costs, Stepper, Stopwatch};
 

@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
 
+mod catch_up;
 mod cycle;
 mod desk;
 mod download;
@@ -25,12 +26,13 @@ mod schedule;
 mod stepper;
 mod words;
 
+pub use catch_up::catch_up;
 pub use controller::COMMAND_WORDS;
 pub use cycle::{Board, Noticed};
 pub use desk::{Desk, Visit};
 pub use exchange::{Access, Exchange, Orders};
 pub use health::{BACKGROUND_SILENCE, Health, RAMPED_DOWN};
-pub use recording::{Kept, catch_up};
+pub use recording::Kept;
 pub use report::{Probes, Report};
 pub use schedule::{Due, Schedule};
 pub use stepper::Stopwatch;

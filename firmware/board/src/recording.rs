@@ -6,8 +6,6 @@ use controller::supervised::Machine;
 use controller::{CONFIG_WORDS, Config};
 use specgen_link::{RecorderAction, RecorderStatus};
 
-use crate::exchange::{Access, Exchange};
-
 /// Most blocks. The oldest is given up when a new one begins, so many of them keep more of what was before the trigger.
 const BLOCKS: usize = 8;
 /// A block has so many times the words that it begins with, or more: settings and snapshot are not to fill the memory.
@@ -91,9 +89,14 @@ impl Kept {
         self.machine = *machine;
     }
 
+    /// Digest of the machine as it was.
+    pub(crate) fn digest(&self) -> u64 {
+        self.machine.digest()
+    }
+
     /// Words of what a block begins with, settings and state, from the `first`-th on.
     #[inline(never)]
-    fn words(&self, first: usize, words: &mut [u64; PIECE]) -> usize {
+    pub(crate) fn words(&self, first: usize, words: &mut [u64; PIECE]) -> usize {
         let left = PREAMBLE.saturating_sub(first);
         if first < CONFIG_WORDS {
             let config = self.config.to_words();
@@ -109,46 +112,5 @@ impl Kept {
 }
 
 /// Words of what a block begins with besides its header, and of a piece that is written while the tick is held off.
-const PREAMBLE: usize = RECORD_LAYOUT.config + RECORD_LAYOUT.state;
-const PIECE: usize = 32;
-
-/// Work of the background, best after each tick: keeps the machine where the recorder wants one, and writes down what is owed then.
-/// The tick is held off for each piece that is written, and for the copy: one that begins late finds the conversion over, which is a
-/// fault. So nothing is copied unless `calm` says that no tick is due meanwhile. Blocks are whole, and can be fetched, after it.
-pub fn catch_up(with: &mut Access<'_>, calm: impl Fn() -> bool) {
-    let (mut taken, mut block) = (None, false);
-    with(&mut |exchange, machine| {
-        let Exchange { recorder: Some(recorder), kept, config, .. } = exchange else { return };
-        if let (Some(want), Some(kept)) = (recorder.wants(), &mut *kept)
-            && calm()
-        {
-            kept.keep(config, machine);
-            recorder.owe(want);
-        }
-        if recorder.owes() {
-            block = recorder.owes_block();
-            taken = kept.take();
-        }
-    });
-    // Nothing owed; or another one is at it, whom this one has interrupted.
-    let Some(kept) = taken else { return };
-    let digest = kept.machine.digest();
-    let mut first = if block { 0 } else { PREAMBLE };
-    while first < PREAMBLE {
-        let mut words = [0; PIECE];
-        let count = kept.words(first, &mut words);
-        with(&mut |exchange, _| {
-            if let (Some(recorder), Some(words)) = (&mut exchange.recorder, words.get(..count)) {
-                recorder.hand_in(first, words);
-            }
-        });
-        first += count;
-    }
-    let mut kept = Some(kept);
-    with(&mut |exchange, _| {
-        exchange.kept = kept.take();
-        if let Some(recorder) = &mut exchange.recorder {
-            recorder.settle(digest);
-        }
-    });
-}
+pub(crate) const PREAMBLE: usize = RECORD_LAYOUT.config + RECORD_LAYOUT.state;
+pub(crate) const PIECE: usize = 32;

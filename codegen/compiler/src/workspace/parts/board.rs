@@ -10,6 +10,7 @@ pub const PART: Part = Part {
     with: &["hal", "link"],
     files: files! { "board":
         "Cargo.toml",
+        "src/catch_up.rs",
         "src/cycle.rs",
         "src/desk.rs",
         "src/download.rs",
