@@ -138,7 +138,8 @@ mod tests {
     fn what_is_over_is_named_with_who_takes_most_and_by_how_much_to_shrink() {
         let mut target = Target { mcu: Mcu::Mps2An500, budget: Budget::NONE };
         assert_eq!(over(&target, &used()), Vec::<String>::new());
-        target.budget = Budget { flash: Some(60_000), ram: Some(9000), stack: Some(1672), instructions: Some(4107) };
+        target.budget =
+            Budget { flash: Some(60_000), ram: Some(9000), stack: Some(1672), instructions: Some(4107), time: None };
         assert_eq!(over(&target, &used()), Vec::<String>::new());
         target.budget.instructions = Some(4000);
         assert_eq!(
