@@ -110,7 +110,7 @@ mod app {
         let noticed = Noticed { missed: due.missed, stop: local.stop.is_open() };
         (context.shared.exchange, context.shared.board).lock(|exchange, board| {
             if crate::specgen_tick(board, exchange, noticed) {
-                timer::arm(local.schedule.restart(timer::now()));
+                timer::restart(local.schedule);
             }
             exchange.report.took(due.late, timer::now().wrapping_sub(begin), local.schedule.period());
             exchange.orphaned = local.health.is_orphaned();

@@ -146,8 +146,10 @@ where
         self.delay.delay_ns(RESET_HIGH);
         self.reset.set_low().map_err(|_| Fault::Pin)?;
         self.delay.delay_ns(RESET_WAIT);
-        self.begin()?;
-        self.read().map(|_| ())
+        let read = self.begin().and_then(|()| self.read());
+        // Or what gives the edge might still be at it when a tick asks for the next one.
+        self.start.hold();
+        read.map(|_| ())
     }
 
     fn begin(&mut self) -> Result<(), Fault> {

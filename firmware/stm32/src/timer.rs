@@ -3,7 +3,8 @@
 
 use core::num::NonZeroU32;
 
-use embassy_stm32::pac::TIM2;
+use cortex_m::peripheral::NVIC;
+use embassy_stm32::pac::{Interrupt, TIM2};
 use embassy_stm32::peripherals;
 use embassy_stm32::rcc;
 use specgen_board::{PERIOD_NANOSECONDS, Schedule};
@@ -57,6 +58,16 @@ pub fn arm(next: u32) {
     if now().wrapping_sub(next) < u32::MAX / 2 {
         TIM2.egr().write(|w| w.set_ccg(0, true));
     }
+}
+
+/// After a tick that took longer than one may: the next interrupt comes one period from now, and none that came due meanwhile, in the
+/// middle of the time that the timer of CONVST and LDAC takes for this one.
+pub fn restart(schedule: &mut Schedule) {
+    arm(schedule.restart(now()));
+    acknowledge();
+    // The line has fallen by the time that the last write is read back.
+    let _ = TIM2.sr().read();
+    NVIC::unpend(Interrupt::TIM2);
 }
 
 /// Takes the interrupt back.

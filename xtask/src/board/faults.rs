@@ -147,7 +147,7 @@ fn one(trial: &Trial, name: &str, end: &End, times: &Times) -> Result<String, St
 /// A new host acknowledges once and arms.
 fn arms_again(trial: &Trial, session: &Session) -> Result<(), String> {
     let mut again = session.host(trial);
-    again.args(["acknowledge", "wait 0.2", "arm", "wait holding 600", "ramp-down", "wait disarmed 600"]);
+    again.args(["acknowledge", "wait 0.2", "arm", "wait holding 60", "ramp-down", "wait disarmed 60"]);
     match again.stdout(Stdio::null()).stderr(Stdio::null()).status() {
         Ok(status) if status.success() => Ok(()),
         _ => Err("a new host cannot arm it again".to_owned()),
