@@ -44,7 +44,7 @@ const H743: Board = Board {
     name: "board-h743",
     folder: "stm32h743",
     mcu: Mcu::Stm32H743Zi,
-    flash: 96 * 1024,
+    flash: 100 * 1024,
     ram: 44 * 1024,
     stack: 16 * 1024,
     tightly: Some(0x1_0000),

@@ -258,7 +258,7 @@ pub const SET: &[Slip] = &[
     s(Small, RECORD, Record(|text| scaled(text, 2, -1.0)), &["", "hysteresis.records"], &["sign"]),
     s(Small, RECORD, Record(|text| text.replacen("time_s", "time_ms", 1)), &["", "hysteresis.records"], &["time_s"]),
     s(Small, RECORD, Record(|text| text.replacen("displacement_um", "displacement", 1)), &["", "hysteresis.records"], &["displacement_um"]),
-    s(Small, RECORD, Record(|text| text.replace(',', ";")), &["", "hysteresis.records"], &["comma"]),
+    s(Small, RECORD, Record(|text| text.replace('.', ",")), &["", "hysteresis.records"], &["comma"]),
     s(Own, RECORD, Value("hysteresis.records", "[\"legs.csv\"]"), &["hysteresis.records"], &["file"]),
     // Given in another frame, or about another point.
     s(Own, FRAME, Value("platform.inertia", "[\"0.0898 kg m^2\", \"0.0898 kg m^2\", \"0.02 kg m^2\"]"), &["platform.inertia"], &["centre of mass"]),
