@@ -69,7 +69,7 @@ fn what_a_board_recorded_is_downloaded_and_replays_bit_for_bit() {
         line.tick(10);
     }
     let status = record(&mut client, RecorderAction::Look);
-    assert!(!status.running && status.triggered && status.ticks > 1000, "{status:?}");
+    assert!(!status.running && status.triggered && status.ticks > 800, "{status:?}");
     assert!(status.ticks >= status.capacity, "{status:?}: the ring is full");
     assert_eq!(line.phase(), Phase::Running);
     assert!(!line.with(|rig| rig.exchange.waves()), "the wave came to its end");
