@@ -164,4 +164,5 @@ fn finish(
 }
 
 #[cfg(test)]
+#[path = "record/tests/files.rs"]
 mod files;
