@@ -81,6 +81,7 @@ fn every_value_of_the_reference_is_in_si() {
         calibration: None,
         modal_damping: 0.02,
         notch_damping: Some(1.0),
+        active_damping: false,
         gains: None,
         position_gains: None,
         adaptation: None,

@@ -23,7 +23,7 @@ mod cases;
 mod rules;
 
 /// Specs below `specs/`: both kinds of controller first, each written in full; of the others, what is not as in these.
-const SPECS: [&str; 18] = [
+const SPECS: [&str; 19] = [
     "reference.toml",
     "legs.toml",
     "minimal.toml",
@@ -33,6 +33,7 @@ const SPECS: [&str; 18] = [
     "features/m4f.toml",
     "features/offset-load.toml",
     "features/platform-calibration.toml",
+    "features/platform-damping.toml",
     "features/platform-environment.toml",
     "features/platform-f32.toml",
     "features/platform-force-sensor.toml",

@@ -12,7 +12,8 @@
 //! | [`ewma_limit`], [`pcc_limit`] | Jury limits of the run-to-run laws |
 //! | [`Factor`] | Cholesky factors of large matrices, by blocks |
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
-//! | [`largest`] | where a condition ceases to hold, by bisection |
+//! | [`largest`], [`simplex`] | where a condition ceases to hold, by bisection; where a cost is least |
+//! | [`nyquist`] | sensitivity and stability of a loop of one signal |
 //! | [`Kernels`], [`displacements`], [`jacobian`], [`leg_forces`], [`pivot_ratio`] | the controller's kernels on these numbers, compiled here |
 //!
 //! A crate of its own because it is optimised for speed, which the rest of the compiler is not.
@@ -26,6 +27,7 @@ mod jury;
 mod kernels;
 mod matrix;
 pub mod nnls;
+pub mod nyquist;
 mod search;
 mod space;
 mod symmetric;
@@ -40,7 +42,7 @@ pub use form::magnitude;
 pub use jury::{ewma_limit, pcc_limit};
 pub use kernels::{Kernels, displacements, jacobian, leg_forces, pivot_ratio};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
-pub use search::largest;
+pub use search::{largest, simplex};
 pub use space::{cross, dot, norm, rotation};
 pub use symmetric::{diagonalize, generalized_modes, inverse_of_modes, symmetric_eigen};
 pub use taylor::{Expansion, Taylor, expand};

@@ -5,7 +5,7 @@ use core::f64::consts::TAU;
 use serde_json::{Value, json};
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::lower;
-use specgen_compiler::stability::platform::{Design, Law, RestDynamics, closed_loop_of};
+use specgen_compiler::stability::platform::{Design, Law, RestDynamics};
 use specgen_language::model::TaskSpace;
 use specgen_studies::reproduce::write::digits;
 
@@ -93,12 +93,12 @@ pub fn section(compiled: &Compiled, mode: u32, command: &str) -> Section {
         section = section
             .pane(&[AXES[axis]], vec![Part::Lead(lead.clone()), Part::Columns(vec![left, vec![Part::Rows(all)]])]);
     }
-    section.text("The open loop is that of the model with the sampled platform, lags of amplifiers and gauges, and notch, opened at the legs, all axes at once: its gain margin is λ = ρ/ρ̂ of the legs. The limits of the control modes are found by eigenvalues of the whole closed loop.")
+    section.text("The open loop is that of the model with the sampled platform, lags of amplifiers and gauges, notch and active damping, opened at the legs, all axes at once: its gain margin is λ = ρ/ρ̂ of the legs. The limits of the control modes are found by eigenvalues of the whole closed loop.")
 }
 
 fn bode(compiled: &Compiled, design: &Design, task: &TaskSpace, law: Law) -> Option<Vec<Vec<Chart>>> {
     let rest = RestDynamics::of(&lower::platform(&compiled.model).ok()?);
-    let closed_loop = closed_loop_of(&compiled.model, task, &rest)?;
+    let closed_loop = design.closed_loop(&compiled.model, task, &rest)?;
     let tuning = if law == Law::Position { &design.position } else { &design.combined };
     let highest = 0.45 / compiled.model.timing.period;
     let decades = libm::log10(highest / LOWEST);

@@ -14,7 +14,7 @@
 //!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T                  damping, lead
 //! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is what was really requested
 //! ```
-//! N is the modal notch. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback
+//! N is the modal notch. Active damping D(z) e, where a spec asks for it, is part of p: `specgen_runtime::damping`. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback
 //! is none and does not.
 //!
 //! Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
@@ -30,15 +30,16 @@ use crate::limits::DAC;
 use crate::notch::{modal_error, notch_error, notch_innovation};
 use crate::setpoint::SETPOINTS;
 use crate::task_space::{
-    AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH, METRES_PER_CELL,
-    MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT, WRENCH_TO_LEGS,
+    AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, DAMPING, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH,
+    METRES_PER_CELL, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT,
+    WRENCH_TO_LEGS,
 };
 use crate::tick::WRENCH_FAULT;
 use crate::{Config, LEGS, LegState, Real, State, TickInput, TickOutput, dynamics, kinematics, sensing};
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, transform};
 use specgen_runtime::setpoint::CommandKind;
-use specgen_runtime::{ControlMode, Estimate, Integral, Interaction, Law, NotchState};
+use specgen_runtime::{ControlMode, Damping, Estimate, Integral, Interaction, Law, NotchState};
 
 /// One control tick. See the module for the timing.
 pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput {
@@ -50,8 +51,9 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
 pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, input: &TickInput) -> u32 {
     let entered = enter_mode(config, state);
     let gauge_faults = sense(config, state, &input.gauge);
-    if gauge_faults == 0 {
-        learn(config, state);
+    let error = if gauge_faults == 0 { learn(config, state) } else { [0.0; 6] };
+    if config.mode().damps_modes() {
+        state.damping.act(&DAMPING, &error);
     }
     let wrench_good = take_wrench(config, state, &input.wrench);
     let damping = damping(config, state);
@@ -130,6 +132,9 @@ fn enter_mode(config: &Config, state: &mut State) -> bool {
     if mode.law() == Law::Invhys {
         state.innovation_notch = NotchState::new();
     }
+    if !mode.damps_modes() {
+        state.damping = Damping::new();
+    }
     if !mode.feeds_back() {
         state.integral = Integral::new();
         state.error_notch = NotchState::new();
@@ -175,9 +180,9 @@ pub(crate) fn sense(config: &Config, state: &mut State, gauge: &[Real; 6]) -> u3
     faults
 }
 
-/// What the readings teach: the integral of (7) and the run-to-run estimates.
+/// What the readings teach: the integral of (7) and the run-to-run estimates. Returns V⁻¹ e, the error of each mode.
 #[inline]
-pub(crate) fn learn(config: &Config, state: &mut State) {
+pub(crate) fn learn(config: &Config, state: &mut State) -> [Real; 6] {
     let mode = config.mode();
     let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
     if mode.feeds_back() {
@@ -200,6 +205,7 @@ pub(crate) fn learn(config: &Config, state: &mut State) {
         let (level, drift) = (config.level_weight(), config.drift_weight());
         Estimate::correct(&mut state.estimates, mode.law(), level, drift, &innovation);
     }
+    error
 }
 
 /// Whether the integral's growth would push a leg further beyond the limit that holds it back.
@@ -253,7 +259,7 @@ pub(crate) fn known_load(config: &Config, state: &State) -> ([Real; LEGS], [Real
     (load.displacement, each(|leg| (load.force[leg] - REST_FORCE[leg]) * COMPLIANCE))
 }
 
-/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂: m of each leg.
+/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, and what is asked for against the modes: m of each leg.
 #[inline]
 pub(crate) fn correction(config: &Config, state: &mut State) -> [Real; LEGS] {
     if config.mode().feeds_back() {
@@ -263,7 +269,7 @@ pub(crate) fn correction(config: &Config, state: &mut State) -> [Real; LEGS] {
         state.deflection = transform(&FORCE_TO_MODES, &force);
     }
     let wanted = each(|mode| state.deflection[mode] - state.estimates[mode].correction());
-    transform(&MODES_TO_LEGS, &wanted)
+    transform(&MODES_TO_LEGS, &state.damping.beside(wanted))
 }
 
 /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,

@@ -3,7 +3,7 @@
 
 //! Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics.
 
-use specgen_runtime::{Affine, Notch, Section};
+use specgen_runtime::{Affine, Notch, Resonator, Section};
 use crate::{LEGS, Real};
 
 /// T_s, s; from `timing.period`.
@@ -241,3 +241,9 @@ pub const NOTCH: Option<Notch<Real>> = Some(Notch {
         [0.0, 0.0, 0.0, 0.0, 8.688595285446508, 0.0],
     ],
 });
+
+/// Modes with active damping; from `control.active_damping`.
+pub const DAMPED: usize = 0;
+
+/// Active damping of each.
+pub const DAMPING: [Resonator<Real>; DAMPED] = [];

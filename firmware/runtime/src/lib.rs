@@ -16,6 +16,7 @@
 //! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
 //! | [`feedback`] | position feedback with anti-windup | (7) |
 //! | [`motion`] | pose, rate and acceleration | |
+//! | [`damping`] | active damping of the platform's modes | |
 //! | [`notch`] | modal notch of the feedback | |
 //! | [`transfer`] | bumpless change of mode | |
 //! | [`setpoint`] | bias, moves, trajectories, streams; user frames | section 4, trajectories |
@@ -44,6 +45,7 @@ mod choice;
 pub mod crc;
 pub mod creep;
 pub mod dac;
+pub mod damping;
 pub mod digest;
 pub mod dynamic;
 pub mod dynamics;
@@ -74,6 +76,7 @@ pub use attitude::{Attitude, Series};
 pub use crc::Crc32;
 pub use creep::{Creep, CreepEverett, CreepMemory};
 pub use dac::{CodeLimits, Dac};
+pub use damping::{Damping, Resonator};
 pub use digest::Digest;
 pub use dynamic::{DynamicEverett, DynamicMemory};
 pub use dynamics::{Affine, Load, Platform};

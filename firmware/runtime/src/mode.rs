@@ -29,6 +29,13 @@ impl ControlMode {
         !matches!(self, Self::P)
     }
 
+    /// Whether active damping, where there is any, is at work: with the feedback that it was designed beside.
+    #[inline]
+    #[must_use]
+    pub const fn damps_modes(self) -> bool {
+        matches!(self, Self::PF(_))
+    }
+
     /// Run-to-run law; `Invhys` where nothing adapts.
     #[inline]
     #[must_use]

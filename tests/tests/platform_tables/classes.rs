@@ -54,13 +54,13 @@ impl PoseTrajectory for Circle {
 }
 
 /// Case 1 at 10 Hz and the circle, nm rms of the norm.
-fn errors(bench: &Bench) -> [f64; 2] {
+pub fn errors(bench: &Bench) -> [f64; 2] {
     let (scenario, mut controller) = (bench.scenario(), bench.controller());
     let paths: [&dyn PoseTrajectory; 2] = [&PaperPose::corrected(PaperPath::Case1, 10.0), &Circle];
     paths.map(|path| scenario.run(&mut controller, path).unwrap().errors.rms_translation_nm())
 }
 
-fn bouc_wen(name: &str, edits: &[(&str, &str)]) -> Bench {
+pub fn bouc_wen(name: &str, edits: &[(&str, &str)]) -> Bench {
     let legs = Specimen::within_tolerances(&PlatformParameters::reference(), &LegParameters::bouc_wen(), 1);
     Bench::new(name, legs, edits)
 }

@@ -5,7 +5,7 @@ use host_sim::platform::rig::{Noise, Record, RunOptions};
 use host_sim::platform::{PlatformScenario, Specimen};
 use host_sim::trajectory::{PoseTarget, PoseTrajectory};
 use specgen::lower::platform;
-use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning, closed_loop_of};
+use specgen::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning};
 
 use specgen_tests::length;
 
@@ -88,10 +88,10 @@ fn largest(holds: impl Fn(f64) -> bool, highest: f64) -> f64 {
     (low * high).sqrt()
 }
 
-fn closed_loop(bench: &Bench) -> ClosedLoop {
+pub fn closed_loop(bench: &Bench) -> ClosedLoop {
     let model = &bench.emitted.compiled.model;
     let rest = RestDynamics::of(&platform(model).expect("it compiled"));
-    closed_loop_of(model, model.task_space.as_ref().expect("[control]"), &rest).expect("it has modes")
+    bench.design().closed_loop(model, model.task_space.as_ref().expect("[control]"), &rest).expect("it has modes")
 }
 
 /// Predicted and simulated factors on a tuning at which a law becomes unstable.

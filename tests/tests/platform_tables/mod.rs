@@ -5,6 +5,7 @@
 mod behaviour;
 pub mod bench;
 mod classes;
+mod damping;
 mod limits;
 mod oracle;
 mod tables;

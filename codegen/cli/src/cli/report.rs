@@ -246,7 +246,7 @@ fn evidence_of(compiled: &Compiled, built: &Built, name: &str) -> Result<Vec<Sec
     if let Some(design) = &compiled.design {
         let modes = Section::new("modes", "Modes", &check).table(evidence::modes(design));
         sections.push(modes.text(
-            "The sampled closed loop has the platform's modes, lags of amplifiers and gauges, and notch, over the declared gain_ratio.",
+            "The sampled closed loop has the platform's modes, lags of amplifiers and gauges, notch and active damping, over the declared gain_ratio.",
         ));
     }
     sections.extend([

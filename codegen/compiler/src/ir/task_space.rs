@@ -98,6 +98,8 @@ pub struct ControlLaw {
     pub bias: [f64; 6],
     /// Modal notch, if declared.
     pub notch: Option<Notch>,
+    /// Active damping of each mode, if declared.
+    pub damping: Option<[Resonator; 6]>,
 }
 
 /// Six biquads in modal coordinates.
@@ -116,6 +118,15 @@ pub struct Notch {
 pub struct Section {
     /// g.
     pub depth: f64,
+    /// a₁, a₂.
+    pub a: [f64; 2],
+}
+
+/// (b₀ + b₁z⁻¹ + b₂z⁻²) / (1 + a₁z⁻¹ + a₂z⁻²).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Resonator {
+    /// b₀, b₁, b₂.
+    pub b: [f64; 3],
     /// a₁, a₂.
     pub a: [f64; 2],
 }

@@ -2,7 +2,7 @@
 
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE};
 
-use crate::ir::{Actuation, ControlLaw, Notch, Permitted, Range, Scalar, Setting, State, TaskSpace};
+use crate::ir::{Actuation, ControlLaw, Notch, Permitted, Range, Resonator, Scalar, Setting, State, TaskSpace};
 use specgen_language::model::{LARGEST_GAIN, LARGEST_RUN_INTERVAL, LARGEST_TRAVEL, LARGEST_TURN};
 use specgen_numerics::Matrix6;
 
@@ -143,9 +143,11 @@ fn largest_request(law: &ControlLaw) -> f64 {
     // Environment, damping, and all that is measured or computed of the motion.
     let load = norm(&law.wrench_to_legs) * (LARGEST_GAIN * (apart + 2.0 * LARGEST) + LARGEST) + law.lead.abs() * apart;
     // A change of mode is bumpless by an offset as large as the request.
-    let request = 2.0 * (apart + load + norm(&law.modes_to_legs) * (deflection + 2.0));
+    let damping = law.damping.as_ref().map_or(0.0, |sections| modal * resounds(sections));
+    let request = 2.0 * (apart + load + norm(&law.modes_to_legs) * (deflection + damping + 2.0));
     let innovation = modal + deflection + norm(&law.legs_to_modes) * 2.0 * request;
-    let largest = MARGIN * ring * innovation;
+    let filtered = ring * innovation;
+    let largest = MARGIN * if filtered > damping { filtered } else { damping };
     if largest < FINITE { largest } else { FINITE }
 }
 
@@ -162,6 +164,15 @@ fn ring(notch: &Notch) -> f64 {
     notch.sections.iter().fold(1.0, |most: f64, section| {
         let fades = 1.0 - libm::sqrt(section.a[1].abs());
         let rings = 1.0 + 8.0 * section.depth.abs() / (fades * fades);
+        if fades > 0.0 && rings > most { rings } else { most }
+    })
+}
+
+/// The same for active damping.
+fn resounds(sections: &[Resonator; 6]) -> f64 {
+    sections.iter().fold(1.0, |most: f64, Resonator { b, a }| {
+        let fades = 1.0 - libm::sqrt(a[1].abs());
+        let rings = 8.0 * (b[0].abs() + b[1].abs() + b[2].abs()) / (fades * fades);
         if fades > 0.0 && rings > most { rings } else { most }
     })
 }

@@ -1,7 +1,7 @@
 //! Constants of the control law in task space: maps at rest, modal notch, settings at start-up.
 
 use super::linear;
-use crate::ir::{ControlLaw, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Scalar, Section};
+use crate::ir::{ControlLaw, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Resonator, Scalar, Section};
 use crate::stability::platform::{self as design, Design, RestDynamics};
 use specgen_language::model::{self, Model};
 use specgen_numerics::{Matrix6, multiply6, transpose6};
@@ -64,6 +64,9 @@ pub(super) fn law(
         metres_per_cell: round(metres_per_cell),
         bias: task.setpoint.bias,
         notch,
+        damping: design.damping.as_ref().map(|damping| {
+            damping.sections.map(|section| Resonator { b: section.b.map(round), a: section.a.map(round) })
+        }),
     }
 }
 

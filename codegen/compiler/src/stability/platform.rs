@@ -9,6 +9,7 @@
 //! axial modes inside a leg, hysteresis (λ stands for it), dynamics of the gauges beyond a first-order lag.
 
 mod closed_loop;
+mod damping;
 mod law;
 mod margins;
 mod modes;
@@ -24,11 +25,12 @@ use serde::Serialize;
 use specgen_runtime::Platform;
 
 use specgen_language::diagnostic::Diagnostic;
-use specgen_language::model::{Gains, Interaction, Model, TaskSpace};
+use specgen_language::model::{AdaptationMode, Gains, Interaction, Model, TaskSpace};
 use specgen_numerics::Matrix6;
 
 pub use super::LARGEST_RADIUS;
 pub use closed_loop::{ClosedLoop, Conditions};
+pub use damping::{ActiveDamping, DampedMode};
 pub use law::{Adapting, Law, Tuning};
 pub use margins::{ClosedMode, ModeMargins};
 pub use modes::ModalBasis;
@@ -74,6 +76,8 @@ pub struct Design {
     pub lead_given: bool,
     /// On feedback, if the spec has one.
     pub notch: Option<Notch>,
+    /// Of each mode in P/F, if the spec asks for it.
+    pub damping: Option<ActiveDamping>,
     /// Ω, rad/s: level bandwidth at which EWMA alone becomes unstable.
     pub bandwidth_limit: f64,
     /// Gains and bandwidths of F and P/F, given or by the rule.
@@ -105,14 +109,16 @@ pub struct Mode {
 /// # Errors
 /// What has no modes, or is unstable in some control mode, at the key that is to blame, with a number that would do.
 pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<Design, Vec<Diagnostic>> {
-    let Some(closed_loop) = closed_loop_of(model, task, plant) else {
+    let Some(mut closed_loop) = closed_loop_of(model, task, plant) else {
         return Err(vec![refusal::no_modes(model)]);
     };
     let ratios = model.adaptation.gain_ratio;
     let limit = bandwidth_limit(&closed_loop);
     let given = task.gains.as_ref().map(gains);
     let given = rule::Given { gains: given.as_ref(), bandwidths: task.adaptation };
-    let combined = rule::combined(&closed_loop, limit, given, ratios);
+    let damping = task.active_damping.then(|| rule::damped(&mut closed_loop, limit, adapting(model)));
+    let start = damping.as_ref().map(|(_, tuning)| tuning);
+    let combined = rule::combined(&closed_loop, limit, given, start, ratios);
     let position = task.position_gains.as_ref().map_or_else(|| rule::alone(&closed_loop, limit, ratios), gains);
     refusal::check(model, task, &closed_loop, &combined, &position)?;
     let margins: Vec<ModeMargins> = Law::ALL
@@ -124,6 +130,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         .collect();
     let mut findings = refusal::thin(model, task, &closed_loop, &margins);
     findings.extend(refusal::slower_than_position(model, task, &combined, &position));
+    findings.extend(damping.as_ref().and_then(|(damping, _)| refusal::hardly_damped(model, &closed_loop, damping)));
     let basis = &closed_loop.basis;
     Ok(Design {
         modes: core::array::from_fn(|i| Mode {
@@ -135,6 +142,7 @@ pub fn design(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Result<D
         lead: lead(model, task, basis),
         lead_given: task.lead.is_some(),
         notch: closed_loop.notch.clone(),
+        damping: damping.map(|(damping, _)| damping),
         bandwidth_limit: limit,
         combined,
         position,
@@ -156,7 +164,16 @@ pub fn lead(model: &Model, task: &TaskSpace, basis: &ModalBasis) -> f64 {
     })
 }
 
-/// The loop of a spec up to its tuning; none if the platform has no six modes.
+impl Design {
+    /// The loop of the spec that this was designed for, up to its tuning; `task` is its `[control]`.
+    #[must_use]
+    pub fn closed_loop(&self, model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Option<ClosedLoop> {
+        let active_damping = self.damping.as_ref().map(|damping| damping.sections);
+        closed_loop_of(model, task, plant).map(|closed_loop| ClosedLoop { active_damping, ..closed_loop })
+    }
+}
+
+/// The loop of a spec up to tuning and active damping; none if the platform has no six modes.
 #[must_use]
 pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> Option<ClosedLoop> {
     let basis = ModalBasis::of(plant, model.actuator.axial_stiffness)?;
@@ -171,10 +188,20 @@ pub fn closed_loop_of(model: &Model, task: &TaskSpace, plant: &RestDynamics) -> 
         lag: model.amplifier.lag,
         gauge_lag: model.sensor.lag,
         notch,
+        active_damping: None,
         velocity_cutoff: task.velocity_cutoff,
         environment: task.environment.stiffness,
         measured: task.interaction == Interaction::Measured,
     })
+}
+
+/// The run-to-run law that the spec starts with.
+fn adapting(model: &Model) -> Adapting {
+    match model.adaptation.mode {
+        AdaptationMode::Invhys => Adapting::Invhys,
+        AdaptationMode::Ewma => Adapting::Ewma,
+        AdaptationMode::Pcc => Adapting::Pcc,
+    }
 }
 
 fn gains(gains: &Gains) -> Tuning {

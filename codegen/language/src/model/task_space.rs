@@ -98,6 +98,8 @@ section! {
         notch = FLAG, Default(true), "", true;
         /// Damping ratio that the notch leaves of each mode, above `modal_damping`.
         notch_damping = number(Range::above(0.0, 1.0)), Rule("1, with a notch"), "zeta_d", 1.0;
+        /// Whether each mode of the platform is damped by a second-order section on its error, in P/F: the compiler designs it together with gains and bandwidths that the spec leaves out. Needs the notch.
+        active_damping = FLAG, Default(false), "", true;
         /// First-order low-pass of the pose derivative, below half the tick rate (pi rad / period).
         velocity_cutoff = BANDWIDTH, Rule("0.6 pi rad / period"), "" ["cutoff", "velocity_filter"], "9e3 rad/s";
         /// Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words.
@@ -120,6 +122,8 @@ section! {
         /// ζ_d of the modal notch, in (0, 1] and above `modal_damping`. None: no notch.
         notch_damping: Option<f64> =
             fields.flag("control.notch")?.then(|| fields.number("control.notch_damping").unwrap_or(1.0));
+        /// Whether the modes are damped actively in P/F.
+        active_damping: bool = fields.flag("control.active_damping")?;
         /// Gains of P and F together. None: the compiler's start rule.
         gains: Option<Gains> = Gains::read(fields, "gains");
         /// Gains of P alone. None: the compiler's start rule.

@@ -3,7 +3,7 @@
 use specgen_compiler::compile::Compiled;
 use specgen_compiler::lower::platform;
 use specgen_compiler::stability::platform::{
-    Adapting, ClosedLoop, Conditions, LARGEST_RADIUS, Law, RestDynamics, Tuning, closed_loop_of,
+    Adapting, ClosedLoop, Conditions, LARGEST_RADIUS, Law, RestDynamics, Tuning,
 };
 use specgen_compiler::stability::{LegDynamics, ewma_limit, pcc_limit, spectral_radius};
 use specgen_language::model::{Adaptation, AdaptationMode, ControlMode};
@@ -57,7 +57,10 @@ impl Feasibility {
         let Some(task) = &model.task_space else { return legs() };
         // Compiling found both: neither can be missing here.
         let rest = platform(model).map(|platform| RestDynamics::of(&platform));
-        let Some(closed_loop) = rest.ok().and_then(|rest| closed_loop_of(model, task, &rest)) else { return legs() };
+        let design = compiled.design.as_ref();
+        let Some(closed_loop) = rest.ok().and_then(|rest| design?.closed_loop(model, task, &rest)) else {
+            return legs();
+        };
         // A running controller may be switched to any of them; the one of the spec is asked first.
         let adapting = match model.adaptation.mode {
             AdaptationMode::Invhys => Adapting::Invhys,

@@ -3,10 +3,11 @@
 use crate::config::Environment;
 use crate::hysteresis::{GRID, Memory};
 use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
+use crate::task_space::DAMPED;
 use crate::{LEGS, Real, limits};
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Snapshot};
-use specgen_runtime::{ControlMode, Digest, Estimate, Integral, Interaction, NotchState, Rate, Transfer};
+use specgen_runtime::{ControlMode, Damping, Digest, Estimate, Integral, Interaction, NotchState, Rate, Transfer};
 
 specgen_runtime::state! { |words|
     /// State of one leg.
@@ -38,6 +39,8 @@ specgen_runtime::state! { |words|
         pub error_notch: NotchState<Real> = NotchState::new(), part;
         /// Notch on the innovation.
         pub innovation_notch: NotchState<Real> = NotchState::new(), part;
+        /// What is asked for against the modes.
+        pub damping: Damping<Real, DAMPED> = Damping::new(), part;
         /// k_I ∫e.
         pub integral: Integral<Real> = Integral::new(), part;
         /// δ̂ and φ̂ of each mode.

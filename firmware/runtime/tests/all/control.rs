@@ -3,7 +3,7 @@
 use core::f64::consts::TAU;
 
 use specgen_runtime::feedback::winds_up;
-use specgen_runtime::{ControlMode, Estimate, Integral, Law, NotchState, Section, Transfer};
+use specgen_runtime::{ControlMode, Damping, Estimate, Integral, Law, NotchState, Resonator, Section, Transfer};
 
 /// The notch of a mode at `frequency` (Hz) by the bilinear transformation with prewarping, sampled at 10 kHz.
 fn section(frequency: f64, damping: f64, notch_damping: f64) -> Section<f64> {
@@ -55,6 +55,36 @@ fn the_notch_has_the_response_of_its_formula() {
             assert!((turn - turn.round()).abs() < 1e-6, "{mode} Hz at {frequency} Hz: {phase}, {angle}");
         }
     }
+}
+
+/// y_n = b₀x_n + b₁x_{n−1} + b₂x_{n−2} − a₁y_{n−1} − a₂y_{n−2}, by its definition, for an input without a pattern.
+#[test]
+fn active_damping_is_the_difference_equation_of_its_sections() {
+    let sections: [Resonator<f64>; 6] = std::array::from_fn(|k| {
+        let k = k as f64;
+        Resonator { b: [0.6 + 0.1 * k, -1.1 - 0.2 * k, 0.5 - 0.05 * k], a: [-1.6 + 0.2 * k, 0.8 - 0.1 * k] }
+    });
+    let mut damping = Damping::<f64, 6>::new();
+    let (mut inputs, mut outputs) = (vec![[0.0; 6]; 2], vec![[0.0; 6]; 2]);
+    for tick in 0..200_u32 {
+        let error: [f64; 6] = std::array::from_fn(|k| f64::from((tick * 37 + k as u32 * 11) % 101) * 1e-8 - 5e-7);
+        damping.act(&sections, &error);
+        inputs.push(error);
+        let (x, y) = (&inputs[inputs.len() - 3..], &outputs[outputs.len() - 2..]);
+        let expected: [f64; 6] = std::array::from_fn(|k| {
+            let Resonator { b, a } = sections[k];
+            b[0] * x[2][k] + b[1] * x[1][k] + b[2] * x[0][k] - a[0] * y[1][k] - a[1] * y[0][k]
+        });
+        for (found, expected) in damping.asked.iter().zip(&expected) {
+            assert!((found - expected).abs() < 1e-18, "tick {tick}: {found:e}, {expected:e}");
+        }
+        assert_eq!(damping.beside([1.0; 6]), damping.asked.map(|asked| 1.0 + asked));
+        outputs.push(expected);
+    }
+    // Without sections nothing is asked for, and nothing takes room.
+    let mut none = Damping::<f64, 0>::new();
+    none.act(&[], &[1.0; 6]);
+    assert_eq!((none.beside([1.0; 6]), size_of_val(&none)), ([1.0; 6], 0));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use specgen_runtime::setpoint::{Generator, LONGEST, Profile, Stop};
 use specgen_runtime::snapshot::{Field, Invalid, LARGEST, LARGEST_PLACE, Piece, Reader, Sizes, Snapshot, Writer};
 use specgen_runtime::supervisor::{Approach, Supervisor, TIMERS};
 use specgen_runtime::{
-    CreepMemory, Digest, DynamicMemory, Estimate, Integral, Motion, NotchState, Rate, ReversalMemory, Transfer,
+    CreepMemory, Damping, Digest, DynamicMemory, Estimate, Integral, Motion, NotchState, Rate, ReversalMemory, Transfer,
 };
 
 const SIZES: Sizes = Sizes { request: 32.0, reading: 8.0, stiffness: 2.0 };
@@ -139,6 +139,9 @@ fn every_word_of_the_small_states_counts() {
     let notch = NotchState::<f64>::new();
     every_word_counts(&notch, Words::default().reals(12), NotchState::digest);
     numbers_within(&notch, 0..12, SIZES.request);
+    let damping = Damping::<f64, 6>::new();
+    every_word_counts(&damping, Words::default().reals(18), Damping::digest);
+    numbers_within(&damping, 0..18, SIZES.request);
     let transfer = Transfer::<f64>::new();
     every_word_counts(&transfer, Words::default().reals(6).whole(&[1]), Transfer::digest);
     numbers_within(&transfer, 0..6, SIZES.request);

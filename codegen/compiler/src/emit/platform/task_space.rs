@@ -35,10 +35,11 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let (cells_per_metre, metres_per_cell) = (real(law.cells_per_metre), real(law.metres_per_cell));
     let lead = real(law.lead);
     let notch = law.notch.as_ref().map_or_else(|| quote! { None }, |notch| with_sections(ir, notch, &matrix));
+    let (damped, damping) = with_damping(ir, law.damping.as_ref());
     quote! {
         #![doc = " Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics."]
 
-        use specgen_runtime::{Affine, Notch, Section};
+        use specgen_runtime::{Affine, Notch, Resonator, Section};
 
         use crate::{LEGS, Real};
 
@@ -75,6 +76,10 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const METRES_PER_CELL: Real = #metres_per_cell;
         /// Notch of each mode; from `control.notch_damping`. Without one, modal coordinates are those of the pose.
         pub const NOTCH: Option<Notch<Real>> = #notch;
+        /// Modes with active damping; from `control.active_damping`.
+        pub const DAMPED: usize = #damped;
+        /// Active damping of each.
+        pub const DAMPING: [Resonator<Real>; DAMPED] = [#(#damping),*];
     }
 }
 
@@ -87,4 +92,17 @@ fn with_sections(ir: &Ir, notch: &ir::Notch, matrix: &dyn Fn(&[[f64; 6]; 6]) -> 
     quote! {
         Some(Notch { sections: [#(#sections),*], pose_to_modes: #pose_to_modes, modes_to_pose: #modes_to_pose })
     }
+}
+
+/// How many modes are damped, and the section of each.
+fn with_damping(ir: &Ir, sections: Option<&[ir::Resonator; 6]>) -> (proc_macro2::Literal, Vec<TokenStream>) {
+    let sections: Vec<TokenStream> = sections
+        .into_iter()
+        .flatten()
+        .map(|section| {
+            let (b, a) = (literal::reals(ir.scalar, &section.b), literal::reals(ir.scalar, &section.a));
+            quote! { Resonator { b: [#b], a: [#a] } }
+        })
+        .collect();
+    (proc_macro2::Literal::usize_unsuffixed(sections.len()), sections)
 }

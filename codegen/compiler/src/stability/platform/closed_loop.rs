@@ -8,7 +8,7 @@
 //! e  = N(−g) ;   s ← s + T k_I e ;   u = K⁻¹ (k_p e + s)
 //! ν  = N(g − u_last) ;   δ̂ ← δ̂ + ω1 (ν + φ̂) ;   φ̂ ← φ̂ + ω2 ν          Y − (q̂ − p) − δ̂ − φ̂ is g − u_last
 //! v  ← a v + (1 − a) (g − g_last)/T ;   p = K⁻¹ (K_w z − k_v v)          K_w: measured interaction force
-//! q̂ = u − δ̂ − φ̂ + p ;   d = λ q̂, late by the delay
+//! q̂ = u − δ̂ − φ̂ + p + D e ;   d = λ q̂, late by the delay                    D: active damping, on e before N
 //! ```
 
 use super::law::{Adapting, Law, Tuning};
@@ -55,6 +55,8 @@ pub struct ClosedLoop {
     pub gauge_lag: f64,
     /// On feedback.
     pub notch: Option<Notch>,
+    /// D of each mode in P/F, if there is active damping.
+    pub active_damping: Option<[Biquad; 6]>,
     /// Cut-off of the velocity filter, rad/s.
     pub velocity_cutoff: f64,
     /// Diagonal of K_e, N/m and N m/rad.
@@ -111,6 +113,7 @@ struct Layout {
     history: usize,
     error_notch: usize,
     innovation_notch: usize,
+    active_damping: usize,
     last_feedback: usize,
     integral: usize,
     level: usize,
@@ -125,6 +128,7 @@ struct Assembly<'a> {
     tuning: &'a Tuning,
     conditions: &'a Conditions,
     feeds_back: bool,
+    damps_modes: bool,
     adapts: bool,
     drifts: bool,
     integrating: Vec<usize>,
@@ -149,6 +153,7 @@ impl<'a> Assembly<'a> {
         let history = take(6 * libm::ceil(conditions.delay) as usize);
         let error_notch = take(notch(feeds_back));
         let innovation_notch = take(notch(adapts));
+        let active_damping = take(if of.active_damping.is_some() && law.damps_modes() { 12 } else { 0 });
         let last_feedback = take(if feeds_back && adapts { 6 } else { 0 });
         let integral = take(integrating.len());
         let level = take(if adapts { 6 } else { 0 });
@@ -159,6 +164,7 @@ impl<'a> Assembly<'a> {
             history,
             error_notch,
             innovation_notch,
+            active_damping,
             last_feedback,
             integral,
             level,
@@ -168,7 +174,19 @@ impl<'a> Assembly<'a> {
             total,
         };
         let next = Matrix::zeros(total);
-        Self { of, tuning, conditions, feeds_back, adapts, drifts, integrating, damped, layout, next }
+        Self {
+            of,
+            tuning,
+            conditions,
+            feeds_back,
+            damps_modes: law.damps_modes(),
+            adapts,
+            drifts,
+            integrating,
+            damped,
+            layout,
+            next,
+        }
     }
 
     fn matrix(mut self) -> Matrix {
@@ -178,10 +196,12 @@ impl<'a> Assembly<'a> {
         let feedback = self.feedback(&seen);
         let estimates = self.adaptation(&seen, &feedback);
         let load = self.load(&place, &seen);
+        let damping = self.active_damping(&seen);
         let request: [Signal; 6] = core::array::from_fn(|i| {
             let mut request = feedback[i].clone();
             add(&mut request, -1.0, &estimates[i]);
             add(&mut request, 1.0, &load[i]);
+            add(&mut request, 1.0, &damping[i]);
             request
         });
         self.plant(&request);
@@ -204,10 +224,14 @@ impl<'a> Assembly<'a> {
 
     /// The notch on six modal signals, its states at `first`.
     fn notched(&mut self, first: usize, input: &[Signal; 6]) -> [Signal; 6] {
-        let Some(notch) = &self.of.notch else {
-            return input.clone();
-        };
-        let sections: [Biquad; 6] = notch.sections;
+        match &self.of.notch {
+            Some(notch) => self.filtered(first, &notch.sections, input),
+            None => input.clone(),
+        }
+    }
+
+    /// Sections on six modal signals, their states at `first`.
+    fn filtered(&mut self, first: usize, sections: &[Biquad; 6], input: &[Signal; 6]) -> [Signal; 6] {
         core::array::from_fn(|i| {
             let Biquad { b, a } = sections[i];
             let (s1, s2) = (first + 2 * i, first + 2 * i + 1);
@@ -254,6 +278,15 @@ impl<'a> Assembly<'a> {
             }
         }
         feedback
+    }
+
+    /// D e, which the innovation does not see.
+    fn active_damping(&mut self, seen: &[Signal; 6]) -> [Signal; 6] {
+        let Some(sections) = self.of.active_damping.as_ref().filter(|_| self.damps_modes) else {
+            return self.zeros();
+        };
+        let minus = core::array::from_fn(|i| scaled(-1.0, &seen[i]));
+        self.filtered(self.layout.active_damping, sections, &minus)
     }
 
     /// δ̂ + φ̂ after the reading.

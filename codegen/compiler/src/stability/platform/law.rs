@@ -55,6 +55,11 @@ impl Law {
         !matches!(self, Self::Feedforward(_))
     }
 
+    /// Whether active damping is at work.
+    pub(super) fn damps_modes(self) -> bool {
+        matches!(self, Self::Combined(_))
+    }
+
     /// The estimates in use.
     pub(super) fn adapting(self) -> Adapting {
         match self {

@@ -5,9 +5,7 @@ use core::f64::consts::TAU;
 use super::closed_loop::{ClosedLoop, Conditions};
 use super::law::{Law, Tuning};
 use super::sampled::Plant;
-
-/// Re and Im.
-type Complex = [f64; 2];
+use specgen_numerics::nyquist::Complex;
 
 impl ClosedLoop {
     /// The open loop of each axis x to θz at `frequencies` (Hz, below half the tick rate), the other axes open as well: gain
@@ -65,7 +63,7 @@ impl ClosedLoop {
 }
 
 /// Gaussian elimination with the largest pivot: the columns behind the square become its inverse times themselves.
-fn solve(rows: &mut [Vec<Complex>]) {
+pub(super) fn solve(rows: &mut [Vec<Complex>]) {
     let size = rows.len();
     let square = |v: Complex| v[0] * v[0] + v[1] * v[1];
     for column in 0..size {

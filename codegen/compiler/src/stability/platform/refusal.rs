@@ -3,6 +3,7 @@
 use core::f64::consts::{PI, TAU};
 
 use super::closed_loop::{ClosedLoop, Conditions};
+use super::damping::ActiveDamping;
 use super::law::{Adapting, Law, Tuning};
 use super::margins::ModeMargins;
 use super::search::largest_stable;
@@ -20,6 +21,9 @@ const SLACK: f64 = 0.95;
 /// Below these a margin is thin.
 const THIN_GAIN: f64 = 1.5;
 const THIN_DELAY: f64 = 0.5;
+/// Above these active damping does little, or too much.
+const MOST_COMPLIANT: f64 = 0.67;
+const MOST_SENSITIVE: f64 = 2.2;
 
 /// A platform that [`super::ModalBasis`] refuses.
 pub(super) fn no_modes(model: &Model) -> Diagnostic {
@@ -265,6 +269,39 @@ pub(super) fn thin(
         ));
     }
     findings
+}
+
+/// Modes that active damping leaves as they are, or thin.
+pub(super) fn hardly_damped(model: &Model, closed_loop: &ClosedLoop, damping: &ActiveDamping) -> Option<Diagnostic> {
+    let left: Vec<String> = closed_loop
+        .basis
+        .frequencies
+        .iter()
+        .zip(&damping.modes)
+        .filter_map(|(frequency, mode)| {
+            let hertz = frequency / TAU;
+            match mode {
+                None => Some(format!("{hertz:.0} Hz (too fast for the period)")),
+                Some(mode) if mode.compliance > MOST_COMPLIANT || mode.sensitivity[1] > MOST_SENSITIVE => {
+                    Some(format!(
+                        "{hertz:.0} Hz (peak of the compliance {:.2} of that without, largest sensitivity {:.2})",
+                        mode.compliance, mode.sensitivity[1]
+                    ))
+                }
+                Some(_) => None,
+            }
+        })
+        .collect();
+    (!left.is_empty()).then(|| {
+        Diagnostic::at(
+            &model.spans,
+            &["control.active_damping", "control"],
+            codes::HARDLY_DAMPED,
+            format!("active damping does little for the modes at {}", left.join(", ")),
+            "shorten timing.period, or take an amplifier of less lag; or leave active damping out: active_damping = false"
+                .to_owned(),
+        )
+    })
 }
 
 /// P/F without estimates has its integral alone against what disturbs it, as P has; where that of P is faster, P may be the

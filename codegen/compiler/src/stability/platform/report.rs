@@ -4,6 +4,7 @@ use core::f64::consts::TAU;
 use std::fmt::Write as _;
 
 use super::Design;
+use super::damping::{ActiveDamping, DampedMode, SLOW};
 use super::law::Tuning;
 
 /// A few lines: modes, gains, and a table of margins.
@@ -29,6 +30,9 @@ pub fn describe(design: &Design) -> String {
     );
     let _ = write!(text, "{}", gains("gains", &design.combined));
     let _ = write!(text, "{}", gains("gains of P alone", &design.position));
+    if let Some(damping) = &design.damping {
+        text.push_str(&damped(design, damping));
+    }
     let touching = if design.touching { "free and touching the declared work piece" } else { "free of contact" };
     let _ = writeln!(text, "  every control mode, checked {touching}:");
     let _ = writeln!(
@@ -67,6 +71,35 @@ fn gains(name: &str, tuning: &Tuning) -> String {
     let _ = writeln!(text, "{indent}k_I {} N/(m s), N m/(rad s)", list(&tuning.integral));
     if tuning.derivative != [0.0; 6] {
         let _ = writeln!(text, "{indent}k_v {} N s/m, N m s/rad", list(&tuning.derivative));
+    }
+    text
+}
+
+/// What active damping does, mode by mode.
+fn damped(design: &Design, damping: &ActiveDamping) -> String {
+    let lowest = design.modes[0].frequency / TAU;
+    let mut text = format!(
+        "  active damping in P/F:   peak of       |S|             |S| at {:.1}, {:.1}, {:.0} Hz\n    mode                 compliance   largest   worst            (without)\n",
+        lowest / SLOW[0],
+        lowest / SLOW[1],
+        lowest / SLOW[2]
+    );
+    for (mode, found) in design.modes.iter().zip(&damping.modes) {
+        // Writing to a String cannot fail.
+        let _ = match found {
+            Some(DampedMode { compliance, sensitivity: [nominal, worst], slow, without }) => writeln!(
+                text,
+                "    {:>7.1} Hz            {compliance:>6.3} x    {nominal:>6.2}  {worst:>6.2}   {:.3} {:.3} {:.2} ({:.3} {:.3} {:.2})",
+                mode.frequency / TAU,
+                slow[0],
+                slow[1],
+                slow[2],
+                without[0],
+                without[1],
+                without[2]
+            ),
+            None => writeln!(text, "    {:>7.1} Hz   too fast for the period", mode.frequency / TAU),
+        };
     }
     text
 }

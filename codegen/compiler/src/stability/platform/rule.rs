@@ -6,6 +6,7 @@
 //! damping, free and touching the declared work piece.
 
 use super::closed_loop::{ClosedLoop, Conditions};
+use super::damping::{self, ActiveDamping};
 use super::law::{Adapting, Law, Tuning};
 use super::search::largest_stable;
 use super::{LARGEST_RADIUS, nominal_conditions};
@@ -45,19 +46,19 @@ pub fn bandwidth_limit(closed_loop: &ClosedLoop) -> f64 {
 }
 
 /// Gains and bandwidths of P/F: those given stay, the others follow the rule.
-pub(super) fn combined(closed_loop: &ClosedLoop, limit: f64, given: Given, ratios: [f64; 2]) -> Tuning {
+///
+/// With active damping what it was designed beside, `damped`, stands in place of the rule's start.
+pub(super) fn combined(
+    closed_loop: &ClosedLoop,
+    limit: f64,
+    given: Given,
+    damped: Option<&Tuning>,
+    ratios: [f64; 2],
+) -> Tuning {
     const ADAPTED: [Law; 2] = [Law::Feedforward(Adapting::Ewma), Law::Feedforward(Adapting::Pcc)];
     const CLOSED: [Law; 3] =
         [Law::Combined(Adapting::Invhys), Law::Combined(Adapting::Ewma), Law::Combined(Adapting::Pcc)];
-    let stiffness = &closed_loop.basis.axis_stiffness;
-    let level_bandwidth = limit / LEVEL;
-    let start = Tuning {
-        proportional: stiffness.map(|k| proportional(closed_loop) * k),
-        integral: stiffness.map(|k| limit / INTEGRAL * k),
-        derivative: [0.0; 6],
-        level_bandwidth,
-        drift_bandwidth: DRIFT * level_bandwidth,
-    };
+    let start = damped.copied().unwrap_or_else(|| start(closed_loop, limit));
     let fixed: &[Law] = match (given.gains.is_some(), given.bandwidths.is_some()) {
         (true, true) => return given.over(&start),
         (true, false) => &CLOSED[..1],
@@ -66,6 +67,26 @@ pub(super) fn combined(closed_loop: &ClosedLoop, limit: f64, given: Given, ratio
     };
     let free: Vec<Law> = ADAPTED.into_iter().chain(CLOSED).filter(|law| !fixed.contains(law)).collect();
     shrink(closed_loop, &free, fixed, ratios, |factor| given.over(&start.scaled(factor, factor)))
+}
+
+/// Where the rule begins.
+fn start(closed_loop: &ClosedLoop, limit: f64) -> Tuning {
+    let stiffness = &closed_loop.basis.axis_stiffness;
+    let level_bandwidth = limit / LEVEL;
+    Tuning {
+        proportional: stiffness.map(|k| proportional(closed_loop) * k),
+        integral: stiffness.map(|k| limit / INTEGRAL * k),
+        derivative: [0.0; 6],
+        level_bandwidth,
+        drift_bandwidth: DRIFT * level_bandwidth,
+    }
+}
+
+/// Puts active damping into the loop; what it is, and the gains and bandwidths that it was designed beside.
+pub(super) fn damped(closed_loop: &mut ClosedLoop, limit: f64, adapting: Adapting) -> (ActiveDamping, Tuning) {
+    let (damping, tuning) = damping::design(closed_loop, adapting, &start(closed_loop, limit));
+    closed_loop.active_damping = Some(damping.sections);
+    (damping, tuning)
 }
 
 /// Gains of P alone.

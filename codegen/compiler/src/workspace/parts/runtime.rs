@@ -17,6 +17,7 @@ pub const PART: Part = Part {
         "src/creep.rs",
         "src/dac.rs",
         "src/digest.rs",
+        "src/damping.rs",
         "src/dynamic.rs",
         "src/dynamics.rs",
         "src/dynamics/affine.rs",

@@ -108,6 +108,18 @@ pub(super) fn both_bandwidths(f: &Fields, findings: &mut Findings) -> Option<()>
 
 pub(super) fn notch(f: &Fields, findings: &mut Findings) -> Option<()> {
     there(f)?;
+    let path = "control.active_damping";
+    if f.flag(path)? && !f.flag("control.notch")? {
+        findings.add(
+            codes::ALTERNATIVES,
+            path,
+            f.span(path),
+            format!(
+                "`{path}` stands beside notch = false: it is designed beside the notch, in the coordinates of the modes"
+            ),
+            "take one of the two out".to_owned(),
+        );
+    }
     let path = "control.notch_damping";
     let damping = f.number(path)?;
     if !f.flag("control.notch")? {

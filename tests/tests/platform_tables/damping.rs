@@ -1,0 +1,102 @@
+//! Active damping of the modes: what it was designed for, by the model of the loop; and what it does to machines of both classes of
+//! legs, beside the same machines without.
+
+use host_sim::platform::rig::{Bench as Rig, Request};
+use host_sim::platform::{Specimen, WorkPart};
+use host_sim::trajectory::PoseTarget;
+use specgen::stability::platform::{Adapting, Conditions, Law};
+use specgen_tests::length;
+
+use super::bench::{Bench, PERIOD, in_parallel};
+use super::classes::{bouc_wen, errors};
+use super::limits::closed_loop;
+
+const DAMPED: (&str, &str) = ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true");
+
+#[test]
+fn every_mode_is_damped_within_the_bounds_of_the_design() {
+    let bench = Bench::new("damping-plays", Specimen::reference(), &[DAMPED]);
+    let design = bench.design();
+    for (mode, found) in design.modes.iter().zip(design.damping.as_ref().unwrap().modes) {
+        let found = found.unwrap();
+        println!("{:.1} Hz: {found:.3?}", mode.frequency / std::f64::consts::TAU);
+        assert!(found.compliance <= 0.55, "peak of the compliance");
+        assert!(found.sensitivity[1] <= 2.0, "worst |S|");
+        assert!(found.slow[1] <= 0.5, "|S| at 50 Hz");
+    }
+    let closed_loop = closed_loop(&bench);
+    for adapting in [Adapting::Invhys, Adapting::Ewma, Adapting::Pcc] {
+        for step in 0..=20 {
+            let stiffness = 0.6 + 0.05 * f64::from(step);
+            let conditions = Conditions { stiffness, ..Conditions::NOMINAL };
+            let radius = closed_loop.spectral_radius(Law::Combined(adapting), &design.combined, &conditions);
+            assert!(radius < 1.0, "stiffness x {stiffness}: {radius}");
+        }
+    }
+}
+
+/// Largest distance of the true pose from the set-point, nm, from 10 ms after a force of 1 N along x has gone; and its rms while
+/// nothing happens, nm and nrad.
+fn disturbed(bench: &Bench) -> [f64; 3] {
+    const FAR: f64 = 10e-6;
+    const REST: usize = 10_000;
+    let part = WorkPart { stiffness: [1.0 / FAR, 0.0, 0.0], tip: [0.0; 3], one_sided: false };
+    let mut controller = bench.controller();
+    let mut prepared = bench.scenario().rig().clone();
+    let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, 0).unwrap();
+    rig.arm(60.0).unwrap();
+    let ticks = |rig: &mut Rig<'_>, count: usize, target: &dyn Fn(usize) -> f64| -> Vec<[f64; 6]> {
+        (0..count)
+            .map(|tick| {
+                let mut wanted = PoseTarget::default();
+                wanted.pose[0] = target(tick);
+                let out = rig.tick(&Request::stream(wanted)).unwrap();
+                let pose = rig.rig().plant().pose();
+                std::array::from_fn(|axis| pose[axis] - out.target[axis])
+            })
+            .collect()
+    };
+    ticks(&mut rig, 4000, &|_| 0.0);
+    let rest = ticks(&mut rig, REST, &|_| 0.0);
+    rig.rig().plant_mut().touch(part);
+    ticks(&mut rig, 2000, &|tick| FAR * (tick + 1) as f64 / 2000.0);
+    ticks(&mut rig, 6000, &|_| FAR);
+    let force = rig.rig().plant().wrench().force[0];
+    assert!((force + 1.0).abs() < 0.01, "{force} N");
+    rig.rig().plant_mut().release();
+    let after = ticks(&mut rig, 1000, &|_| FAR);
+    let far = |error: &[f64; 6]| (error[0].powi(2) + error[1].powi(2) + error[2].powi(2)).sqrt() * 1e9;
+    let rms = |axes: std::ops::Range<usize>| {
+        let mean: Vec<f64> =
+            axes.clone().map(|axis| rest.iter().map(|error| error[axis]).sum::<f64>() / REST as f64).collect();
+        let square = |error: &[f64; 6]| -> f64 { axes.clone().zip(&mean).map(|(k, m)| (error[k] - m).powi(2)).sum() };
+        (rest.iter().map(square).sum::<f64>() / REST as f64).sqrt() * 1e9
+    };
+    [after[100..].iter().map(far).fold(0.0, f64::max), rms(0..3), rms(3..6)]
+}
+
+#[test]
+fn damped_machines_follow_and_hold_better_than_undamped_ones() {
+    type Make = fn() -> Bench;
+    let plays: [Make; 2] = [
+        || Bench::new("classes-plays", Specimen::reference(), &[]),
+        || Bench::new("damping-plays", Specimen::reference(), &[DAMPED]),
+    ];
+    let other: [Make; 2] = [|| bouc_wen("classes-bouc-wen", &[]), || bouc_wen("damping-bouc-wen", &[DAMPED])];
+    let cases = [("plays", plays, 19.0), ("Bouc-Wen", other, 60.0)];
+    for (name, makes, bar) in length(&cases[..1], &cases) {
+        let found = in_parallel(2, |which| {
+            let bench = makes[which as usize]();
+            (errors(&bench), disturbed(&bench))
+        });
+        for (what, ([case, circle], [ring, place, turn])) in ["without", "damped"].iter().zip(&found) {
+            println!(
+                "{name}, {what}: case 1 at 10 Hz {case:.1} nm, circle {circle:.1} nm; 10 ms after a step of 1 N {ring:.1} nm; \
+                 holding {place:.2} nm, {turn:.1} nrad"
+            );
+        }
+        let [(before, [ring, place, turn]), (after, [rung, placed, turned])] = found[..] else { unreachable!() };
+        assert!(after[0] <= *bar && after[0] < before[0], "{after:?}");
+        assert!(rung <= 10.0 && rung < ring && placed <= place && turned <= turn, "{found:?}");
+    }
+}
