@@ -51,9 +51,10 @@ pub fn step(config: &Config, state: &mut State, input: &TickInput) -> TickOutput
 pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, input: &TickInput) -> u32 {
     let entered = enter_mode(config, state);
     let gauge_faults = sense(config, state, &input.gauge);
-    let error = if gauge_faults == 0 { learn(config, state) } else { [0.0; 6] };
-    if config.mode().damps_modes() {
-        state.damping.act(&DAMPING, &error);
+    if gauge_faults == 0 {
+        learn(config, state);
+    } else {
+        state.damping.act(&DAMPING, &[0.0; 6]);
     }
     let wrench_good = take_wrench(config, state, &input.wrench);
     let damping = damping(config, state);
@@ -180,11 +181,14 @@ pub(crate) fn sense(config: &Config, state: &mut State, gauge: &[Real; 6]) -> u3
     faults
 }
 
-/// What the readings teach: the integral of (7) and the run-to-run estimates. Returns V⁻¹ e, the error of each mode.
+/// What the readings teach: the integral of (7), the run-to-run estimates, and what is asked for against the modes.
 #[inline]
-pub(crate) fn learn(config: &Config, state: &mut State) -> [Real; 6] {
+pub(crate) fn learn(config: &Config, state: &mut State) {
     let mode = config.mode();
     let error = modal_error(&difference(&state.generator.target().pose, &state.pose));
+    if mode.damps_modes() {
+        state.damping.act(&DAMPING, &error);
+    }
     if mode.feeds_back() {
         state.error = notch_error(&mut state.error_notch, &error);
         let growth = Integral::growth(&config.active_gains().integral, PERIOD, &state.error);
@@ -205,7 +209,6 @@ pub(crate) fn learn(config: &Config, state: &mut State) -> [Real; 6] {
         let (level, drift) = (config.level_weight(), config.drift_weight());
         Estimate::correct(&mut state.estimates, mode.law(), level, drift, &innovation);
     }
-    error
 }
 
 /// Whether the integral's growth would push a leg further beyond the limit that holds it back.

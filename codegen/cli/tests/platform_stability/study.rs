@@ -66,6 +66,7 @@ pub fn model() -> (Model, TaskSpace) {
         calibration: None,
         modal_damping: 0.02,
         notch_damping: Some(1.0),
+        active_damping: false,
         gains: None,
         position_gains: None,
         adaptation: None,
