@@ -9,13 +9,15 @@ use crate::task_space::DAMPED;
 use crate::{LEGS, Real, limits};
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Snapshot};
-use specgen_runtime::{ControlMode, Damping, Digest, Estimate, Integral, Interaction, NotchState, Rate, Transfer};
+use specgen_runtime::{ControlMode, Damping, Digest, Estimate, Integral, Interaction, LastLine, NotchState, Rate, Transfer};
 
 specgen_runtime::state! { |words|
     /// State of one leg.
     pub struct LegState(leg: usize) {
         /// Reversal memory of the drive that was really applied.
         pub memory: Memory = memory_at_rest(leg), part if memory.highest() <= GRID as Real;
+        /// Where on its table the leg was found last.
+        pub last: LastLine<Real> = LastLine::new(), derived;
         /// Converter code now held at the output.
         pub code: i32 = code_at_rest(), ticks(limits::CODES[1]) if *code >= limits::CODES[0];
         /// q̂ = ρ̂X: displacement really requested by the code held, in the model of the mode it was asked in, m.

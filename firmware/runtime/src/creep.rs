@@ -12,7 +12,7 @@
 //! Each state is a mean of past f with positive weights, so it stays within the reach of the table whatever is demanded.
 
 use crate::crc::Crc32;
-use crate::everett::Everett;
+use crate::everett::{Everett, LastLine};
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
 use crate::snapshot::LARGEST_PLACE;
@@ -145,6 +145,7 @@ impl<T: Real, const CAP: usize, const K: usize> CreepMemory<T, CAP, K> {
     pub fn track<const N: usize, const NODES: usize>(
         &mut self,
         _table: &CreepEverett<T, N, NODES, K>,
+        _last: &mut LastLine<T>,
         _displacement: T,
         _permitted: impl FnOnce(T) -> Option<T>,
     ) -> bool {

@@ -13,7 +13,7 @@
 //! - the rate term takes away more than half of what Γ₀ gains since the last tick. On a straight branch of slope f' the inverse
 //!   is u ← (q + Γ₁ u_last)/(f' + Γ₁), and grows from tick to tick if Γ₁ < −f'/2.
 
-use crate::everett::Everett;
+use crate::everett::{Everett, LastLine};
 use crate::memory::ReversalMemory;
 use crate::real::{Real, saturate};
 use crate::snapshot::LARGEST_PLACE;
@@ -152,6 +152,7 @@ impl<T: Real, const CAP: usize> DynamicMemory<T, CAP> {
     pub fn track<const N: usize, const NODES: usize>(
         &mut self,
         _table: &DynamicEverett<T, N, NODES>,
+        _last: &mut LastLine<T>,
         _displacement: T,
         _permitted: impl FnOnce(T) -> Option<T>,
     ) -> bool {

@@ -7,6 +7,7 @@
 //! Drives are counted in *cells* above the lowest threshold: 0 ≤ x ≤ N. Between nodes E is bilinear in square cells
 //! (uniform weight) and linear in the triangles on the diagonal (their weight is reversible).
 
+use crate::field::Field;
 use crate::real::{Real, saturate};
 
 /// Everett function of one leg: `N` × `N` cells, `NODES` = (N+1)(N+2)/2 nodes.
@@ -59,6 +60,55 @@ impl<T: Real> Line<T> {
         let length = if self.slope > T::ZERO { (value - self.base) / self.slope } else { T::ZERO };
         if RISING { self.origin + length } else { self.origin - length }
     }
+}
+
+/// The stretch on which a leg was found last, so that one that tracks within it does not look it up again: most of the ticks.
+///
+/// What it holds follows from its key and the table, which must be the same each time. So it is no part of a state: it may be empty, or of
+/// another time, and no bit changes.
+#[derive(Debug, Clone, Copy)]
+pub struct LastLine<T> {
+    /// Drive that the branch starts from, and whether it rises.
+    start: T,
+    rising: bool,
+    line: Line<T>,
+}
+
+impl<T: Real> LastLine<T> {
+    /// Of none.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { start: T::ZERO, rising: false, line: Line::END }
+    }
+
+    /// [`Everett::rising`] or [`Everett::falling`] from `start` within `cell`.
+    #[inline(always)]
+    pub(crate) fn of<const RISING: bool, const N: usize, const NODES: usize>(
+        &mut self,
+        table: &Everett<T, N, NODES>,
+        start: T,
+        cell: usize,
+    ) -> Line<T> {
+        if self.line.cell == cell && self.start == start && self.rising == RISING {
+            return self.line;
+        }
+        let line = if RISING { table.rising(start, cell) } else { table.falling(start, cell) };
+        // Within the cell where it starts a branch is found faster than it is kept.
+        if Everett::<T, N, NODES>::cell(start) != cell {
+            *self = Self { start, rising: RISING, line };
+        }
+        line
+    }
+}
+
+impl<T: Real> Default for LastLine<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<T> Field for LastLine<T> {
+    const WORDS: usize = 0;
 }
 
 /// A drive, taken apart: cell number 0..N and the place in it, 0..=1.

@@ -80,7 +80,7 @@ pub use damping::{Damping, Resonator};
 pub use digest::Digest;
 pub use dynamic::{DynamicEverett, DynamicMemory};
 pub use dynamics::{Affine, Load, Platform};
-pub use everett::Everett;
+pub use everett::{Everett, LastLine};
 pub use feedback::{Gains, Integral};
 pub use kinematics::Legs;
 pub use memory::ReversalMemory;

@@ -10,7 +10,7 @@
 //! The inverse walks the same staircase by displacement, then solves one branch ([`Everett::rise`], [`Everett::fall`]). Within
 //! a cell of the table a branch is a straight line ([`Line`]), which inverse and forward model share.
 
-use crate::everett::{Everett, Line};
+use crate::everett::{Everett, LastLine, Line};
 use crate::real::{Real, saturate};
 use crate::snapshot::{LARGEST, LARGEST_PLACE};
 
@@ -196,10 +196,12 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
 
     /// [`ReversalMemory::follow_within`] where nothing is unusual: the table reaches `displacement` (m, finite), the solution lies in the
     /// cell of the present drive, and `permitted` lets it through. Then that has been done; else nothing has changed. Returns which.
+    /// `last` is of this table and no other.
     #[inline(always)]
     pub fn track<const N: usize, const NODES: usize>(
         &mut self,
         table: &Everett<T, N, NODES>,
+        last: &mut LastLine<T>,
         displacement: T,
         permitted: impl FnOnce(T) -> Option<T>,
     ) -> bool {
@@ -209,7 +211,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
         let cell = Everett::<T, N, NODES>::cell(self.drive);
         if displacement > self.displacement {
             let (start, at_start, top) = self.start::<true>(displacement);
-            let branch = Branch { top, at_start, line: table.rising(start, cell) };
+            let branch = Branch { top, at_start, line: last.of::<true, N, NODES>(table, start, cell) };
             match branch.line.within::<true>(displacement - at_start) {
                 Some(drive) => {
                     permitted(drive).is_some_and(|drive| self.take_or_apply::<true, N, NODES>(table, &branch, drive))
@@ -218,7 +220,7 @@ impl<T: Real, const CAP: usize> ReversalMemory<T, CAP> {
             }
         } else if displacement < self.displacement {
             let (start, at_start, top) = self.start::<false>(displacement);
-            let branch = Branch { top, at_start, line: table.falling(start, cell) };
+            let branch = Branch { top, at_start, line: last.of::<false, N, NODES>(table, start, cell) };
             match branch.line.within::<false>(at_start - displacement) {
                 Some(drive) => {
                     permitted(drive).is_some_and(|drive| self.take_or_apply::<false, N, NODES>(table, &branch, drive))

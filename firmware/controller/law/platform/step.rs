@@ -288,7 +288,7 @@ pub fn actuate(config: &Config, leg: &mut LegState, table: &Table, request: Real
 fn track(config: &Config, leg: &mut LegState, table: &Table, request: Real) -> bool {
     let previous = leg.code;
     let mut code = previous;
-    let tracked = leg.memory.track(table, request, |drive| {
+    let tracked = leg.memory.track(table, &mut leg.last, request, |drive| {
         code = DAC.free_code(drive, previous, config.code_limits())?;
         Some(DAC.drive(code))
     });

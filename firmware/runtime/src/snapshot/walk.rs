@@ -4,6 +4,7 @@ use core::convert::Infallible;
 
 use super::{Choice, Invalid, LARGEST, Piece, Reader, Sizes, Snapshot, Writer};
 use crate::digest::Digest;
+use crate::field::Field;
 use crate::real::Real;
 
 /// Declares a state in one list. Each field has its type, its value at reset, and how its word or words are walked over: a method of
@@ -156,6 +157,13 @@ pub trait Words: Sized {
     #[inline]
     fn choice(&mut self, value: &impl Choice) -> Result<(), Infallible> {
         self.put(value.to_word());
+        Ok(())
+    }
+
+    /// What follows from the rest, and has no word.
+    #[inline]
+    fn derived<F: Field>(&mut self, _value: &F) -> Result<(), Infallible> {
+        const { assert!(F::WORDS == 0) };
         Ok(())
     }
 
@@ -324,6 +332,16 @@ impl Reader<'_> {
     #[inline]
     pub fn choice<C: Choice>(&mut self, value: &mut C) -> Result<(), Invalid> {
         *value = C::of_word(self.word(u64::MAX)?).ok_or(self.refused())?;
+        Ok(())
+    }
+
+    /// [`Words::derived`], left as it is.
+    ///
+    /// # Errors
+    /// Never.
+    #[inline]
+    pub fn derived<F: Field>(&mut self, _value: &mut F) -> Result<(), Invalid> {
+        const { assert!(F::WORDS == 0) };
         Ok(())
     }
 
