@@ -8,7 +8,7 @@ use specgen::model::Mcu;
 use specgen::target::checks::{self, Rules};
 use specgen::target::{build, toolchain};
 use specgen::workspace;
-use specgen_tests::{compile_edited, image_target, repository, scratch};
+use specgen_tests::{compile_edited, image_target, kept, repository};
 
 /// As of the page: the board in `examples/own-board` beside a generated folder, on an ADC of 16 bits.
 const EDITS: &[(&str, &str)] = &[("mcu = \"mps2-an500\"", "mcu = \"stm32h743zi\""), ("bits  = 17", "bits  = 16")];
@@ -18,7 +18,8 @@ const EDITS: &[(&str, &str)] = &[("mcu = \"mps2-an500\"", "mcu = \"stm32h743zi\"
 pub fn own_board_builds() {
     let Ok(toolchain) = toolchain::find() else { return };
     let compiled = compile_edited("own-board", "reference.toml", EDITS, &[]);
-    let dir = scratch("own-board");
+    let dir = kept("own-board");
+    let _ = fs::remove_dir_all(&dir);
     let files = workspace::files_with(&compiled.ir, &emit::emit(&compiled.ir), &["board"]);
     workspace::write_scratch(&dir.join("generated"), &files).unwrap();
     copy(&repository().join("examples/own-board"), &dir.join("own-board"));

@@ -209,8 +209,8 @@ fn option(found: &RateIdentified, wanted: RateOption) -> &RateModel {
     &found.models.iter().find(|(option, _)| *option == wanted).unwrap().1
 }
 
-/// What the study found holds for the emitted controller: on the reference plant (6) does not beat the static inverse, and creep
-/// with lead does at 10 Hz.
+/// What the study found holds for the emitted controller: on the reference plant (6) beats the static inverse at 1 Hz, and not at 10 Hz, nor under
+/// PCC; creep with lead does both.
 #[test]
 fn what_the_options_are_worth_on_the_reference_plant() {
     if length(true, false) {
@@ -240,7 +240,7 @@ fn what_the_options_are_worth_on_the_reference_plant() {
         assert!((ours / study - 1.0).abs() < 0.1, "{ours} against {study}");
     }
     // (6) against the static table of the same records, and against that of the slowest one under PCC.
-    assert!(dynamic[1] > still[1] && dynamic[2] > still[2], "{dynamic:?} {still:?}");
+    assert!(dynamic[1] < still[1] && dynamic[2] > still[2], "{dynamic:?} {still:?}");
     assert!(
         dynamic_pcc[2] > still_pcc[2] && dynamic_pcc[2] > slow_pcc[2],
         "{dynamic_pcc:?} {still_pcc:?} {slow_pcc:?}"

@@ -38,6 +38,8 @@ const LOCKED: [&str; 11] = [
     BOARDS[1],
     LINK_PROOF,
 ];
+/// The board of one's own beside what is generated, where the test of the boards leaves both.
+const OWN_BOARD: &str = "target/tests/boards/own-board/own-board/Cargo.toml";
 /// Its own workspace, built by a test.
 const LINK_PROOF: &str = "firmware/link/tests/proof/Cargo.toml";
 /// Its own workspace, because of its dependencies too.
@@ -83,7 +85,7 @@ pub fn setup() -> ExitCode {
 
 /// `cargo xtask test`
 pub fn test(root: &Path) -> ExitCode {
-    let mut report = Report::new(12 + LOCKED.len());
+    let mut report = Report::new(13 + LOCKED.len());
     report.step("cross compiler and QEMU", setup::microcontroller);
     let mode = Mode { tools_missing: report.has_failed(), ..Mode::default() };
     report.step("formatting", || formatting(root));
@@ -103,6 +105,13 @@ pub fn test(root: &Path) -> ExitCode {
     for manifest in LOCKED {
         report.step(&format!("lock file and licences of {manifest}"), || packages::check(root, manifest));
     }
+    report.step("lock file and licences of examples/own-board/Cargo.toml", || {
+        if root.join(OWN_BOARD).is_file() {
+            packages::check(root, OWN_BOARD)
+        } else {
+            setup::missing(format!("{OWN_BOARD} is not there; the test of the boards leaves it"))
+        }
+    });
     report.finish()
 }
 
@@ -198,30 +207,31 @@ fn formatting(root: &Path) -> Outcome {
         }
     }
     // Carried over into every controller, and a member of no package where they lie.
-    match law_files(&root.join("firmware/controller/law")) {
-        Ok(files) => {
-            let fix = format!("run: rustfmt --edition 2024 {}", files.join(" "));
-            let mut rustfmt = Command::new("rustfmt");
-            rustfmt.current_dir(root).args(["--edition", "2024", "--check"]).args(&files);
-            expect_success(rustfmt, &fix)
-        }
-        Err(error) => Outcome::Failed(format!("firmware/controller/law: {error}")),
-    }
-}
-
-fn law_files(law: &Path) -> std::io::Result<Vec<String>> {
     let mut files = Vec::new();
-    for folder in std::fs::read_dir(law)? {
-        for file in std::fs::read_dir(folder?.path())? {
-            let path = file?.path();
-            // The page of a crate lies beside them.
-            if path.extension().is_some_and(|extension| extension == "rs") {
-                files.push(path.display().to_string());
-            }
+    // And the board of one's own, whose packages stand beside it only where something was generated.
+    for folder in ["firmware/controller/law", "examples/own-board/src"] {
+        if let Err(error) = rust_files(&root.join(folder), &mut files) {
+            return Outcome::Failed(format!("{folder}: {error}"));
         }
     }
     files.sort();
-    Ok(files)
+    let fix = format!("run: rustfmt --edition 2024 {}", files.join(" "));
+    let mut rustfmt = Command::new("rustfmt");
+    rustfmt.current_dir(root).args(["--edition", "2024", "--check"]).args(&files);
+    expect_success(rustfmt, &fix)
+}
+
+/// Every file of Rust below `folder`.
+fn rust_files(folder: &Path, files: &mut Vec<String>) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() {
+            rust_files(&path, files)?;
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            files.push(path.display().to_string());
+        }
+    }
+    Ok(())
 }
 
 fn lints(root: &Path) -> Outcome {

@@ -1,10 +1,11 @@
 //! Opens the data files that are named: as text that is kept, or to be read line by line.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{Read, Seek};
 use std::path::Path;
 
 use super::columns::foreign;
+use super::container::{Kind, Lines};
 use super::findings::Findings;
 use specgen_language::diagnostic::{Diagnostic, codes};
 
@@ -65,9 +66,39 @@ fn regular(path: &Path) -> std::io::Result<File> {
     Ok(file)
 }
 
-/// A data file to read from, or `None` after the reason was reported.
-pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<File> {
-    regular(path).map_err(|e| unreadable(&e, findings)).ok()
+/// A data file to read lines from, or `None` after the reason was reported. One of MATLAB, HDF5 or TDMS is as large as a text that is
+/// kept at most; another is read as it comes.
+pub(crate) fn open_file(path: &Path, findings: &mut Findings) -> Option<Source> {
+    let (mut file, mut first) = (regular(path).map_err(|e| unreadable(&e, findings)).ok()?, Vec::new());
+    let begun = (&mut file).take(Kind::TELLING as u64).read_to_end(&mut first).and_then(|_| file.rewind());
+    let bytes = begun.and_then(|()| file.metadata()).map_err(|e| unreadable(&e, findings)).ok()?.len();
+    let Some(kind) = Kind::of(&first) else { return Some(Source::File(file)) };
+    if bytes > MAX_FILE_BYTES {
+        foreign::report_as(&first, &format!("and larger than {} MiB", MAX_FILE_BYTES >> 20), findings);
+        return None;
+    }
+    kind.open(path, bytes)
+        .map(Source::Container)
+        .map_err(|why| foreign::report_as(&first, &format!("and {why}"), findings))
+        .ok()
+}
+
+/// Where the lines of a data file come from.
+#[derive(Debug)]
+pub(crate) enum Source {
+    /// Its text.
+    File(File),
+    /// Columns that are no text.
+    Container(Lines),
+}
+
+impl Read for Source {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        match self {
+            Self::File(file) => file.read(into),
+            Self::Container(lines) => lines.read(into),
+        }
+    }
 }
 
 fn unreadable(e: &std::io::Error, findings: &mut Findings) {

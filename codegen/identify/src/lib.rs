@@ -12,6 +12,7 @@
 mod branches;
 mod cause;
 mod columns;
+mod container;
 mod coverage;
 mod dead_time;
 pub mod declared;

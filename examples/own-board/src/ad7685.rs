@@ -5,7 +5,7 @@
 //! | what | as used here |
 //! | --- | --- |
 //! | chain | SDI of a part to SDO of the next; the last one's SDO to the microcontroller, the first one's SDI to ground |
-//! | start | SCK low, SDI low at the rising edge of CNV: all parts sample, and CNV stays high until they are read |
+//! | start | SCK low, SDI low at the rising edge of CNV: all parts sample at `begin`, and CNV stays high until they are read |
 //! | conversion | 2.2 µs at most, then 1.8 µs of acquisition before the next |
 //! | SPI | mode 0 (SCK idles low): bits change at falling edges, the first is out when the conversion ends |
 //! | order | the part next to the microcontroller first, 16 bits each, MSB first, straight binary: 0 at 0 V |
@@ -56,11 +56,15 @@ impl<SPI: SpiBus, START: OutputPin, DELAY: DelayNs> Gauges for Chain<SPI, START,
     fn start(&mut self) -> Result<(), Fault> {
         self.start.set_low().map_err(|_| Fault::Pin)?;
         self.delay.delay_ns(ACQUISITION);
+        self.begin()?;
         self.read().map(|_| ())
     }
 
+    fn begin(&mut self) -> Result<(), Fault> {
+        self.start.set_high().map_err(|_| Fault::Pin)
+    }
+
     fn read(&mut self) -> Result<[i32; CHANNELS], Fault> {
-        self.start.set_high().map_err(|_| Fault::Pin)?;
         self.delay.delay_ns(CONVERSION);
         let frame = self.frame();
         self.start.set_low().map_err(|_| Fault::Pin)?;

@@ -14,7 +14,7 @@ fn read(answer: [u8; 14]) -> Result<[i32; 6], Fault> {
     let mut spi = Spi::new(&[Step::transfer_in_place(vec![0; 14], answer.to_vec()), Step::flush()]);
     let mut start = Pin::new(&[Level::set(State::High), Level::set(State::Low)]);
     let mut chain = Chain::new(spi.clone(), start.clone(), NoopDelay::new());
-    let codes = chain.read();
+    let codes = chain.begin().and_then(|()| chain.read());
     spi.done();
     start.done();
     codes
@@ -84,7 +84,7 @@ impl SpiBus for Overrun {
 fn cnv_is_low_again_after_an_error_of_the_bus() {
     let mut start = Pin::new(&[Level::set(State::High), Level::set(State::Low)]);
     let mut chain = Chain::new(Overrun, start.clone(), NoopDelay::new());
-    assert_eq!(chain.read(), Err(Fault::Bus));
+    assert_eq!(chain.begin().and_then(|()| chain.read()), Err(Fault::Bus));
     start.done();
 }
 
@@ -166,6 +166,7 @@ fn outputs_change_together_and_each_is_read_back_in_its_turn() {
     let (mut spi, mut enable) = (Spi::new(&frames(&list)), Pin::new(&[]));
     let mut dac = Dac80508::new(spi.clone(), enable.clone(), NoopDelay::new());
     for tick in 0..7 {
+        assert_eq!(dac.ask(), Ok(()));
         assert_eq!(dac.write(&codes(tick + 1).map(i32::from)), Ok(()), "tick {tick}");
     }
     spi.done();
@@ -176,10 +177,13 @@ fn outputs_change_together_and_each_is_read_back_in_its_turn() {
 fn a_part_that_holds_another_code_is_found_and_a_code_out_of_range_is_not_written() {
     let mut list = write(0, 0, [7; 6]);
     list.extend(write(1, 6, [8; 6]));
+    // Nothing asked for, nothing compared.
+    list.extend(write(2, 0xdead, [9; 6]).into_iter().skip(1));
     let (mut spi, mut enable) = (Spi::new(&frames(&list)), Pin::new(&[]));
     let mut dac = Dac80508::new(spi.clone(), enable.clone(), NoopDelay::new());
-    assert_eq!(dac.write(&[7; 6]), Ok(()));
-    assert_eq!(dac.write(&[8; 6]), Err(Fault::ReadBack));
+    assert_eq!((dac.ask(), dac.write(&[7; 6])), (Ok(()), Ok(())));
+    assert_eq!((dac.ask(), dac.write(&[8; 6])), (Ok(()), Err(Fault::ReadBack)));
+    assert_eq!(dac.write(&[9; 6]), Ok(()));
     assert_eq!(dac.write(&[0, 0, 0, 0, 0, 65_536]), Err(Fault::Code));
     assert_eq!(dac.write(&[-1, 0, 0, 0, 0, 0]), Err(Fault::Code));
     spi.done();

@@ -9,7 +9,9 @@ use crate::task_space::DAMPED;
 use crate::{LEGS, Real, limits};
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Snapshot};
-use specgen_runtime::{ControlMode, Damping, Digest, Estimate, Integral, Interaction, LastLine, NotchState, Rate, Transfer};
+use specgen_runtime::{
+    ControlMode, Damping, Digest, Estimate, Integral, Interaction, LastLine, NotchState, Rate, Transfer,
+};
 
 specgen_runtime::state! { |words|
     /// State of one leg.

@@ -1,21 +1,29 @@
 //! Active damping of the modes: what it was designed for, by the model of the loop; and what it does to machines of both classes of
 //! legs, beside the same machines without.
 
+use std::sync::OnceLock;
+
 use host_sim::platform::rig::{Bench as Rig, Request};
 use host_sim::platform::{Specimen, WorkPart};
 use host_sim::trajectory::PoseTarget;
 use specgen::stability::platform::{Adapting, Conditions, Law};
 use specgen_tests::length;
 
-use super::bench::{Bench, PERIOD, in_parallel};
+use super::bench::{Bench, PERIOD, in_parallel, reference_machine};
 use super::classes::{bouc_wen, errors};
 use super::limits::closed_loop;
 
 const DAMPED: (&str, &str) = ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true");
 
+/// The reference machine, damped.
+fn damped_machine() -> &'static Bench {
+    static BENCH: OnceLock<Bench> = OnceLock::new();
+    BENCH.get_or_init(|| Bench::new("damping-plays", Specimen::reference(), &[DAMPED]))
+}
+
 #[test]
 fn every_mode_is_damped_within_the_bounds_of_the_design() {
-    let bench = Bench::new("damping-plays", Specimen::reference(), &[DAMPED]);
+    let bench = damped_machine();
     let design = bench.design();
     for (mode, found) in design.modes.iter().zip(design.damping.as_ref().unwrap().modes) {
         let found = found.unwrap();
@@ -24,7 +32,7 @@ fn every_mode_is_damped_within_the_bounds_of_the_design() {
         assert!(found.sensitivity[1] <= 2.0, "worst |S|");
         assert!(found.slow[1] <= 0.5, "|S| at 50 Hz");
     }
-    let closed_loop = closed_loop(&bench);
+    let closed_loop = closed_loop(bench);
     for adapting in [Adapting::Invhys, Adapting::Ewma, Adapting::Pcc] {
         for step in 0..=20 {
             let stiffness = 0.6 + 0.05 * f64::from(step);
@@ -77,18 +85,18 @@ fn disturbed(bench: &Bench) -> [f64; 3] {
 
 #[test]
 fn damped_machines_follow_and_hold_better_than_undamped_ones() {
-    type Make = fn() -> Bench;
-    let plays: [Make; 2] = [
-        || Bench::new("classes-plays", Specimen::reference(), &[]),
-        || Bench::new("damping-plays", Specimen::reference(), &[DAMPED]),
-    ];
-    let other: [Make; 2] = [|| bouc_wen("classes-bouc-wen", &[]), || bouc_wen("damping-bouc-wen", &[DAMPED])];
-    let cases = [("plays", plays, 19.0), ("Bouc-Wen", other, 60.0)];
-    for (name, makes, bar) in length(&cases[..1], &cases) {
-        let found = in_parallel(2, |which| {
-            let bench = makes[which as usize]();
-            (errors(&bench), disturbed(&bench))
-        });
+    let other = || {
+        static BENCHES: OnceLock<[Bench; 2]> = OnceLock::new();
+        let [without, damped] =
+            BENCHES.get_or_init(|| [bouc_wen("classes-bouc-wen", &[]), bouc_wen("damping-bouc-wen", &[DAMPED])]);
+        [without, damped]
+    };
+    type Benches<'a> = &'a dyn Fn() -> [&'static Bench; 2];
+    let cases: [(&str, Benches<'_>, f64); 2] =
+        [("plays", &|| [reference_machine(), damped_machine()], 19.0), ("Bouc-Wen", &other, 60.0)];
+    for (name, benches, bar) in length(&cases[..1], &cases) {
+        let benches = benches();
+        let found = in_parallel(2, |which| (errors(benches[which as usize]), disturbed(benches[which as usize])));
         for (what, ([case, circle], [ring, place, turn])) in ["without", "damped"].iter().zip(&found) {
             println!(
                 "{name}, {what}: case 1 at 10 Hz {case:.1} nm, circle {circle:.1} nm; 10 ms after a step of 1 N {ring:.1} nm; \

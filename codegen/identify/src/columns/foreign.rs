@@ -5,8 +5,13 @@ use specgen_language::diagnostic::codes;
 
 /// Reports a file that is told by its first line; whether it is one.
 pub(crate) fn report(first: &[u8], findings: &mut Findings) -> bool {
+    report_as(first, "not a text file", findings)
+}
+
+/// The same, with what else is to be said of it.
+pub(crate) fn report_as(first: &[u8], more: &str, findings: &mut Findings) -> bool {
     let Some((what, help)) = told(first, findings.path()) else { return false };
-    findings.add(codes::RECORD_NOT_TEXT, Some(1), format!("is {what}, not a text file"), &help);
+    findings.add(codes::RECORD_NOT_TEXT, Some(1), format!("is {what}, {more}"), &help);
     true
 }
 

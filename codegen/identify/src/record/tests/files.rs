@@ -1,6 +1,8 @@
 //! Small files as the programs of the bench write them: each is read as the same record, or refused with a fix that is taken.
 
 use super::*;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 
 /// Time (s), drive (V), displacement (µm) of three loops of a play.
 fn rows() -> Vec<[f64; 3]> {
@@ -191,6 +193,63 @@ fn what_is_refused_says_what_is_then_taken() {
     }
 }
 
+fn containers() -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src/record/tests/containers")
+}
+
+/// As scipy, h5py and nptdms write them (`make.py` beside them): the bits of every value.
+#[test]
+fn files_of_matlab_hdf5_and_tdms_are_the_same_record() {
+    for name in ["v5.mat", "v5-plain.mat", "v7.3.mat", "record.h5", "record.tdms"] {
+        let record = read_record(&containers().join(name), name, &Reading::default())
+            .unwrap_or_else(|found| panic!("{name}: {found:#?}"));
+        let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        let wanted = |k: usize, scale: f64| rows().iter().map(|row| (row[k] * scale).to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&record.time), wanted(0, 1.0), "{name}");
+        assert_eq!(bits(&record.drive), wanted(1, 1.0), "{name}");
+        assert_eq!(bits(&record.displacement), wanted(2, 1e-6), "{name}");
+    }
+    // Other names are named as in a text.
+    let reading =
+        Reading::new(&["drive_V=displacement_um".to_owned(), "displacement_um=drive_V".to_owned()], None).unwrap();
+    let swapped = read_record(&containers().join("v5.mat"), "v5.mat", &reading).unwrap();
+    assert_eq!(swapped.drive[7].to_bits(), rows()[7][2].to_bits());
+}
+
+/// Bytes changed and files cut short: an answer that names the file's kind and the line that exports it, or a record.
+#[test]
+fn damaged_files_of_matlab_hdf5_and_tdms_are_answered() {
+    let folder = std::env::temp_dir().join(format!("specgen-containers-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(3);
+    let mut refused = 0;
+    for name in ["v5.mat", "v5-plain.mat", "v7.3.mat", "record.h5", "record.tdms"] {
+        let good = std::fs::read(containers().join(name)).unwrap();
+        for _ in 0..60 {
+            let mut bytes = good.clone();
+            for _ in 0..1 + random.next_u32() % 4 {
+                let at = 20 + random.next_u32() as usize % (bytes.len() - 20);
+                match random.next_u32() % 3 {
+                    0 => bytes[at] = random.next_u32() as u8,
+                    1 => bytes[at] = 0xff,
+                    _ => bytes.truncate(at.max(24)),
+                }
+                if bytes.len() < 40 {
+                    break;
+                }
+            }
+            let path = folder.join(name);
+            std::fs::write(&path, &bytes).unwrap();
+            if let Err(found) = read_record(&path, name, &Reading::default()) {
+                refused += 1;
+                assert!(!found.is_empty() && found.iter().all(|one| !one.help.is_empty()), "{found:?}");
+            }
+        }
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert!(refused > 50, "{refused}");
+}
+
 /// A butterfly loop, and a gauge in the column of the drive, are called what they are.
 #[test]
 fn loops_that_no_table_holds_are_named() {
@@ -220,7 +279,7 @@ fn damaged_files_are_answered() {
         file("# time_s drive_V displacement_um", |[t, u, y]| format!("{t} {u} {y}")),
         file("", |row| row.map(comma).join(",")),
     ];
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let mut random = ChaCha8Rng::seed_from_u64(7);
     let mut below = |n: usize| (random.next_u64() % n as u64) as usize;
     for round in 0..150 {
         let mut bytes = files[round % files.len()].clone().into_bytes();

@@ -1,0 +1,188 @@
+//! Records in the files of MATLAB, HDF5 and TDMS: their columns as lines of text, which are then read like those of any file.
+//!
+//! Columns are the arrays of numbers with the most values, under their names; what is shorter says something about the record and is
+//! left out. Numbers are written so that they read back to the bit.
+
+use std::fmt::Write as _;
+use std::io::{self, Read};
+use std::path::Path;
+
+use matfile::{MatFile, NumericData};
+use tdms_rs::{DataType, TdmsFile};
+
+/// Names and values.
+type Columns = Vec<(String, Vec<f64>)>;
+
+/// What a file is by its first bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// MAT-file of version 5.
+    Mat,
+    /// HDF5, as MAT-files of version 7.3 are too, behind a header of their own.
+    Hdf5,
+    /// TDMS.
+    Tdms,
+}
+
+impl Kind {
+    /// Bytes that tell.
+    pub(crate) const TELLING: usize = 19;
+
+    /// Of a file that begins with `first`.
+    pub(crate) fn of(first: &[u8]) -> Option<Self> {
+        let kinds = [
+            (&b"MATLAB 5.0 MAT-file"[..], Self::Mat),
+            (b"MATLAB 7.3 MAT-file", Self::Hdf5),
+            (b"\x89HDF\r\n\x1a\n", Self::Hdf5),
+            (b"TDSm", Self::Tdms),
+        ];
+        kinds.into_iter().find(|(magic, _)| first.starts_with(magic)).map(|(_, kind)| kind)
+    }
+
+    /// The columns of the file at `path`, `bytes` long, as lines.
+    ///
+    /// # Errors
+    /// Why there are none, in words that follow the name of the file.
+    pub(crate) fn open(self, path: &Path, bytes: u64) -> Result<Lines, String> {
+        let columns = match self {
+            Self::Mat => of_mat(path),
+            Self::Hdf5 => of_hdf5(path),
+            Self::Tdms => of_tdms(path, bytes),
+        };
+        let mut columns = columns.map_err(|error| format!("cannot be read: {error}"))?;
+        let longest = columns.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
+        columns.retain(|(_, values)| values.len() == longest);
+        if longest < 2 || columns.len() < 2 {
+            return Err("has no two arrays of numbers, one for each column".to_owned());
+        }
+        Ok(Lines::new(columns))
+    }
+}
+
+fn of_mat(path: &Path) -> Result<Columns, String> {
+    let file = std::fs::File::open(path).map_err(|error| error.to_string())?;
+    let file = MatFile::parse(io::BufReader::new(file)).map_err(|error| error.to_string())?;
+    Ok(file
+        .arrays()
+        .iter()
+        .filter(|array| is_column(array.size()))
+        .map(|array| (array.name().to_owned(), numbers(array.data())))
+        .collect())
+}
+
+/// Whether an array has one dimension that counts.
+fn is_column<N: Copy + PartialOrd + From<u8>>(size: &[N]) -> bool {
+    size.iter().filter(|length| **length > N::from(1)).count() <= 1
+}
+
+fn numbers(data: &NumericData) -> Vec<f64> {
+    match data {
+        NumericData::Double { real, .. } => real.clone(),
+        NumericData::Single { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
+        NumericData::Int8 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
+        NumericData::UInt8 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
+        NumericData::Int16 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
+        NumericData::UInt16 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
+        NumericData::Int32 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
+        NumericData::UInt32 { real, .. } => real.iter().map(|value| f64::from(*value)).collect(),
+        // Counters; beyond 2⁵³ none is exact.
+        NumericData::Int64 { real, .. } => real.iter().map(|value| *value as f64).collect(),
+        NumericData::UInt64 { real, .. } => real.iter().map(|value| *value as f64).collect(),
+    }
+}
+
+/// Datasets of the root, and of its groups where the root has no column.
+fn of_hdf5(path: &Path) -> Result<Columns, String> {
+    let said = |error: hdf5_pure::Error| error.to_string();
+    let file = hdf5_pure::File::open(path).map_err(said)?;
+    let read = |names: Vec<String>, of: &dyn Fn(&str) -> Result<hdf5_pure::Dataset, hdf5_pure::Error>| -> Columns {
+        // Texts and tables are no columns.
+        let column = |name: String| {
+            let data = of(&name).ok()?;
+            is_column(&data.shape().ok()?).then(|| data.read_f64().ok())?.map(|values| (name, values))
+        };
+        names.into_iter().filter_map(column).collect()
+    };
+    let root = file.root();
+    let mut columns = read(root.datasets().map_err(said)?, &|name| root.dataset(name));
+    if columns.iter().filter(|(_, values)| values.len() > 1).count() < 2 {
+        // What MATLAB keeps for itself begins so.
+        for name in root.groups().map_err(said)?.into_iter().filter(|name| !name.starts_with('#')) {
+            let group = file.group(&name).map_err(said)?;
+            columns.extend(read(group.datasets().map_err(said)?, &|name| group.dataset(name)));
+        }
+    }
+    Ok(columns)
+}
+
+fn of_tdms(path: &Path, bytes: u64) -> Result<Columns, String> {
+    let said = |error: tdms_rs::TdmsError| error.to_string();
+    let file = TdmsFile::open(path).map_err(said)?;
+    let mut columns = Vec::new();
+    for channel in file.groups().flat_map(|group| group.channels().collect::<Vec<_>>()) {
+        let count = channel.len();
+        // A damaged file may say any number.
+        if count as u64 > bytes {
+            return Err(format!("channel `{}` has more values than the file has bytes", channel.name()));
+        }
+        macro_rules! values {
+            ($type:ty) => {{
+                let mut values = vec![<$type>::default(); count];
+                channel.read(0..count, &mut values).map_err(said)?;
+                values.into_iter().map(|value| value as f64).collect()
+            }};
+        }
+        let values = match channel.dtype() {
+            DataType::Double => values!(f64),
+            DataType::Float => values!(f32),
+            DataType::I8 => values!(i8),
+            DataType::I16 => values!(i16),
+            DataType::I32 => values!(i32),
+            DataType::I64 => values!(i64),
+            DataType::U8 => values!(u8),
+            DataType::U16 => values!(u16),
+            DataType::U32 => values!(u32),
+            DataType::U64 => values!(u64),
+            DataType::String | DataType::Boolean | DataType::TimeStamp => continue,
+        };
+        columns.push((channel.name().to_owned(), values));
+    }
+    Ok(columns)
+}
+
+/// Columns of one length, line by line as they are read, names first.
+#[derive(Debug)]
+pub(crate) struct Lines {
+    columns: Columns,
+    next: usize,
+    line: Vec<u8>,
+    taken: usize,
+}
+
+impl Lines {
+    fn new(columns: Columns) -> Self {
+        // What separates names cannot stand in one.
+        let names: Vec<String> = columns.iter().map(|(name, _)| name.replace(['\t', '\n', '\r'], " ")).collect();
+        Self { columns, next: 0, line: (names.join("\t") + "\n").into_bytes(), taken: 0 }
+    }
+}
+
+impl Read for Lines {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        if self.taken == self.line.len() {
+            let mut text = String::new();
+            for (k, (_, values)) in self.columns.iter().enumerate() {
+                let Some(value) = values.get(self.next) else { return Ok(0) };
+                // Writing to a String cannot fail.
+                let _ = write!(text, "{}{value:?}", if k > 0 { "\t" } else { "" });
+            }
+            text.push('\n');
+            self.next += 1;
+            (self.line, self.taken) = (text.into_bytes(), 0);
+        }
+        let count = into.len().min(self.line.len() - self.taken);
+        into[..count].copy_from_slice(&self.line[self.taken..self.taken + count]);
+        self.taken += count;
+        Ok(count)
+    }
+}
