@@ -286,25 +286,37 @@ impl<'a> Code<'a> {
     }
 
     /// Every instruction of a block, up to where the next one begins.
-    fn walk(&self, block: u64, next: u64, mut each: impl FnMut(&Instruction)) -> Result<(), TargetError> {
+    fn walk(&self, block: u64, next: u64, each: impl FnMut(&Instruction)) -> Result<(), TargetError> {
         let astray = |at: u64| misread(format!("from {block:#x} the emulator went to {next:#x}, past {at:#x}"));
-        let mut at = block;
+        let (mut at, mut walked) = (block, Vec::new());
+        // Instructions before `next`, where the block goes on past it.
+        let mut within = None;
         loop {
+            if at == next && at != block {
+                within = Some(walked.len());
+            }
             let instruction = self.at(at).ok_or_else(|| astray(at))?;
-            each(&instruction);
             at += u64::from(instruction.size());
-            if instruction.ends_block() {
-                let leads = match instruction.branch() {
+            let (ends, branch) = (instruction.ends_block(), instruction.branch());
+            walked.push(instruction);
+            if ends {
+                let leads = match branch {
                     Some(Branch::Call(target) | Branch::Jump(target)) => next == target || next == at,
                     _ => true,
                 };
-                return if leads { Ok(()) } else { Err(astray(at)) };
+                if !leads {
+                    // Where its clock had something to do the emulator stops within a block, and goes on from there.
+                    walked.truncate(within.ok_or_else(|| astray(at))?);
+                }
+                break;
             }
             // A page may end here, or within the next instruction.
             if at == next && (at / PAGE != block / PAGE || (at + 2) / PAGE != block / PAGE) {
-                return Ok(());
+                break;
             }
         }
+        walked.iter().for_each(each);
+        Ok(())
     }
 }
 
@@ -356,7 +368,10 @@ mod tests {
         assert_eq!(count(0x1000, 0x1002), Some(3));
         assert_eq!(count(0x1002, 0x1006), Some(2));
         assert_eq!(count(0x1006, 0x2000), Some(1));
-        assert_eq!(count(0x1000, 0x1004), None);
+        // Cut where the emulator's clock was due: at an instruction, and nowhere else.
+        assert_eq!(count(0x1000, 0x1004), Some(2));
+        assert_eq!(count(0x1000, 0x1003), None);
+        assert_eq!(count(0x1002, 0x1008), None);
         assert_eq!(count(0x3000, 0x3002), None);
     }
 }
