@@ -77,6 +77,14 @@ pub fn of(model: &Model, ir: &Ir) -> Result<Precision, Vec<Diagnostic>> {
     tried(model, ir, 0, SAMPLES)
 }
 
+/// The same without random poses: its bounds, and what the corners of the workspace show.
+///
+/// # Errors
+/// As [`of`].
+pub fn bounds(model: &Model, ir: &Ir) -> Result<Precision, Vec<Diagnostic>> {
+    tried(model, ir, 0, 0)
+}
+
 /// The same with `samples` random poses from `seed` beside the corners.
 ///
 /// # Errors

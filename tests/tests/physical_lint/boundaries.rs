@@ -17,7 +17,7 @@ fn checked(text: &str, dir: &Path, rounding: bool) -> Vec<Diagnostic> {
         Ok(compiled) => {
             let mut findings = compiled.findings;
             if rounding {
-                let precision = precision::of(&compiled.model, &compiled.ir).expect("lowered before");
+                let precision = precision::bounds(&compiled.model, &compiled.ir).expect("lowered before");
                 findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
             }
             findings.extend(specgen::lint::estimated(&compiled.model));

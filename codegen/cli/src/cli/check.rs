@@ -64,7 +64,10 @@ struct Ratio {
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let compiled = spec::quietly(&arguments.spec, ui)?;
-    let precision = precision::of(&compiled.model, &compiled.ir)
+    // Findings come of the bounds; what was found by trial, which takes longer, is shown only where it is asked for.
+    let shown_whole = arguments.details || ui.is_json();
+    let precision = if shown_whole { precision::of } else { precision::bounds };
+    let precision = precision(&compiled.model, &compiled.ir)
         .map_err(|findings| Refused { source: Some(compiled.source.clone()), findings })?;
     let mut findings = compiled.findings.clone();
     findings.extend(precision::findings(&compiled.model, &precision, compiled.pose_noise.as_ref()));
