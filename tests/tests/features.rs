@@ -31,7 +31,9 @@ fn parse(tree: &str) -> Resolved {
     for line in tree.lines().filter(|line| !line.is_empty()) {
         // The mark of a package that its own tests lead back to.
         let (package, features) = line.trim_end_matches(" (*)").split_once('|').unwrap();
-        packages.entry(package.to_owned()).or_default().insert(features.to_owned());
+        // `default` stands for others, which are listed beside it.
+        let features = features.split(',').filter(|name| *name != "default").collect::<Vec<_>>().join(",");
+        packages.entry(package.to_owned()).or_default().insert(features);
     }
     packages
 }
@@ -51,8 +53,9 @@ fn differences(product: &Resolved, tested: &Resolved) -> Vec<String> {
 
 #[test]
 fn what_is_tested_has_the_features_of_what_is_shipped() {
-    let product = resolve(&["--edges=normal,build"]);
-    let tested = resolve(&["--workspace", "--edges=normal,build,dev"]);
+    // What a procedural macro is made of compiles nothing of the product.
+    let product = resolve(&["--edges=normal,build,no-proc-macro"]);
+    let tested = resolve(&["--workspace", "--edges=normal,build,dev,no-proc-macro"]);
     assert!(product.len() > 80 && tested.len() > product.len(), "{} and {}", product.len(), tested.len());
     let found = differences(&product, &tested);
     assert!(
