@@ -67,10 +67,14 @@ pub(super) fn largest<T: Real>(values: &[T; 6], factors: &[T; 6]) -> T {
     largest
 }
 
-/// The least n in 1..=[`LONGEST`] that is `enough`, which must hold above it too; none if there is none.
-pub(super) fn least<T: Real>(enough: impl Fn(T) -> bool) -> Option<i32> {
+/// The least n in 1..=[`LONGEST`] that is `enough`, which must hold above it too, and at the first power of two above `known`
+/// (≥ 0, or NaN where 1 is enough); none if there is none.
+pub(super) fn least<T: Real>(known: T, enough: impl Fn(T) -> bool) -> Option<i32> {
     let mut too_few = 0;
-    for bit in 0..=BITS {
+    // Halvings of LONGEST down to that power: bigger ones need no look, nor does it itself.
+    let known = known.truncate();
+    let above = if known < LONGEST { BITS + known.leading_zeros() - 31 } else { 0 };
+    for bit in above..=BITS {
         let tried = too_few + (LONGEST >> bit);
         if !enough(T::from_i32(tried)) {
             too_few = tried;
@@ -88,12 +92,14 @@ impl<T: Real> Profile<T> {
         let a = largest(delta, &limits.acceleration);
         let j = largest(delta, &limits.jerk);
         // Jerk until it has built up the full acceleration, or the full speed, or a quarter of the time is over.
-        let jerk_ticks: i32 = least(|n: T| n * a >= j || n * n * v >= j || (n * n * n) + (n * n * n) >= j)?;
+        let jerk_ticks: i32 = least(j / a, |n: T| n * a >= j || n * n * v >= j || (n * n * n) + (n * n * n) >= j)?;
         let n = T::from_i32(jerk_ticks);
         let for_jerk = j / n;
         let a = if for_jerk > a { for_jerk } else { a };
         // Then the acceleration is kept until it has built up the full speed, or half the way is done.
-        let rise_ticks: i32 = least(|m: T| m >= n && (m * v >= a || m * (m + n) >= a))?;
+        let full_speed = a / v;
+        let known = if full_speed > n { full_speed } else { n };
+        let rise_ticks: i32 = least(known, |m: T| m >= n && (m * v >= a || m * (m + n) >= a))?;
         let m = T::from_i32(rise_ticks);
         let for_acceleration = a / m;
         let span = if for_acceleration > v { for_acceleration } else { v };
@@ -154,5 +160,35 @@ impl<T: Real> Profile<T> {
             let t = T::from_i32(tick) - T::from_i32(both) * T::HALF;
             Progress { place: self.speed * t, rate: self.speed, acceleration: T::ZERO }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The search starts lower where it may, and finds the same.
+    #[test]
+    fn what_is_known_changes_no_result() {
+        let mut seed = 1_u64;
+        let mut number = |scale: f64| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            scale * ((seed >> 40) as f64 / 16_777_216.0)
+        };
+        let mut found = [0; 2];
+        for k in 0..20_000 {
+            let (a, j) = (number(1e3), number([1.0, 1e3, 1e6, 1e10][k % 4]) as f32);
+            let a = a as f32;
+            let enough = |n: f32| n * a >= j || n * n * n >= j;
+            let (all, fewer) = (least(LONGEST as f32, enough), least(j / a, enough));
+            assert_eq!(all, fewer, "{a} {j}");
+            found[usize::from(all.is_some_and(|n| n > 1))] += 1;
+        }
+        assert!(found.iter().all(|n| *n > 1000), "{found:?}");
+        for exact in [0.0, 1.0, 2.0, 3.0, 4.0, 1023.0, 1024.0, 2_097_151.0, 2_097_152.0, 2_097_153.0, f64::INFINITY] {
+            let enough = |n: f64| n >= exact;
+            assert_eq!(least(f64::INFINITY, enough), least(exact, enough), "{exact}");
+        }
+        assert_eq!(least(f64::NAN, |_| true), Some(1));
     }
 }

@@ -30,7 +30,8 @@ impl<T: Real> StopLimits<T> {
     pub fn ticks(&self, rate: &[T; 6]) -> i32 {
         let a = largest(rate, &self.acceleration) * T::from_f64(1.5);
         let j = largest(rate, &self.jerk) * T::from_f64(6.0);
-        match least(|d: T| d >= a && d * d >= j) {
+        let known = if j > a { j } else { a };
+        match least(known, |d: T| d >= a && d * d >= j) {
             Some(ticks) if ticks < self.shortest => self.shortest,
             Some(ticks) => ticks,
             None => LONGEST,
