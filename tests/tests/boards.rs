@@ -204,9 +204,6 @@ fn the_stm32h743_image_fits_and_its_tick_cannot_fail() {
 
 #[test]
 fn the_stm32f446_image_fits_and_its_tick_cannot_fail_nor_compute_doubles() {
-    if specgen_tests::length(true, false) {
-        return println!("skipped: only in the soak: the second board, whose HAL is compiled for half a minute");
-    }
     check(&F446);
 }
 

@@ -18,9 +18,13 @@ use session::{Host, Session};
 
 /// Its own workspace.
 pub const MANIFEST: &str = "tests/board/Cargo.toml";
+/// What a run takes, as cargo is told.
+type Package = [&'static str; 2];
+const TOOL: Package = ["--manifest-path", MANIFEST];
+/// By itself, its dependencies have other features than beside the tests: it is compiled once more.
+const SPECGEN: Package = ["--package", "specgen"];
 /// Where `tests/tests/boards.rs` leaves image and spec of each target.
 const TESTED: &str = "target/tests/boards";
-/// Both; the tests build the second in the soak only, whose HAL is compiled for half a minute.
 const TARGETS: [&str; 2] = ["stm32h743", "stm32f4"];
 /// In the answer to `status`.
 const STANDS: &str = "; status 0x";
@@ -52,6 +56,7 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
     };
     let (spec, target) = match *arguments {
         ["--tested"] => return Some(tested(root, with_faults)),
+        [option, ..] if option.starts_with('-') => return None,
         [spec] | [spec, "--target", "stm32h743"] => (spec, "stm32h743"),
         [spec, "--target", "stm32f4"] => (spec, "stm32f4"),
         _ => return None,
@@ -66,7 +71,7 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
         cycles,
     };
     let mut report = Report::new(3 + usize::from(with_faults));
-    report.step("the tool, the engine and specgen", || built(root));
+    report.step("the tool, the engine and specgen", || built(root, &[SPECGEN, TOOL]));
     report.step("the image", || image(&trial));
     if !report.has_failed() {
         report.step("from boot to a record that replays", || outcome(run(&trial, false)));
@@ -80,31 +85,31 @@ pub fn command(root: &Path, arguments: &[&str]) -> Option<ExitCode> {
 fn tested(root: &Path, with_faults: bool) -> ExitCode {
     let mut report = Report::new(1);
     report.step("images on the emulated board", || {
-        if with_faults { long(root) } else { each(root, &TARGETS, |trial| run(trial, true)) }
+        if with_faults { long(root) } else { each(root, &[SPECGEN, TOOL], |trial| run(trial, true)) }
     });
     report.finish()
 }
 
-/// For the test run: from boot to a record that replays, of the one image that its tests build.
+/// For the test run: from boot to a record that replays, of the images that its tests build, with the specgen that they made.
 pub fn short(root: &Path) -> Outcome {
-    each(root, &TARGETS[..1], |trial| run(trial, true))
+    each(root, &[TOOL], |trial| run(trial, true))
 }
 
 /// For the soak: with the estimate of a tick and faults, one image after the other: a host does not wait long for a board that has half a processor.
 pub fn long(root: &Path) -> Outcome {
-    each(root, &TARGETS, |trial| {
+    each(root, &[SPECGEN, TOOL], |trial| {
         run(trial, false)?;
         run(&Trial { cycles: true, ..trial.clone() }, false)?;
         faults::run(trial)
     })
 }
 
-fn each(root: &Path, targets: &[&'static str], work: impl Fn(&Trial) -> Result<(), String>) -> Outcome {
-    let prepared = built(root);
+fn each(root: &Path, packages: &[Package], work: impl Fn(&Trial) -> Result<(), String>) -> Outcome {
+    let prepared = built(root, packages);
     if !matches!(prepared, Outcome::Passed) {
         return prepared;
     }
-    for &target in targets {
+    for target in TARGETS {
         let folder = root.join(TESTED).join(target);
         let trial = Trial {
             spec: folder.join("platform.toml"),
@@ -129,11 +134,11 @@ fn outcome(result: Result<(), String>) -> Outcome {
 }
 
 /// What is built and brought before a run.
-fn built(root: &Path) -> Outcome {
+fn built(root: &Path, packages: &[Package]) -> Outcome {
     if let Err(error) = provision::engine(&mut |line| println!("{line}")) {
         return setup::missing(format!("{error}"));
     }
-    for package in [["--package", "specgen"], ["--manifest-path", MANIFEST]] {
+    for package in packages {
         let mut build = cargo(root, &[&["build", "--release", "--quiet", "--locked"], &package[..]].concat());
         // The same folder for both: what the tool depends on is among the workspace's.
         build.arg("--target-dir").arg(built_in(root));
