@@ -121,12 +121,10 @@ fn shifts(tried: &[f64]) -> Vec<Shift> {
 /// What the best fit leaves of each target, Σ of squares; `None` if the Gram matrix is not positive definite.
 pub(super) fn residuals(gram: &DMatrix<f64>, rhs: &[Vec<f64>], energy: &[f64]) -> Option<Vec<f64>> {
     let factor = Factor::of(gram.nrows(), |row, column| gram[(column, row)])?;
-    let left = rhs.iter().zip(energy).map(|(rhs, energy)| {
-        let mut solution = rhs.clone();
-        factor.solve(&mut solution);
-        solution.iter().zip(rhs).fold(*energy, |left, (w, b)| left - w * b)
-    });
-    Some(left.collect())
+    let mut solutions = rhs.to_vec();
+    factor.solve_all(&mut solutions);
+    let left = solutions.iter().zip(rhs).zip(energy);
+    Some(left.map(|((w, b), energy)| w.iter().zip(b).fold(*energy, |left, (w, b)| left - w * b)).collect())
 }
 
 /// Place of the smallest.

@@ -8,6 +8,12 @@
 const BLOCK: usize = 64;
 /// Rows and columns that are multiplied in registers.
 const TILE: usize = 4;
+/// Right-hand sides that are solved side by side.
+const LANES: usize = 8;
+/// Multiplications from which on several threads are quicker than one.
+const WORTH_A_THREAD: usize = 2_000_000;
+/// Most threads.
+const THREADS: usize = 8;
 
 /// L of A = L Lᵀ.
 #[derive(Debug, Clone, Default)]
@@ -16,13 +22,15 @@ pub struct Factor {
     rows: Vec<f64>,
     stride: usize,
     size: usize,
+    threads: usize,
 }
 
 impl Factor {
     /// An empty factor that may grow to `most` rows.
     #[must_use]
     pub fn new(most: usize) -> Self {
-        Self { rows: vec![0.0; most * most], stride: most, size: 0 }
+        let threads = std::thread::available_parallelism().map_or(1, |count| count.get().min(THREADS));
+        Self { rows: vec![0.0; most * most], stride: most, size: 0, threads }
     }
 
     /// The factor of a matrix given by its lower triangle; `None` if it is not positive definite.
@@ -91,19 +99,33 @@ impl Factor {
             }
         }
         let tiles: Vec<&[f64]> = panel.chunks_exact(TILE * width).collect();
-        for (below, left) in tiles.iter().enumerate().skip(from) {
+        let take = |below: usize, rows: &mut [f64]| {
             for (across, right) in tiles[..=below].iter().enumerate() {
-                let product = product(left, right);
+                let product = product(tiles[below], right);
                 let column = end + across * TILE;
-                for (lane, sums) in product.iter().enumerate() {
+                for ((lane, sums), own) in product.iter().enumerate().zip(rows.chunks_mut(stride)) {
                     let row = end + below * TILE + lane;
                     if row >= kept && row < size {
                         let count = TILE.min(row + 1 - column);
-                        let at = row * stride + column;
-                        self.rows[at..at + count].iter_mut().zip(sums).for_each(|(value, sum)| *value -= sum);
+                        own[column..column + count].iter_mut().zip(sums).for_each(|(value, sum)| *value -= sum);
                     }
                 }
             }
+        };
+        let below = self.rows[end * stride..size * stride].chunks_mut(TILE * stride).enumerate().skip(from);
+        let work = (size - end) * (size - kept.max(end)) * width;
+        let threads = if work < WORTH_A_THREAD { 1 } else { self.threads };
+        if threads < 2 {
+            below.for_each(|(tile, rows)| take(tile, rows));
+        } else {
+            // Row by row each sum is what one thread makes of it: how many there are changes no bit.
+            let mut shares: Vec<Vec<(usize, &mut [f64])>> = (0..threads).map(|_| Vec::new()).collect();
+            below.for_each(|(tile, rows)| shares[tile % threads].push((tile, rows)));
+            std::thread::scope(|scope| {
+                for share in shares {
+                    scope.spawn(|| share.into_iter().for_each(|(tile, rows)| take(tile, rows)));
+                }
+            });
         }
         true
     }
@@ -141,6 +163,37 @@ impl Factor {
             rest[0] /= row(k)[k];
             let x = rest[0];
             before.iter_mut().zip(row(k)).for_each(|(value, l)| *value -= l * x);
+        }
+    }
+}
+
+impl Factor {
+    /// [`Factor::solve`] for several right-hand sides, side by side: the same bits, sooner.
+    pub fn solve_all(&self, right_hand_sides: &mut [Vec<f64>]) {
+        for group in right_hand_sides.chunks_mut(LANES) {
+            let mut values = vec![[0.0; LANES]; self.size];
+            for (lane, one) in group.iter().enumerate() {
+                values.iter_mut().zip(one).for_each(|(value, b)| value[lane] = *b);
+            }
+            for k in 0..self.size {
+                let row = &self.rows[k * self.stride..=k * self.stride + k];
+                let (before, rest) = values.split_at_mut(k);
+                for (l, x) in row.iter().zip(&*before) {
+                    rest[0].iter_mut().zip(x).for_each(|(sum, x)| *sum -= l * x);
+                }
+                rest[0].iter_mut().for_each(|sum| *sum /= row[k]);
+            }
+            for k in (0..self.size).rev() {
+                let row = &self.rows[k * self.stride..=k * self.stride + k];
+                let (before, rest) = values.split_at_mut(k);
+                rest[0].iter_mut().for_each(|x| *x /= row[k]);
+                for (value, l) in before.iter_mut().zip(row) {
+                    value.iter_mut().zip(&rest[0]).for_each(|(value, x)| *value -= l * x);
+                }
+            }
+            for (lane, one) in group.iter_mut().enumerate() {
+                one.iter_mut().zip(&values).for_each(|(b, value)| *b = value[lane]);
+            }
         }
     }
 }
@@ -205,6 +258,30 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn threads_and_right_hand_sides_beside_each_other_change_no_bit() {
+        let n = 700;
+        let factored = |threads: usize| {
+            let mut factor = Factor { threads, ..Factor::new(n) };
+            assert!(factor.set(0, n, entry));
+            factor
+        };
+        let factor = factored(1);
+        let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        for threads in [2, 3, THREADS] {
+            assert_eq!(bits(&factored(threads).rows), bits(&factor.rows), "{threads} threads");
+        }
+        let mut all: Vec<Vec<f64>> =
+            (0..LANES + 3).map(|k| (0..n).map(|r| ((r * 7 + k) % 11) as f64).collect()).collect();
+        let mut each = all.clone();
+        each.iter_mut().for_each(|one| factor.solve(one));
+        factor.solve_all(&mut all);
+        for (one, other) in each.iter().zip(&all) {
+            assert_eq!(bits(one), bits(other));
+        }
+        assert_ne!(bits(&all[0]), bits(&all[1]));
     }
 
     #[test]
