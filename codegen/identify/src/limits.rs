@@ -16,6 +16,8 @@ const SKIPPED_TIME: f64 = 1.6e-3;
 const HARDLY: f64 = 0.08;
 /// Times that the travel's displacement must exceed the noise for a verdict.
 const ABOVE_NOISE: f64 = 30.0;
+/// From the lowest to the highest of the samples of a travel, noise alone comes to less than this, of its rms.
+const NOISE_EXTENT: f64 = 8.0;
 
 /// Reports every stretch on which the displacement hardly moves.
 pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displacement: &[f64], findings: &mut Findings) {
@@ -23,7 +25,8 @@ pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displaceme
     let (bottom, top) = extent(displacement);
     let gain = (top - bottom) / (high - low);
     let travel = TRAVEL * (high - low);
-    if gain * travel < ABOVE_NOISE * noise_floor(displacement) {
+    let noise = noise_floor(displacement);
+    if gain * travel < ABOVE_NOISE * noise {
         return;
     }
     // A glitch at the end of a stretch is no standstill: medians of three do not see it.
@@ -43,7 +46,10 @@ pub(crate) fn check(lines: &LineNumbers, time: &[f64], drive: &[f64], displaceme
                 break;
             };
             let moved = sign * (middle[to] - middle[at]);
-            let hardly = moved < HARDLY * gain * (drive[to] - drive[at]).abs();
+            let little = HARDLY * gain * (drive[to] - drive[at]).abs();
+            // One that rings goes there and back: it is where it was, and moved meanwhile.
+            let (lowest, highest) = extent(&middle[at..=to]);
+            let hardly = moved < little && highest - lowest < little + NOISE_EXTENT * noise;
             flat = match (flat, hardly) {
                 (Some((from, _)), true) => Some((from, to)),
                 (None, true) => Some((at, to)),
