@@ -10,6 +10,7 @@ mod dynamics_command;
 mod examples;
 mod findings;
 mod firmware;
+mod gains;
 mod guide;
 mod interrupt;
 mod kills;

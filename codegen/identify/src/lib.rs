@@ -21,6 +21,7 @@ pub mod everett;
 mod export;
 mod file;
 mod findings;
+pub mod gains;
 pub mod gauge;
 mod grid_choice;
 mod least_squares;

@@ -188,6 +188,13 @@ pub const STIFFNESS: &str = "\
 Examples:
   specgen identify stiffness force.csv                # actuator.axial_stiffness";
 
+pub const GAINS: &str = "\
+Examples:
+  specgen sim platform.toml --record run.rec --seconds 2
+      a run; of a machine, by its recorder or `rt-pc --record`
+  specgen identify gains run.rec --spec platform.toml -o gains
+      six tables in gains/, and the line of the spec that names them";
+
 pub const RATE: &str = "\
 Examples:
   specgen identify rate record.csv fast.csv --drive 0:100 --grid 16 -o leg

@@ -4,6 +4,7 @@
 //! name of such a command is given as `./linear`.
 
 mod everett;
+mod gains;
 mod gauge;
 mod linear;
 mod predict;
@@ -43,6 +44,8 @@ enum Kind {
     Linear(linear::Arguments),
     /// Frequency response from a swept sine, multisine or noise: resonance, damping, lag, dead time.
     Response(response::Arguments),
+    /// Gain of each leg of a platform over its table, from a recorded run; writes the six tables.
+    Gains(gains::Arguments),
     /// Calibration of a gauge from its voltage and a reference.
     Gauge(gauge::Arguments),
     /// Displacement that a table or a spec predicts for a drive, beside the measured one.
@@ -57,6 +60,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     match &arguments.kind {
         Some(Kind::Linear(arguments)) => linear::run(arguments, ui),
         Some(Kind::Response(arguments)) => response::run(arguments, ui),
+        Some(Kind::Gains(arguments)) => gains::run(arguments, ui),
         Some(Kind::Gauge(arguments)) => gauge::run(arguments, ui),
         Some(Kind::Stiffness(arguments)) => stiffness::run(arguments, ui),
         Some(Kind::Predict(arguments)) => predict::run(arguments, ui),

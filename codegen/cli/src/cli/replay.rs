@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     };
     let compiled = spec::looked_up(spec, ui)?;
     // Before the library is built: a wrong spec is refused at once.
-    same_build(arguments, &reader.header().description, &compiled)?;
+    same_build(&arguments.recording, spec, &reader.header().description, &compiled)?;
     let controller = sim::emitted(&compiled, ui)?;
     let mut machine = Supervised::new(controller).map_err(sim::environment)?;
     ui.progress("running the record again");
@@ -95,7 +95,12 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
 }
 
 /// Refuses the record of another spec or of another version of specgen.
-fn same_build(arguments: &Arguments, recorded: &Description, compiled: &Compiled) -> Result<(), Failure> {
+pub(super) fn same_build(
+    recording: &Path,
+    spec: &Path,
+    recorded: &Description,
+    compiled: &Compiled,
+) -> Result<(), Failure> {
     let version = env!("CARGO_PKG_VERSION");
     if recorded.digest == compiled.ir.digest && recorded.version == version {
         return Ok(());
@@ -103,22 +108,22 @@ fn same_build(arguments: &Arguments, recorded: &Description, compiled: &Compiled
     Err(Failure::Gate(format!(
         "{} is of spec digest {}, specgen {}; {} gives {}, specgen {version}: name the spec that the target was built from, and \
          use the specgen that built it",
-        arguments.recording.display(),
+        recording.display(),
         recorded.digest,
         recorded.version,
-        arguments.spec.as_ref().map_or_else(String::new, |spec| spec.display().to_string()),
+        spec.display(),
         compiled.ir.digest,
     )))
 }
 
-fn open(path: &Path) -> Result<Reader<BufReader<File>>, Failure> {
+pub(super) fn open(path: &Path) -> Result<Reader<BufReader<File>>, Failure> {
     let refuse = |error: &dyn std::fmt::Display| Failure::Gate(format!("{}: {error}", path.display()));
     let file = File::open(path).map_err(|error| refuse(&format_args!("cannot be read: {error}")))?;
     Reader::new(BufReader::with_capacity(1 << 20, file)).map_err(|error| refuse(&error))
 }
 
 /// Why the record fails, if it does. A file that was cut off is whole as far as it goes.
-fn verdict(found: &Replay) -> Option<String> {
+pub(super) fn verdict(found: &Replay) -> Option<String> {
     if let Some(divergence) = &found.divergence {
         return Some(format!("the first tick that differs is {divergence}"));
     }

@@ -56,6 +56,15 @@ impl From<&Record> for Drive {
     }
 }
 
+impl Drive {
+    /// A voltage (V) over `time` (s, rising) of which the displacement is not known.
+    #[must_use]
+    pub fn of_voltage(shown_as: &str, time: Vec<f64>, voltage: Vec<f64>) -> Self {
+        let weightless = vec![false; time.len()];
+        Self { shown_as: shown_as.to_owned(), time, drive: voltage, displacement: None, weightless, held: 0.0 }
+    }
+}
+
 /// Reads `time_s`, `drive_V` or `monitor_V`, and `displacement_um` if it is there.
 ///
 /// # Errors
