@@ -230,6 +230,12 @@ unsafe impl Send for Controller {}
 unsafe impl Sync for Controller {}
 
 impl Controller {
+    /// Sizes and alignments of its state, its configuration, and its machine.
+    #[must_use]
+    pub fn layouts(&self) -> [Layout; 3] {
+        [self.state.layout, self.config.layout, self.machine_layout]
+    }
+
     /// Loads a controller's host library, with the spec's configuration and the power-up state.
     ///
     /// # Errors

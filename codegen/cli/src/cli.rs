@@ -11,6 +11,7 @@ mod doctor;
 mod dynamics;
 mod examples;
 mod explain;
+mod export;
 mod file;
 mod firmware;
 mod forc;
@@ -126,6 +127,8 @@ enum Command {
     Replay(replay::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
     Dynamics(dynamics::Arguments),
+    /// Write the controller for programs that are not ours: a C header with the library.
+    Export(export::Arguments),
     /// Identify from measured records: the Everett table, or linear, response, gauge, stiffness.
     Identify(identify::Arguments),
     /// Simulate the reversal-curve experiment that `identify` needs, on a leg of a spec or the reference leg.
@@ -185,6 +188,7 @@ pub fn run() -> ExitCode {
         Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
         Some(Command::Operate(arguments)) => operate::run(arguments, &mut ui),
         Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
+        Some(Command::Export(arguments)) => export::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
         Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
         Some(Command::Forc(arguments)) => forc::run(arguments, &mut ui),

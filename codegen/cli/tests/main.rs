@@ -8,6 +8,7 @@ mod cli;
 mod documents;
 mod dynamics_command;
 mod examples;
+mod export;
 mod findings;
 mod firmware;
 mod gains;

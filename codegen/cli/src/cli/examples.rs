@@ -188,6 +188,11 @@ pub const STIFFNESS: &str = "\
 Examples:
   specgen identify stiffness force.csv                # actuator.axial_stiffness";
 
+pub const EXPORT: &str = "\
+Examples:
+  specgen export c platform.toml -o c            # then, in c/:
+  cc -std=c11 example.c tick.c -L. -lcontroller -Wl,-rpath,'$ORIGIN' -o example";
+
 pub const GAINS: &str = "\
 Examples:
   specgen sim platform.toml --record run.rec --seconds 2

@@ -1,6 +1,5 @@
 //! `specgen identify gains`: a recorded run of a platform in; the gain of each leg over its table, and six tables of their own out.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,7 +8,7 @@ use host_sim::record::{self, Block, Header, ReplayError};
 use serde::Serialize;
 
 use super::refused;
-use crate::cli::file::write_file;
+use crate::cli::file::write_folder;
 use crate::cli::table::{right, row};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use crate::cli::{replay, sim, spec};
@@ -84,11 +83,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     }
     let mut files = String::new();
     if let Some(folder) = &folder {
-        fs::create_dir_all(folder).map_err(|error| Failure::Environment(format!("{}: {error}", folder.display())))?;
-        for (leg, (table, found)) in legs.iter().enumerate() {
-            let text = write_table_csv(&gains::scaled(table, found.gain));
-            write_file(&folder.join(format!("leg{}.csv", leg + 1)), text.as_bytes())?;
-        }
+        let tables = legs.iter().enumerate().map(|(leg, (table, found))| {
+            (format!("leg{}.csv", leg + 1), write_table_csv(&gains::scaled(table, found.gain)).into_bytes())
+        });
+        write_folder(folder, &tables.collect::<Vec<_>>())?;
         files = format!("wrote 6 tables to {}\n", folder.display());
     }
     let legs = legs.into_iter().map(|(_, found)| found).collect();

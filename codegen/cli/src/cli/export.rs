@@ -1,0 +1,236 @@
+//! `specgen export`: the controller for programs that are not ours.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+use std::alloc::Layout;
+
+use host_sim::controller::{ABI_VERSION, Controller, Supervised, TickController};
+use serde::Serialize;
+use specgen_language::interrupt::Scratch;
+use specgen_runtime::supervisor::{self, Request};
+use specgen_toolchain::host::build_library;
+
+use super::file::{claim, write_folder};
+use super::sim::environment;
+use super::spec;
+use super::ui::{Failure, Outcome, Ui};
+use specgen_compiler::workspace;
+
+/// Requests to the supervisor, by their words.
+const REQUESTS: [(&str, u32); 6] = [
+    ("NONE", Request::None as u32),
+    ("ARM", Request::Arm as u32),
+    ("RUN", Request::Run as u32),
+    ("HOLD", Request::Hold as u32),
+    ("RAMP_DOWN", Request::RampDown as u32),
+    ("ACKNOWLEDGE", Request::Acknowledge as u32),
+];
+/// Bits of its events.
+const EVENTS: [(&str, u32); 5] = [
+    ("MISSED_TICK", supervisor::MISSED_TICK),
+    ("LINK_LOST", supervisor::LINK_LOST),
+    ("INTEGRITY", supervisor::INTEGRITY),
+    ("CONVERTER", supervisor::CONVERTER),
+    ("STOP", supervisor::STOP),
+];
+const TICK: &str = include_str!("export/tick.c");
+const EXAMPLE: &str = include_str!("export/example.c");
+
+/// Arguments of `export`.
+#[derive(Args, Debug)]
+#[command(after_help = super::examples::EXPORT)]
+pub struct Arguments {
+    #[command(subcommand)]
+    kind: Kind,
+}
+
+#[derive(Subcommand, Debug)]
+enum Kind {
+    /// A C header, the library for this host, and two sources that use them: `tick.c` for firmware, `example.c` that runs it.
+    C(C),
+}
+
+/// Arguments of `export c`.
+#[derive(Args, Debug)]
+struct C {
+    /// The spec file.
+    spec: PathBuf,
+    /// Folder for controller.h, the library, tick.c and example.c.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let Kind::C(C { spec, output }) = &arguments.kind;
+    let compiled = spec::compiled(spec, ui)?;
+    let _claimed = claim(output)?;
+    let scratch = Scratch::new().map_err(environment)?;
+    let folder = scratch.path().join("controller");
+    workspace::write_scratch(&folder, &compiled.files)?;
+    ui.progress("building the emitted controller for this host");
+    let library = build_library(&folder, &scratch.path().join("target"))?;
+    let bytes = fs::read(&library).map_err(environment)?;
+    let machine = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
+    let name = format!("{}controller{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
+    let files = [
+        ("controller.h".to_owned(), header(&machine).into_bytes()),
+        (name, bytes),
+        ("tick.c".to_owned(), TICK.as_bytes().to_vec()),
+        ("example.c".to_owned(), EXAMPLE.as_bytes().to_vec()),
+    ];
+    write_folder(output, &files)?;
+    let names = files.iter().map(|(name, _)| name.clone()).collect();
+    ui.result(&Exported { folder: output.display().to_string(), files: names });
+    Ok(())
+}
+
+/// Files that were written.
+#[derive(Serialize)]
+struct Exported {
+    folder: String,
+    files: Vec<String>,
+}
+
+impl Outcome for Exported {
+    fn text(&self) -> String {
+        format!(
+            "wrote {} to {}\n  cc -std=c11 -Wall example.c tick.c -L. -lcontroller -Wl,-rpath,'$ORIGIN' -o example\n",
+            self.files.join(", "),
+            self.folder
+        )
+    }
+}
+
+/// `controller.h`.
+fn header(machine: &Supervised) -> String {
+    let controller = machine.controller();
+    let about = controller.description();
+    let [state, config, whole] = controller.layouts();
+    let real = if about.scalar.bits() == 32 { ("float", "uint32_t") } else { ("double", "uint64_t") };
+    let mut text = format!(
+        "/* Controller of `{}`, spec digest {}, specgen {}. Written by `specgen export c`.\n   \
+         All numbers travel as words of 64 bits: whole numbers as they are, reals by their bit pattern ({}), zero-extended. Units: m, \
+         rad,\n   N, V, s. Nothing here allocates, and nothing panics. */\n\
+         #ifndef SPECGEN_CONTROLLER_H\n#define SPECGEN_CONTROLLER_H\n\n\
+         #include <stddef.h>\n#include <stdint.h>\n#include <string.h>\n\n\
+         #ifdef __cplusplus\nextern \"C\" {{\n#endif\n\n\
+         #define SPECGEN_ABI_VERSION {ABI_VERSION}u\n#define SPECGEN_NAME \"{}\"\n#define SPECGEN_DIGEST \"{}\"\n\
+         #define SPECGEN_VERSION \"{}\"\n\ntypedef {} specgen_real;\n\n",
+        about.name, about.digest, about.version, real.0, about.name, about.digest, about.version, real.0,
+    );
+    // Writing to a String cannot fail.
+    let _ = write!(
+        text,
+        "/* What the caller keeps: enough for targets whose pointers have at most 64 bits. */\n\
+         typedef struct {{ uint64_t memory[{}]; }} specgen_config;\n\
+         typedef struct {{ uint64_t memory[{}]; }} specgen_state;\n\
+         typedef struct {{ uint64_t memory[{}]; }} specgen_machine;\n\n",
+        words(config),
+        words(state),
+        words(whole)
+    );
+    for (what, names) in
+        [("CONFIG", about.config_names.clone()), ("INPUT", machine.input_names()), ("OUTPUT", machine.output_names())]
+    {
+        let _ = writeln!(text, "enum {{");
+        let mut gauges = None;
+        for (place, name) in names.iter().enumerate() {
+            let _ = writeln!(text, "    SPECGEN_{what}_{} = {place},", identifier(name));
+            if what == "INPUT" && (name == "gauge[0]" || name == "displacement[0]") {
+                gauges = Some(place);
+            }
+        }
+        if let Some(place) = gauges {
+            let _ = writeln!(text, "    SPECGEN_INPUT_GAUGES = {place},");
+        }
+        let own = if what == "CONFIG" { names.len() } else { names.len() - 2 };
+        let _ = writeln!(text, "    SPECGEN_{what}_WORDS = {own}{}", if what == "CONFIG" { "" } else { "," });
+        if what != "CONFIG" {
+            let _ = writeln!(text, "    SPECGEN_MACHINE_{what}_WORDS = {}", names.len());
+        }
+        text += "};\n\n";
+    }
+    for (what, values) in [("REQUEST", &REQUESTS[..]), ("EVENT", &EVENTS[..])] {
+        let lines: Vec<String> =
+            values.iter().map(|(name, value)| format!("    SPECGEN_{what}_{name} = {value}")).collect();
+        let _ = write!(text, "enum {{\n{}\n}};\n\n", lines.join(",\n"));
+    }
+    text += DECLARATIONS;
+    let _ = write!(
+        text,
+        "static inline uint64_t specgen_of_real(specgen_real value) {{\n    {bits} bits;\n    memcpy(&bits, &value, sizeof bits);\n    \
+         return bits;\n}}\n\n\
+         static inline specgen_real specgen_to_real(uint64_t word) {{\n    {bits} bits = ({bits})word;\n    specgen_real value;\n    \
+         memcpy(&value, &bits, sizeof value);\n    return value;\n}}\n\n{CHECK}",
+        bits = real.1,
+    );
+    text
+}
+
+/// Words of 64 bits that hold it; their alignment is enough for all of these.
+fn words(layout: Layout) -> usize {
+    debug_assert!(layout.align() <= 8);
+    layout.size().div_ceil(8)
+}
+
+/// `gauge[3]` as `GAUGE_3`.
+fn identifier(name: &str) -> String {
+    name.replace('[', "_").replace(']', "").to_ascii_uppercase()
+}
+
+const DECLARATIONS: &str = "\
+/* Version of the library's interface: SPECGEN_ABI_VERSION, or it is not for this header. */
+uint32_t specgen_abi_version(void);
+/* Lines `key=value` in UTF-8 about the library, not ended by a zero. */
+void specgen_describe(const uint8_t **text, size_t *length);
+size_t specgen_machine_bytes(void);
+
+/* Settings of the spec: SPECGEN_CONFIG_WORDS words. */
+void specgen_config_default(uint64_t *words);
+/* 0, or one more than the index of the first word that is out of range; `config` is then as it was. */
+int32_t specgen_config_check(const uint64_t *words);
+int32_t specgen_config_load(specgen_config *config, const uint64_t *words);
+
+/* A tick under the supervisor (requests, bits of its events: above; a request is taken when it begins to be given), which decides about amplifiers and codes: SPECGEN_MACHINE_INPUT_WORDS words in,
+   SPECGEN_MACHINE_OUTPUT_WORDS out. One machine is stepped by one thread at a time. */
+void specgen_machine_reset(specgen_machine *machine);
+void specgen_machine_step(const specgen_config *config, specgen_machine *machine, const uint64_t *input, uint64_t *output);
+uint64_t specgen_machine_digest(const specgen_machine *machine);
+
+/* The law alone, for simulators: SPECGEN_INPUT_WORDS in, SPECGEN_OUTPUT_WORDS out. Nothing watches over it. */
+void specgen_state_reset(specgen_state *state);
+void specgen_step(const specgen_config *config, specgen_state *state, const uint64_t *input, uint64_t *output);
+uint64_t specgen_state_digest(const specgen_state *state);
+
+";
+
+const CHECK: &str = "\
+/* 0 if the library is the one that this header was written for: interface, digest of the spec, memory. */
+static inline int specgen_check(void) {
+    const char *wanted = \"\\ndigest=\" SPECGEN_DIGEST \"\\n\";
+    const uint8_t *text = NULL;
+    size_t length = 0, at, count = strlen(wanted);
+    if (specgen_abi_version() != SPECGEN_ABI_VERSION) {
+        return 1;
+    }
+    if (specgen_machine_bytes() > sizeof(specgen_machine)) {
+        return 2;
+    }
+    specgen_describe(&text, &length);
+    for (at = 0; at + count <= length; at++) {
+        if (memcmp(text + at, wanted, count) == 0) {
+            return 0;
+        }
+    }
+    return 3;
+}
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
+";

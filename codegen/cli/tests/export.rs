@@ -1,0 +1,67 @@
+//! `specgen export c` as a user runs it: the header is C11 and C++17 without a warning, and the program gives the digest of the same
+//! library under Rust, after as many ticks.
+
+use std::process::Command;
+
+use crate::support::{Folder, skipped};
+use host_sim::controller::{Controller, Supervised, TickController};
+
+const TICKS: u64 = 1000;
+
+/// What example.c gives its controller, by Rust; each gauge off by so many ulps.
+fn digest(folder: &Folder, dir: &str, ulps: u64) -> u64 {
+    let library = folder.path(dir).join("libcontroller.so");
+    let mut machine = Supervised::new(Controller::load(&library).unwrap()).unwrap();
+    let words = machine.controller().description().config_names.len();
+    let mut settings = vec![0; words];
+    machine.controller().default_config().clone_into(&mut settings);
+    machine.configure(&settings).unwrap();
+    let scalar = machine.controller().description().scalar;
+    let names = machine.input_names();
+    let place = |name: &str| names.iter().position(|one| one == name).unwrap();
+    let gauges = names.iter().position(|name| name == "gauge[0]" || name == "displacement[0]").unwrap();
+    let (mut input, mut output) = (vec![0; names.len()], vec![0; machine.output_names().len()]);
+    for tick in 0..TICKS {
+        for leg in 0..6 {
+            input[gauges + leg] = scalar.encode(1e-9 * ((tick + leg as u64) % 7) as f64) + ulps;
+        }
+        input[place("request")] = u64::from(tick > 0);
+        machine.step(&input, &mut output);
+    }
+    machine.digest()
+}
+
+#[test]
+fn a_program_in_c_links_the_controller_and_gets_its_bits() {
+    let folder = Folder::new();
+    for (spec, dir) in [("reference.toml", "c"), ("legs.toml", "six/c")] {
+        let run = folder.run(&["export", "c", spec, "-o", dir]);
+        assert!(run.code == 0 && run.stdout.contains("cc -std=c11"), "{}{}", run.stdout, run.stderr);
+        let wanted = format!("digest {:016x}", digest(&folder, dir, 0));
+        assert_ne!(wanted, format!("digest {:016x}", digest(&folder, dir, 1)));
+        let strict = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-Wl,-rpath,$ORIGIN", "-o", "example"];
+        for (compiler, language) in [("cc", &["-std=c11"][..]), ("c++", &["-std=c++17", "-x", "c++"])] {
+            let sources = ["example.c", "tick.c", "-x", "none", "-L.", "-lcontroller"];
+            let sources = if compiler == "cc" { [&sources[..2], &sources[4..]].concat() } else { sources.to_vec() };
+            let built =
+                Command::new(compiler).args(language).args(strict).args(sources).current_dir(folder.path(dir)).output();
+            let Ok(built) = built else {
+                skipped(&format!("there is no {compiler} here"));
+                continue;
+            };
+            assert!(built.status.success(), "{compiler}: {}", String::from_utf8_lossy(&built.stderr));
+            let ran = Command::new(folder.path(dir).join("example")).arg(TICKS.to_string()).output().unwrap();
+            let text = String::from_utf8(ran.stdout).unwrap();
+            assert!(ran.status.success() && text.contains(&wanted), "{compiler}: {text} for {wanted}");
+        }
+        // The library of another spec is not taken.
+        let header = folder.path(dir).join("controller.h");
+        let other = std::fs::read_to_string(&header).unwrap();
+        let line = other.lines().find(|line| line.starts_with("#define SPECGEN_DIGEST")).unwrap();
+        std::fs::write(&header, other.replace(line, "#define SPECGEN_DIGEST \"0\"")).unwrap();
+        let source = ["-std=c11", "example.c", "tick.c", "-L.", "-lcontroller", "-Wl,-rpath,$ORIGIN", "-o", "example"];
+        assert!(Command::new("cc").args(source).current_dir(folder.path(dir)).status().unwrap().success());
+        let ran = Command::new(folder.path(dir).join("example")).output().unwrap();
+        assert!(!ran.status.success() && String::from_utf8_lossy(&ran.stderr).contains("do not belong together"));
+    }
+}
