@@ -160,6 +160,82 @@ fn a_script_runs_a_wave_and_fetches_its_record() {
     assert!(board.is(Phase::Disarmed));
 }
 
+const UP: [&str; 5] = ["reference.toml", "arm", "wait arming 20", "run", "wait running 20"];
+/// Target of the last tick, from rest: the bias of 10 µm is in it.
+const TARGETS: [(&str, f64); 4] =
+    [("target[0]_m", 0.0), ("target[1]_m", 1e-6), ("target[2]_m", 11.5e-6), ("target[3]_rad", 2e-6)];
+const MOVE: &str = "move x=0 y=0 z=2um rx=0 ry=0 rz=0";
+
+#[test]
+fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
+    let folder = Folder::new();
+    let board = Served::new(&folder);
+    let operate = |script: &[&str]| Run::of(&mut board.operate(&folder, script));
+    // A machine whose session ended early has lost its host: down at once, for otherwise it holds for ten seconds.
+    let recover = || {
+        operate(&["reference.toml", "ramp-down", "wait disarmed 60"]).says(1, &["faulted: link lost"]);
+        wait(&board, Phase::Faulted);
+        operate(&["reference.toml", "acknowledge", "wait disarmed 20"]).says(0, &[]);
+    };
+    // What this session has not commanded is not known to it.
+    for (script, text) in [
+        (&["move z=1um"][..], "would be guessed"),
+        (&[MOVE, "set command=hold", "jog z=1um"], "would be guessed"),
+        (&[MOVE, "ramp-down", "jog z=1um"], "would be guessed"),
+        (&[MOVE, "jog z=1"], "z wants a unit of"),
+    ] {
+        let run = operate(&[&UP[..], script].concat());
+        run.says(2, &[text]);
+        assert!(board.is(Phase::Disarmed), "{script:?}");
+    }
+    operate(&["reference.toml", MOVE]).says(1, &["disarmed: it moves when it runs"]);
+
+    let script = [
+        "wait arrived 20",
+        MOVE,
+        "wait arrived 20",
+        "jog z=-500nm rx=2urad",
+        "wait arrived 20",
+        "move y=1um",
+        "wait arrived 20",
+        "record arm 100",
+        "record trigger",
+        "wait 0.5",
+        "record stop",
+        "record download run.rec",
+        "ramp-down",
+        "wait disarmed 60",
+    ];
+    let run = operate(&[&UP[..], &script].concat());
+    run.says(0, &[]);
+    assert!(run.stdout.contains("moves to x 0.000 um, y 1.000 um, z 1.500 um, rx 2.000 urad"), "{run:?}");
+    // The platform's own target, as the controller computed it.
+    let replayed = folder.run(&["replay", "run.rec", "--spec", "reference.toml", "--csv", "run.csv"]);
+    assert_eq!(replayed.code, 0, "{replayed:?}");
+    let csv = folder.read("run.csv");
+    let mut lines = csv.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let last: Vec<&str> = lines.next_back().unwrap().split(',').collect();
+    for (name, expected) in TARGETS {
+        let column = names.iter().position(|known| known == &name).unwrap_or_else(|| panic!("{name}: {names:?}"));
+        let value: f64 = last[column].parse().unwrap();
+        assert!((value - expected).abs() < 1e-15, "{name}: {value}");
+    }
+
+    // Beyond the workspace nothing moves, and while a motion is under way nothing is promised.
+    let run = operate(&[&UP[..], &["wait arrived 20", MOVE, "wait arrived 20", "jog z=100um"]].concat());
+    run.says(1, &["refuses to move to x 0.000 um, y 0.000 um, z 102.000 um", "outside the workspace"]);
+    recover();
+
+    // On the way to the bias, 0.1 s, a command is not looked at yet. A computer that is busy may come after it.
+    let is_early = (0..5).any(|_| {
+        let run = operate(&[&UP[..], &[MOVE]].concat());
+        recover();
+        run.code == 1 && run.stderr.contains("a motion is under way; `wait arrived` first")
+    });
+    assert!(is_early);
+}
+
 #[test]
 fn a_fault_ends_a_script_with_its_cause_and_lines_go_on_after_a_mistake() {
     let folder = Folder::new();

@@ -8,6 +8,7 @@
 pub mod doctor;
 mod order;
 pub mod pil;
+pub mod place;
 pub mod served;
 mod session;
 mod socket;

@@ -6,13 +6,16 @@ use std::time::Duration;
 use specgen_link::RecorderAction;
 use specgen_runtime::supervisor::{Phase, Request};
 
+use crate::place::{Named, named};
+
 /// How long something is waited for if nothing else is said.
 const TIMEOUT: Duration = Duration::from_secs(60);
 /// Longest time that can be asked for, s.
 const LONGEST: f64 = 86_400.0;
 /// Rows after a trigger, if nothing else is said.
 const AFTER: u32 = 1000;
-const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, wait PHASE|SECONDS [TIMEOUT], config, \
+const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
+                        move|jog AXIS=QUANTITY…, wait PHASE|arrived|SECONDS [TIMEOUT], config, \
                         config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, stop";
 
 /// One order.
@@ -24,6 +27,13 @@ pub enum Order {
     Ask(Request),
     /// Set input words that are no measurements.
     Set(Vec<(String, String)>),
+    /// Go to a pose, or by a step from the one commanded last.
+    Move {
+        /// By a step.
+        relative: bool,
+        /// What is said of each axis.
+        axes: Named,
+    },
     /// Go on when something is so.
     Wait {
         /// What.
@@ -52,6 +62,8 @@ pub enum Order {
 pub enum Until {
     /// The machine is in this phase.
     Phase(Phase),
+    /// It runs, and no way to the bias, move, trajectory or stop is under way.
+    Arrived,
     /// So long has passed.
     Passed(Duration),
 }
@@ -76,6 +88,8 @@ impl Order {
             ["set", ref rest @ ..] if !rest.is_empty() => {
                 Self::Set(rest.iter().map(|text| assignment(text)).collect::<Result<_, _>>()?)
             }
+            ["move", ref rest @ ..] if !rest.is_empty() => Self::Move { relative: false, axes: named(rest)? },
+            ["jog", ref rest @ ..] if !rest.is_empty() => Self::Move { relative: true, axes: named(rest)? },
             ["wait", until] => Self::wait(until, None)?,
             ["wait", until, limit] => Self::wait(until, Some(limit))?,
             ["config"] => Self::Config,
@@ -103,6 +117,7 @@ impl Order {
         let phase = (0..).map_while(Phase::from_word).find(|phase| phase.name().replace(' ', "-") == until);
         let until = match phase {
             Some(phase) => Until::Phase(phase),
+            None if until == "arrived" => Until::Arrived,
             None => Until::Passed(seconds(until)?),
         };
         Ok(Self::Wait { until, limit: limit.unwrap_or(TIMEOUT) })
@@ -114,7 +129,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
     time.map(Duration::from_secs_f64).ok_or_else(|| {
         let phases: Vec<String> =
             (0..).map_while(Phase::from_word).map(|phase| phase.name().replace(' ', "-")).collect();
-        format!("expected a phase ({}) or a time from 0 to {LONGEST} s, found `{text}`", phases.join(", "))
+        format!("expected a phase ({}), `arrived` or a time from 0 to {LONGEST} s, found `{text}`", phases.join(", "))
     })
 }
 
@@ -139,6 +154,8 @@ mod tests {
             ("wait ramping-down 3", Some(Order::Wait { until: Until::Phase(Phase::RampingDown), limit: time(3.0) })),
             ("wait 0.5", Some(Order::Wait { until: Until::Passed(time(0.5)), limit: TIMEOUT })),
             ("set a=1 b[2]=-2e-6", Some(Order::Set(vec![("a".into(), "1".into()), ("b[2]".into(), "-2e-6".into())]))),
+            ("wait arrived 3", Some(Order::Wait { until: Until::Arrived, limit: time(3.0) })),
+            ("jog z=1um", Some(Order::Move { relative: true, axes: [None, None, Some(1e-6), None, None, None] })),
             ("record arm 7", Some(Order::Record(RecorderAction::Arm { after: 7 }))),
             ("record download run.rec", Some(Order::Download("run.rec".into()))),
             ("wave stop", Some(Order::StopWave)),
@@ -158,6 +175,8 @@ mod tests {
             ("set", "is none of"),
             ("set a", "expected NAME=VALUE"),
             ("wait", "is none of"),
+            ("move", "is none of"),
+            ("move z=1", "z wants a unit of"),
             ("wait nan", "expected a phase (disarmed, arming, running"),
             ("wait -1", "found `-1`"),
             ("wait running soon", "found `soon`"),

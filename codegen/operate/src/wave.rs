@@ -15,8 +15,8 @@ use serde::Deserialize;
 use specgen_runtime::Real;
 use specgen_runtime::wave::{AxisWave, Refused, Settings, Shape, TONES, Tone, WORDS, step_of};
 
-/// Names of the axes of a pose.
-const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+use crate::place::AXES;
+
 /// Ticks of anything, at most.
 const MOST_TICKS: f64 = (1_u64 << 30) as f64;
 

@@ -139,7 +139,8 @@ Examples:
       a real-time PC, from a file
 
 Commands: status, arm, run, hold, ramp-down, acknowledge, none,
-  set NAME=VALUE…, wait PHASE|SECONDS [TIMEOUT], config, config write SPEC,
+  set NAME=VALUE…, move|jog AXIS=QUANTITY… (z=1um rx=2urad),
+  wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC,
   record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
   stop (ends the program at a socket)
 

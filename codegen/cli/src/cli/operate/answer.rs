@@ -84,6 +84,18 @@ impl Outcome for MachineStatus {
     }
 }
 
+/// Where a move or a step goes, m and rad.
+#[derive(Serialize)]
+pub struct Moves {
+    pub pose: [f64; 6],
+}
+
+impl Outcome for Moves {
+    fn text(&self) -> String {
+        format!("moves to {}\n", specgen_operate::place::in_words(&self.pose))
+    }
+}
+
 /// Settings by name, in the order of the controller.
 pub struct Settings(pub Vec<(String, Value)>);
 

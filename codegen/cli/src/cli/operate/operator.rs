@@ -8,17 +8,23 @@ use host_sim::controller::MachineWord;
 use serde_json::json;
 use specgen_link::client::{ClientError, Port};
 use specgen_link::{RecorderStatus, Refusal, Status};
+use specgen_runtime::setpoint::{BUSY, REFUSED};
 use specgen_runtime::supervisor::{Phase, Request};
 
-use super::answer::{Answer, Downloaded, MachineStatus, Plain, RecorderState, Settings};
+use super::answer::{Answer, Downloaded, MachineStatus, Moves, Plain, RecorderState, Settings};
 use super::health::Standing;
 use crate::cli::file::{check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
+use specgen_operate::place::{Named, meant};
 use specgen_operate::{Order, Session, Until, read_wave, refused_wave};
 
 /// How long ramping down may take.
 const DOWN: Duration = Duration::from_secs(60);
+/// After so many ticks the status says what became of a command.
+const SEEN: u64 = 10;
+/// How long these may take.
+const ANSWERED: Duration = Duration::from_secs(2);
 
 /// Why a session ends before its orders do.
 pub enum Ended {
@@ -124,8 +130,21 @@ impl<P: Port> Operator<P> {
     /// Refuses `orders` if one of them makes no sense whatever the device does: names, numbers, waves, files that cannot be.
     pub fn check(&self, orders: &[Order]) -> Result<(), Failure> {
         let nonsense = |text: String| Failure::Usage(format!("{text}; nothing was asked of the machine"));
+        let mut pose = self.session.pose();
         orders.iter().try_for_each(|order| match order {
-            Order::Set(assignments) => self.session.assign(assignments).map(|_| ()).map_err(nonsense),
+            Order::Set(assignments) => {
+                pose = None;
+                self.session.assign(assignments).map(|_| ()).map_err(nonsense)
+            }
+            Order::Move { relative, axes } => {
+                let to = meant(pose, *relative, axes).map_err(nonsense)?;
+                pose = Some(to);
+                self.session.move_words(&to).map(|_| ()).map_err(nonsense)
+            }
+            Order::Ask(Request::Arm | Request::Hold | Request::RampDown | Request::Acknowledge) => {
+                pose = None;
+                Ok(())
+            }
             Order::Wave(path) => self.wave_of(path).map(|_| ()).map_err(nonsense),
             Order::Download(path) => check_place(path),
             _ => Ok(()),
@@ -143,6 +162,10 @@ impl<P: Port> Operator<P> {
             Order::Wait { until, limit } => {
                 self.wait(*until, *limit, ui)?;
                 self.note(&line, &Plain(self.stands()), ui);
+            }
+            Order::Move { relative, axes } => {
+                let pose = self.go(*relative, axes)?;
+                self.note(&line, &Moves { pose }, ui);
             }
             Order::Config => {
                 let settings = self.config()?;
@@ -182,9 +205,54 @@ impl<P: Port> Operator<P> {
             Order::Wave(path) => self.wave(path)?,
             Order::StopWave => self.session.stop_wave()?,
             Order::Stop => self.session.stop().map_err(unsupported)?,
-            Order::Status | Order::Wait { .. } | Order::Config | Order::Record(_) | Order::Download(_) => {}
+            Order::Status
+            | Order::Wait { .. }
+            | Order::Move { .. }
+            | Order::Config
+            | Order::Record(_)
+            | Order::Download(_) => {}
         }
         Ok(())
+    }
+
+    /// Sends a move, and waits until the machine has taken or refused it. Where a motion is under way a machine looks at a
+    /// command only after it, so that nothing could be said of this one.
+    fn go(&mut self, relative: bool, axes: &Named) -> Result<[f64; 6], Ended> {
+        let status = self.session.status();
+        if u64::from(status.phase) != Phase::Running.word() {
+            return Err(Ended::Refused(format!("the machine is {}: it moves when it runs", self.stands())));
+        }
+        if status.status & BUSY != 0 {
+            return Err(Ended::Refused("a motion is under way; `wait arrived` first".to_owned()));
+        }
+        let pose = meant(self.session.pose(), relative, axes).map_err(Ended::Refused)?;
+        let words = self.session.move_words(&pose).map_err(Ended::Refused)?;
+        let before = self.session.pose();
+        self.session.command(words).map_err(waving)?;
+        self.look()?;
+        let (sent, start) = (self.session.status().tick, Instant::now());
+        while self.session.status().tick < sent + SEEN {
+            if start.elapsed() >= ANSWERED {
+                return Err(Ended::Fault(format!("the machine makes no ticks, and is {}", self.stands())));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+            self.look()?;
+        }
+        let status = self.session.status();
+        if u64::from(status.phase) != Phase::Running.word() {
+            return Err(Ended::Fault(format!("the machine is {} and does not move", self.stands())));
+        }
+        if status.status & REFUSED != 0 {
+            if let Some(before) = before {
+                self.session.taken(before);
+            }
+            return Err(Ended::Refused(format!(
+                "the machine refuses to move to {}: outside the workspace; it stands where it stood",
+                specgen_operate::place::in_words(&pose)
+            )));
+        }
+        self.session.taken(pose);
+        Ok(pose)
     }
 
     fn wait(&mut self, until: Until, limit: Duration, ui: &Ui) -> Result<(), Ended> {
@@ -192,19 +260,30 @@ impl<P: Port> Operator<P> {
         loop {
             let there = match until {
                 Until::Phase(phase) => u64::from(self.session.status().phase) == phase.word(),
+                Until::Arrived => {
+                    let Status { phase, status, .. } = *self.session.status();
+                    let runs = u64::from(phase) == Phase::Running.word();
+                    if runs && status & REFUSED != 0 {
+                        return Err(Ended::Refused("the machine refuses its command, and stands".to_owned()));
+                    }
+                    runs && status & BUSY == 0
+                }
                 Until::Passed(time) => start.elapsed() >= time,
             };
             if there {
                 return Ok(());
             }
-            if let Until::Phase(phase) = until
-                && start.elapsed() >= limit
-            {
+            let expected = match until {
+                Until::Phase(phase) => phase.name(),
+                Until::Arrived => "arrived",
+                Until::Passed(_) => "",
+            };
+            if !expected.is_empty() && start.elapsed() >= limit {
                 return Err(Ended::Fault(format!(
                     "the machine is still {} after {} s, expected {}",
                     self.stands(),
                     limit.as_secs_f64(),
-                    phase.name()
+                    expected
                 )));
             }
             std::thread::sleep(self.session.due());
