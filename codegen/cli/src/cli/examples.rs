@@ -82,7 +82,7 @@ Examples:
   specgen sim platform.toml --frequency 10   # at rest, a wave, its trajectories
   specgen sim platform.toml --trajectory case-2 --plot case-2.svg
   specgen sim legs.toml --paper -o tables   # Tables 1 and 2, beside the paper's
-  specgen sim platform.toml --record run.rec --seconds 0.5   # for `replay`";
+  specgen sim platform.toml --record run.rec   # for `replay`";
 
 pub const TUNE: &str = "\
 Examples:
@@ -191,13 +191,10 @@ Examples:
 
 pub const EXPORT: &str = "\
 Examples:
-  specgen export c platform.toml -o c            # then, in c/:
-  cc -std=c11 example.c tick.c -L. -lcontroller -Wl,-rpath,'$ORIGIN' -o example";
+  specgen export c platform.toml -o c      # prints the line that compiles it";
 
 pub const GAINS: &str = "\
 Examples:
-  specgen sim platform.toml --record run.rec --seconds 2
-      a run; of a machine, by its recorder or `rt-pc --record`
   specgen identify gains run.rec --spec platform.toml -o gains
       six tables in gains/, and the line of the spec that names them";
 

@@ -55,6 +55,7 @@ enum Kind {
 
 /// Arguments of `export c`.
 #[derive(Args, Debug)]
+#[command(after_help = super::examples::EXPORT)]
 struct C {
     /// The spec file.
     spec: PathBuf,
