@@ -36,6 +36,8 @@ const EVENTS: [(&str, u32); 5] = [
     ("CONVERTER", supervisor::CONVERTER),
     ("STOP", supervisor::STOP),
 ];
+/// Of the words that the caller's memory is made of, bytes.
+const ALIGNMENT: usize = 8;
 const TICK: &str = include_str!("export/tick.c");
 const EXAMPLE: &str = include_str!("export/example.c");
 
@@ -75,6 +77,13 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let library = build_library(&folder, &scratch.path().join("target"))?;
     let bytes = fs::read(&library).map_err(environment)?;
     let machine = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
+    if let Some(layout) = machine.controller().layouts().iter().find(|layout| layout.align() > ALIGNMENT) {
+        let message = format!(
+            "the controller's memory is aligned to {} bytes, that of a C header to {ALIGNMENT}",
+            layout.align()
+        );
+        return Err(Failure::Environment(message));
+    }
     let name = format!("{}controller{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let files = [
         ("controller.h".to_owned(), header(&machine).into_bytes()),
@@ -171,10 +180,9 @@ fn header(machine: &Supervised) -> String {
     text
 }
 
-/// Words of 64 bits that hold it; their alignment is enough for all of these.
+/// Words of 64 bits that hold it.
 fn words(layout: Layout) -> usize {
-    debug_assert!(layout.align() <= 8);
-    layout.size().div_ceil(8)
+    layout.size().div_ceil(ALIGNMENT)
 }
 
 /// `gauge[3]` as `GAUGE_3`.
@@ -195,8 +203,8 @@ void specgen_config_default(uint64_t *words);
 int32_t specgen_config_check(const uint64_t *words);
 int32_t specgen_config_load(specgen_config *config, const uint64_t *words);
 
-/* A tick under the supervisor (requests, bits of its events: above; a request is taken when it begins to be given), which decides about amplifiers and codes: SPECGEN_MACHINE_INPUT_WORDS words in,
-   SPECGEN_MACHINE_OUTPUT_WORDS out. One machine is stepped by one thread at a time. */
+/* A tick under the supervisor, which decides about amplifiers and codes: SPECGEN_MACHINE_INPUT_WORDS words in,
+   SPECGEN_MACHINE_OUTPUT_WORDS out. A request is taken when it begins to be given. One machine is stepped by one thread at a time. */
 void specgen_machine_reset(specgen_machine *machine);
 void specgen_machine_step(const specgen_config *config, specgen_machine *machine, const uint64_t *input, uint64_t *output);
 uint64_t specgen_machine_digest(const specgen_machine *machine);
