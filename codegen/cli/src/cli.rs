@@ -15,6 +15,7 @@ mod export;
 mod file;
 mod firmware;
 mod forc;
+mod gcs;
 mod identify;
 mod lsp;
 mod new;
@@ -123,6 +124,8 @@ enum Command {
     Pil(pil::Arguments),
     /// Operate a machine over the link: arm, run, set-points, settings, waves, records; from a script or line by line.
     Operate(operate::Arguments),
+    /// Let programs that speak the General Command Set 2.0 of piezo stages and hexapods move a machine: a bridge on the link.
+    Gcs(gcs::Arguments),
     /// Run a recording of a target again on the host and compare every tick by bits; export it as CSV.
     Replay(replay::Arguments),
     /// Compute M, C, G, J and leg forces at given states, by the model that the controller uses.
@@ -187,6 +190,7 @@ pub fn run() -> ExitCode {
         Some(Command::Reproduce(arguments)) => reproduce::run(arguments, &mut ui),
         Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
         Some(Command::Operate(arguments)) => operate::run(arguments, &mut ui),
+        Some(Command::Gcs(arguments)) => gcs::run(arguments, &mut ui),
         Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
         Some(Command::Export(arguments)) => export::run(arguments, &mut ui),
         Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),

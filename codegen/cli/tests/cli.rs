@@ -8,7 +8,7 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 
 use crate::support::{Document, Folder, Run};
 
-const COMMANDS: [&str; 19] = [
+const COMMANDS: [&str; 20] = [
     "check",
     "build",
     "size",
@@ -20,6 +20,7 @@ const COMMANDS: [&str; 19] = [
     "reproduce",
     "pil",
     "operate",
+    "gcs",
     "replay",
     "dynamics",
     "identify",
@@ -47,7 +48,7 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["chek"], "did you mean `specgen check`?"),
         (
             &["frobnicate", "legs.toml"],
-            "new, check, explain, build, size, flash, sim, tune, robust, report, reproduce, pil, operate, replay, dynamics, export, identify, forc, plant, doctor, lsp, dump-ir, cache, completions",
+            "new, check, explain, build, size, flash, sim, tune, robust, report, reproduce, pil, operate, gcs, replay, dynamics, export, identify, forc, plant, doctor, lsp, dump-ir, cache, completions",
         ),
         (&["check"], "<SPEC>"),
         (&["explain", "w0441"], "did you mean E0441, workspace bound that no pose reaches?"),
@@ -85,6 +86,9 @@ fn arguments_that_make_no_sense_are_usage_errors() {
         (&["pil", "reference.toml", "--samples", "100"], "runs at its timing.period"),
         (&["pil", "reference.toml", "--trajectory", "case-3"], "but not `case-3`"),
         (&["operate"], "--port"),
+        (&["gcs"], "--port"),
+        (&["gcs", "--socket", "y", "--axis", "1=Q"], "with an axis of X Y Z U V W"),
+        (&["gcs", "--socket", "y", "--listen", "here"], "invalid value"),
         (&["operate", "--port", "x", "--socket", "y"], "cannot be used with"),
         (&["operate", "--socket", "y", "--baud", "9600"], "cannot be used with"),
         (&["operate", "--socket", "y", "legs.toml", "go"], "`go` is none of: status, arm"),

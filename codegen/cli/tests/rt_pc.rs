@@ -21,6 +21,7 @@ use specgen_link::{Bytes, RecorderAction, Refusal, Request, WaveAction};
 use specgen_runtime::wave::{AxisWave, Settings, Shape, Tone, step_of};
 
 mod clients;
+mod gcs;
 mod host;
 use host::{Host, Record};
 
@@ -227,6 +228,7 @@ fn a_platform_runs_its_trajectory_in_closed_loop_and_its_record_replays_to_the_b
 
     a_host_arms_it_over_the_link_makes_a_wave_and_is_missed(&bench);
     clients::nobody_keeps_others_from_ramping_down(&bench);
+    gcs::clients_move_it_and_none_disturbs_it(&bench);
     a_record_that_finds_no_room_brings_the_machine_down(&bench);
     a_card_is_read_driven_and_switched_off(&bench);
 }

@@ -4,8 +4,8 @@ use specgen_runtime::Platform;
 
 use crate::ir::Setpoints;
 use crate::lint::{self, paths::PathDemand};
-use crate::lower::platform;
 use crate::lower::setpoint::{self, Stopping};
+use crate::lower::{platform, stroke};
 use crate::reach::{self, Reach};
 use specgen_identify::everett::EverettTable;
 use specgen_language::diagnostic::{Diagnostic, Severity};
@@ -30,8 +30,7 @@ pub struct Demand {
 /// # Errors
 /// All findings about what is out of reach or too fast.
 pub fn check(model: &Model, setpoints: Option<&Setpoints>, tables: &[EverettTable]) -> Result<Demand, Vec<Diagnostic>> {
-    let largest = tables.iter().map(|table| table.node(table.grid, 0));
-    let stroke = largest.fold(model.actuator.stroke, |a, b| if b < a { b } else { a });
+    let stroke = stroke(model, tables);
     match (&model.task_space, setpoints) {
         (Some(task), Some(setpoints)) => of_platform(model, task, &platform(model)?, setpoints, stroke),
         _ => of_legs(model, stroke),

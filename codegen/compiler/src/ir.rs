@@ -326,6 +326,8 @@ pub struct Bounds {
     pub leg: [f64; 2],
     /// Gauge reading, m.
     pub sensor: [f64; 2],
+    /// What every leg can do, m; for hosts, which the controller tells it.
+    pub stroke: f64,
 }
 
 /// Codes of the gauges' converters; the constants of [`specgen_runtime::GaugeConverter`], where each is explained.

@@ -105,6 +105,7 @@ pub fn lower(
             pose: model.workspace.bounds().map(round),
             leg: [-stroke, LEG_SETPOINT_STROKES * stroke].map(round),
             sensor: model.sensor.range.map(round),
+            stroke: self::stroke(model, tables),
         },
         gauge_converter,
         permitted: permitted::lower(&actuation, max_step, model.sensor.range, task_space.as_ref(), scalar),
@@ -113,6 +114,13 @@ pub fn lower(
         task_space,
         integrity,
     })
+}
+
+/// What every leg can do, m: as far as both the data sheet's stroke and every leg's table allow.
+#[must_use]
+pub fn stroke(model: &Model, tables: &[EverettTable]) -> f64 {
+    let largest = tables.iter().map(|table| table.node(table.grid, 0));
+    largest.fold(model.actuator.stroke, |a, b| if b < a { b } else { a })
 }
 
 /// Arithmetic of the emitted controller.

@@ -6,6 +6,8 @@
 //! ```
 
 pub mod doctor;
+pub mod gcs;
+pub mod motion;
 mod order;
 pub mod pil;
 pub mod place;
@@ -15,6 +17,6 @@ mod socket;
 mod wave;
 
 pub use order::{Order, Until};
-pub use session::{ALIVE, Session};
+pub use session::{ALIVE, Place, Session};
 pub use socket::SocketLine;
 pub use wave::{read_wave, refused_wave};

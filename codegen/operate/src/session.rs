@@ -9,6 +9,7 @@ use specgen_link::{
 };
 use specgen_runtime::supervisor;
 
+use crate::motion::Motion;
 use crate::pil::{self, OpenError, Opened};
 
 /// How often a device gets a request, at least: five times before it takes the link for lost.
@@ -17,12 +18,36 @@ pub const ALIVE: Duration = Duration::from_millis(20);
 /// Names of the word `command` of a platform, by its value.
 const COMMANDS: [&str; 4] = ["hold", "stream", "move", "trajectory"];
 
+/// Words of a pose.
+const POSE: usize = 6;
+
+/// Where a platform is, m and rad.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// Ticks since power-up.
+    pub tick: u64,
+    /// Number of `supervisor::Phase`.
+    pub phase: u8,
+    /// The controller's status word.
+    pub status: u32,
+    /// Pose measured, in the user's coordinates.
+    pub pose: [f64; 6],
+    /// Set-point, in the user's coordinates: where the platform is to be now, not where a motion ends.
+    pub target: [f64; 6],
+    /// Set-point less pose, in the platform's axes.
+    pub error: [f64; 6],
+    /// Voltage of each leg, V.
+    pub voltage: [f64; 6],
+}
+
 /// An open session.
 pub struct Session<P> {
     client: Client<P>,
     identity: Identity,
     description: Description,
     period: f64,
+    /// Of a platform.
+    motion: Option<Motion>,
     /// Input words that are no measurements, as they were sent last.
     command: Vec<u64>,
     asked: Instant,
@@ -51,6 +76,7 @@ impl<P: Port> Session<P> {
         let period = period.filter(|period| *period > 0.0 && f64::is_finite(*period)).ok_or_else(|| {
             OpenError::Other("the controller's description lacks `period`: build and flash it with this specgen".into())
         })?;
+        let motion = Motion::parse(&text).map_err(OpenError::Other)?;
         let measured = |name: &String| name.starts_with("gauge[") || name.starts_with("displacement[");
         let words = description.input_names.iter().position(measured).unwrap_or(description.input_names.len());
         let mut session = Self {
@@ -58,6 +84,7 @@ impl<P: Port> Session<P> {
             identity,
             description,
             period,
+            motion,
             command: vec![0; words],
             asked: Instant::now(),
             status: Status {
@@ -84,6 +111,17 @@ impl<P: Port> Session<P> {
     /// Control period, s.
     pub fn period(&self) -> f64 {
         self.period
+    }
+
+    /// Where the platform may go, by its controller; none of six legs.
+    pub fn motion(&self) -> Option<&Motion> {
+        self.motion.as_ref()
+    }
+
+    /// Whether two numbers are the same to the controller, whose numbers may be of 32 bits.
+    pub fn is_same(&self, a: f64, b: f64) -> bool {
+        let scalar = self.description.scalar;
+        scalar.decode(scalar.encode(a)) == scalar.decode(scalar.encode(b))
     }
 
     /// What it said last.
@@ -113,6 +151,25 @@ impl<P: Port> Session<P> {
             }
             _ => Err(ClientError::Unexpected),
         }
+    }
+
+    /// Where the platform is, and that the host is there; none of six legs.
+    pub fn place(&mut self) -> Result<Option<Place>, ClientError> {
+        let Some(motion) = &self.motion else { return Ok(None) };
+        let Reply::Place { tick, phase, status, words } = self.client.ask(&Request::Place)? else {
+            return Err(ClientError::Unexpected);
+        };
+        self.asked = Instant::now();
+        let mut numbers = [0.0; 4 * POSE];
+        let given = words.words(numbers.len()).ok_or(ClientError::Unexpected)?;
+        for (number, word) in numbers.iter_mut().zip(given) {
+            *number = self.description.scalar.decode(word);
+        }
+        let six = |first: usize| -> [f64; POSE] { core::array::from_fn(|axis| numbers[first + axis]) };
+        let (measured, wanted, target) = (six(0), six(POSE), six(2 * POSE));
+        let error = core::array::from_fn(|axis| wanted[axis] - measured[axis]);
+        let pose = motion.user(&measured).unwrap_or(measured);
+        Ok(Some(Place { tick, phase, status, pose, target, error, voltage: six(3 * POSE) }))
     }
 
     /// What the device noticed of itself; its events are forgotten with that.

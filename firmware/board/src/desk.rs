@@ -2,7 +2,7 @@
 
 use controller::supervised::{MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
 use controller::waves::{self, Wave};
-use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, Real};
+use controller::{COMMAND_WORDS, CONFIG_WORDS, DESCRIPTION, PLACE_WORDS, Real, place_words};
 use specgen_link::lockstep::{Session, piece};
 use specgen_link::{
     Bytes, Counted, Counters, Device, Health, Identity, RecorderAction, Refusal, Reply, Request, Status, WaveAction,
@@ -99,6 +99,20 @@ impl Visit<'_, '_> {
             exchange.report.health.events = 0;
         });
         Reply::Health(Health { clock: probes.hertz, stack: (probes.stack)(), ..health })
+    }
+
+    #[inline(never)]
+    fn place(&mut self) -> Reply<'_> {
+        let mut words = [0; PLACE_WORDS];
+        let (mut tick, mut phase, mut status) = (0, Phase::Disarmed, 0);
+        (self.with)(&mut |exchange, machine| {
+            (tick, phase, status) = (exchange.report.tick, exchange.report.phase, exchange.report.status);
+            words = place_words(&machine.state);
+        });
+        match self.desk.session.answer(&words) {
+            Some(words) if PLACE_WORDS > 0 => Reply::Place { tick, phase: phase.word() as u8, status, words },
+            _ => Reply::Refused(Refusal::Unsupported),
+        }
     }
 
     /// Asks for something of the ticks, unless the host steps the machine or `order` refuses.
@@ -290,6 +304,7 @@ impl Device for Visit<'_, '_> {
             Request::Describe { offset } => piece(DESCRIPTION.as_bytes(), offset),
             Request::Status => self.status(),
             Request::Health => self.health(),
+            Request::Place => self.place(),
             Request::Supervise { request } => self.supervise(request),
             Request::Setpoint { words } => self.command(words),
             Request::ReadConfig => self.config(),

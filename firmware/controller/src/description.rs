@@ -2,7 +2,7 @@
 
 //! What a controller says of itself.
 
-use crate::identity::{ABOUT, BIAS};
+use crate::identity::{ABOUT, MOTION};
 use crate::{CONFIG_NAMES, INPUT_NAMES, OUTPUT_NAMES};
 
 /// What this controller is, one `key=value` a line, lists separated by commas: for tools that load it at run time.
@@ -24,7 +24,7 @@ const fn describe(text: &mut [u8]) -> usize {
     end = put_list(text, end, "config_names=", &CONFIG_NAMES);
     end = put_list(text, end, "input_names=", &INPUT_NAMES);
     end = put_list(text, end, "output_names=", &OUTPUT_NAMES);
-    put(text, end, BIAS)
+    put(text, end, MOTION)
 }
 
 /// A line with a list. Like [`put`] it goes on from `end` and returns the new one.

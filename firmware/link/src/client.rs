@@ -63,6 +63,7 @@ impl Timeout {
             request,
             Request::Status
                 | Request::Health
+                | Request::Place
                 | Request::Supervise { .. }
                 | Request::Setpoint { .. }
                 | Request::Wave { .. }

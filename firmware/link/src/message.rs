@@ -79,6 +79,8 @@ pub enum Request<'a> {
     Stop,
     /// Answered by [`Reply::Health`]; its events are then forgotten, and those of [`Reply::Status`] with them.
     Health,
+    /// Where the platform is. Six legs know of none: [`Refusal::Unsupported`]. Answered by [`Reply::Place`].
+    Place,
 }
 
 /// What a recorder is to do.
@@ -150,6 +152,18 @@ pub enum Reply<'a> {
     },
     /// What it noticed of itself.
     Health(Health),
+    /// Where the platform was at the end of a tick.
+    Place {
+        /// Ticks since power-up.
+        tick: u64,
+        /// Number of `supervisor::Phase`.
+        phase: u8,
+        /// The controller's status word.
+        status: u32,
+        /// The controller's `place_words`: pose measured, set-point, set-point in the user's coordinates, voltages of the legs.
+        #[serde(borrow)]
+        words: Bytes<'a>,
+    },
 }
 
 /// Why a request was not carried out.

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use controller::waves::{self, Wave};
-use controller::{Config, Real};
+use controller::{Config, PLACE_WORDS, Real};
 use specgen_link::Health;
 use specgen_runtime::wave::Settings;
 
@@ -27,6 +27,8 @@ pub struct Console {
     pub operator: Operator,
     pub capture: Capture,
     pub said: Option<Said>,
+    /// Where the platform was then.
+    pub place: [u64; PLACE_WORDS],
     /// What the loop noticed of itself.
     pub health: Health,
     /// Settings that are in force once all orders are taken.
@@ -48,6 +50,7 @@ impl Console {
             operator,
             capture,
             said: None,
+            place: [0; PLACE_WORDS],
             health,
             config,
             events: 0,
@@ -60,6 +63,7 @@ impl Console {
     /// Takes what a tick gave.
     pub fn update(&mut self, row: &Row, said: Said) {
         self.said = Some(said);
+        self.place = row.place;
         self.events |= row.input.events;
         self.capture.update(row.recorded, row.triggered);
         if !said.waving && self.wave.is_some_and(|number| said.orders.wrapping_sub(number).cast_signed() >= 0) {

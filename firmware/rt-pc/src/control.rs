@@ -13,7 +13,7 @@ use controller::snapshot::recorder;
 use controller::supervised::{
     CONVERTER, INTEGRITY, LINK_LOST, MISSED_TICK, Machine, MachineInput, MachineOutput, Phase, supervise,
 };
-use controller::{Config, LEGS, Real};
+use controller::{Config, LEGS, Real, place_words};
 use specgen_rt::account::{Account, Stamps};
 use specgen_rt::clock::{self, Usage};
 use specgen_rt::{allocation, scheduling};
@@ -138,6 +138,7 @@ impl<D: Device> Loop<'_, D> {
                 count,
                 input,
                 output: row_of(&output),
+                place: place_words(&machine.state),
                 digest,
                 late: account.late().iter().sum(),
                 orders: 0,

@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use controller::snapshot::MACHINE_STATE_WORDS;
 use controller::snapshot::recorder::{self, Recorder};
 use controller::supervised::{MachineInput, Request};
-use controller::{Config, Real};
+use controller::{Config, PLACE_WORDS, Real};
 use rtrb::{Consumer, Producer, RingBuffer};
 use specgen_link::Health;
 use specgen_runtime::wave;
@@ -33,6 +33,8 @@ pub struct Row {
     pub count: u64,
     pub input: MachineInput,
     pub output: recorder::Row,
+    /// Where the platform is after the tick.
+    pub place: [u64; PLACE_WORDS],
     /// Digest of the machine after the tick; 0 where nothing records the run.
     pub digest: u64,
     /// Ticks before it that were late.

@@ -147,6 +147,16 @@ Commands: status, arm, run, hold, ramp-down, acknowledge, none,
 The link lives as long as this command does; without it the machine holds after
 0.1 s. Ctrl-C ramps down first.";
 
+pub const GCS: &str = "\
+Examples:
+  specgen gcs --socket rt.sock                       # (board) at 127.0.0.1:50000
+  specgen gcs --port /dev/ttyACM0 platform.toml      # (board) only its controller
+  specgen gcs --socket rt.sock --axis 1=Z            # (board)
+      for a client that knows one axis, called 1
+
+Axes X Y Z in um, U V W in urad. docs/gcs.md has the commands. The machine has
+this program as its host: Ctrl-C ramps down first.";
+
 pub const REPLAY: &str = "\
 Examples:
   specgen replay run.rec --spec platform.toml

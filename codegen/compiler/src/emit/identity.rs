@@ -4,7 +4,7 @@ use proc_macro2::TokenStream;
 use quote::{format_ident, quote};
 
 use super::literal;
-use crate::ir::{Ir, Scalar};
+use crate::ir::{Frames, Ir, Scalar};
 
 pub fn emit(ir: &Ir) -> TokenStream {
     let scalar = format_ident!("f{}", ir.scalar.bits().to_string());
@@ -21,10 +21,7 @@ pub fn emit(ir: &Ir) -> TokenStream {
         ir.actuation.voltage[0],
         ir.actuation.voltage[1],
     );
-    let bias = ir.task_space.as_ref().map_or_else(String::new, |task| {
-        let bias: Vec<String> = task.law.bias.iter().map(|value| format!("{value:?}")).collect();
-        format!("bias={}\n", bias.join(","))
-    });
+    let motion = motion(ir);
     quote! {
         #![doc = " What this controller is."]
 
@@ -44,6 +41,39 @@ pub fn emit(ir: &Ir) -> TokenStream {
         pub const SPECGEN_VERSION: &str = #version;
         /// Of the description what stands before the names of words, and what stands after them.
         pub(crate) const ABOUT: &str = #about;
-        pub(crate) const BIAS: &str = #bias;
+        pub(crate) const MOTION: &str = #motion;
     }
+}
+
+/// Where a platform may go, how fast, and in which coordinates: what a host has to know beforehand to say whether a pose can be
+/// reached. Nothing of six legs.
+fn motion(ir: &Ir) -> String {
+    let Some(task) = &ir.task_space else { return String::new() };
+    let setpoints = &task.setpoints;
+    let mut text = String::new();
+    let mut line = |key: &str, values: &[f64]| {
+        let values: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
+        text.push_str(&format!("{key}={}\n", values.join(",")));
+    };
+    line("bias", &task.law.bias);
+    line("origin", &setpoints.bias);
+    line("bound", &ir.bounds.pose);
+    line("speed", &setpoints.speed);
+    line("stroke", &[ir.bounds.stroke]);
+    line("rest_leg", ir.kinematics.rest_leg.as_flattened());
+    line("platform_joint", ir.kinematics.platform_joint.as_flattened());
+    match setpoints.frames {
+        Frames::Parallel => {}
+        Frames::Tool { point, largest_angle } => {
+            line("tool", &point);
+            line("largest_angle", &[largest_angle]);
+        }
+        Frames::Work { axes, point, largest_angle } => {
+            line("tool", &point);
+            line("axes", axes.as_flattened());
+            line("largest_angle", &[largest_angle]);
+        }
+    }
+    let names: Vec<&str> = setpoints.trajectories.iter().map(|trajectory| trajectory.name.as_str()).collect();
+    text + "trajectories=" + &names.join(",") + "\n"
 }

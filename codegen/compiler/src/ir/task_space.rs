@@ -235,6 +235,8 @@ pub struct Setpoints {
     pub bias: [f64; 6],
     /// The user's coordinates of the bias, m and rad.
     pub home: [f64; 6],
+    /// V: largest speed of moves, m/s and rad/s; for hosts, which the controller tells it.
+    pub speed: [f64; 6],
     /// 1/(V T_s) of moves, 1/m and 1/rad.
     pub speed_limit: [f64; 6],
     /// 1/(A T_s²).

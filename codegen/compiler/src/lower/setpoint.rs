@@ -94,6 +94,7 @@ pub fn lower(
             square_rate: round(1.0 / (period * period)),
             bias: user.bias.map(round),
             home: user.home.map(round),
+            speed: rules.speed,
             speed_limit: limits.speed.map(round),
             acceleration_limit: limits.acceleration.map(round),
             jerk_limit: limits.jerk.map(round),

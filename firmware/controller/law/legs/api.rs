@@ -7,7 +7,7 @@ pub use crate::identity::{LEGS, PERIOD_SECONDS, Real, SCALAR_BITS, SPEC_DIGEST, 
 pub use crate::state::{LegState, State};
 pub use crate::step::{actuate, step};
 pub use crate::tick::{
-    COMMAND_WORDS, GAUGE_FAULT, INPUT_NAMES, INPUT_WORDS, LEG_LIMITED, OUTPUT_NAMES, OUTPUT_WORDS, SETPOINT_FAULT,
-    STATIC_INVERSE, TickInput, TickOutput, output_words,
+    COMMAND_WORDS, GAUGE_FAULT, INPUT_NAMES, INPUT_WORDS, LEG_LIMITED, OUTPUT_NAMES, OUTPUT_WORDS, PLACE_WORDS,
+    SETPOINT_FAULT, STATIC_INVERSE, TickInput, TickOutput, output_words, place_words,
 };
 pub use specgen_runtime::{CodeLimits, Law, SetpointKind};

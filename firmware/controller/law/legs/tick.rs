@@ -28,6 +28,9 @@ pub const COMMAND_WORDS: usize = 6;
 /// Words of a tick's output.
 pub const OUTPUT_WORDS: usize = 37;
 
+/// Words of where a platform is: six legs know of none.
+pub const PLACE_WORDS: usize = 0;
+
 /// Names of the input words.
 pub const INPUT_NAMES: [&str; INPUT_WORDS] = names![; "setpoint", "displacement";];
 
@@ -98,4 +101,10 @@ pub fn output_words(output: &TickOutput, _state: &State) -> [u64; OUTPUT_WORDS] 
     }
     words[6 * LEGS] = output.status as u64;
     words
+}
+
+/// Where a platform is: nothing of it is known.
+#[must_use]
+pub fn place_words(_state: &State) -> [u64; PLACE_WORDS] {
+    []
 }

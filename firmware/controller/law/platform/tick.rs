@@ -1,6 +1,7 @@
 //! What a tick reads and yields, and both as 64-bit words: the bits of a number (an `f32` zero-extended) or an integer. Every target
 //! reads and writes these, so that two of them can be compared bit for bit.
 
+use crate::limits::DAC;
 use crate::task_space::MODES_TO_LEGS;
 use crate::words::{names, six};
 use crate::{LEGS, Real, State};
@@ -39,6 +40,9 @@ pub const COMMAND_WORDS: usize = 21;
 
 /// Words of a tick's output.
 pub const OUTPUT_WORDS: usize = 55;
+
+/// Words of where a platform is, see [`place_words`].
+pub const PLACE_WORDS: usize = 24;
 
 /// Names of the input words. `command` is 0 hold, 1 stream, 2 move, 3 trajectory.
 pub const INPUT_NAMES: [&str; INPUT_WORDS] =
@@ -128,6 +132,23 @@ pub fn output_words(output: &TickOutput, state: &State) -> [u64; OUTPUT_WORDS] {
         words[8 * LEGS + index] = state.load[index].to_word();
     }
     words[9 * LEGS] = output.status as u64;
+    words
+}
+
+/// Where the platform is: the pose measured and the set-point, both from rest and with the bias, then the set-point in the
+/// user's coordinates, m and rad; then the voltage of each leg, V. Six words each.
+#[must_use]
+pub fn place_words(state: &State) -> [u64; PLACE_WORDS] {
+    let mut words = [0; PLACE_WORDS];
+    let (target, place) = (state.generator.target(), state.generator.place());
+    for axis in 0..6 {
+        words[axis] = state.pose[axis].to_word();
+        words[6 + axis] = target.pose[axis].to_word();
+        words[12 + axis] = place[axis].to_word();
+    }
+    for (leg, state) in state.legs.iter().enumerate() {
+        words[18 + leg] = DAC.voltage(state.code).to_word();
+    }
     words
 }
 

@@ -54,6 +54,7 @@ fn requests() -> Vec<Request<'static>> {
         Request::Wave { action: WaveAction::Stop, words: Bytes(&[]) },
         Request::Stop,
         Request::Health,
+        Request::Place,
     ]
 }
 
@@ -71,6 +72,7 @@ fn replies() -> Vec<Reply<'static>> {
     all.extend([
         Reply::Done,
         Reply::Health(HEALTH),
+        Reply::Place { tick: u64::MAX, phase: 2, status: 1 << 18, words: leaked(24, 8) },
         Reply::Identity(IDENTITY),
         Reply::Config { words: leaked(WORDS, 6) },
         Reply::Stepped { cost: u32::MAX, digest: u64::MAX, output: leaked(WORDS, 7) },

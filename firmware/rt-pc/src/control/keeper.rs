@@ -138,15 +138,30 @@ impl<'a> Keeper<'a> {
 mod tests {
     use super::*;
     use crate::record::Writer;
+    use controller::PLACE_WORDS;
     use controller::snapshot::recorder;
     use controller::supervised::{MACHINE_INPUT_WORDS, MachineInput};
     use rtrb::RingBuffer;
 
     fn row(count: u64, digest: u64) -> Row {
         let output = recorder::Row { codes: [0; 6], status: 0, supervisor: 0 };
+        let place = [0; PLACE_WORDS];
         let input = MachineInput::from_words(&[count; MACHINE_INPUT_WORDS]);
         let (opens, waving, triggered) = (false, false, false);
-        Row { tick: count, count, input, output, digest, late: 0, orders: 0, opens, waving, recorded: None, triggered }
+        Row {
+            tick: count,
+            count,
+            input,
+            output,
+            place,
+            digest,
+            late: 0,
+            orders: 0,
+            opens,
+            waving,
+            recorded: None,
+            triggered,
+        }
     }
 
     #[test]

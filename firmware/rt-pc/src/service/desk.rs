@@ -1,7 +1,7 @@
 //! What is answered over the link.
 
 use controller::supervised::{Cause, MACHINE_INPUT_WORDS, MACHINE_OUTPUT_WORDS, Phase, Request as Wanted};
-use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, Real};
+use controller::{COMMAND_WORDS, CONFIG_WORDS, Config, DESCRIPTION, PLACE_WORDS, Real};
 use specgen_link::{
     Bytes, Counted, Counters, Device, Health, Identity, RecorderAction, RecorderStatus, Refusal, Reply, Request,
     Status, WaveAction, put_words,
@@ -51,6 +51,16 @@ impl<'a> Desk<'a> {
 
     fn health(&mut self) -> Reply<'static> {
         Reply::Health(Health { events: core::mem::take(self.events), ..self.console.health })
+    }
+
+    fn place(&mut self) -> Reply<'_> {
+        let Reply::Status(Status { tick, phase, status, .. }) = self.status() else {
+            return Reply::Refused(Refusal::State);
+        };
+        match put_words(&self.console.place, &mut self.words) {
+            Some(words) if PLACE_WORDS > 0 => Reply::Place { tick, phase, status, words },
+            _ => Reply::Refused(Refusal::Unsupported),
+        }
     }
 
     /// Gives the orders to this host, then does `what`.
@@ -174,6 +184,7 @@ impl Device for Desk<'_> {
             Request::Describe { offset } => piece(DESCRIPTION.as_bytes(), offset),
             Request::Status => self.status(),
             Request::Health => self.health(),
+            Request::Place => self.place(),
             Request::Supervise { request } => self.supervise(request).map_or_else(Reply::Refused, |()| Reply::Done),
             Request::Setpoint { words } => self.ordered(|desk| desk.command(words)),
             Request::ReadConfig => match put_words(&self.console.config().to_words(), &mut self.words) {

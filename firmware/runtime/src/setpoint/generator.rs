@@ -113,6 +113,12 @@ impl<T: Real> Generator<T> {
         &self.target
     }
 
+    /// The same set-point in the user's coordinates, m and rad; those of the bias until it is reached.
+    #[must_use]
+    pub fn place(&self) -> &[T; 6] {
+        &self.place
+    }
+
     /// As [`Generator::tick`], with a copy of the set-point.
     #[inline]
     pub fn next<F: Frames<T>>(&mut self, setpoints: &Setpoints<T, F>, command: &Command<T>) -> (Target<T>, u32) {

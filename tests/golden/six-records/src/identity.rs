@@ -26,4 +26,4 @@ pub const SPECGEN_VERSION: &str = "0.1.0";
 
 /// Of the description what stands before the names of words, and what stands after them.
 pub(crate) const ABOUT: &str = "name=six-records\ndigest=367d27d007c5563f7a7630a6eb6b9eddbc902d8c6f0d0cdbbb87d8ae38b0df4a\nversion=0.1.0\nkind=legs\nscalar_bits=32\nleg_gain=6.31e-7\nperiod=0.0002\ngrid=8\ndrive_range=0.0,100.0\n";
-pub(crate) const BIAS: &str = "";
+pub(crate) const MOTION: &str = "";

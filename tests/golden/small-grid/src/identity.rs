@@ -26,4 +26,4 @@ pub const SPECGEN_VERSION: &str = "0.1.0";
 
 /// Of the description what stands before the names of words, and what stands after them.
 pub(crate) const ABOUT: &str = "name=small-grid\ndigest=51ddf0f792570378fbb53268041912e6a8cd4fafe921b0c65823dc8f51404428\nversion=0.1.0\nkind=legs\nscalar_bits=64\nleg_gain=6.31e-7\nperiod=0.0002\ngrid=8\ndrive_range=0.0,100.0\n";
-pub(crate) const BIAS: &str = "";
+pub(crate) const MOTION: &str = "";

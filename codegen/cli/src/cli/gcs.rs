@@ -1,0 +1,121 @@
+//! `specgen gcs`: programs that speak the General Command Set move a machine over the link.
+
+use std::net::{SocketAddr, TcpListener};
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args};
+use host_sim::controller::MachineWord;
+use serde::Serialize;
+use specgen_language::interrupt;
+use specgen_link::client::{Port, Timeout};
+use specgen_operate::gcs::{Axes, Bridge, Stage};
+use specgen_operate::pil::{BAUD, OpenError, SerialLine};
+use specgen_operate::{Session, SocketLine};
+
+use super::operate::Operator;
+use super::spec;
+use super::ui::{Failure, Outcome, Ui};
+
+/// Arguments of `gcs`.
+#[derive(Args, Debug)]
+#[command(group(ArgGroup::new("line").required(true).args(["port", "socket"])), after_help = super::examples::GCS)]
+pub struct Arguments {
+    /// The spec that the device was built from; another controller is then refused.
+    #[arg(value_name = "SPEC")]
+    spec: Option<PathBuf>,
+    /// A board at this serial port.
+    #[arg(long, value_name = "DEVICE")]
+    port: Option<PathBuf>,
+    /// Its rate, baud.
+    #[arg(long, default_value_t = BAUD, requires = "port", conflicts_with = "socket", value_parser = clap::value_parser!(u32).range(1200..=12_000_000))]
+    baud: u32,
+    /// A program that serves the link at this Unix socket.
+    #[arg(long, value_name = "PATH")]
+    socket: Option<PathBuf>,
+    /// Where clients connect. Whoever can reach it can move the machine: the command set knows no password.
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:50000")]
+    listen: SocketAddr,
+    /// Show this axis (X Y Z U V W) under another name and no axis that is not named; for clients that know one axis. Repeat for
+    /// more.
+    #[arg(long = "axis", value_name = "NAME=AXIS")]
+    axes: Vec<String>,
+}
+
+/// What was served.
+#[derive(Serialize)]
+struct Summary {
+    device: String,
+    listened: String,
+    stands: String,
+}
+
+impl Outcome for Summary {
+    fn text(&self) -> String {
+        String::new()
+    }
+}
+
+pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    let axes = Axes::named(&arguments.axes).map_err(|error| Failure::Usage(format!("--axis: {error}")))?;
+    let compiled = arguments.spec.as_deref().map(|spec| spec::looked_up(spec, ui)).transpose()?;
+    let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.as_str());
+    interrupt::heed();
+    match (&arguments.port, &arguments.socket) {
+        (Some(path), _) => {
+            let line = SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?;
+            serve(line, Timeout::SERIAL, &path.display().to_string(), digest, arguments.listen, axes, ui)
+        }
+        (None, Some(path)) => {
+            let line = SocketLine::open(path).map_err(Failure::Environment)?;
+            serve(line, Timeout::SOCKET, &path.display().to_string(), digest, arguments.listen, axes, ui)
+        }
+        // One of the two is required.
+        (None, None) => Err(Failure::Usage("name the device with --port or --socket".to_owned())),
+    }
+}
+
+fn serve(
+    line: impl Port,
+    timeout: Timeout,
+    name: &str,
+    digest: Option<&str>,
+    listen: SocketAddr,
+    axes: Axes,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
+    let session = Session::open(line, timeout, digest).map_err(|error| match error {
+        OpenError::Other(text) => Failure::Gate(format!("{name}: {text}")),
+        OpenError::Link(_) => Failure::Environment(format!("{name}: {error}")),
+    })?;
+    let stage = Stage::new(session).map_err(|error| Failure::Gate(format!("{name}: {error}")))?;
+    let no = |error: std::io::Error| Failure::Environment(format!("cannot listen at {listen}: {error}"));
+    let listener = TcpListener::bind(listen).map_err(no)?;
+    let address = listener.local_addr().map_err(no)?;
+    let stop = interrupt::heed();
+    let mut bridge = Bridge::new(stage, axes, listener).map_err(no)?;
+    if !address.ip().is_loopback() {
+        ui.progress("warning: whoever reaches this address can move the machine");
+    }
+    ui.progress(&format!("{name}: GCS at {address}; Ctrl-C ramps down and ends"));
+    let mut shown = String::new();
+    let ended = bridge.run(stop, |session| {
+        let status = session.status();
+        let stands =
+            MachineWord { phase: status.phase, cause: status.cause, amplifier_on: status.amplifier_on }.to_string();
+        if stands != shown {
+            ui.progress(&format!("tick {}: {stands}", status.tick));
+            shown = stands;
+        }
+    });
+    let lost = |error: &dyn std::fmt::Display| {
+        Failure::Environment(format!(
+            "{name}: {error}; a machine that lost its host holds, then ramps down (supervisor.host_lost)"
+        ))
+    };
+    ended.map_err(|error| lost(&error))?;
+    let mut operator = Operator::new(bridge.into_session(), stop);
+    let stands =
+        if operator.is_powered() { operator.ramp_down(ui).map_err(|error| lost(&error))? } else { operator.stands() };
+    ui.result(&Summary { device: name.to_owned(), listened: address.to_string(), stands });
+    Ok(())
+}

@@ -1,0 +1,306 @@
+//! `specgen gcs` between clients of the General Command Set and the real-time program, byte by byte as clients talk. Times are printed,
+//! not asserted.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use rustix::process::Signal;
+use specgen::operate::{Place, Session, SocketLine};
+use specgen_link::client::Timeout;
+
+use super::{Bench, DISARMED, RUNNING, Running, signal, wait_for};
+
+/// How far the platform may be from its target once it has arrived, µm: the gauges' noise many times over, and nothing of a move.
+const THERE: f64 = 0.05;
+
+/// The bridge, at a port of its own.
+struct Bridge {
+    process: Option<Child>,
+    port: u16,
+}
+
+impl Bridge {
+    fn new(bench: &Bench, more: &[&str]) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_specgen"));
+        command.args(["gcs", "--listen", "127.0.0.1:0", "--socket"]).arg(bench.path("gcs.link")).arg(&bench.spec);
+        let mut process = command.args(more).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut said = BufReader::new(process.stderr.take().unwrap()).lines();
+        let port = said.find_map(|line| {
+            let line = line.unwrap();
+            line.split_once("GCS at 127.0.0.1:")?.1.split(';').next()?.parse().ok()
+        });
+        // What it says later is nobody's: it must not wait for that.
+        std::thread::spawn(move || said.for_each(drop));
+        Self { process: Some(process), port: port.unwrap() }
+    }
+
+    fn client(&self) -> Client {
+        let stream = TcpStream::connect(("127.0.0.1", self.port)).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        stream.set_nodelay(true).unwrap();
+        Client(stream)
+    }
+
+    /// As Ctrl-C does.
+    fn end(mut self) {
+        let mut process = self.process.take().unwrap();
+        signal(&process, Signal::INT);
+        assert_eq!(process.wait().unwrap().code(), Some(0));
+    }
+}
+
+impl Drop for Bridge {
+    fn drop(&mut self) {
+        if let Some(process) = &mut self.process {
+            let _ = process.kill();
+            let _ = process.wait();
+        }
+    }
+}
+
+struct Client(TcpStream);
+
+impl Client {
+    fn send(&mut self, text: &str) {
+        self.0.write_all(text.as_bytes()).unwrap();
+        self.0.write_all(b"\n").unwrap();
+    }
+
+    /// Lines up to one that does not end in a space.
+    fn answer(&mut self) -> String {
+        let mut bytes = Vec::new();
+        while !bytes.ends_with(b"\n") || bytes.ends_with(b" \n") {
+            let mut byte = [0];
+            self.0.read_exact(&mut byte).unwrap();
+            bytes.extend(byte);
+        }
+        bytes.pop();
+        bytes.into_iter().map(char::from).collect()
+    }
+
+    fn ask(&mut self, text: &str) -> String {
+        self.send(text);
+        self.answer()
+    }
+
+    fn single(&mut self, byte: u8) -> String {
+        self.0.write_all(&[byte]).unwrap();
+        self.answer()
+    }
+
+    fn error(&mut self) -> String {
+        self.ask("ERR?")
+    }
+
+    /// Sends what has no answer; the error that it came to.
+    fn order(&mut self, text: &str) -> String {
+        self.send(text);
+        self.error()
+    }
+
+    fn value(&mut self, text: &str) -> f64 {
+        self.ask(text).split_once('=').unwrap().1.parse().unwrap()
+    }
+
+    fn settle(&mut self) {
+        wait_for("the end of the motion", || self.single(5) == "0");
+    }
+}
+
+pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
+    let link = bench.path("gcs.link");
+    let mut command = bench.command("gcs.rec");
+    command.args(["--elastic", "--sim-timeout", "5000", "--link-silence", "1000", "--link"]).arg(&link);
+    let running = Running::new(&mut command);
+    wait_for("the link", || link.exists());
+    let bridge = Bridge::new(bench, &[]);
+    let mut looker = Session::open(SocketLine::open(&link).unwrap(), Timeout::SOCKET, None).unwrap();
+    let mut look = || looker.place().unwrap().unwrap();
+    let mut first = bridge.client();
+
+    who_is_there(&mut first, &mut look);
+    moves_are_made_or_refused_before_anything_moves(&mut first, &mut look);
+    latency(&mut first, &mut look);
+    let mut second = bridge.client();
+    others_look_and_stop_and_are_no_burden(&bridge, &mut first, &mut second, &mut look);
+    one_that_leaves_leaves_the_orders(first, &mut second, &mut look);
+    bridge.end();
+    assert_eq!(look().phase, DISARMED, "Ctrl-C ramps down");
+
+    // Under one name for an axis, as clients of single stages want it; and off is off.
+    let bridge = Bridge::new(bench, &["--axis", "1=Z"]);
+    let mut client = bridge.client();
+    assert_eq!(client.ask("SAI?"), "1");
+    assert_eq!(client.ask("SPA? 1 0X7000601"), "1 0X7000601=um");
+    assert_eq!([client.order("SVO 1 1"), client.order("MOV 1 3"), client.order("MOV Z 3")], ["0", "0", "15"]);
+    client.settle();
+    assert!((client.value("POS? 1") - 3.0).abs() < THERE);
+    assert_eq!(client.order("SVO 1 0"), "0");
+    wait_for("the way down", || look().phase == DISARMED);
+    assert_eq!([client.ask("SVO? 1"), client.order("MOV 1 1")], ["1=0", "5"]);
+    bridge.end();
+
+    let (summary, _) = bench.check(&running.end(Signal::INT), "gcs.rec");
+    assert_eq!(summary["incidents"].as_array().map(Vec::len), Some(0), "never disturbed: {summary:#}");
+}
+
+fn who_is_there(client: &mut Client, look: &mut impl FnMut() -> Place) {
+    let name = client.ask("*IDN?");
+    assert!(name.starts_with("specgen,HEXAPOD reference,") && name.split(',').count() == 4, "{name}");
+    assert_eq!([client.ask("CSV?"), client.error()], ["2.0", "0"]);
+    assert_eq!(client.ask("SAI? ALL"), "X \nY \nZ \nU \nV \nW");
+    assert_eq!([client.ask("SVO? X U"), client.single(4)], ["X=0 \nU=0", "65536"]);
+    // What the strokes allow, not what the workspace says: below rest there is no voltage.
+    let (lowest, highest, right) = (client.value("TMN? Z"), client.value("PLM? Z"), client.value("TMX? X"));
+    assert!(
+        (-9.9..-9.0).contains(&lowest) && (highest - 42.0).abs() < 1e-6 && right < 20.0,
+        "{lowest} {highest} {right}"
+    );
+    assert_eq!(client.order("MOV X 1"), "5");
+    assert_eq!(look().phase, DISARMED);
+    assert_eq!([client.order("SVO X 1"), client.ask("SVO? X")], ["0", "X=1"]);
+    assert_eq!(client.order("FRF"), "0");
+    // Waits for the machine as it comes up.
+    assert_eq!(client.order("MOV X 0 Y 0 Z 15 U 0 V 0 W 0"), "0");
+    client.settle();
+    assert_eq!([client.ask("ONT? Z"), client.single(7), client.single(4)], ["Z=1", "\u{b1}", "102400"]);
+    assert_eq!(look().phase, RUNNING);
+}
+
+fn moves_are_made_or_refused_before_anything_moves(client: &mut Client, look: &mut impl FnMut() -> Place) {
+    let mut worst: f64 = 0.0;
+    for count in 0..100_u32 {
+        let to = f64::from(count * 37 % 41) * 0.25 - 5.0;
+        assert_eq!(client.order(&format!("MOV X {to:.6} Z {:.6}", 15.0 - to)), "0");
+        client.settle();
+        assert_eq!([client.value("MOV? X"), client.value("MOV? Z")], [to, 15.0 - to]);
+        for error in [client.value("POS? X") - to, client.value("POS? Z") - 15.0 + to] {
+            assert!(error.abs() < THERE, "{count}: {error}");
+            worst = if error.abs() > worst { error.abs() } else { worst };
+        }
+    }
+    println!("gcs: 100 moves, {:.1} nm from the target at most, gauges' noise included", 1e3 * worst);
+    assert_eq!([client.order("MOV X 1 Y 2 Z 15"), client.order("MVR X 0.5")], ["0", "0"]);
+    client.settle();
+    assert_eq!([client.value("MOV? X"), client.value("MOV? Y")], [1.5, 2.0]);
+
+    let before = look();
+    for (order, code) in [
+        ("MOV Q 1", "15"),
+        ("MOV X 1 Q 1", "15"),
+        ("MOV X 500", "7"),
+        ("MOV Y 1 Z -11", "7"),
+        ("MVR U 399 V 399", "7"),
+        ("MOV X", "24"),
+        ("MOV", "24"),
+        ("MOV X one", "1"),
+        ("MOV X nan", "1"),
+        ("MOV X 1 X 2", "22"),
+        ("VLS 50", "8"),
+        ("VEL X 50", "8"),
+        ("SVO X 2", "17"),
+        ("WHO", "2"),
+        ("VLS 100", "0"),
+        ("VEL X 100", "0"),
+    ] {
+        assert_eq!(client.order(order), code, "{order}");
+        let now = look();
+        assert!(now.target == before.target && now.phase == RUNNING && now.status >> 16 == 0, "{order}: {now:?}");
+    }
+    assert_eq!(client.ask("VMO? X 1 Y 2"), "1");
+    assert_eq!(client.ask("VMO? Z -11"), "0");
+    // As far as the direction leads, and no further.
+    let far = client.value("TRA? X 1");
+    assert_eq!(client.order(&format!("MOV X {:.6}", far - 0.001)), "0");
+    assert_eq!(client.order(&format!("MOV X {:.6}", far + 0.001)), "7");
+    // Stopped on the way, it stands where it says.
+    wait_for("the motion", || client.value("POS? X") > 3.0);
+    client.0.write_all(&[24]).unwrap();
+    assert_eq!(client.error(), "10");
+    client.settle();
+    let stood = client.value("MOV? X");
+    assert!(stood < far - 1.0 && (client.value("POS? X") - stood).abs() < THERE, "{stood}");
+    // About a pivot: turned, its coordinates stay, and those of the platform move.
+    assert_eq!(client.order("MOV X 0 Y 0"), "0");
+    client.settle();
+    assert_eq!(client.order("SPI T -10000"), "0");
+    assert_eq!([client.order("MOV V 100"), client.order("SPI T 0")], ["0", "93"]);
+    client.settle();
+    assert_eq!([client.value("MOV? X"), client.ask("SPI? T").trim_start_matches("T=").parse().unwrap()], [0.0, -1e4]);
+    // −(R − I) c of c = (0, 0, −10 mm) turned by 100 µrad about y: +1 µm in x.
+    let x = look().target[0];
+    assert!((x - 1e-6).abs() < 1e-10, "{x}");
+    assert_eq!([client.order("SPI T 0"), client.order("MOV V 0 X 0")], ["9", "0"]);
+    client.settle();
+    assert_eq!(client.order("SPI T 0"), "0");
+}
+
+/// From the order on the wire to the first tick whose set-point follows it, as another host sees it.
+fn latency(client: &mut Client, look: &mut impl FnMut() -> Place) {
+    let mut times: Vec<f64> = (0..50)
+        .map(|count| {
+            let before = look().target;
+            let start = Instant::now();
+            client.send(&format!("MOV Y {}", 2 - count % 2));
+            while look().target == before {
+                assert!(start.elapsed() < Duration::from_secs(20));
+            }
+            let time = start.elapsed().as_secs_f64() * 1e3;
+            client.settle();
+            time
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    println!(
+        "gcs: MOV to the first tick that follows: {:.2} ms (median), {:.2} ms (longest of 50)",
+        times[25], times[49]
+    );
+}
+
+fn others_look_and_stop_and_are_no_burden(
+    bridge: &Bridge,
+    first: &mut Client,
+    second: &mut Client,
+    look: &mut impl FnMut() -> Place,
+) {
+    assert_eq!([second.order("MOV X 1"), second.order("SVO X 0")], ["89", "89"]);
+    // One that asks and never listens, one that sends what is no command, one that is gone in the middle of a line.
+    let mut deaf = bridge.client();
+    deaf.0.set_write_timeout(Some(Duration::from_millis(100))).unwrap();
+    let _ = deaf.0.write_all(&b"POS?\n".repeat(100_000));
+    let mut garbage = bridge.client();
+    let bytes: Vec<u8> = (0..40_000_u32).map(|count| (count.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+    garbage.0.set_write_timeout(Some(Duration::from_millis(100))).unwrap();
+    // Without the byte that stops, which anybody may send.
+    let _ = garbage.0.write_all(&bytes.into_iter().filter(|byte| *byte != 24).collect::<Vec<_>>());
+    bridge.client().0.write_all(b"MOV X").unwrap();
+    second.0.write_all(&b"XYZZY 1 2\n".repeat(10_000)).unwrap();
+    for count in 0..10_u32 {
+        let to = f64::from(count % 3);
+        assert_eq!(first.order(&format!("MOV X {to:.6}")), "0", "{count}");
+        first.settle();
+        assert!((first.value("POS? X") - to).abs() < THERE);
+        assert_eq!(look().phase, RUNNING);
+    }
+    assert_eq!([second.error(), second.error()], ["2", "0"]);
+    // Anybody may stop.
+    assert_eq!(first.order("MOV X 30"), "0");
+    wait_for("the motion", || second.value("POS? X") > 5.0);
+    assert_eq!(second.order("HLT"), "10");
+    first.settle();
+    assert!(first.value("MOV? X") < 29.0 && look().phase == RUNNING);
+    assert_eq!(first.error(), "0", "each client has its own errors");
+}
+
+fn one_that_leaves_leaves_the_orders(mut first: Client, second: &mut Client, look: &mut impl FnMut() -> Place) {
+    assert_eq!(first.order("MOV X -20"), "0");
+    wait_for("the motion", || second.value("POS? X") < 0.0);
+    drop(first);
+    second.settle();
+    assert!((second.value("POS? X") + 20.0).abs() < THERE, "it goes where it was sent, and stays");
+    assert_eq!(look().phase, RUNNING);
+    assert_eq!([second.order("MOV X 0"), second.error()], ["0", "0"]);
+    second.settle();
+}

@@ -1,0 +1,363 @@
+//! What commands do, and what is answered.
+
+use specgen_link::client::Port;
+
+use super::axes::{Axes, from_wire, to_wire};
+use super::code::Code;
+use super::input::{Piece, STOP};
+use super::stage::{No, Stage};
+use crate::motion::Motion;
+
+/// Bits of the status that `#4` answers.
+const REFERENCED: u32 = 0x1_0000;
+const ON_TARGET: u32 = 0x8000;
+const IN_MOTION: u32 = 0x2000;
+const SERVO: u32 = 0x1000;
+const ERROR: u32 = 0x100;
+
+/// Parameters that `SPA?` knows: largest speed, unit of an axis.
+const SPEED: u32 = 0xa;
+const UNIT: u32 = 0x0700_0601;
+
+/// Largest pivot coordinate that is meant, m.
+const FARTHEST: f64 = 10.0;
+
+/// Every command, with what `HLP?` says of it.
+const HELP: &[&str] = &[
+    "#3 Real positions",
+    "#4 Status",
+    "#5 Mask of axes in motion",
+    "#7 Ready",
+    "#24 Stop all axes",
+    "*IDN? Who is there",
+    "CSV? Version of the command set",
+    "ERR? Last error, then cleared",
+    "FRF [axes] Reference: gauges are absolute, nothing moves",
+    "FRF? [axes] Whether referenced",
+    "HLP? This list",
+    "HLT [axes] Stop",
+    "MOV axis value ... Go to",
+    "MOV? [axes] Where to",
+    "MVR axis value ... Go by",
+    "NLM? [axes], TMN? [axes] Least position",
+    "ONT? [axes] Whether on target",
+    "PLM? [axes], TMX? [axes] Largest position",
+    "POS? [axes] Position",
+    "PUN? [axes] Unit",
+    "SAI? [ALL] Axes",
+    "SPA? axis id Parameter",
+    "SPI point value ... Pivot point R S T",
+    "SPI? [points] Pivot point",
+    "STP Stop all axes",
+    "SVO axis state ... Servo of the machine, all axes at once",
+    "SVO? [axes] Servo",
+    "TRA? axis direction ... How far along a direction",
+    "VEL axis value ... The speed of the spec, or more",
+    "VEL? [axes] Speed",
+    "VLS value The speed of the spec, or more",
+    "VLS? Speed",
+    "VMO? axis value ... Whether it can go there",
+];
+
+/// What one command came to: an answer, if there is one, or why there is none.
+pub(super) type Outcome = Result<Option<String>, No>;
+
+/// Who asks, as far as commands care.
+pub(super) struct Asked<'a> {
+    pub(super) axes: &'a Axes,
+    /// The error that waits to be asked for.
+    pub(super) error: &'a mut Option<Code>,
+    /// Whether this client may order.
+    pub(super) may_order: bool,
+}
+
+/// Whether a command wants the orders: it moves something, or lets it move.
+pub(super) fn is_order(piece: &Piece) -> bool {
+    let Piece::Line(line) = piece else { return false };
+    let word = line.split_whitespace().next().unwrap_or_default();
+    matches!(word, "MOV" | "MVR" | "SVO" | "FRF" | "SPI" | "VEL" | "VLS")
+}
+
+/// Carries a command out.
+pub(super) fn execute<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, piece: &Piece) -> Outcome {
+    match piece {
+        Piece::TooLong => Err(Code::TooLong.into()),
+        Piece::Single(byte) => single(stage, asked, *byte),
+        Piece::Line(line) => {
+            if is_order(piece) && !asked.may_order {
+                return Err(Code::NotNow.into());
+            }
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let (command, rest) = words.split_first().ok_or(Code::UnknownCommand)?;
+            match command.strip_suffix('?') {
+                Some(command) => query(stage, asked, command, rest),
+                None => order(stage, asked, command, rest),
+            }
+        }
+    }
+}
+
+fn single<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, byte: u8) -> Outcome {
+    if byte == STOP {
+        return stop(stage);
+    }
+    stage.refresh()?;
+    let text = match byte {
+        3 => return query(stage, asked, "POS", &[]),
+        4 => {
+            let moves = stage.moves();
+            let bits = [
+                (REFERENCED, true),
+                (SERVO, stage.servo()),
+                (IN_MOTION, moves),
+                (ON_TARGET, stage.servo() && !moves),
+                (ERROR, asked.error.is_some()),
+            ];
+            bits.iter().filter(|(_, is)| *is).map(|(bit, _)| bit).sum::<u32>().to_string()
+        }
+        // A platform moves as a whole.
+        5 if stage.moves() => format!("{:X}", (1_u32 << asked.axes.iter().count()) - 1),
+        7 => return Ok(Some(char::from(if stage.is_rising() { 0xb0 } else { 0xb1 }).to_string())),
+        // Nothing in motion, no macro, no wave.
+        _ => "0".to_owned(),
+    };
+    Ok(Some(text))
+}
+
+fn stop<P: Port>(stage: &mut Stage<P>) -> Outcome {
+    stage.refresh()?;
+    stage.stop()?;
+    Err(Code::Stopped.into())
+}
+
+fn order<P: Port>(stage: &mut Stage<P>, asked: &Asked<'_>, command: &str, rest: &[&str]) -> Outcome {
+    match command {
+        "MOV" | "MVR" => {
+            let values = values(asked.axes, rest)?;
+            stage.refresh()?;
+            let mut pose = stage.standing()?;
+            for (axis, value) in values {
+                let value = from_wire(value);
+                pose[axis] = if command == "MVR" { pose[axis] + value } else { value };
+            }
+            stage.go(&pose)?;
+        }
+        "SVO" => {
+            let values = values(asked.axes, rest)?;
+            stage.refresh()?;
+            match values.iter().map(|(_, value)| *value).collect::<Vec<_>>()[..] {
+                // The platform's loop is one.
+                [first, ref others @ ..] if others.iter().any(|other| other != &first) => {
+                    return Err(Code::ParameterRange.into());
+                }
+                [0.0, ..] => stage.shut_down()?,
+                [1.0, ..] => stage.start()?,
+                _ => return Err(Code::ParameterRange.into()),
+            }
+        }
+        "STP" if rest.is_empty() => return stop(stage),
+        "STP" => return Err(Code::ParameterCount.into()),
+        "HLT" => {
+            chosen(asked.axes, rest)?;
+            return stop(stage);
+        }
+        "FRF" => {
+            chosen(asked.axes, rest)?;
+            stage.refresh()?;
+            if !stage.servo() {
+                return Err(Code::ServoOff.into());
+            }
+        }
+        "SPI" => {
+            let mut pivot = stage.pivot();
+            for (name, value) in pairs(rest)? {
+                let value = from_wire(number(value)?);
+                let place = point(name)?;
+                if value.abs() > FARTHEST {
+                    return Err(Code::ParameterRange.into());
+                }
+                pivot[place] = value;
+            }
+            stage.refresh()?;
+            stage.set_pivot(pivot)?;
+        }
+        "VEL" => {
+            for (axis, value) in values(asked.axes, rest)? {
+                fast_enough(value, to_wire(stage.motion().speed()[axis]))?;
+            }
+        }
+        "VLS" => match rest {
+            [value] => fast_enough(number(value)?, system_speed(stage.motion()))?,
+            _ => return Err(Code::ParameterCount.into()),
+        },
+        _ => return Err(Code::UnknownCommand.into()),
+    }
+    Ok(None)
+}
+
+/// A machine has the speed of its spec. A client that allows more gets it; one that asks for less would not get less.
+fn fast_enough(value: f64, speed: f64) -> Result<(), Code> {
+    // As many digits as are answered, so that what was read may be set.
+    if value >= speed - 1e-6 { Ok(()) } else { Err(Code::Velocity) }
+}
+
+/// Of the translations together: that of the slowest, µm/s.
+fn system_speed(motion: &Motion) -> f64 {
+    let [x, y, z, ..] = *motion.speed();
+    to_wire([y, z].into_iter().fold(x, |least, speed| if speed < least { speed } else { least }))
+}
+
+fn query<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, command: &str, rest: &[&str]) -> Outcome {
+    let axes = asked.axes;
+    let text = match command {
+        "*IDN" => {
+            let description = stage.session().description();
+            let digest: String = description.digest.chars().take(8).collect();
+            // Clients part fields at commas.
+            let name = description.name.replace(',', " ");
+            format!("specgen,HEXAPOD {name},{digest},{}", description.version)
+        }
+        "CSV" => "2.0".to_owned(),
+        "ERR" => {
+            stage.refresh()?;
+            if asked.may_order {
+                // What becomes of a move is known some ticks after it.
+                if !stage.is_answered() {
+                    return Err(No::Later);
+                }
+                if let Some(code) = stage.mishap() {
+                    asked.error.get_or_insert(code);
+                }
+            }
+            asked.error.take().map_or(0, |code| code as u32).to_string()
+        }
+        "HLP" => lines(HELP.iter().map(|line| (*line).to_owned())),
+        "SAI" if rest.iter().all(|word| *word == "ALL") => lines(axes.iter().map(|(name, _)| name.to_owned())),
+        "TPC" => "0".to_owned(),
+        "JON" => lines(rest.iter().map(|name| format!("{name}=0"))),
+        "HIN" => per_axis(axes, rest, |_| "0".to_owned())?,
+        "PUN" => per_axis(axes, rest, |axis| unit(axis).to_owned())?,
+        "FRF" | "RON" | "EAX" => per_axis(axes, rest, |_| "1".to_owned())?,
+        "VEL" => per_axis(axes, rest, |axis| decimal(to_wire(stage.motion().speed()[axis])))?,
+        "VLS" => decimal(system_speed(stage.motion())),
+        "TMN" | "NLM" => per_axis(axes, rest, |axis| decimal(to_wire(limits(stage, axis)[0])))?,
+        "TMX" | "PLM" => per_axis(axes, rest, |axis| decimal(to_wire(limits(stage, axis)[1])))?,
+        "SPA" => parameters(stage.motion(), axes, rest)?,
+        "SPI" => {
+            let names = if rest.is_empty() { &["R", "S", "T"][..] } else { rest };
+            let pivot = stage.pivot();
+            let of = |name: &&str| Ok::<_, Code>(format!("{name}={}", decimal(to_wire(pivot[point(name)?]))));
+            lines(names.iter().map(of).collect::<Result<Vec<_>, _>>()?.into_iter())
+        }
+        "POS" | "MOV" | "ONT" | "SVO" | "VMO" | "TRA" => {
+            stage.refresh()?;
+            match command {
+                "POS" => per_axis(axes, rest, |axis| decimal(to_wire(stage.pose()[axis])))?,
+                "MOV" => per_axis(axes, rest, |axis| decimal(to_wire(stage.goal()[axis])))?,
+                "ONT" => {
+                    let there = stage.servo() && !stage.moves();
+                    per_axis(axes, rest, |_| u32::from(there).to_string())?
+                }
+                "SVO" => per_axis(axes, rest, |_| u32::from(stage.servo()).to_string())?,
+                "VMO" => {
+                    let mut pose = stage.goal();
+                    for (axis, value) in values(axes, rest)? {
+                        pose[axis] = from_wire(value);
+                    }
+                    u32::from(stage.admitted(&pose).is_some()).to_string()
+                }
+                _ => reach(stage, axes, rest)?,
+            }
+        }
+        _ => return Err(Code::UnknownCommand.into()),
+    };
+    Ok(Some(text))
+}
+
+/// Least and largest position of an axis with the others at zero, m or rad.
+fn limits<P: Port>(stage: &Stage<P>, axis: usize) -> [f64; 2] {
+    let way = |sign: f64| core::array::from_fn(|other| if other == axis { sign } else { 0.0 });
+    [-1.0, 1.0].map(|sign| sign * stage.reach(&[0.0; 6], &way(sign)))
+}
+
+/// How far each axis gets from the goal along a direction.
+fn reach<P: Port>(stage: &Stage<P>, axes: &Axes, rest: &[&str]) -> Result<String, Code> {
+    let values = values(axes, rest)?;
+    let mut way = [0.0; 6];
+    for (axis, value) in &values {
+        way[*axis] = from_wire(*value);
+    }
+    let start = stage.goal();
+    let far = stage.reach(&start, &way);
+    let names = rest.iter().step_by(2).zip(&values);
+    Ok(lines(names.map(|(name, (axis, _))| format!("{name}={}", decimal(to_wire(start[*axis] + far * way[*axis]))))))
+}
+
+fn parameters(motion: &Motion, axes: &Axes, rest: &[&str]) -> Result<String, Code> {
+    let of = |(name, id): (&str, &str)| {
+        let axis = axes.place(name).ok_or(Code::Axis)?;
+        let hexadecimal = id.strip_prefix("0x").or_else(|| id.strip_prefix("0X"));
+        let number = hexadecimal.map_or_else(|| id.parse().ok(), |digits| u32::from_str_radix(digits, 16).ok());
+        match number.ok_or(Code::Syntax)? {
+            SPEED => Ok(format!("{name} {id}={}", decimal(to_wire(motion.speed()[axis])))),
+            UNIT => Ok(format!("{name} {id}={}", unit(axis))),
+            _ => Err(Code::ParameterRange),
+        }
+    };
+    Ok(lines(pairs(rest)?.into_iter().map(of).collect::<Result<Vec<_>, _>>()?.into_iter()))
+}
+
+fn unit(axis: usize) -> &'static str {
+    if axis < 3 { "um" } else { "urad" }
+}
+
+/// `NAME=…` of the axes that are named, or of all.
+fn per_axis(axes: &Axes, rest: &[&str], of: impl Fn(usize) -> String) -> Result<String, Code> {
+    Ok(lines(chosen(axes, rest)?.into_iter().map(|(name, axis)| format!("{name}={}", of(axis)))))
+}
+
+fn chosen<'a>(axes: &'a Axes, names: &[&'a str]) -> Result<Vec<(&'a str, usize)>, Code> {
+    if names.is_empty() {
+        return Ok(axes.iter().collect());
+    }
+    names.iter().map(|name| axes.place(name).map(|axis| (*name, axis)).ok_or(Code::Axis)).collect()
+}
+
+/// Axis and value of each pair, every axis once.
+fn values(axes: &Axes, rest: &[&str]) -> Result<Vec<(usize, f64)>, Code> {
+    let mut found: Vec<(usize, f64)> = Vec::new();
+    for (name, value) in pairs(rest)? {
+        let axis = axes.place(name).ok_or(Code::Axis)?;
+        if found.iter().any(|(known, _)| *known == axis) {
+            return Err(Code::AxisTwice);
+        }
+        found.push((axis, number(value)?));
+    }
+    Ok(found)
+}
+
+fn pairs<'a>(rest: &[&'a str]) -> Result<Vec<(&'a str, &'a str)>, Code> {
+    let (pairs, odd) = rest.as_chunks::<2>();
+    if pairs.is_empty() || !odd.is_empty() {
+        return Err(Code::ParameterCount);
+    }
+    Ok(pairs.iter().map(|[name, value]| (*name, *value)).collect())
+}
+
+fn number(text: &str) -> Result<f64, Code> {
+    text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or(Code::Syntax)
+}
+
+fn point(name: &str) -> Result<usize, Code> {
+    ["R", "S", "T"].iter().position(|known| *known == name).ok_or(Code::Axis)
+}
+
+/// µm and µrad to a millionth, finer than the ten-thousandths in which a client counts.
+fn decimal(value: f64) -> String {
+    format!("{value:.6}")
+}
+
+/// Lines of an answer; every one but the last ends in a space.
+fn lines(lines: impl Iterator<Item = String>) -> String {
+    lines.collect::<Vec<_>>().join(" \n")
+}

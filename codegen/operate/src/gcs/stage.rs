@@ -1,0 +1,353 @@
+//! The machine as GCS sees it: a servo that is on or off, a goal, and whether it is there.
+
+use std::time::{Duration, Instant};
+
+use specgen_link::Refusal;
+use specgen_link::client::{ClientError, Port};
+use specgen_runtime::setpoint::{BUSY, Frames, REFUSED, Target, Tool};
+use specgen_runtime::supervisor::{Phase, Request};
+
+use super::code::Code;
+use crate::motion::{self, Motion};
+use crate::session::{Place, Session};
+
+/// Ticks after which a place shows what became of an order.
+const SEEN: u64 = 10;
+/// A place that is older is asked for anew before it is told.
+const FRESH: Duration = Duration::from_micros(500);
+/// After so long a machine that makes no ticks is not waited for.
+const SILENT: Duration = Duration::from_millis(100);
+/// How long it may take until the machine runs.
+const UP: Duration = Duration::from_secs(10);
+
+/// A session with a platform.
+pub struct Stage<P> {
+    session: Session<P>,
+    motion: Motion,
+    place: Place,
+    seen: Instant,
+    /// Where the last move leads, in the user's coordinates; none if nothing is known of one.
+    goal: Option<[f64; 6]>,
+    /// The last order: a tick from which on the place shows what became of it, and when it was sent.
+    ordered: (u64, Instant),
+    /// On the way to a machine that runs.
+    rising: Option<Rising>,
+    /// The pivot point, from the tool point along the user's axes, m.
+    pivot: [f64; 3],
+    /// What went wrong after the command that asked for it had been taken.
+    mishap: Option<Code>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Rising {
+    since: Instant,
+    asked: Request,
+}
+
+/// Why an order is not carried out.
+pub(super) enum No {
+    Code(Code),
+    /// Not yet: the machine is coming up, or to rest.
+    Later,
+    Link(ClientError),
+}
+
+impl From<Code> for No {
+    fn from(code: Code) -> Self {
+        Self::Code(code)
+    }
+}
+
+impl From<ClientError> for No {
+    fn from(error: ClientError) -> Self {
+        match error {
+            ClientError::Refused(Refusal::State) => Self::Code(Code::WaveActive),
+            ClientError::Refused(Refusal::Busy) => Self::Code(Code::NotNow),
+            other => Self::Link(other),
+        }
+    }
+}
+
+impl<P: Port> Stage<P> {
+    /// Of a session with a platform.
+    ///
+    /// # Errors
+    /// The device has six legs, or does not say where it is.
+    pub fn new(mut session: Session<P>) -> Result<Self, String> {
+        let motion = session.motion().cloned();
+        let place = session.place().map_err(|error| error.to_string())?;
+        let (Some(motion), Some(place)) = (motion, place) else {
+            return Err("the device controls six legs without a platform: GCS speaks of poses".to_owned());
+        };
+        Ok(Self {
+            session,
+            motion,
+            place,
+            seen: Instant::now(),
+            goal: None,
+            ordered: (0, Instant::now()),
+            rising: None,
+            pivot: [0.0; 3],
+            mishap: None,
+        })
+    }
+
+    /// The session, for what is not GCS.
+    pub fn into_session(self) -> Session<P> {
+        self.session
+    }
+
+    pub(super) fn session(&self) -> &Session<P> {
+        &self.session
+    }
+
+    pub(super) fn motion(&self) -> &Motion {
+        &self.motion
+    }
+
+    fn phase(&self) -> Option<Phase> {
+        Phase::from_word(u64::from(self.place.phase))
+    }
+
+    pub(super) fn runs(&self) -> bool {
+        self.phase() == Some(Phase::Running)
+    }
+
+    /// Whether the loop is closed, or is about to be.
+    pub(super) fn servo(&self) -> bool {
+        self.runs() || self.rising.is_some()
+    }
+
+    pub(super) fn is_rising(&self) -> bool {
+        self.rising.is_some()
+    }
+
+    /// Whether the goal is what the device stands at or moves to.
+    fn is_at(&self, goal: &[f64; 6]) -> bool {
+        goal.iter().zip(&self.place.target).all(|(goal, target)| self.session.is_same(*goal, *target))
+    }
+
+    /// Whether something moves, or is about to.
+    pub(super) fn moves(&self) -> bool {
+        self.is_rising()
+            || self.runs()
+                && (self.place.status & BUSY != 0
+                    || !self.is_answered()
+                    || self.goal.is_some_and(|goal| !self.is_at(&goal)))
+    }
+
+    /// Whether the place shows what became of the last order.
+    pub(super) fn is_answered(&self) -> bool {
+        let (tick, sent) = self.ordered;
+        self.place.tick >= tick || sent.elapsed() >= SILENT
+    }
+
+    /// Takes what went wrong since the last call.
+    pub(super) fn mishap(&mut self) -> Option<Code> {
+        self.mishap.take()
+    }
+
+    /// Asks where it is, unless that was just said.
+    pub(super) fn refresh(&mut self) -> Result<(), ClientError> {
+        if self.seen.elapsed() < FRESH && self.is_answered() {
+            return Ok(());
+        }
+        self.look()
+    }
+
+    /// Asks where it is, and goes on with what is under way. Keeps the link alive.
+    pub(super) fn look(&mut self) -> Result<(), ClientError> {
+        if let Some(place) = self.session.place()? {
+            self.place = place;
+        }
+        if self.place.phase != self.session.status().phase {
+            // With its cause, to be shown.
+            self.session.poll()?;
+        }
+        self.seen = Instant::now();
+        if !self.runs() {
+            self.goal = None;
+        }
+        let refused = self.runs() && self.place.status & REFUSED != 0 && self.is_answered();
+        if refused && self.place.status & BUSY == 0 && self.goal.is_some_and(|goal| !self.is_at(&goal)) {
+            self.goal = None;
+            self.mishap = Some(Code::Position);
+            // It is not to be tried again.
+            self.halt()?;
+        }
+        self.rise()
+    }
+
+    /// When the device must hear of its host again.
+    pub(super) fn due(&self) -> Duration {
+        self.session.due()
+    }
+
+    fn ask(&mut self, request: Request) -> Result<(), ClientError> {
+        self.session.supervise(request)?;
+        self.ordered = (self.place.tick + SEEN, Instant::now());
+        Ok(())
+    }
+
+    /// The next step towards a machine that runs. Each waits for what the last one did.
+    fn rise(&mut self) -> Result<(), ClientError> {
+        let Some(rising) = self.rising else { return Ok(()) };
+        if !self.is_answered() {
+            return Ok(());
+        }
+        let asked = rising.asked;
+        let next = match self.phase() {
+            Some(Phase::Running) => {
+                self.rising = None;
+                return Ok(());
+            }
+            // It faulted on the way.
+            Some(Phase::Faulted) if matches!(asked, Request::Arm | Request::Run) => None,
+            Some(Phase::Faulted) => Some(Request::Acknowledge),
+            Some(Phase::Disarmed) => Some(Request::Arm),
+            Some(Phase::Arming | Phase::Holding) => Some(Request::Run),
+            Some(Phase::RampingDown) | None => Some(asked),
+        };
+        match next.filter(|_| rising.since.elapsed() < UP) {
+            Some(next) if next == asked => Ok(()),
+            Some(next) => {
+                self.rising = Some(Rising { asked: next, ..rising });
+                self.ask(next)
+            }
+            None => {
+                self.rising = None;
+                self.mishap = Some(Code::ServoOff);
+                self.ask(Request::None)
+            }
+        }
+    }
+
+    /// Servo on: acknowledges a fault, arms and runs.
+    pub(super) fn start(&mut self) -> Result<(), No> {
+        if !self.servo() {
+            // A request counts when it begins to be given.
+            self.ask(Request::None)?;
+            self.rising = Some(Rising { since: Instant::now(), asked: Request::None });
+        }
+        Ok(())
+    }
+
+    /// Servo off: ramps down.
+    pub(super) fn shut_down(&mut self) -> Result<(), No> {
+        (self.rising, self.goal) = (None, None);
+        Ok(self.ask(Request::RampDown)?)
+    }
+
+    /// Stops, within the limits of stops, whoever has the orders. A machine that comes up goes on doing so.
+    pub(super) fn stop(&mut self) -> Result<(), No> {
+        if !self.runs() {
+            return Ok(());
+        }
+        self.session.stop_wave().or_else(refused)?;
+        match self.halt() {
+            Err(ClientError::Refused(_)) => {
+                // Set-points are another's, or a wave's until it is at rest.
+                self.goal = None;
+                Ok(self.ask(Request::Hold)?)
+            }
+            other => Ok(other?),
+        }
+    }
+
+    /// To rest, and to stay.
+    fn halt(&mut self) -> Result<(), ClientError> {
+        let hold = [("command".to_owned(), "hold".to_owned())];
+        let words = self.session.assign(&hold).map_err(|_| ClientError::Unexpected)?;
+        self.session.command(words)?;
+        self.goal = None;
+        self.ordered = (self.place.tick + SEEN, Instant::now());
+        Ok(())
+    }
+
+    /// Where it is to be once nothing moves, as clients see it.
+    pub(super) fn goal(&self) -> [f64; 6] {
+        self.seen_user_of(&self.goal.unwrap_or(self.place.target))
+    }
+
+    /// Where it is, as clients see it, m and rad.
+    pub(super) fn pose(&self) -> [f64; 6] {
+        self.seen_user_of(&self.place.pose)
+    }
+
+    /// The goal that a move changes: only of a machine that runs, and that is going nowhere that is not known.
+    pub(super) fn standing(&self) -> Result<[f64; 6], No> {
+        if self.is_rising() {
+            return Err(No::Later);
+        }
+        if !self.runs() {
+            return Err(Code::ServoOff.into());
+        }
+        if self.goal.is_none() && self.moves() {
+            return Err(No::Later);
+        }
+        Ok(self.goal())
+    }
+
+    /// Goes to a pose, after the motion under way if there is one; refused before anything moves if it is out of reach.
+    pub(super) fn go(&mut self, pose: &[f64; 6]) -> Result<(), No> {
+        let user = self.admitted(pose).ok_or(Code::Position)?;
+        let words = self.session.move_words(&user).map_err(|_| Code::Position)?;
+        self.session.command(words)?;
+        self.goal = Some(user);
+        self.ordered = (self.place.tick + SEEN, Instant::now());
+        Ok(())
+    }
+
+    /// The user's pose of one as clients see it, if the platform can stand there.
+    pub(super) fn admitted(&self, pose: &[f64; 6]) -> Option<[f64; 6]> {
+        let user = self.user_of(pose)?;
+        self.motion.admits(&user).then_some(user)
+    }
+
+    /// How far it is from a pose as clients see it along a way, as a multiple of it.
+    pub(super) fn reach(&self, start: &[f64; 6], way: &[f64; 6]) -> f64 {
+        motion::reach(|pose| self.admitted(pose).is_some(), start, way)
+    }
+
+    fn turns_about_pivot(&self) -> Tool<f64> {
+        Tool { point: self.pivot, largest_angle: core::f64::consts::FRAC_PI_4 }
+    }
+
+    /// From what clients see to the user's coordinates: they see the pivot point move.
+    fn user_of(&self, pose: &[f64; 6]) -> Option<[f64; 6]> {
+        Some(self.turns_about_pivot().to_platform(&Target::at(*pose))?.pose)
+    }
+
+    fn seen_user_of(&self, user: &[f64; 6]) -> [f64; 6] {
+        let [_, _, _, u, v, w] = *user;
+        let turned = self.turns_about_pivot().to_platform(&Target::at([0.0, 0.0, 0.0, u, v, w]));
+        let shift = turned.map_or([0.0; 6], |turned| turned.pose);
+        core::array::from_fn(|axis| if axis < 3 { user[axis] - shift[axis] } else { user[axis] })
+    }
+
+    /// m, from the tool point.
+    pub(super) fn pivot(&self) -> [f64; 3] {
+        self.pivot
+    }
+
+    /// Another pivot point. Only at rest and not turned: no coordinate of a platform that stands still is to change.
+    pub(super) fn set_pivot(&mut self, pivot: [f64; 3]) -> Result<(), No> {
+        if self.moves() {
+            return Err(Code::InMotion.into());
+        }
+        let [_, _, _, u, v, w] = self.goal();
+        if [u, v, w] != [0.0; 3] {
+            return Err(Code::Pivot.into());
+        }
+        self.pivot = pivot;
+        Ok(())
+    }
+}
+
+/// A wave that there is none of, or that is another's, is no reason not to stop.
+fn refused(error: ClientError) -> Result<(), ClientError> {
+    match error {
+        ClientError::Refused(_) => Ok(()),
+        other => Err(other),
+    }
+}
