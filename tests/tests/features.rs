@@ -65,6 +65,27 @@ fn what_is_tested_has_the_features_of_what_is_shipped() {
     );
 }
 
+/// Versions of a lock file by package.
+fn locked(manifest: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let text = std::fs::read_to_string(repository().join(manifest).with_file_name("Cargo.lock")).unwrap();
+    let mut packages: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for package in text.split("[[package]]").skip(1) {
+        let field = |key: &str| package.lines().find_map(|line| line.strip_prefix(key)).unwrap().to_owned();
+        packages.entry(field("name = ")).or_default().insert(field("version = "));
+    }
+    packages
+}
+
+/// It has a lock file of its own, and the bits of the command.
+#[test]
+fn the_python_package_is_made_of_what_the_command_is_made_of() {
+    let (command, python) = (locked("Cargo.toml"), locked("codegen/python/Cargo.toml"));
+    let common = python.iter().filter_map(|(name, versions)| Some((name, versions, command.get(name)?)));
+    let others: Vec<_> = common.clone().filter(|(_, versions, all)| !versions.is_subset(all)).collect();
+    assert!(common.count() > 100 && others.is_empty(), "other versions than the command has: {others:?}");
+    assert!(python.contains_key("\"pyo3\""));
+}
+
 #[test]
 fn a_difference_is_found() {
     let product = parse("a v1.0.0|std\na v1.0.0|std\nb v2.0.0|\nc v3.0.0|x,y\n");

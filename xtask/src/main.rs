@@ -15,6 +15,7 @@ mod setup;
 mod skips;
 mod soak;
 mod steps;
+mod wheel;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -28,6 +29,7 @@ const USAGE: &str = "usage: cargo xtask COMMAND
   board   SPEC [--target stm32h743|stm32f4] [--cycles | --faults], or --tested [--faults]: a board's image on an emulated board, from boot to a record
           that replays; with times by a model of the core, or with faults
   fuzz    SECONDS [TARGET]: what comes from outside, under a fuzzer guided by coverage; `fuzz keep` keeps what it found
+  wheel   the Python package: builds it into target/wheel/dist, and tries it in a fresh environment
   bless   writes the generated files that are committed anew
   changelog VERSION: puts the fragments in changelog/ into CHANGELOG.md, as a release
   fresh   the two commands of the README in minimal Debian roots; `cargo xtask fresh --help`
@@ -43,6 +45,7 @@ fn main() -> ExitCode {
         ["soak"] => steps::soak(&root()),
         ["mutants"] => steps::mutants(&root(), None),
         ["mutants", sample] => steps::mutants(&root(), Some(sample)),
+        ["wheel"] => wheel::command(&root()),
         ["bless"] => steps::bless(&root()),
         ["changelog", version] => match changelog::release(&root(), version) {
             Ok(()) => ExitCode::SUCCESS,

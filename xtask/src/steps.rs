@@ -7,7 +7,7 @@ use std::time::Instant;
 use crate::binaries::{self, Binary, Mode, Ran};
 use crate::judged::Trial;
 use crate::run::{Outcome, Report, cargo, expect_success};
-use crate::{board, fuzz, generated, mutants, packages, setup, soak};
+use crate::{board, fuzz, generated, mutants, packages, setup, soak, wheel};
 
 /// Its own workspace, built for another machine.
 const FIRMWARE: &str = "firmware/qemu/Cargo.toml";
@@ -22,14 +22,15 @@ const BOARDS_COMMON: &str = "firmware/stm32/Cargo.toml";
 /// Its own workspace, because of its dependencies.
 const REAL_TIME: &str = "firmware/rt-pc/Cargo.toml";
 /// Workspaces of their own with lock files of their own.
-const STANDING_ALONE: [&str; 9] =
-    [FIRMWARE, TICK, REAL_TIME, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM, BOARDS[0], BOARDS[1]];
+const STANDING_ALONE: [&str; 10] =
+    [FIRMWARE, TICK, REAL_TIME, wheel::MANIFEST, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM, BOARDS[0], BOARDS[1]];
 /// Every lock file there is.
-const LOCKED: [&str; 11] = [
+const LOCKED: [&str; 12] = [
     "Cargo.toml",
     FIRMWARE,
     TICK,
     REAL_TIME,
+    wheel::MANIFEST,
     SCHEMA,
     fuzz::MANIFEST,
     board::MANIFEST,
@@ -194,10 +195,20 @@ fn formatting(root: &Path) -> Outcome {
     }
     // Not `--all`: the emitted controller is formatted by specgen itself.
     let members = HAND_WRITTEN.iter().flat_map(|name| ["--package", name]);
-    let excluded =
-        [FIRMWARE, TICK, HOST_LIBRARY, REAL_TIME, BOARDS_COMMON, SCHEMA, fuzz::MANIFEST, board::MANIFEST, LOOM]
-            .into_iter()
-            .chain(BOARDS);
+    let excluded = [
+        FIRMWARE,
+        TICK,
+        HOST_LIBRARY,
+        REAL_TIME,
+        wheel::MANIFEST,
+        BOARDS_COMMON,
+        SCHEMA,
+        fuzz::MANIFEST,
+        board::MANIFEST,
+        LOOM,
+    ]
+    .into_iter()
+    .chain(BOARDS);
     let excluded = excluded.map(|manifest| vec!["--manifest-path", manifest]);
     for scope in std::iter::once(members.collect()).chain(excluded) {
         let fix = format!("run: cargo fmt {}", scope.join(" "));

@@ -33,12 +33,16 @@ mod table;
 mod tune;
 mod ui;
 
+use std::ffi::OsString;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
 
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use serde::Serialize;
+use serde_json::Value;
 
 use specgen_compiler::compile::{Compiled, Refused};
 use specgen_compiler::ir::Ir;
@@ -172,40 +176,7 @@ pub fn run() -> ExitCode {
     if cli.common.no_cache {
         target::cache::switch_off();
     }
-    let done = match &cli.command {
-        None => match misspelt(cli.build.spec.as_deref()) {
-            Some(failure) => Err(failure),
-            None => build::run(&cli.build, &mut ui),
-        },
-        Some(Command::New(arguments)) => new::run(arguments, &mut ui),
-        Some(Command::Check(arguments)) => check::run(arguments, &mut ui),
-        Some(Command::Explain(arguments)) => explain::run(arguments, &ui),
-        Some(Command::Build(arguments)) => firmware::run(arguments, &mut ui),
-        Some(Command::Size(arguments)) => firmware::run_size(arguments, &mut ui),
-        Some(Command::Flash(arguments)) => firmware::run_flash(arguments, &mut ui),
-        Some(Command::Sim(arguments)) => sim::run(arguments, &mut ui),
-        Some(Command::Tune(arguments)) => tune::run(arguments, &mut ui),
-        Some(Command::Robust(arguments)) => robust::run(arguments, &mut ui),
-        Some(Command::Report(arguments)) => report::run(arguments, &mut ui),
-        Some(Command::Reproduce(arguments)) => reproduce::run(arguments, &mut ui),
-        Some(Command::Pil(arguments)) => pil::run(arguments, &mut ui),
-        Some(Command::Operate(arguments)) => operate::run(arguments, &mut ui),
-        Some(Command::Gcs(arguments)) => gcs::run(arguments, &mut ui),
-        Some(Command::Replay(arguments)) => replay::run(arguments, &mut ui),
-        Some(Command::Export(arguments)) => export::run(arguments, &mut ui),
-        Some(Command::Dynamics(arguments)) => dynamics::run(arguments, &mut ui),
-        Some(Command::Identify(arguments)) => identify::run(arguments, &mut ui),
-        Some(Command::Forc(arguments)) => forc::run(arguments, &mut ui),
-        Some(Command::Plant(arguments)) => plant::run(arguments, &mut ui),
-        Some(Command::Doctor(arguments)) => doctor::run(arguments, &mut ui),
-        Some(Command::Lsp(arguments)) => lsp::run(arguments),
-        Some(Command::DumpIr { spec }) => dump_ir(spec, &mut ui),
-        Some(Command::Cache(arguments)) => cache::run(arguments, &ui),
-        Some(Command::Completions(arguments)) => {
-            completions::run(arguments, command(), &ui);
-            Ok(())
-        }
-    };
+    let done = perform(&cli, &mut ui);
     if done.is_err() {
         interrupt::settle();
     }
@@ -216,6 +187,74 @@ pub fn run() -> ExitCode {
     }
     let code = done.map_or_else(|failure| ui.failed(&failure), |()| 0);
     ExitCode::from(ui.not_all_out().unwrap_or(code))
+}
+
+/// Performs one command as a function of this program: `arguments` are those behind `specgen`, what `--json` prints comes back,
+/// and `hear` is told of the progress. After `stop` is set, the command ends with what there is of a result, or at the next tick
+/// of a simulation or line of progress.
+#[must_use]
+pub fn call(
+    arguments: impl IntoIterator<Item = OsString>,
+    stop: &'static AtomicBool,
+    hear: impl Fn(&str) + 'static,
+) -> Value {
+    interrupt::own(stop);
+    let mut ui = Ui::called(move |line| {
+        hear(line);
+        interrupt::point();
+    });
+    let done = match Cli::try_parse_from(std::iter::once("specgen".into()).chain(arguments)) {
+        // What it has not shown when it unwinds is not looked at.
+        Ok(cli) => catch_unwind(AssertUnwindSafe(|| perform(&cli, &mut ui))).unwrap_or_else(|cause| {
+            if cause.is::<interrupt::Ended>() { Err(Failure::ended_early()) } else { resume_unwind(cause) }
+        }),
+        Err(error) => {
+            let text = error.render().to_string();
+            Err(Failure::Usage(text.trim().trim_start_matches("error: ").to_owned()))
+        }
+    };
+    if let Err(failure) = done {
+        ui.failed(&failure);
+    }
+    ui.taken()
+}
+
+/// What was asked for.
+fn perform(cli: &Cli, ui: &mut Ui) -> Result<(), Failure> {
+    match &cli.command {
+        None => match misspelt(cli.build.spec.as_deref()) {
+            Some(failure) => Err(failure),
+            None => build::run(&cli.build, ui),
+        },
+        Some(Command::New(arguments)) => new::run(arguments, ui),
+        Some(Command::Check(arguments)) => check::run(arguments, ui),
+        Some(Command::Explain(arguments)) => explain::run(arguments, ui),
+        Some(Command::Build(arguments)) => firmware::run(arguments, ui),
+        Some(Command::Size(arguments)) => firmware::run_size(arguments, ui),
+        Some(Command::Flash(arguments)) => firmware::run_flash(arguments, ui),
+        Some(Command::Sim(arguments)) => sim::run(arguments, ui),
+        Some(Command::Tune(arguments)) => tune::run(arguments, ui),
+        Some(Command::Robust(arguments)) => robust::run(arguments, ui),
+        Some(Command::Report(arguments)) => report::run(arguments, ui),
+        Some(Command::Reproduce(arguments)) => reproduce::run(arguments, ui),
+        Some(Command::Pil(arguments)) => pil::run(arguments, ui),
+        Some(Command::Operate(arguments)) => operate::run(arguments, ui),
+        Some(Command::Gcs(arguments)) => gcs::run(arguments, ui),
+        Some(Command::Replay(arguments)) => replay::run(arguments, ui),
+        Some(Command::Export(arguments)) => export::run(arguments, ui),
+        Some(Command::Dynamics(arguments)) => dynamics::run(arguments, ui),
+        Some(Command::Identify(arguments)) => identify::run(arguments, ui),
+        Some(Command::Forc(arguments)) => forc::run(arguments, ui),
+        Some(Command::Plant(arguments)) => plant::run(arguments, ui),
+        Some(Command::Doctor(arguments)) => doctor::run(arguments, ui),
+        Some(Command::Lsp(arguments)) => lsp::run(arguments),
+        Some(Command::DumpIr { spec }) => dump_ir(spec, ui),
+        Some(Command::Cache(arguments)) => cache::run(arguments, ui),
+        Some(Command::Completions(arguments)) => {
+            completions::run(arguments, command(), ui);
+            Ok(())
+        }
+    }
 }
 
 /// Help and version, or why the arguments make no sense.

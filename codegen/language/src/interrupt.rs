@@ -3,6 +3,7 @@
 //! A command that has a result to show on the way, or a machine to bring down, asks by [`heed`] to be notified instead, and ends
 //! by itself.
 
+use std::cell::Cell;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,10 @@ use tempfile::TempDir;
 use crate::lock;
 
 static PRESSED: AtomicBool = AtomicBool::new(false);
+thread_local! {
+    /// In place of [`PRESSED`] and [`HEEDED`], for the command of this thread.
+    static OWN: Cell<Option<(&'static AtomicBool, bool)>> = const { Cell::new(None) };
+}
 static HEEDED: AtomicBool = AtomicBool::new(false);
 /// Held by whoever must not be cut in two.
 static WHOLE: Mutex<()> = Mutex::new(());
@@ -70,8 +75,29 @@ pub fn catch(end: impl Fn() -> u8 + Send + 'static) {
 /// From now on an interrupt does nothing but set what is returned: the command looks at it and ends by itself. A second one
 /// does nothing.
 pub fn heed() -> &'static AtomicBool {
+    if let Some((stop, _)) = OWN.get() {
+        OWN.set(Some((stop, true)));
+        return stop;
+    }
     HEEDED.store(true, Ordering::SeqCst);
     &PRESSED
+}
+
+/// From now on a command in this thread is interrupted by `stop`, which is its caller's to set, and by nothing else: for programs
+/// in which a command is a function.
+pub fn own(stop: &'static AtomicBool) {
+    OWN.set(Some((stop, false)));
+}
+
+/// How a command unwinds that its caller interrupted.
+#[derive(Debug)]
+pub struct Ended;
+
+/// Unwinds with [`Ended`] if the command of this thread was interrupted by its caller, and does not heed that by itself.
+pub fn point() {
+    if OWN.get().is_some_and(|(stop, heeded)| !heeded && stop.load(Ordering::SeqCst)) {
+        std::panic::resume_unwind(Box::new(Ended));
+    }
 }
 
 /// Waits for the end if an interrupt is about to bring it: what failed meanwhile failed because of it, as a compiler that
@@ -263,6 +289,21 @@ mod tests {
         // What stands in the way for good is an error, and no reason to wait.
         std::os::unix::fs::symlink("nowhere", &folder).unwrap();
         assert_eq!(make_folder(&folder).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+    }
+
+    #[test]
+    fn a_command_of_a_thread_has_an_interrupt_of_its_own() {
+        let [first, second] = [(); 2].map(|()| &*Box::leak(Box::new(AtomicBool::new(false))));
+        let is_ended = || std::panic::catch_unwind(point).is_err_and(|cause| cause.is::<Ended>());
+        own(first);
+        assert!(!is_ended());
+        first.store(true, Ordering::SeqCst);
+        assert!(is_ended() && !std::thread::spawn(is_ended).join().unwrap());
+        // Whoever heeds it ends by itself; the next command begins anew.
+        assert!(std::ptr::eq(heed(), first) && !is_ended());
+        assert!(!PRESSED.load(Ordering::SeqCst) && !HEEDED.load(Ordering::SeqCst));
+        own(second);
+        assert!(!is_ended());
     }
 
     #[test]

@@ -68,6 +68,8 @@ pub struct Supervised {
 
 // SAFETY: as for `Controller`: the machine's memory belongs to this value alone and holds plain values.
 unsafe impl Send for Supervised {}
+// SAFETY: what takes a shared reference only reads the machine and its configuration.
+unsafe impl Sync for Supervised {}
 
 impl Supervised {
     /// Puts a controller under its supervisor, disarmed.

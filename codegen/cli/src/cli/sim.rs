@@ -9,7 +9,8 @@ use std::fmt::Display;
 use std::path::PathBuf;
 
 use clap::Args;
-use host_sim::controller::Controller;
+use host_sim::controller::{Controller, ControllerError, TickController};
+use host_sim::description::Description;
 use host_sim::plant::{LegParameters, NoiseParameters};
 
 use super::file::{check_place, claim, write_folder};
@@ -18,7 +19,7 @@ use super::spec;
 use super::ui::{Failure, Ui};
 use specgen_compiler::compile;
 use specgen_compiler::workspace;
-use specgen_language::interrupt::Scratch;
+use specgen_language::interrupt::{self, Scratch};
 use specgen_toolchain as target;
 
 /// Arguments of `sim`.
@@ -142,13 +143,39 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     // A place that cannot be is refused before the minutes of the rest, too.
     let _claimed = arguments.output.as_deref().map(claim).transpose()?;
     arguments.record.as_deref().map_or(Ok(()), check_place)?;
-    let mut controller = emitted(&compiled, ui)?;
+    let controller = emitted(&compiled, ui)?;
     if let Some(path) = &arguments.record {
         return record::run(arguments, path, &compiled, controller, ui);
     }
+    let mut controller = Interruptible(controller);
     match task {
         Some(task) => platform::run(arguments, &compiled, task, &mut controller, ui),
         None => legs::run(arguments, &compiled, &mut controller, ui),
+    }
+}
+
+/// A controller whose runs end with the command.
+struct Interruptible(Controller);
+
+impl TickController for Interruptible {
+    fn description(&self) -> &Description {
+        self.0.description()
+    }
+    fn default_config(&self) -> Vec<u64> {
+        self.0.default_config()
+    }
+    fn configure(&mut self, words: &[u64]) -> Result<(), ControllerError> {
+        self.0.configure(words)
+    }
+    fn reset(&mut self) {
+        self.0.reset();
+    }
+    fn step(&mut self, input: &[u64], output: &mut [u64]) {
+        interrupt::point();
+        self.0.step(input, output);
+    }
+    fn state_digest(&self) -> u64 {
+        self.0.state_digest()
     }
 }
 

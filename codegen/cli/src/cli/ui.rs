@@ -95,6 +95,16 @@ pub struct Ui {
     findings: Vec<Value>,
     /// Why standard output is not whole.
     lost: RefCell<Option<io::Error>>,
+    /// Of a command that another program called.
+    called: Option<Called>,
+}
+
+/// Where a command's words go when another program called it.
+struct Called {
+    /// Takes lines of progress.
+    hear: Box<dyn Fn(&str)>,
+    /// What would be printed.
+    document: RefCell<Value>,
 }
 
 /// Writes to standard error. A message that cannot be written, on a full disk say, is no reason to end.
@@ -107,12 +117,24 @@ macro_rules! say {
 impl Ui {
     /// Text, or one JSON document at the end.
     pub fn new(json: bool) -> Self {
-        Self { json, findings: Vec::new(), lost: RefCell::new(None) }
+        Self { json, findings: Vec::new(), lost: RefCell::new(None), called: None }
+    }
+
+    /// One document, which is kept for [`Ui::taken`]; `hear` is told of the progress. Nothing is printed.
+    pub fn called(hear: impl Fn(&str) + 'static) -> Self {
+        Self { called: Some(Called { hear: Box::new(hear), document: RefCell::new(Value::Null) }), ..Self::new(true) }
+    }
+
+    /// The document of a command that another program called.
+    pub fn taken(self) -> Value {
+        self.called.map_or(Value::Null, |called| called.document.into_inner())
     }
 
     /// A line about what is being done, for the eyes only.
     pub fn progress(&self, line: &str) {
-        if !self.json {
+        if let Some(called) = &self.called {
+            (called.hear)(line);
+        } else if !self.json {
             say!("{line}\n");
         }
     }
@@ -199,7 +221,9 @@ impl Ui {
 
     /// Shows how far something is, in place of the line before where the eyes are at a terminal.
     pub fn rate(&self, line: &str) {
-        if !self.json {
+        if let Some(called) = &self.called {
+            (called.hear)(line);
+        } else if !self.json {
             if io::stderr().is_terminal() {
                 say!("\r\x1b[2K{line}");
             } else {
@@ -215,9 +239,9 @@ impl Ui {
         }
     }
 
-    /// Whether standard error is a terminal.
+    /// Whether standard error is a terminal, or a program takes every line that would be shown at one.
     pub fn is_terminal(&self) -> bool {
-        io::stderr().is_terminal()
+        self.called.is_some() || io::stderr().is_terminal()
     }
 
     /// Whether the result is for programs.
@@ -283,7 +307,10 @@ impl Ui {
             "findings": self.findings,
             "result": result,
         });
-        self.out(&format!("{document:#}\n"));
+        match &self.called {
+            Some(called) => *called.document.borrow_mut() = document,
+            None => self.out(&format!("{document:#}\n")),
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use host_sim::closed_loop::Tracking;
-use host_sim::controller::{Controller, TickController};
+use host_sim::controller::TickController;
 use host_sim::plant::NoiseParameters;
 use host_sim::scenario::{LINEARITY_FREQUENCIES, MODES, TRACKING_FREQUENCIES, select};
 use host_sim::table::{LinearityTable, TrackingRow, TrackingTable};
@@ -76,7 +76,12 @@ fn range(model: &Model) -> [f64; 2] {
 }
 
 /// Tracking of the spec's own legs: the shape of their hysteresis is that of the plant file, all else the spec's.
-fn own(arguments: &Arguments, compiled: &Compiled, controller: &mut Controller, ui: &mut Ui) -> Result<(), Failure> {
+fn own(
+    arguments: &Arguments,
+    compiled: &Compiled,
+    controller: &mut dyn TickController,
+    ui: &mut Ui,
+) -> Result<(), Failure> {
     let model = &compiled.model;
     let leg = machine::leg(model, &arguments.plant.leg()?);
     let noise = if arguments.plant.no_noise { NoiseParameters::NONE } else { leg.noise };
@@ -162,7 +167,7 @@ impl Outcome for Own<'_> {
 pub(super) fn run(
     arguments: &Arguments,
     compiled: &Compiled,
-    controller: &mut Controller,
+    controller: &mut dyn TickController,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
     if !arguments.paper {

@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use std::fmt::Write as _;
 
 use host_sim::closed_loop::RunError;
-use host_sim::controller::Controller;
+use host_sim::controller::TickController;
 use host_sim::platform::rig::{Noise, PlatformRun, Record};
 use host_sim::platform::scenario::{FREE_MODES, PLATFORM_MODES, select};
 use host_sim::platform::table::{AXES, MachiningRow, MachiningTable, PoseRow, PoseTable};
@@ -83,7 +83,7 @@ pub(super) fn run(
     arguments: &Arguments,
     compiled: &Compiled,
     task: &TaskSpace,
-    controller: &mut Controller,
+    controller: &mut dyn TickController,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
     let seed = arguments.plant.seed;
@@ -304,7 +304,7 @@ impl PoseTrajectory for PoseWave {
 
 struct Experiment<'a> {
     scenario: PlatformScenario,
-    controller: &'a mut Controller,
+    controller: &'a mut dyn TickController,
     ui: &'a Ui,
     traced: bool,
     drawn: bool,

@@ -1,0 +1,66 @@
+"""specgen: one description of a piezo-driven Stewart platform in, its controller out.
+
+>>> import specgen
+>>> compiled = specgen.compile("platform.toml")
+>>> law = compiled.controller()
+>>> rows = law.run(numpy.zeros(1000, law.inputs))
+>>> specgen.simulate("platform.toml", frequency=10)["motions"]
+
+Building a controller needs ``cargo``; an exported library, records and recordings do not.
+"""
+
+from ._commands import (
+    Compiled,
+    Identification,
+    Prediction,
+    Replayed,
+    Result,
+    Robustness,
+    Simulation,
+    command,
+    compile,
+    controller,
+    explain,
+    export_c,
+    identify,
+    predict,
+    record,
+    replay,
+    robust,
+    simulate,
+    tune,
+)
+from ._controller import Controller
+from ._findings import Error, Finding, Interrupted, Refused, Unavailable, UsageError
+from ._table import Table, read_table
+
+__all__ = [
+    "Compiled",
+    "Controller",
+    "Error",
+    "Finding",
+    "Identification",
+    "Interrupted",
+    "Prediction",
+    "Refused",
+    "Replayed",
+    "Result",
+    "Robustness",
+    "Simulation",
+    "Table",
+    "Unavailable",
+    "UsageError",
+    "command",
+    "compile",
+    "controller",
+    "explain",
+    "export_c",
+    "identify",
+    "predict",
+    "read_table",
+    "record",
+    "replay",
+    "robust",
+    "simulate",
+    "tune",
+]

@@ -1,0 +1,453 @@
+"""The commands of specgen as functions. Each gives what the command of the same name gives, to the last digit."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cached_property
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from . import _native
+from ._controller import Controller
+from ._findings import Error, Finding, Interrupted, Refused, Unavailable, UsageError, findings_of
+from ._table import Table, read_table
+
+StrPath: TypeAlias = str | PathLike[str]
+Progress: TypeAlias = bool | Callable[[str], object]
+
+
+class Result(Mapping[str, Any]):
+    """What a command found: the fields of its JSON."""
+
+    def __init__(self, data: dict[str, Any], findings: list[Finding], reason: str | None) -> None:
+        self.data = data
+        self.findings = findings
+        """About the spec or the record."""
+        self.reason = reason
+        """Why it does not pass, if it does not."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is good: what makes the command's exit code 0."""
+        return self.reason is None
+
+    def __getitem__(self, name: str) -> Any:
+        return self.data[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.data)
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(self.data)}{'' if self.passed else f'; not passed: {self.reason}'})"
+
+
+def command(*arguments: str | PathLike[str], progress: Progress = False) -> Result:
+    """Runs ``specgen ARGUMENTS`` in this process, as ``command("tune", "platform.toml", "--evaluations", "50")``.
+
+    The interpreter is free meanwhile. ``progress`` is called with each line of progress; True prints them to standard error.
+
+    Raises `Refused`, `UsageError`, `Unavailable`, `Interrupted` (with what was found so far) or KeyboardInterrupt. A figure beyond
+    its limit raises nothing: `Result.passed` is then False.
+    """
+    hear: Callable[[str], object] | None = progress if callable(progress) else _print if progress else None
+    document = json.loads(_native.call([fspath(argument) for argument in arguments], hear))
+    findings, error, data = findings_of(document), document["error"], document["result"]
+    match document["exit_code"], data:
+        case 0, _:
+            return Result(data or {}, findings, None)
+        case 130, None:
+            raise KeyboardInterrupt
+        case 130, _:
+            raise Interrupted(error, Result(data, findings, error))
+        case 1, None if findings:
+            raise Refused(error, findings)
+        case 1, None:
+            raise Error(error)
+        case 1, _:
+            return Result(data, findings, error)
+        case 2, _:
+            raise UsageError(error)
+        case _:
+            raise Unavailable(error)
+
+
+def _print(line: str) -> None:
+    print(line, file=sys.stderr)
+
+
+def _options(**given: object) -> list[str]:
+    """Options of a command line: None and False are left out, sequences are joined by commas."""
+    arguments = []
+    for name, value in given.items():
+        option = "--" + name.replace("_", "-")
+        if value is True:
+            arguments.append(option)
+        elif isinstance(value, Sequence) and not isinstance(value, str):
+            arguments.append(f"{option}={','.join(map(str, value))}")
+        elif value is not None and value is not False:
+            # With `=`: a value may begin with a dash.
+            arguments.append(f"{option}={fspath(value) if isinstance(value, PathLike) else value}")
+    return arguments
+
+
+def explain(code: str) -> str:
+    """The page of a finding, in Markdown: what is checked, why it matters, an example, the fix."""
+    return str(command("explain", code)["page"])
+
+
+class Compiled:
+    """A spec that compiled."""
+
+    def __init__(self, spec: StrPath, checked: Result) -> None:
+        self.spec = Path(spec)
+        self.checked = checked
+        """All that ``specgen check --details --json`` has."""
+        self.findings = checked.findings
+        """Warnings and notes."""
+
+    @property
+    def name(self) -> str:
+        """Of the spec."""
+        return str(self.checked["name"])
+
+    @property
+    def digest(self) -> str:
+        """Of the spec with its records, hexadecimal."""
+        return str(self.checked["digest"])
+
+    @property
+    def verdict(self) -> dict[str, Any]:
+        """Figures with their limits."""
+        return dict(self.checked["verdict"])
+
+    @property
+    def margins(self) -> list[dict[str, Any]]:
+        """Stability: of the closed loops over the platform's modes, law by law; of six legs with their own gauges, the one of the spec."""
+        design = self.design
+        return [self.checked["margins"]] if design is None else list(design["margins"])
+
+    @property
+    def design(self) -> dict[str, Any] | None:
+        """With ``[control]``: modes, notch, gains, what limits them."""
+        design: dict[str, Any] | None = self.checked["design"]
+        return design
+
+    @cached_property
+    def constants(self) -> dict[str, Any]:
+        """Every constant of the controller: ``specgen dump-ir``."""
+        found = command("dump-ir", self.spec)
+        if found["digest"] != self.digest:
+            raise Error(f"{self.spec} has changed since it was compiled; compile it again")
+        return found.data
+
+    def controller(self, *, supervised: bool = False) -> Controller:
+        """Builds the controller for this computer; needs ``cargo``."""
+        built = controller(self.spec, supervised=supervised)
+        if built.digest != self.digest:
+            raise Error(f"{self.spec} has changed since it was compiled; compile it again")
+        return built
+
+    def __repr__(self) -> str:
+        return f"Compiled({self.name}, {self.digest[:16]}, {len(self.findings)} findings)"
+
+
+def compile(spec: StrPath, *, deny_warnings: bool = False) -> Compiled:
+    """Compiles a spec: every check, every constant; writes and builds nothing.
+
+    Raises `Refused`, with the findings, if an error is among them; with ``deny_warnings`` also if a warning is.
+    """
+    return Compiled(spec, command("check", spec, "--details", *_options(deny_warnings=deny_warnings)))
+
+
+def controller(spec: StrPath, *, supervised: bool = False, progress: Progress = False) -> Controller:
+    """Builds the controller of a spec for this computer, and loads it; needs ``cargo``, or a build that was kept."""
+    with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
+        files = command("export", "c", spec, "-o", Path(folder, "c"), progress=progress)["files"]
+        library = next(name for name in files if not name.endswith((".h", ".c")))
+        # What is loaded stays, whatever becomes of the file.
+        return Controller(Path(folder, "c", library), supervised=supervised)
+
+
+def export_c(spec: StrPath, output: StrPath) -> list[Path]:
+    """Writes header, library and sources for programs in C to the folder ``output``; `Controller` loads the library, where no
+    ``cargo`` is, too."""
+    return [Path(output, name) for name in command("export", "c", spec, "-o", output)["files"]]
+
+
+class Simulation(Result):
+    """`simulate`; `traces` has every tick of every run by the name of the run, if they were asked for."""
+
+    traces: dict[str, Table]
+
+
+def simulate(
+    spec: StrPath,
+    *,
+    trajectory: str | None = None,
+    frequency: float | Sequence[float] | None = None,
+    latency: int = 0,
+    samples: int | None = None,
+    paper: bool = False,
+    plant: StrPath | None = None,
+    noise: bool = True,
+    seed: int = 1,
+    traces: bool = False,
+    progress: Progress = False,
+) -> Simulation:
+    """Runs the emitted controller against the simulated machine of a spec: ``specgen sim``.
+
+    Args:
+        trajectory: Of the spec, to be played alone; without it rest, waves, and every trajectory.
+        frequency: Of the waves, Hz; 1 and 10 if not given.
+        latency: Control intervals by which voltages reach the amplifiers late.
+        samples: Without ``[control]``, control ticks per period of the motion.
+        paper: The paper's experiments instead.
+        plant: Shape of the legs' hysteresis: ``plays``, ``bouc-wen``, or a file of leg parameters.
+        noise: Whether gauges and amplifiers have any.
+        seed: Of noise and tolerances.
+        traces: Whether every tick is kept.
+    """
+    with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
+        tables = Path(folder, "sim")
+        options = _options(
+            trajectory=trajectory,
+            frequency=frequency,
+            latency=latency or None,
+            samples=samples,
+            paper=paper,
+            plant=plant,
+            no_noise=not noise,
+            seed=seed,
+            output=tables if traces else None,
+            traces=traces,
+        )
+        found = command("sim", spec, *options, progress=progress)
+        simulation = Simulation(found.data, found.findings, found.reason)
+        named = [path for path in sorted(tables.glob("*.csv")) if path.name not in _TABLES]
+        simulation.traces = {path.stem: read_table(path) for path in named}
+    return simulation
+
+
+# Of `sim`, beside the traces.
+_TABLES = ("motions.csv", "tracking.csv", "free-motion.csv", "machining.csv", "linearity.csv")
+
+
+class Robustness(Result):
+    """`robust`; `runs` has a row for each machine."""
+
+    runs: Table
+
+
+def robust(
+    spec: StrPath,
+    *,
+    draws: int = 100,
+    vary: Mapping[str, str] | None = None,
+    trajectory: str | None = None,
+    frequency: float | None = None,
+    max_error: str | None = None,
+    max_orientation: str | None = None,
+    quantile: float | None = None,
+    diverged_above: str | None = None,
+    threads: int | None = None,
+    plant: StrPath | None = None,
+    noise: bool = True,
+    seed: int = 1,
+    progress: Progress = False,
+) -> Robustness:
+    """Tries the closed loop on corners and random draws of declared uncertainties: ``specgen robust``.
+
+    Args:
+        draws: Random machines, besides the corners.
+        vary: Ranges of uncertainties, such as ``{"mass": "5%", "gain": "0.9:1.1"}``.
+        trajectory: What is followed.
+        frequency: Of it, Hz.
+        max_error: Gate, such as ``"30 nm"``; that of the spec if not given.
+        max_orientation: Gate for the angles, such as ``"100 nrad"``.
+        quantile: Of the draws that the gate compares, %.
+        diverged_above: Error beyond which a run counts as diverged, such as ``"3 um"``.
+        threads: Of this computer; the result does not depend on it.
+
+    A gate that is not passed makes `Result.passed` False. After Ctrl-C, `Interrupted.result` is of the machines so far.
+    """
+    with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
+        options = _options(
+            draws=draws,
+            trajectory=trajectory,
+            frequency=frequency,
+            max_error=max_error,
+            max_orientation=max_orientation,
+            quantile=quantile,
+            diverged_above=diverged_above,
+            threads=threads,
+            plant=plant,
+            no_noise=not noise,
+            seed=seed,
+            output=Path(folder, "robust"),
+        )
+        options += [f"--vary={name}={range}" for name, range in (vary or {}).items()]
+        found = command("robust", spec, *options, progress=progress)
+        robustness = Robustness(found.data, found.findings, found.reason)
+        robustness.runs = read_table(Path(folder, "robust", "runs.csv"))
+    return robustness
+
+
+def tune(
+    spec: StrPath,
+    *,
+    what: str | None = None,
+    optimiser: str | None = None,
+    evaluations: int | None = None,
+    trajectory: str | None = None,
+    frequency: float | None = None,
+    seconds: float | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    threads: int | None = None,
+    output: StrPath | None = None,
+    noise: bool = True,
+    seed: int = 1,
+    progress: Progress = False,
+) -> Result:
+    """Tunes gains and weights on the simulated loop: ``specgen tune``; `command` has its rarer options.
+
+    After Ctrl-C, `Interrupted.result` has the best so far.
+    """
+    options = _options(
+        what=what,
+        optimiser=optimiser,
+        evaluations=evaluations,
+        trajectory=trajectory,
+        frequency=frequency,
+        seconds=seconds,
+        threads=threads,
+        output=output,
+        no_noise=not noise,
+        seed=seed,
+    )
+    options += [f"--bounds={group}={low}:{high}" for group, (low, high) in (bounds or {}).items()]
+    return command("tune", spec, *options, progress=progress)
+
+
+class Identification(Result):
+    """`identify`; `table` is the Everett table: ``up_V``, ``down_V``, ``everett_um``."""
+
+    table: Table
+
+
+def identify(
+    record: StrPath,
+    drive: tuple[float, float],
+    *,
+    grid: int | None = None,
+    validate: StrPath | None = None,
+    columns: Mapping[str, str] | None = None,
+    rate: float | None = None,
+    output: StrPath | None = None,
+    progress: Progress = False,
+) -> Identification:
+    """Identifies an Everett table from a record of reversal curves: ``specgen identify``.
+
+    Args:
+        drive: Voltages of the table, V.
+        grid: Cells per axis; chosen by cross-validation if not given.
+        validate: A second record, not used for the fit, to judge the table by.
+        columns: Names of the columns in a file that has its own.
+        rate: Samples per second, where the file has no time, Hz.
+        output: Where the table is written, for specs and `predict`.
+
+    Other records: ``command("identify", "linear", file)``, and so ``response``, ``gauge``, ``stiffness``, ``gains``.
+    """
+    with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
+        file = Path(output) if output is not None else Path(folder, "table.csv")
+        options = _options(
+            drive=f"{drive[0]}:{drive[1]}",
+            grid=grid,
+            validate=validate,
+            columns=_pairs(columns),
+            rate=rate,
+            output=file,
+        )
+        found = command("identify", record, *options, progress=progress)
+        identification = Identification(found.data, found.findings, found.reason)
+        identification.table = read_table(file)
+    return identification
+
+
+class Prediction(Result):
+    """`predict`; `samples` has ``time_s``, ``drive_V``, ``displacement_um``, and where it was measured ``measured_um`` and
+    ``error_um``."""
+
+    samples: Table
+
+
+def predict(
+    model: StrPath,
+    drive: StrPath,
+    *,
+    leg: int | None = None,
+    dead_time: float | None = None,
+    mode: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    rate: float | None = None,
+    progress: Progress = False,
+) -> Prediction:
+    """Predicts what a leg does with a drive: ``specgen identify predict``.
+
+    Args:
+        model: A table as `identify` writes it, or a spec.
+        drive: A file with ``time_s`` and ``drive_V`` or ``monitor_V``.
+        leg: Of the spec.
+        dead_time: ms.
+        mode: ``"735:0.015"``, Hz and damping ratio, or ``"none"``.
+    """
+    with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
+        file = Path(folder, "prediction.csv")
+        options = _options(leg=leg, dead_time=dead_time, mode=mode, columns=_pairs(columns), rate=rate, output=file)
+        found = command("identify", "predict", model, drive, *options, progress=progress)
+        prediction = Prediction(found.data, found.findings, found.reason)
+        prediction.samples = read_table(file)
+    return prediction
+
+
+def _pairs(columns: Mapping[str, str] | None) -> list[str] | None:
+    return None if columns is None else [f"{name}={column}" for name, column in columns.items()]
+
+
+class Replayed(Result):
+    """`replay`; `rows` has the words of every tick."""
+
+    rows: Table
+
+
+def replay(recording: StrPath, spec: StrPath | None = None, *, progress: Progress = False) -> Replayed:
+    """Reads a recording; with its spec, runs it again tick by tick and compares it by bits: ``specgen replay``.
+
+    `Result.passed` is False where a bit differs or a block is damaged. Without a spec no ``cargo`` is needed.
+    """
+    with tempfile.TemporaryDirectory(prefix="specgen-python-") as folder:
+        file = Path(folder, "rows.csv")
+        found = command("replay", recording, *_options(spec=spec, csv=file), progress=progress)
+        replayed = Replayed(found.data, found.findings, found.reason)
+        replayed.rows = read_table(file)
+    return replayed
+
+
+def record(
+    spec: StrPath,
+    output: StrPath,
+    *,
+    seconds: float = 1.0,
+    noise: bool = True,
+    seed: int = 1,
+    progress: Progress = False,
+) -> Result:
+    """Records a simulated run of a wave under the supervisor, for `replay`: ``specgen sim --record``."""
+    options = _options(record=output, seconds=seconds, no_noise=not noise, seed=seed)
+    return command("sim", spec, *options, progress=progress)

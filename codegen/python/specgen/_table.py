@@ -1,0 +1,78 @@
+"""CSV that the commands write, as arrays."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from importlib import import_module
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# `setpoint_rate[3]_rad/s`: a name, the place among six, the unit.
+_INDEXED = re.compile(r"(.+)\[(\d+)\](?:_(.+))?")
+
+
+class Table(Mapping[str, NDArray[Any]]):
+    """Columns by name. Those that come in sixes, ``voltage[0]`` to ``voltage[5]``, are one array with a row a sample; other names are
+    as in the file, unit included: ``time_s``."""
+
+    def __init__(self, columns: dict[str, NDArray[Any]], units: dict[str, tuple[str | None, ...]]) -> None:
+        self._columns = columns
+        self.units = units
+        """Units of the columns that come in sixes, where the file names them."""
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        return self._columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def __repr__(self) -> str:
+        return f"Table({', '.join(f'{name}{list(column.shape)}' for name, column in self.items())})"
+
+    def to_pandas(self) -> Any:
+        """A ``pandas.DataFrame``, with a column each: ``voltage[0]``."""
+        # Which need not be there, nor its types.
+        pandas = import_module("pandas")
+        flat: dict[str, NDArray[Any]] = {}
+        for name, column in self.items():
+            if column.ndim == 1:
+                flat[name] = column
+            else:
+                flat.update({f"{name}[{place}]": column[:, place] for place in range(column.shape[1])})
+        return pandas.DataFrame(flat)
+
+
+def read_table(path: str | PathLike[str]) -> Table:
+    """Reads a CSV file with one line of names; columns with anything but numbers are text."""
+    with open(path, encoding="utf-8") as file:
+        names = file.readline().rstrip("\n").split(",")
+        rows = [line.rstrip("\n").split(",") for line in file]
+    if not all(len(row) == len(names) for row in rows):
+        raise ValueError(f"{path}: a line has not {len(names)} fields")
+    columns: list[NDArray[Any]] = []
+    for column in zip(*rows) if rows else [()] * len(names):
+        try:
+            columns.append(np.array(column, dtype=np.float64))
+        except ValueError:
+            columns.append(np.array(column, dtype=np.str_))
+    table: dict[str, NDArray[Any]] = {}
+    units: dict[str, tuple[str | None, ...]] = {}
+    sixes: dict[str, list[tuple[NDArray[Any], str | None]]] = {}
+    for name, values in zip(names, columns):
+        if found := _INDEXED.fullmatch(name):
+            sixes.setdefault(found[1], []).append((values, found[3]))
+            table.setdefault(found[1], values)
+        else:
+            table[name] = values
+    for name, members in sixes.items():
+        table[name] = np.column_stack([values for values, _ in members])
+        if any(unit for _, unit in members):
+            units[name] = tuple(unit for _, unit in members)
+    return Table(table, units)

@@ -1,0 +1,234 @@
+//! An emitted controller on rows of words that Python holds.
+#![allow(unsafe_code)]
+
+use std::path::PathBuf;
+
+use host_sim::controller::{Controller, Supervised, TickController};
+use host_sim::word::{Scalar, WordKind};
+use pyo3::buffer::PyBuffer;
+use pyo3::exceptions::PyValueError;
+use pyo3::{PyErr, PyResult, Python, pyclass, pymethods};
+
+use crate::Error;
+
+/// Ticks between two looks at signals.
+const BLOCK: usize = 1 << 16;
+
+/// The law alone, or with its supervisor.
+enum Tick {
+    Law(Box<Controller>),
+    Supervised(Box<Supervised>),
+}
+
+impl Tick {
+    fn controller(&self) -> &Controller {
+        match self {
+            Self::Law(law) => law,
+            Self::Supervised(supervised) => supervised.controller(),
+        }
+    }
+
+    fn step(&mut self, input: &[u64], output: &mut [u64]) {
+        match self {
+            Self::Law(law) => law.step(input, output),
+            Self::Supervised(supervised) => {
+                supervised.step(input, output);
+            }
+        }
+    }
+}
+
+/// Places of the reals among words, and a row of them, where the controller has another scalar than Python.
+struct Rounded {
+    reals: [Vec<usize>; 2],
+    rows: [Vec<u64>; 2],
+}
+
+/// A host library that is loaded, with one configuration and one state. A row is a word of 64 bits for each name: reals as f64, which
+/// are rounded to the controller's scalar, and whole numbers.
+#[pyclass(module = "specgen._native")]
+pub struct Library {
+    tick: Tick,
+    rounded: Option<Rounded>,
+    inputs: Vec<String>,
+    outputs: Vec<String>,
+    /// Rows of [`Library::step`].
+    bound: Option<[PyBuffer<u64>; 2]>,
+}
+
+fn refused(error: impl std::fmt::Display) -> PyErr {
+    Error::new_err(error.to_string())
+}
+
+fn reals(names: &[String]) -> Vec<usize> {
+    (0..names.len()).filter(|place| WordKind::of(&names[*place]) == WordKind::Real).collect()
+}
+
+fn kinds(names: &[String]) -> Vec<(String, bool)> {
+    names.iter().map(|name| (name.clone(), WordKind::of(name) == WordKind::Real)).collect()
+}
+
+#[pymethods]
+impl Library {
+    /// Loads a host library; with its supervisor if `supervised`.
+    #[new]
+    fn new(path: PathBuf, supervised: bool) -> PyResult<Self> {
+        let controller = Controller::load(&path).map_err(refused)?;
+        let tick = if supervised {
+            Tick::Supervised(Box::new(Supervised::new(controller).map_err(refused)?))
+        } else {
+            Tick::Law(Box::new(controller))
+        };
+        let (inputs, outputs) = match &tick {
+            Tick::Law(law) => (law.description().input_names.clone(), law.description().output_names.clone()),
+            Tick::Supervised(supervised) => (supervised.input_names(), supervised.output_names()),
+        };
+        let rounded = (tick.controller().description().scalar != Scalar::F64).then(|| Rounded {
+            reals: [reals(&inputs), reals(&outputs)],
+            rows: [vec![0; inputs.len()], vec![0; outputs.len()]],
+        });
+        Ok(Self { tick, rounded, inputs, outputs, bound: None })
+    }
+
+    /// Name of the spec, its digest, version of specgen, bits of the scalar.
+    fn about(&self) -> (String, String, String, u32) {
+        let about = self.tick.controller().description();
+        (about.name.clone(), about.digest.clone(), about.version.clone(), about.scalar.bits())
+    }
+
+    /// Names of the input words, and which are reals.
+    fn inputs(&self) -> Vec<(String, bool)> {
+        kinds(&self.inputs)
+    }
+
+    /// Names of the output words, and which are reals.
+    fn outputs(&self) -> Vec<(String, bool)> {
+        kinds(&self.outputs)
+    }
+
+    /// Names and values of the settings of the spec.
+    fn settings(&self) -> Vec<(String, f64)> {
+        let controller = self.tick.controller();
+        let about = controller.description();
+        let value = |(name, word): (&String, u64)| match WordKind::of(name) {
+            WordKind::Real => (name.clone(), about.scalar.decode(word)),
+            WordKind::Integer => (name.clone(), word as f64),
+        };
+        about.config_names.iter().zip(controller.default_config()).map(value).collect()
+    }
+
+    /// Takes settings, those that are not named as in the spec; the state is kept.
+    fn configure(&mut self, settings: Vec<(String, f64)>) -> PyResult<()> {
+        let controller = self.tick.controller();
+        let mut words = controller.default_config();
+        for (name, value) in settings {
+            controller.description().set_config(&mut words, &name, value).map_err(refused)?;
+        }
+        match &mut self.tick {
+            Tick::Law(law) => law.configure(&words),
+            Tick::Supervised(supervised) => supervised.configure(&words),
+        }
+        .map_err(refused)
+    }
+
+    /// State as at power-up.
+    fn reset(&mut self) {
+        match &mut self.tick {
+            Tick::Law(law) => law.reset(),
+            Tick::Supervised(supervised) => supervised.reset(),
+        }
+    }
+
+    /// Digest of the state.
+    fn state_digest(&self) -> u64 {
+        match &self.tick {
+            Tick::Law(law) => law.state_digest(),
+            Tick::Supervised(supervised) => supervised.digest(),
+        }
+    }
+
+    /// The rows that [`Library::step`] reads and writes.
+    fn bind(&mut self, input: PyBuffer<u64>, output: PyBuffer<u64>) -> PyResult<()> {
+        rows(&input, self.inputs.len(), false)?;
+        rows(&output, self.outputs.len(), true)?;
+        self.bound = Some([input, output]);
+        Ok(())
+    }
+
+    /// One tick on the bound rows.
+    fn step(&mut self) -> PyResult<()> {
+        let Some([input, output]) = &self.bound else { return Err(PyValueError::new_err("no rows are bound")) };
+        let (input, output) = (input.buf_ptr().cast::<u64>(), output.buf_ptr().cast::<u64>());
+        // SAFETY: `bind` checked length, alignment and that the second may be written; the buffers are held, and the interpreter,
+        // without which nobody else writes to them.
+        unsafe { self.tick(input, output) };
+        Ok(())
+    }
+
+    /// A tick a row, from `inputs` to `outputs`; the interpreter is free meanwhile, and nobody may write to either. They do not
+    /// overlap. After Ctrl-C the rows so far are written.
+    fn run(&mut self, py: Python<'_>, inputs: PyBuffer<u64>, outputs: PyBuffer<u64>) -> PyResult<()> {
+        let count = rows(&inputs, self.inputs.len(), false)?;
+        if rows(&outputs, self.outputs.len(), true)? != count {
+            return Err(PyValueError::new_err("as many rows of outputs as of inputs are expected"));
+        }
+        let (from, to) = (inputs.buf_ptr() as usize, outputs.buf_ptr() as usize);
+        if from < to + outputs.len_bytes() && to < from + inputs.len_bytes() {
+            return Err(PyValueError::new_err("inputs and outputs overlap"));
+        }
+        for block in (0..count).step_by(BLOCK) {
+            let end = count.min(block + BLOCK);
+            py.detach(|| {
+                for row in block..end {
+                    // SAFETY: `rows` checked that there are `count` rows, aligned, and that the outputs may be written; both
+                    // buffers are held until the end. That nobody writes to them meanwhile is the caller's duty, as for every
+                    // function of numpy that frees the interpreter.
+                    unsafe {
+                        let input = (from as *const u64).add(row * self.inputs.len());
+                        self.tick(input, (to as *mut u64).add(row * self.outputs.len()));
+                    }
+                }
+            });
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+}
+
+impl Library {
+    /// # Safety
+    /// The pointers are to a row of inputs and one of outputs, which do not overlap.
+    unsafe fn tick(&mut self, input: *const u64, output: *mut u64) {
+        // SAFETY: the caller's duty.
+        let (input, output) = unsafe {
+            (
+                std::slice::from_raw_parts(input, self.inputs.len()),
+                std::slice::from_raw_parts_mut(output, self.outputs.len()),
+            )
+        };
+        let Some(Rounded { reals, rows: [row_in, row_out] }) = &mut self.rounded else {
+            return self.tick.step(input, output);
+        };
+        row_in.copy_from_slice(input);
+        for place in &reals[0] {
+            row_in[*place] = Scalar::F32.encode(f64::from_bits(input[*place]));
+        }
+        self.tick.step(row_in, row_out);
+        output.copy_from_slice(row_out);
+        for place in &reals[1] {
+            output[*place] = Scalar::F32.decode(row_out[*place]).to_bits();
+        }
+    }
+}
+
+/// Number of rows of `words` in a buffer.
+fn rows(buffer: &PyBuffer<u64>, words: usize, written: bool) -> PyResult<usize> {
+    let fits = buffer.item_count().is_multiple_of(words) && buffer.is_c_contiguous();
+    let aligned = (buffer.buf_ptr() as usize).is_multiple_of(align_of::<u64>());
+    if !fits || !aligned || (written && buffer.readonly()) {
+        return Err(PyValueError::new_err(format!(
+            "rows of {words} words are expected, contiguous and aligned, and outputs that can be written"
+        )));
+    }
+    Ok(buffer.item_count() / words)
+}

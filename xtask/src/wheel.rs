@@ -1,0 +1,106 @@
+//! The Python package: its wheel, built and tried in virtual environments as its users make them.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use crate::run::{Outcome, Report, cargo, expect_success};
+
+/// Its own workspace: no other build needs Python.
+pub const MANIFEST: &str = "codegen/python/Cargo.toml";
+const FOLDER: &str = "codegen/python";
+/// Where everything is made.
+const MADE: &str = "target/wheel";
+
+/// `cargo xtask wheel`
+pub fn command(root: &Path) -> ExitCode {
+    let mut report = Report::new(9);
+    let made = root.join(MADE);
+    let (tools, fresh, wheels) = (made.join("tools"), made.join("fresh"), made.join("dist"));
+    report.step("tools", || environment(&tools, &[OsStr::new("-r"), root.join(FOLDER).join("tools.txt").as_ref()]));
+    report.step("wheel", || build(root, &tools, &wheels));
+    if report.has_failed() {
+        return report.finish();
+    }
+    report.step("the command", || expect_success(cargo(root, &["build", "--release", "--locked"]), "see above"));
+    report.step("fresh environment", || match wheel(&wheels) {
+        // The versions of the tools, so that the same packages are tried everywhere.
+        Ok(wheel) => environment(
+            &fresh,
+            &[wheel.as_ref(), OsStr::new("-r"), root.join(FOLDER).join("tests/requirements.txt").as_ref()],
+        ),
+        Err(why) => Outcome::Failed(why),
+    });
+    let python = |arguments: &[&str]| {
+        let mut python = Command::new(fresh.join("bin/python"));
+        // Not beside the sources, which would be imported.
+        python.current_dir(root).args(arguments);
+        python.env("SPECGEN_COMMAND", target(root).join("release/specgen"));
+        python
+    };
+    let tests = format!("{FOLDER}/tests");
+    report.step("tests", || expect_success(python(&["-m", "pytest", "-q", &tests]), "see the test above"));
+    let config = format!("--config-file={FOLDER}/pyproject.toml");
+    report.step("types", || {
+        expect_success(python(&["-m", "mypy", &config, "-p", "specgen"]), "fix what is reported above")
+    });
+    report.step("types of the tests", || {
+        expect_success(python(&["-m", "mypy", &config, &tests]), "fix what is reported above")
+    });
+    report.step("types of what is not Python", || {
+        expect_success(python(&["-m", "mypy.stubtest", "specgen"]), "correct codegen/python/specgen/_native.pyi")
+    });
+    report.step("lints", || {
+        let clippy =
+            ["clippy", "--release", "--quiet", "--locked", "--manifest-path", MANIFEST, "--", "-D", "warnings"];
+        let mut clippy = cargo(root, &clippy);
+        clippy.env("CARGO_TARGET_DIR", target(root));
+        expect_success(clippy, "fix what is reported above")
+    });
+    report.finish()
+}
+
+/// A virtual environment, anew, with packages.
+fn environment(folder: &Path, packages: &[&OsStr]) -> Outcome {
+    let mut python = Command::new("python3");
+    python.args(["-m", "venv", "--clear"]).arg(folder);
+    match expect_success(
+        python,
+        "python3 from 3.11 on with its module venv is needed (Debian: apt-get install python3-venv)",
+    ) {
+        Outcome::Passed => {}
+        other => return other,
+    }
+    let mut pip = Command::new(folder.join("bin/python"));
+    pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]).args(packages);
+    expect_success(pip, "see above")
+}
+
+fn build(root: &Path, tools: &Path, wheels: &Path) -> Outcome {
+    if let Err(error) = fs::remove_dir_all(wheels)
+        && error.kind() != std::io::ErrorKind::NotFound
+    {
+        return Outcome::Failed(format!("{}: {error}", wheels.display()));
+    }
+    let mut maturin = Command::new(tools.join("bin/maturin"));
+    maturin
+        .current_dir(root)
+        .args(["build", "--release", "--locked", "--manifest-path", MANIFEST, "--out"])
+        .arg(wheels);
+    // Most of what it is made of is the command's.
+    maturin.env("CARGO_TARGET_DIR", target(root));
+    expect_success(maturin, "see above")
+}
+
+/// The one that was built.
+fn wheel(folder: &Path) -> Result<PathBuf, String> {
+    let entries = fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let mut paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    paths.find(|path| path.extension() == Some(OsStr::new("whl"))).ok_or_else(|| "there is no wheel".to_owned())
+}
+
+/// Where cargo builds.
+fn target(root: &Path) -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from)
+}
