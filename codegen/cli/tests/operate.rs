@@ -177,17 +177,19 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
         wait(&board, Phase::Faulted);
         operate(&["reference.toml", "acknowledge", "wait disarmed 20"]).says(0, &[]);
     };
-    // What this session has not commanded is not known to it.
+    // What makes no sense is refused before anything is asked.
     for (script, text) in [
-        (&["move z=1um"][..], "would be guessed"),
-        (&[MOVE, "set command=hold", "jog z=1um"], "would be guessed"),
-        (&[MOVE, "ramp-down", "jog z=1um"], "would be guessed"),
-        (&[MOVE, "jog z=1"], "z wants a unit of"),
+        (&[MOVE, "jog z=1"][..], "z wants a unit of"),
+        (&["goto there"], "there is no pose `there`: `mark there` first; there are zero"),
+        (&["play case-9"], "no trajectory `case-9`; it has case-1, case-2, machining"),
+        (&["gains kd=1"], "there is no gain `kd`"),
+        (&["mode p-pcc"], "expected p, f or pf"),
     ] {
         let run = operate(&[&UP[..], script].concat());
         run.says(2, &[text]);
         assert!(board.is(Phase::Disarmed), "{script:?}");
     }
+    operate(&["gains ki=1"]).says(2, &["name the spec"]);
     operate(&["reference.toml", MOVE]).says(1, &["disarmed: it moves when it runs"]);
 
     let script = [
@@ -198,6 +200,22 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
         "wait arrived 20",
         "move y=1um",
         "wait arrived 20",
+        "mark here",
+        "goto zero",
+        "wait arrived 20",
+        "can-i-go z=5um speed=100um/s",
+        "can-i-go z=5um speed=101um/s",
+        "can-i-go z=5um rx=1urad speed=1mrad/s",
+        "can-i-go z=43um",
+        "can-i-go z=-11um",
+        "goto here",
+        "wait arrived 20",
+        "where",
+        "limits",
+        "mode pf-ewma",
+        "gains",
+        "gains ki[2]=7e9",
+        "status",
         "record arm 100",
         "record trigger",
         "wait 0.5",
@@ -209,6 +227,27 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
     let run = operate(&[&UP[..], &script].concat());
     run.says(0, &[]);
     assert!(run.stdout.contains("moves to x 0.000 um, y 1.000 um, z 1.500 um, rx 2.000 urad"), "{run:?}");
+    let yes_and_no: Vec<&str> = run.stdout.lines().filter(|line| *line == "yes" || line.starts_with("no: ")).collect();
+    assert_eq!(yes_and_no.len(), 5, "{run:?}");
+    for (line, text) in yes_and_no.iter().zip([
+        "yes",
+        "no: z moves at 100.000 um/s at most",
+        "yes",
+        "no: z would be at 53.000 um from rest, outside the workspace of +-52.000 um",
+        "no: leg ",
+    ]) {
+        assert!(line.starts_with(text), "{line}: {text}");
+    }
+    for text in [
+        "        1.5000     ",
+        "42.000  um\n",
+        "mode pf-ewma\n",
+        "  legs 0 to 5: ",
+        "  stable up to \u{3bb} = 2.",
+        "7.0000e9",
+    ] {
+        assert!(run.stdout.contains(text), "{text:?}: {}", run.stdout);
+    }
     // The platform's own target, as the controller computed it.
     let replayed = folder.run(&["replay", "run.rec", "--spec", "reference.toml", "--csv", "run.csv"]);
     assert_eq!(replayed.code, 0, "{replayed:?}");
@@ -222,9 +261,16 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
         assert!((value - expected).abs() < 1e-15, "{name}: {value}");
     }
 
+    // Gains that are unstable are not sent, as the spec would be refused.
+    let run = operate(&[&UP[..], &["wait arrived 20", "gains kp=1e9"]].concat());
+    run.says(1, &["not sent: E04"]);
+    recover();
+    let run = operate(&["reference.toml", "status"]);
+    assert!(run.code == 0 && run.stdout.contains("`arm`, then `run`"), "{run:?}");
+
     // Beyond the workspace nothing moves, and while a motion is under way nothing is promised.
     let run = operate(&[&UP[..], &["wait arrived 20", MOVE, "wait arrived 20", "jog z=100um"]].concat());
-    run.says(1, &["refuses to move to x 0.000 um, y 0.000 um, z 102.000 um", "outside the workspace"]);
+    run.says(1, &["it cannot go to x 0.000 um, y 0.000 um, z 102.000 um", "nothing moves"]);
     recover();
 
     // On the way to the bias, 0.1 s, a command is not looked at yet. A computer that is busy may come after it.

@@ -16,7 +16,7 @@ mod session;
 mod socket;
 mod wave;
 
-pub use order::{Order, Until};
+pub use order::{Order, Until, Wanted};
 pub use session::{ALIVE, Place, Session};
 pub use socket::SocketLine;
 pub use wave::{read_wave, refused_wave};

@@ -6,7 +6,7 @@ use std::time::Duration;
 use specgen_link::RecorderAction;
 use specgen_runtime::supervisor::{Phase, Request};
 
-use crate::place::{Named, named};
+use crate::place::{Named, Pace, named, pace};
 
 /// How long something is waited for if nothing else is said.
 const TIMEOUT: Duration = Duration::from_secs(60);
@@ -15,7 +15,8 @@ const LONGEST: f64 = 86_400.0;
 /// Rows after a trigger, if nothing else is said.
 const AFTER: u32 = 1000;
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
-                        move|jog AXIS=QUANTITY…, wait PHASE|arrived|SECONDS [TIMEOUT], config, \
+                        move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], mark NAME, goto NAME, \
+                        play TRAJECTORY, mode p|f|pf, gains [NAME=VALUE…], wait PHASE|arrived|SECONDS [TIMEOUT], config, \
                         config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, stop";
 
 /// One order.
@@ -34,6 +35,27 @@ pub enum Order {
         /// What is said of each axis.
         axes: Named,
     },
+    /// Say where the platform is.
+    Where,
+    /// Say what each axis can still do from there.
+    Limits,
+    /// Say whether it can go to a pose, or what binds.
+    CanIGo {
+        /// What is said of each axis.
+        axes: Named,
+        /// At this speed at least, m/s, and rad/s.
+        speed: Pace,
+    },
+    /// Give the set-point of now a name.
+    Mark(String),
+    /// Go to a pose that has a name.
+    Goto(String),
+    /// Play a trajectory of the spec.
+    Play(String),
+    /// Other terms of the law, as `mode` of the settings: 0 P, 1 to 3 F, 4 to 6 P/F.
+    Mode(Wanted),
+    /// Show the gains, or set these.
+    Gains(Vec<(String, f64)>),
     /// Go on when something is so.
     Wait {
         /// What.
@@ -55,6 +77,51 @@ pub enum Order {
     StopWave,
     /// Ramp down and end the program that serves the link.
     Stop,
+}
+
+/// A mode as it is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wanted {
+    /// Whether the pose error is fed back, and whether the hysteresis is inverted.
+    pub terms: [bool; 2],
+    /// Number of the run-to-run law; the one in force if none is named.
+    pub law: Option<u64>,
+}
+
+/// Run-to-run laws by their number.
+const LAWS: [&str; 3] = ["invhys", "ewma", "pcc"];
+
+impl Wanted {
+    fn parse(text: &str) -> Result<Self, String> {
+        let (terms, law) = text.split_once('-').map_or((text, None), |(terms, law)| (terms, Some(law)));
+        let law = law.map(|law| LAWS.iter().position(|known| *known == law).map(|place| place as u64));
+        let terms = match terms {
+            "p" => Some([true, false]),
+            "f" => Some([false, true]),
+            "pf" => Some([true, true]),
+            _ => None,
+        };
+        match (terms, law) {
+            (Some(terms), None) => Ok(Self { terms, law: None }),
+            (Some(terms @ [_, true]), Some(Some(law))) => Ok(Self { terms, law: Some(law) }),
+            _ => Err(format!(
+                "expected p, f or pf, the last two with -{} if another law is meant; found `{text}`",
+                LAWS.join(", -")
+            )),
+        }
+    }
+
+    /// The word of the mode, where `now` is the one in force.
+    ///
+    /// # Errors
+    /// No law is named, and none is in force.
+    pub fn word(self, now: u64) -> Result<u64, String> {
+        match (self.terms, self.law.or(now.checked_sub(1).map(|now| now % LAWS.len() as u64))) {
+            ([_, false], _) => Ok(0),
+            ([feeds_back, true], Some(law)) => Ok(1 + law + if feeds_back { LAWS.len() as u64 } else { 0 }),
+            (_, None) => Err(format!("in mode P no run-to-run law is in force: name one, such as pf-{}", LAWS[2])),
+        }
+    }
 }
 
 /// What is waited for.
@@ -90,6 +157,17 @@ impl Order {
             }
             ["move", ref rest @ ..] if !rest.is_empty() => Self::Move { relative: false, axes: named(rest)? },
             ["jog", ref rest @ ..] if !rest.is_empty() => Self::Move { relative: true, axes: named(rest)? },
+            ["where"] => Self::Where,
+            ["limits"] => Self::Limits,
+            ["can-i-go", ref rest @ ..] if !rest.is_empty() => {
+                let (speeds, axes): (Vec<&str>, Vec<&str>) = rest.iter().partition(|word| word.starts_with("speed="));
+                Self::CanIGo { axes: named(&axes)?, speed: pace(&speeds)? }
+            }
+            ["mark", name] => Self::Mark(name.to_owned()),
+            ["goto", name] => Self::Goto(name.to_owned()),
+            ["play", name] => Self::Play(name.to_owned()),
+            ["mode", mode] => Self::Mode(Wanted::parse(mode)?),
+            ["gains", ref rest @ ..] => Self::Gains(rest.iter().map(|text| gain(text)).collect::<Result<_, _>>()?),
             ["wait", until] => Self::wait(until, None)?,
             ["wait", until, limit] => Self::wait(until, Some(limit))?,
             ["config"] => Self::Config,
@@ -139,6 +217,13 @@ fn assignment(text: &str) -> Result<(String, String), String> {
     Ok((name.to_owned(), value.to_owned()))
 }
 
+fn gain(text: &str) -> Result<(String, f64), String> {
+    let expected = || format!("expected a gain such as ki[2]=1e9 in SI, found `{text}`");
+    let (name, value) = assignment(text).map_err(|_| expected())?;
+    let value = value.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0).ok_or_else(expected)?;
+    Ok((name, value))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,6 +241,15 @@ mod tests {
             ("set a=1 b[2]=-2e-6", Some(Order::Set(vec![("a".into(), "1".into()), ("b[2]".into(), "-2e-6".into())]))),
             ("wait arrived 3", Some(Order::Wait { until: Until::Arrived, limit: time(3.0) })),
             ("jog z=1um", Some(Order::Move { relative: true, axes: [None, None, Some(1e-6), None, None, None] })),
+            ("where", Some(Order::Where)),
+            ("gains", Some(Order::Gains(Vec::new()))),
+            ("gains ki[2]=1e9", Some(Order::Gains(vec![("ki[2]".into(), 1e9)]))),
+            ("goto zero", Some(Order::Goto("zero".into()))),
+            ("mode pf-ewma", Some(Order::Mode(Wanted { terms: [true, true], law: Some(1) }))),
+            (
+                "can-i-go x=1um speed=2um/s",
+                Some(Order::CanIGo { axes: [Some(1e-6), None, None, None, None, None], speed: [Some(2e-6), None] }),
+            ),
             ("record arm 7", Some(Order::Record(RecorderAction::Arm { after: 7 }))),
             ("record download run.rec", Some(Order::Download("run.rec".into()))),
             ("wave stop", Some(Order::StopWave)),
@@ -180,6 +274,12 @@ mod tests {
             ("wait nan", "expected a phase (disarmed, arming, running"),
             ("wait -1", "found `-1`"),
             ("wait running soon", "found `soon`"),
+            ("mode p-pcc", "expected p, f or pf"),
+            ("mode fast", "expected p, f or pf"),
+            ("gains ki=-1", "expected a gain such as"),
+            ("gains ki", "expected a gain such as"),
+            ("can-i-go x=1um speed=2um", "expected a speed such as"),
+            ("can-i-go", "is none of"),
             ("record arm 0", "1 or more"),
             ("record arm -1", "1 or more"),
             ("config write", "is none of"),
@@ -188,5 +288,12 @@ mod tests {
             let error = Order::parse(line).unwrap_err();
             assert!(error.contains(expected), "{line}: {error}");
         }
+    }
+
+    #[test]
+    fn a_mode_keeps_the_law_that_is_not_named() {
+        let word = |text, now| Wanted::parse(text).unwrap().word(now);
+        assert_eq!([word("p", 6), word("f", 6), word("pf", 2), word("pf-pcc", 0)], [Ok(0), Ok(3), Ok(5), Ok(6)]);
+        assert!(word("f", 0).unwrap_err().contains("name one, such as pf-pcc"));
     }
 }

@@ -3,7 +3,7 @@
 use specgen_language::quantity::{self, Dimension};
 
 /// Names of the axes of a pose.
-pub(crate) const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+pub const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
 /// What is said of each axis, m and rad; none of one that is not named.
 pub type Named = [Option<f64>; 6];
@@ -34,36 +34,48 @@ pub(crate) fn named(words: &[&str]) -> Result<Named, String> {
     Ok(axes)
 }
 
-/// The pose that is meant, from the one commanded last: axes that are not named stay as they are.
+/// A speed of translations, m/s, and one of rotations, rad/s; none of one that is not asked for.
+pub type Pace = [Option<f64>; 2];
+
+/// Reads `speed=QUANTITY` words, one of each dimension at most.
 ///
 /// # Errors
-/// None was commanded, and not every axis is given.
-pub fn meant(from: Option<[f64; 6]>, relative: bool, axes: &Named) -> Result<[f64; 6], String> {
-    let mut pose = from.unwrap_or_default();
-    let is_given = !relative && axes.iter().all(Option::is_some);
-    if from.is_none() && !is_given {
-        // Zeros in place of what another session commanded would move axes that nobody named.
-        return Err(format!(
-            "this session has commanded no pose since the machine runs, so that axes not named would be guessed: \
-             begin with a `move` of all six ({})",
-            AXES.map(|axis| format!("{axis}=…")).join(" ")
-        ));
-    }
-    for (place, value) in pose.iter_mut().zip(axes) {
-        if let Some(value) = value {
-            *place = if relative { *place + value } else { *value };
+/// The first word that is wrong, and what is expected.
+pub(crate) fn pace(words: &[&str]) -> Result<Pace, String> {
+    let mut pace = [None; 2];
+    for word in words {
+        let expected = || format!("expected a speed such as speed=50um/s or speed=1mrad/s, once each; found `{word}`");
+        let read = word.strip_prefix("speed=").and_then(|text| quantity::parse(text).ok()).ok_or_else(expected)?;
+        let kinds = [Dimension::SPEED, Dimension::ANGULAR_RATE];
+        let kind = kinds.iter().position(|kind| *kind == read.dimension).ok_or_else(expected)?;
+        if read.value < 0.0 || pace[kind].replace(read.value).is_some() {
+            return Err(expected());
         }
     }
-    Ok(pose)
+    Ok(pace)
+}
+
+/// The pose that is meant, from the set-point: axes that are not named stay as they are.
+#[must_use]
+pub fn meant(from: &[f64; 6], relative: bool, axes: &Named) -> [f64; 6] {
+    core::array::from_fn(|axis| match axes[axis] {
+        Some(value) if relative => from[axis] + value,
+        Some(value) => value,
+        None => from[axis],
+    })
+}
+
+/// Millionths with their unit, of an axis.
+#[must_use]
+pub fn amount(axis: usize, value: f64) -> String {
+    format!("{:.3} {}", value * 1e6, if axis < 3 { "um" } else { "urad" })
 }
 
 /// A pose as people say it, µm and µrad.
 #[must_use]
 pub fn in_words(pose: &[f64; 6]) -> String {
     let axes = AXES.iter().zip(pose).enumerate();
-    let text =
-        axes.map(|(axis, (name, value))| format!("{name} {:.3} {}", value * 1e6, if axis < 3 { "um" } else { "urad" }));
-    text.collect::<Vec<_>>().join(", ")
+    axes.map(|(axis, (name, value))| format!("{name} {}", amount(axis, *value))).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -89,13 +101,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_named_stays_and_is_never_guessed() {
+    fn what_is_not_named_stays() {
         let z = [None, None, Some(1e-6), None, None, None];
         let from = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0];
-        assert_eq!(meant(Some(from), false, &z), Ok([1.0, 2.0, 1e-6, 4.0, 5.0, 6.0]));
-        assert_eq!(meant(Some(from), true, &z), Ok([1.0, 2.0, 3.0 + 1e-6, 4.0, 5.0, 6.0]));
-        assert_eq!(meant(None, false, &from.map(Some)), Ok(from));
-        assert!(meant(None, false, &z).unwrap_err().contains("all six"));
-        assert!(meant(None, true, &from.map(Some)).unwrap_err().contains("all six"));
+        assert_eq!(meant(&from, false, &z), [1.0, 2.0, 1e-6, 4.0, 5.0, 6.0]);
+        assert_eq!(meant(&from, true, &z), [1.0, 2.0, 3.0 + 1e-6, 4.0, 5.0, 6.0]);
+    }
+
+    #[test]
+    fn speeds_are_of_lengths_and_angles() {
+        assert_eq!(pace(&["speed=2mrad/s", "speed=5um/s"]), Ok([Some(5e-6), Some(2e-3)]));
+        for words in [&["speed=2"][..], &["speed=2um"], &["speed=-2um/s"], &["speed=1um/s", "speed=2um/s"]] {
+            assert!(pace(words).unwrap_err().contains("expected a speed such as"), "{words:?}");
+        }
     }
 }

@@ -52,8 +52,6 @@ pub struct Session<P> {
     command: Vec<u64>,
     asked: Instant,
     status: Status,
-    /// Pose of the last move that was taken while the machine has been running.
-    pose: Option<[f64; 6]>,
 }
 
 impl<P: Port> Session<P> {
@@ -97,7 +95,6 @@ impl<P: Port> Session<P> {
                 late: 0,
                 link: specgen_link::Counters::NONE,
             },
-            pose: None,
         };
         session.poll()?;
         Ok(session)
@@ -142,10 +139,6 @@ impl<P: Port> Session<P> {
         match self.client.ask(&Request::Status)? {
             Reply::Status(status) => {
                 self.status = status;
-                if u64::from(self.status.phase) != supervisor::Phase::Running.word() {
-                    // It may stand anywhere when it runs again.
-                    self.pose = None;
-                }
                 self.asked = Instant::now();
                 Ok(&self.status)
             }
@@ -236,18 +229,7 @@ impl<P: Port> Session<P> {
         let put = put_words(&words, &mut bytes).ok_or(ClientError::TooLong)?;
         self.done(&Request::Setpoint { words: put })?;
         self.command = words;
-        self.pose = None;
         Ok(())
-    }
-
-    /// Pose of the last move that was taken while the machine has been running, m and rad; none if this session knows of none.
-    pub fn pose(&self) -> Option<[f64; 6]> {
-        self.pose
-    }
-
-    /// The pose of a move that the machine has taken.
-    pub fn taken(&mut self, pose: [f64; 6]) {
-        self.pose = Some(pose);
     }
 
     /// Words of a move to `pose`, m and rad.

@@ -139,7 +139,9 @@ Examples:
       a real-time PC, from a file
 
 Commands: status, arm, run, hold, ramp-down, acknowledge, none,
-  set NAME=VALUE…, move|jog AXIS=QUANTITY… (z=1um rx=2urad),
+  set NAME=VALUE…, move|jog AXIS=QUANTITY… (z=1um rx=2urad), where, limits,
+  can-i-go AXIS=QUANTITY… [speed=QUANTITY], mark|goto NAME, play TRAJECTORY,
+  mode p|f|pf, gains [NAME=VALUE…],
   wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC,
   record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
   stop (ends the program at a socket)

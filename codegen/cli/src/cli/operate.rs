@@ -3,6 +3,7 @@
 mod answer;
 mod health;
 mod operator;
+mod platform;
 
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
@@ -18,6 +19,7 @@ use operator::Ended;
 pub use operator::Operator;
 use specgen_compiler::compile;
 use specgen_language::interrupt;
+use specgen_language::model::Model;
 use specgen_operate::pil::{BAUD, OpenError, SerialLine};
 use specgen_operate::{ALIVE, Order, Session, SocketLine};
 
@@ -47,6 +49,13 @@ pub struct Arguments {
     words: Vec<String>,
 }
 
+/// What is known beforehand of the device.
+struct Device {
+    digest: Option<String>,
+    model: Option<Model>,
+    has_one_host: bool,
+}
+
 /// Where commands come from.
 enum Source {
     List(Vec<Order>),
@@ -71,17 +80,19 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
             }
         }
     }
-    let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.as_str());
+    let digest = compiled.as_ref().map(|compiled| compiled.ir.digest.clone());
+    let device =
+        Device { digest, model: compiled.map(|compiled| compiled.model), has_one_host: arguments.port.is_some() };
     // The machine is not to be left alone.
     interrupt::heed();
     match (&arguments.port, &arguments.socket) {
         (Some(path), _) => {
             let line = SerialLine::open(path, arguments.baud).map_err(Failure::Environment)?;
-            operate(line, Timeout::SERIAL, &path.display().to_string(), digest, source, ui)
+            operate(line, Timeout::SERIAL, &path.display().to_string(), device, source, ui)
         }
         (None, Some(path)) => {
             let line = SocketLine::open(path).map_err(Failure::Environment)?;
-            operate(line, Timeout::SOCKET, &path.display().to_string(), digest, source, ui)
+            operate(line, Timeout::SOCKET, &path.display().to_string(), device, source, ui)
         }
         // One of the two is required.
         (None, None) => Err(Failure::Usage("name the device with --port or --socket".to_owned())),
@@ -126,19 +137,22 @@ fn operate(
     line: impl Port,
     timeout: Timeout,
     name: &str,
-    digest: Option<&str>,
+    device: Device,
     source: Source,
     ui: &mut Ui,
 ) -> Result<(), Failure> {
-    let session = Session::open(line, timeout, digest).map_err(|error| match error {
+    let session = Session::open(line, timeout, device.digest.as_deref()).map_err(|error| match error {
         OpenError::Other(text) => Failure::Gate(format!("{name}: {text}")),
         OpenError::Link(_) => Failure::Environment(format!("{name}: {error}")),
     })?;
-    if digest.is_none() {
+    if device.digest.is_none() {
         let text = format!("{name}: not compared with a spec; name it to be sure that the device runs its controller");
         ui.progress(&text);
     }
     let mut operator = Operator::new(session, interrupt::heed());
+    operator.model = device.model;
+    // A serial line has one end here: whoever asks over it is the host.
+    operator.ordered = device.has_one_host;
     if let Source::List(orders) = &source {
         // A mistake in the last of them would leave the machine alone in the middle.
         operator.check(orders)?;
@@ -219,7 +233,8 @@ fn finish(
     let report = Report { device: name, answers: std::mem::take(&mut operator.answers), status: operator.status() };
     match ended {
         Ok(()) | Err(Ended::Stopped) => {
-            if open && operator.is_powered() {
+            // A machine that another host commands does not miss one that only looked.
+            if open && operator.ordered && operator.is_powered() {
                 let text =
                     "the amplifiers are on; without its host the machine holds, then ramps down (supervisor.host_lost)";
                 ui.progress(&format!("{name}: {}: {text}", operator.stands()));

@@ -3,6 +3,7 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -124,7 +125,7 @@ pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
     moves_are_made_or_refused_before_anything_moves(&mut first, &mut look);
     latency(&mut first, &mut look);
     let mut second = bridge.client();
-    others_look_and_stop_and_are_no_burden(&bridge, &mut first, &mut second, &mut look);
+    others_look_and_stop_and_are_no_burden((&bridge, &link), &mut first, &mut second, &mut look);
     one_that_leaves_leaves_the_orders(first, &mut second, &mut look);
     bridge.end();
     assert_eq!(look().phase, DISARMED, "Ctrl-C ramps down");
@@ -140,10 +141,30 @@ pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
     assert_eq!(client.order("SVO 1 0"), "0");
     wait_for("the way down", || look().phase == DISARMED);
     assert_eq!([client.ask("SVO? 1"), client.order("MOV 1 1")], ["1=0", "5"]);
+    drop(client);
+    a_program_of_others(bench, bridge.port);
     bridge.end();
 
     let (summary, _) = bench.check(&running.end(Signal::INT), "gcs.rec");
     assert_eq!(summary["incidents"].as_array().map(Vec::len), Some(0), "never disturbed: {summary:#}");
+}
+
+/// The free client `qmi` with its driver of a single stage, where it is installed.
+fn a_program_of_others(bench: &Bench, port: u16) {
+    let python = std::env::var("SPECGEN_PYTHON").unwrap_or_else(|_| "python3".to_owned());
+    let has = Command::new(&python).args(["-c", "import qmi"]).stderr(Stdio::null()).status();
+    if !has.is_ok_and(|status| status.success()) {
+        return crate::support::skipped(
+            "no Python with qmi: its exchanges are tried byte by byte (pip install qmi, SPECGEN_PYTHON)",
+        );
+    }
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/rt_pc/qmi_client.py");
+    let mut command = Command::new(&python);
+    // It writes its log there.
+    command.env("QMI_HOME", bench.folder.path()).arg(script).arg(port.to_string());
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    print!("{}", String::from_utf8_lossy(&output.stdout));
 }
 
 fn who_is_there(client: &mut Client, look: &mut impl FnMut() -> Place) {
@@ -260,12 +281,18 @@ fn latency(client: &mut Client, look: &mut impl FnMut() -> Place) {
 }
 
 fn others_look_and_stop_and_are_no_burden(
-    bridge: &Bridge,
+    (bridge, link): (&Bridge, &Path),
     first: &mut Client,
     second: &mut Client,
     look: &mut impl FnMut() -> Place,
 ) {
     assert_eq!([second.order("MOV X 1"), second.order("SVO X 0")], ["89", "89"]);
+    // Who only looks is not missed when it leaves, and does not say so.
+    let mut operate = Command::new(env!("CARGO_BIN_EXE_specgen"));
+    let looked = operate.args(["operate", "--socket"]).arg(link).args(["status", "where", "limits"]).output().unwrap();
+    let (said, shown) = (String::from_utf8_lossy(&looked.stderr), String::from_utf8_lossy(&looked.stdout));
+    assert!(looked.status.success() && !said.contains("holds, then ramps down"), "{said}");
+    assert!(shown.contains("running, amplifiers on") && shown.contains("  legs 0 to 5: "), "{shown}");
     // One that asks and never listens, one that sends what is no command, one that is gone in the middle of a line.
     let mut deaf = bridge.client();
     deaf.0.set_write_timeout(Some(Duration::from_millis(100))).unwrap();

@@ -8,6 +8,7 @@ use specgen_link::Health;
 use specgen_runtime::supervisor::Cause;
 
 use super::answer::MachineStatus;
+use super::platform::Located;
 use crate::cli::ui::Outcome;
 
 /// Answer to `status`: how the machine stands, and what it noticed.
@@ -15,12 +16,23 @@ use crate::cli::ui::Outcome;
 pub struct Standing {
     #[serde(flatten)]
     pub status: MachineStatus,
+    /// Of a platform.
+    pub place: Option<Located>,
+    /// What to do, where something is to be done.
+    pub advice: Option<String>,
     pub health: Noticed,
 }
 
 impl Outcome for Standing {
     fn text(&self) -> String {
-        self.status.text() + &self.health.text(self.status.period)
+        let mut text = self.status.text();
+        if let Some(place) = &self.place {
+            text += &place.text();
+        }
+        if let Some(advice) = &self.advice {
+            text += &format!("  {advice}\n");
+        }
+        text + &self.health.text(self.status.period)
     }
 }
 

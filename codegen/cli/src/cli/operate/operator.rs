@@ -1,5 +1,6 @@
 //! The operator of a session: carries orders out one after the other, notices faults, keeps the link alive.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -13,10 +14,12 @@ use specgen_runtime::supervisor::{Phase, Request};
 
 use super::answer::{Answer, Downloaded, MachineStatus, Moves, Plain, RecorderState, Settings};
 use super::health::Standing;
+use super::platform::{Located, ZERO, in_words};
 use crate::cli::file::{check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
-use specgen_operate::place::{Named, meant};
+use specgen_language::model::Model;
+use specgen_operate::place::meant;
 use specgen_operate::{Order, Session, Until, read_wave, refused_wave};
 
 /// How long ramping down may take.
@@ -50,7 +53,13 @@ impl From<ClientError> for Ended {
 
 /// One host's hands on a machine.
 pub struct Operator<P> {
-    session: Session<P>,
+    pub(super) session: Session<P>,
+    /// What the device was built from, where that is known.
+    pub model: Option<Model>,
+    /// Poses by the names that this session gave them.
+    pub(super) marks: BTreeMap<String, [f64; 6]>,
+    /// Whether anything was ordered, so that this host is missed when it leaves.
+    pub ordered: bool,
     interrupted: &'static AtomicBool,
     /// Phase and cause that were shown last.
     shown: (u8, u8),
@@ -63,7 +72,16 @@ pub struct Operator<P> {
 impl<P: Port> Operator<P> {
     pub fn new(session: Session<P>, interrupted: &'static AtomicBool) -> Self {
         let shown = (session.status().phase, session.status().cause);
-        Self { session, interrupted, shown, attended: false, answers: Vec::new() }
+        Self {
+            session,
+            model: None,
+            marks: BTreeMap::new(),
+            ordered: false,
+            interrupted,
+            shown,
+            attended: false,
+            answers: Vec::new(),
+        }
     }
 
     /// Phase and cause in words.
@@ -130,21 +148,22 @@ impl<P: Port> Operator<P> {
     /// Refuses `orders` if one of them makes no sense whatever the device does: names, numbers, waves, files that cannot be.
     pub fn check(&self, orders: &[Order]) -> Result<(), Failure> {
         let nonsense = |text: String| Failure::Usage(format!("{text}; nothing was asked of the machine"));
-        let mut pose = self.session.pose();
+        let mut marks: Vec<&str> = self.marks.keys().map(String::as_str).collect();
         orders.iter().try_for_each(|order| match order {
-            Order::Set(assignments) => {
-                pose = None;
-                self.session.assign(assignments).map(|_| ()).map_err(nonsense)
+            Order::Set(assignments) => self.session.assign(assignments).map(|_| ()).map_err(nonsense),
+            Order::Mark(name) => {
+                marks.push(name);
+                self.motion().map(|_| ()).map_err(nonsense)
             }
-            Order::Move { relative, axes } => {
-                let to = meant(pose, *relative, axes).map_err(nonsense)?;
-                pose = Some(to);
-                self.session.move_words(&to).map(|_| ()).map_err(nonsense)
-            }
-            Order::Ask(Request::Arm | Request::Hold | Request::RampDown | Request::Acknowledge) => {
-                pose = None;
-                Ok(())
-            }
+            Order::Goto(name) if name != ZERO && !marks.contains(&name.as_str()) => Err(nonsense(self.no_mark(name))),
+            Order::Play(name) => self.trajectory(name).map(|_| ()).map_err(nonsense),
+            Order::Gains(gains) => self.gains_of(gains).map(|_| ()).map_err(nonsense),
+            Order::Move { .. }
+            | Order::Where
+            | Order::Limits
+            | Order::CanIGo { .. }
+            | Order::Goto(_)
+            | Order::Mode(_) => self.motion().map(|_| ()).map_err(nonsense),
             Order::Wave(path) => self.wave_of(path).map(|_| ()).map_err(nonsense),
             Order::Download(path) => check_place(path),
             _ => Ok(()),
@@ -157,16 +176,27 @@ impl<P: Port> Operator<P> {
         match order {
             Order::Status => {
                 let health = self.session.health()?.into();
-                self.note(&line, &Standing { status: self.status(), health }, ui);
+                let place = self.session.place()?.map(Located::from);
+                let advice = self.advice();
+                self.note(&line, &Standing { status: self.status(), place, advice, health }, ui);
             }
             Order::Wait { until, limit } => {
                 self.wait(*until, *limit, ui)?;
                 self.note(&line, &Plain(self.stands()), ui);
             }
             Order::Move { relative, axes } => {
-                let pose = self.go(*relative, axes)?;
+                let from = self.place()?.target;
+                let pose = self.go(meant(&from, *relative, axes))?;
                 self.note(&line, &Moves { pose }, ui);
             }
+            Order::Where
+            | Order::Limits
+            | Order::CanIGo { .. }
+            | Order::Mark(_)
+            | Order::Goto(_)
+            | Order::Play(_)
+            | Order::Mode(_)
+            | Order::Gains(_) => self.of_platform(order, &line, ui)?,
             Order::Config => {
                 let settings = self.config()?;
                 self.note(&line, &settings, ui);
@@ -195,6 +225,7 @@ impl<P: Port> Operator<P> {
 
     /// Orders that are answered by being done.
     fn ask(&mut self, order: &Order) -> Result<(), Ended> {
+        self.ordered = true;
         match order {
             Order::Ask(request) => self.session.supervise(*request)?,
             Order::Set(assignments) => {
@@ -205,19 +236,15 @@ impl<P: Port> Operator<P> {
             Order::Wave(path) => self.wave(path)?,
             Order::StopWave => self.session.stop_wave()?,
             Order::Stop => self.session.stop().map_err(unsupported)?,
-            Order::Status
-            | Order::Wait { .. }
-            | Order::Move { .. }
-            | Order::Config
-            | Order::Record(_)
-            | Order::Download(_) => {}
+            // The others have an answer of their own.
+            _ => {}
         }
         Ok(())
     }
 
     /// Sends a move, and waits until the machine has taken or refused it. Where a motion is under way a machine looks at a
     /// command only after it, so that nothing could be said of this one.
-    fn go(&mut self, relative: bool, axes: &Named) -> Result<[f64; 6], Ended> {
+    pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<[f64; 6], Ended> {
         let status = self.session.status();
         if u64::from(status.phase) != Phase::Running.word() {
             return Err(Ended::Refused(format!("the machine is {}: it moves when it runs", self.stands())));
@@ -225,11 +252,12 @@ impl<P: Port> Operator<P> {
         if status.status & BUSY != 0 {
             return Err(Ended::Refused("a motion is under way; `wait arrived` first".to_owned()));
         }
-        let pose = meant(self.session.pose(), relative, axes).map_err(Ended::Refused)?;
+        if let Some(binding) = self.motion().map_err(Ended::Refused)?.binding(&pose) {
+            let (to, binds) = (specgen_operate::place::in_words(&pose), in_words(&binding));
+            return Err(Ended::Refused(format!("it cannot go to {to}: {binds}; nothing moves")));
+        }
         let words = self.session.move_words(&pose).map_err(Ended::Refused)?;
-        let before = self.session.pose();
-        self.session.command(words).map_err(waving)?;
-        self.look()?;
+        self.send(words)?;
         let (sent, start) = (self.session.status().tick, Instant::now());
         while self.session.status().tick < sent + SEEN {
             if start.elapsed() >= ANSWERED {
@@ -243,16 +271,19 @@ impl<P: Port> Operator<P> {
             return Err(Ended::Fault(format!("the machine is {} and does not move", self.stands())));
         }
         if status.status & REFUSED != 0 {
-            if let Some(before) = before {
-                self.session.taken(before);
-            }
             return Err(Ended::Refused(format!(
                 "the machine refuses to move to {}: outside the workspace; it stands where it stood",
                 specgen_operate::place::in_words(&pose)
             )));
         }
-        self.session.taken(pose);
         Ok(pose)
+    }
+
+    /// Sends a command, and looks at the machine.
+    pub(super) fn send(&mut self, words: Vec<u64>) -> Result<(), Ended> {
+        self.ordered = true;
+        self.session.command(words).map_err(waving)?;
+        self.look()
     }
 
     fn wait(&mut self, until: Until, limit: Duration, ui: &Ui) -> Result<(), Ended> {

@@ -1,0 +1,375 @@
+//! Orders about where a platform is and may go, and about the terms of its law.
+
+use std::fmt::Write as _;
+
+use host_sim::word::status_words;
+use serde::Serialize;
+use specgen_compiler::compile;
+use specgen_language::model::Gains;
+use specgen_link::Refusal;
+use specgen_link::client::{ClientError, Port};
+use specgen_operate::motion::{Binding, Motion};
+use specgen_operate::place::{AXES, Named, Pace, amount, meant};
+use specgen_operate::{Order, Place, Wanted};
+use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
+use specgen_runtime::supervisor::{Cause, Phase};
+
+use super::answer::Plain;
+use super::operator::{Ended, Operator};
+use crate::cli::table::{left, right, row};
+use crate::cli::ui::Outcome;
+
+/// The name that the user's zero always has.
+pub const ZERO: &str = "zero";
+/// Gains of each kind, in the order of the settings; those of P alone have `position_` before them.
+const GAINS: [&str; 3] = ["kp", "ki", "kv"];
+/// Modes by the word `mode`.
+const MODES: [&str; 7] = ["p", "f-invhys", "f-ewma", "f-pcc", "pf-invhys", "pf-ewma", "pf-pcc"];
+
+/// Where a platform is: µm and µrad, V.
+#[derive(Serialize)]
+pub struct Located {
+    tick: u64,
+    pose: [f64; 6],
+    target: [f64; 6],
+    error: [f64; 6],
+    voltage: [f64; 6],
+    moves: bool,
+}
+
+impl From<Place> for Located {
+    fn from(place: Place) -> Self {
+        let millionths = |values: [f64; 6]| values.map(|value| value * 1e6);
+        Self {
+            tick: place.tick,
+            pose: millionths(place.pose),
+            target: millionths(place.target),
+            error: millionths(place.error),
+            voltage: place.voltage,
+            moves: u64::from(place.phase) == Phase::Running.word() && place.status & BUSY != 0,
+        }
+    }
+}
+
+impl Outcome for Located {
+    fn text(&self) -> String {
+        let mut text = String::new();
+        let columns = [left(6), right(12), right(14), right(12), left(0).behind("  ")];
+        row(&mut text, &columns, &[&"", &"pose", &"set-point", &"error"]);
+        for (axis, name) in AXES.iter().enumerate() {
+            let cells = [self.pose[axis], self.target[axis], self.error[axis]].map(|value| format!("{value:.4}"));
+            row(&mut text, &columns, &[&format!("  {name}"), &cells[0], &cells[1], &cells[2], &unit(axis)]);
+        }
+        let volts: Vec<String> = self.voltage.iter().map(|voltage| format!("{voltage:.2}")).collect();
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "  legs 0 to 5: {} V{}", volts.join(", "), if self.moves { "; moving" } else { "" });
+        text
+    }
+}
+
+/// What each axis can still do: least and largest value, µm and µrad, the others staying where they are.
+#[derive(Serialize)]
+struct Limits {
+    from: [f64; 6],
+    limits: [[f64; 2]; 6],
+}
+
+impl Outcome for Limits {
+    fn text(&self) -> String {
+        let mut text = String::new();
+        let columns = [left(6), right(12), right(12), right(12), left(0).behind("  ")];
+        row(&mut text, &columns, &[&"", &"from", &"least", &"largest"]);
+        for (axis, name) in AXES.iter().enumerate() {
+            let cells =
+                [self.from[axis], self.limits[axis][0], self.limits[axis][1]].map(|value| format!("{value:.3}"));
+            row(&mut text, &columns, &[&format!("  {name}"), &cells[0], &cells[1], &cells[2], &unit(axis)]);
+        }
+        text
+    }
+}
+
+/// Whether it can go somewhere.
+#[derive(Serialize)]
+struct CanGo {
+    can: bool,
+    /// What keeps it from it.
+    binds: Option<String>,
+}
+
+impl Outcome for CanGo {
+    fn text(&self) -> String {
+        self.binds.as_ref().map_or_else(|| "yes\n".to_owned(), |binds| format!("no: {binds}\n"))
+    }
+}
+
+/// Gains in force, SI: by axis, proportional, integral, derivative.
+#[derive(Serialize)]
+struct GainsInForce {
+    mode: &'static str,
+    gains: [[f64; 6]; 3],
+    position_gains: [[f64; 6]; 3],
+    /// Where they were just set: λ up to which every mode of the law is stable with them, by the compiler.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    gain_ratio_limit: Option<f64>,
+}
+
+impl Outcome for GainsInForce {
+    fn text(&self) -> String {
+        let mut text = format!("mode {}\n", self.mode);
+        let columns = [left(24), right(12), right(12), right(12), right(12), right(12), right(12)];
+        row(&mut text, &columns, &[&"", &"x", &"y", &"z", &"rx", &"ry", &"rz"]);
+        for (prefix, set) in [("", &self.gains), ("position_", &self.position_gains)] {
+            for (name, values) in GAINS.iter().zip(set) {
+                let [x, y, z, rx, ry, rz] = values.map(|value| format!("{value:.4e}"));
+                row(&mut text, &columns, &[&format!("  {prefix}{name}"), &x, &y, &z, &rx, &ry, &rz]);
+            }
+        }
+        if let Some(limit) = self.gain_ratio_limit {
+            let _ = writeln!(text, "  stable up to λ = {limit:.2} in every mode");
+        }
+        text
+    }
+}
+
+fn unit(axis: usize) -> &'static str {
+    if axis < 3 { "um" } else { "urad" }
+}
+
+/// What binds, in words.
+pub fn in_words(binding: &Binding) -> String {
+    match *binding {
+        Binding::Axis { axis, at, bound } => format!(
+            "{} would be at {} from rest, outside the workspace of +-{}",
+            AXES[axis],
+            amount(axis, at),
+            amount(axis, bound)
+        ),
+        Binding::Leg { leg, at, range: [low, high] } => format!(
+            "leg {leg} would be {} from rest, beyond what it can do, {} to {}",
+            amount(0, at),
+            amount(0, low),
+            amount(0, high)
+        ),
+    }
+}
+
+impl<P: Port> Operator<P> {
+    pub(super) fn motion(&self) -> Result<&Motion, String> {
+        self.session.motion().ok_or_else(|| "the device controls six legs: it knows of no pose".to_owned())
+    }
+
+    pub(super) fn place(&mut self) -> Result<Place, Ended> {
+        let place = self.session.place()?;
+        place.ok_or_else(|| Ended::Refused("the device controls six legs: it knows of no pose".to_owned()))
+    }
+
+    pub(super) fn no_mark(&self, name: &str) -> String {
+        let known: Vec<&str> = std::iter::once(ZERO).chain(self.marks.keys().map(String::as_str)).collect();
+        format!("there is no pose `{name}`: `mark {name}` first; there are {}", known.join(", "))
+    }
+
+    pub(super) fn trajectory(&self, name: &str) -> Result<usize, String> {
+        let known = self.motion()?.trajectories();
+        known.iter().position(|known| known == name).ok_or_else(|| {
+            format!(
+                "the machine has no trajectory `{name}`; it has {}",
+                if known.is_empty() { "none".to_owned() } else { known.join(", ") }
+            )
+        })
+    }
+
+    /// Places of the settings that these gains are, and their values.
+    pub(super) fn gains_of(&self, gains: &[(String, f64)]) -> Result<Vec<(usize, f64)>, String> {
+        self.motion()?;
+        if !gains.is_empty() && self.model.is_none() {
+            return Err("gains are held against the margins of the spec before they are sent: name the spec".to_owned());
+        }
+        let names = &self.session.description().config_names;
+        let is_gain = |name: &str| {
+            let stem = name.split('[').next().unwrap_or(name);
+            GAINS.contains(&stem.strip_prefix("position_").unwrap_or(stem))
+        };
+        let mut places = Vec::new();
+        for (name, value) in gains {
+            let found = names.iter().enumerate().filter(|(_, known)| {
+                let whole = known.split('[').next() == Some(name.as_str());
+                is_gain(known) && (*known == name || whole)
+            });
+            let before = places.len();
+            places.extend(found.map(|(place, _)| (place, *value)));
+            if places.len() == before {
+                return Err(format!(
+                    "there is no gain `{name}`; there are kp, ki, kv, and position_kp, position_ki, position_kv of P alone, each of all axes or with an axis, as in ki[2]"
+                ));
+            }
+        }
+        Ok(places)
+    }
+
+    /// Carries out what is about a platform.
+    pub(super) fn of_platform(&mut self, order: &Order, line: &str, ui: &crate::cli::ui::Ui) -> Result<(), Ended> {
+        match order {
+            Order::Where => {
+                let place = Located::from(self.place()?);
+                self.note(line, &place, ui);
+            }
+            Order::Limits => {
+                let target = self.place()?.target;
+                let motion = self.motion().map_err(Ended::Refused)?;
+                let limits = core::array::from_fn(|axis| motion.limits(&target, axis).map(|value| value * 1e6));
+                self.note(line, &Limits { from: target.map(|value| value * 1e6), limits }, ui);
+            }
+            Order::CanIGo { axes, speed } => {
+                let target = self.place()?.target;
+                let binds = self.binds(&target, axes, speed).map_err(Ended::Refused)?;
+                self.note(line, &CanGo { can: binds.is_none(), binds }, ui);
+            }
+            Order::Mark(name) => {
+                let target = self.place()?.target;
+                self.marks.insert(name.clone(), target);
+                self.note(line, &Plain("done".to_owned()), ui);
+            }
+            Order::Goto(name) => {
+                let pose = if name == ZERO { Some([0.0; 6]) } else { self.marks.get(name).copied() };
+                let pose = self.go(pose.ok_or_else(|| Ended::Refused(self.no_mark(name)))?)?;
+                self.note(line, &super::answer::Moves { pose }, ui);
+            }
+            Order::Play(name) => {
+                let selector = self.trajectory(name).map_err(Ended::Refused)?;
+                let command = [("command", "trajectory".to_owned()), ("selector", selector.to_string())];
+                let command = command.map(|(name, value)| (name.to_owned(), value));
+                let words = self.session.assign(&command).map_err(Ended::Refused)?;
+                self.send(words)?;
+                self.note(line, &Plain("done".to_owned()), ui);
+            }
+            Order::Mode(wanted) => {
+                self.set_mode(*wanted)?;
+                self.show_gains(None, line, ui)?;
+            }
+            Order::Gains(gains) => {
+                let limit = if gains.is_empty() { None } else { self.set_gains(gains)? };
+                self.show_gains(limit, line, ui)?;
+            }
+            // The others know of no platform.
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// What keeps it from going there so fast; none if it can.
+    fn binds(&self, from: &[f64; 6], axes: &Named, [along, about]: &Pace) -> Result<Option<String>, String> {
+        let (motion, to) = (self.motion()?, meant(from, false, axes));
+        if let Some(binding) = motion.binding(&to) {
+            return Ok(Some(in_words(&binding)));
+        }
+        let slow = (0..6).find_map(|axis| {
+            let (asked, speed) = (if axis < 3 { along } else { about }, motion.speed()[axis]);
+            let moves = (to[axis] - from[axis]).abs() > 0.0;
+            // As many digits as the spec has them in.
+            asked.filter(|asked| moves && *asked > speed * (1.0 + 1e-9)).map(|_| (axis, speed))
+        });
+        Ok(slow.map(|(axis, speed)| {
+            format!("{} moves at {}/s at most (control.setpoint.speed)", AXES[axis], amount(axis, speed))
+        }))
+    }
+
+    fn word_of(&self, words: &[u64], name: &str) -> Option<u64> {
+        let place = self.session.description().config_names.iter().position(|known| known == name)?;
+        words.get(place).copied()
+    }
+
+    /// Six numbers of the settings.
+    fn six(&self, words: &[u64], stem: &str) -> [f64; 6] {
+        let scalar = self.session.description().scalar;
+        let number = |axis: usize| self.word_of(words, &format!("{stem}[{axis}]")).map(|word| scalar.decode(word));
+        core::array::from_fn(|axis| number(axis).unwrap_or_default())
+    }
+
+    fn show_gains(&mut self, gain_ratio_limit: Option<f64>, line: &str, ui: &crate::cli::ui::Ui) -> Result<(), Ended> {
+        let words = self.session.config()?;
+        let mode = self.word_of(&words, "mode").and_then(|mode| MODES.get(usize::try_from(mode).ok()?).copied());
+        let set = |prefix: &str| GAINS.map(|name| self.six(&words, &format!("{prefix}{name}")));
+        let (gains, position_gains) = (set(""), set("position_"));
+        self.note(line, &GainsInForce { mode: mode.unwrap_or("?"), gains, position_gains, gain_ratio_limit }, ui);
+        Ok(())
+    }
+
+    /// Every mode of the law is stable with the spec's gains, or the spec was refused.
+    fn set_mode(&mut self, wanted: Wanted) -> Result<(), Ended> {
+        let mut words = self.session.config()?;
+        let now = self.word_of(&words, "mode").unwrap_or_default();
+        let mode = wanted.word(now).map_err(Ended::Refused)?;
+        let place = self.session.description().config_names.iter().position(|name| name == "mode");
+        if let Some(slot) = place.and_then(|place| words.get_mut(place)) {
+            *slot = mode;
+        }
+        self.configure(&words)
+    }
+
+    /// Holds the gains against the margins of the spec, then sends them: λ up to which they are stable in every mode.
+    fn set_gains(&mut self, gains: &[(String, f64)]) -> Result<Option<f64>, Ended> {
+        let places = self.gains_of(gains).map_err(Ended::Refused)?;
+        let mut words = self.session.config()?;
+        let scalar = self.session.description().scalar;
+        for (place, value) in places {
+            if let Some(slot) = words.get_mut(place) {
+                *slot = scalar.encode(value);
+            }
+        }
+        let of = |prefix: &str| {
+            let [proportional, integral, derivative] = GAINS.map(|name| self.six(&words, &format!("{prefix}{name}")));
+            Gains { proportional, integral, derivative }
+        };
+        let Some(mut model) = self.model.clone() else { return Ok(None) };
+        if let Some(task) = &mut model.task_space {
+            (task.gains, task.position_gains) = (Some(of("")), Some(of("position_")));
+        }
+        let design = compile::check_stability(&model).map_err(|findings| {
+            let texts: Vec<String> = findings.iter().map(|one| format!("{}: {}", one.code, one.message)).collect();
+            Ended::Refused(format!("not sent: {}", texts.join("; ")))
+        })?;
+        self.configure(&words)?;
+        let limits = design.1.iter().flat_map(|design| &design.margins).filter_map(|mode| mode.gain_ratio_limit);
+        Ok(limits.reduce(|least, limit| if limit < least { limit } else { least }))
+    }
+
+    fn configure(&mut self, words: &[u64]) -> Result<(), Ended> {
+        self.ordered = true;
+        self.session.write_config(words).map_err(|error| match error {
+            ClientError::Refused(Refusal::Word { index }) => {
+                let names = &self.session.description().config_names;
+                let name = names.get(usize::from(index)).map_or("?", String::as_str);
+                Ended::Refused(format!("the device refuses `{name}`: out of its range there"))
+            }
+            other => other.into(),
+        })
+    }
+
+    /// What is to be done now, by phase, cause and status.
+    pub(super) fn advice(&self) -> Option<String> {
+        let status = self.session.status();
+        let phase = Phase::from_word(u64::from(status.phase))?;
+        let cause = Cause::from_word(u64::from(status.cause)).unwrap_or(Cause::None);
+        let text = match (phase, cause) {
+            (Phase::Disarmed, _) => "`arm`, then `run`".to_owned(),
+            (Phase::Arming, _) => "`run` may be asked for now".to_owned(),
+            (Phase::Holding, Cause::None) => "`run` goes on, `ramp-down` switches off".to_owned(),
+            (Phase::Holding, cause) => {
+                format!("it holds because of {}: when that is mended, `none`, then `run`", cause.name())
+            }
+            (Phase::RampingDown, _) => "`wait disarmed`, or faulted".to_owned(),
+            (Phase::Faulted, cause) => format!("mend the cause ({}), then `none`, `acknowledge`, `arm`", cause.name()),
+            (Phase::Running, _) if status.status & STALE != 0 => {
+                "the stream has stopped: send set-points, or move".to_owned()
+            }
+            (Phase::Running, _) if status.status & REFUSED != 0 => {
+                "the command is refused: `limits` says how far it can go; `set command=hold` ends it".to_owned()
+            }
+            (Phase::Running, _) => {
+                let limited = status.status & !(REFUSED | STALE | BUSY);
+                return (limited != 0).then(|| format!("look into: {}", status_words(limited).replace('+', ", ")));
+            }
+        };
+        Some(text)
+    }
+}
