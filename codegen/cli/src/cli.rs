@@ -38,6 +38,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
+use std::sync::mpsc::Receiver;
 
 use clap::error::{ContextKind, ErrorKind};
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -50,6 +51,7 @@ use specgen_language::diagnostic::{Diagnostic, Severity};
 use specgen_language::interrupt;
 use specgen_language::spec::nearest;
 use specgen_toolchain as target;
+pub use ui::Said;
 use ui::{Failure, Outcome, Ui};
 
 /// Compiles one description of a piezo-driven Stewart platform into a `no_std` Rust controller.
@@ -191,18 +193,20 @@ pub fn run() -> ExitCode {
 
 /// Performs one command as a function of this program: `arguments` are those behind `specgen`, what `--json` prints comes back,
 /// and `hear` is told of the progress. After `stop` is set, the command ends with what there is of a result, or at the next tick
-/// of a simulation or line of progress.
+/// of a simulation or line of progress. `orders` are the lines of a session that reads any: `operate` without commands.
 #[must_use]
 pub fn call(
     arguments: impl IntoIterator<Item = OsString>,
     stop: &'static AtomicBool,
-    hear: impl Fn(&str) + 'static,
+    hear: impl Fn(Said<'_>) + 'static,
+    orders: Option<Receiver<String>>,
 ) -> Value {
     interrupt::own(stop);
-    let mut ui = Ui::called(move |line| {
-        hear(line);
+    let said = move |said: Said<'_>| {
+        hear(said);
         interrupt::point();
-    });
+    };
+    let mut ui = Ui::called(said, orders);
     let done = match Cli::try_parse_from(std::iter::once("specgen".into()).chain(arguments)) {
         // What it has not shown when it unwinds is not looked at.
         Ok(cli) => catch_unwind(AssertUnwindSafe(|| perform(&cli, &mut ui))).unwrap_or_else(|cause| {

@@ -32,6 +32,7 @@ from ._commands import (
 )
 from ._controller import Controller
 from ._findings import Error, Finding, Interrupted, Refused, Unavailable, UsageError
+from ._machine import Machine
 from ._table import Table, read_table
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "Finding",
     "Identification",
     "Interrupted",
+    "Machine",
     "Prediction",
     "Refused",
     "Replayed",

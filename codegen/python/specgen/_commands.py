@@ -56,8 +56,16 @@ def command(*arguments: str | PathLike[str], progress: Progress = False) -> Resu
     Raises `Refused`, `UsageError`, `Unavailable`, `Interrupted` (with what was found so far) or KeyboardInterrupt. A figure beyond
     its limit raises nothing: `Result.passed` is then False.
     """
-    hear: Callable[[str], object] | None = progress if callable(progress) else _print if progress else None
-    document = json.loads(_native.call([fspath(argument) for argument in arguments], hear))
+    return result_of(json.loads(_native.call([fspath(argument) for argument in arguments], listener(progress))))
+
+
+def listener(progress: Progress) -> Callable[[str], object] | None:
+    """What takes lines of progress."""
+    return progress if callable(progress) else _print if progress else None
+
+
+def result_of(document: dict[str, Any]) -> Result:
+    """The result of a command's document, or why there is none is raised."""
     findings, error, data = findings_of(document), document["error"], document["result"]
     match document["exit_code"], data:
         case 0, _:

@@ -7,7 +7,7 @@ mod controller;
 use pyo3::exceptions::PyException;
 use pyo3::{create_exception, pymodule};
 
-create_exception!(_native, Error, PyException, "What specgen refuses or cannot do.");
+create_exception!(specgen, Error, PyException, "What specgen refuses or cannot do.");
 
 /// `specgen._native`.
 #[pymodule]
@@ -15,7 +15,7 @@ mod _native {
     #[pymodule_export]
     use super::Error;
     #[pymodule_export]
-    use super::call::call;
+    use super::call::{Session, call};
     #[pymodule_export]
     use super::controller::Library;
 }

@@ -172,40 +172,53 @@ fn list(orders: &[Order], operator: &mut Operator<impl Port>, ui: &mut Ui) -> Re
     operator.look()
 }
 
-/// Lines from standard input, the machine looked at meanwhile. What is wrong with a line ends nothing.
+/// Lines from standard input or the program that called, the machine looked at meanwhile. What is wrong with a line ends nothing.
 fn lines(operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
     operator.attended = true;
-    let lines = reader();
+    let lines = match ui.orders() {
+        Some(lines) => {
+            line("status", operator, ui)?;
+            lines
+        }
+        None => reader(),
+    };
     if std::io::stdin().is_terminal() {
         ui.progress(&format!("{}; commands, one a line; end with Ctrl-D", operator.stands()));
     }
     loop {
-        let line = match lines.recv_timeout(ALIVE) {
-            Ok(line) => line,
+        match lines.recv_timeout(ALIVE) {
+            Ok(text) => line(&text, operator, ui)?,
             Err(RecvTimeoutError::Timeout) => {
                 operator.look()?;
                 operator.show(ui);
-                continue;
             }
             Err(RecvTimeoutError::Disconnected) => return operator.look(),
-        };
-        let done = match Order::parse(&line) {
-            Ok(None) => Ok(()),
-            Ok(Some(order)) => operator.obey(&order, ui),
-            Err(text) => Err(Ended::Refused(text)),
-        };
-        let text = match done {
-            Ok(()) => continue,
-            Err(Ended::Refused(text) | Ended::Fault(text)) => text,
-            Err(Ended::Failed(Failure::Environment(text) | Failure::Gate(text) | Failure::Usage(text))) => text,
-            Err(Ended::Failed(Failure::Refused(refused))) => {
-                ui.findings(refused.source.as_ref(), &refused.findings);
-                "the spec is refused".to_owned()
-            }
-            Err(other) => return Err(other),
-        };
-        operator.note(&line, &Mistake { error: text }, ui);
+        }
     }
+}
+
+/// Carries one line out, and answers it.
+fn line(line: &str, operator: &mut Operator<impl Port>, ui: &mut Ui) -> Result<(), Ended> {
+    let done = match Order::parse(line) {
+        Ok(None) => Ok(()),
+        Ok(Some(order)) => operator.obey(&order, ui),
+        Err(text) => Err(Ended::Refused(text)),
+    };
+    let mistake = match done {
+        Ok(()) => None,
+        Err(Ended::Refused(text) | Ended::Fault(text)) => Some(text),
+        Err(Ended::Failed(Failure::Environment(text) | Failure::Gate(text) | Failure::Usage(text))) => Some(text),
+        Err(Ended::Failed(Failure::Refused(refused))) => {
+            ui.findings(refused.source.as_ref(), &refused.findings);
+            Some("the spec is refused".to_owned())
+        }
+        Err(other) => return Err(other),
+    };
+    if let Some(error) = mistake {
+        operator.note(line, &Mistake { error }, ui);
+    }
+    ui.answered(&mut operator.answers);
+    Ok(())
 }
 
 /// A thread that waits for lines, so that the link does not.

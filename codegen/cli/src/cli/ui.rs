@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::io::{self, IsTerminal, Write};
 use std::path::PathBuf;
-use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -99,10 +99,20 @@ pub struct Ui {
     called: Option<Called>,
 }
 
+/// What a command says on its way to a program that called it.
+#[derive(Debug)]
+pub enum Said<'a> {
+    /// A line about what is being done.
+    Progress(&'a str),
+    /// Answers to a line of orders: an array of objects with `command` and `answer`.
+    Answers(Value),
+}
+
 /// Where a command's words go when another program called it.
 struct Called {
-    /// Takes lines of progress.
-    hear: Box<dyn Fn(&str)>,
+    hear: Box<dyn Fn(Said<'_>)>,
+    /// Lines of a session, in place of standard input.
+    orders: Option<Receiver<String>>,
     /// What would be printed.
     document: RefCell<Value>,
 }
@@ -121,8 +131,22 @@ impl Ui {
     }
 
     /// One document, which is kept for [`Ui::taken`]; `hear` is told of the progress. Nothing is printed.
-    pub fn called(hear: impl Fn(&str) + 'static) -> Self {
-        Self { called: Some(Called { hear: Box::new(hear), document: RefCell::new(Value::Null) }), ..Self::new(true) }
+    pub fn called(hear: impl Fn(Said<'_>) + 'static, orders: Option<Receiver<String>>) -> Self {
+        let document = RefCell::new(Value::Null);
+        Self { called: Some(Called { hear: Box::new(hear), orders, document }), ..Self::new(true) }
+    }
+
+    /// Where the lines of a session come from, if a program gives them.
+    pub fn orders(&mut self) -> Option<Receiver<String>> {
+        self.called.as_mut()?.orders.take()
+    }
+
+    /// Hands the answers to a line of orders to the program that gave it; without one they are kept for the document.
+    pub fn answered(&self, answers: &mut Vec<impl Serialize>) {
+        if let Some(called) = &self.called {
+            (called.hear)(Said::Answers(json!(answers)));
+            answers.clear();
+        }
     }
 
     /// The document of a command that another program called.
@@ -133,7 +157,7 @@ impl Ui {
     /// A line about what is being done, for the eyes only.
     pub fn progress(&self, line: &str) {
         if let Some(called) = &self.called {
-            (called.hear)(line);
+            (called.hear)(Said::Progress(line));
         } else if !self.json {
             say!("{line}\n");
         }
@@ -222,7 +246,7 @@ impl Ui {
     /// Shows how far something is, in place of the line before where the eyes are at a terminal.
     pub fn rate(&self, line: &str) {
         if let Some(called) = &self.called {
-            (called.hear)(line);
+            (called.hear)(Said::Progress(line));
         } else if !self.json {
             if io::stderr().is_terminal() {
                 say!("\r\x1b[2K{line}");

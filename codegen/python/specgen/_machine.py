@@ -1,0 +1,167 @@
+"""A machine that is operated over the link."""
+
+from __future__ import annotations
+
+import json
+from os import PathLike, fspath
+from types import TracebackType
+from typing import Any, Self
+
+from ._commands import Progress, Result, StrPath, listener, result_of
+from ._findings import Error
+from ._native import Session
+
+
+class Machine:
+    """A board at a serial port, or a program that serves the link at a Unix socket: the words of ``specgen operate``.
+
+    >>> with specgen.Machine(socket="link", spec="platform.toml") as machine:
+    ...     machine.arm()
+    ...     machine.wait("arming")
+    ...     machine.run()
+    ...     machine.wait("running")
+    ...     machine.wait("arrived")
+    ...     machine.move(x=0, y=0, z=5e-6, rx=0, ry=0, rz=0)
+    ...     machine.wait("arrived")
+
+    The session stays alive between two orders, in a thread of its own. The machine holds, then ramps down, when it ends
+    (``supervisor.host_lost``); Ctrl-C while an order is under way, and an exception in a ``with`` block, ramp it down first.
+
+    An order that is refused, and a fault while one waits, raise `Error`; the session goes on.
+    """
+
+    def __init__(
+        self,
+        *,
+        socket: StrPath | None = None,
+        port: StrPath | None = None,
+        baud: int | None = None,
+        spec: StrPath | None = None,
+        progress: Progress = False,
+    ) -> None:
+        """With a ``spec`` a machine with another controller is refused."""
+        arguments = ["operate"]
+        given = {"--socket": socket, "--port": port, "--baud": baud}
+        for option, value in given.items():
+            if value is not None:
+                arguments.append(f"{option}={fspath(value) if isinstance(value, PathLike) else value}")
+        if spec is not None:
+            arguments.append(fspath(spec))
+        self._session: Session | None = Session(arguments, listener(progress))
+        self._answers(None)
+
+    def order(self, line: str) -> Any:
+        """Gives an order as ``specgen operate`` takes it, such as ``"wait running 5"``, and returns its answer."""
+        return self._answers(line)
+
+    def _answers(self, line: str | None) -> Any:
+        if self._session is None:
+            raise Error("the session has ended")
+        goes_on, text = self._session.answers(line)
+        if not goes_on:
+            self._session = None
+            # Why it ended: `result_of` raises it.
+            return result_of(json.loads(text)).data
+        answers = json.loads(text)
+        answer = answers[-1]["answer"] if answers else None
+        if isinstance(answer, dict) and "error" in answer:
+            raise Error(answer["error"])
+        return answer
+
+    def status(self) -> dict[str, Any]:
+        """Tick, phase (``stands``), status, late ticks, health."""
+        status: dict[str, Any] = self.order("status")
+        return status
+
+    def arm(self) -> None:
+        """Switches the amplifiers on; from then on the machine may `run`."""
+        self.order("arm")
+
+    def run(self) -> None:
+        """Goes to the bias pose, or goes on after a hold."""
+        self.order("run")
+
+    def hold(self) -> None:
+        """Keeps the set-point."""
+        self.order("hold")
+
+    def ramp_down(self) -> None:
+        """Leads the voltages to rest, and switches the amplifiers off."""
+        self.order("ramp-down")
+
+    def acknowledge(self) -> None:
+        """Acknowledges a fault."""
+        self.order("acknowledge")
+
+    def wait(self, until: str | float, limit: float | None = None) -> None:
+        """Until a phase such as ``"running"``, until it has ``"arrived"``, or some seconds; at most ``limit`` seconds."""
+        self.order(f"wait {until}" if limit is None else f"wait {until} {limit}")
+
+    def move(self, **axes: float | str) -> list[float]:
+        """Moves to a pose, and returns it, m and rad: ``x``, ``y``, ``z``, ``rx``, ``ry``, ``rz``, as numbers or with a unit,
+        ``z="5um"``. Axes that are not given stay; the first move of a session gives all six."""
+        return self._go("move", axes)
+
+    def jog(self, **axes: float | str) -> list[float]:
+        """Moves by so much."""
+        return self._go("jog", axes)
+
+    def _go(self, order: str, axes: dict[str, float | str]) -> list[float]:
+        def value(axis: str, given: float | str) -> str:
+            if isinstance(given, str):
+                return given.replace(" ", "")
+            return f"{float(given)!r}{'m' if axis in ('x', 'y', 'z') else 'rad'}"
+
+        words = [f"{axis}={value(axis, given)}" for axis, given in axes.items()]
+        answer = self.order(" ".join([order, *words]))
+        return [float(part) for part in answer["pose"]]
+
+    def set(self, **words: float) -> None:
+        """Sets input words: ``machine.set(**{"setpoint[2]": 1e-6, "command": 2})``."""
+        self.order("set " + " ".join(f"{name}={value!r}" for name, value in words.items()))
+
+    def settings(self) -> dict[str, float]:
+        """Settings in force."""
+        settings: dict[str, float] = self.order("config")
+        return settings
+
+    def write_settings(self, spec: StrPath) -> None:
+        """Takes the settings of a spec; its tables stay in the spec."""
+        self.order(f"config write {fspath(spec)}")
+
+    def wave(self, file: StrPath | None) -> None:
+        """Starts the wave of a file; None ends the one under way."""
+        self.order("wave stop" if file is None else f"wave {fspath(file)}")
+
+    def record(self, after: int | None = None) -> dict[str, Any]:
+        """Starts the recorder, which keeps ``after`` ticks after its trigger."""
+        recorder: dict[str, Any] = self.order("record arm" if after is None else f"record arm {after}")
+        return recorder
+
+    def trigger(self) -> dict[str, Any]:
+        """Triggers the recorder."""
+        recorder: dict[str, Any] = self.order("record trigger")
+        return recorder
+
+    def download(self, file: StrPath) -> None:
+        """Writes the recording to a file, for `replay`."""
+        self.order(f"record download {fspath(file)}")
+
+    def close(self, *, ramp_down: bool = False) -> Result | None:
+        """Ends the session; with ``ramp_down`` only when the amplifiers are off. How the machine stood, or None if it had ended."""
+        session, self._session = self._session, None
+        document = session.close(ramp_down) if session is not None else None
+        if document is None:
+            return None
+        decoded = json.loads(document)
+        if ramp_down and decoded["exit_code"] == 130 and decoded["result"] is not None:
+            return Result(decoded["result"], [], None)
+        return result_of(decoded)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close(ramp_down=error is not None)

@@ -1,0 +1,104 @@
+"""A machine over a socket: the emitted program for a PC, on the simulated machine of its spec."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from conftest import LEGS, REFERENCE
+
+import specgen
+
+
+@pytest.fixture(scope="session")
+def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The program that `specgen build --target rt-pc` writes."""
+    folder = tmp_path_factory.mktemp("rt-pc") / "controller"
+    specgen.command("build", REFERENCE, "--target", "rt-pc", "-o", folder)
+    return next(folder.glob("target/rt-pc/release/rt-pc"))
+
+
+@pytest.fixture
+def link(program: Path, tmp_path: Path) -> Iterator[Path]:
+    """The socket of a machine."""
+    name, socket = f"python-{uuid.uuid4().hex[:12]}", tmp_path / "link"
+    plant = subprocess.Popen([os.environ["SPECGEN_COMMAND"], "plant", REFERENCE, "--name", name], stderr=subprocess.DEVNULL)
+    place = Path("/dev/shm") / f"specgen-plant-{name}"
+    controller = None
+    try:
+        waited(place)
+        line = [program, "--sim", name, "--allow-no-rt", "--elastic", "--sim-timeout", "5000", "--link-silence", "1000"]
+        controller = subprocess.Popen([*line, "--link", socket], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        waited(socket)
+        yield socket
+    finally:
+        for process in (controller, plant):
+            if process is not None:
+                process.terminate()
+                process.wait()
+        place.unlink(missing_ok=True)
+
+
+def waited(path: Path) -> None:
+    begun = time.monotonic()
+    while not path.exists():
+        assert time.monotonic() < begun + 30, f"{path} does not come"
+        time.sleep(0.05)
+
+
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("cargo") is None, reason="a program of Linux, which cargo builds")
+def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
+    with pytest.raises(specgen.Error, match="digest"):
+        specgen.Machine(socket=link, spec=LEGS)
+    with specgen.Machine(socket=link, spec=REFERENCE) as machine:
+        assert machine.status()["stands"] == "disarmed"
+        with pytest.raises(specgen.Error, match="moves when it runs"):
+            machine.move(z=1e-6)
+        with pytest.raises(specgen.Error, match="none of"):
+            machine.order("dance")
+        machine.record()
+        machine.arm()
+        machine.wait("arming", 60)
+        machine.run()
+        machine.wait("running", 60)
+        machine.wait("arrived", 60)
+        machine.move(x=0, y=0, z=5e-6, rx=0, ry=0, rz=0)
+        machine.wait("arrived", 60)
+        # The session stays alive while nothing is asked.
+        time.sleep(2)
+        assert machine.status()["stands"] == "running"
+        assert machine.jog(z="1 um", rx=1e-6)[2] == pytest.approx(6e-6)
+        machine.wait("arrived", 60)
+        with pytest.raises(specgen.Error, match="outside the workspace"):
+            machine.move(z=1e-3)
+        assert machine.settings() == specgen.compile(REFERENCE).controller().settings
+        machine.ramp_down()
+        machine.wait("disarmed", 60)
+        machine.order("record stop")
+        machine.download(tmp_path / "run.rec")
+    assert machine.close() is None
+    with pytest.raises(specgen.Error, match="ended"):
+        machine.status()
+    again = specgen.replay(tmp_path / "run.rec", REFERENCE)
+    assert again.passed and again["ticks"] > 100
+    # An exception brings it down.
+    with pytest.raises(LookupError), specgen.Machine(socket=link) as machine:
+        machine.arm()
+        machine.wait("arming", 60)
+        assert machine.status()["amplifiers_on"]
+        raise LookupError
+    with specgen.Machine(socket=link) as machine:
+        status = machine.status()
+        assert status["stands"] == "disarmed" and not status["amplifiers_on"]
+
+
+def test_what_is_not_there_is_said(tmp_path: Path) -> None:
+    with pytest.raises(specgen.Unavailable, match="none"):
+        specgen.Machine(socket=tmp_path / "none")
+    with pytest.raises(specgen.UsageError):
+        specgen.Machine()
