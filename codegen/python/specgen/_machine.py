@@ -64,7 +64,7 @@ class Machine:
             return result_of(json.loads(text)).data
         answers = json.loads(text)
         answer = answers[-1]["answer"] if answers else None
-        if isinstance(answer, dict) and "error" in answer:
+        if isinstance(answer, dict) and answer.keys() == {"error"}:
             raise Error(answer["error"])
         return answer
 
@@ -107,14 +107,39 @@ class Machine:
         return self._go("jog", axes)
 
     def _go(self, order: str, axes: dict[str, float | str]) -> list[float]:
-        def value(axis: str, given: float | str) -> str:
-            if isinstance(given, str):
-                return given.replace(" ", "")
-            return f"{float(given)!r}{'m' if axis in ('x', 'y', 'z') else 'rad'}"
-
-        words = [f"{axis}={value(axis, given)}" for axis, given in axes.items()]
-        answer = self.order(" ".join([order, *words]))
+        answer = self.order(" ".join([order, *_quantities(axes)]))
         return [float(part) for part in answer["pose"]]
+
+    def can_go(self, **axes: float | str) -> str | None:
+        """None if it can go there, or what binds; nothing moves."""
+        binds: str | None = self.order(" ".join(["can-i-go", *_quantities(axes)]))["binds"]
+        return binds
+
+    def where(self) -> dict[str, Any]:
+        """Pose by the gauges, set-point and error, um and urad; voltage of each leg, V."""
+        where: dict[str, Any] = self.order("where")
+        return where
+
+    def limits(self) -> list[list[float]]:
+        """Least and largest value of each axis from here, the others staying, um and urad."""
+        limits: list[list[float]] = self.order("limits")["limits"]
+        return limits
+
+    def mark(self, name: str) -> None:
+        """Gives the set-point a name for this session."""
+        self.order(f"mark {name}")
+
+    def goto(self, name: str) -> None:
+        """Goes to a mark, or to ``"zero"``."""
+        self.order(f"goto {name}")
+
+    def play(self, trajectory: str) -> None:
+        """Plays a trajectory of the spec."""
+        self.order(f"play {trajectory}")
+
+    def mode(self, mode: str) -> None:
+        """Terms of the law, such as ``"pf-pcc"``."""
+        self.order(f"mode {mode}")
 
     def set(self, **words: float) -> None:
         """Sets input words: ``machine.set(**{"setpoint[2]": 1e-6, "command": 2})``."""
@@ -165,3 +190,14 @@ class Machine:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close(ramp_down=error is not None)
+
+
+def _quantities(axes: dict[str, float | str]) -> list[str]:
+    """Words of an order: numbers get the unit of their axis."""
+
+    def value(axis: str, given: float | str) -> str:
+        if isinstance(given, str):
+            return given.replace(" ", "")
+        return f"{float(given)!r}{'m' if axis in ('x', 'y', 'z') else 'rad'}"
+
+    return [f"{axis}={value(axis, given)}" for axis, given in axes.items()]

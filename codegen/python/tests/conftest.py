@@ -13,11 +13,13 @@ import specgen
 REPOSITORY = Path(__file__).parents[3]
 REFERENCE = REPOSITORY / "specs/reference.toml"
 LEGS = REPOSITORY / "specs/legs.toml"
+# `cargo xtask wheel` says where it is.
+COMMAND = os.environ.get("SPECGEN_COMMAND", str(REPOSITORY / "target/release/specgen"))
 
 
 def command(*arguments: object) -> Any:
-    """The document of the command, run as its users run it; `cargo xtask wheel` says where it is."""
-    line = [os.environ["SPECGEN_COMMAND"], *map(str, arguments), "--json"]
+    """The document of the command, run as its users run it."""
+    line = [COMMAND, *map(str, arguments), "--json"]
     return json.loads(subprocess.run(line, stdout=subprocess.PIPE, check=False).stdout)
 
 

@@ -1,6 +1,5 @@
 """A machine over a socket: the emitted program for a PC, on the simulated machine of its spec."""
 
-import os
 import shutil
 import subprocess
 import sys
@@ -10,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from conftest import LEGS, REFERENCE
+from conftest import COMMAND, LEGS, REFERENCE
 
 import specgen
 
@@ -27,13 +26,13 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def link(program: Path, tmp_path: Path) -> Iterator[Path]:
     """The socket of a machine."""
     name, socket = f"python-{uuid.uuid4().hex[:12]}", tmp_path / "link"
-    plant = subprocess.Popen([os.environ["SPECGEN_COMMAND"], "plant", REFERENCE, "--name", name], stderr=subprocess.DEVNULL)
+    plant = subprocess.Popen([COMMAND, "plant", REFERENCE, "--name", name], stderr=subprocess.DEVNULL)
     place = Path("/dev/shm") / f"specgen-plant-{name}"
     controller = None
     try:
         waited(place)
-        line = [program, "--sim", name, "--allow-no-rt", "--elastic", "--sim-timeout", "5000", "--link-silence", "1000"]
-        controller = subprocess.Popen([*line, "--link", socket], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        line = [str(program), "--sim", name, "--allow-no-rt", "--elastic", "--sim-timeout", "5000", "--link-silence", "1000"]
+        controller = subprocess.Popen([*line, "--link", str(socket)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
         waited(socket)
         yield socket
     finally:
@@ -74,8 +73,17 @@ def test_a_machine_is_operated(link: Path, tmp_path: Path) -> None:
         assert machine.status()["stands"] == "running"
         assert machine.jog(z="1 um", rx=1e-6)[2] == pytest.approx(6e-6)
         machine.wait("arrived", 60)
-        with pytest.raises(specgen.Error, match="outside the workspace"):
+        with pytest.raises(specgen.Error, match="nothing moves"):
             machine.move(z=1e-3)
+        assert machine.where()["target"][2] == pytest.approx(6.0)
+        assert machine.can_go(z=1e-6) is None and "leg" in (machine.can_go(z="1 mm") or "")
+        assert machine.limits()[2][1] > 6.0
+        machine.mark("here")
+        machine.jog(y=-2e-6)
+        machine.wait("arrived", 60)
+        machine.goto("here")
+        machine.wait("arrived", 60)
+        assert machine.where()["target"][1] == pytest.approx(0.0)
         assert machine.settings() == specgen.compile(REFERENCE).controller().settings
         machine.ramp_down()
         machine.wait("disarmed", 60)
