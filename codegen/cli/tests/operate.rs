@@ -208,6 +208,13 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
         "can-i-go z=5um rx=1urad speed=1mrad/s",
         "can-i-go z=43um",
         "can-i-go z=-11um",
+        "frame tool z=-10mm",
+        "move ry=50urad",
+        "wait arrived 20",
+        "where",
+        "frame work rz=5deg x=1um",
+        "frame none",
+        "where",
         "goto here",
         "wait arrived 20",
         "where",
@@ -248,6 +255,9 @@ fn moves_in_words_are_taken_or_refused_and_no_axis_is_guessed() {
     ] {
         assert!(run.stdout.contains(text), "{text:?}: {}", run.stdout);
     }
+    // Turned about a point 10 mm below by 50 urad about y, that point stays, and what is controlled moves by half a micrometre.
+    let frame = "rz 87266.463 urad; tool point at x 0.000 um, y 0.000 um, z -10000.000 um";
+    assert!(run.stdout.contains("        0.5000     ") && run.stdout.contains(frame), "{}", run.stdout);
     // The platform's own target, as the controller computed it.
     let replayed = folder.run(&["replay", "run.rec", "--spec", "reference.toml", "--csv", "run.csv"]);
     assert_eq!(replayed.code, 0, "{replayed:?}");

@@ -6,6 +6,7 @@
 //! ```
 
 pub mod doctor;
+pub mod frame;
 pub mod gcs;
 pub mod motion;
 mod order;
@@ -16,7 +17,7 @@ mod session;
 mod socket;
 mod wave;
 
-pub use order::{Order, Until, Wanted};
+pub use order::{Framed, Order, Until, Wanted};
 pub use session::{ALIVE, Place, Session};
 pub use socket::SocketLine;
 pub use wave::{read_wave, refused_wave};

@@ -135,40 +135,17 @@ impl Motion {
     /// The user's coordinates of a pose of the platform, m and rad.
     #[must_use]
     pub fn user(&self, pose: &[f64; 6]) -> Option<[f64; 6]> {
-        let mut user = [0.0; 6];
-        for _ in 0..PASSES {
-            let found = self.platform(&user)?;
-            let mut left = [0.0; 6];
-            for ((left, wanted), found) in left.iter_mut().zip(pose).zip(found) {
-                *left = wanted - found;
-            }
-            if left == [0.0; 6] {
-                break;
-            }
-            for (value, step) in user.iter_mut().zip(self.turned_back(&left)) {
-                *value += step;
-            }
-        }
-        Some(user)
-    }
-
-    /// A small step of the platform along the user's axes.
-    fn turned_back(&self, step: &[f64; 6]) -> [f64; 6] {
-        let Coordinates::Work(Work { axes, .. }) = &self.frames else { return *step };
-        let along = |axis: usize, of: usize| (0..3).map(|row| axes[row][axis] * step[of + row]).sum();
-        core::array::from_fn(|axis| if axis < 3 { along(axis, 0) } else { along(axis - 3, 3) })
+        let axes = match &self.frames {
+            Coordinates::Work(Work { axes, .. }) => Some(axes),
+            Coordinates::Parallel | Coordinates::Tool(_) => None,
+        };
+        inverse(|user| self.platform(user), axes, pose)
     }
 
     /// How far each leg is from rest at a pose of the platform, m.
     fn displacements(&self, pose: &[f64; 6]) -> [f64; 6] {
         let [x, y, z, tilt_x, tilt_y, tilt_z] = *pose;
-        let [(sx, cx), (sy, cy), (sz, cz)] = [tilt_x, tilt_y, tilt_z].map(|angle| (libm::sin(angle), libm::cos(angle)));
-        // R = Rz Ry Rx (AI.1).
-        let turn = [
-            [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
-            [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
-            [-sy, cy * sx, cy * cx],
-        ];
+        let turn = rotation([tilt_x, tilt_y, tilt_z]);
         self.legs.map(|Leg { rest, joint }| {
             let [[now_x, old_x], [now_y, old_y], [now_z, old_z]] = core::array::from_fn(|row| {
                 let turned: f64 = (0..3).map(|column| turn[row][column] * joint[column]).sum();
@@ -204,19 +181,44 @@ impl Motion {
         };
         axes.chain(legs).filter(|(excess, _)| *excess > 1.0).fold(None, worst).map(|(_, binding)| binding)
     }
+}
 
-    /// How far it is from `user` along `way` to the end of the workspace, as a multiple of `way`, not below 0.
-    #[must_use]
-    pub fn reach(&self, user: &[f64; 6], way: &[f64; 6]) -> f64 {
-        reach(|pose| self.admits(pose), user, way)
-    }
+/// The least and the largest value of one axis that `admits` says yes to, the others as in `pose`.
+#[must_use]
+pub fn limits(admits: impl Fn(&[f64; 6]) -> bool, pose: &[f64; 6], axis: usize) -> [f64; 2] {
+    let way = |sign: f64| core::array::from_fn(|other| if other == axis { sign } else { 0.0 });
+    [pose[axis] - reach(&admits, pose, &way(-1.0)), pose[axis] + reach(&admits, pose, &way(1.0))]
+}
 
-    /// The least and the largest value of one of the user's axes, the others as in `user`.
-    #[must_use]
-    pub fn limits(&self, user: &[f64; 6], axis: usize) -> [f64; 2] {
-        let way = |sign: f64| core::array::from_fn(|other| if other == axis { sign } else { 0.0 });
-        [user[axis] - self.reach(user, &way(-1.0)), user[axis] + self.reach(user, &way(1.0))]
+/// R = Rz Ry Rx (AI.1) of three angles, rad.
+pub(crate) fn rotation(angles: [f64; 3]) -> [[f64; 3]; 3] {
+    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(|angle| (libm::sin(angle), libm::cos(angle)));
+    [
+        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+        [-sy, cy * sx, cy * cx],
+    ]
+}
+
+/// The pose that `forward` leads to `wanted`, where its columns are nearly those of `axes` (of the identity without them).
+pub(crate) fn inverse(
+    forward: impl Fn(&[f64; 6]) -> Option<[f64; 6]>,
+    axes: Option<&[[f64; 3]; 3]>,
+    wanted: &[f64; 6],
+) -> Option<[f64; 6]> {
+    let mut pose = [0.0; 6];
+    for _ in 0..PASSES {
+        let found = forward(&pose)?;
+        let left: [f64; 6] = core::array::from_fn(|axis| wanted[axis] - found[axis]);
+        if left == [0.0; 6] {
+            break;
+        }
+        for (axis, value) in pose.iter_mut().enumerate() {
+            let (column, first) = (axis % 3, axis - axis % 3);
+            *value += axes.map_or(left[axis], |axes| (0..3).map(|row| axes[row][column] * left[first + row]).sum());
+        }
     }
+    Some(pose)
 }
 
 /// How far it is from `start` along `way` until `admits` says no, as a multiple of `way`, not below 0.
@@ -276,8 +278,8 @@ mod tests {
             assert!(found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-13), "{found:?}");
         };
         // Upwards the workspace ends, downwards the strokes do, a hundredth before their end.
-        close(motion.limits(&[0.0; 6], 2), [-9.3e-6, 4.2e-5]);
-        close(motion.limits(&[4e-5, 0.0, 0.0, 0.0, 0.0, 0.0], 0), [-5e-5, 5e-5]);
+        close(limits(|pose| motion.admits(pose), &[0.0; 6], 2), [-9.3e-6, 4.2e-5]);
+        close(limits(|pose| motion.admits(pose), &[4e-5, 0.0, 0.0, 0.0, 0.0, 0.0], 0), [-5e-5, 5e-5]);
         assert!(motion.admits(&[0.0, 0.0, 4.199e-5, 0.0, 0.0, 0.0]) && !motion.admits(&[f64::NAN; 6]));
         assert_eq!(motion.binding(&[0.0; 6]), None);
         let Some(Binding::Axis { axis: 2, at, bound }) = motion.binding(&[6e-5, 0.0, 9e-5, 0.0, 0.0, 0.0]) else {
@@ -291,9 +293,9 @@ mod tests {
         assert!((at + 1e-5).abs() < 1e-8 && (range[0] - 7e-7).abs() < 1e-18, "{at} {range:?}");
         // Without room at the user's zero none is asked for.
         let bare = Motion::parse(&described(0.0, "")).unwrap().unwrap();
-        close(bare.limits(&[0.0; 6], 2), [0.0, 5.2e-5]);
+        close(limits(|pose| bare.admits(pose), &[0.0; 6], 2), [0.0, 5.2e-5]);
         // From outside there is no way.
-        assert_eq!(motion.reach(&[1.0; 6], &[-1.0; 6]).to_bits(), 0);
+        assert_eq!(reach(|pose| motion.admits(pose), &[1.0; 6], &[-1.0; 6]).to_bits(), 0);
     }
 
     #[test]

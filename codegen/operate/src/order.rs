@@ -15,7 +15,7 @@ const LONGEST: f64 = 86_400.0;
 /// Rows after a trigger, if nothing else is said.
 const AFTER: u32 = 1000;
 const COMMANDS: &str = "status, arm, run, hold, ramp-down, acknowledge, none, set NAME=VALUE…, \
-                        move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], mark NAME, goto NAME, \
+                        move|jog AXIS=QUANTITY…, where, limits, can-i-go AXIS=QUANTITY… [speed=QUANTITY], frame [none | work|tool AXIS=QUANTITY…], mark NAME, goto NAME, \
                         play TRAJECTORY, mode p|f|pf, gains [NAME=VALUE…], wait PHASE|arrived|SECONDS [TIMEOUT], config, \
                         config write SPEC, record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop, stop";
 
@@ -46,6 +46,8 @@ pub enum Order {
         /// At this speed at least, m/s, and rad/s.
         speed: Pace,
     },
+    /// Show the frame that poses are said in, or say them in another: work frame, tool point. Of an axis that is not named: zero.
+    Frame(Option<Framed>),
     /// Give the set-point of now a name.
     Mark(String),
     /// Go to a pose that has a name.
@@ -77,6 +79,17 @@ pub enum Order {
     StopWave,
     /// Ramp down and end the program that serves the link.
     Stop,
+}
+
+/// Frames of a session.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Framed {
+    /// Those of the controller.
+    None,
+    /// This work frame, m and rad.
+    Work([f64; 6]),
+    /// This tool point, m.
+    Tool([f64; 3]),
 }
 
 /// A mode as it is asked for.
@@ -163,6 +176,17 @@ impl Order {
                 let (speeds, axes): (Vec<&str>, Vec<&str>) = rest.iter().partition(|word| word.starts_with("speed="));
                 Self::CanIGo { axes: named(&axes)?, speed: pace(&speeds)? }
             }
+            ["frame"] => Self::Frame(None),
+            ["frame", "none"] => Self::Frame(Some(Framed::None)),
+            ["frame", "work", ref rest @ ..] if !rest.is_empty() => {
+                Self::Frame(Some(Framed::Work(named(rest)?.map(Option::unwrap_or_default))))
+            }
+            ["frame", "tool", ref rest @ ..] if !rest.is_empty() => match named(rest)? {
+                [x, y, z, None, None, None] => {
+                    Self::Frame(Some(Framed::Tool([x, y, z].map(Option::unwrap_or_default))))
+                }
+                _ => return Err(format!("`{line}`: a tool point has x, y and z")),
+            },
             ["mark", name] => Self::Mark(name.to_owned()),
             ["goto", name] => Self::Goto(name.to_owned()),
             ["play", name] => Self::Play(name.to_owned()),
@@ -244,6 +268,7 @@ mod tests {
             ("where", Some(Order::Where)),
             ("gains", Some(Order::Gains(Vec::new()))),
             ("gains ki[2]=1e9", Some(Order::Gains(vec![("ki[2]".into(), 1e9)]))),
+            ("frame tool z=40mm", Some(Order::Frame(Some(Framed::Tool([0.0, 0.0, 0.04]))))),
             ("goto zero", Some(Order::Goto("zero".into()))),
             ("mode pf-ewma", Some(Order::Mode(Wanted { terms: [true, true], law: Some(1) }))),
             (
@@ -274,6 +299,7 @@ mod tests {
             ("wait nan", "expected a phase (disarmed, arming, running"),
             ("wait -1", "found `-1`"),
             ("wait running soon", "found `soon`"),
+            ("frame tool rx=1urad", "a tool point has x, y and z"),
             ("mode p-pcc", "expected p, f or pf"),
             ("mode fast", "expected p, f or pf"),
             ("gains ki=-1", "expected a gain such as"),

@@ -34,8 +34,6 @@ pub struct Place {
     pub pose: [f64; 6],
     /// Set-point, in the user's coordinates: where the platform is to be now, not where a motion ends.
     pub target: [f64; 6],
-    /// Set-point less pose, in the platform's axes.
-    pub error: [f64; 6],
     /// Voltage of each leg, V.
     pub voltage: [f64; 6],
 }
@@ -159,10 +157,9 @@ impl<P: Port> Session<P> {
             *number = self.description.scalar.decode(word);
         }
         let six = |first: usize| -> [f64; POSE] { core::array::from_fn(|axis| numbers[first + axis]) };
-        let (measured, wanted, target) = (six(0), six(POSE), six(2 * POSE));
-        let error = core::array::from_fn(|axis| wanted[axis] - measured[axis]);
+        let (measured, target) = (six(0), six(2 * POSE));
         let pose = motion.user(&measured).unwrap_or(measured);
-        Ok(Some(Place { tick, phase, status, pose, target, error, voltage: six(3 * POSE) }))
+        Ok(Some(Place { tick, phase, status, pose, target, voltage: six(3 * POSE) }))
     }
 
     /// What the device noticed of itself; its events are forgotten with that.

@@ -141,7 +141,7 @@ Examples:
 Commands: status, arm, run, hold, ramp-down, acknowledge, none,
   set NAME=VALUE…, move|jog AXIS=QUANTITY… (z=1um rx=2urad), where, limits,
   can-i-go AXIS=QUANTITY… [speed=QUANTITY], mark|goto NAME, play TRAJECTORY,
-  mode p|f|pf, gains [NAME=VALUE…],
+  frame [none | work|tool AXIS=QUANTITY…], mode p|f|pf, gains [NAME=VALUE…],
   wait PHASE|arrived|SECONDS [TIMEOUT], config, config write SPEC,
   record arm [AFTER] | trigger | stop | look | download FILE, wave FILE | stop,
   stop (ends the program at a socket)

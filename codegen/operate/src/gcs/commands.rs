@@ -6,7 +6,7 @@ use super::axes::{Axes, from_wire, to_wire};
 use super::code::Code;
 use super::input::{Piece, STOP};
 use super::stage::{No, Stage};
-use crate::motion::Motion;
+use crate::motion::{Motion, limits};
 
 /// Bits of the status that `#4` answers.
 const REFERENCED: u32 = 0x1_0000;
@@ -240,8 +240,8 @@ fn query<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, command: &str, re
         "FRF" | "RON" | "EAX" => per_axis(axes, rest, |_| "1".to_owned())?,
         "VEL" => per_axis(axes, rest, |axis| decimal(to_wire(stage.motion().speed()[axis])))?,
         "VLS" => decimal(system_speed(stage.motion())),
-        "TMN" | "NLM" => per_axis(axes, rest, |axis| decimal(to_wire(limits(stage, axis)[0])))?,
-        "TMX" | "PLM" => per_axis(axes, rest, |axis| decimal(to_wire(limits(stage, axis)[1])))?,
+        "TMN" | "NLM" => per_axis(axes, rest, |axis| decimal(to_wire(ends(stage, axis)[0])))?,
+        "TMX" | "PLM" => per_axis(axes, rest, |axis| decimal(to_wire(ends(stage, axis)[1])))?,
         "SPA" => parameters(stage.motion(), axes, rest)?,
         "SPI" => {
             let names = if rest.is_empty() { &["R", "S", "T"][..] } else { rest };
@@ -275,9 +275,8 @@ fn query<P: Port>(stage: &mut Stage<P>, asked: &mut Asked<'_>, command: &str, re
 }
 
 /// Least and largest position of an axis with the others at zero, m or rad.
-fn limits<P: Port>(stage: &Stage<P>, axis: usize) -> [f64; 2] {
-    let way = |sign: f64| core::array::from_fn(|other| if other == axis { sign } else { 0.0 });
-    [-1.0, 1.0].map(|sign| sign * stage.reach(&[0.0; 6], &way(sign)))
+fn ends<P: Port>(stage: &Stage<P>, axis: usize) -> [f64; 2] {
+    limits(|pose| stage.admitted(pose).is_some(), &[0.0; 6], axis)
 }
 
 /// How far each axis gets from the goal along a direction.

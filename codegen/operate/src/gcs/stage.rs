@@ -4,10 +4,11 @@ use std::time::{Duration, Instant};
 
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
-use specgen_runtime::setpoint::{BUSY, Frames, REFUSED, Target, Tool};
+use specgen_runtime::setpoint::{BUSY, REFUSED};
 use specgen_runtime::supervisor::{Phase, Request};
 
 use super::code::Code;
+use crate::frame::Frame;
 use crate::motion::{self, Motion};
 use crate::session::{Place, Session};
 
@@ -32,8 +33,8 @@ pub struct Stage<P> {
     ordered: (u64, Instant),
     /// On the way to a machine that runs.
     rising: Option<Rising>,
-    /// The pivot point, from the tool point along the user's axes, m.
-    pivot: [f64; 3],
+    /// Its tool point is the pivot point of clients: they see it move.
+    frame: Frame,
     /// What went wrong after the command that asked for it had been taken.
     mishap: Option<Code>,
 }
@@ -87,7 +88,7 @@ impl<P: Port> Stage<P> {
             goal: None,
             ordered: (0, Instant::now()),
             rising: None,
-            pivot: [0.0; 3],
+            frame: Frame::default(),
             mishap: None,
         })
     }
@@ -266,12 +267,12 @@ impl<P: Port> Stage<P> {
 
     /// Where it is to be once nothing moves, as clients see it.
     pub(super) fn goal(&self) -> [f64; 6] {
-        self.seen_user_of(&self.goal.unwrap_or(self.place.target))
+        self.seen_from_pivot(&self.goal.unwrap_or(self.place.target))
     }
 
     /// Where it is, as clients see it, m and rad.
     pub(super) fn pose(&self) -> [f64; 6] {
-        self.seen_user_of(&self.place.pose)
+        self.seen_from_pivot(&self.place.pose)
     }
 
     /// The goal that a move changes: only of a machine that runs, and that is going nowhere that is not known.
@@ -300,7 +301,7 @@ impl<P: Port> Stage<P> {
 
     /// The user's pose of one as clients see it, if the platform can stand there.
     pub(super) fn admitted(&self, pose: &[f64; 6]) -> Option<[f64; 6]> {
-        let user = self.user_of(pose)?;
+        let user = self.frame.user(pose)?;
         self.motion.admits(&user).then_some(user)
     }
 
@@ -309,25 +310,13 @@ impl<P: Port> Stage<P> {
         motion::reach(|pose| self.admitted(pose).is_some(), start, way)
     }
 
-    fn turns_about_pivot(&self) -> Tool<f64> {
-        Tool { point: self.pivot, largest_angle: core::f64::consts::FRAC_PI_4 }
-    }
-
-    /// From what clients see to the user's coordinates: they see the pivot point move.
-    fn user_of(&self, pose: &[f64; 6]) -> Option<[f64; 6]> {
-        Some(self.turns_about_pivot().to_platform(&Target::at(*pose))?.pose)
-    }
-
-    fn seen_user_of(&self, user: &[f64; 6]) -> [f64; 6] {
-        let [_, _, _, u, v, w] = *user;
-        let turned = self.turns_about_pivot().to_platform(&Target::at([0.0, 0.0, 0.0, u, v, w]));
-        let shift = turned.map_or([0.0; 6], |turned| turned.pose);
-        core::array::from_fn(|axis| if axis < 3 { user[axis] - shift[axis] } else { user[axis] })
+    fn seen_from_pivot(&self, user: &[f64; 6]) -> [f64; 6] {
+        self.frame.pose(user).unwrap_or(*user)
     }
 
     /// m, from the tool point.
     pub(super) fn pivot(&self) -> [f64; 3] {
-        self.pivot
+        *self.frame.tool()
     }
 
     /// Another pivot point. Only at rest and not turned: no coordinate of a platform that stands still is to change.
@@ -339,7 +328,7 @@ impl<P: Port> Stage<P> {
         if [u, v, w] != [0.0; 3] {
             return Err(Code::Pivot.into());
         }
-        self.pivot = pivot;
+        self.frame = Frame::new([0.0; 6], pivot);
         Ok(())
     }
 }

@@ -14,11 +14,12 @@ use specgen_runtime::supervisor::{Phase, Request};
 
 use super::answer::{Answer, Downloaded, MachineStatus, Moves, Plain, RecorderState, Settings};
 use super::health::Standing;
-use super::platform::{Located, ZERO, in_words};
+use super::platform::{ZERO, in_words};
 use crate::cli::file::{check_place, write_file};
 use crate::cli::ui::{Failure, Outcome, Ui};
 use specgen_compiler::compile;
 use specgen_language::model::Model;
+use specgen_operate::frame::Frame;
 use specgen_operate::place::meant;
 use specgen_operate::{Order, Session, Until, read_wave, refused_wave};
 
@@ -58,6 +59,8 @@ pub struct Operator<P> {
     pub model: Option<Model>,
     /// Poses by the names that this session gave them.
     pub(super) marks: BTreeMap<String, [f64; 6]>,
+    /// What poses are said in.
+    pub(super) frame: Frame,
     /// Whether anything was ordered, so that this host is missed when it leaves.
     pub ordered: bool,
     interrupted: &'static AtomicBool,
@@ -76,6 +79,7 @@ impl<P: Port> Operator<P> {
             session,
             model: None,
             marks: BTreeMap::new(),
+            frame: Frame::default(),
             ordered: false,
             interrupted,
             shown,
@@ -159,6 +163,7 @@ impl<P: Port> Operator<P> {
             Order::Play(name) => self.trajectory(name).map(|_| ()).map_err(nonsense),
             Order::Gains(gains) => self.gains_of(gains).map(|_| ()).map_err(nonsense),
             Order::Move { .. }
+            | Order::Frame(_)
             | Order::Where
             | Order::Limits
             | Order::CanIGo { .. }
@@ -176,7 +181,7 @@ impl<P: Port> Operator<P> {
         match order {
             Order::Status => {
                 let health = self.session.health()?.into();
-                let place = self.session.place()?.map(Located::from);
+                let place = self.session.place()?.map(|place| self.located(&place));
                 let advice = self.advice();
                 self.note(&line, &Standing { status: self.status(), place, advice, health }, ui);
             }
@@ -185,13 +190,15 @@ impl<P: Port> Operator<P> {
                 self.note(&line, &Plain(self.stands()), ui);
             }
             Order::Move { relative, axes } => {
-                let from = self.place()?.target;
-                let pose = self.go(meant(&from, *relative, axes))?;
+                let from = self.target()?;
+                let pose = meant(&from, *relative, axes);
+                self.go(self.user(&pose)?)?;
                 self.note(&line, &Moves { pose }, ui);
             }
             Order::Where
             | Order::Limits
             | Order::CanIGo { .. }
+            | Order::Frame(_)
             | Order::Mark(_)
             | Order::Goto(_)
             | Order::Play(_)
@@ -244,7 +251,7 @@ impl<P: Port> Operator<P> {
 
     /// Sends a move, and waits until the machine has taken or refused it. Where a motion is under way a machine looks at a
     /// command only after it, so that nothing could be said of this one.
-    pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<[f64; 6], Ended> {
+    pub(super) fn go(&mut self, pose: [f64; 6]) -> Result<(), Ended> {
         let status = self.session.status();
         if u64::from(status.phase) != Phase::Running.word() {
             return Err(Ended::Refused(format!("the machine is {}: it moves when it runs", self.stands())));
@@ -253,7 +260,8 @@ impl<P: Port> Operator<P> {
             return Err(Ended::Refused("a motion is under way; `wait arrived` first".to_owned()));
         }
         if let Some(binding) = self.motion().map_err(Ended::Refused)?.binding(&pose) {
-            let (to, binds) = (specgen_operate::place::in_words(&pose), in_words(&binding));
+            let to = self.frame.pose(&pose).unwrap_or(pose);
+            let (to, binds) = (specgen_operate::place::in_words(&to), in_words(&binding));
             return Err(Ended::Refused(format!("it cannot go to {to}: {binds}; nothing moves")));
         }
         let words = self.session.move_words(&pose).map_err(Ended::Refused)?;
@@ -276,7 +284,7 @@ impl<P: Port> Operator<P> {
                 specgen_operate::place::in_words(&pose)
             )));
         }
-        Ok(pose)
+        Ok(())
     }
 
     /// Sends a command, and looks at the machine.

@@ -8,13 +8,14 @@ use specgen_compiler::compile;
 use specgen_language::model::Gains;
 use specgen_link::Refusal;
 use specgen_link::client::{ClientError, Port};
-use specgen_operate::motion::{Binding, Motion};
-use specgen_operate::place::{AXES, Named, Pace, amount, meant};
-use specgen_operate::{Order, Place, Wanted};
+use specgen_operate::frame::Frame;
+use specgen_operate::motion::{self, Binding, Motion};
+use specgen_operate::place::{self, AXES, Named, Pace, amount, meant};
+use specgen_operate::{Framed, Order, Place, Wanted};
 use specgen_runtime::setpoint::{BUSY, REFUSED, STALE};
 use specgen_runtime::supervisor::{Cause, Phase};
 
-use super::answer::Plain;
+use super::answer::{Moves, Plain};
 use super::operator::{Ended, Operator};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::Outcome;
@@ -23,6 +24,8 @@ use crate::cli::ui::Outcome;
 pub const ZERO: &str = "zero";
 /// Gains of each kind, in the order of the settings; those of P alone have `position_` before them.
 const GAINS: [&str; 3] = ["kp", "ki", "kv"];
+/// Why a frame has no such pose.
+const BEYOND: &str = "an angle is beyond what a frame is meant for, 15 deg";
 /// Modes by the word `mode`.
 const MODES: [&str; 7] = ["p", "f-invhys", "f-ewma", "f-pcc", "pf-invhys", "pf-ewma", "pf-pcc"];
 
@@ -35,20 +38,6 @@ pub struct Located {
     error: [f64; 6],
     voltage: [f64; 6],
     moves: bool,
-}
-
-impl From<Place> for Located {
-    fn from(place: Place) -> Self {
-        let millionths = |values: [f64; 6]| values.map(|value| value * 1e6);
-        Self {
-            tick: place.tick,
-            pose: millionths(place.pose),
-            target: millionths(place.target),
-            error: millionths(place.error),
-            voltage: place.voltage,
-            moves: u64::from(place.phase) == Phase::Running.word() && place.status & BUSY != 0,
-        }
-    }
 }
 
 impl Outcome for Located {
@@ -64,6 +53,23 @@ impl Outcome for Located {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "  legs 0 to 5: {} V{}", volts.join(", "), if self.moves { "; moving" } else { "" });
         text
+    }
+}
+
+/// What poses of this session are said in: µm and µrad.
+#[derive(Serialize)]
+struct FrameInForce {
+    work: [f64; 6],
+    tool: [f64; 3],
+}
+
+impl Outcome for FrameInForce {
+    fn text(&self) -> String {
+        let [x, y, z] = self.tool.map(|value| amount(0, value * 1e-6));
+        format!(
+            "work frame at {}; tool point at x {x}, y {y}, z {z}\n",
+            place::in_words(&self.work.map(|value| value * 1e-6))
+        )
     }
 }
 
@@ -163,6 +169,36 @@ impl<P: Port> Operator<P> {
         place.ok_or_else(|| Ended::Refused("the device controls six legs: it knows of no pose".to_owned()))
     }
 
+    /// The set-point, in the session's frame.
+    pub(super) fn target(&mut self) -> Result<[f64; 6], Ended> {
+        let target = self.place()?.target;
+        Ok(self.seen(&target))
+    }
+
+    /// A pose of the controller as the session says it.
+    fn seen(&self, user: &[f64; 6]) -> [f64; 6] {
+        self.frame.pose(user).unwrap_or(*user)
+    }
+
+    /// The controller's coordinates of a pose in the session's frame.
+    pub(super) fn user(&self, pose: &[f64; 6]) -> Result<[f64; 6], Ended> {
+        self.frame.user(pose).ok_or_else(|| Ended::Refused(format!("it cannot go there: {BEYOND}")))
+    }
+
+    /// Where it is, in the session's frame.
+    pub(super) fn located(&self, place: &Place) -> Located {
+        let millionths = |values: [f64; 6]| values.map(|value| value * 1e6);
+        let (pose, target) = (self.seen(&place.pose), self.seen(&place.target));
+        Located {
+            tick: place.tick,
+            pose: millionths(pose),
+            target: millionths(target),
+            error: core::array::from_fn(|axis| (target[axis] - pose[axis]) * 1e6),
+            voltage: place.voltage,
+            moves: u64::from(place.phase) == Phase::Running.word() && place.status & BUSY != 0,
+        }
+    }
+
     pub(super) fn no_mark(&self, name: &str) -> String {
         let known: Vec<&str> = std::iter::once(ZERO).chain(self.marks.keys().map(String::as_str)).collect();
         format!("there is no pose `{name}`: `mark {name}` first; there are {}", known.join(", "))
@@ -210,19 +246,32 @@ impl<P: Port> Operator<P> {
     pub(super) fn of_platform(&mut self, order: &Order, line: &str, ui: &crate::cli::ui::Ui) -> Result<(), Ended> {
         match order {
             Order::Where => {
-                let place = Located::from(self.place()?);
-                self.note(line, &place, ui);
+                let place = self.place()?;
+                self.note(line, &self.located(&place), ui);
             }
             Order::Limits => {
-                let target = self.place()?.target;
+                let target = self.target()?;
                 let motion = self.motion().map_err(Ended::Refused)?;
-                let limits = core::array::from_fn(|axis| motion.limits(&target, axis).map(|value| value * 1e6));
+                let admits = |pose: &[f64; 6]| self.frame.user(pose).is_some_and(|user| motion.admits(&user));
+                let limits =
+                    core::array::from_fn(|axis| motion::limits(admits, &target, axis).map(|value| value * 1e6));
                 self.note(line, &Limits { from: target.map(|value| value * 1e6), limits }, ui);
             }
             Order::CanIGo { axes, speed } => {
-                let target = self.place()?.target;
+                let target = self.target()?;
                 let binds = self.binds(&target, axes, speed).map_err(Ended::Refused)?;
                 self.note(line, &CanGo { can: binds.is_none(), binds }, ui);
+            }
+            Order::Frame(frame) => {
+                self.frame = match frame {
+                    None => self.frame,
+                    Some(Framed::None) => Frame::default(),
+                    Some(Framed::Work(work)) => Frame::new(*work, *self.frame.tool()),
+                    Some(Framed::Tool(tool)) => Frame::new(*self.frame.work(), *tool),
+                };
+                let (work, tool) =
+                    (self.frame.work().map(|value| value * 1e6), self.frame.tool().map(|value| value * 1e6));
+                self.note(line, &FrameInForce { work, tool }, ui);
             }
             Order::Mark(name) => {
                 let target = self.place()?.target;
@@ -231,8 +280,9 @@ impl<P: Port> Operator<P> {
             }
             Order::Goto(name) => {
                 let pose = if name == ZERO { Some([0.0; 6]) } else { self.marks.get(name).copied() };
-                let pose = self.go(pose.ok_or_else(|| Ended::Refused(self.no_mark(name)))?)?;
-                self.note(line, &super::answer::Moves { pose }, ui);
+                let user = pose.ok_or_else(|| Ended::Refused(self.no_mark(name)))?;
+                self.go(user)?;
+                self.note(line, &Moves { pose: self.seen(&user) }, ui);
             }
             Order::Play(name) => {
                 let selector = self.trajectory(name).map_err(Ended::Refused)?;
@@ -259,12 +309,15 @@ impl<P: Port> Operator<P> {
     /// What keeps it from going there so fast; none if it can.
     fn binds(&self, from: &[f64; 6], axes: &Named, [along, about]: &Pace) -> Result<Option<String>, String> {
         let (motion, to) = (self.motion()?, meant(from, false, axes));
-        if let Some(binding) = motion.binding(&to) {
+        let Some(user) = self.frame.user(&to) else { return Ok(Some(BEYOND.to_owned())) };
+        if let Some(binding) = motion.binding(&user) {
             return Ok(Some(in_words(&binding)));
         }
+        let start = self.frame.user(from);
         let slow = (0..6).find_map(|axis| {
+            // The controller's axes have the speeds.
             let (asked, speed) = (if axis < 3 { along } else { about }, motion.speed()[axis]);
-            let moves = (to[axis] - from[axis]).abs() > 0.0;
+            let moves = start.is_none_or(|start| (user[axis] - start[axis]).abs() > 0.0);
             // As many digits as the spec has them in.
             asked.filter(|asked| moves && *asked > speed * (1.0 + 1e-9)).map(|_| (axis, speed))
         });
