@@ -83,6 +83,7 @@ fn prepared() -> Folder {
         let newtons = 20.0 * (1.0 - (TAU * f64::from(k) / 1000.0).cos());
         [f64::from(k) * 0.01, newtons, 5.0 + newtons / 10.0 + 1e-3 * (f64::from(k) * 1.7).sin()]
     };
+    folder.write("candidates.json", "[{}, {\"level\": 0.2, \"drift\": 0.03}]");
     write("force.csv", "time_s,force_N,displacement_um", &mut (0..4000).map(force));
     folder
 }

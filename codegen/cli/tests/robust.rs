@@ -181,6 +181,113 @@ fn what_cannot_be_run_is_refused_with_a_fix_and_nothing_is_written() {
     }
 }
 
+/// Parts in `files`, each with what it is called and its content.
+fn parts(folder: &Folder, of: u32) -> Vec<String> {
+    let part = |index: u32| {
+        let (shard, file) = (format!("{index}/{of}"), format!("part-{index}-{of}.json"));
+        let run = folder.run(&[&STUDY[..], &["--threads", "1", "--shard", &shard, "-o", &file]].concat());
+        assert_eq!(run.code, 0, "{run:#?}");
+        file
+    };
+    (1..=of).map(part).collect()
+}
+
+const STUDY: [&str; 12] = [
+    "robust", "legs.toml", "--draws", "7", "--frequency", "20", "--seed", "18446744073709551615", "--vary", "mass=20%",
+    "--max-error", "1 nm",
+];
+
+#[test]
+fn merged_parts_are_the_single_run_byte_for_byte() {
+    let folder = Folder::new();
+    let single = folder.run(&[&STUDY[..], &["-o", "single"]].concat());
+    let document = folder.run(&[&STUDY[..], &["--json"]].concat());
+    single.says(1, &["above 1.00 nm"]);
+    let files = contents(&folder.path("single"));
+    for of in length(&[1, 4][..], &[1, 4, 7, 40]) {
+        let mut names = parts(&folder, *of);
+        names.reverse();
+        // One was run again, elsewhere.
+        folder.write("again.json", folder.read(&names[0]));
+        names.push("again.json".to_owned());
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let merged = folder.run(&[&["robust", "merge", "-o", "merged"], &names[..]].concat());
+        assert_eq!((merged.code, &merged.stdout), (1, &single.stdout), "{of}");
+        assert_eq!(contents(&folder.path("merged")), files, "{of}");
+        let json = folder.run(&[&["robust", "merge", "--json"], &names[..]].concat());
+        assert_eq!((json.code, &json.stdout), (1, &document.stdout), "{of}");
+    }
+}
+
+#[test]
+fn parts_that_do_not_fit_are_refused_by_name() {
+    let folder = Folder::new();
+    let names = parts(&folder, 3);
+    let refused = |files: &[&str], code: i32, says: &str| {
+        folder.run(&[&["robust", "merge"], files].concat()).says(code, &[says]);
+    };
+    let [one, two, three] = [0, 1, 2].map(|index: usize| names[index].as_str());
+    refused(&[one, three], 1, "missing: --shard 2/3");
+    refused(&[one, "legs.toml", two], 1, "`legs.toml` is no JSON");
+    refused(&[one, "part-4.json", two], 3, "could not read `part-4.json`");
+    let text = folder.read(two);
+    let with = |old: &str, new: &str, says: &str| {
+        assert!(text.contains(old), "{old} in {text}");
+        folder.write("other.json", text.replace(old, new));
+        refused(&[one, "other.json", three], 1, says);
+    };
+    with("\"draws\": 7", "\"draws\": 8", "`other.json` and `part-1-3.json` are of different studies: draws is 8 here, 7 there");
+    with("\"frequency\": 20.0", "\"frequency\": 21.0", "frequency is 21.0 here");
+    with("\"noise\": true", "\"noise\": false", "noise is false here");
+    with("\"plant\": \"", "\"plant\": \"0", "plant is ");
+    with("\"digest\": \"", "\"digest\": \"0", "digest is ");
+    with("legs.toml", "other.toml", "spec is \"other.toml\" here");
+    with("specgen robust part", "specgen report", "was not written by specgen robust --shard");
+    let version = format!("\"specgen\": \"{}\"", env!("CARGO_PKG_VERSION"));
+    with(&version, "\"specgen\": \"0.0.1\"", "`other.json` was written by specgen \"0.0.1\"");
+    // What was cut off, or counts in other parts.
+    folder.write("other.json", &text[..text.len() / 2]);
+    refused(&[one, "other.json", three], 1, "`other.json` is no JSON");
+    refused(&[one, &parts(&folder, 2)[1], three], 1, "is part 2 of 2, `part-1-3.json` one of 3");
+    // One figure of the copy is another.
+    let value: Value = serde_json::from_str(&text).unwrap();
+    let mut changed = value.clone();
+    let error = value["runs"][0]["outcome"]["ran"]["error_nm"].as_f64().unwrap();
+    changed["runs"][0]["outcome"]["ran"]["error_nm"] = Value::from(error.next_up());
+    folder.write("other.json", changed.to_string());
+    refused(&[one, two, "other.json", three], 1, "are both part 2 of 3 and differ");
+    changed = value;
+    changed["runs"].as_array_mut().unwrap().pop();
+    folder.write("other.json", changed.to_string());
+    refused(&[one, "other.json", three], 1, "run it again with --shard 2/3");
+    for (more, says) in [
+        (&["--shard", "4/3", "-o", "x.json"][..], "I from 1 to N"),
+        (&["--shard", "1/3"], "--output"),
+        (&["--shard", "1/3", "-o", "x.json", "--replay", "nominal"], "cannot be used with"),
+        (&["--shard", "1/3", "-o", "x.json", "--plot", "x.svg"], "cannot be used with"),
+    ] {
+        folder.run(&[&["robust", "legs.toml"], more].concat()).says(2, &[says]);
+    }
+}
+
+/// A part is whole or not there.
+#[cfg(unix)]
+#[test]
+fn a_killed_shard_leaves_nothing_and_is_run_again() {
+    let folder = Folder::new();
+    for (signal, code) in [(rustix::process::Signal::INT, Some(130)), (rustix::process::Signal::KILL, None)] {
+        let mut command = folder.command();
+        command.args(["robust", "legs.toml", "--draws", "3000", "--threads", "1", "--shard", "1/2", "-o", "part.json"]);
+        let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        let lines = std::io::BufReader::new(child.stderr.take().unwrap());
+        let mut lines = std::io::BufRead::lines(lines);
+        assert!(lines.any(|line| line.unwrap().starts_with("robust: ")));
+        crate::support::send(signal, child.id());
+        assert_eq!(child.wait().unwrap().code(), code);
+        assert!(!folder.path("part.json").exists());
+    }
+}
+
 /// An interrupt as the terminal sends it.
 #[cfg(unix)]
 #[test]

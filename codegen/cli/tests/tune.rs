@@ -214,3 +214,44 @@ fn ctrl_c_keeps_the_best_so_far_and_says_so() {
     run.says(130, &["interrupted: this is the best of"]);
     assert!(run.stdout.contains("tuned") && run.stdout.contains("+++ legs.toml"), "{}", run.stdout);
 }
+
+/// Two ways to one figure: a candidate of a file, and the row of the spec in a search.
+#[test]
+fn candidates_of_a_file_have_the_scores_of_the_search() {
+    let folder = Folder::new();
+    let some = ["tune", "legs.toml", "--seconds", "0.3"];
+    let searched = folder.json(&[&some[..], &["--evaluations", "8", "--population", "4"]].concat()).value;
+    let spec = row(&searched["result"], "spec");
+    let weights = &spec["setting"]["Legs"];
+    let score = |candidates: &str, threads: &str| {
+        folder.write("candidates.json", candidates);
+        let document = folder.json(&[&some[..], &["--evaluate", "candidates.json", "--threads", threads]].concat());
+        assert_eq!(document.code, 0, "{:#}", document.value);
+        document.value["result"].clone()
+    };
+    let file = format!(
+        "[{{}}, {{\"level\": {}, \"drift\": {}}}, {{\"level\": 0.9}}, {{\"level\": 0.2}}]",
+        weights["level"], weights["drift"]
+    );
+    let found = score(&file, "2");
+    let candidates = found["candidates"].as_array().unwrap();
+    for same in &candidates[..2] {
+        assert_eq!(same["verdict"]["Run"], spec["tuned_on"], "{same:#}");
+        assert_eq!(same["cost"], spec["tuned_on"]["Scored"]["cost"]);
+    }
+    assert_eq!((&candidates[2]["verdict"], &candidates[2]["cost"]), (&Value::from("Unstable"), &Value::Null));
+    assert_ne!(candidates[3]["cost"], candidates[0]["cost"], "the comparison can fail");
+    assert_eq!(score(&file, "1"), found);
+    // What there is to propose.
+    let names: Vec<Value> = score("[]", "1")["parameters"].as_array().unwrap().iter().map(|one| one["name"].clone()).collect();
+    assert_eq!(names, ["level", "drift"]);
+    for (text, says) in [
+        ("[{\"level\": 2}]", "candidate 0, from 0: level is 2, not within its bounds"),
+        ("[{}, {\"kp[0]\": 1}]", "candidate 1, from 0: nothing that is tuned here is called `kp[0]`; expected level, drift"),
+        ("[{\"level\": null}]", "expected an array of objects"),
+        ("{}", "expected an array of objects"),
+    ] {
+        folder.write("candidates.json", text);
+        folder.run(&["tune", "legs.toml", "--evaluate", "candidates.json"]).says(1, &[says]);
+    }
+}

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! factors (spec, options, defaults) → plan: nominal, corners, draws with a seed each → run (emitted controller) → quantiles → gate
+//!                                   └ shards, each run anywhere, merged ┘
 //! ```
 //! Each member of a plan is a machine of its own, prepared from the start, under the spec's own settings.
 
@@ -11,9 +12,11 @@ pub mod gate;
 pub mod plan;
 pub mod quantiles;
 pub mod run;
+pub mod shard;
 
 pub use deviation::Deviation;
 pub use factors::{Factor, Factors, Origin};
 pub use gate::Gate;
 pub use plan::{Member, Plan};
 pub use run::{Figures, Outcome, Study};
+pub use shard::Shard;

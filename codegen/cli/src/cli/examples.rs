@@ -90,14 +90,24 @@ Examples:
       weights as a patch; front, history and plot in tuning
   specgen tune platform.toml --write  # (minutes)
       gains and bandwidths into the spec
-  specgen tune platform.toml --what gains --bounds ki=10:1000  # (minutes)";
+  specgen tune platform.toml --what gains --bounds ki=10:1000  # (minutes)
+  specgen tune legs.toml --evaluate candidates.json --json
+      scores for a search of your own";
 
 pub const ROBUST: &str = "\
 Examples:
   specgen robust legs.toml --draws 10      # ten random machines and the corners
   specgen robust legs.toml --replay gain-low     # one of them alone, to the bit
   specgen robust platform.toml --max-error \"60 nm\"  # (minutes)
-      a gate for builds";
+      a gate for builds
+  specgen robust legs.toml --draws 9 --shard 1/2 -o part-1.json
+      half of the machines; the other half on another computer
+  specgen robust legs.toml --draws 9 --shard 2/2 -o part-2.json";
+
+pub const MERGE: &str = "\
+Examples:
+  specgen robust merge part-2.json part-1.json -o merged
+      the report of a single run, byte for byte";
 
 pub const REPORT: &str = "\
 Examples:

@@ -1,36 +1,58 @@
-//! `specgen robust`: corners and random draws of declared uncertainties, quantiles of the error, a gate for builds.
+//! `specgen robust`: corners and random draws of declared uncertainties, quantiles of the error, a gate for builds; in parts on
+//! many computers, which `specgen robust merge` puts together.
 
+mod merge;
 mod report;
 mod trajectory;
+mod work;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::Args;
+use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::file::{claim, write_folder};
+use super::file::{check_place, claim, write_folder};
 use super::plot::Plot;
 use super::sim::{PlantArguments, emitted, environment, frequency};
 use super::spec;
 use super::ui::{Failure, Ui};
-use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
 use specgen_language::spec::quantity::{self, Dimension};
 use specgen_studies::robust::factors::Given;
-use specgen_studies::robust::{Factors, Gate, Plan, Study};
+use specgen_studies::robust::{Member, Outcome, Plan, Shard, Study};
+use work::{Part, Ran, Work};
 
-/// Part of the stroke beyond which an error counts as diverged, unless asked otherwise.
-const BOUND: f64 = 0.05;
 /// Lines of progress of a run whose output is not looked at.
 const LINES: usize = 20;
 
 /// Arguments of `robust`.
 #[derive(Args, Debug)]
-#[command(after_help = super::examples::ROBUST)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    override_usage = "specgen robust [OPTIONS] <SPEC>\n       specgen robust merge [OPTIONS] <PART>...",
+    after_help = super::examples::ROBUST
+)]
 pub struct Arguments {
+    #[command(subcommand)]
+    kind: Option<Kind>,
+    #[command(flatten)]
+    study: StudyArguments,
+}
+
+#[derive(Subcommand, Debug)]
+enum Kind {
+    /// Put the parts of a study together that were run with --shard; the report is that of a single run, byte for byte.
+    Merge(merge::Arguments),
+}
+
+/// Arguments of a study, or of a part of one.
+#[derive(Args, Debug)]
+struct StudyArguments {
     /// The spec file.
-    spec: PathBuf,
+    #[arg(required = true)]
+    spec: Option<PathBuf>,
     /// Random machines, besides the corners.
     #[arg(long = "draws", value_name = "N", alias = "samples", default_value_t = 100, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     draws: u32,
@@ -64,7 +86,11 @@ pub struct Arguments {
     /// Worker threads; as many as the machine has if not given. The result does not depend on it.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
-    /// Write runs (CSV) and report (JSON) here.
+    /// Run one part of N alone, I from 1 to N, and write it into the file of -o, for `specgen robust merge`. No gate is
+    /// judged.
+    #[arg(long, value_name = "I/N", value_parser = Shard::parse, requires = "output", conflicts_with_all = ["replay", "plot"])]
+    shard: Option<Shard>,
+    /// Write runs (CSV) and report (JSON) here; with --shard the name of one file.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     #[command(flatten)]
@@ -94,22 +120,34 @@ fn percent(text: &str) -> Result<f64, String> {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
+    match &arguments.kind {
+        Some(Kind::Merge(arguments)) => merge::run(arguments, ui),
+        None => study(&arguments.study, ui),
+    }
+}
+
+fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
     let begun = Instant::now();
-    let leg = arguments.plant.leg()?;
-    let compiled = spec::compiled(&arguments.spec, ui)?;
-    let followed = trajectory::chosen(arguments, &compiled)?;
-    let gate = gate(arguments, &compiled)?;
-    let factors = Factors::of(&compiled.model, &arguments.vary);
-    let seed = arguments.plant.seed;
-    let plan = match &arguments.replay {
-        Some(name) => Plan::alone(&factors, name, seed).map_err(Failure::Usage)?,
-        None => Plan::new(&factors, arguments.draws, seed),
+    let Some(path) = &arguments.spec else {
+        return Err(Failure::Usage("a spec file is expected, or merge".to_owned()));
     };
+    let leg = arguments.plant.leg()?;
+    let compiled = spec::compiled(path, ui)?;
+    let followed = trajectory::chosen(arguments, &compiled)?;
+    let work = Work::of(arguments, path, &compiled, &followed, &leg)?;
+    let whole = match &arguments.replay {
+        Some(name) => Plan::alone(&work.factors, name, work.seed).map_err(Failure::Usage)?,
+        None => work.plan(),
+    };
+    let plan = arguments.shard.map_or_else(|| whole.clone(), |shard| shard.of(&whole));
     let threads = arguments.threads.map_or_else(
         || std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
         |threads| threads as usize,
     );
-    let _claimed = arguments.output.as_deref().map(claim).transpose()?;
+    let _claimed = match (&arguments.output, arguments.shard) {
+        (Some(file), Some(_)) => check_place(file).map(|()| None)?,
+        (folder, _) => folder.as_deref().map(claim).transpose()?,
+    };
     arguments.plot.wanted()?;
     let controller = emitted(&compiled, ui)?;
     let study = Study {
@@ -117,8 +155,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         controller: &controller,
         leg: &leg,
         trajectory: followed.choice,
-        noise: !arguments.plant.no_noise,
-        bound: arguments.diverged_above.unwrap_or(BOUND * compiled.model.actuator.stroke),
+        noise: work.noise,
+        bound: work.bound,
     };
     // The machines that are done make a result.
     let stop = interrupt::heed();
@@ -137,54 +175,62 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     });
     ui.rate_done();
     let runs = runs.map_err(environment)?;
-
-    let reasons = gate.reasons(&runs);
-    let found = report::Found {
-        arguments,
-        compiled: &compiled,
-        factors: &factors,
-        followed: &followed,
-        study: &study,
-        gate: &gate,
-        reasons: &reasons,
-        planned: all,
-        runs: &runs,
-    };
-    let report = found.report();
-    let below = "rms error by share of the machines";
-    if let Some(line) = arguments.plot.charts(&compiled.ir.name, below, &[found.chart()])? {
-        ui.progress(line.trim_end());
+    if let (Some(shard), Some(file)) = (arguments.shard, &arguments.output) {
+        if runs.len() < all {
+            // A part is whole or not there.
+            return Err(Failure::ended_early());
+        }
+        Part { shard, planned: whole.members.len(), work, runs: runs.into_iter().map(Ran::from).collect() }
+            .write(file, ui)?;
+        ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
+        return Ok(());
     }
-    if let Some(folder) = &arguments.output {
-        let files = [
-            ("runs.csv".to_owned(), found.csv().into_bytes()),
-            ("report.json".to_owned(), format!("{:#}\n", json!(report)).into_bytes()),
-        ];
-        write_folder(folder, &files)?;
-        ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
-    }
-    ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
-    if runs.len() < all {
-        let message =
-            format!("interrupted: the figures are of {} of {all} machines, and no gate is passed", runs.len());
-        return Err(Failure::Interrupted { message, result: ui.shown(&report) });
-    }
-    ui.judged(&report, (!reasons.is_empty()).then(|| format!("not robust: {}", reasons.join("; "))))
+    let results = Results { output: arguments.output.as_deref(), plot: &arguments.plot };
+    results.put(&work, arguments.replay.is_some(), all, &runs, ui, || {
+        ui.progress(&format!("{:.1} s in all", begun.elapsed().as_secs_f64()));
+    })
 }
 
-/// Of the options, else of the spec.
-fn gate(arguments: &Arguments, compiled: &Compiled) -> Result<Gate, Failure> {
-    let declared = &compiled.model.robust;
-    if arguments.max_orientation.is_some() && compiled.model.task_space.is_none() {
-        return Err(Failure::Usage(
-            "--max-orientation is for a spec with [control]; legs with their own gauges have --max-error".to_owned(),
-        ));
+/// Where a report goes.
+struct Results<'a> {
+    output: Option<&'a Path>,
+    plot: &'a Plot,
+}
+
+impl Results<'_> {
+    /// Writes and shows what `runs` of `planned` machines found; `alone` if it was one that was named. `last` is called
+    /// before the report is shown.
+    fn put(
+        &self,
+        work: &Work,
+        alone: bool,
+        planned: usize,
+        runs: &[(Member, Outcome)],
+        ui: &Ui,
+        last: impl FnOnce(),
+    ) -> Result<(), Failure> {
+        let gate = work.gate(alone);
+        let reasons = gate.reasons(runs);
+        let found = report::Found { work, gate: &gate, reasons: &reasons, alone, planned, runs };
+        let report = found.report();
+        let below = "rms error by share of the machines";
+        if let Some(line) = self.plot.charts(&work.name, below, &[found.chart()])? {
+            ui.progress(line.trim_end());
+        }
+        if let Some(folder) = self.output {
+            let files = [
+                ("runs.csv".to_owned(), found.csv().into_bytes()),
+                ("report.json".to_owned(), format!("{:#}\n", json!(report)).into_bytes()),
+            ];
+            write_folder(folder, &files)?;
+            ui.progress(&format!("wrote {} files to {}", files.len(), folder.display()));
+        }
+        last();
+        if runs.len() < planned {
+            let message =
+                format!("interrupted: the figures are of {} of {planned} machines, and no gate is passed", runs.len());
+            return Err(Failure::Interrupted { message, result: ui.shown(&report) });
+        }
+        ui.judged(&report, (!reasons.is_empty()).then(|| format!("not robust: {}", reasons.join("; "))))
     }
-    let orientation = if compiled.model.task_space.is_some() { declared.max_orientation } else { None };
-    Ok(Gate {
-        error_nm: arguments.max_error.or(declared.max_error).map(|error| error * 1e9),
-        orientation_nrad: arguments.max_orientation.or(orientation).map(|error| error * 1e9),
-        // Of one machine there is one figure.
-        quantile: arguments.quantile.filter(|_| arguments.replay.is_none()),
-    })
 }

@@ -1,5 +1,6 @@
 //! `specgen tune`: gains and weights from the simulated loop with the emitted controller.
 
+mod evaluate;
 mod report;
 mod start;
 
@@ -77,6 +78,10 @@ pub struct Arguments {
     /// Worker threads; as many as the machine has if not given. The result does not depend on it.
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
     threads: Option<u32>,
+    /// Search nothing: score the candidates of this file, for a search of your own. A JSON array of objects with numbers by the
+    /// names of parameters, in the unit of --bounds; one that is left out stays as in the spec. `[]` shows names and bounds.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["optimiser", "compare", "evaluations", "population", "output", "write", "plot"])]
+    evaluate: Option<PathBuf>,
     /// Write front, history, report and plot here.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -167,6 +172,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         WhatArgument::All => What::All,
     };
     let space = Space::of(&compiled, what, &arguments.bounds).map_err(|found| refused(&compiled, found))?;
+    let asked = arguments.evaluate.as_deref().map(|file| evaluate::read(file, &space)).transpose()?;
     let required = Required { gain: arguments.gain_margin, delay: arguments.delay_margin };
     let feasibility = Feasibility::of(&compiled, required);
     let threads = arguments.threads.map_or_else(
@@ -177,7 +183,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     arguments.plot.wanted()?;
     let controller = emitted(&compiled, ui)?;
     let job = Job { arguments, compiled, controller, leg, space, feasibility, threads };
-    job.run(ui)
+    match asked {
+        Some(asked) => evaluate::run(&job, &asked, ui),
+        None => job.run(ui),
+    }
 }
 
 /// Arguments that do not go with the kind of the spec.

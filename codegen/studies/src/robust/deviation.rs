@@ -5,7 +5,7 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::Specimen;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::factors::{Factor, Factors};
 use crate::machine;
@@ -18,7 +18,7 @@ const STREAM: u64 = 21;
 const MOST_DAMPING: f64 = 0.99;
 
 /// Factors of one leg.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LegDeviation {
     /// On its axial stiffness.
     pub stiffness: f64,
@@ -35,7 +35,7 @@ pub struct LegDeviation {
 }
 
 /// Factors of one machine.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Deviation {
     /// On mass and inertia.
     pub mass: f64,

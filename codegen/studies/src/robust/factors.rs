@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use specgen_language::model::Model;
 
 /// Something that a machine has more or less of than its spec says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Factor {
     /// On mass and inertia of the platform; of legs with their own gauges on the moved mass, by their resonance.
@@ -84,7 +84,7 @@ impl fmt::Display for Factor {
 }
 
 /// Who said how much a factor varies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Origin {
     /// Nobody.
@@ -106,7 +106,7 @@ impl fmt::Display for Origin {
 }
 
 /// Range of one factor.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Varied {
     /// Which.
     pub factor: Factor,
@@ -185,7 +185,7 @@ fn check(factor: Factor, [low, high]: [f64; 2]) -> Result<(), String> {
 }
 
 /// Every factor with its range.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Factors(Vec<Varied>);
 
 impl Factors {

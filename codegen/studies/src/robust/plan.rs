@@ -2,7 +2,7 @@
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::deviation::Deviation;
 use super::factors::{Factor, Factors};
@@ -13,7 +13,7 @@ const FACTORIAL: usize = 4;
 const STREAM: u64 = 22;
 
 /// One machine of a plan.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Member {
     /// `nominal`, of a corner such as `mass-low`, or the seed of a draw.
     pub name: String,

@@ -7,7 +7,7 @@ use std::sync::mpsc;
 use host_sim::closed_loop::RunError;
 use host_sim::controller::Controller;
 use host_sim::plant::LegParameters;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::plan::{Member, Plan};
 use crate::tuning::{Case, Conditions, Setting, TrajectoryChoice};
@@ -18,16 +18,20 @@ const LIMITS: u32 = 0x3f;
 /// Status bits of gauges or forces that are not believed, and of set-points that are refused or stale.
 const FAULTS: u32 = 0x3f00 | 0x1_0000 | 0x2_0000 | 0x8_0000;
 
-/// What a run that kept its bound did.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+/// What a run that kept its bound did. No figure is below zero; one beyond all numbers is infinite, `null` in JSON.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Figures {
     /// Root mean square of the translation's error as a norm, nm; of legs over time and legs.
+    #[serde(deserialize_with = "or_infinite")]
     pub error_nm: f64,
     /// Largest such error, nm; of legs the largest of one leg.
+    #[serde(deserialize_with = "or_infinite")]
     pub peak_nm: f64,
     /// Root mean square of the angles' error as a norm, nrad; 0 for legs.
+    #[serde(deserialize_with = "or_infinite")]
     pub orientation_nrad: f64,
     /// Largest such error, nrad.
+    #[serde(deserialize_with = "or_infinite")]
     pub orientation_peak_nrad: f64,
     /// Part of the ticks with a leg at a limit, %.
     pub limited_percent: f64,
@@ -37,8 +41,13 @@ pub struct Figures {
     pub fault_bits: u32,
 }
 
+/// JSON has no infinity.
+fn or_infinite<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
+}
+
 /// What became of a member.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// It kept the bound.

@@ -3,6 +3,7 @@
 //! Gains count against the stiffness of their axis, K_ii = (Jᵀ k_a J)_ii: `kp` and `kv`·rad/s as ratios, `ki` in 1/s. A
 //! setting is rounded to four digits here already, so that what is scored is what is written into the spec.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
@@ -204,6 +205,26 @@ impl Space {
             self.put(&mut setting, parameter.role, value);
         }
         setting
+    }
+
+    /// The setting with these numbers by name, in the unit of the bounds; the others stay as they are in the spec.
+    ///
+    /// # Errors
+    /// In words, if a name is not that of a parameter or its number is not within the bounds.
+    pub fn named(&self, values: &BTreeMap<String, f64>) -> Result<Setting, String> {
+        let mut setting = self.base;
+        for (name, value) in values {
+            let Some(parameter) = self.parameters.iter().find(|parameter| parameter.role.to_string() == *name) else {
+                let known: Vec<String> = self.parameters.iter().map(|parameter| parameter.role.to_string()).collect();
+                return Err(format!("nothing that is tuned here is called `{name}`; expected {}", known.join(", ")));
+            };
+            let [low, high] = parameter.bounds;
+            if !(low..=high).contains(value) {
+                return Err(format!("{name} is {value}, not within its bounds {low:e} to {high:e}; --bounds sets others"));
+            }
+            self.put(&mut setting, parameter.role, *value);
+        }
+        Ok(setting)
     }
 
     /// The numbers in [0, 1] that give a setting, or the nearest within bounds.

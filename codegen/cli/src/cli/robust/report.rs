@@ -5,13 +5,11 @@ use std::fmt::Write as _;
 use serde::Serialize;
 use specgen_report::chart::{Axis, Chart, DOTS};
 
-use super::Arguments;
-use super::trajectory::Followed;
+use super::work::{Work, quoted};
 use crate::cli::table::{left, right, row};
 use crate::cli::ui::Outcome as Shown;
-use specgen_compiler::compile::Compiled;
 use specgen_studies::robust::quantiles::quantile;
-use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, Member, Outcome, Study};
+use specgen_studies::robust::{Deviation, Factor, Factors, Figures, Gate, Member, Outcome};
 
 /// Quantiles of the draws that are shown, %; 100 is the largest.
 const QUANTILES: [f64; 4] = [5.0, 50.0, 95.0, 100.0];
@@ -48,13 +46,11 @@ const ROWS: [Row; 6] = [
 /// What a study worked on, and what its machines did.
 #[derive(Clone, Copy)]
 pub(super) struct Found<'a> {
-    pub(super) arguments: &'a Arguments,
-    pub(super) compiled: &'a Compiled,
-    pub(super) factors: &'a Factors,
-    pub(super) followed: &'a Followed,
-    pub(super) study: &'a Study<'a>,
+    pub(super) work: &'a Work,
     pub(super) gate: &'a Gate,
     pub(super) reasons: &'a [String],
+    /// Whether it is one machine that was named.
+    pub(super) alone: bool,
     /// Machines that were asked for.
     pub(super) planned: usize,
     pub(super) runs: &'a [(Member, Outcome)],
@@ -125,14 +121,14 @@ struct Run<'a> {
 impl<'a> Found<'a> {
     pub(super) fn report(self) -> Report<'a> {
         Report {
-            name: &self.compiled.ir.name,
-            digest: &self.compiled.ir.digest,
-            trajectory: &self.followed.name,
-            frequency: self.followed.frequency,
-            seed: self.arguments.plant.seed,
-            noise: self.study.noise,
-            diverged_above_nm: self.study.bound * 1e9,
-            factors: self.factors,
+            name: &self.work.name,
+            digest: &self.work.digest,
+            trajectory: &self.work.trajectory,
+            frequency: self.work.frequency,
+            seed: self.work.seed,
+            noise: self.work.noise,
+            diverged_above_nm: self.work.bound * 1e9,
+            factors: &self.work.factors,
             planned: self.planned,
             diverged: self.runs.iter().filter(|(_, outcome)| outcome.figures().is_none()).count(),
             table: self.rows().map(|row| self.line(row)).collect(),
@@ -157,7 +153,7 @@ impl<'a> Found<'a> {
     }
 
     fn rows(&self) -> impl Iterator<Item = &'static Row> + use<> {
-        let platform = self.compiled.model.task_space.is_some();
+        let platform = self.work.platform;
         ROWS.iter().filter(move |row| platform || !row.platform_only)
     }
 
@@ -196,38 +192,15 @@ impl<'a> Found<'a> {
 
     /// The command that runs one member alone.
     fn replay(&self, member: &Member) -> String {
-        let Arguments { spec, vary, trajectory, frequency, plant, diverged_above, .. } = self.arguments;
-        let mut out = format!("specgen robust {} --replay {}", quoted(&spec.display().to_string()), member.name);
-        // Writing to a String cannot fail, here and below.
-        if plant.seed != 1 {
-            let _ = write!(out, " --seed {}", plant.seed);
-        }
-        if let Some(name) = trajectory {
-            let _ = write!(out, " --trajectory {}", quoted(name));
-        }
-        if let Some(hertz) = frequency {
-            let _ = write!(out, " --frequency {hertz}");
-        }
-        for given in vary {
-            let _ = write!(out, " --vary {}={}:{}", given.factor, given.range[0], given.range[1]);
-        }
-        if let Some(bound) = diverged_above {
-            let _ = write!(out, " --diverged-above '{bound:e} m'");
-        }
-        if let Some(path) = &plant.plant {
-            let _ = write!(out, " --plant {}", quoted(&path.display().to_string()));
-        }
-        if plant.no_noise {
-            out.push_str(" --no-noise");
-        }
-        out
+        let Work { spec, options, .. } = self.work;
+        format!("specgen robust {} --replay {}{options}", quoted(spec), member.name)
     }
 
     fn figures(&self, outcome: &Outcome) -> String {
         match outcome {
             Outcome::Ran(f) => {
                 let mut out = format!("{:.2} nm rms, {:.1} nm peak", f.error_nm, f.peak_nm);
-                if self.compiled.model.task_space.is_some() {
+                if self.work.platform {
                     let (rms, peak) = (f.orientation_nrad, f.orientation_peak_nrad);
                     let _ = write!(out, ", {rms:.1} nrad rms, {peak:.1} nrad peak");
                 }
@@ -323,7 +296,7 @@ impl Shown for Report<'_> {
             let _ = writeln!(out, "  {:<12}{low:>7.3} to {high:<7.3}({}{each})", one.factor.name(), one.origin);
         }
         match found.runs {
-            [(member, outcome)] if found.arguments.replay.is_some() => {
+            [(member, outcome)] if found.alone => {
                 let _ = writeln!(out, "{}: {}\n{}", member.name, found.figures(outcome), described(&member.deviation));
             }
             _ => self.figures(&mut out),
@@ -368,16 +341,6 @@ impl Report<'_> {
             let _ = writeln!(out, "worst {}: {name}: {}", line.row.name, self.found.figures(outcome));
             let _ = writeln!(out, "{}\n  replay: {replay}", described(&member.deviation));
         }
-    }
-}
-
-/// As a shell takes it for one word.
-fn quoted(text: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./+=:%,".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        text.to_owned()
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use host_sim::trajectory::PaperPath;
 
-use super::Arguments;
+use super::StudyArguments;
 use crate::cli::ui::Failure;
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::{self, TrajectoryKind};
@@ -24,7 +24,7 @@ pub(super) struct Followed {
 ///
 /// The spec's own paths are known by their names, with their own frequency unless one is asked for. The paper's names mean
 /// the paper's paths at the usual frequency, unless the spec gives another path that name.
-pub(super) fn chosen(arguments: &Arguments, compiled: &Compiled) -> Result<Followed, Failure> {
+pub(super) fn chosen(arguments: &StudyArguments, compiled: &Compiled) -> Result<Followed, Failure> {
     let platform = compiled.model.task_space.as_ref();
     let frequency = arguments.frequency.unwrap_or(FREQUENCY);
     let name = arguments.trajectory.as_deref().unwrap_or(if platform.is_some() { "case-1" } else { "leg" });

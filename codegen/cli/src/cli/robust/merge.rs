@@ -1,0 +1,56 @@
+//! `specgen robust merge`: the report of a study whose parts were run apart.
+
+use std::fs;
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::Results;
+use super::work::Part;
+use crate::cli::file::claim;
+use crate::cli::plot::Plot;
+use crate::cli::ui::{Failure, Ui};
+use specgen_studies::robust::shard;
+
+/// Arguments of `robust merge`.
+#[derive(Args, Debug)]
+#[command(after_help = crate::cli::examples::MERGE)]
+pub struct Arguments {
+    /// Files that --shard wrote, all of one study, in any order.
+    #[arg(value_name = "PART", required = true)]
+    parts: Vec<PathBuf>,
+    /// Write runs (CSV) and report (JSON) here.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    plot: Plot,
+}
+
+pub(super) fn run(arguments: &Arguments, ui: &Ui) -> Result<(), Failure> {
+    arguments.plot.wanted()?;
+    let mut read = Vec::new();
+    for path in &arguments.parts {
+        let name = path.display().to_string();
+        let text = fs::read_to_string(path)
+            .map_err(|error| Failure::Environment(format!("could not read `{name}`: {error}")))?;
+        let part = Part::read(&text).map_err(|why| Failure::Gate(format!("`{name}` {why}")))?;
+        if let Some((first, other)) = read.first()
+            && let Some((what, here, there)) = part.differs(other)
+        {
+            return Err(Failure::Gate(format!(
+                "`{name}` and `{first}` are of different studies: {what} is {here} here, {there} there"
+            )));
+        }
+        read.push((name, part));
+    }
+    let Some((_, first)) = read.first() else {
+        return Err(Failure::Usage("there is no part to merge".to_owned()));
+    };
+    let work = first.work.clone();
+    let plan = work.plan();
+    let parts: Vec<shard::Part> = read.into_iter().map(|(name, part)| part.named(name)).collect();
+    let runs = shard::merged(&plan, &parts).map_err(Failure::Gate)?;
+    let _claimed = arguments.output.as_deref().map(claim).transpose()?;
+    let results = Results { output: arguments.output.as_deref(), plot: &arguments.plot };
+    results.put(&work, false, plan.members.len(), &runs, ui, || {})
+}

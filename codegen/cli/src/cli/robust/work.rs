@@ -1,0 +1,238 @@
+//! What a study was asked to do, and a part of what it did, as a file.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use host_sim::plant::LegParameters;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+
+use super::StudyArguments;
+use super::trajectory::Followed;
+use crate::cli::file::write_file;
+use crate::cli::ui::{Failure, Outcome as Shown, Ui};
+use specgen_compiler::compile::Compiled;
+use specgen_studies::robust::{Factors, Gate, Member, Outcome, Plan, Shard, shard};
+use specgen_toolchain::sha256;
+
+/// Part of the stroke beyond which an error counts as diverged, unless asked otherwise.
+const BOUND: f64 = 0.05;
+/// What the file of a part says that it is.
+const FORMAT: &str = "specgen robust part";
+
+/// All that the report of a study depends on, but for its runs. Parts of one study have the same.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Work {
+    /// Version of specgen that ran it.
+    pub(super) specgen: String,
+    /// The spec's file, as it was named.
+    pub(super) spec: String,
+    /// Name of the platform.
+    pub(super) name: String,
+    /// Of the spec and its records.
+    pub(super) digest: String,
+    /// Whether it has `[control]`.
+    pub(super) platform: bool,
+    pub(super) trajectory: String,
+    /// Hz.
+    pub(super) frequency: f64,
+    pub(super) seed: u64,
+    pub(super) draws: u32,
+    pub(super) noise: bool,
+    /// SHA-256 of the parameters of the simulated leg.
+    pub(super) plant: String,
+    /// Error beyond which a run has diverged, m.
+    pub(super) bound: f64,
+    pub(super) factors: Factors,
+    /// Of the gate, m.
+    pub(super) max_error: Option<f64>,
+    /// Of the gate, rad.
+    pub(super) max_orientation: Option<f64>,
+    /// Of the gate, %.
+    pub(super) quantile: Option<f64>,
+    /// Options that were given and decide what a member is, each with a space before it.
+    pub(super) options: String,
+}
+
+impl Work {
+    /// Of the options, else of the spec.
+    pub(super) fn of(
+        arguments: &StudyArguments,
+        path: &Path,
+        compiled: &Compiled,
+        followed: &Followed,
+        leg: &LegParameters,
+    ) -> Result<Self, Failure> {
+        let declared = &compiled.model.robust;
+        let platform = compiled.model.task_space.is_some();
+        if arguments.max_orientation.is_some() && !platform {
+            return Err(Failure::Usage(
+                "--max-orientation is for a spec with [control]; legs with their own gauges have --max-error"
+                    .to_owned(),
+            ));
+        }
+        Ok(Self {
+            specgen: env!("CARGO_PKG_VERSION").to_owned(),
+            spec: path.display().to_string(),
+            name: compiled.ir.name.clone(),
+            digest: compiled.ir.digest.clone(),
+            platform,
+            trajectory: followed.name.clone(),
+            frequency: followed.frequency,
+            seed: arguments.plant.seed,
+            draws: arguments.draws,
+            noise: !arguments.plant.no_noise,
+            // Numbers are printed so that they read back to the same bits.
+            plant: sha256(format!("{leg:?}").as_bytes()),
+            bound: arguments.diverged_above.unwrap_or(BOUND * compiled.model.actuator.stroke),
+            factors: Factors::of(&compiled.model, &arguments.vary),
+            max_error: arguments.max_error.or(declared.max_error),
+            max_orientation: arguments.max_orientation.or(declared.max_orientation.filter(|_| platform)),
+            quantile: arguments.quantile,
+            options: options(arguments),
+        })
+    }
+
+    /// All machines.
+    pub(super) fn plan(&self) -> Plan {
+        Plan::new(&self.factors, self.draws, self.seed)
+    }
+
+    /// What must not be exceeded. Of one machine alone there is one figure.
+    pub(super) fn gate(&self, alone: bool) -> Gate {
+        Gate {
+            error_nm: self.max_error.map(|error| error * 1e9),
+            orientation_nrad: self.max_orientation.map(|error| error * 1e9),
+            quantile: self.quantile.filter(|_| !alone),
+        }
+    }
+}
+
+/// What a replay of a member has to be given as well.
+fn options(arguments: &StudyArguments) -> String {
+    let StudyArguments { vary, trajectory, frequency, plant, diverged_above, .. } = arguments;
+    let mut out = String::new();
+    // Writing to a String cannot fail, here and below.
+    if plant.seed != 1 {
+        let _ = write!(out, " --seed {}", plant.seed);
+    }
+    if let Some(name) = trajectory {
+        let _ = write!(out, " --trajectory {}", quoted(name));
+    }
+    if let Some(hertz) = frequency {
+        let _ = write!(out, " --frequency {hertz}");
+    }
+    for given in vary {
+        let _ = write!(out, " --vary {}={}:{}", given.factor, given.range[0], given.range[1]);
+    }
+    if let Some(bound) = diverged_above {
+        let _ = write!(out, " --diverged-above '{bound:e} m'");
+    }
+    if let Some(path) = &plant.plant {
+        let _ = write!(out, " --plant {}", quoted(&path.display().to_string()));
+    }
+    if plant.no_noise {
+        out.push_str(" --no-noise");
+    }
+    out
+}
+
+/// As a shell takes it for one word.
+pub(super) fn quoted(text: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./+=:%,".contains(c);
+    if !text.is_empty() && text.chars().all(plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
+}
+
+/// A member and what became of it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Ran {
+    member: Member,
+    outcome: Outcome,
+}
+
+impl From<(Member, Outcome)> for Ran {
+    fn from((member, outcome): (Member, Outcome)) -> Self {
+        Self { member, outcome }
+    }
+}
+
+/// What `--shard` writes.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Part {
+    pub(super) shard: Shard,
+    /// Machines of all parts.
+    pub(super) planned: usize,
+    pub(super) work: Work,
+    pub(super) runs: Vec<Ran>,
+}
+
+impl Part {
+    pub(super) fn write(&self, file: &Path, ui: &Ui) -> Result<(), Failure> {
+        let mut document = json!(self);
+        document["format"] = json!(FORMAT);
+        write_file(file, format!("{document:#}\n").as_bytes())?;
+        ui.result(&Written {
+            file: file.display().to_string(),
+            shard: self.shard,
+            planned: self.planned,
+            machines: self.runs.len(),
+            diverged: self.runs.iter().filter(|ran| ran.outcome.figures().is_none()).count(),
+        });
+        Ok(())
+    }
+
+    /// Of the text of a file; in words why not.
+    pub(super) fn read(text: &str) -> Result<Self, String> {
+        let document: Value = serde_json::from_str(text).map_err(|error| format!("is no JSON: {error}"))?;
+        if document["format"] != FORMAT {
+            return Err("was not written by specgen robust --shard".to_owned());
+        }
+        // The version first: another one may have other fields.
+        let (version, ours) = (&document["work"]["specgen"], env!("CARGO_PKG_VERSION"));
+        if version != ours {
+            return Err(format!("was written by specgen {version}, this is {ours}; run all parts with one version"));
+        }
+        serde_json::from_value(document).map_err(|error| format!("is not a whole part: {error}"))
+    }
+
+    /// The first thing in which this part is of another study than `other`: what it is called, here and there.
+    pub(super) fn differs(&self, other: &Self) -> Option<(String, Value, Value)> {
+        let fields = |part: &Self| match json!(part.work) {
+            Value::Object(fields) => fields,
+            _ => Map::new(),
+        };
+        let there = fields(other);
+        let mut ours = fields(self).into_iter();
+        ours.find_map(|(name, value)| {
+            let other = &there[&name];
+            (value != *other).then(|| (name.clone(), value, other.clone()))
+        })
+    }
+
+    pub(super) fn named(self, name: String) -> shard::Part {
+        let runs = self.runs.into_iter().map(|Ran { member, outcome }| (member, outcome)).collect();
+        shard::Part { name, shard: self.shard, runs }
+    }
+}
+
+/// A part that was written.
+#[derive(Serialize)]
+struct Written {
+    file: String,
+    shard: Shard,
+    planned: usize,
+    machines: usize,
+    diverged: usize,
+}
+
+impl Shown for Written {
+    fn text(&self) -> String {
+        let Self { file, shard: Shard { index, of }, planned, machines, diverged } = self;
+        format!("wrote part {index} of {of} to {file}: {machines} of {planned} machines, {diverged} diverged\n")
+    }
+}
