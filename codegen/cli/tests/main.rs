@@ -32,5 +32,6 @@ mod report;
 mod reproducible;
 mod robust;
 mod rt_pc;
+mod scale;
 mod support;
 mod tune;

@@ -193,8 +193,18 @@ fn parts(folder: &Folder, of: u32) -> Vec<String> {
 }
 
 const STUDY: [&str; 12] = [
-    "robust", "legs.toml", "--draws", "7", "--frequency", "20", "--seed", "18446744073709551615", "--vary", "mass=20%",
-    "--max-error", "1 nm",
+    "robust",
+    "legs.toml",
+    "--draws",
+    "7",
+    "--frequency",
+    "20",
+    "--seed",
+    "18446744073709551615",
+    "--vary",
+    "mass=20%",
+    "--max-error",
+    "1 nm",
 ];
 
 #[test]
@@ -236,7 +246,11 @@ fn parts_that_do_not_fit_are_refused_by_name() {
         folder.write("other.json", text.replace(old, new));
         refused(&[one, "other.json", three], 1, says);
     };
-    with("\"draws\": 7", "\"draws\": 8", "`other.json` and `part-1-3.json` are of different studies: draws is 8 here, 7 there");
+    with(
+        "\"draws\": 7",
+        "\"draws\": 8",
+        "`other.json` and `part-1-3.json` are of different studies: draws is 8 here, 7 there",
+    );
     with("\"frequency\": 20.0", "\"frequency\": 21.0", "frequency is 21.0 here");
     with("\"noise\": true", "\"noise\": false", "noise is false here");
     with("\"plant\": \"", "\"plant\": \"0", "plant is ");
@@ -278,7 +292,8 @@ fn a_killed_shard_leaves_nothing_and_is_run_again() {
     for (signal, code) in [(rustix::process::Signal::INT, Some(130)), (rustix::process::Signal::KILL, None)] {
         let mut command = folder.command();
         command.args(["robust", "legs.toml", "--draws", "3000", "--threads", "1", "--shard", "1/2", "-o", "part.json"]);
-        let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        let mut child =
+            command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped()).spawn().unwrap();
         let lines = std::io::BufReader::new(child.stderr.take().unwrap());
         let mut lines = std::io::BufRead::lines(lines);
         assert!(lines.any(|line| line.unwrap().starts_with("robust: ")));

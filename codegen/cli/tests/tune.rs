@@ -243,11 +243,15 @@ fn candidates_of_a_file_have_the_scores_of_the_search() {
     assert_ne!(candidates[3]["cost"], candidates[0]["cost"], "the comparison can fail");
     assert_eq!(score(&file, "1"), found);
     // What there is to propose.
-    let names: Vec<Value> = score("[]", "1")["parameters"].as_array().unwrap().iter().map(|one| one["name"].clone()).collect();
+    let names: Vec<Value> =
+        score("[]", "1")["parameters"].as_array().unwrap().iter().map(|one| one["name"].clone()).collect();
     assert_eq!(names, ["level", "drift"]);
     for (text, says) in [
         ("[{\"level\": 2}]", "candidate 0, from 0: level is 2, not within its bounds"),
-        ("[{}, {\"kp[0]\": 1}]", "candidate 1, from 0: nothing that is tuned here is called `kp[0]`; expected level, drift"),
+        (
+            "[{}, {\"kp[0]\": 1}]",
+            "candidate 1, from 0: nothing that is tuned here is called `kp[0]`; expected level, drift",
+        ),
         ("[{\"level\": null}]", "expected an array of objects"),
         ("{}", "expected an array of objects"),
     ] {

@@ -220,7 +220,9 @@ impl Space {
             };
             let [low, high] = parameter.bounds;
             if !(low..=high).contains(value) {
-                return Err(format!("{name} is {value}, not within its bounds {low:e} to {high:e}; --bounds sets others"));
+                return Err(format!(
+                    "{name} is {value}, not within its bounds {low:e} to {high:e}; --bounds sets others"
+                ));
             }
             self.put(&mut setting, parameter.role, *value);
         }

@@ -18,8 +18,8 @@ use specgen_studies::tuning::{self, Evaluation, Setting, Space};
 /// The candidates of a file; every name and number is looked at before any is run.
 pub(super) fn read(file: &Path, space: &Space) -> Result<Vec<Setting>, Failure> {
     let shown = file.display();
-    let text = fs::read_to_string(file)
-        .map_err(|error| Failure::Environment(format!("could not read `{shown}`: {error}")))?;
+    let text =
+        fs::read_to_string(file).map_err(|error| Failure::Environment(format!("could not read `{shown}`: {error}")))?;
     let asked: Vec<BTreeMap<String, f64>> = serde_json::from_str(&text).map_err(|error| {
         Failure::Gate(format!("`{shown}`: expected an array of objects such as [{{\"level\": 0.2}}]: {error}"))
     })?;
@@ -68,8 +68,7 @@ pub(super) fn run(job: &Job, asked: &[Setting], ui: &Ui) -> Result<(), Failure> 
     if !asked.is_empty() {
         ui.progress("preparing the machine: pre-cycle, settling, arming");
         let case = job.case(&own, &job.tuned_on())?;
-        let mut workers: Vec<Controller> =
-            (0..job.threads.clamp(1, asked.len())).map(|_| case.worker()).collect();
+        let mut workers: Vec<Controller> = (0..job.threads.clamp(1, asked.len())).map(|_| case.worker()).collect();
         let settings: Vec<&Setting> = asked.iter().collect();
         let verdicts = evaluate(&settings, &job.feasibility, &case, &mut workers, interrupt::heed());
         for (setting, verdict) in asked.iter().zip(verdicts) {
