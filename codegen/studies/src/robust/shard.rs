@@ -156,7 +156,7 @@ mod tests {
         };
         let [one, two, three] = [1, 2, 3].map(|index| part(&plan, index, 3));
         refused(&[], "no part");
-        refused(&[one.clone()], "missing: --shard 2/3, 3/3");
+        refused(std::slice::from_ref(&one), "missing: --shard 2/3, 3/3");
         refused(&[one.clone(), part(&plan, 2, 4)], "`2.json` is part 2 of 4, `1.json` one of 3");
         let mut other = two.clone();
         other.name = "again.json".to_owned();
