@@ -9,9 +9,11 @@ use std::time::{Duration, Instant};
 
 use rustix::process::Signal;
 use specgen::operate::{Place, Session, SocketLine};
+use specgen_link::Request;
 use specgen_link::client::Timeout;
 
-use super::{Bench, DISARMED, HOLDING, RUNNING, Running, signal, wait_for};
+use super::host::Host;
+use super::{Bench, DISARMED, HOLDING, NONE, RUNNING, Running, signal, wait_for};
 
 /// How far the platform may be from its target once it has arrived, µm: the gauges' noise many times over, and nothing of a move.
 const THERE: f64 = 0.05;
@@ -120,6 +122,12 @@ pub fn clients_move_it_and_none_disturbs_it(bench: &Bench) {
     let mut looker = Session::open(SocketLine::open(&link).unwrap(), Timeout::SOCKET, None).unwrap();
     let mut look = || looker.place().unwrap().unwrap();
     let mut first = bridge.client();
+
+    // Orders of the link that another host has are refused, and the bridge goes on.
+    let mut host = Host::open(&link, 7).unwrap();
+    host.done(&Request::Supervise { request: NONE });
+    assert_eq!([first.order("SVO X 1"), first.ask("SVO? X")], ["89", "X=0"]);
+    drop(host);
 
     who_is_there(&mut first, &mut look);
     moves_are_made_or_refused_before_anything_moves(&mut first, &mut look);

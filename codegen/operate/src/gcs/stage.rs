@@ -174,9 +174,23 @@ impl<P: Port> Stage<P> {
             self.goal = None;
             self.mishap = Some(Code::Position);
             // It is not to be tried again.
-            self.halt()?;
+            let halted = self.halt();
+            self.granted(halted)?;
         }
-        self.rise()
+        let risen = self.rise();
+        self.granted(risen)
+    }
+
+    /// What another host or a wave keeps it from is no broken link: whoever asked for it is told.
+    fn granted(&mut self, done: Result<(), ClientError>) -> Result<(), ClientError> {
+        match done {
+            Err(ClientError::Refused(Refusal::Busy | Refusal::State)) => {
+                self.rising = None;
+                self.mishap = Some(Code::NotNow);
+                Ok(())
+            }
+            other => other,
+        }
     }
 
     /// When the device must hear of its host again.
