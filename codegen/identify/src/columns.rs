@@ -16,6 +16,7 @@ use super::findings::Findings;
 use dialect::{decoded, is_blank, is_comment, split};
 use input::Input;
 use specgen_language::diagnostic::{Code, codes};
+use specgen_language::interrupt;
 
 pub(crate) use line_numbers::LineNumbers;
 
@@ -171,6 +172,7 @@ impl Lines<'_> {
         let mut columns = vec![Vec::new(); wanted.len()];
         let mut text = Vec::new();
         loop {
+            interrupt::point();
             let line = match self.input.next(&mut text) {
                 Ok(Some(line)) => line,
                 Ok(None) => break,

@@ -17,6 +17,7 @@ use super::record::Record;
 use super::regressor::Plane;
 use super::{DeadTime, Options, coverage, dead_time, prior, selection};
 use specgen_language::diagnostic::{Diagnostic, codes};
+use specgen_language::interrupt;
 use specgen_numerics::nnls;
 
 /// Grids that are tried.
@@ -141,6 +142,7 @@ fn choose(record: &Record, drive: [f64; 2], dead_time: DeadTime, findings: &mut 
             let mut gram = &whole - &part.gram;
             prior::add(grid, &mut gram);
             let rhs: Vec<f64> = whole_rhs.iter().zip(&part.rhs[0]).map(|(sum, b)| sum - b).collect();
+            interrupt::point();
             let solved = match &near {
                 Some(near) => nnls::solve_from(&gram, &rhs, near),
                 None => nnls::solve(&gram, &rhs),

@@ -12,6 +12,7 @@ use super::record::Record;
 use super::regressor::{Plane, Term};
 use super::staircase::Staircase;
 use crate::everett::EverettTable;
+use specgen_language::interrupt;
 
 pub(super) use sums::Sums;
 
@@ -44,6 +45,7 @@ pub fn each_row_from(
 ) {
     let mut row = Vec::new();
     for (k, &u) in drive.iter().enumerate().skip(first) {
+        interrupt::point();
         memory.push(u);
         plane.row(&memory, &mut row);
         visit(k, &row);
@@ -99,6 +101,7 @@ pub fn walk(
     let mut row = Vec::new();
     let mut at = 0;
     for (k, &u) in record.drive.iter().enumerate().skip(first) {
+        interrupt::point();
         memory.push(u);
         let Some(branch) = branches.get(at) else { break };
         if k < branch.first {

@@ -53,15 +53,18 @@ def read_table(path: str | PathLike[str]) -> Table:
     """Reads a CSV file with one line of names; columns with anything but numbers are text."""
     with open(path, encoding="utf-8") as file:
         names = file.readline().rstrip("\n").split(",")
-        rows = [line.rstrip("\n").split(",") for line in file]
-    if not all(len(row) == len(names) for row in rows):
-        raise ValueError(f"{path}: a line has not {len(names)} fields")
-    columns: list[NDArray[Any]] = []
-    for column in zip(*rows) if rows else [()] * len(names):
+        first = file.readline().rstrip("\n").split(",")
+    numbers = [place for place, field in enumerate(first) if _is_number(field)]
+    columns: list[NDArray[Any]] = [np.empty(0)] * len(names)
+    while first != [""]:
         try:
-            columns.append(np.array(column, dtype=np.float64))
+            for places, kind in ((numbers, np.float64), (_others(numbers, len(names)), np.str_)):
+                for place, column in zip(places, _columns(path, places, kind)):
+                    columns[place] = column
+            break
         except ValueError:
-            columns.append(np.array(column, dtype=np.str_))
+            # One of them has something else further down.
+            numbers = [place for place in numbers if _all_numbers(path, place)]
     table: dict[str, NDArray[Any]] = {}
     units: dict[str, tuple[str | None, ...]] = {}
     sixes: dict[str, list[tuple[NDArray[Any], str | None]]] = {}
@@ -76,3 +79,28 @@ def read_table(path: str | PathLike[str]) -> Table:
         if any(unit for _, unit in members):
             units[name] = tuple(unit for _, unit in members)
     return Table(table, units)
+
+
+def _columns(path: str | PathLike[str], places: list[int], kind: type[Any]) -> Any:
+    if not places:
+        return []
+    rows = np.loadtxt(
+        path, kind, comments=None, delimiter=",", skiprows=1, usecols=places, ndmin=2, encoding="utf-8", quotechar=None
+    )
+    return rows.T
+
+
+def _others(numbers: list[int], count: int) -> list[int]:
+    return [place for place in range(count) if place not in numbers]
+
+
+def _is_number(field: str) -> bool:
+    try:
+        float(field)
+    except ValueError:
+        return False
+    return True
+
+
+def _all_numbers(path: str | PathLike[str], place: int) -> bool:
+    return all(map(_is_number, _columns(path, [place], np.str_)[0]))

@@ -8,12 +8,12 @@ import time
 from pathlib import Path
 
 import pytest
-from conftest import REFERENCE
+from conftest import REFERENCE, REPOSITORY
 
 HEAD = "import specgen, sys\ndef said(line): print(line, flush=True)\n"
 
 
-def interrupted(body: str, when: str) -> tuple[float, str, int]:
+def interrupted(body: str, when: str, after: float = 0.0) -> tuple[float, str, int]:
     """Seconds from the signal to the end, output and exit code of a program that is interrupted when it has said `when`."""
     program = subprocess.Popen([sys.executable, "-c", HEAD + body], stdout=subprocess.PIPE, text=True, stderr=subprocess.STDOUT)
     assert program.stdout is not None
@@ -22,6 +22,7 @@ def interrupted(body: str, when: str) -> tuple[float, str, int]:
         text += line
         if when in line:
             break
+    time.sleep(after)
     program.send_signal(signal.SIGINT)
     begun = time.monotonic()
     text += program.communicate(timeout=60)[0]
@@ -39,6 +40,29 @@ except KeyboardInterrupt:
     assert text.endswith("interrupted\n") and code == 0, text
     # A wave of 800 s.
     assert seconds < 5, f"{seconds} s"
+
+
+def test_an_identification_ends_at_ctrl_c(tmp_path: Path) -> None:
+    short = (REPOSITORY / "specs/records/reference-forc.csv").read_text().splitlines()
+    comments = [line for line in short if line.startswith("#")]
+    names, *rows = [line for line in short if not line.startswith("#")]
+    times = [float(row.split(",")[0]) for row in rows]
+    step = times[1] - times[0]
+    record = tmp_path / "long.csv"
+    with record.open("w") as file:
+        print(*comments, names, sep="\n", file=file)
+        for number in range(2_000_000):
+            print(f"{times[0] + number * step!r},{rows[number % len(rows)].split(',', 1)[1]}", file=file)
+    body = f"""
+print("begun", flush=True)
+try:
+    specgen.identify({str(record)!r}, (0, 100), grid=48)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    seconds, text, code = interrupted(body, "begun", after=1.0)
+    assert text.endswith("interrupted\n") and code == 0, text
+    assert seconds < 3, f"{seconds} s"
 
 
 def test_machines_that_are_done_make_a_result() -> None:

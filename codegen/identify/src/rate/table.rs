@@ -9,6 +9,7 @@ use super::prepare::Prepared;
 use crate::everett::EverettTable;
 use crate::regressor::Plane;
 use crate::{normal, prior};
+use specgen_language::interrupt;
 use specgen_numerics::nnls::{self, Failure};
 
 /// Tables for the same drives and one displacement after the other: what only depends on the drives is kept.
@@ -41,6 +42,7 @@ impl<'a> Tables<'a> {
         // To order one: the tolerances of the solver are relative, and so small weights keep their digits.
         let scale = 1.0 / size(&sum);
         sum.iter_mut().for_each(|b| *b *= scale);
+        interrupt::point();
         let weights = nnls::solve_from(&self.gram, &sum, &self.near.borrow())?.weights;
         let table = normal::table_of(self.plane, &weights, 1.0 / scale);
         self.near.replace(weights);
