@@ -11,6 +11,7 @@ mod examples;
 mod export;
 mod findings;
 mod firmware;
+mod fmu;
 mod gains;
 mod guide;
 mod interrupt;

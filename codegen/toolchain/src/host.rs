@@ -51,6 +51,48 @@ pub fn build_program(dir: &Path, folder: &str, target_dir: &Path) -> Result<Path
     Ok(program.path)
 }
 
+/// Builds `sources/fmu.c` together with the controller of the workspace `dir` into one shared library, `target_dir/NAME` with the
+/// ending of this host, and returns its path. Nothing of the controller is visible from outside, so that a process may load several.
+///
+/// # Errors
+/// [`TargetError::MissingTool`] without cargo or a C compiler, [`TargetError::PanicPath`] if the controller can panic,
+/// [`TargetError::BuildFailed`] for everything else that these say.
+pub fn build_unit(sources: &Path, dir: &Path, target_dir: &Path, name: &str) -> Result<PathBuf, TargetError> {
+    let package = dir.join("host");
+    let mut command = clean_command(cargo()?);
+    command.args(["rustc", "--release", "--lib", "--crate-type", "staticlib"]);
+    let request =
+        BuildRequest { package: &package, target_dir: &target_dir.join("unit"), rustc_args: &[], locked: false };
+    let archive = cargo_artifact(&mut command, &request, &package.display().to_string(), |message| {
+        let files = message["filenames"].as_array()?.iter().filter_map(|file| file.as_str());
+        files.map(PathBuf::from).find(|file| file.extension().is_some_and(|extension| extension == "a"))
+    })?;
+    let compiler = find_in_path("cc").ok_or_else(|| TargetError::MissingTool {
+        tool: "cc".into(),
+        looked: "cc on PATH".into(),
+        command: "apt-get install gcc libc6-dev".into(),
+    })?;
+    let library = target_dir.join(format!("{name}{}", std::env::consts::DLL_SUFFIX));
+    let mut command = clean_command(compiler);
+    command.args(["-std=c11", "-O2", "-Wall", "-Wextra", "-fPIC", "-fvisibility=hidden", "-shared"]);
+    command.arg(sources.join("fmu.c")).arg(&archive.path).arg("-o").arg(&library);
+    if cfg!(target_os = "linux") {
+        // Nothing undefined: what calls a panic does not link.
+        command.args(["-Wl,-z,defs", "-Wl,--exclude-libs,ALL", "-lc"]);
+    }
+    let what = sources.join("fmu.c").display().to_string();
+    let done = command.output().map_err(|error| TargetError::io("running cc on", &sources.join("fmu.c"), error))?;
+    if done.status.success() {
+        return Ok(library);
+    }
+    let text = String::from_utf8_lossy(&done.stderr).into_owned();
+    Err(if text.contains("specgen_panic_path_remains") {
+        TargetError::PanicPath { what, text }
+    } else {
+        TargetError::BuildFailed { what, text }
+    })
+}
+
 fn cargo() -> Result<PathBuf, TargetError> {
     find_in_path("cargo").ok_or_else(|| TargetError::MissingTool {
         tool: "cargo".into(),

@@ -215,6 +215,10 @@ pub const EXPORT: &str = "\
 Examples:
   specgen export c platform.toml -o c      # prints the line that compiles it";
 
+pub const EXPORT_FMU: &str = "\
+Examples:
+  specgen export fmu platform.toml -o fmu   # for Simulink, Dymola, OMSimulator";
+
 pub const GAINS: &str = "\
 Examples:
   specgen identify gains run.rec --spec platform.toml -o gains

@@ -1,5 +1,7 @@
 //! `specgen export`: the controller for programs that are not ours.
 
+mod fmu;
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
@@ -53,6 +55,8 @@ pub struct Arguments {
 enum Kind {
     /// A C header, the library for this host, and two sources that use them: `tick.c` for firmware, `example.c` that runs it.
     C(C),
+    /// An FMI 2.0 co-simulation unit of the controller under its supervisor, sources included.
+    Fmu(fmu::Arguments),
 }
 
 /// Arguments of `export c`.
@@ -67,7 +71,10 @@ struct C {
 }
 
 pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
-    let Kind::C(C { spec, output }) = &arguments.kind;
+    let C { spec, output } = match &arguments.kind {
+        Kind::C(arguments) => arguments,
+        Kind::Fmu(arguments) => return fmu::run(arguments, ui),
+    };
     let compiled = spec::compiled(spec, ui)?;
     let _claimed = claim(output)?;
     let scratch = Scratch::new().map_err(environment)?;
@@ -77,13 +84,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let library = build_library(&folder, &scratch.path().join("target"))?;
     let bytes = fs::read(&library).map_err(environment)?;
     let machine = Supervised::new(Controller::load(&library).map_err(environment)?).map_err(environment)?;
-    if let Some(layout) = machine.controller().layouts().iter().find(|layout| layout.align() > ALIGNMENT) {
-        let message = format!(
-            "the controller's memory is aligned to {} bytes, that of a C header to {ALIGNMENT}",
-            layout.align()
-        );
-        return Err(Failure::Environment(message));
-    }
+    fits(&machine)?;
     let name = format!("{}controller{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let files = [
         ("controller.h".to_owned(), header(&machine).into_bytes()),
@@ -95,6 +96,17 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let names = files.iter().map(|(name, _)| name.clone()).collect();
     ui.result(&Exported { folder: output.display().to_string(), files: names });
     Ok(())
+}
+
+/// Whether its memory can be that of a C header.
+fn fits(machine: &Supervised) -> Result<(), Failure> {
+    match machine.controller().layouts().iter().find(|layout| layout.align() > ALIGNMENT) {
+        None => Ok(()),
+        Some(layout) => Err(Failure::Environment(format!(
+            "the controller's memory is aligned to {} bytes, that of a C header to {ALIGNMENT}",
+            layout.align()
+        ))),
+    }
 }
 
 /// Files that were written.

@@ -1,0 +1,348 @@
+/* FMI 2.0 co-simulation of the supervised controller, over controller.h. Variables are the words of a tick: inputs, outputs, settings, in
+   this order; fmu.h has their kinds. A step from t to t + h runs the ticks k with t <= k*period < t + h, t counted from the start of
+   the experiment, all of them with the inputs as they are: with h = period it is one tick. Outputs are zero before the first. */
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "controller.h"
+#include "fmu.h"
+
+#if defined(_WIN32)
+#define FMI2_EXPORT __declspec(dllexport)
+#else
+#define FMI2_EXPORT __attribute__((visibility("default")))
+#endif
+
+/* Types and states of FMI 2.0, sections 2.1.2 to 2.1.5 and 4.2. */
+typedef void *fmi2Component;
+typedef void *fmi2ComponentEnvironment;
+typedef void *fmi2FMUstate;
+typedef unsigned int fmi2ValueReference;
+typedef double fmi2Real;
+typedef int fmi2Integer;
+typedef int fmi2Boolean;
+typedef char fmi2Char;
+typedef const fmi2Char *fmi2String;
+typedef char fmi2Byte;
+typedef enum { fmi2OK, fmi2Warning, fmi2Discard, fmi2Error, fmi2Fatal, fmi2Pending } fmi2Status;
+typedef enum { fmi2ModelExchange, fmi2CoSimulation } fmi2Type;
+typedef enum { fmi2DoStepStatus, fmi2PendingStatus, fmi2LastSuccessfulTime, fmi2Terminated } fmi2StatusKind;
+typedef void (*fmi2CallbackLogger)(fmi2ComponentEnvironment, fmi2String, fmi2Status, fmi2String, fmi2String, ...);
+typedef struct {
+    fmi2CallbackLogger logger;
+    void *(*allocateMemory)(size_t, size_t);
+    void (*freeMemory)(void *);
+    void (*stepFinished)(fmi2ComponentEnvironment, fmi2Status);
+    fmi2ComponentEnvironment componentEnvironment;
+} fmi2CallbackFunctions;
+
+enum {
+    FIRST_OUTPUT = SPECGEN_MACHINE_INPUT_WORDS,
+    FIRST_SETTING = FIRST_OUTPUT + SPECGEN_MACHINE_OUTPUT_WORDS,
+    VARIABLES = FIRST_SETTING + SPECGEN_CONFIG_WORDS
+};
+
+/* What a step changes: this is the state of the FMU. */
+typedef struct {
+    specgen_config config;
+    specgen_machine machine;
+    uint64_t words[VARIABLES];
+    double start;
+    uint64_t ticks;
+    int settings_changed;
+} Content;
+
+typedef struct {
+    const fmi2CallbackFunctions *callbacks;
+    const char *name;
+    Content content;
+} Instance;
+
+static fmi2Status refuse(const Instance *instance, const char *message) {
+    if (instance->callbacks->logger != NULL) {
+        instance->callbacks->logger(
+            instance->callbacks->componentEnvironment, instance->name, fmi2Error, "logStatusError", message);
+    }
+    return fmi2Error;
+}
+
+static void reset(Content *content) {
+    memset(content, 0, sizeof *content);
+    specgen_config_default(content->words + FIRST_SETTING);
+    specgen_machine_reset(&content->machine);
+    content->settings_changed = 1;
+}
+
+/* Settings act together: single ones may be out of range until the last of them is set. */
+static fmi2Status take_settings(Instance *instance) {
+    if (instance->content.settings_changed) {
+        if (specgen_config_load(&instance->content.config, instance->content.words + FIRST_SETTING) != 0) {
+            return refuse(instance, "a setting is out of its range: docs/settings.md of specgen has them");
+        }
+        instance->content.settings_changed = 0;
+    }
+    return fmi2OK;
+}
+
+FMI2_EXPORT const char *fmi2GetTypesPlatform(void) {
+    return "default";
+}
+
+FMI2_EXPORT const char *fmi2GetVersion(void) {
+    return "2.0";
+}
+
+FMI2_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count, const fmi2String categories[]) {
+    (void)c, (void)on, (void)count, (void)categories;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                                          const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging) {
+    Instance *instance;
+    size_t length;
+    char *copy;
+    (void)resources, (void)visible, (void)logging;
+    if (callbacks == NULL || callbacks->allocateMemory == NULL || callbacks->freeMemory == NULL || name == NULL ||
+        guid == NULL || type != fmi2CoSimulation || strcmp(guid, FMU_GUID) != 0 || specgen_check() != 0) {
+        return NULL;
+    }
+    length = strlen(name) + 1;
+    instance = (Instance *)callbacks->allocateMemory(1, sizeof(Instance) + length);
+    if (instance == NULL) {
+        return NULL;
+    }
+    copy = (char *)(instance + 1);
+    memcpy(copy, name, length);
+    instance->callbacks = callbacks;
+    instance->name = copy;
+    reset(&instance->content);
+    return instance;
+}
+
+FMI2_EXPORT void fmi2FreeInstance(fmi2Component c) {
+    if (c != NULL) {
+        ((Instance *)c)->callbacks->freeMemory(c);
+    }
+}
+
+FMI2_EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
+                                           fmi2Boolean stop_defined, fmi2Real stop) {
+    (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
+    ((Instance *)c)->content.start = start;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+    (void)c;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    return take_settings((Instance *)c);
+}
+
+FMI2_EXPORT fmi2Status fmi2Terminate(fmi2Component c) {
+    (void)c;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2Reset(fmi2Component c) {
+    reset(&((Instance *)c)->content);
+    return fmi2OK;
+}
+
+static int is_a(fmi2ValueReference variable, char kind) {
+    return variable < VARIABLES && FMU_KINDS[variable] == kind;
+}
+
+static int is_settable(fmi2ValueReference variable) {
+    return variable < FIRST_OUTPUT || variable >= FIRST_SETTING;
+}
+
+FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference variables[], size_t count, fmi2Real values[]) {
+    const Instance *instance = (const Instance *)c;
+    size_t k;
+    for (k = 0; k < count; k++) {
+        if (!is_a(variables[k], 'r')) {
+            return refuse(instance, "fmi2GetReal: a variable is not real");
+        }
+        values[k] = specgen_to_real(instance->content.words[variables[k]]);
+    }
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference variables[], size_t count, fmi2Integer values[]) {
+    const Instance *instance = (const Instance *)c;
+    size_t k;
+    for (k = 0; k < count; k++) {
+        if (!is_a(variables[k], 'i')) {
+            return refuse(instance, "fmi2GetInteger: a variable is not whole");
+        }
+        values[k] = (fmi2Integer)(uint32_t)instance->content.words[variables[k]];
+    }
+    return fmi2OK;
+}
+
+static fmi2Status set(Instance *instance, fmi2ValueReference variable, char kind, uint64_t word) {
+    if (!is_a(variable, kind) || !is_settable(variable)) {
+        return refuse(instance, "a variable is of another type or cannot be set");
+    }
+    instance->content.words[variable] = word;
+    instance->content.settings_changed |= variable >= FIRST_SETTING;
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference variables[], size_t count, const fmi2Real values[]) {
+    fmi2Status status = fmi2OK;
+    size_t k;
+    for (k = 0; k < count && status == fmi2OK; k++) {
+        status = set((Instance *)c, variables[k], 'r', specgen_of_real((specgen_real)values[k]));
+    }
+    return status;
+}
+
+FMI2_EXPORT fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference variables[], size_t count,
+                                      const fmi2Integer values[]) {
+    fmi2Status status = fmi2OK;
+    size_t k;
+    for (k = 0; k < count && status == fmi2OK; k++) {
+        status = set((Instance *)c, variables[k], 'i', (uint32_t)values[k]);
+    }
+    return status;
+}
+
+/* There are no variables of other types. */
+static fmi2Status none(fmi2Component c, size_t count) {
+    return count == 0 ? fmi2OK : refuse((const Instance *)c, "there is no variable of this type");
+}
+
+FMI2_EXPORT fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference v[], size_t count, fmi2Boolean values[]) {
+    (void)v, (void)values;
+    return none(c, count);
+}
+
+FMI2_EXPORT fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference v[], size_t count, fmi2String values[]) {
+    (void)v, (void)values;
+    return none(c, count);
+}
+
+FMI2_EXPORT fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference v[], size_t count, const fmi2Boolean values[]) {
+    (void)v, (void)values;
+    return none(c, count);
+}
+
+FMI2_EXPORT fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference v[], size_t count, const fmi2String values[]) {
+    (void)v, (void)values;
+    return none(c, count);
+}
+
+FMI2_EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    Instance *instance = (Instance *)c;
+    if (*state == NULL) {
+        *state = instance->callbacks->allocateMemory(1, sizeof(Content));
+        if (*state == NULL) {
+            return refuse(instance, "there is no memory for a state");
+        }
+    }
+    memcpy(*state, &instance->content, sizeof(Content));
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+    memcpy(&((Instance *)c)->content, state, sizeof(Content));
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    if (*state != NULL) {
+        ((Instance *)c)->callbacks->freeMemory(*state);
+        *state = NULL;
+    }
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
+    (void)state, (void)size;
+    return refuse((const Instance *)c, "a state is not serialised");
+}
+
+FMI2_EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
+    (void)state, (void)bytes, (void)size;
+    return refuse((const Instance *)c, "a state is not serialised");
+}
+
+FMI2_EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
+    (void)bytes, (void)size, (void)state;
+    return refuse((const Instance *)c, "a state is not serialised");
+}
+
+FMI2_EXPORT fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t unknowns,
+                                                    const fmi2ValueReference known[], size_t knowns, const fmi2Real dk[],
+                                                    fmi2Real du[]) {
+    (void)unknown, (void)unknowns, (void)known, (void)knowns, (void)dk, (void)du;
+    return refuse((const Instance *)c, "there are no directional derivatives");
+}
+
+FMI2_EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference v[], size_t count,
+                                                   const fmi2Integer order[], const fmi2Real values[]) {
+    (void)v, (void)count, (void)order, (void)values;
+    return refuse((const Instance *)c, "inputs are held, not extrapolated");
+}
+
+FMI2_EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference v[], size_t count,
+                                                    const fmi2Integer order[], fmi2Real values[]) {
+    (void)v, (void)count, (void)order, (void)values;
+    return refuse((const Instance *)c, "outputs have no derivatives");
+}
+
+FMI2_EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real from, fmi2Real step, fmi2Boolean no_way_back) {
+    Instance *instance = (Instance *)c;
+    Content *content = &instance->content;
+    /* A millionth of a period: times of importers are sums of rounded steps. */
+    const double end = (from - content->start + step) / FMU_PERIOD - 1e-6;
+    (void)no_way_back;
+    if (take_settings(instance) != fmi2OK) {
+        return fmi2Error;
+    }
+    /* Not for a time that is no number, or farther than ticks are counted. */
+    if (!(end < 9e15)) {
+        return refuse(instance, "the end of a step is not a time");
+    }
+    while ((double)content->ticks < end) {
+        specgen_machine_step(
+            &content->config, &content->machine, content->words, content->words + FIRST_OUTPUT);
+        content->ticks++;
+    }
+    return fmi2OK;
+}
+
+FMI2_EXPORT fmi2Status fmi2CancelStep(fmi2Component c) {
+    return refuse((const Instance *)c, "a step is over when it returns");
+}
+
+FMI2_EXPORT fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
+    (void)c, (void)kind, (void)value;
+    return fmi2Discard;
+}
+
+FMI2_EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+    (void)c, (void)kind, (void)value;
+    return fmi2Discard;
+}
+
+FMI2_EXPORT fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value) {
+    (void)c, (void)kind, (void)value;
+    return fmi2Discard;
+}
+
+FMI2_EXPORT fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    (void)c, (void)kind, (void)value;
+    return fmi2Discard;
+}
+
+FMI2_EXPORT fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value) {
+    (void)c, (void)kind, (void)value;
+    return fmi2Discard;
+}
