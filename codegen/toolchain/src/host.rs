@@ -81,7 +81,7 @@ pub fn build_unit(sources: &Path, dir: &Path, target_dir: &Path, name: &str) -> 
         command.args(["-Wl,-z,defs", "-Wl,--exclude-libs,ALL", "-lc"]);
     }
     let what = sources.join("fmu.c").display().to_string();
-    let done = command.output().map_err(|error| TargetError::io("running cc on", &sources.join("fmu.c"), error))?;
+    let done = command.output().map_err(|error| TargetError::io("running cc on", sources.join("fmu.c"), error))?;
     if done.status.success() {
         return Ok(library);
     }
