@@ -120,10 +120,10 @@ pub fn status_words(status: u32) -> String {
     legs(0, "leg", " limited");
     legs(8, "gauge", " fault");
     legs(24, "leg", " inverse static");
-    for (bit, what) in [(16, "set-point refused"), (17, "set-point stale"), (18, "moving"), (19, "wrench fault")] {
+    for (bit, what) in [(16, "set-point refused"), (17, "set-point stale"), (18, "moving"), (19, "wrench fault"), (20, "correction limited")] {
         words.extend((status >> bit & 1 == 1).then(|| what.to_owned()));
     }
-    let known = 0x3f | 0x3f << 8 | 0xf << 16 | 0x3f << 24;
+    let known = 0x3f | 0x3f << 8 | 0x1f << 16 | 0x3f << 24;
     words.extend((0..u32::BITS).filter(|bit| status & !known & 1 << bit != 0).map(|bit| format!("bit {bit}")));
     words.join("+")
 }
@@ -139,7 +139,7 @@ mod tests {
         assert_eq!(status_words(0x2_2000), "gauge 5 fault+set-point stale");
         let texts: std::collections::BTreeSet<String> = (0..32).map(|bit| status_words(1 << bit)).collect();
         let unknown = texts.iter().filter(|text| text.starts_with("bit ")).count();
-        assert_eq!((texts.len(), unknown), (32, 10), "each bit has a text of its own");
+        assert_eq!((texts.len(), unknown), (32, 9), "each bit has a text of its own");
     }
 
     #[test]

@@ -17,6 +17,7 @@ mod firmware;
 mod forc;
 mod gcs;
 mod identify;
+mod learn;
 mod lsp;
 mod new;
 mod operate;
@@ -120,6 +121,8 @@ enum Command {
     Sim(sim::Arguments),
     /// Tune gains and weights on the simulated loop with the emitted controller.
     Tune(tune::Arguments),
+    /// Learn a motion that repeats on the simulated machine: passes, and the correction that takes out what they show.
+    Learn(learn::Arguments),
     /// Try the closed loop on corners and random draws of declared uncertainties; a gate for builds.
     Robust(robust::Arguments),
     /// Write one HTML page about a spec: a verdict, tracking, error budget, margins, hysteresis, findings; or about a run.
@@ -238,6 +241,7 @@ fn perform(cli: &Cli, ui: &mut Ui) -> Result<(), Failure> {
         Some(Command::Flash(arguments)) => firmware::run_flash(arguments, ui),
         Some(Command::Sim(arguments)) => sim::run(arguments, ui),
         Some(Command::Tune(arguments)) => tune::run(arguments, ui),
+        Some(Command::Learn(arguments)) => learn::run(arguments, ui),
         Some(Command::Robust(arguments)) => robust::run(arguments, ui),
         Some(Command::Report(arguments)) => report::run(arguments, ui),
         Some(Command::Reproduce(arguments)) => reproduce::run(arguments, ui),

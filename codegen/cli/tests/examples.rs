@@ -42,6 +42,9 @@ fn every_command_has_examples_that_the_program_takes() {
 fn prepared() -> Folder {
     let folder = Folder::new();
     fs::copy(folder.path("reference.toml"), folder.path("platform.toml")).unwrap();
+    let learning = fs::read_to_string(folder.path("reference.toml")).unwrap();
+    let learning = learning.replacen("[control]\n", "[control]\ncorrection = \"2 um\"\n", 1);
+    fs::write(folder.path("learning.toml"), learning).unwrap();
     fs::copy(repository().join("tests/oracle/dynamics-reference.json"), folder.path("states.json")).unwrap();
     let write = |name: &str, header: &str, rows: &mut dyn Iterator<Item = [f64; 3]>| {
         let text = rows.fold(format!("{header}\n"), |mut text, [a, b, c]| {

@@ -17,7 +17,7 @@ pub fn eigenvalues(matrix: &Matrix) -> Option<Vec<(f64, f64)>> {
             return None;
         }
         balance(&mut part);
-        hessenberg(&mut part);
+        reduce(&mut part);
         deflate(&mut part, &mut found)?;
     }
     Some(found)
@@ -82,9 +82,11 @@ pub fn spectral_radius(matrix: &Matrix) -> f64 {
     largest
 }
 
-/// Similar matrix with zeros below the first subdiagonal, by elimination with row pivots.
-fn hessenberg(a: &mut Matrix) {
+/// Similar matrix with zeros below the first subdiagonal, by elimination with row pivots. Returns the steps: the row that was exchanged
+/// for row k + 1 in the k-th, and the factors of that row in the ones below.
+pub(crate) fn reduce(a: &mut Matrix) -> Vec<(usize, Vec<f64>)> {
     let n = a.size();
+    let mut steps = Vec::with_capacity(n.saturating_sub(2));
     for m in 1..n.saturating_sub(1) {
         let mut pivot = m;
         for i in m..n {
@@ -105,14 +107,16 @@ fn hessenberg(a: &mut Matrix) {
             }
         }
         let leading = a[(m, m - 1)];
-        if leading == 0.0 {
-            continue;
-        }
-        for i in m + 1..n {
+        let mut factors = vec![0.0; n - m - 1];
+        for (i, kept) in (m + 1..n).zip(&mut factors) {
+            if leading == 0.0 {
+                break;
+            }
             let factor = a[(i, m - 1)] / leading;
             if factor == 0.0 {
                 continue;
             }
+            *kept = factor;
             a[(i, m - 1)] = 0.0;
             for j in m..n {
                 let x = a[(m, j)];
@@ -123,7 +127,9 @@ fn hessenberg(a: &mut Matrix) {
                 a[(j, m)] += factor * x;
             }
         }
+        steps.push((pivot, factors));
     }
+    steps
 }
 
 /// Eigenvalues of a Hessenberg matrix, from its lower end.

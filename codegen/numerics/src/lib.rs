@@ -13,6 +13,7 @@
 //! | [`Factor`] | Cholesky factors of large matrices, by blocks |
 //! | [`nnls`] | non-negative least squares: the weights of a hysteresis table |
 //! | [`largest`], [`simplex`] | where a condition ceases to hold, by bisection; where a cost is least |
+//! | [`Resolvent`] | what a sampled system answers at each frequency |
 //! | [`nyquist`] | sensitivity and stability of a loop of one signal |
 //! | [`Kernels`], [`displacements`], [`jacobian`], [`leg_forces`], [`pivot_ratio`] | the controller's kernels on these numbers, compiled here |
 //!
@@ -28,6 +29,7 @@ mod kernels;
 mod matrix;
 pub mod nnls;
 pub mod nyquist;
+mod resolvent;
 mod search;
 mod space;
 mod symmetric;
@@ -42,6 +44,7 @@ pub use form::magnitude;
 pub use jury::{ewma_limit, pcc_limit};
 pub use kernels::{Kernels, displacements, jacobian, leg_forces, pivot_ratio};
 pub use matrix::{Matrix, Matrix6, multiply6, transpose6};
+pub use resolvent::Resolvent;
 pub use search::{largest, simplex};
 pub use space::{cross, dot, norm, rotation};
 pub use symmetric::{diagonalize, generalized_modes, inverse_of_modes, symmetric_eigen};

@@ -15,6 +15,7 @@
 //! | [`adaptation`] | run-to-run EWMA and PCC | (AII.3), (AII.5), (AII.6) |
 //! | [`mode`] | P, F, P/F; where the interaction force comes from | section 4 |
 //! | [`feedback`] | position feedback with anti-windup | (7) |
+//! | [`correction`] | what was learned or prepared for a motion, added to the request | |
 //! | [`motion`] | pose, rate and acceleration | |
 //! | [`damping`] | active damping of the platform's modes | |
 //! | [`notch`] | modal notch of the feedback | |
@@ -33,6 +34,7 @@
 //! | [`digest`] | fingerprint of the state for comparing two machines | |
 //! | [`snapshot`] | a state as words and back, checked | |
 //! | [`wave`] | set-points on board: sine, chirp, multisine, reversal curves | |
+//! | [`playback`] | a table of corrections, interpolated | |
 //! | [`recorder`], [`record`] | ticks kept in fixed memory, and the format they leave in | |
 //! | [`real`] | the scalar type, `f32` or `f64` | |
 //!
@@ -42,6 +44,7 @@
 pub mod adaptation;
 pub mod attitude;
 mod choice;
+pub mod correction;
 pub mod crc;
 pub mod creep;
 pub mod dac;
@@ -59,6 +62,7 @@ pub mod mode;
 pub mod motion;
 pub mod notch;
 pub mod permitted;
+pub mod playback;
 pub mod real;
 pub mod record;
 pub mod recorder;
@@ -73,6 +77,7 @@ pub mod wave;
 
 pub use adaptation::{Estimate, Law};
 pub use attitude::{Attitude, Series};
+pub use correction::{Correction, CorrectionLimit};
 pub use crc::Crc32;
 pub use creep::{Creep, CreepEverett, CreepMemory};
 pub use dac::{CodeLimits, Dac};

@@ -142,6 +142,8 @@ fn title(name: &str) -> String {
         ("setpoint_rate", true) => "_rad/s",
         ("setpoint_acceleration", false) => "_m/s2",
         ("setpoint_acceleration", true) => "_rad/s2",
+        ("correction", false) => "_m",
+        ("correction", true) => "_rad",
         ("wrench", false) => "_N",
         ("wrench", true) => "_Nm",
         ("displacement", _) => "_m",

@@ -11,6 +11,10 @@ use crate::description::{Description, DescriptionError};
 const COMMAND: [&str; 3] = ["command", "selector", "sequence"];
 /// Vectors of a row, in the order of [`Row::vectors`].
 const VECTORS: [&str; 5] = ["setpoint", "setpoint_rate", "setpoint_acceleration", "gauge", "wrench"];
+/// The vector that only some controllers take.
+const CORRECTION: &str = "correction";
+/// Corrections: some are larger than the limits let pass, m and rad.
+const CORRECTED: [f64; 2] = [3e-6, 3e-5];
 
 /// What the platform takes.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,6 +81,7 @@ pub fn record(
     for (places, stem) in vectors.iter_mut().zip(VECTORS) {
         *places = description.inputs(stem)?;
     }
+    let correction = description.inputs(CORRECTION).ok();
     let mut generator = Generator::new(inputs, seed);
     Ok(in_stretches(description, rows, &CYCLE, &mut generator, Generator::begin, |generator, kind, row| {
         let made = generator.row(kind);
@@ -87,6 +92,10 @@ pub fn record(
             for (place, value) in places.iter().zip(vector) {
                 row[*place] = generator.draw.word(description.scalar, kind == Kind::Special, value);
             }
+        }
+        for (axis, place) in correction.iter().flatten().enumerate() {
+            let value = CORRECTED[axis / 3] * generator.draw.symmetric();
+            row[*place] = generator.draw.word(description.scalar, kind == Kind::Special, value);
         }
     }))
 }

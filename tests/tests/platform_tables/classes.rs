@@ -11,11 +11,13 @@ use specgen_tests::length;
 use super::bench::{Bench, reference_machine};
 
 /// A circle in x and y that grows from its middle and shrinks to it again, each within `RAMP`.
-struct Circle;
+pub struct Circle {
+    /// Hz.
+    pub frequency: f64,
+}
 
 impl Circle {
     const RADIUS: f64 = 5e-6;
-    const FREQUENCY: f64 = 50.0;
     const RAMP: f64 = 0.04;
     const DURATION: f64 = 0.2;
 
@@ -41,7 +43,7 @@ impl PoseTrajectory for Circle {
 
     fn target(&self, time: f64) -> PoseTarget {
         let [a, rate, bend] = Self::radius(time).map(|value| value * Self::RADIUS);
-        let angular = TAU * Self::FREQUENCY;
+        let angular = TAU * self.frequency;
         let mut target = PoseTarget::default();
         for (axis, phase) in [(0, TAU / 4.0), (1, 0.0)] {
             let (s, c) = (angular * time + phase).sin_cos();
@@ -56,7 +58,7 @@ impl PoseTrajectory for Circle {
 /// Case 1 at 10 Hz and the circle, nm rms of the norm.
 pub fn errors(bench: &Bench) -> [f64; 2] {
     let (scenario, mut controller) = (bench.scenario(), bench.controller());
-    let paths: [&dyn PoseTrajectory; 2] = [&PaperPose::corrected(PaperPath::Case1, 10.0), &Circle];
+    let paths: [&dyn PoseTrajectory; 2] = [&PaperPose::corrected(PaperPath::Case1, 10.0), &Circle { frequency: 50.0 }];
     paths.map(|path| scenario.run(&mut controller, path).unwrap().errors.rms_translation_nm())
 }
 

@@ -6,6 +6,7 @@ mod behaviour;
 pub mod bench;
 mod classes;
 mod damping;
+mod learning;
 mod limits;
 mod oracle;
 mod tables;

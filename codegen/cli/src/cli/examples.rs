@@ -94,6 +94,15 @@ Examples:
   specgen tune legs.toml --evaluate candidates.json --json
       scores for a search of your own";
 
+pub const LEARN: &str = "\
+Examples:
+  specgen learn learning.toml -o case-1.json
+      its [control] has correction = \"2 um\"; case 1 at 10 Hz, 5 passes
+  specgen learn learning.toml --from case-1.json --passes 1
+      goes on where that ended
+  specgen learn learning.toml --prepare --passes 0 -o prepared.json
+      what lag and modes would leave, by the model alone";
+
 pub const ROBUST: &str = "\
 Examples:
   specgen robust legs.toml --draws 10      # ten random machines and the corners

@@ -100,6 +100,8 @@ pub struct ControlLaw {
     pub notch: Option<Notch>,
     /// Active damping of each mode, if declared.
     pub damping: Option<[Resonator; 6]>,
+    /// Limits of the correction on each axis, if there is one.
+    pub correction: Option<[CorrectionLimit; 6]>,
 }
 
 /// Six biquads in modal coordinates.
@@ -129,6 +131,15 @@ pub struct Resonator {
     pub b: [f64; 3],
     /// a₁, a₂.
     pub a: [f64; 2],
+}
+
+/// How far and how fast the correction of an axis goes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CorrectionLimit {
+    /// m or rad.
+    pub most: f64,
+    /// m or rad in a tick.
+    pub step: f64,
 }
 
 /// Control mode.

@@ -144,7 +144,8 @@ fn largest_request(law: &ControlLaw) -> f64 {
     let load = norm(&law.wrench_to_legs) * (LARGEST_GAIN * (apart + 2.0 * LARGEST) + LARGEST) + law.lead.abs() * apart;
     // A change of mode is bumpless by an offset as large as the request.
     let damping = law.damping.as_ref().map_or(0.0, |sections| modal * resounds(sections));
-    let request = 2.0 * (apart + load + norm(&law.modes_to_legs) * (deflection + damping + 2.0));
+    let correction = law.correction.as_ref().map_or(0.0, |limits| to_modes * (limits[0].most + limits[3].most));
+    let request = 2.0 * (apart + load + norm(&law.modes_to_legs) * (deflection + damping + correction + 2.0));
     let innovation = modal + deflection + norm(&law.legs_to_modes) * 2.0 * request;
     let filtered = ring * innovation;
     let largest = MARGIN * if filtered > damping { filtered } else { damping };

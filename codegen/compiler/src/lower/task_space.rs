@@ -1,7 +1,9 @@
 //! Constants of the control law in task space: maps at rest, modal notch, settings at start-up.
 
 use super::linear;
-use crate::ir::{ControlLaw, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Resonator, Scalar, Section};
+use crate::ir::{
+    ControlLaw, CorrectionLimit, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Resonator, Scalar, Section,
+};
 use crate::stability::platform::{self as design, Design, RestDynamics};
 use specgen_language::model::{self, Model};
 use specgen_numerics::{Matrix6, multiply6, transpose6};
@@ -17,6 +19,8 @@ const IDENTITY: Matrix6 = {
 };
 /// Offset of a change of mode that is over, m: a hundredth of a converter step, far below what a gauge sees.
 const TRANSFER_NEGLIGIBLE: f64 = 1e-11;
+/// Time in which a correction may go from nothing to its limit, s.
+const CORRECTION_TIME: f64 = 1e-3;
 
 /// Constants of (7) and of the composition of P and F. `rest_force` are the leg forces at rest, N.
 pub(super) fn law(
@@ -66,6 +70,13 @@ pub(super) fn law(
         notch,
         damping: design.damping.as_ref().map(|damping| {
             damping.sections.map(|section| Resonator { b: section.b.map(round), a: section.a.map(round) })
+        }),
+        correction: task.correction.map(|most| {
+            let turn = most / model.geometry.joint_radius();
+            [most, most, most, turn, turn, turn].map(|most| CorrectionLimit {
+                most: round(most),
+                step: round(most * model.timing.period / CORRECTION_TIME),
+            })
         }),
     }
 }

@@ -131,6 +131,7 @@ codes! {
     WRONG_PART = "E0333";
     TICK_TOO_LONG = "E0334";
     TICK_TIGHT = "W0335";
+    CORRECTION_TOO_LARGE = "E0336";
 
     // Stability, reach, set-points, gauges, supervisor.
     UNSTABLE_STATIC = "E0401";

@@ -100,6 +100,8 @@ section! {
         notch_damping = number(Range::above(0.0, 1.0)), Rule("1, with a notch"), "zeta_d", 1.0;
         /// Whether each mode of the platform is damped by a second-order section on its error, in P/F: the compiler designs it together with gains and bandwidths that the spec leaves out. Needs the notch.
         active_damping = FLAG, Default(false), "", true;
+        /// Largest correction of the request along each axis that a tick takes beside the set-point, for what `specgen learn` finds, about each axis as much at the platform joints; at most a tenth of `actuator.stroke`. It goes from nothing to there in 1 ms at the fastest. Without it a controller has no such input.
+        correction: Option<f64> = one(Dimension::LENGTH, Range::above(0.0, 1e-3), "um"), Optional, "", "2 um";
         /// First-order low-pass of the pose derivative, below half the tick rate (pi rad / period).
         velocity_cutoff = BANDWIDTH, Rule("0.6 pi rad / period"), "" ["cutoff", "velocity_filter"], "9e3 rad/s";
         /// Where the interaction force (5) in (7) comes from: nowhere, the stiffness of [control.environment], or a force sensor on the `wrench` words.

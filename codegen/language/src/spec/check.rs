@@ -48,6 +48,7 @@ const CHECKS: &[Check] = &[
     control::no_leg_keys,
     control::both_bandwidths,
     control::notch,
+    control::small_correction,
     control::cutoff_below_tick_rate,
     control::environment_for_model,
     control::bias_inside_workspace,

@@ -63,6 +63,20 @@ pub enum TrajectoryChoice {
     },
 }
 
+impl TrajectoryChoice {
+    /// For the platform of a spec.
+    #[must_use]
+    pub fn of_platform(self, model: &Model, task: &TaskSpace) -> Box<dyn PoseTrajectory> {
+        match self {
+            Self::Paper { path, frequency } => Box::new(PaperPose { path, reading: Reading::Corrected, frequency }),
+            Self::Multisine { frequency, seconds, seed, corners } => {
+                let sines = Multisine::new(seconds, frequency, [0.0; 6], reach(model, task), seed);
+                Box::new(if corners { sines.with_corners() } else { sines })
+            }
+        }
+    }
+}
+
 /// Under what a run is made.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Conditions {
@@ -212,15 +226,7 @@ impl Case {
         let mut scenario: PlatformScenario =
             machine::scenario(model, task, specimen, &noise, conditions.noise.unwrap_or_default());
         scenario.options.latency = conditions.latency;
-        let trajectory: Box<dyn PoseTrajectory> = match conditions.trajectory {
-            TrajectoryChoice::Paper { path, frequency } => {
-                Box::new(PaperPose { path, reading: Reading::Corrected, frequency })
-            }
-            TrajectoryChoice::Multisine { frequency, seconds, seed, corners } => {
-                let sines = Multisine::new(seconds, frequency, [0.0; 6], reach(model, task), seed);
-                Box::new(if corners { sines.with_corners() } else { sines })
-            }
-        };
+        let trajectory = conditions.trajectory.of_platform(model, task);
         let mut armed = controller.fork();
         armed.configure(&start.words(&armed))?;
         let study = PlatformStudy::new(&scenario, &armed, trajectory.as_ref(), conditions.whole_ticks)?;

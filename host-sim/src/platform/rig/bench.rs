@@ -57,13 +57,15 @@ pub struct Request {
     pub fresh: bool,
     /// The set-point.
     pub target: PoseTarget,
+    /// Correction of the request, m and rad; for controllers that take one.
+    pub correction: Six,
 }
 
 impl Request {
     /// The next set-point of a stream.
     #[must_use]
     pub fn stream(target: PoseTarget) -> Self {
-        Self { command: Command::Stream, selector: 0, fresh: true, target }
+        Self { command: Command::Stream, selector: 0, fresh: true, target, ..Self::default() }
     }
 }
 
@@ -203,6 +205,9 @@ impl<'a> Bench<'a> {
             self.input[self.wiring.gauge[k]] = scalar.encode(gauge[k]);
             self.input[self.wiring.wrench[k]] = scalar.encode(wrench[k]);
         }
+        for (place, value) in self.wiring.correction.iter().flatten().zip(request.correction) {
+            self.input[*place] = scalar.encode(value);
+        }
         self.controller.step(&self.input, &mut self.output);
         if let Some(trace) = &mut self.trace {
             trace.push(&self.input, &self.output, self.controller.state_digest());
@@ -252,6 +257,8 @@ struct Wiring {
     pose: [usize; 6],
     rate: [usize; 6],
     acceleration: [usize; 6],
+    /// None where the controller takes no correction.
+    correction: Option<[usize; 6]>,
     gauge: [usize; 6],
     wrench: [usize; 6],
     voltage: [usize; 6],
@@ -270,6 +277,7 @@ impl Wiring {
             pose: description.inputs("setpoint")?,
             rate: description.inputs("setpoint_rate")?,
             acceleration: description.inputs("setpoint_acceleration")?,
+            correction: description.inputs("correction").ok(),
             gauge: description.inputs("gauge")?,
             wrench: description.inputs("wrench")?,
             voltage: description.outputs("voltage")?,

@@ -2,7 +2,6 @@
 
 use host_sim::trajectory::PaperPath;
 
-use super::StudyArguments;
 use crate::cli::ui::Failure;
 use specgen_compiler::compile::Compiled;
 use specgen_language::model::{self, TrajectoryKind};
@@ -14,27 +13,33 @@ const FREQUENCY: f64 = 10.0;
 const SECONDS: f64 = 1.0;
 
 /// A trajectory with what it is called.
-pub(super) struct Followed {
-    pub(super) name: String,
-    pub(super) frequency: f64,
-    pub(super) choice: TrajectoryChoice,
+pub(in crate::cli) struct Followed {
+    pub(in crate::cli) name: String,
+    pub(in crate::cli) frequency: f64,
+    pub(in crate::cli) choice: TrajectoryChoice,
 }
 
 /// What `--trajectory` and `--frequency` mean for this spec.
 ///
 /// The spec's own paths are known by their names, with their own frequency unless one is asked for. The paper's names mean
 /// the paper's paths at the usual frequency, unless the spec gives another path that name.
-pub(super) fn chosen(arguments: &StudyArguments, compiled: &Compiled) -> Result<Followed, Failure> {
+pub(in crate::cli) fn chosen(
+    trajectory: Option<&str>,
+    frequency: Option<f64>,
+    seed: u64,
+    compiled: &Compiled,
+) -> Result<Followed, Failure> {
     let platform = compiled.model.task_space.as_ref();
-    let frequency = arguments.frequency.unwrap_or(FREQUENCY);
-    let name = arguments.trajectory.as_deref().unwrap_or(if platform.is_some() { "case-1" } else { "leg" });
+    let asked = frequency;
+    let frequency = asked.unwrap_or(FREQUENCY);
+    let name = trajectory.unwrap_or(if platform.is_some() { "case-1" } else { "leg" });
     let followed = |frequency, choice| Ok(Followed { name: name.to_owned(), frequency, choice });
     let paper = |path, frequency| followed(frequency, TrajectoryChoice::Paper { path, frequency });
     let own = platform.and_then(|task| task.trajectories.iter().find(|one| one.name == name));
-    if let (Some(own), Some(_)) = (own, &arguments.trajectory) {
+    if let (Some(own), Some(_)) = (own, trajectory) {
         return match own.kind {
             TrajectoryKind::Paper { path, as_printed: false, frequency } => {
-                paper(streamed(path), arguments.frequency.unwrap_or(frequency))
+                paper(streamed(path), asked.unwrap_or(frequency))
             }
             _ => Err(Failure::Usage(format!(
                 "the spec's trajectory `{name}` is a waveform or as printed, which this command does not follow; name \
@@ -42,7 +47,7 @@ pub(super) fn chosen(arguments: &StudyArguments, compiled: &Compiled) -> Result<
             ))),
         };
     }
-    let sines = TrajectoryChoice::Multisine { frequency, seconds: SECONDS, seed: arguments.plant.seed, corners: false };
+    let sines = TrajectoryChoice::Multisine { frequency, seconds: SECONDS, seed, corners: false };
     match (name, platform) {
         ("multisine", _) => followed(frequency, sines),
         ("leg", None) | ("case-1", Some(_)) => paper(PaperPath::Case1, frequency),

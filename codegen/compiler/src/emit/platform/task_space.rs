@@ -36,10 +36,11 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
     let lead = real(law.lead);
     let notch = law.notch.as_ref().map_or_else(|| quote! { None }, |notch| with_sections(ir, notch, &matrix));
     let (damped, damping) = with_damping(ir, law.damping.as_ref());
+    let (corrected, correction) = with_correction(ir, law.correction.as_ref());
     quote! {
         #![doc = " Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics."]
 
-        use specgen_runtime::{Affine, Notch, Resonator, Section};
+        use specgen_runtime::{Affine, CorrectionLimit, Notch, Resonator, Section};
 
         use crate::{LEGS, Real};
 
@@ -80,6 +81,10 @@ pub fn emit(ir: &Ir, task: &TaskSpace) -> TokenStream {
         pub const DAMPED: usize = #damped;
         /// Active damping of each.
         pub const DAMPING: [Resonator<Real>; DAMPED] = [#(#damping),*];
+        /// Axes with a correction of the request; from `control.correction`.
+        pub const CORRECTED: usize = #corrected;
+        /// How far and how fast that of each goes.
+        pub const CORRECTION: [CorrectionLimit<Real>; CORRECTED] = [#(#correction),*];
     }
 }
 
@@ -105,4 +110,17 @@ fn with_damping(ir: &Ir, sections: Option<&[ir::Resonator; 6]>) -> (proc_macro2:
         })
         .collect();
     (proc_macro2::Literal::usize_unsuffixed(sections.len()), sections)
+}
+
+/// How many axes take a correction, and the limits of each.
+fn with_correction(ir: &Ir, limits: Option<&[ir::CorrectionLimit; 6]>) -> (proc_macro2::Literal, Vec<TokenStream>) {
+    let limits: Vec<TokenStream> = limits
+        .into_iter()
+        .flatten()
+        .map(|limit| {
+            let (most, step) = (literal::real(ir.scalar, limit.most), literal::real(ir.scalar, limit.step));
+            quote! { CorrectionLimit { most: #most, step: #step } }
+        })
+        .collect();
+    (proc_macro2::Literal::usize_unsuffixed(limits.len()), limits)
 }

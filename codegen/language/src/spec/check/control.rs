@@ -7,6 +7,9 @@ use crate::keys::fields::Fields;
 use crate::spec::findings::Findings;
 use crate::spec::text::number;
 
+/// Largest correction as part of the stroke.
+const CORRECTION_SHARE: f64 = 0.1;
+
 /// `Some` in a spec with `[control]`.
 pub(super) fn there(f: &Fields) -> Option<()> {
     f.table("control").map(|_| ())
@@ -140,6 +143,24 @@ pub(super) fn notch(f: &Fields, findings: &mut Findings) -> Option<()> {
             f.span(path),
             format!("`{path}` is {}, not above `control.modal_damping`, {}", number(damping), number(own)),
             "write notch_damping = 1.0, the usual choice, or take the notch out with notch = false".to_owned(),
+        );
+    }
+    Some(())
+}
+
+/// A correction is a small part of what the legs can do: what is more belongs into the set-points.
+pub(super) fn small_correction(f: &Fields, findings: &mut Findings) -> Option<()> {
+    there(f)?;
+    let path = "control.correction";
+    let (most, stroke) = (f.number(path)?, f.number("actuator.stroke")?);
+    let limit = CORRECTION_SHARE * stroke;
+    if most > limit * (1.0 + 1e-9) {
+        findings.add(
+            codes::CORRECTION_TOO_LARGE,
+            path,
+            f.span(path),
+            format!("`{path}` is {} m, above a tenth of `actuator.stroke`, {} m", number(most), number(limit)),
+            format!("write correction = \"{} um\" or less", number(libm::floor(limit * 1e8) / 1e2)),
         );
     }
     Some(())

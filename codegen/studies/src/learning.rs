@@ -1,0 +1,22 @@
+//! Iterative learning of a motion that repeats: between passes the correction that a tick adds to its request is changed by what the
+//! gauges showed of the error.
+//!
+//! ```text
+//! c ← Q (c + L e)        e = h_d − h over a pass;  L = V T⁻¹ V⁻¹;  |Q| = 1/(1 + (f/f_c)⁸), without phase
+//! ```
+//! T is the closed loop from a correction to the gauges, of the compiler's model in modal coordinates. Per frequency the error of a pass is
+//! that of the one before times Q (I − T_real L), so learning converges where its spectral radius is below 1: f_c is the highest
+//! frequency at which that holds, with room, for every machine within the intervals of `[robust]`. All of it works between passes; in a
+//! tick a table is played.
+
+mod convergence;
+mod motion;
+mod passes;
+mod table;
+mod update;
+
+pub use convergence::{Convergence, LARGEST_RADIUS, Learnable};
+pub use motion::Motion;
+pub use passes::{LearnError, Learned, Pass, Pupil, Seen, learn};
+pub use table::{Table, TableError, knots};
+pub use update::Update;

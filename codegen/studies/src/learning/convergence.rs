@@ -1,0 +1,307 @@
+//! How far up in frequency learning converges, for every machine within the declared intervals.
+
+use std::f64::consts::TAU;
+
+use serde::Serialize;
+use specgen_compiler::compile::Compiled;
+use specgen_compiler::lower;
+use specgen_compiler::stability::platform::{Adapting, ClosedLoop, Conditions, Law, RestDynamics, Tuning};
+use specgen_language::model::{AdaptationMode, ControlMode};
+use specgen_numerics::nyquist::{Complex, over, plus, square, times};
+
+use crate::robust::Factors;
+use crate::robust::factors::Factor;
+
+/// Largest spectral radius of Q (I − T L) that is let pass: the error of a pass against that of the one before.
+pub const LARGEST_RADIUS: f64 = 0.9;
+/// Order of Q at its upper end, and at its lower one.
+const ORDERS: [f64; 2] = [8.0, 4.0];
+/// Where the loop leaves less of a correction than this it is not learned: the feedback does it.
+const LEAST_LEFT: f64 = 0.004;
+/// Parts of the inverse that are tried: less of it learns more slowly, and bears more of what is not known.
+const SHARES: [f64; 7] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4];
+/// Knots in a period of f_c.
+const KNOTS: f64 = 3.5;
+/// Radius at which the whole inverse is good enough.
+const FAST: f64 = 0.5;
+/// Frequencies looked at between a hundredth of the highest and it, and as many more about each mode.
+const GRID: u32 = 160;
+/// About a mode: from this part of its frequency less to as much more.
+const ABOUT: f64 = 0.25;
+/// Stiffnesses over masses looked at, evenly spaced, ends included.
+const STIFFNESSES: u32 = 5;
+/// Squarings of the matrix whose norm bounds its spectral radius: ‖M³²‖^(1/32).
+const SQUARINGS: i32 = 5;
+
+/// Six by six, complex.
+pub(super) type Matrix6c = [[Complex; 6]; 6];
+
+/// A loop that can learn, as it starts.
+pub struct Learnable {
+    pub(super) closed_loop: ClosedLoop,
+    law: Law,
+    tuning: Tuning,
+    /// τ, s.
+    pub(super) lead: f64,
+}
+
+/// What learning may do on every machine within the intervals.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Convergence {
+    /// Below the first learning leaves the error to the feedback; the second is f_c. Hz.
+    pub band: [f64; 2],
+    /// Largest bound of ρ(Q (I − T L)) over frequencies and machines.
+    pub radius: f64,
+    /// Where, Hz.
+    pub at: f64,
+    /// The part of T⁻¹ that is learned with at frequencies (Hz), rising.
+    #[serde(skip)]
+    pub(super) shares: Vec<[f64; 2]>,
+}
+
+impl Convergence {
+    /// Ticks of `period` (s) from knot to knot of a table that holds what Q lets through.
+    #[must_use]
+    pub fn spacing(&self, period: f64) -> u32 {
+        let apart = libm::floor(1.0 / (KNOTS * self.band[1] * period));
+        if apart >= 1.0 { apart as u32 } else { 1 }
+    }
+
+    /// |Q| at a frequency, Hz.
+    pub(super) fn passed(&self, hertz: f64) -> f64 {
+        let [low, high] = self.band;
+        let below = if low > 0.0 { 1.0 / (1.0 + libm::pow(low / hertz, ORDERS[1])) } else { 1.0 };
+        below * cut(hertz, high)
+    }
+
+    /// The part of T⁻¹ at a frequency, Hz.
+    pub(super) fn share(&self, hertz: f64) -> f64 {
+        let above = self.shares.partition_point(|[at, _]| *at <= hertz);
+        match (above.checked_sub(1).and_then(|below| self.shares.get(below)), self.shares.get(above)) {
+            (Some([a, below]), Some([b, above])) => below + (above - below) * (hertz - a) / (b - a),
+            (Some([_, share]), None) | (None, Some([_, share])) => *share,
+            (None, None) => 1.0,
+        }
+    }
+}
+
+impl Learnable {
+    /// The loop of a spec with [control] in the mode that it starts in; none for six legs.
+    #[must_use]
+    pub fn of(compiled: &Compiled) -> Option<Self> {
+        let (model, task) = (&compiled.model, compiled.model.task_space.as_ref()?);
+        let design = compiled.design.as_ref()?;
+        let closed_loop = design.closed_loop(model, task, &RestDynamics::of(&lower::platform(model).ok()?))?;
+        let adapting = match model.adaptation.mode {
+            AdaptationMode::Invhys => Adapting::Invhys,
+            AdaptationMode::Ewma => Adapting::Ewma,
+            AdaptationMode::Pcc => Adapting::Pcc,
+        };
+        let (law, tuning) = match task.mode {
+            ControlMode::P => (Law::Position, design.position),
+            ControlMode::F => (Law::Feedforward(adapting), design.combined),
+            ControlMode::PF => (Law::Combined(adapting), design.combined),
+        };
+        Some(Self { closed_loop, law, tuning, lead: design.lead })
+    }
+
+    /// T at frequencies (Hz), in modal coordinates.
+    pub(super) fn response(&self, closed_loop: &ClosedLoop, conditions: &Conditions, frequencies: &[f64]) -> Vec<Matrix6c> {
+        let angles: Vec<f64> = frequencies.iter().map(|hertz| TAU * hertz * closed_loop.period).collect();
+        closed_loop.correction_response(self.law, &self.tuning, conditions, &angles)
+    }
+
+    /// G, without feedback.
+    pub(super) fn open_loop(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
+        let law = Law::Feedforward(Adapting::Invhys);
+        let open = Self { closed_loop: self.closed_loop.clone(), law, tuning: Tuning::NONE, lead: 0.0 };
+        open.nominal(frequencies)
+    }
+
+    /// T as the compiler's model has it.
+    pub(super) fn nominal(&self, frequencies: &[f64]) -> Vec<Matrix6c> {
+        self.response(&self.closed_loop, &Conditions::NOMINAL, frequencies)
+    }
+
+    /// The highest f_c up to `wish` (Hz) at which learning converges on every machine within `factors`; none where it does at no
+    /// frequency looked at.
+    #[must_use]
+    pub fn convergence(&self, factors: &Factors, wish: f64) -> Option<Convergence> {
+        let frequencies = self.grid(wish);
+        let inverses: Vec<Matrix6c> = self.nominal(&frequencies).iter().map(inverse).collect();
+        let mut radii = vec![[0.0; SHARES.len()]; frequencies.len()];
+        for (closed_loop, conditions) in self.machines(factors) {
+            let real = self.response(&closed_loop, &conditions, &frequencies);
+            for ((radii, real), inverse) in radii.iter_mut().zip(&real).zip(&inverses) {
+                let product = multiply(real, inverse);
+                for (radius, share) in radii.iter_mut().zip(SHARES) {
+                    let found = spectral_radius(&left(&product, share));
+                    // A NaN is no convergence.
+                    *radius = if found <= *radius { *radius } else { found };
+                }
+            }
+        }
+        let chosen = radii.iter().map(|radii| {
+            let least = (0..SHARES.len()).min_by(|a, b| radii[*a].total_cmp(&radii[*b])).unwrap_or(0);
+            let index = if radii[0] <= FAST { 0 } else { least };
+            (SHARES[index], radii[index])
+        });
+        let (shares, radii): (Vec<f64>, Vec<f64>) = chosen.unzip();
+        let mut highest = wish;
+        for (hertz, radius) in frequencies.iter().zip(&radii) {
+            let excess = radius / LARGEST_RADIUS - 1.0;
+            if excess.is_nan() {
+                return None;
+            }
+            if excess > 0.0 {
+                let bound = hertz / libm::pow(excess, 1.0 / ORDERS[0]);
+                highest = if bound < highest { bound } else { highest };
+            }
+        }
+        let lowest = *frequencies.first()?;
+        // The slowest frequency at which every mode answers.
+        let answers = frequencies.iter().zip(&inverses).find(|(_, inverse)| norm(inverse) * LEAST_LEFT <= 1.0);
+        let low = answers.map(|(hertz, _)| *hertz).filter(|hertz| *hertz > lowest).unwrap_or(0.0);
+        if !(highest > lowest && highest > low) {
+            return None;
+        }
+        let shares = frequencies.iter().zip(shares).map(|(hertz, share)| [*hertz, share]).collect();
+        let mut found = Convergence { band: [low, highest], radius: 0.0, at: 0.0, shares };
+        for (hertz, radius) in frequencies.iter().zip(&radii) {
+            let radius = radius * found.passed(*hertz);
+            if radius > found.radius {
+                (found.radius, found.at) = (radius, *hertz);
+            }
+        }
+        Some(found)
+    }
+
+    /// Frequencies up to where Q lets nothing through, rising, closest about the modes.
+    fn grid(&self, wish: f64) -> Vec<f64> {
+        let highest = highest(wish, self.closed_loop.period);
+        let share = |k: u32| f64::from(k) / f64::from(GRID - 1);
+        let mut all: Vec<f64> = (0..GRID).map(|k| highest * libm::pow(1e-3, 1.0 - share(k))).collect();
+        for mode in self.closed_loop.basis.frequencies {
+            let hertz = mode / TAU;
+            let about = (0..GRID).map(|k| hertz * (1.0 - ABOUT + 2.0 * ABOUT * share(k)));
+            all.extend(about.filter(|hertz| *hertz < highest));
+        }
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    }
+
+    /// Every corner of gain, stiffness over mass, damping, lag and delay.
+    fn machines(&self, factors: &Factors) -> Vec<(ClosedLoop, Conditions)> {
+        let range = |factor| factors.range(factor);
+        let ([soft, stiff], [light, heavy]) = (range(Factor::Stiffness), range(Factor::Mass));
+        let [low, high] = [soft / heavy, stiff / light];
+        let mut all = Vec::new();
+        for lag in range(Factor::Lag) {
+            let mut closed_loop = self.closed_loop.clone();
+            closed_loop.lag *= lag;
+            for k in 0..STIFFNESSES {
+                let stiffness = low + (high - low) * f64::from(k) / f64::from(STIFFNESSES - 1);
+                for gain_ratio in range(Factor::Gain) {
+                    for damping in range(Factor::Damping) {
+                        for delay in range(Factor::DelayTicks) {
+                            let conditions = Conditions { gain_ratio, stiffness, damping, delay, touching: false };
+                            all.push((closed_loop.clone(), conditions));
+                        }
+                    }
+                }
+            }
+        }
+        all
+    }
+}
+
+/// Where Q of f_c (Hz) lets less than a ten-thousandth through, or the fastest that can be sampled well, Hz.
+pub(super) fn highest(bandwidth: f64, period: f64) -> f64 {
+    let (cut, fastest) = (3.2 * bandwidth, 0.45 / period);
+    if cut < fastest { cut } else { fastest }
+}
+
+/// |Q| at its upper end.
+pub(super) fn cut(hertz: f64, bandwidth: f64) -> f64 {
+    1.0 / (1.0 + libm::pow(hertz / bandwidth, ORDERS[0]))
+}
+
+/// I − share · product.
+fn left(product: &Matrix6c, share: f64) -> Matrix6c {
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| [f64::from(i == j) - share * product[i][j][0], -share * product[i][j][1]])
+    })
+}
+
+fn multiply(a: &Matrix6c, b: &Matrix6c) -> Matrix6c {
+    std::array::from_fn(|i| std::array::from_fn(|j| (0..6).fold([0.0; 2], |sum, k| plus(sum, times(a[i][k], b[k][j])))))
+}
+
+/// Bound of the spectral radius from above, close: ‖M^n‖^(1/n).
+fn spectral_radius(matrix: &Matrix6c) -> f64 {
+    let mut power = *matrix;
+    let mut scale = 0.0;
+    for _ in 0..SQUARINGS {
+        let norm = norm(&power);
+        if norm == 0.0 || !norm.is_finite() {
+            return norm;
+        }
+        // Kept near 1, with its logarithm beside it.
+        power = power.map(|row| row.map(|value| value.map(|part| part / norm)));
+        power = multiply(&power, &power);
+        scale = 2.0 * (scale + libm::log(norm));
+    }
+    libm::exp((scale + libm::log(norm(&power))) / libm::exp2(f64::from(SQUARINGS)))
+}
+
+/// Largest sum of magnitudes of a row.
+fn norm(matrix: &Matrix6c) -> f64 {
+    let sums = matrix.iter().map(|row| row.iter().map(|value| libm::sqrt(square(*value))).sum::<f64>());
+    sums.fold(0.0, |most, sum| if sum <= most { most } else { sum })
+}
+
+/// By elimination with row pivots; not finite where there is none.
+pub(super) fn inverse(matrix: &Matrix6c) -> Matrix6c {
+    let mut a = *matrix;
+    let mut b: Matrix6c = std::array::from_fn(|i| std::array::from_fn(|j| [f64::from(i == j), 0.0]));
+    for k in 0..6 {
+        let pivot = (k..6).max_by(|i, j| square(a[*i][k]).total_cmp(&square(a[*j][k]))).unwrap_or(k);
+        a.swap(k, pivot);
+        b.swap(k, pivot);
+        let leading = a[k][k];
+        a[k] = a[k].map(|value| over(value, leading));
+        b[k] = b[k].map(|value| over(value, leading));
+        for i in (0..6).filter(|i| *i != k) {
+            let factor = a[i][k].map(|part| -part);
+            a[i] = std::array::from_fn(|j| plus(a[i][j], times(factor, a[k][j])));
+            b[i] = std::array::from_fn(|j| plus(b[i][j], times(factor, b[k][j])));
+        }
+    }
+    b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_inverse_is_one_and_the_radius_is_bounded_closely() {
+        let mut state = 1_u32;
+        let mut draw = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(state >> 8) / f64::from(1 << 24) - 0.5
+        };
+        let matrix: Matrix6c = std::array::from_fn(|_| std::array::from_fn(|_| [draw(), draw()]));
+        let off = left(&multiply(&matrix, &inverse(&matrix)), 1.0);
+        assert!(norm(&off) < 1e-13, "{off:?}");
+        // Similar to a triangle: its eigenvalues are those on the diagonal.
+        let triangle: Matrix6c = std::array::from_fn(|i| {
+            std::array::from_fn(|j| if j < i { [0.0; 2] } else if i == j { [0.1 * i as f64, 0.3] } else { [draw(), 0.0] })
+        });
+        let similar = multiply(&multiply(&matrix, &triangle), &inverse(&matrix));
+        let radius = spectral_radius(&similar);
+        let expected = libm::hypot(0.5, 0.3);
+        assert!(radius >= expected * (1.0 - 1e-9) && radius < 1.15 * expected, "{radius} {expected}");
+    }
+}

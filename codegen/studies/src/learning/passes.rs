@@ -1,0 +1,195 @@
+//! Passes over a machine, simulated or real, until learning is done.
+
+use std::fmt;
+use std::ops::{ControlFlow, Range};
+
+use host_sim::closed_loop::RunError;
+use host_sim::platform::rig::{Bench, Request};
+use host_sim::word::status_words;
+use serde::Serialize;
+use specgen_runtime::playback::{self, Knot};
+
+use super::motion::Motion;
+use super::table::knots;
+use super::update::Update;
+
+/// Status bits of set-points that were refused or stale: the motion was not made.
+const NOT_FOLLOWED: u32 = 0x3_0000;
+/// Status bits of gauges that were not believed.
+const GAUGES: u32 = 0x3f00;
+/// Status bit of a correction that the limits held back.
+const CORRECTION_LIMITED: u32 = 1 << 20;
+/// An error above this part of the least one ends learning: it grows.
+const GROWS: f64 = 1.5;
+
+/// Why nothing is learned.
+#[derive(Debug)]
+pub enum LearnError {
+    /// The machine does not make a pass.
+    Run(RunError),
+    /// A pass with these status bits: the controller refused a set-point, or believed no gauge.
+    Status(u32),
+}
+
+impl fmt::Display for LearnError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Run(error) => error.fmt(f),
+            Self::Status(status) => write!(
+                f,
+                "the controller does not make this motion: {}; make it slower, or raise control.setpoint.stream_speed or the \
+                 workspace in the spec",
+                status_words(*status)
+            ),
+        }
+    }
+}
+
+impl std::error::Error for LearnError {}
+
+impl From<RunError> for LearnError {
+    fn from(error: RunError) -> Self {
+        Self::Run(error)
+    }
+}
+
+/// What a machine showed in a pass, tick by tick.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Seen {
+    /// Set-point less what the gauges showed, at the end of each tick, m and rad.
+    pub measured: Vec<[f64; 6]>,
+    /// Set-point less true pose; what was measured, where nothing else is known.
+    pub real: Vec<[f64; 6]>,
+    /// Status bits seen.
+    pub status: u32,
+}
+
+/// What learns: a machine that makes a pass.
+pub trait Pupil {
+    /// A pass of the motion under the correction of these knots, so many ticks apart.
+    ///
+    /// # Errors
+    /// If the machine does not make it.
+    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, RunError>;
+}
+
+impl Pupil for Bench<'_> {
+    fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, RunError> {
+        let ticks = motion.targets.len();
+        let mut seen = Seen { measured: Vec::with_capacity(ticks), real: Vec::with_capacity(ticks), status: 0 };
+        let mut last: Option<[f64; 6]> = None;
+        for (tick, target) in motion.targets.iter().enumerate() {
+            let correction = playback::at(knots, spacing, tick as u32);
+            let done = self.tick(&Request { correction, ..Request::stream(*target) })?;
+            let off = |pose: &[f64; 6], target: &[f64; 6]| std::array::from_fn(|axis| target[axis] - pose[axis]);
+            // The gauges are read at the beginning of a tick: what they show is the end of the one before.
+            if let Some(target) = last {
+                seen.measured.push(off(&done.measured, &target));
+            }
+            last = Some(done.target);
+            seen.real.push(off(&done.pose, &done.target));
+            seen.status |= done.status;
+        }
+        // The pass ends at rest: its last tick is as the one before.
+        seen.measured.extend(seen.measured.last().copied());
+        Ok(seen)
+    }
+}
+
+/// Errors of a pass, over the motion itself.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pass {
+    /// Root mean square of the translation's true error as a norm, nm.
+    pub translation_nm: f64,
+    /// Of the angles', nrad.
+    pub orientation_nrad: f64,
+    /// Of both as the gauges show them, angles times the radius of the joints, nm: what decides.
+    pub measured_nm: f64,
+    /// Status bits seen.
+    pub status: u32,
+}
+
+impl Pass {
+    fn of(seen: &Seen, scored: &Range<usize>, radius: f64) -> Self {
+        let rms = |errors: &[[f64; 6]], weights: [f64; 2]| {
+            let sum: f64 = errors[scored.clone()]
+                .iter()
+                .map(|error| (0..6).map(|axis| weights[axis / 3] * error[axis] * error[axis]).sum::<f64>())
+                .sum();
+            libm::sqrt(sum / scored.len() as f64) * 1e9
+        };
+        Self {
+            translation_nm: rms(&seen.real, [1.0, 0.0]),
+            orientation_nrad: rms(&seen.real, [0.0, 1.0]),
+            measured_nm: rms(&seen.measured, [1.0, radius * radius]),
+            status: seen.status,
+        }
+    }
+
+    /// Whether the limits held the correction back.
+    #[must_use]
+    pub fn limited(&self) -> bool {
+        self.status & CORRECTION_LIMITED != 0
+    }
+}
+
+/// What came of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Learned {
+    /// The first is without correction, or with the one that learning began with.
+    pub passes: Vec<Pass>,
+    /// The pass with the least error.
+    pub best: usize,
+    /// Its knots.
+    #[serde(skip)]
+    pub knots: Vec<Knot>,
+    /// Whether learning ended because the error grew.
+    pub grew: bool,
+}
+
+/// Makes `count` passes beyond the first and learns from each; the best is kept, and an error that grows ends it. One pass before them
+/// is not counted: only after it is the hysteresis as in every repetition. `begin` is the
+/// correction of the first pass, none of no knots; `radius` (m) is that of the joints. `watch` hears of each pass and may end it.
+///
+/// # Errors
+/// If the machine does not make a pass, or not the motion.
+pub fn learn(
+    pupil: &mut dyn Pupil,
+    motion: &Motion,
+    update: &Update,
+    begin: &[Knot],
+    spacing: u32,
+    count: usize,
+    radius: f64,
+    mut watch: impl FnMut(usize, &Pass) -> ControlFlow<()>,
+) -> Result<Learned, LearnError> {
+    let mut played: Vec<Knot> = begin.to_vec();
+    let mut learned = Learned { passes: Vec::new(), best: 0, knots: played.clone(), grew: false };
+    followed(pupil.pass(motion, &played, spacing)?)?;
+    for number in 0..=count {
+        let seen = followed(pupil.pass(motion, &played, spacing)?)?;
+        let pass = Pass::of(&seen, &motion.scored, radius);
+        let go_on = watch(number, &pass);
+        learned.passes.push(pass);
+        let least = learned.passes[learned.best].measured_nm;
+        if pass.measured_nm < least {
+            learned.best = number;
+            learned.knots.clone_from(&played);
+        }
+        // A NaN grows, too.
+        learned.grew = number > 0 && !(pass.measured_nm <= GROWS * least);
+        if number == count || learned.grew || go_on.is_break() {
+            break;
+        }
+        let correction: Vec<[f64; 6]> =
+            (0..motion.corrected as u32).map(|tick| playback::at(&played, spacing, tick)).collect();
+        played = knots(&update.next(&correction, &seen.measured[..motion.corrected]), spacing);
+    }
+    Ok(learned)
+}
+
+/// A pass in which the motion was made and seen.
+fn followed(seen: Seen) -> Result<Seen, LearnError> {
+    let bad = seen.status & (NOT_FOLLOWED | GAUGES);
+    if bad == 0 { Ok(seen) } else { Err(LearnError::Status(bad)) }
+}

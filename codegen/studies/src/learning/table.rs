@@ -1,0 +1,169 @@
+//! The learned correction as a table: knots, and a file that says for what they were learned.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use specgen_runtime::playback::{Knot, UNIT};
+
+/// Version of the file.
+const FORMAT: &str = "specgen correction 1";
+
+/// A correction that was learned.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Table {
+    /// What the file is.
+    format: String,
+    /// Digest of the spec.
+    pub digest: String,
+    /// The machine that it was learned on, as its user calls it.
+    pub machine: String,
+    /// The motion, as its user calls it.
+    pub motion: String,
+    /// Ticks from knot to knot.
+    pub spacing: u32,
+    /// Knots: pm and prad.
+    pub knots: Vec<Knot>,
+}
+
+/// Why a file is not taken.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum TableError {
+    /// It is none.
+    Format(String),
+    /// It is of another spec, machine or motion: what, there, here.
+    Other(&'static str, String, String),
+}
+
+impl fmt::Display for TableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Format(why) => write!(f, "this is no correction that `specgen learn` wrote: {why}"),
+            Self::Other(what, there, here) => {
+                write!(f, "it was learned for the {what} `{there}`, not `{here}`; learn anew, without --from")
+            }
+        }
+    }
+}
+
+impl std::error::Error for TableError {}
+
+impl Table {
+    /// A table for a spec (by its digest), a machine and a motion.
+    #[must_use]
+    pub fn new(digest: &str, machine: &str, motion: &str, spacing: u32, knots: Vec<Knot>) -> Self {
+        let [digest, machine, motion] = [digest, machine, motion].map(str::to_owned);
+        Self { format: FORMAT.to_owned(), digest, machine, motion, spacing, knots }
+    }
+
+    /// Its file: JSON, a knot a line.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        let head = serde_json::json!({
+            "format": self.format, "digest": self.digest, "machine": self.machine, "motion": self.motion,
+            "spacing": self.spacing,
+        });
+        let lines: Vec<String> = self.knots.iter().map(|knot| format!("{knot:?}")).collect();
+        let head = head.to_string();
+        format!("{},\n\"knots\":[\n{}\n]}}\n", head.trim_end_matches('}'), lines.join(",\n"))
+    }
+
+    /// The table of a file.
+    ///
+    /// # Errors
+    /// If it is none.
+    pub fn read(text: &str) -> Result<Self, TableError> {
+        let table: Self = serde_json::from_str(text).map_err(|error| TableError::Format(error.to_string()))?;
+        if table.format != FORMAT {
+            return Err(TableError::Format(format!("its format is `{}`, expected `{FORMAT}`", table.format)));
+        }
+        if table.spacing == 0 {
+            return Err(TableError::Format("`spacing` is 0, expected a number of ticks".to_owned()));
+        }
+        Ok(table)
+    }
+
+    /// Whether it is for this spec, machine and motion.
+    ///
+    /// # Errors
+    /// What it is not for.
+    pub fn is_for(&self, digest: &str, machine: &str, motion: &str) -> Result<(), TableError> {
+        let other = |what, there: &str, here: &str| Err(TableError::Other(what, there.to_owned(), here.to_owned()));
+        if self.digest != digest {
+            return other("spec with digest", &self.digest, digest);
+        }
+        if self.machine != machine {
+            return other("machine", &self.machine, machine);
+        }
+        if self.motion != motion {
+            return other("motion", &self.motion, motion);
+        }
+        Ok(())
+    }
+}
+
+/// Knots of the spline that passes through every `spacing`-th value of a signal (m and rad), which begins and ends at 0.
+#[must_use]
+pub fn knots(signal: &[[f64; 6]], spacing: u32) -> Vec<Knot> {
+    let values: Vec<[f64; 6]> = signal.iter().step_by(spacing as usize).copied().collect();
+    let size = values.len();
+    let mut knots = vec![[0; 6]; size];
+    let mut eliminated = vec![[0.0; 2]; size];
+    for axis in 0..6 {
+        // (a_{k−1} + 4 a_k + a_{k+1})/6 = v_k.
+        let mut last = [0.0; 2];
+        for (kept, value) in eliminated.iter_mut().zip(&values) {
+            let pivot = 4.0 - last[0];
+            last = [1.0 / pivot, (6.0 * value[axis] / UNIT - last[1]) / pivot];
+            *kept = last;
+        }
+        let mut next = 0.0;
+        for (knot, [above, value]) in knots.iter_mut().zip(&eliminated).rev() {
+            next = value - above * next;
+            // Beyond the range of a word is beyond every limit; the cast saturates.
+            knot[axis] = libm::round(next) as i32;
+        }
+    }
+    knots
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use specgen_runtime::playback;
+
+    #[test]
+    fn the_spline_passes_through_the_signal_at_its_knots_and_near_it_between() {
+        let signal: Vec<[f64; 6]> = (0..1001)
+            .map(|tick| {
+                let t = f64::from(tick) / 1000.0;
+                let window = libm::pow(libm::sin(std::f64::consts::PI * t), 2.0);
+                std::array::from_fn(|axis| 1e-6 * window * libm::sin(40.0 * t + axis as f64))
+            })
+            .collect();
+        let knots = knots(&signal, 5);
+        for (tick, wanted) in signal.iter().enumerate() {
+            let found: [f64; 6] = playback::at(&knots, 5, tick as u32);
+            let allowed = if tick % 5 == 0 { 1.5e-12 } else { 3e-11 };
+            for (found, wanted) in found.iter().zip(wanted) {
+                assert!((found - wanted).abs() < allowed, "{tick}: {found:e} {wanted:e}");
+            }
+        }
+        assert_eq!(playback::at::<f64>(&knots, 5, 2000), [0.0; 6]);
+    }
+
+    #[test]
+    fn a_table_comes_back_and_is_refused_for_anything_else() {
+        let table = Table::new("d1", "stage 7", "case-1 10 Hz", 5, vec![[1, -2, 3, 4, 5, i32::MIN]; 3]);
+        let back = Table::read(&table.to_json()).unwrap();
+        assert_eq!(back, table);
+        assert_eq!(back.is_for("d1", "stage 7", "case-1 10 Hz"), Ok(()));
+        for (digest, machine, motion) in [("d2", "stage 7", "case-1 10 Hz"), ("d1", "stage 8", "case-1 10 Hz"), ("d1", "stage 7", "x")] {
+            let error = back.is_for(digest, machine, motion).unwrap_err().to_string();
+            assert!(error.contains("learn anew"), "{error}");
+        }
+        for text in ["", "{}", &table.to_json().replace("correction 1", "correction 9")] {
+            assert!(Table::read(text).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! Learning between passes: what it makes of motions on machines of both classes of legs, on machines within the intervals, and on one
+//! that is not. All of it is simulation.
+
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+use std::sync::OnceLock;
+
+use host_sim::platform::rig::{Bench as Rig, Noise};
+use host_sim::platform::{PlatformScenario, Specimen};
+use host_sim::plant::LegParameters;
+use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
+use specgen::learning::{Convergence, Learnable, Learned, Motion, Pupil, Update, knots, learn};
+use specgen::machine;
+use specgen::robust::{Deviation, Factors};
+use specgen::stability::platform::{Adapting, Conditions, Law, Tuning};
+use specgen_tests::length;
+
+use super::bench::{Bench, PERIOD, in_parallel, scenario};
+use super::classes::{Circle, bouc_wen};
+use super::limits::closed_loop;
+
+/// With streams fast enough for a circle of 5 µm at 200 Hz.
+const LEARNING: [(&str, &str); 3] = [
+    ("notch_damping   = 1.0", "notch_damping   = 1.0\nactive_damping  = true\ncorrection = \"6 um\""),
+    ("stream_speed = [\"5 mm/s\", \"5 mm/s\", \"5 mm/s\"", "stream_speed = [\"8 mm/s\", \"8 mm/s\", \"8 mm/s\""),
+    ("stale_ticks  = 10", "stale_ticks = 3"),
+];
+/// Of the platform's joints, m.
+const RADIUS: f64 = 0.1;
+/// Back to the start, m/s and rad/s.
+const SPEED: [f64; 6] = [1e-3, 1e-3, 1e-3, 1e-2, 1e-2, 1e-2];
+/// Highest frequency to be learned, Hz.
+const WISH: f64 = 800.0;
+
+fn plays() -> &'static Bench {
+    static BENCH: OnceLock<Bench> = OnceLock::new();
+    BENCH.get_or_init(|| Bench::new("learning-plays", Specimen::reference(), &LEARNING))
+}
+
+fn other() -> &'static Bench {
+    static BENCH: OnceLock<Bench> = OnceLock::new();
+    BENCH.get_or_init(|| bouc_wen("learning-bouc-wen", &LEARNING))
+}
+
+/// What the compiler knows of its loop, and what learning may do on every machine within the intervals of [robust].
+fn design(bench: &Bench) -> (Learnable, Convergence) {
+    let compiled = &bench.emitted.compiled;
+    let learnable = Learnable::of(compiled).unwrap();
+    let convergence = learnable.convergence(&Factors::of(&compiled.model, &[]), WISH).unwrap();
+    (learnable, convergence)
+}
+
+/// So many passes of a motion on a machine with the controller of a bench.
+fn passes(
+    bench: &Bench,
+    machine: &PlatformScenario,
+    latency: usize,
+    trajectory: &dyn PoseTrajectory,
+    (learnable, convergence): &(Learnable, Convergence),
+    count: usize,
+) -> Learned {
+    let motion = Motion::of(trajectory, PERIOD, &SPEED).unwrap();
+    let update = Update::new(learnable, &motion, convergence);
+    let mut controller = bench.controller();
+    let mut prepared = machine.rig().clone();
+    let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, latency).unwrap();
+    rig.arm(60.0).unwrap();
+    let spacing = convergence.spacing(PERIOD);
+    learn(&mut rig, &motion, &update, &[], spacing, count, RADIUS, |_, _| ControlFlow::Continue(())).unwrap()
+}
+
+fn case_1(hertz: f64) -> PaperPose {
+    PaperPose::corrected(PaperPath::Case1, hertz)
+}
+
+#[test]
+fn a_path_with_corners_is_learned_to_nanometres_in_five_passes() {
+    let learned = passes(plays(), &plays().scenario(), 0, &case_1(10.0), &design(plays()), 5);
+    let [first, best] = [0, learned.best].map(|pass| learned.passes[pass]);
+    println!("case 1 at 10 Hz: {:.1} -> {:.1} nm, {:.0} nrad", first.translation_nm, best.translation_nm, best.orientation_nrad);
+    assert!(first.translation_nm > 15.0 && best.translation_nm <= 6.0 && best.orientation_nrad <= 45.0, "{learned:?}");
+    assert!(!learned.grew && learned.passes.iter().all(|pass| !pass.limited()));
+}
+
+/// T of the frequency domain against the same loop tick by tick, where nothing is fed back.
+#[test]
+fn the_channel_of_a_correction_is_that_of_the_time_domain() {
+    let closed_loop = closed_loop(plays());
+    let law = Law::Feedforward(Adapting::Invhys);
+    for hertz in [20.0, 361.0, 700.0] {
+        let angle = TAU * hertz * PERIOD;
+        let ticks = 20_000_u32;
+        let requests: Vec<[f64; 6]> = (1..=ticks).map(|tick| [(angle * f64::from(tick)).sin(); 6]).collect();
+        let shown = closed_loop.without_feedback(&requests);
+        let [response] = closed_loop.correction_response(law, &Tuning::NONE, &Conditions::NOMINAL, &[angle])[..] else {
+            unreachable!()
+        };
+        for (mode, row) in response.iter().enumerate() {
+            let expected = |tick: f64| row[mode][0] * (angle * tick).sin() + row[mode][1] * (angle * tick).cos();
+            for tick in ticks - 50..ticks {
+                let off = shown[tick as usize][mode] - expected(f64::from(tick + 1));
+                assert!(off.abs() < 1e-6, "{hertz} Hz, mode {mode}: {off}");
+            }
+        }
+    }
+}
+
+/// A step along x, as fast as streams may be.
+struct Step {
+    size: f64,
+    rise: f64,
+}
+
+impl PoseTrajectory for Step {
+    fn duration(&self) -> f64 {
+        0.1
+    }
+
+    fn target(&self, time: f64) -> PoseTarget {
+        let mut target = PoseTarget::default();
+        target.pose[0] = self.size * (time / self.rise).clamp(0.0, 1.0);
+        target
+    }
+}
+
+/// Errors (nm rms) of case 1 at 10 Hz as it is and prepared, and when a step has settled to ±10 nm likewise, ms.
+fn prepared(bench: &Bench) -> ([f64; 2], [[f64; 2]; 2]) {
+    let learnable = Learnable::of(&bench.emitted.compiled).unwrap();
+    let pass = |motion: &Motion, with: bool| {
+        let spacing = 3;
+        let table = if with { knots(&Update::prepared(&learnable, motion, WISH), spacing) } else { Vec::new() };
+        let mut controller = bench.controller();
+        let mut prepared = bench.scenario().rig().clone();
+        let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, 0).unwrap();
+        rig.arm(60.0).unwrap();
+        let seen = rig.pass(motion, &table, spacing).unwrap();
+        assert_eq!(seen.status, 0, "{:#x}", seen.status);
+        seen
+    };
+    let path = Motion::of(&case_1(10.0), PERIOD, &SPEED).unwrap();
+    let case = [false, true].map(|with| {
+        let seen = pass(&path, with);
+        let errors = &seen.real[path.scored.clone()];
+        let sum: f64 = errors.iter().map(|e| e[..3].iter().map(|x| x * x).sum::<f64>()).sum();
+        (sum / errors.len() as f64).sqrt() * 1e9
+    });
+    let steps = [Step { size: 1e-6, rise: 2e-4 }, Step { size: 10e-6, rise: 2e-3 }].map(|step| {
+        let motion = Motion::of(&step, PERIOD, &SPEED).unwrap();
+        [false, true].map(|with| {
+            let seen = pass(&motion, with);
+            let off = |tick: &usize| {
+                let place = motion.targets[*tick].pose[0] - seen.real[*tick][0];
+                (place - step.size).abs() > 10e-9
+            };
+            let last = motion.scored.clone().filter(off).last().unwrap();
+            (last + 2 - motion.scored.start) as f64 * PERIOD * 1e3
+        })
+    });
+    (case, steps)
+}
+
+#[test]
+fn what_lag_and_modes_would_leave_is_prepared_by_the_model() {
+    for (name, bench) in [("plays", plays as fn() -> &'static Bench), ("Bouc-Wen", other)].iter().take(length(1, 2)) {
+        let ([bare, prepared], [small, large]) = prepared(bench());
+        println!(
+            "{name}: case 1 at 10 Hz {bare:.1} -> {prepared:.1} nm; settled to 10 nm: step of 1 µm {:.1} -> {:.1} ms, of 10 µm \
+             {:.1} -> {:.1} ms",
+            small[0], small[1], large[0], large[1]
+        );
+        assert!(prepared < bare && small[1] < small[0] && large[1] < large[0]);
+        assert!(*name != "plays" || prepared <= 15.0, "{prepared}");
+    }
+}
+
+#[test]
+fn both_classes_of_legs_are_learned() {
+    if length(true, false) {
+        return println!("skipped: only in the soak: six motions learned on both classes of legs");
+    }
+    type Motions = [(&'static str, Box<dyn PoseTrajectory + Sync>, usize, f64); 6];
+    let motions: Motions = [
+        ("case 1 at 1 Hz", Box::new(case_1(1.0)), 5, f64::INFINITY),
+        ("case 1 at 10 Hz", Box::new(case_1(10.0)), 5, 6.0),
+        ("case 1 at 30 Hz", Box::new(case_1(30.0)), 5, 20.0),
+        ("case 1 at 50 Hz", Box::new(case_1(50.0)), 8, 35.0),
+        ("circle of 5 µm at 50 Hz", Box::new(Circle { frequency: 50.0 }), 8, 15.0),
+        ("circle of 5 µm at 200 Hz", Box::new(Circle { frequency: 200.0 }), 8, 20.0),
+    ];
+    for (class, bench) in [("plays", plays()), ("Bouc-Wen", other())] {
+        let design = design(bench);
+        let found = in_parallel(motions.len() as u32, |which| {
+            let (_, motion, count, _) = &motions[which as usize];
+            passes(bench, &bench.scenario(), 0, motion.as_ref(), &design, *count)
+        });
+        for ((name, _, _, bar), learned) in motions.iter().zip(&found) {
+            let all: Vec<String> = learned
+                .passes
+                .iter()
+                .map(|pass| format!("{:.1}/{:.0}", pass.translation_nm, pass.orientation_nrad))
+                .collect();
+            println!("{class}, {name}: {} nm/nrad, best {}", all.join(" "), learned.best);
+            let [first, best] = [0, learned.best].map(|pass| learned.passes[pass]);
+            assert!(best.translation_nm <= *bar && best.translation_nm <= first.translation_nm, "{name}: {learned:?}");
+            assert!(!learned.grew);
+            match *name {
+                "case 1 at 10 Hz" => assert!(best.orientation_nrad <= 45.0, "{learned:?}"),
+                "circle of 5 µm at 200 Hz" => assert!(40.0 * best.translation_nm <= first.translation_nm, "{learned:?}"),
+                _ => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn every_machine_within_the_intervals_learns() {
+    if length(true, false) {
+        return println!("skipped: only in the soak: learning on 100 machines drawn from the intervals of [robust]");
+    }
+    let bench = plays();
+    let model = &bench.emitted.compiled.model;
+    let task = model.task_space.as_ref().unwrap();
+    let design = design(bench);
+    let factors = Factors::of(model, &[]);
+    let found = in_parallel(100, |seed| {
+        let deviation = Deviation::drawn(&factors, u64::from(seed));
+        let leg = if seed % 2 == 0 { LegParameters::reference() } else { LegParameters::bouc_wen() };
+        let specimen = deviation.specimen(model, task, &leg);
+        let machine = machine::scenario(model, task, &specimen, &Noise::of(&specimen), u64::from(seed));
+        passes(bench, &machine, deviation.delay_ticks as usize, &case_1(10.0), &design, 8)
+    });
+    let errors = |which: fn(&Learned) -> usize| {
+        let mut all: Vec<f64> = found.iter().map(|learned| learned.passes[which(learned)].translation_nm).collect();
+        all.sort_by(f64::total_cmp);
+        [all[50], all[99]]
+    };
+    println!("100 machines, median and largest, nm: without {:.1?}, learned {:.1?}", errors(|_| 0), errors(|one| one.best));
+    for (seed, learned) in found.iter().enumerate() {
+        let [first, best, last] = [0, learned.best, learned.passes.len() - 1].map(|pass| learned.passes[pass].translation_nm);
+        assert!(!learned.grew && last <= 1.2 * best && 3.0 * best <= first, "seed {seed}: {learned:?}");
+    }
+}
+
+/// Half of the stiffness is far outside the intervals: the modes lie where learning turns the wrong way.
+#[test]
+fn learning_that_diverges_ends_by_itself_and_keeps_the_best_pass() {
+    let bench = plays();
+    let mut specimen = bench.specimen.clone();
+    specimen.stiffness = specimen.stiffness.map(|stiffness| 0.6 * stiffness);
+    let learned = passes(bench, &scenario(&specimen), 0, &case_1(10.0), &design(bench), 40);
+    let errors: Vec<f64> = learned.passes.iter().map(|pass| pass.measured_nm).collect();
+    println!("stiffness x 0.6: {errors:.0?} nm by the gauges, best {}", learned.best);
+    assert!(learned.grew && learned.passes.len() < 40, "{errors:?}");
+    assert!(errors.iter().all(|error| *error >= errors[learned.best]));
+}
