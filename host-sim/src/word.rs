@@ -120,7 +120,13 @@ pub fn status_words(status: u32) -> String {
     legs(0, "leg", " limited");
     legs(8, "gauge", " fault");
     legs(24, "leg", " inverse static");
-    for (bit, what) in [(16, "set-point refused"), (17, "set-point stale"), (18, "moving"), (19, "wrench fault"), (20, "correction limited")] {
+    for (bit, what) in [
+        (16, "set-point refused"),
+        (17, "set-point stale"),
+        (18, "moving"),
+        (19, "wrench fault"),
+        (20, "correction limited"),
+    ] {
         words.extend((status >> bit & 1 == 1).then(|| what.to_owned()));
     }
     let known = 0x3f | 0x3f << 8 | 0x1f << 16 | 0x3f << 24;

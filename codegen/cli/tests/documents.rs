@@ -181,6 +181,7 @@ fn status_bits_are_those_that_are_emitted() {
         ("17", "SETPOINT_STALE", 1 << 17),
         ("18", "GENERATOR_BUSY", 1 << 18),
         ("19", "WRENCH_FAULT", 1 << 19),
+        ("20", "CORRECTION_LIMITED", 1 << 20),
     ] {
         assert!(page.contains(&format!("\n| {rows} | ")), "no row {rows}");
         let line = step.lines().find(|line| line.contains(&format!("const {constant}: u32"))).unwrap();

@@ -9,7 +9,7 @@ use crate::hysteresis::TABLES;
 use crate::limits::DAC;
 use crate::notch::{modal_error, notch_error};
 use crate::setpoint::SETPOINTS;
-use crate::step::{actuate, correction, known_load, learn};
+use crate::step::{actuate, known_load, learn, reaction};
 use crate::{Config, LEGS, Real, State, TickInput};
 use specgen_runtime::Real as _;
 use specgen_runtime::linear::difference;
@@ -35,9 +35,9 @@ pub fn prepare(config: &Config, state: &mut State, input: &TickInput) {
     crate::step::sense(config, state, &input.gauge);
     state.generator.tick(&SETPOINTS, &input.command);
     let (demand, _) = known_load(config, state);
-    let correction = correction(config, state);
+    let reaction = reaction(config, state);
     for (index, leg) in state.legs.iter_mut().enumerate() {
-        leg.excess = demand[index] + correction[index];
+        leg.excess = demand[index] + reaction[index];
     }
 }
 

@@ -11,7 +11,7 @@ use crate::{Config, LEGS, Real, State, TickInput, kinematics, sensing};
 use specgen_runtime::linear::component;
 use specgen_runtime::setpoint::{CommandKind, Generator};
 use specgen_runtime::supervisor::{Phase, Sample};
-use specgen_runtime::{Damping, Estimate, Integral, NotchState, Transfer};
+use specgen_runtime::{Correction, Damping, Estimate, Integral, NotchState, Transfer};
 
 /// The gauges' words.
 #[inline]
@@ -46,6 +46,7 @@ pub(crate) fn begin(_config: &Config, state: &mut State, supervisor: &mut Superv
     state.error_notch = NotchState::new();
     state.innovation_notch = NotchState::new();
     state.damping = Damping::new();
+    state.correction = Correction::new();
     state.error = [0.0; 6];
     state.deflection = [0.0; 6];
     state.transfer = Transfer::new();

@@ -5,12 +5,12 @@
 use crate::config::Environment;
 use crate::hysteresis::{GRID, Memory};
 use crate::supervision::{code_at_rest, displacement_at_rest, memory_at_rest};
-use crate::task_space::DAMPED;
+use crate::task_space::{CORRECTED, DAMPED};
 use crate::{LEGS, Real, limits};
 use specgen_runtime::setpoint::Generator;
 use specgen_runtime::snapshot::{LARGEST, LARGEST_PLACE, Snapshot};
 use specgen_runtime::{
-    ControlMode, Damping, Digest, Estimate, Integral, Interaction, LastLine, NotchState, Rate, Transfer,
+    ControlMode, Correction, Damping, Digest, Estimate, Integral, Interaction, LastLine, NotchState, Rate, Transfer,
 };
 
 specgen_runtime::state! { |words|
@@ -47,6 +47,8 @@ specgen_runtime::state! { |words|
         pub innovation_notch: NotchState<Real> = NotchState::new(), part;
         /// What is asked for against the modes.
         pub damping: Damping<Real, DAMPED> = Damping::new(), part;
+        /// What was learned or prepared for the motion.
+        pub correction: Correction<Real, CORRECTED> = Correction::new(), part;
         /// k_I ∫e.
         pub integral: Integral<Real> = Integral::new(), part;
         /// δ̂ and φ̂ of each mode.

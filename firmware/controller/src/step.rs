@@ -14,7 +14,7 @@
 //!            + J⁻ᵀ k_v ė/k_a + τ (Δl(h_d(t_{n+1})) − Δl(h_d(t_n)))/T                  damping, lead
 //! legs       q = Δl(h_d) + p + J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂ ;  u = Γ⁻¹(q)       limited: q̂ is what was really requested
 //! ```
-//! N is the modal notch. Active damping D(z) e, where a spec asks for it, is part of p: `specgen_runtime::damping`. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback
+//! N is the modal notch. A correction c that was learned or prepared for the motion (`specgen_runtime::correction`) adds J c to q; like damping the innovation does not see it. Active damping D(z) e, where a spec asks for it, is part of p: `specgen_runtime::damping`. p is a load that the legs really carry, so it belongs to the model of the innovation; the feedback
 //! is none and does not.
 //!
 //! Y = Δl(h) is taken to first order about the set-point, Δl(h_d) − J e. With q = Δl(h_d) + p + f − δ̂ − φ̂ + b (feedback f,
@@ -30,11 +30,11 @@ use crate::limits::DAC;
 use crate::notch::{modal_error, notch_error, notch_innovation};
 use crate::setpoint::SETPOINTS;
 use crate::task_space::{
-    AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, DAMPING, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH,
+    AFFINE_LOAD, CELLS_PER_METRE, COMPLIANCE, CORRECTION, DAMPING, FORCE_TO_MODES, LEAD, LEGS_TO_MODES, LEGS_TO_WRENCH,
     METRES_PER_CELL, MODES_TO_LEGS, PERIOD, REST_FORCE, TRANSFER_KEEP, TRANSFER_NEGLIGIBLE, WRENCH_LIMIT,
     WRENCH_TO_LEGS,
 };
-use crate::tick::WRENCH_FAULT;
+use crate::tick::{CORRECTION_LIMITED, WRENCH_FAULT};
 use crate::{Config, LEGS, LegState, Real, State, TickInput, TickOutput, dynamics, kinematics, sensing};
 use specgen_runtime::feedback::{force_of, winds_up};
 use specgen_runtime::linear::{difference, each, transform};
@@ -60,13 +60,14 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
     let damping = damping(config, state);
     let setpoint_status = state.generator.tick_as(&SETPOINTS, kind, &input.command);
     let (demand, load) = known_load(config, state);
-    let correction = correction(config, state);
+    let correction_held = state.correction.follow(&CORRECTION, &input.correction);
+    let reaction = reaction(config, state);
     state.load = if LEAD == 0.0 { load } else { each(|leg| load[leg] + (demand[leg] - state.demand[leg]) * LEAD) };
     state.demand = demand;
     if let Some(damping) = &damping {
         state.load = each(|leg| state.load[leg] + damping[leg]);
     }
-    let mut request = each(|leg| demand[leg] + state.load[leg] + correction[leg]);
+    let mut request = each(|leg| demand[leg] + state.load[leg] + reaction[leg]);
     if entered {
         hand_over(config, state, &request);
         request = each(|leg| state.legs[leg].requested);
@@ -87,7 +88,8 @@ pub(crate) fn advance(config: &Config, state: &mut State, kind: CommandKind, inp
     for (index, leg) in state.legs.iter().enumerate() {
         static_inverse |= ((config.mode().inverts() && leg.memory.fell_back()) as u32) << (24 + index);
     }
-    static_inverse | limited | gauge_faults << 8 | setpoint_status | if wrench_good { 0 } else { WRENCH_FAULT }
+    let inputs = if wrench_good { 0 } else { WRENCH_FAULT } | if correction_held { CORRECTION_LIMITED } else { 0 };
+    static_inverse | limited | gauge_faults << 8 | setpoint_status | inputs
 }
 
 /// What goes out, of the state that the tick left.
@@ -262,9 +264,9 @@ pub(crate) fn known_load(config: &Config, state: &State) -> ([Real; LEGS], [Real
     (load.displacement, each(|leg| (load.force[leg] - REST_FORCE[leg]) * COMPLIANCE))
 }
 
-/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, and what is asked for against the modes: m of each leg.
+/// J⁻ᵀ(k_p e + s)/k_a − δ̂ − φ̂, what is asked for against the modes, and J c: m of each leg.
 #[inline]
-pub(crate) fn correction(config: &Config, state: &mut State) -> [Real; LEGS] {
+pub(crate) fn reaction(config: &Config, state: &mut State) -> [Real; LEGS] {
     if config.mode().feeds_back() {
         let proportional = force_of(&config.active_gains().proportional, &state.error);
         let integral = &state.integral.force;
@@ -272,7 +274,12 @@ pub(crate) fn correction(config: &Config, state: &mut State) -> [Real; LEGS] {
         state.deflection = transform(&FORCE_TO_MODES, &force);
     }
     let wanted = each(|mode| state.deflection[mode] - state.estimates[mode].correction());
-    transform(&MODES_TO_LEGS, &state.damping.beside(wanted))
+    let mut wanted = state.damping.beside(wanted);
+    if let Some(correction) = state.correction.pose() {
+        let correction = modal_error(&correction);
+        wanted = each(|mode| wanted[mode] + correction[mode]);
+    }
+    transform(&MODES_TO_LEGS, &wanted)
 }
 
 /// The request as a permitted code; the memory then holds the drive of that code. Returns whether a limit of table,

@@ -3,7 +3,7 @@
 
 //! Constants of the control law (7) in task space, at rest; from `actuator`, `control` and the dynamics.
 
-use specgen_runtime::{Affine, Notch, Resonator, Section};
+use specgen_runtime::{Affine, CorrectionLimit, Notch, Resonator, Section};
 use crate::{LEGS, Real};
 
 /// T_s, s; from `timing.period`.
@@ -247,3 +247,9 @@ pub const DAMPED: usize = 0;
 
 /// Active damping of each.
 pub const DAMPING: [Resonator<Real>; DAMPED] = [];
+
+/// Axes with a correction of the request; from `control.correction`.
+pub const CORRECTED: usize = 0;
+
+/// How far and how fast that of each goes.
+pub const CORRECTION: [CorrectionLimit<Real>; CORRECTED] = [];

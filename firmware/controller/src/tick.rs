@@ -4,8 +4,8 @@
 //! reads and writes these, so that two of them can be compared bit for bit.
 
 use crate::limits::DAC;
-use crate::task_space::MODES_TO_LEGS;
-use crate::words::{names, six};
+use crate::task_space::{CORRECTED, MODES_TO_LEGS};
+use crate::words::{names, numbers, six};
 use crate::{LEGS, Real, State};
 use specgen_runtime::Real as _;
 use specgen_runtime::linear::{each, transform};
@@ -30,15 +30,18 @@ pub const GENERATOR_BUSY: u32 = 0x4_0000;
 /// Bit 19: measured wrench not finite or out of range; the last one believed was kept.
 pub const WRENCH_FAULT: u32 = 0x8_0000;
 
+/// Bit 20: correction not a number, or larger or faster than it may be; followed as far as the limits let it.
+pub const CORRECTION_LIMITED: u32 = 0x10_0000;
+
 /// Bits 24 to 29: the rate-dependent inverse of the leg was not safe to use; the static one stood in for it. Never set by models
 /// with one inverse.
 pub const STATIC_INVERSE: u32 = 0x3f00_0000;
 
 /// Words of a tick's input.
-pub const INPUT_WORDS: usize = 33;
+pub const INPUT_WORDS: usize = COMMAND_WORDS + 12;
 
 /// Words of a command: they stand before those that are measured.
-pub const COMMAND_WORDS: usize = 21;
+pub const COMMAND_WORDS: usize = 21 + CORRECTED;
 
 /// Words of a tick's output.
 pub const OUTPUT_WORDS: usize = 55;
@@ -46,9 +49,23 @@ pub const OUTPUT_WORDS: usize = 55;
 /// Words of where a platform is, see [`place_words`].
 pub const PLACE_WORDS: usize = 24;
 
-/// Names of the input words. `command` is 0 hold, 1 stream, 2 move, 3 trajectory.
-pub const INPUT_NAMES: [&str; INPUT_WORDS] =
-    names!["command", "selector", "sequence"; "setpoint", "setpoint_rate", "setpoint_acceleration", "gauge", "wrench";];
+/// Names of the input words. `command` is 0 hold, 1 stream, 2 move, 3 trajectory; `correction` stands there if `control.correction` asks
+/// for it.
+pub const INPUT_NAMES: [&str; INPUT_WORDS] = {
+    let mut names = [""; INPUT_WORDS];
+    let mut k = 0;
+    while k < INPUT_WORDS {
+        names[k] = EVERY_NAME[if k < 21 || INPUT_WORDS == EVERY_NAME.len() { k } else { k + 6 }];
+        k += 1;
+    }
+    names
+};
+
+/// Those of a controller that has them all.
+const EVERY_NAME: [&str; 39] = names![
+    "command", "selector", "sequence";
+    "setpoint", "setpoint_rate", "setpoint_acceleration", "correction", "gauge", "wrench";
+];
 
 /// Names of the output words.
 pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] =
@@ -59,6 +76,8 @@ pub const OUTPUT_NAMES: [&str; OUTPUT_WORDS] =
 pub struct TickInput {
     /// What the platform is to do.
     pub command: Command<Real>,
+    /// c, what was learned or prepared for the motion, added to the request: m and rad.
+    pub correction: [Real; CORRECTED],
     /// Reading of each gauge: V if the spec gives a calibration, else m from rest.
     pub gauge: [Real; 6],
     /// Measured force (N) and torque (N m) of the work piece ON the platform, about P_C, base axes.
@@ -72,7 +91,8 @@ pub struct TickOutput {
     pub voltage: [Real; LEGS],
     /// Converter code of each leg.
     pub dac_code: [i32; LEGS],
-    /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`], [`SETPOINT_STALE`], [`GENERATOR_BUSY`], [`WRENCH_FAULT`].
+    /// [`LEG_LIMITED`], [`GAUGE_FAULT`], [`SETPOINT_FAULT`], [`SETPOINT_STALE`], [`GENERATOR_BUSY`], [`WRENCH_FAULT`],
+    /// [`CORRECTION_LIMITED`].
     pub status: u32,
 }
 
@@ -80,14 +100,14 @@ impl TickInput {
     /// From words in the order of [`INPUT_NAMES`].
     #[must_use]
     pub fn from_words(words: &[u64; INPUT_WORDS]) -> Self {
-        let wrench = six(words, COMMAND_WORDS + 6);
-        Self { command: command(words), gauge: six(words, COMMAND_WORDS), wrench }
+        let (gauge, wrench) = (six(words, COMMAND_WORDS), six(words, COMMAND_WORDS + 6));
+        Self { command: command(words), correction: numbers(words, 21), gauge, wrench }
     }
 
     /// Of the words of a command, and of readings as a target has them. One that measures no wrench gives NaN for it.
     #[must_use]
     pub fn measured(words: &[u64; COMMAND_WORDS], gauge: &[Real; 6], wrench: &[Real; 6]) -> Self {
-        Self { command: command(words), gauge: *gauge, wrench: *wrench }
+        Self { command: command(words), correction: numbers(words, 21), gauge: *gauge, wrench: *wrench }
     }
 
     /// As words in the order of [`INPUT_NAMES`].
@@ -98,6 +118,7 @@ impl TickInput {
         words.reals(&self.command.target.pose);
         words.reals(&self.command.target.rate);
         words.reals(&self.command.target.acceleration);
+        words.reals(&self.correction);
         words.reals(&self.gauge);
         words.reals(&self.wrench);
     }

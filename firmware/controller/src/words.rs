@@ -26,7 +26,12 @@ pub(crate) use names;
 
 /// Six numbers from the word `first` on; zero beyond the end.
 pub(crate) fn six(words: &[u64], first: usize) -> [Real; 6] {
-    let mut vector = [0.0; 6];
+    numbers(words, first)
+}
+
+/// So many numbers from the word `first` on; zero beyond the end.
+pub(crate) fn numbers<const N: usize>(words: &[u64], first: usize) -> [Real; N] {
+    let mut vector = [0.0; N];
     for (value, word) in vector.iter_mut().zip(words.iter().skip(first)) {
         *value = Real::from_word(*word);
     }

@@ -34,8 +34,16 @@ impl<T: Real, const N: usize> Correction<T, N> {
         let mut held_back = false;
         for ((limit, wanted), given) in limits.iter().zip(wanted).zip(&mut self.given) {
             let (low, high) = (*given - limit.step, *given + limit.step);
-            // A number passes every comparison that is not with itself; NaN none.
-            let aim = if *wanted == *wanted { saturate(*wanted, -limit.most, limit.most) } else { T::ZERO };
+            // NaN fails both comparisons.
+            let aim = if *wanted > limit.most {
+                limit.most
+            } else if *wanted >= -limit.most {
+                *wanted
+            } else if *wanted < -limit.most {
+                -limit.most
+            } else {
+                T::ZERO
+            };
             *given = saturate(aim, low, high);
             held_back |= *given != *wanted;
         }

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
+use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Bench as Rig, Noise};
 use host_sim::platform::{PlatformScenario, Specimen};
-use host_sim::plant::LegParameters;
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
 use specgen::learning::{Convergence, Learnable, Learned, Motion, Pupil, Update, knots, learn};
 use specgen::machine;
@@ -59,14 +59,14 @@ fn passes(
     (learnable, convergence): &(Learnable, Convergence),
     count: usize,
 ) -> Learned {
-    let motion = Motion::of(trajectory, PERIOD, &SPEED).unwrap();
+    let motion = Motion::of(trajectory, PERIOD, &SPEED, RADIUS).unwrap();
     let update = Update::new(learnable, &motion, convergence);
     let mut controller = bench.controller();
     let mut prepared = machine.rig().clone();
     let mut rig = Rig::new(&mut prepared, &mut controller, PERIOD, latency).unwrap();
     rig.arm(60.0).unwrap();
     let spacing = convergence.spacing(PERIOD);
-    learn(&mut rig, &motion, &update, &[], spacing, count, RADIUS, |_, _| ControlFlow::Continue(())).unwrap()
+    learn(&mut rig, &motion, &update, &[], spacing, count, |_, _| ControlFlow::Continue(())).unwrap()
 }
 
 fn case_1(hertz: f64) -> PaperPose {
@@ -77,7 +77,10 @@ fn case_1(hertz: f64) -> PaperPose {
 fn a_path_with_corners_is_learned_to_nanometres_in_five_passes() {
     let learned = passes(plays(), &plays().scenario(), 0, &case_1(10.0), &design(plays()), 5);
     let [first, best] = [0, learned.best].map(|pass| learned.passes[pass]);
-    println!("case 1 at 10 Hz: {:.1} -> {:.1} nm, {:.0} nrad", first.translation_nm, best.translation_nm, best.orientation_nrad);
+    println!(
+        "case 1 at 10 Hz: {:.1} -> {:.1} nm, {:.0} nrad",
+        first.translation_nm, best.translation_nm, best.orientation_nrad
+    );
     assert!(first.translation_nm > 15.0 && best.translation_nm <= 6.0 && best.orientation_nrad <= 45.0, "{learned:?}");
     assert!(!learned.grew && learned.passes.iter().all(|pass| !pass.limited()));
 }
@@ -137,7 +140,7 @@ fn prepared(bench: &Bench) -> ([f64; 2], [[f64; 2]; 2]) {
         assert_eq!(seen.status, 0, "{:#x}", seen.status);
         seen
     };
-    let path = Motion::of(&case_1(10.0), PERIOD, &SPEED).unwrap();
+    let path = Motion::of(&case_1(10.0), PERIOD, &SPEED, RADIUS).unwrap();
     let case = [false, true].map(|with| {
         let seen = pass(&path, with);
         let errors = &seen.real[path.scored.clone()];
@@ -145,14 +148,14 @@ fn prepared(bench: &Bench) -> ([f64; 2], [[f64; 2]; 2]) {
         (sum / errors.len() as f64).sqrt() * 1e9
     });
     let steps = [Step { size: 1e-6, rise: 2e-4 }, Step { size: 10e-6, rise: 2e-3 }].map(|step| {
-        let motion = Motion::of(&step, PERIOD, &SPEED).unwrap();
+        let motion = Motion::of(&step, PERIOD, &SPEED, RADIUS).unwrap();
         [false, true].map(|with| {
             let seen = pass(&motion, with);
             let off = |tick: &usize| {
                 let place = motion.targets[*tick].pose[0] - seen.real[*tick][0];
                 (place - step.size).abs() > 10e-9
             };
-            let last = motion.scored.clone().filter(off).last().unwrap();
+            let last = motion.scored.clone().rfind(off).unwrap();
             (last + 2 - motion.scored.start) as f64 * PERIOD * 1e3
         })
     });
@@ -205,7 +208,9 @@ fn both_classes_of_legs_are_learned() {
             assert!(!learned.grew);
             match *name {
                 "case 1 at 10 Hz" => assert!(best.orientation_nrad <= 45.0, "{learned:?}"),
-                "circle of 5 µm at 200 Hz" => assert!(40.0 * best.translation_nm <= first.translation_nm, "{learned:?}"),
+                "circle of 5 µm at 200 Hz" => {
+                    assert!(40.0 * best.translation_nm <= first.translation_nm, "{learned:?}")
+                }
                 _ => {}
             }
         }
@@ -234,9 +239,14 @@ fn every_machine_within_the_intervals_learns() {
         all.sort_by(f64::total_cmp);
         [all[50], all[99]]
     };
-    println!("100 machines, median and largest, nm: without {:.1?}, learned {:.1?}", errors(|_| 0), errors(|one| one.best));
+    println!(
+        "100 machines, median and largest, nm: without {:.1?}, learned {:.1?}",
+        errors(|_| 0),
+        errors(|one| one.best)
+    );
     for (seed, learned) in found.iter().enumerate() {
-        let [first, best, last] = [0, learned.best, learned.passes.len() - 1].map(|pass| learned.passes[pass].translation_nm);
+        let [first, best, last] =
+            [0, learned.best, learned.passes.len() - 1].map(|pass| learned.passes[pass].translation_nm);
         assert!(!learned.grew && last <= 1.2 * best && 3.0 * best <= first, "seed {seed}: {learned:?}");
     }
 }

@@ -21,7 +21,9 @@ use specgen_compiler::compile::Compiled;
 use specgen_language::interrupt;
 use specgen_language::model::TaskSpace;
 use specgen_runtime::playback::Knot;
-use specgen_studies::learning::{Convergence, LearnError, Learnable, Learned, Motion, Pass, Table, Update, knots, learn};
+use specgen_studies::learning::{
+    Convergence, LearnError, Learnable, Learned, Motion, Pass, Table, Update, knots, learn,
+};
 use specgen_studies::machine;
 use specgen_studies::robust::Factors;
 use specgen_studies::robust::factors::Given;
@@ -88,8 +90,10 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     })?;
     let trajectory = followed.choice.of_platform(model, task);
     let speed = task.setpoint.speed;
-    let motion = Motion::of(trajectory.as_ref(), model.timing.period, &speed).map_err(gate)?;
-    let (begin, spacing) = begin(arguments, &compiled, &learnable, &motion, &convergence, [&machine_name, &motion_name])?;
+    let motion =
+        Motion::of(trajectory.as_ref(), model.timing.period, &speed, model.geometry.joint_radius()).map_err(gate)?;
+    let (begin, spacing) =
+        begin(arguments, &compiled, &learnable, &motion, &convergence, [&machine_name, &motion_name])?;
 
     let mut controller = emitted(&compiled, ui)?;
     let specimen = machine::specimen(model, task, &leg, Some(seed));
@@ -101,7 +105,7 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
     let update = Update::new(&learnable, &motion, &convergence);
     let stop = interrupt::heed();
     let count = arguments.passes as usize;
-    let learned = learn(&mut bench, &motion, &update, &begin, spacing, count, model.geometry.joint_radius(), |number, pass| {
+    let learned = learn(&mut bench, &motion, &update, &begin, spacing, count, |number, pass| {
         ui.rate(&format!("learn: pass {number} of {count}, {:.1} nm", pass.translation_nm));
         if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
@@ -113,7 +117,8 @@ pub fn run(arguments: &Arguments, ui: &mut Ui) -> Result<(), Failure> {
         ui.progress(&format!("wrote {} knots to {}", learned.knots.len(), path.display()));
     }
     let ended = learned.passes.len() <= count && !learned.grew;
-    let found = Found { name: compiled.ir.name.clone(), motion: motion_name, machine: machine_name, convergence, learned };
+    let found =
+        Found { name: compiled.ir.name.clone(), motion: motion_name, machine: machine_name, convergence, learned };
     if ended {
         let message = "interrupted: the best pass so far is kept".to_owned();
         return Err(Failure::Interrupted { message, result: ui.shown(&found) });

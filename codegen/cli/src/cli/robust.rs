@@ -133,12 +133,8 @@ fn study(arguments: &StudyArguments, ui: &mut Ui) -> Result<(), Failure> {
     };
     let leg = arguments.plant.leg()?;
     let compiled = spec::compiled(path, ui)?;
-    let followed = trajectory::chosen(
-        arguments.trajectory.as_deref(),
-        arguments.frequency,
-        arguments.plant.seed,
-        &compiled,
-    )?;
+    let followed =
+        trajectory::chosen(arguments.trajectory.as_deref(), arguments.frequency, arguments.plant.seed, &compiled)?;
     let work = Work::of(arguments, path, &compiled, &followed, &leg)?;
     let whole = match &arguments.replay {
         Some(name) => Plan::alone(&work.factors, name, work.seed).map_err(Failure::Usage)?,

@@ -2,7 +2,8 @@
 
 use super::linear;
 use crate::ir::{
-    ControlLaw, CorrectionLimit, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Resonator, Scalar, Section,
+    ControlLaw, CorrectionLimit, Gains, Interaction, LEGS, Law, Mode, Notch, PlatformDefaults, Resonator, Scalar,
+    Section,
 };
 use crate::stability::platform::{self as design, Design, RestDynamics};
 use specgen_language::model::{self, Model};

@@ -106,7 +106,12 @@ impl Learnable {
     }
 
     /// T at frequencies (Hz), in modal coordinates.
-    pub(super) fn response(&self, closed_loop: &ClosedLoop, conditions: &Conditions, frequencies: &[f64]) -> Vec<Matrix6c> {
+    pub(super) fn response(
+        &self,
+        closed_loop: &ClosedLoop,
+        conditions: &Conditions,
+        frequencies: &[f64],
+    ) -> Vec<Matrix6c> {
         let angles: Vec<f64> = frequencies.iter().map(|hertz| TAU * hertz * closed_loop.period).collect();
         closed_loop.correction_response(self.law, &self.tuning, conditions, &angles)
     }
@@ -297,7 +302,15 @@ mod tests {
         assert!(norm(&off) < 1e-13, "{off:?}");
         // Similar to a triangle: its eigenvalues are those on the diagonal.
         let triangle: Matrix6c = std::array::from_fn(|i| {
-            std::array::from_fn(|j| if j < i { [0.0; 2] } else if i == j { [0.1 * i as f64, 0.3] } else { [draw(), 0.0] })
+            std::array::from_fn(|j| {
+                if j < i {
+                    [0.0; 2]
+                } else if i == j {
+                    [0.1 * i as f64, 0.3]
+                } else {
+                    [draw(), 0.0]
+                }
+            })
         });
         let similar = multiply(&multiply(&matrix, &triangle), &inverse(&matrix));
         let radius = spectral_radius(&similar);

@@ -22,14 +22,16 @@ pub struct Motion {
     pub scored: Range<usize>,
     /// Ticks that a correction may be given for: those, and the rest before and after it.
     pub corrected: usize,
+    /// Of the platform's joints, m: what angles count with.
+    pub radius: f64,
 }
 
 impl Motion {
-    /// Of a trajectory, at intervals (s); back to its start no faster than `speed` (m/s and rad/s of each axis).
+    /// Of a trajectory, at intervals (s); back to its start no faster than `speed` (m/s and rad/s of each axis). Angles count with `radius` (m).
     ///
     /// # Errors
     /// If it has no tick, or too many.
-    pub fn of(trajectory: &dyn PoseTrajectory, interval: f64, speed: &[f64; 6]) -> Result<Self, RunError> {
+    pub fn of(trajectory: &dyn PoseTrajectory, interval: f64, speed: &[f64; 6], radius: f64) -> Result<Self, RunError> {
         let [before, after] = [BEFORE, AFTER].map(|time| libm::round(time / interval) as usize);
         let ticks = ticks_within(trajectory.duration(), interval)?;
         let at = |target: PoseTarget| PoseTarget { pose: target.pose, ..PoseTarget::default() };
@@ -59,6 +61,6 @@ impl Motion {
             }
         }));
         targets.extend(std::iter::repeat_n(start, after));
-        Ok(Self { targets, scored, corrected })
+        Ok(Self { targets, scored, corrected, radius })
     }
 }

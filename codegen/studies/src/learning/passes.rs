@@ -1,7 +1,7 @@
 //! Passes over a machine, simulated or real, until learning is done.
 
 use std::fmt;
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 
 use host_sim::closed_loop::RunError;
 use host_sim::platform::rig::{Bench, Request};
@@ -110,7 +110,8 @@ pub struct Pass {
 }
 
 impl Pass {
-    fn of(seen: &Seen, scored: &Range<usize>, radius: f64) -> Self {
+    fn of(seen: &Seen, motion: &Motion) -> Self {
+        let Motion { scored, radius, .. } = motion;
         let rms = |errors: &[[f64; 6]], weights: [f64; 2]| {
             let sum: f64 = errors[scored.clone()]
                 .iter()
@@ -149,7 +150,7 @@ pub struct Learned {
 
 /// Makes `count` passes beyond the first and learns from each; the best is kept, and an error that grows ends it. One pass before them
 /// is not counted: only after it is the hysteresis as in every repetition. `begin` is the
-/// correction of the first pass, none of no knots; `radius` (m) is that of the joints. `watch` hears of each pass and may end it.
+/// correction of the first pass, none of no knots. `watch` hears of each pass and may end it.
 ///
 /// # Errors
 /// If the machine does not make a pass, or not the motion.
@@ -160,7 +161,6 @@ pub fn learn(
     begin: &[Knot],
     spacing: u32,
     count: usize,
-    radius: f64,
     mut watch: impl FnMut(usize, &Pass) -> ControlFlow<()>,
 ) -> Result<Learned, LearnError> {
     let mut played: Vec<Knot> = begin.to_vec();
@@ -168,7 +168,7 @@ pub fn learn(
     followed(pupil.pass(motion, &played, spacing)?)?;
     for number in 0..=count {
         let seen = followed(pupil.pass(motion, &played, spacing)?)?;
-        let pass = Pass::of(&seen, &motion.scored, radius);
+        let pass = Pass::of(&seen, motion);
         let go_on = watch(number, &pass);
         learned.passes.push(pass);
         let least = learned.passes[learned.best].measured_nm;
@@ -177,7 +177,8 @@ pub fn learn(
             learned.knots.clone_from(&played);
         }
         // A NaN grows, too.
-        learned.grew = number > 0 && !(pass.measured_nm <= GROWS * least);
+        let kept = pass.measured_nm <= GROWS * least;
+        learned.grew = number > 0 && !kept;
         if number == count || learned.grew || go_on.is_break() {
             break;
         }

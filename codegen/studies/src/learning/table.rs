@@ -158,7 +158,9 @@ mod tests {
         let back = Table::read(&table.to_json()).unwrap();
         assert_eq!(back, table);
         assert_eq!(back.is_for("d1", "stage 7", "case-1 10 Hz"), Ok(()));
-        for (digest, machine, motion) in [("d2", "stage 7", "case-1 10 Hz"), ("d1", "stage 8", "case-1 10 Hz"), ("d1", "stage 7", "x")] {
+        for (digest, machine, motion) in
+            [("d2", "stage 7", "case-1 10 Hz"), ("d1", "stage 8", "case-1 10 Hz"), ("d1", "stage 7", "x")]
+        {
             let error = back.is_for(digest, machine, motion).unwrap_err().to_string();
             assert!(error.contains("learn anew"), "{error}");
         }

@@ -83,7 +83,11 @@ impl Update {
         let closed_loop = &learnable.closed_loop;
         let update = Self::of(learnable, motion, bandwidth, |frequencies| {
             let channel = learnable.open_loop(frequencies);
-            channel.iter().zip(frequencies).map(|(response, hertz)| (inverse(response), cut(*hertz, bandwidth))).collect()
+            channel
+                .iter()
+                .zip(frequencies)
+                .map(|(response, hertz)| (inverse(response), cut(*hertz, bandwidth)))
+                .collect()
         });
         let start = motion.targets[0].pose;
         let modal = |pose: &[f64; 6]| mapped(&update.to_modal, pose);

@@ -109,7 +109,7 @@ impl ByHand {
             sequence: command[2] as u32,
             target: Target { pose: vector(3), rate: vector(9), acceleration: vector(15) },
         };
-        let tick = TickInput { command, gauge, wrench: [Real::NAN; 6] };
+        let tick = TickInput { command, correction: [], gauge, wrench: [Real::NAN; 6] };
         supervise(&self.config, &mut self.machine, &MachineInput { tick, request, events })
     }
 }

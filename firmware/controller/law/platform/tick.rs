@@ -53,7 +53,7 @@ pub const INPUT_NAMES: [&str; INPUT_WORDS] = {
     let mut names = [""; INPUT_WORDS];
     let mut k = 0;
     while k < INPUT_WORDS {
-        names[k] = EVERY_NAME[if k < 21 || CORRECTED > 0 { k } else { k + 6 }];
+        names[k] = EVERY_NAME[if k < 21 || INPUT_WORDS == EVERY_NAME.len() { k } else { k + 6 }];
         k += 1;
     }
     names

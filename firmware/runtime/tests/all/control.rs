@@ -3,7 +3,11 @@
 use core::f64::consts::TAU;
 
 use specgen_runtime::feedback::winds_up;
-use specgen_runtime::{ControlMode, Damping, Estimate, Integral, Law, NotchState, Resonator, Section, Transfer};
+use specgen_runtime::playback::{self, Knot};
+use specgen_runtime::{
+    ControlMode, Correction, CorrectionLimit, Damping, Estimate, Integral, Law, NotchState, Resonator, Section,
+    Transfer,
+};
 
 /// The notch of a mode at `frequency` (Hz) by the bilinear transformation with prewarping, sampled at 10 kHz.
 fn section(frequency: f64, damping: f64, notch_damping: f64) -> Section<f64> {
@@ -85,6 +89,50 @@ fn active_damping_is_the_difference_equation_of_its_sections() {
     let mut none = Damping::<f64, 0>::new();
     none.act(&[], &[1.0; 6]);
     assert_eq!((none.beside([1.0; 6]), size_of_val(&none)), ([1.0; 6], 0));
+}
+
+/// |c| ≤ most and |Δc| ≤ step whatever is asked for; what is within both is taken as it is, and what is no number leads back to nothing.
+#[test]
+fn a_correction_keeps_to_its_limits_whatever_is_asked_for() {
+    let limits = [CorrectionLimit { most: 2e-6, step: 3e-7 }; 6];
+    let mut correction = Correction::<f64, 6>::new();
+    let small: [f64; 6] = std::array::from_fn(|k| 1e-8 * k as f64);
+    assert!(!correction.follow(&limits, &small));
+    assert_eq!((correction.given, correction.pose()), (small, Some(small)));
+    let asked = [1.0, -1.0, f64::INFINITY, f64::NEG_INFINITY, 1.9e-6, f64::NAN];
+    let mut last = correction.given;
+    for _ in 0..20 {
+        assert!(correction.follow(&limits, &asked), "NaN is always held back");
+        for (now, last) in correction.given.iter().zip(&last) {
+            assert!(now.abs() <= 2e-6 && (now - last).abs() <= 3e-7 * (1.0 + 1e-9));
+        }
+        last = correction.given;
+    }
+    assert_eq!(last, [2e-6, -2e-6, 2e-6, -2e-6, 1.9e-6, 0.0]);
+    let mut none = Correction::<f64, 0>::new();
+    assert_eq!((none.follow(&[], &[]), none.pose(), size_of_val(&none)), (false, None, 0));
+}
+
+/// B is not negative and sums to 1, so what is played lies within its knots and moves from tick to tick by no more than their differences.
+#[test]
+fn a_table_is_played_within_its_knots() {
+    let knots: Vec<Knot> =
+        (0..40).map(|k| std::array::from_fn(|axis| ((k * 7919 + axis * 104_729) % 2001) as i32 - 1000)).collect();
+    let mut last = [0.0; 6];
+    for tick in 0..300 {
+        let now: [f64; 6] = playback::at(&knots, 6, tick);
+        for (now, last) in now.iter().zip(&last) {
+            assert!(now.abs() <= 1000.0 * playback::UNIT * (1.0 + 1e-12));
+            assert!(tick == 0 || (now - last).abs() <= 2000.0 / 6.0 * playback::UNIT * (1.0 + 1e-9), "{tick}");
+        }
+        last = now;
+    }
+    assert_eq!(last, [0.0; 6]);
+    let level: Vec<Knot> = vec![[700; 6]; 40];
+    for tick in 12..200 {
+        let now: [f64; 6] = playback::at(&level, 6, tick);
+        assert!(now.iter().all(|now| (now - 700.0 * playback::UNIT).abs() < 1e-24));
+    }
 }
 
 #[test]
