@@ -9,7 +9,7 @@ use host_sim::plant::LegParameters;
 use host_sim::platform::rig::{Bench as Rig, Noise};
 use host_sim::platform::{PlatformScenario, Specimen};
 use host_sim::trajectory::{PaperPath, PaperPose, PoseTarget, PoseTrajectory};
-use specgen::learning::{Convergence, Learnable, Learned, Motion, Pupil, Update, knots, learn};
+use specgen::learning::{Convergence, Learnable, Learned, Motion, Repeating, Update, knots, learn};
 use specgen::machine;
 use specgen::robust::{Deviation, Factors};
 use specgen::stability::platform::{Adapting, Conditions, Law, Tuning};

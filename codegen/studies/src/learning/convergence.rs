@@ -86,7 +86,7 @@ impl Convergence {
 }
 
 impl Learnable {
-    /// The loop of a spec with [control] in the mode that it starts in; none for six legs.
+    /// The loop of a spec with `[control]` in the mode that it starts in; none for six legs.
     #[must_use]
     pub fn of(compiled: &Compiled) -> Option<Self> {
         let (model, task) = (&compiled.model, compiled.model.task_space.as_ref()?);

@@ -64,8 +64,8 @@ pub struct Seen {
     pub status: u32,
 }
 
-/// What learns: a machine that makes a pass.
-pub trait Pupil {
+/// A machine that can repeat a motion.
+pub trait Repeating {
     /// A pass of the motion under the correction of these knots, so many ticks apart.
     ///
     /// # Errors
@@ -73,7 +73,7 @@ pub trait Pupil {
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, RunError>;
 }
 
-impl Pupil for Bench<'_> {
+impl Repeating for Bench<'_> {
     fn pass(&mut self, motion: &Motion, knots: &[Knot], spacing: u32) -> Result<Seen, RunError> {
         let ticks = motion.targets.len();
         let mut seen = Seen { measured: Vec::with_capacity(ticks), real: Vec::with_capacity(ticks), status: 0 };
@@ -155,7 +155,7 @@ pub struct Learned {
 /// # Errors
 /// If the machine does not make a pass, or not the motion.
 pub fn learn(
-    pupil: &mut dyn Pupil,
+    machine: &mut dyn Repeating,
     motion: &Motion,
     update: &Update,
     begin: &[Knot],
@@ -165,9 +165,9 @@ pub fn learn(
 ) -> Result<Learned, LearnError> {
     let mut played: Vec<Knot> = begin.to_vec();
     let mut learned = Learned { passes: Vec::new(), best: 0, knots: played.clone(), grew: false };
-    followed(pupil.pass(motion, &played, spacing)?)?;
+    followed(machine.pass(motion, &played, spacing)?)?;
     for number in 0..=count {
-        let seen = followed(pupil.pass(motion, &played, spacing)?)?;
+        let seen = followed(machine.pass(motion, &played, spacing)?)?;
         let pass = Pass::of(&seen, motion);
         let go_on = watch(number, &pass);
         learned.passes.push(pass);
